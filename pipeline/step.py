@@ -107,9 +107,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     lane_state, lane = lanes.follow(state.lanes, frame.raw_lanes, view, now, params.lanes)
     clock.lap("lanes")
     ring = frame.sweep.ring if frame.sweep is not None else None
-    around = road_edges.Surroundings(
-        sweep.points, sweep.kind, ring, sweep.ground, lidar_tracks, objects, state.cipv.lead_id
-    )
+    around = road_edges.Surroundings(sweep.points, sweep.kind, ring, sweep.ground, lidar_tracks, objects)
     edge_state, edges = road_edges.follow(state.edges, around, now, params.path)
     clock.lap("edges")
     evidence = corridor.Evidence(lane, frame.gnss, frame.route, (edges.path,) if edges is not None else ())

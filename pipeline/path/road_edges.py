@@ -24,8 +24,6 @@ class Surroundings(NamedTuple):
     ground: Ground | None
     tracks: tuple[LidarTrack, ...]
     objects: tuple[FusedObject, ...]
-    lead_id: int | None
-    """Of the lead in the frame before: what is in the path is no edge of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +61,8 @@ def follow(state: EdgeState, around: Surroundings, now: Moment, params: PathPara
             around.ground,
             road_structure.long(around.objects, cluster_of),
         )
-    not_edges = [item for item in around.objects if item.id == around.lead_id or road_structure.drives(item)]
-    fresh, before = road_structure.without(fresh, not_edges), road_structure.without(before, not_edges)
+    driving = [item for item in around.objects if road_structure.drives(item)]
+    fresh, before = road_structure.without(fresh, driving), road_structure.without(before, driving)
     cells = road_structure.merged(before, fresh)
     if len(cells.xy) < _FEWEST_CELLS:
         return EdgeState(cells, None), None

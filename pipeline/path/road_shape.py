@@ -29,8 +29,8 @@ _BAND_M = 12.0
 _IMPROBABLE = 12.0
 _CLEAR_M = 0.9
 """Half a car's width."""
-_SOON_PER_M = 0.01
-"""How much a road's curvature may differ from that of the way just driven."""
+_SOON_PER_M, _LATER_PER_M = 0.01, 0.025
+"""How much a road's curvature over the next 6 and 20 m may differ from that of the way just driven."""
 _MODEL_SIGMA_PER_M2 = 0.0004
 """A street is no cubic."""
 
@@ -178,6 +178,7 @@ def _weights(s, d, blocks, cells, first, second, heading, bin_m, band_m, temper,
                 a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
                 prior = ((bends[1] + 2.0 * a + 60.0 * b) / bend_sigma) ** 2
                 prior += ((bends[2] + 2.0 * a + 180.0 * b) / bend_sigma) ** 2
+                prior += ((bends[1] + 2.0 * a + 60.0 * b - own) / _LATER_PER_M) ** 2
                 prior += ((heading0 + heading[i]) / heading_sigma) ** 2
                 prior += ((bends[0] + 2.0 * a + 18.0 * b - own) / own_sigma) ** 2
                 out[i, j, k] = 0.5 * prior

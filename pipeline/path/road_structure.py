@@ -31,7 +31,7 @@ _DRIVES_MPS = 4.0
 """What the LiDAR alone takes for moving may be a hedge of which ever more is seen; faster it is a vehicle."""
 _LONG_M = 6.0
 _MARGIN_M = 0.8
-_BLOCKED, _PERHAPS_A_LEAD = 12.0, 3.0
+_BLOCKED, _PERHAPS_A_LEAD = 12.0, 4.0
 """Nobody drives over a kerb or through a hedge. A car in the way may be a parked one in a bend, or a lead."""
 
 
@@ -105,11 +105,10 @@ def without(cells: Cells, objects: Sequence[FusedObject]) -> Cells:
 
 
 def drives(item: FusedObject) -> bool:
-    """Whether it is a vehicle that drives."""
-    if not item.moving or item.cuboid is None:
+    """Whether it surely is a vehicle that drives."""
+    if not item.moving or item.cuboid is None or (item.speed_over_ground_mps or 0.0) < _DRIVES_MPS:
         return False
-    fast = (item.speed_over_ground_mps or 0.0) > _DRIVES_MPS and max(item.cuboid.size[:2]) < _LONG_M
-    return item.label in VEHICLES or fast
+    return item.label in VEHICLES or max(item.cuboid.size[:2]) < _LONG_M
 
 
 def long(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int]:
