@@ -27,6 +27,9 @@ _TEMPER = 0.25
 """Cells of one car or one hedge are not independent of each other: four are worth one."""
 _BAND_M = 12.0
 _IMPROBABLE = 12.0
+_SLICE_M, _CHANCE = 2.0, 0.5
+"""Of each distance, what lies within so much of the way counts once: a tree is no edge. And how many of the cells are
+where they are by chance."""
 _CLEAR_M = 0.9
 """Half a car's width."""
 _SOON_PER_M, _LATER_PER_M = 0.01, 0.025
@@ -111,7 +114,7 @@ def fitted(xy: F64, blocks: F64, starts: list[F64], ego: EgoState, params: PathP
             heading0, bends = _bends(found)
             first, second, heading = (_steps(*each) for each in (grid.first_m, grid.second_m, grid.heading))
             weights, evidence = _weights(
-                along[keep], aside[keep], blocks[keep], len(xy), first, second, heading, grid.bin_m, _BAND_M, _TEMPER,
+                along[keep], aside[keep], blocks[keep], first, second, heading, grid.bin_m, _BAND_M, _TEMPER,
                 heading0, bends, own, own_sigma, curvature_sigma, heading_sigma,
             )  # fmt: skip
             mean, found_sigma = _moments(s, first, second, heading, weights)
@@ -163,12 +166,15 @@ def _moments(s: F64, first: F64, second: F64, heading: F64, weights: F64) -> tup
 
 
 @numba.njit(cache=True, nogil=True)
-def _weights(s, d, blocks, cells, first, second, heading, bin_m, band_m, temper, heading0, bends, own, own_sigma, bend_sigma, heading_sigma):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _weights(s, d, blocks, first, second, heading, bin_m, band_m, temper, heading0, bends, own, own_sigma, bend_sigma, heading_sigma):  # type: ignore[no-untyped-def]  # pragma: no cover
     """(H, U, W) probability of each shape."""
     bins = int(2.0 * band_m / bin_m) + 3
+    slices = int(s.max() / _SLICE_M) + 1 if len(s) else 1
     count = np.zeros(bins, np.int32)
-    by_chance = max(0.5 * cells / bins, 0.25)
-    logs = np.log(np.maximum(np.arange(4 * cells + 8) / 4.0 - 0.5, 0.0) + by_chance)
+    last = np.full((slices, bins), -1, np.int32)
+    by_chance = _CHANCE * max(len(s) / bins, 1.0)
+    logs = np.log(np.maximum(np.arange(4 * slices + 8) / 4.0 - 0.5, 0.0) / by_chance + 1.0)
+    shape = -1
     out = np.empty((len(heading), len(first), len(second)))
     likeliest = np.inf
     for i in range(len(heading)):
@@ -193,18 +199,20 @@ def _weights(s, d, blocks, cells, first, second, heading, bin_m, band_m, temper,
                     continue
                 b = (second[k] - 4.0 * first[j] + 40.0 * heading[i]) / 32000.0
                 a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
+                shape += 1
                 count[:] = 0
-                outside, blocked = cells - len(s), 0.0
+                blocked = 0.0
                 for n in range(len(s)):
                     aside = d[n] - s[n] * (heading[i] + s[n] * (a + s[n] * b))
                     at = (aside + band_m) / bin_m
                     if abs(aside) < _CLEAR_M:
                         blocked += blocks[n]
                     if 0.0 <= at < bins - 3:
-                        count[int(at) + 1] += 1
-                    else:
-                        outside += 1
-                total = outside * logs[0] - blocked
+                        c, way = int(at) + 1, int(s[n] / _SLICE_M)
+                        if last[way, c] != shape:
+                            last[way, c] = shape
+                            count[c] += 1
+                total = -blocked
                 for c in range(1, bins - 1):
                     if count[c]:
                         total += count[c] * logs[count[c - 1] + 2 * count[c] + count[c + 1]]

@@ -20,10 +20,12 @@ CELL_M = 0.5
 """One vote a cell: rings lie so close on what is near that it would outvote all that is far."""
 _LOW_M, _HIGH_M = 0.3, 2.5
 """Above the road's own unevenness, below the crowns of trees."""
-_STEP_M, _STEP_MOST_M = 0.06, 0.25
-"""Height of a kerb: six sigmas of the noise of a LiDAR's height at 10 m, up to where it counts as standing."""
-_STEP_WITHIN_M = 0.5
-_GROUP = 3
+_STEP_M, _STEP_MOST_M = 0.05, 0.25
+"""Height of a kerb: from a lowered one up to where it counts as standing."""
+_FLAT_M, _FLAT_SHARE = 0.02, 0.05
+"""A stretch of a ring is level if its heights differ by no more than a road's roughness, over this share of its range."""
+_SLANT = 0.35
+"""How long a ring takes to climb a kerb, as a share of its range: a kerb of 0.15 m seen from 0.5 m."""
 _KERBS_TO_M = 30.0
 _KEPT_S = 2.5
 """Own motion places a cell as well as it was measured for as long: 1 % of 25 m, and 0.5° of heading."""
@@ -74,7 +76,7 @@ def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int]) 
     above = ground.above(points)
     standing = near & (above > _LOW_M) & (above < _HIGH_M) & (kind != GROUND)
     low = near & (above < _LOW_M) & (points[:, 0] < _KERBS_TO_M)
-    kerbs = _steps(points[low], ring[low], above[low])
+    kerbs = _kerbs(points[low], ring[low], above[low])
     xy = np.vstack([points[standing, :2], kerbs]).astype(np.float64)
     blocks = np.full(len(xy), _BLOCKED)
     blocks[: len(xy) - len(kerbs)][~np.isin(kind[standing], np.array(long, dtype=np.int64))] = _PERHAPS_A_LEAD
@@ -123,38 +125,48 @@ def long(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int
     ]
 
 
-def _steps(points: F32, ring: U8, above: F64) -> F64:
-    """(M, 2) places where the road steps up by a kerb's height, along each ring."""
+def _kerbs(points: F32, ring: U8, above: F64) -> F64:
+    """(M, 2) places on kerbs: between a flat stretch of a ring and the next that is higher or lower by a kerb's height.
+    A ring climbs a kerb slantwise, so that its points in between lie along it."""
     if not len(points):
         return np.zeros((0, 2))
     order = np.lexsort((np.arctan2(points[:, 1], points[:, 0]), ring))
-    found = _kernel(
-        points[order].astype(np.float64), ring[order], above[order], _GROUP, _STEP_WITHIN_M, _STEP_M, _STEP_MOST_M
-    )
-    return np.asarray(found)
+    xy = points[order, :2].astype(np.float64)
+    on_kerb = _between_levels(xy, ring[order], above[order], _FLAT_M, _FLAT_SHARE, _STEP_M, _STEP_MOST_M, _SLANT)
+    return np.asarray(xy[on_kerb])
+
+
+def warm_up() -> None:
+    """Compile the kernel, or load it from numba's cache."""
+    _kerbs(np.zeros((2, 4), np.float32), np.zeros(2, np.uint8), np.zeros(2))
 
 
 @numba.njit(cache=True, nogil=True)
-def _kernel(points, ring, above, group, within, low, high):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Between each three neighbours and the next three of a ring: level before and after, and a step between."""
-    out = np.empty((len(points), 2))
-    count, since = 0, -group
-    for k in range(group, len(points) - group):
-        if ring[k - group] != ring[k + group - 1] or k - since < group:
+def _between_levels(xy, ring, above, flat_m, flat_share, step, most, slant):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(N,) bool, which points lie between two level stretches of their ring, one a kerb's height above the other."""
+    out = np.zeros(len(xy), np.bool_)
+    first, last_end, last_level = 0, -1, 0.0
+    while first < len(xy):
+        low = high = total = above[first]
+        end = first
+        while end + 1 < len(xy) and ring[end + 1] == ring[first]:
+            low_with, high_with = min(low, above[end + 1]), max(high, above[end + 1])
+            if high_with - low_with > flat_m:
+                break
+            low, high, total = low_with, high_with, total + above[end + 1]
+            end += 1
+        far = np.hypot(xy[first, 0], xy[first, 1])
+        span = np.hypot(xy[end, 0] - xy[first, 0], xy[end, 1] - xy[first, 1])
+        if end - first < 4 or span < flat_share * far:
+            if end + 1 < len(xy) and ring[end + 1] != ring[first] and end == first:
+                last_end = -1
+            first += 1
             continue
-        gap = np.hypot(points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1])
-        if gap > within:
-            continue
-        before, after = 0.0, 0.0
-        low_a, high_a, low_b, high_b = np.inf, -np.inf, np.inf, -np.inf
-        for j in range(group):
-            a, b = above[k - 1 - j], above[k + j]
-            before, after = before + a / group, after + b / group
-            low_a, high_a = min(low_a, a), max(high_a, a)
-            low_b, high_b = min(low_b, b), max(high_b, b)
-        step = abs(after - before)
-        if low < step < high and high_a - low_a < 0.5 * step and high_b - low_b < 0.5 * step:
-            out[count, 0], out[count, 1] = points[k, 0], points[k, 1]
-            count += 1
-            since = k
-    return out[:count]
+        level = total / (end - first + 1)
+        if last_end >= 0 and ring[last_end] == ring[first]:
+            gap = np.hypot(xy[first, 0] - xy[last_end, 0], xy[first, 1] - xy[last_end, 1])
+            if step < abs(level - last_level) < most and gap < slant * far:
+                out[last_end : first + 1] = True
+        last_end, last_level = end, level
+        first = end + 1
+    return out
