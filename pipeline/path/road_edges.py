@@ -13,6 +13,8 @@ from pipeline.path.road_structure import NONE, Cells
 from pipeline.types import F32, I32, U8, FusedObject, Ground, LidarTrack, Moment
 
 _FEWEST_CELLS = 25
+_ANEW_EVERY = 3
+"""A shape that is followed may be the wrong one: so often it is looked for anew, which takes as long again."""
 
 
 class Surroundings(NamedTuple):
@@ -34,6 +36,8 @@ class EdgeState:
     """Structure beside the road."""
     shape: F64 | None = None
     """(K, 2) the road's shape in that frame."""
+    since: int = 0
+    """Frames since it was looked for as if nothing were known."""
 
 
 class Edges(NamedTuple):
@@ -66,5 +70,7 @@ def follow(state: EdgeState, around: Surroundings, now: Moment, params: PathPara
     cells = road_structure.merged(before, fresh)
     if len(cells.xy) < _FEWEST_CELLS:
         return EdgeState(cells, None), None
-    center, sigma = road_shape.fitted(cells.xy, cells.blocks, road_shape.begin(state.shape, ego, dt_s, params), ego, params)
-    return EdgeState(cells, center), Edges(PathEstimate("edges", center, sigma), cells.xy)
+    starts = road_shape.begin(state.shape, ego, dt_s, state.since == 0, params)
+    center, sigma = road_shape.fitted(cells.xy, cells.blocks, starts, ego, params)
+    since = (state.since + 1) % _ANEW_EVERY
+    return EdgeState(cells, center, since), Edges(PathEstimate("edges", center, sigma), cells.xy)

@@ -23,13 +23,12 @@ from pipeline.types import EgoState
 
 _NODES_M = (20.0, 40.0)
 """A shape is a cubic: where it is aside at these two distances, and its heading at the car."""
-_TEMPER = 0.25
-"""Cells of one car or one hedge are not independent of each other: four are worth one."""
+_TEMPER = 0.2
+"""Cells of one car or one hedge are not independent of each other: five are worth one."""
 _BAND_M = 12.0
 _IMPROBABLE = 12.0
-_SLICE_M, _CHANCE = 2.0, 0.5
-"""Of each distance, what lies within so much of the way counts once: a tree is no edge. And how many of the cells are
-where they are by chance."""
+_CHANCE = 1.0
+"""How many of the cells are where they are by chance, against those that line up."""
 _CLEAR_M = 0.9
 """Half a car's width."""
 _SOON_PER_M, _LATER_PER_M = 0.01, 0.025
@@ -48,19 +47,42 @@ class Grid(NamedTuple):
 
 
 _WIDE = Grid((8.0, 1.0), (24.0, 2.0), (0.0, 1.0), 1.5)
-_ROUNDS = (
-    Grid((4.0, 0.5), (15.0, 1.25), (0.02, 0.02), 1.0),
-    Grid((1.5, 0.25), (4.5, 0.5), (0.03, 0.015), 0.5),
-)
+_USUAL = Grid((4.0, 0.5), (15.0, 1.25), (0.02, 0.02), 1.0)
+_FINE = Grid((1.5, 0.25), (4.5, 0.5), (0.03, 0.015), 0.5)
+_MOST_CELLS, _MOST_FINE = 150, 250
+"""Keeps the time bounded; a sweep of 16 rings has 100 to 300."""
 
 
-def begin(before: F64 | None, ego: EgoState, dt_s: float | None, params: PathParams) -> list[F64]:
-    """Lines from which shapes are measured: the arc of own motion, and that of the frame before, moved on."""
+class Prior(NamedTuple):
+    """What roads can be, before anything beside one is seen."""
+
+    bend_sigma: float
+    """Of the curvature over 20 m, 1/m."""
+    heading_sigma: float
+    """Of the road against the car, rad."""
+    own: float
+    """Curvature of the way just driven, 1/m."""
+    own_sigma: float
+    """Of the road's next metres against it."""
+
+
+class Starts(NamedTuple):
+    """Lines from which shapes are measured, (K, 2) each; one of them at least."""
+
+    own: F64 | None
+    """The arc of own motion: wherever the road goes, it begins along it. None: not tried again yet."""
+    before: F64 | None
+    """The shape of the frame before, moved on; None where there is none."""
+
+
+def begin(before: F64 | None, ego: EgoState, dt_s: float | None, anew: bool, params: PathParams) -> Starts:
+    """Where to look for the shape. anew: also as if nothing were known of it."""
     s = samples(params.length_m)
-    rate = ego.yaw_rate_radps or 0.0
-    curvature = rate / ego.speed_mps if ego.speed_mps > params.min_speed_mps else 0.0
-    own = arc(curvature, s)[0]
-    return [own, _moved_on(before, ego, dt_s, s)] if before is not None and dt_s else [own]
+    moved = _moved_on(before, ego, dt_s, s) if before is not None and dt_s else None
+    if moved is not None and not anew:
+        return Starts(None, moved)
+    turning = ego.speed_mps > params.min_speed_mps
+    return Starts(arc((ego.yaw_rate_radps or 0.0) / ego.speed_mps if turning else 0.0, s)[0], moved)
 
 
 def _moved_on(shape: F64, ego: EgoState, dt_s: float, s: F64) -> F64:
@@ -88,13 +110,13 @@ def _resampled(line: F64, s: F64) -> F64:
     return out - out[0]
 
 
-def fitted(xy: F64, blocks: F64, starts: list[F64], ego: EgoState, params: PathParams) -> tuple[F64, F64]:
+def fitted(xy: F64, blocks: F64, starts: Starts, ego: EgoState, params: PathParams) -> tuple[F64, F64]:
     """(K, 2) the most probable shape and (K,) its sigma.
 
     Args:
         xy: (M, 2) cells.
         blocks: (M,) how strongly each says that no road leads through it, in log-likelihood.
-        starts: (K, 2) lines from which shapes are measured.
+        starts: lines from which shapes are measured.
         ego: own motion.
         params: of the path.
     """
@@ -104,24 +126,32 @@ def fitted(xy: F64, blocks: F64, starts: list[F64], ego: EgoState, params: PathP
     speed = max(ego.speed_mps, params.min_speed_mps)
     heading_sigma = max(params.lane_keeping_sigma_mps / speed, 0.01)
     own = (ego.yaw_rate_radps or 0.0) / speed if ego.speed_mps > params.min_speed_mps else 0.0
-    own_sigma = float(np.hypot(2.0 * params.yaw_rate_sigma_radps / speed, _SOON_PER_M)) if ego.yaw_rate_radps is not None else 1.0
-    best, line, sigma = -np.inf, starts[0], np.zeros(len(s))
-    for n, start in enumerate(starts):
-        evidence, found, found_sigma = -np.inf, start, sigma
-        for grid in _ROUNDS if n else (_WIDE, *_ROUNDS):
-            aside, along = nearest(found, xy)
-            keep = np.flatnonzero((along > 0.0) & (along < _NODES_M[1] + 5.0) & (np.abs(aside) < 2.0 * _BAND_M))
-            heading0, bends = _bends(found)
-            first, second, heading = (_steps(*each) for each in (grid.first_m, grid.second_m, grid.heading))
-            weights, evidence = _weights(
-                along[keep], aside[keep], blocks[keep], first, second, heading, grid.bin_m, _BAND_M, _TEMPER,
-                heading0, bends, own, own_sigma, curvature_sigma, heading_sigma,
-            )  # fmt: skip
-            mean, found_sigma = _moments(s, first, second, heading, weights)
-            found = _shifted(found, mean, s)
-        if evidence > best:
-            best, line, sigma = evidence, found, found_sigma
+    own_sigma = float(np.hypot(2.0 * params.yaw_rate_sigma_radps / speed, _SOON_PER_M))
+    if ego.yaw_rate_radps is None:
+        own_sigma = 1.0
+    prior = Prior(curvature_sigma, heading_sigma, own, own_sigma)
+    begun = [starts.before] if starts.before is not None else []
+    if starts.own is not None:
+        begun.append(_round(starts.own, xy, blocks, _WIDE, prior, s)[0])
+    found = [_round(line, xy, blocks, _USUAL, prior, s) for line in begun]
+    best = max(found, key=lambda each: each[2])
+    line, sigma, _ = _round(best[0], xy, blocks, _FINE, prior, s)
     return line, np.sqrt(sigma**2 + params.lane_keeping_sigma_m**2 + (_MODEL_SIGMA_PER_M2 * s * s) ** 2)
+
+
+def _round(line: F64, xy: F64, blocks: F64, grid: Grid, prior: Prior, s: F64) -> tuple[F64, F64, float]:
+    """The line moved to the most probable shape around it, (K,) its sigma, and the log-evidence."""
+    aside, along = nearest(line, xy)
+    keep = np.flatnonzero((along > 0.0) & (along < _NODES_M[1] + 5.0) & (np.abs(aside) < 2.0 * _BAND_M))
+    keep = keep[:: -(-len(keep) // (_MOST_FINE if grid is _FINE else _MOST_CELLS)) or 1]
+    heading, bends = _bends(line)
+    first, second, turns = (_steps(*each) for each in (grid.first_m, grid.second_m, grid.heading))
+    weights, evidence = _weights(
+        along[keep], aside[keep], blocks[keep], first, second, turns, grid.bin_m, _BAND_M, _TEMPER,
+        heading, bends, *prior, _CHANCE, _CLEAR_M, _LATER_PER_M, _IMPROBABLE,
+    )  # fmt: skip
+    mean, sigma = _moments(s, first, second, turns, weights)
+    return _shifted(line, mean, s), sigma, evidence
 
 
 def _steps(most: float, step: float) -> F64:
@@ -166,15 +196,32 @@ def _moments(s: F64, first: F64, second: F64, heading: F64, weights: F64) -> tup
 
 
 @numba.njit(cache=True, nogil=True)
-def _weights(s, d, blocks, first, second, heading, bin_m, band_m, temper, heading0, bends, own, own_sigma, bend_sigma, heading_sigma):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _weights(
+    s,
+    d,
+    blocks,
+    first,
+    second,
+    heading,
+    bin_m,
+    band_m,
+    temper,
+    heading0,
+    bends,
+    bend_sigma,
+    heading_sigma,
+    own,
+    own_sigma,
+    chance,
+    clear_m,
+    later,
+    improbable,
+):  # type: ignore[no-untyped-def]  # pragma: no cover
     """(H, U, W) probability of each shape."""
     bins = int(2.0 * band_m / bin_m) + 3
-    slices = int(s.max() / _SLICE_M) + 1 if len(s) else 1
     count = np.zeros(bins, np.int32)
-    last = np.full((slices, bins), -1, np.int32)
-    by_chance = _CHANCE * max(len(s) / bins, 1.0)
-    logs = np.log(np.maximum(np.arange(4 * slices + 8) / 4.0 - 0.5, 0.0) / by_chance + 1.0)
-    shape = -1
+    by_chance = chance * max(len(s) / bins, 1.0)
+    logs = np.log(np.maximum(np.arange(4 * len(s) + 8) / 4.0 - 0.5, 0.0) / by_chance + 1.0)
     out = np.empty((len(heading), len(first), len(second)))
     likeliest = np.inf
     for i in range(len(heading)):
@@ -184,7 +231,7 @@ def _weights(s, d, blocks, first, second, heading, bin_m, band_m, temper, headin
                 a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
                 prior = ((bends[1] + 2.0 * a + 60.0 * b) / bend_sigma) ** 2
                 prior += ((bends[2] + 2.0 * a + 180.0 * b) / bend_sigma) ** 2
-                prior += ((bends[1] + 2.0 * a + 60.0 * b - own) / _LATER_PER_M) ** 2
+                prior += ((bends[1] + 2.0 * a + 60.0 * b - own) / later) ** 2
                 prior += ((heading0 + heading[i]) / heading_sigma) ** 2
                 prior += ((bends[0] + 2.0 * a + 18.0 * b - own) / own_sigma) ** 2
                 out[i, j, k] = 0.5 * prior
@@ -194,24 +241,20 @@ def _weights(s, d, blocks, first, second, heading, bin_m, band_m, temper, headin
         for j in range(len(first)):
             for k in range(len(second)):
                 prior = out[i, j, k]
-                if prior > likeliest + _IMPROBABLE:
+                if prior > likeliest + improbable:
                     out[i, j, k] = -np.inf
                     continue
                 b = (second[k] - 4.0 * first[j] + 40.0 * heading[i]) / 32000.0
                 a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
-                shape += 1
                 count[:] = 0
                 blocked = 0.0
                 for n in range(len(s)):
                     aside = d[n] - s[n] * (heading[i] + s[n] * (a + s[n] * b))
                     at = (aside + band_m) / bin_m
-                    if abs(aside) < _CLEAR_M:
+                    if abs(aside) < clear_m:
                         blocked += blocks[n]
                     if 0.0 <= at < bins - 3:
-                        c, way = int(at) + 1, int(s[n] / _SLICE_M)
-                        if last[way, c] != shape:
-                            last[way, c] = shape
-                            count[c] += 1
+                        count[int(at) + 1] += 1
                 total = -blocked
                 for c in range(1, bins - 1):
                     if count[c]:

@@ -23,7 +23,7 @@ _LOW_M, _HIGH_M = 0.3, 2.5
 _STEP_M, _STEP_MOST_M = 0.05, 0.25
 """Height of a kerb: from a lowered one up to where it counts as standing."""
 _FLAT_M, _FLAT_SHARE = 0.02, 0.05
-"""A stretch of a ring is level if its heights differ by no more than a road's roughness, over this share of its range."""
+"""A stretch of a ring is level if its heights differ by no more than a road's roughness, over so much of its range."""
 _SLANT = 0.35
 """How long a ring takes to climb a kerb, as a share of its range: a kerb of 0.15 m seen from 0.5 m."""
 _KERBS_TO_M = 30.0
@@ -33,8 +33,8 @@ _DRIVES_MPS = 4.0
 """What the LiDAR alone takes for moving may be a hedge of which ever more is seen; faster it is a vehicle."""
 _LONG_M = 6.0
 _MARGIN_M = 0.8
-_BLOCKED, _PERHAPS_A_LEAD = 12.0, 4.0
-"""Nobody drives over a kerb or through a hedge. A car in the way may be a parked one in a bend, or a lead."""
+_BLOCKED, _PERHAPS_A_LEAD = 4.0, 1.5
+"""Nobody drives through a hedge. A car in the way may be a parked one in a bend, or a lead; a kerb, a crown."""
 
 
 class Cells(NamedTuple):
@@ -78,8 +78,8 @@ def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int]) 
     low = near & (above < _LOW_M) & (points[:, 0] < _KERBS_TO_M)
     kerbs = _kerbs(points[low], ring[low], above[low])
     xy = np.vstack([points[standing, :2], kerbs]).astype(np.float64)
-    blocks = np.full(len(xy), _BLOCKED)
-    blocks[: len(xy) - len(kerbs)][~np.isin(kind[standing], np.array(long, dtype=np.int64))] = _PERHAPS_A_LEAD
+    blocks = np.full(len(xy), _PERHAPS_A_LEAD)
+    blocks[: len(xy) - len(kerbs)][np.isin(kind[standing], np.array(long, dtype=np.int64))] = _BLOCKED
     return Cells(xy, blocks, np.zeros(len(xy)))
 
 
