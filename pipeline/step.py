@@ -107,10 +107,12 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     lane_state, lane = lanes.follow(state.lanes, frame.raw_lanes, view, now, params.lanes)
     clock.lap("lanes")
     ring = frame.sweep.ring if frame.sweep is not None else None
-    around = road_edges.Surroundings(sweep.points, sweep.kind, ring, sweep.ground, lidar_tracks, objects)
+    around = road_edges.Surroundings(
+        sweep.points, sweep.kind, ring, sweep.ground, lidar_tracks, objects, sweep.sensor_height_m
+    )
     edge_state, edges = road_edges.follow(state.edges, around, now, params.path)
     clock.lap("edges")
-    evidence = corridor.Evidence(lane, frame.gnss, frame.route, (edges.path,) if edges is not None else ())
+    evidence = corridor.Evidence(lane, frame.gnss, frame.route, edges.path if edges is not None else None)
     path_state, path = corridor.predict(state.path, evidence, now, params.path)
     agreement_state = agreement.follow(state.agreement, objects, now.dt_s, params.fusion)
     path = agreement.heed(path, agreement_state, params.fusion)
@@ -136,6 +138,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         vision_boxes=fused.vision_boxes,
         ground=sweep.ground,
         lanes=lane,
+        edges=edges.cells if edges is not None else None,
     )
     result = Result(
         frame=frame.name,

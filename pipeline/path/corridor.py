@@ -59,8 +59,8 @@ class Evidence(NamedTuple):
     """Where the car is on the Earth, if a fix came with this frame."""
     route: Route | None = None
     """The road it follows."""
-    surroundings: tuple[PathEstimate, ...] = ()
-    """The road as what is around shows it: its edges, where one can drive, where the lead drove."""
+    edges: PathEstimate | None = None
+    """The path along what runs beside the road."""
 
 
 def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParams) -> tuple[PathState, Path]:
@@ -77,7 +77,7 @@ def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParam
     seen = (*surest, yaw_rate.ahead(yaw, ego, params))
     estimates = [each for each in seen if each is not None]
     if not any(_shows_the_road(each, params) for each in surest):
-        estimates.extend(evidence.surroundings)
+        estimates += [evidence.edges] if evidence.edges is not None else []
     guess = straight(ego, params)
     if all(each.sigma_m[0] > guess.sigma_m[0] for each in estimates) or _fades(ego, estimates):
         estimates.append(guess)  # of the next metres a vague route tells less than that the car goes where it points
@@ -114,8 +114,8 @@ def warm_up() -> None:
 
 
 def _shows_the_road(each: PathEstimate | None, params: PathParams) -> bool:
-    """Whether paint or a route shows the road well. Then what is around adds nothing, and may not outvote it: a car
-    keeps to its lane where the kerb goes another way."""
+    """Whether paint or a route shows the road well. Then its edges add nothing, and may not outvote it: a car keeps to
+    its lane where the kerb goes another way."""
     return each is not None and float(each.sigma_m[int(_LOOK_AHEAD_M[1] / STEP_M)]) <= params.good_sigma_m
 
 

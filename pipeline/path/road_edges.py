@@ -5,27 +5,40 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from pipeline.common.geometry import F64
 from pipeline.params import PathParams
 from pipeline.path import road_shape, road_structure
-from pipeline.path.estimates import PathEstimate
+from pipeline.path.estimates import PathEstimate, samples
 from pipeline.path.road_structure import NONE, Cells
-from pipeline.types import F32, I32, U8, FusedObject, Ground, LidarTrack, Moment
+from pipeline.types import F32, I32, U8, EgoState, FusedObject, Ground, LidarTrack, Moment
 
 _FEWEST_CELLS = 25
-_ANEW_EVERY = 3
-"""A shape that is followed may be the wrong one: so often it is looked for anew, which takes as long again."""
+_EVERY, _ANEW_EVERY = 2, 4
+"""In every second frame the shape is looked for, in between it is moved on. A shape that is followed may be the wrong
+one: in every fourth it is looked for as if nothing were known of it, which takes as long again."""
+_LOWEST_M = 0.1
+"""A sensor that seems to lie lower has no road below it."""
 
 
 class Surroundings(NamedTuple):
     """What the stages before found in a frame."""
 
     points: F32
+    """(N, 4) of the sweep."""
     kind: I32
+    """(N,) what each point was taken for."""
     ring: U8 | None
+    """(N,) the channel of each; None without a sweep."""
     ground: Ground | None
+    """The road below."""
     tracks: tuple[LidarTrack, ...]
+    """Of clusters."""
     objects: tuple[FusedObject, ...]
+    """With whether they move."""
+    sensor_height_m: float
+    """Over the road."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,42 +48,60 @@ class EdgeState:
     cells: Cells = NONE
     """Structure beside the road."""
     shape: F64 | None = None
-    """(K, 2) the road's shape in that frame."""
-    since: int = 0
-    """Frames since it was looked for as if nothing were known."""
+    """(K, 2) the road's shape in that frame; None where it is not known."""
+    sigma_m: F64 | None = None
+    """(K,) of it."""
+    turn: int = 0
+    """Frames so far, modulo ``_ANEW_EVERY``."""
 
 
 class Edges(NamedTuple):
     """The road by its edges."""
 
     path: PathEstimate
+    """Along them, as far from them as the car is now."""
     cells: F64
-    """(M, 2) the structure that it was taken from."""
+    """(M, 2) ego x, y of the structure that it was taken from."""
 
 
 def follow(state: EdgeState, around: Surroundings, now: Moment, params: PathParams) -> tuple[EdgeState, Edges | None]:
     """One frame. None without own motion, which places earlier sweeps, and where too little stands beside the road."""
-    ego = now.ego
+    ego, dt_s = now.ego, now.dt_s
     if ego is None or not params.use_edges:
         return EdgeState(), None
-    dt_s = now.dt_s
     before = road_structure.moved(state.cells, ego, dt_s) if dt_s else NONE
-    fresh = NONE
-    if around.ground is not None and around.ring is not None and around.ground.fitted.any():
-        cluster_of = {track.id: track.obstacle.cluster for track in around.tracks if not track.carried}
-        fresh = road_structure.seen(
-            around.points,
-            around.kind,
-            around.ring,
-            around.ground,
-            road_structure.long(around.objects, cluster_of),
-        )
+    turn = (state.turn + 1) % _ANEW_EVERY
+    if state.turn % _EVERY and dt_s and state.shape is not None and state.sigma_m is not None:
+        shape = road_shape.moved_on(state.shape, ego, dt_s, samples(params.length_m))
+        return _found(EdgeState(before, shape, state.sigma_m, turn))
+    cells = road_structure.merged(before, _seen(around))
     driving = [item for item in around.objects if road_structure.drives(item)]
-    fresh, before = road_structure.without(fresh, driving), road_structure.without(before, driving)
-    cells = road_structure.merged(before, fresh)
+    cells = road_structure.without(cells, driving)
     if len(cells.xy) < _FEWEST_CELLS:
-        return EdgeState(cells, None), None
-    starts = road_shape.begin(state.shape, ego, dt_s, state.since == 0, params)
-    center, sigma = road_shape.fitted(cells.xy, cells.blocks, starts, ego, params)
-    since = (state.since + 1) % _ANEW_EVERY
-    return EdgeState(cells, center, since), Edges(PathEstimate("edges", center, sigma), cells.xy)
+        return EdgeState(cells), None
+    starts = road_shape.begin(state.shape, ego, dt_s, state.turn == 0, params)
+    return _found(EdgeState(cells, *road_shape.fitted(cells.xy, cells.blocks, starts, ego, params), turn))
+
+
+def _seen(around: Surroundings) -> Cells:
+    """The cells of this sweep."""
+    ground = around.ground
+    if ground is None or around.ring is None or not ground.fitted.any() or not around.sensor_height_m > _LOWEST_M:
+        return NONE
+    cluster_of = {track.id: track.obstacle.cluster for track in around.tracks if not track.carried}
+    long = road_structure.long(around.objects, cluster_of)
+    return road_structure.seen(around.points, around.kind, around.ring, ground, long, around.sensor_height_m)
+
+
+def _found(state: EdgeState) -> tuple[EdgeState, Edges]:
+    assert state.shape is not None
+    assert state.sigma_m is not None
+    return state, Edges(PathEstimate("edges", state.shape, state.sigma_m), state.cells.xy)
+
+
+def warm_up() -> None:
+    """Compile the kernels, or load them from numba's cache."""
+    road_structure.warm_up()
+    ego, params = EgoState(0, 10.0, 0.0), PathParams()
+    starts = road_shape.begin(None, ego, None, True, params)
+    road_shape.fitted(np.zeros((2, 2)), np.zeros(2), starts, ego, params)

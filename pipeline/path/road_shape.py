@@ -48,8 +48,8 @@ class Grid(NamedTuple):
 
 _WIDE = Grid((8.0, 1.0), (24.0, 2.0), (0.0, 1.0), 1.5)
 _USUAL = Grid((4.0, 0.5), (15.0, 1.25), (0.02, 0.02), 1.0)
-_FINE = Grid((1.5, 0.25), (4.5, 0.5), (0.03, 0.015), 0.5)
-_MOST_CELLS, _MOST_FINE = 150, 250
+_FINE = Grid((1.5, 0.25), (4.5, 0.5), (0.02, 0.02), 0.5)
+_MOST_CELLS, _MOST_FINE = 150, 200
 """Keeps the time bounded; a sweep of 16 rings has 100 to 300."""
 
 
@@ -78,14 +78,14 @@ class Starts(NamedTuple):
 def begin(before: F64 | None, ego: EgoState, dt_s: float | None, anew: bool, params: PathParams) -> Starts:
     """Where to look for the shape. anew: also as if nothing were known of it."""
     s = samples(params.length_m)
-    moved = _moved_on(before, ego, dt_s, s) if before is not None and dt_s else None
+    moved = moved_on(before, ego, dt_s, s) if before is not None and dt_s else None
     if moved is not None and not anew:
         return Starts(None, moved)
     turning = ego.speed_mps > params.min_speed_mps
     return Starts(arc((ego.yaw_rate_radps or 0.0) / ego.speed_mps if turning else 0.0, s)[0], moved)
 
 
-def _moved_on(shape: F64, ego: EgoState, dt_s: float, s: F64) -> F64:
+def moved_on(shape: F64, ego: EgoState, dt_s: float, s: F64) -> F64:
     """The shape of the frame before, from the car on, parallel to itself."""
     turned, way = (ego.yaw_rate_radps or 0.0) * dt_s, ego.speed_mps * dt_s
     c, sn = np.cos(turned), np.sin(turned)
@@ -195,7 +195,7 @@ def _moments(s: F64, first: F64, second: F64, heading: F64, weights: F64) -> tup
     return mean @ rows, np.sqrt(np.maximum(np.einsum("ik,ij,jk->k", rows, spread, rows), 0.0))
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz", "contract", "reassoc"})
 def _weights(
     s,
     d,
@@ -237,6 +237,8 @@ def _weights(
                 out[i, j, k] = 0.5 * prior
                 likeliest = min(likeliest, out[i, j, k])
     best = -np.inf
+    s2, s3 = s * s, s * s * s
+    per_m, middle, last = 1.0 / bin_m, band_m / bin_m + 1.0, bins - 1.0  # the outer bins hold what is out of the band
     for i in range(len(heading)):
         for j in range(len(first)):
             for k in range(len(second)):
@@ -249,12 +251,9 @@ def _weights(
                 count[:] = 0
                 blocked = 0.0
                 for n in range(len(s)):
-                    aside = d[n] - s[n] * (heading[i] + s[n] * (a + s[n] * b))
-                    at = (aside + band_m) / bin_m
-                    if abs(aside) < clear_m:
-                        blocked += blocks[n]
-                    if 0.0 <= at < bins - 3:
-                        count[int(at) + 1] += 1
+                    aside = d[n] - heading[i] * s[n] - a * s2[n] - b * s3[n]
+                    blocked += blocks[n] if abs(aside) < clear_m else 0.0
+                    count[int(min(max(aside * per_m + middle, 0.0), last))] += 1
                 total = -blocked
                 for c in range(1, bins - 1):
                     if count[c]:

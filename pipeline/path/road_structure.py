@@ -24,8 +24,9 @@ _STEP_M, _STEP_MOST_M = 0.05, 0.25
 """Height of a kerb: from a lowered one up to where it counts as standing."""
 _FLAT_M, _FLAT_SHARE = 0.02, 0.05
 """A stretch of a ring is level if its heights differ by no more than a road's roughness, over so much of its range."""
-_SLANT = 0.35
-"""How long a ring takes to climb a kerb, as a share of its range: a kerb of 0.15 m seen from 0.5 m."""
+_SLANT, _SLACK_M = 1.5, 0.4
+"""A ring that climbs by h comes nearer by its share h/H of the range, H being the sensor's height over the road, and
+takes so much way for it: what takes longer is the crown of the road, no kerb."""
 _KERBS_TO_M = 30.0
 _KEPT_S = 2.5
 """Own motion places a cell as well as it was measured for as long: 1 % of 25 m, and 0.5° of heading."""
@@ -62,7 +63,7 @@ def moved(cells: Cells, ego: EgoState, dt_s: float) -> Cells:
     return Cells(xy[keep], cells.blocks[keep], age_s[keep])
 
 
-def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int]) -> Cells:
+def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int], height_m: float) -> Cells:
     """Cells of one sweep.
 
     Args:
@@ -71,12 +72,14 @@ def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int]) 
         ring: (N,) the channel of each.
         ground: the road below them.
         long: clusters that are too long for a car.
+        height_m: of the sensor over the road.
     """
-    near = (points[:, 0] > 0.0) & (points[:, 0] < REACH_M) & (np.abs(points[:, 1]) < ASIDE_M)
+    near = np.flatnonzero((points[:, 0] > 0.0) & (points[:, 0] < REACH_M) & (np.abs(points[:, 1]) < ASIDE_M))
+    points, kind, ring = points[near], kind[near], ring[near]
     above = ground.above(points)
-    standing = near & (above > _LOW_M) & (above < _HIGH_M) & (kind != GROUND)
-    low = near & (above < _LOW_M) & (points[:, 0] < _KERBS_TO_M)
-    kerbs = _kerbs(points[low], ring[low], above[low])
+    standing = (above > _LOW_M) & (above < _HIGH_M) & (kind != GROUND)
+    low = (above < _LOW_M) & (points[:, 0] < _KERBS_TO_M)
+    kerbs = _kerbs(points[low], ring[low], above[low], height_m)
     xy = np.vstack([points[standing, :2], kerbs]).astype(np.float64)
     blocks = np.full(len(xy), _PERHAPS_A_LEAD)
     blocks[: len(xy) - len(kerbs)][np.isin(kind[standing], np.array(long, dtype=np.int64))] = _BLOCKED
@@ -125,24 +128,27 @@ def long(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int
     ]
 
 
-def _kerbs(points: F32, ring: U8, above: F64) -> F64:
+def _kerbs(points: F32, ring: U8, above: F64, height_m: float) -> F64:
     """(M, 2) places on kerbs: between a flat stretch of a ring and the next that is higher or lower by a kerb's height.
     A ring climbs a kerb slantwise, so that its points in between lie along it."""
     if not len(points):
         return np.zeros((0, 2))
-    order = np.lexsort((np.arctan2(points[:, 1], points[:, 0]), ring))
+    order = np.argsort(ring, kind="stable")  # along a ring, points come in the order in which they were measured
     xy = points[order, :2].astype(np.float64)
-    on_kerb = _between_levels(xy, ring[order], above[order], _FLAT_M, _FLAT_SHARE, _STEP_M, _STEP_MOST_M, _SLANT)
+    slant = _SLANT / height_m
+    on_kerb = _between_levels(
+        xy, ring[order], above[order], _FLAT_M, _FLAT_SHARE, _STEP_M, _STEP_MOST_M, slant, _SLACK_M
+    )
     return np.asarray(xy[on_kerb])
 
 
 def warm_up() -> None:
     """Compile the kernel, or load it from numba's cache."""
-    _kerbs(np.zeros((2, 4), np.float32), np.zeros(2, np.uint8), np.zeros(2))
+    _kerbs(np.zeros((2, 4), np.float32), np.zeros(2, np.uint8), np.zeros(2), 1.0)
 
 
 @numba.njit(cache=True, nogil=True)
-def _between_levels(xy, ring, above, flat_m, flat_share, step, most, slant):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _between_levels(xy, ring, above, flat_m, flat_share, step, most, slant, slack):  # type: ignore[no-untyped-def]  # pragma: no cover
     """(N,) bool, which points lie between two level stretches of their ring, one a kerb's height above the other."""
     out = np.zeros(len(xy), np.bool_)
     first, last_end, last_level = 0, -1, 0.0
@@ -165,7 +171,7 @@ def _between_levels(xy, ring, above, flat_m, flat_share, step, most, slant):  # 
         level = total / (end - first + 1)
         if last_end >= 0 and ring[last_end] == ring[first]:
             gap = np.hypot(xy[first, 0] - xy[last_end, 0], xy[first, 1] - xy[last_end, 1])
-            if step < abs(level - last_level) < most and gap < slant * far:
+            if step < abs(level - last_level) < most and gap < slack + slant * abs(level - last_level) * far:
                 out[last_end : first + 1] = True
         last_end, last_level = end, level
         first = end + 1

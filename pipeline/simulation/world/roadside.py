@@ -1,5 +1,5 @@
-"""Roadside items: guard rails, delineator posts, trees, buildings and sign gantries, placed by seed, and the strips that
-a scenario names: kerbs, hedges and walls. They are placed in (s, d) once per scenario and looked up by s, so both
+"""Roadside items: guard rails, delineator posts, trees, buildings and sign gantries, placed by seed, and the strips
+that a scenario names: kerbs, hedges and walls. They are placed in (s, d) once per scenario and looked up by s, so both
 sensors see the same items.
 """
 
