@@ -174,7 +174,7 @@ def _shifted(line: F64, aside: F64, s: F64) -> F64:
     return _resampled(line + aside[:, None] * normal, s)
 
 
-def _cubic(first, second, heading):  # type: ignore[no-untyped-def]
+def _cubic(first: F64, second: F64, heading: F64) -> tuple[F64, F64]:
     """a, b of heading·s + a·s² + b·s³ through the nodes."""
     b = (second - 4.0 * first + 40.0 * heading) / 32000.0
     return (first - 20.0 * heading - 8000.0 * b) / 400.0, b
@@ -196,7 +196,7 @@ def _moments(s: F64, first: F64, second: F64, heading: F64, weights: F64) -> tup
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz", "contract", "reassoc"})
-def _weights(
+def _weights(  # type: ignore[no-untyped-def]
     s,
     d,
     blocks,
@@ -216,7 +216,7 @@ def _weights(
     clear_m,
     later,
     improbable,
-):  # type: ignore[no-untyped-def]  # pragma: no cover
+):  # pragma: no cover
     """(H, U, W) probability of each shape."""
     bins = int(2.0 * band_m / bin_m) + 3
     count = np.zeros(bins, np.int32)
