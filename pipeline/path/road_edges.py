@@ -15,9 +15,9 @@ from pipeline.path.road_structure import NONE, Cells
 from pipeline.types import F32, I32, U8, EgoState, FusedObject, Ground, LidarTrack, Moment
 
 _FEWEST_CELLS = 25
-_EVERY, _ANEW_EVERY = 2, 4
-"""In every second frame the shape is looked for, in between it is moved on. A shape that is followed may be the wrong
-one: in every fourth it is looked for as if nothing were known of it, which takes as long again."""
+_EVERY, _ANEW_EVERY = 1, 3
+"""The shape is looked for in every frame. A shape that is followed may be the wrong
+one: in every third it is looked for as if nothing were known of it, which takes as long again."""
 _LOWEST_M = 0.1
 """A sensor that seems to lie lower has no road below it."""
 
@@ -51,6 +51,8 @@ class EdgeState:
     """(K, 2) the road's shape in that frame; None where it is not known."""
     sigma_m: F64 | None = None
     """(K,) of it."""
+    room_m: tuple[float, float] = (0.0, 0.0)
+    """How far the corridor reaches to the left and to the right of it."""
     turn: int = 0
     """Frames so far, modulo ``_ANEW_EVERY``."""
 
@@ -73,14 +75,16 @@ def follow(state: EdgeState, around: Surroundings, now: Moment, params: PathPara
     turn = (state.turn + 1) % _ANEW_EVERY
     if state.turn % _EVERY and dt_s and state.shape is not None and state.sigma_m is not None:
         shape = road_shape.moved_on(state.shape, ego, dt_s, samples(params.length_m))
-        return _found(EdgeState(before, shape, state.sigma_m, turn))
+        return _found(EdgeState(before, shape, state.sigma_m, state.room_m, turn))
     cells = road_structure.merged(before, _seen(around))
     driving = [item for item in around.objects if road_structure.drives(item)]
     cells = road_structure.without(cells, driving)
     if len(cells.xy) < _FEWEST_CELLS:
         return EdgeState(cells), None
     starts = road_shape.begin(state.shape, ego, dt_s, state.turn == 0, params)
-    return _found(EdgeState(cells, *road_shape.fitted(cells.xy, cells.blocks, starts, ego, params), turn))
+    shape, sigma_m = road_shape.fitted(cells.xy, cells.blocks, starts, ego, params)
+    room_m = road_shape.room(shape, cells.xy, params.half_width_m)
+    return _found(EdgeState(cells, shape, sigma_m, room_m, turn))
 
 
 def _seen(around: Surroundings) -> Cells:
@@ -96,7 +100,8 @@ def _seen(around: Surroundings) -> Cells:
 def _found(state: EdgeState) -> tuple[EdgeState, Edges]:
     assert state.shape is not None
     assert state.sigma_m is not None
-    return state, Edges(PathEstimate("edges", state.shape, state.sigma_m), state.cells.xy)
+    left_m, right_m = (np.full(len(state.shape), each) for each in state.room_m)
+    return state, Edges(PathEstimate("edges", state.shape, state.sigma_m, left_m, right_m), state.cells.xy)
 
 
 def warm_up() -> None:

@@ -29,6 +29,8 @@ _BAND_M = 12.0
 _IMPROBABLE = 12.0
 _CHANCE = 1.0
 """How many of the cells are where they are by chance, against those that line up."""
+_EDGE_M, _EDGE_CELLS, _EDGE_SHARE = 0.5, 5, 0.3
+"""An edge is so wide a strip beside the road with so many cells, and with this share of the fullest one's."""
 _CLEAR_M = 0.9
 """Half a car's width."""
 _SOON_PER_M, _LATER_PER_M = 0.01, 0.025
@@ -137,6 +139,22 @@ def fitted(xy: F64, blocks: F64, starts: Starts, ego: EgoState, params: PathPara
     best = max(found, key=lambda each: each[2])
     line, sigma, _ = _round(best[0], xy, blocks, _FINE, prior, s)
     return line, np.sqrt(sigma**2 + params.lane_keeping_sigma_m**2 + (_MODEL_SIGMA_PER_M2 * s * s) ** 2)
+
+
+def room(line: F64, xy: F64, usual_m: float) -> tuple[float, float]:
+    """How far the corridor reaches to the left and to the right of the line: half way between the car's own side and an
+    edge as near as that, for what stands beyond the middle belongs rather to the edge; else as usual."""
+    aside, along = nearest(line, xy)
+    near = aside[(along > 0.0) & (along < _NODES_M[1])]
+    left, right = (_nearest_edge_m(side[side > _CLEAR_M]) for side in (near, -near))
+    return min(usual_m, 0.5 * (_CLEAR_M + left)), min(usual_m, 0.5 * (_CLEAR_M + right))
+
+
+def _nearest_edge_m(aside: F64) -> float:
+    """Distance of the nearest edge with enough cells; infinite without one."""
+    counts = np.bincount((aside / _EDGE_M).astype(np.intp), minlength=1)
+    full = np.flatnonzero(counts >= max(_EDGE_CELLS, _EDGE_SHARE * counts.max()))
+    return float(full[0]) * _EDGE_M if len(full) else np.inf
 
 
 def _round(line: F64, xy: F64, blocks: F64, grid: Grid, prior: Prior, s: F64) -> tuple[F64, F64, float]:
