@@ -174,7 +174,7 @@ def _round(line: F64, xy: F64, blocks: F64, grid: Grid, prior: Prior, s: F64) ->
 
 def _steps(most: float, step: float) -> F64:
     count = round(most / step)
-    return np.arange(-count, count + 1) * step
+    return np.asarray(np.arange(-count, count + 1) * step, np.float64)
 
 
 def _bends(line: F64) -> tuple[float, F64]:
