@@ -83,7 +83,7 @@ def follow(state: EdgeState, around: Surroundings, now: Moment, params: PathPara
         return EdgeState(cells), None
     starts = road_shape.begin(state.shape, ego, dt_s, state.turn == 0, params)
     shape, sigma_m = road_shape.fitted(cells.xy, cells.blocks, starts, ego, params)
-    room_m = road_shape.room(shape, cells.xy, params.half_width_m)
+    room_m = road_shape.room(shape, cells.xy[cells.stands], params.half_width_m)
     return _found(EdgeState(cells, shape, sigma_m, room_m, turn))
 
 

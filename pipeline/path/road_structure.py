@@ -12,6 +12,7 @@ import numba
 import numpy as np
 
 from pipeline.types import F32, F64, GROUND, I32, U8, VEHICLES, EgoState, FusedObject, Ground
+from pipeline.types.arrays import Mask
 
 REACH_M, ASIDE_M = 48.0, 24.0
 """Farther ahead, or farther to the side, a 16-channel LiDAR shows nothing of a road's edge."""
@@ -47,9 +48,11 @@ class Cells(NamedTuple):
     """(M,) how strongly each says that no road leads through it, in log-likelihood."""
     age_s: F64
     """(M,) time since each was last seen."""
+    stands: Mask
+    """(M,) bool, whether it stands up: a kerb does not."""
 
 
-NONE = Cells(np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+NONE = Cells(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
 
 
 def moved(cells: Cells, ego: EgoState, dt_s: float) -> Cells:
@@ -60,7 +63,7 @@ def moved(cells: Cells, ego: EgoState, dt_s: float) -> Cells:
     xy = np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s])
     age_s = cells.age_s + dt_s
     keep = (xy[:, 0] > _BEHIND_M) & (age_s <= _KEPT_S)
-    return Cells(xy[keep], cells.blocks[keep], age_s[keep])
+    return Cells(xy[keep], cells.blocks[keep], age_s[keep], cells.stands[keep])
 
 
 def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int], height_m: float) -> Cells:
@@ -83,17 +86,17 @@ def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int], 
     xy = np.vstack([points[standing, :2], kerbs]).astype(np.float64)
     blocks = np.full(len(xy), _PERHAPS_A_LEAD)
     blocks[: len(xy) - len(kerbs)][np.isin(kind[standing], np.array(long, dtype=np.int64))] = _BLOCKED
-    return Cells(xy, blocks, np.zeros(len(xy)))
+    return Cells(xy, blocks, np.zeros(len(xy)), np.arange(len(xy)) < len(xy) - len(kerbs))
 
 
 def merged(before: Cells, fresh: Cells) -> Cells:
     """All cells, one in each square of the grid, the fresh ones first."""
-    xy, blocks, age_s = (np.concatenate(pair) for pair in zip(fresh, before, strict=True))
+    xy, blocks, age_s, stands = (np.concatenate(pair) for pair in zip(fresh, before, strict=True))
     if not len(xy):
         return NONE
     at = np.floor(xy / CELL_M).astype(np.int64)
     _, first = np.unique(at[:, 0] * 100_003 + at[:, 1], return_index=True)
-    return Cells(xy[first], blocks[first], age_s[first])
+    return Cells(xy[first], blocks[first], age_s[first], stands[first])
 
 
 def without(cells: Cells, objects: Sequence[FusedObject]) -> Cells:
