@@ -109,7 +109,7 @@ def without(cells: Cells, objects: Sequence[FusedObject]) -> Cells:
             dx, dy = cells.xy[:, 0] - x, cells.xy[:, 1] - y
             along, across = np.abs(dx * c + dy * s), np.abs(dy * c - dx * s)
             keep &= (along > length / 2 + _MARGIN_M) | (across > width / 2 + _MARGIN_M)
-    return Cells(*(each[keep] for each in cells))
+    return Cells(cells.xy[keep], cells.blocks[keep], cells.age_s[keep], cells.stands[keep])
 
 
 def drives(item: FusedObject) -> bool:
