@@ -37,7 +37,7 @@ class Scenarios:
     what: tyro.conf.Positional[Literal["run"]]
     """What to do"""
     suite: str = "paper"
-    """paper, curves, euroncap, iso, all, robustness, or the name of one experiment"""
+    """paper, curves, streets, euroncap, iso, all, robustness, or the name of one experiment"""
     short: bool = False
     """Run a few cases of each only: seconds instead of minutes"""
     jobs: Annotated[int, tyro.conf.arg(metavar="N")] = 0

@@ -13,7 +13,7 @@ from pipeline.run import Sensors
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.detection_model import Detections
 
-Suite = Literal["paper", "curves", "euroncap", "iso", "robustness"]
+Suite = Literal["paper", "curves", "streets", "euroncap", "iso", "robustness"]
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,21 @@ from pipeline.experiments.paper.braking import BRAKING
 from pipeline.experiments.paper.cipv_choice import CHOOSING
 from pipeline.experiments.paper.distance_regression import REGRESSION
 from pipeline.experiments.paper.lidar_range import RANGING
+from pipeline.experiments.streets.experiment import STREETS
 
-EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, CHOOSING, CURVES, BRAKING, NCAP, ISO)
+EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (
+    RANGING,
+    REGRESSION,
+    BEV_ERROR,
+    CHOOSING,
+    CURVES,
+    STREETS,
+    BRAKING,
+    NCAP,
+    ISO,
+)
 Keep = Callable[[Experiment[Any, Any], ExperimentDrive], None]
-SUITES = ("paper", "curves", "euroncap", "iso", "all")
+SUITES = ("paper", "curves", "streets", "euroncap", "iso", "all")
 
 
 class NoSuchSuite(BadInput):

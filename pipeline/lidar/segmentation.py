@@ -30,6 +30,11 @@ class SegmentedSweep:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Ego x y z of the sensor, where its rays start."""
 
+    @property
+    def sensor_height_m(self) -> float:
+        """Of the sensor over the road; NaN without ground."""
+        return float(self.ground.above(np.array([self.origin]))[0]) if self.ground is not None else float("nan")
+
 
 _NO_SWEEP = SegmentedSweep(np.zeros((0, 4), np.float32), np.zeros(0, np.uint8), np.zeros(0, np.int32), None, None)
 

@@ -34,6 +34,9 @@ class PathParams(Section):
     use_lanes: bool = choice(True, "Put the corridor between the lane lines where they are visible")
     use_gnss: bool = choice(True, "Put the corridor along the planned route where GNSS locates the car on it")
     use_yaw_rate: bool = choice(True, "Bend the corridor by the yaw rate")
+    use_edges: bool = choice(
+        False, "Put the corridor along what runs beside the road: kerbs, hedges, walls, rails, parked cars"
+    )
     min_speed_mps: float = slider(2.0, 0.0, 10.0, 0.5, "m/s", "Yaw rate and GNSS course are ignored below this speed")
     yaw_rate_sigma_radps: float = slider(
         0.007, 0.0005, 0.05, 0.0005, "rad/s", "Noise of the yaw rate, including small steering corrections"

@@ -29,7 +29,7 @@ EDGE_SIGMA_M = 0.5
 @dataclass(frozen=True, eq=False)
 class FusedPath:
     """The path of all sources together. center: (K, 2). sigma_m: (K,). left_m, right_m: (K,) distances to the edges.
-    shares: (K, 4) of ``SOURCES``. behind_m: (K,) how far it still lags behind its sources."""
+    shares: (K, S) of ``SOURCES``. behind_m: (K,) how far it still lags behind its sources."""
 
     center: F64
     sigma_m: F64
@@ -76,6 +76,8 @@ def _edges(estimates: list[PathEstimate], half_width_m: float) -> tuple[F64, F64
     usual = np.full(len(estimates[0].center), half_width_m)
     for each in estimates:
         if each.left_m is not None and each.right_m is not None:
+            if each.source == "edges":  # they are parallel to the path: as far from it as they are from the car
+                return each.left_m, each.right_m
             trust = EDGE_SIGMA_M**2 / (EDGE_SIGMA_M**2 + each.sigma_m**2)
             return usual + trust * (each.left_m - usual), usual + trust * (each.right_m - usual)
     return usual, usual

@@ -1,8 +1,9 @@
 """The ego corridor: where the car is going, as a centre line with a left and a right edge (paper, section CIPV).
 
     lane lines ───────────┐
-    GNSS on a route ──────┼─► compare, weigh ─► blend with the frame before ─► Path
-    yaw rate's arc ───────┤
+    GNSS on a route ──────┤
+    yaw rate's arc ───────┼─► compare, weigh ─► blend with the frame before ─► Path
+    the road's edges ─────┤
     (else straight ahead) ┘
 
 The paper uses lane centres on straights and a GPS path in curves, chosen by hand. Here every source gives its sigma at
@@ -58,6 +59,8 @@ class Evidence(NamedTuple):
     """Where the car is on the Earth, if a fix came with this frame."""
     route: Route | None = None
     """The road it follows."""
+    edges: PathEstimate | None = None
+    """The path along what runs beside the road."""
 
 
 def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParams) -> tuple[PathState, Path]:
@@ -70,12 +73,11 @@ def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParam
     yaw = yaw_rate.follow(state.yaw, ego, dt_s, params) if params.use_yaw_rate else None
     placed, wrong_fix = gnss.follow(state.gnss, evidence.route, evidence.fix, ego, now.t_ns, dt_s, params)
     placed, along_route, wrong_route = gnss.ahead(placed, params)
-    seen = (
-        between_lines(evidence.lane, params) if params.use_lanes else None,
-        along_route,
-        yaw_rate.ahead(yaw, ego, params),
-    )
+    surest = (between_lines(evidence.lane, params) if params.use_lanes else None, along_route)
+    seen = (*surest, yaw_rate.ahead(yaw, ego, params))
     estimates = [each for each in seen if each is not None]
+    if not any(_shows_the_road(each, params) for each in surest):
+        estimates += [evidence.edges] if evidence.edges is not None else []
     guess = straight(ego, params)
     if all(each.sigma_m[0] > guess.sigma_m[0] for each in estimates) or _fades(ego, estimates):
         estimates.append(guess)  # of the next metres a vague route tells less than that the car goes where it points
@@ -109,6 +111,12 @@ def warm_up() -> None:
         now = Moment(t_ns, 0.1 if k else None, ego, ego)
         state, path = predict(state, Evidence(None, fix, route), now, params)
     nearest_on_path(path, np.zeros((1, 2)))
+
+
+def _shows_the_road(each: PathEstimate | None, params: PathParams) -> bool:
+    """Whether paint or a route shows the road well. Then its edges add nothing, and may not outvote it: a car keeps to
+    its lane where the kerb goes another way."""
+    return each is not None and float(each.sigma_m[int(_LOOK_AHEAD_M[1] / STEP_M)]) <= params.good_sigma_m
 
 
 def _expected(
@@ -166,12 +174,12 @@ def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], para
 
 
 def _by_source(shares: F64) -> dict[str, float]:
-    """(4,) shares of ``SOURCES`` by their names."""
+    """(S,) shares of ``SOURCES`` by their names."""
     return {str(name): share for name, share in zip(SOURCES, shares.tolist(), strict=True) if share > _NO_SHARE}
 
 
 def _carrier(shares: F64) -> PathSource:
-    """The source that carries the path, by (4,) shares of ``SOURCES``."""
+    """The source that carries the path, by (S,) shares of ``SOURCES``."""
     main = int(np.argmax(shares))
     return SOURCES[main] if shares[main] >= _CARRIES_ALONE else "fused"
 

@@ -18,8 +18,8 @@ from pipeline.params import PathParams
 from pipeline.types import EgoState
 from pipeline.types.lane import EgoLane, LaneLine
 
-SourceName = Literal["lane", "gnss", "yaw_rate", "straight"]
-SOURCES: tuple[SourceName, ...] = ("lane", "gnss", "yaw_rate", "straight")
+SourceName = Literal["lane", "gnss", "yaw_rate", "straight", "edges"]
+SOURCES: tuple[SourceName, ...] = ("lane", "gnss", "yaw_rate", "straight", "edges")
 STEP_M = 1.0
 UNKNOWN_SIGMA_M = 1e3
 """Sigma of a position about which a source says nothing."""

@@ -12,7 +12,7 @@ from pipeline.types.frame import EgoState, Frame, OwnMotion, StreamHealth
 from pipeline.types.lane import EgoLane
 from pipeline.types.objects import FusedObject, Ground, LidarTrack, Obstacle, VisionTrack
 
-PathSource = Literal["lane", "gnss", "yaw_rate", "straight", "fused"]
+PathSource = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "fused"]
 
 
 @dataclass(frozen=True)
@@ -157,6 +157,8 @@ class Layers:
     """The ego lane's lines; None where no lane detector runs."""
     ground: Ground | None = None
     """The road under the sweep; None without one."""
+    edges: F64 | None = None
+    """(M, 2) ego x, y of what runs beside the road, where the path is taken from it; None where it is not."""
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,11 @@ SOURCES: Mapping[str, Mapping[str, bool]] = {
     "GNSS route": {"path.use_lanes": False, "path.use_yaw_rate": False},
     "yaw rate": {"path.use_lanes": False, "path.use_gnss": False},
     "lane lines and yaw rate": {"path.use_gnss": False},
-    "straight guess": {"path.use_lanes": False, "path.use_gnss": False, "path.use_yaw_rate": False},
+    "straight guess": {
+        "path.use_lanes": False,
+        "path.use_gnss": False,
+        "path.use_yaw_rate": False,
+    },
     "fused": {},
     LIDAR_ALONE: {},
 }
@@ -114,16 +118,21 @@ def moments(scene: Scenario, frames: Iterable[tuple[World, Frame]], reach_m: flo
 
 
 def driven(
-    scene: Scenario, reach_m: float, names: Sequence[str] = tuple(SOURCES), over_line_s: float | None = None
+    scene: Scenario,
+    reach_m: float,
+    names: Sequence[str] = tuple(SOURCES),
+    over_line_s: float | None = None,
+    settings: Mapping[str, Mapping[str, bool]] = SOURCES,
+    lines: LineNoise | None = LINES,
 ) -> dict[str, Frames]:
-    """Every frame once through the sensors, and once through the pipeline for each named set of sources. over_line_s:
-    when a wheel of vehicle 2 crosses the lane line, if it cuts in."""
+    """Every frame once through the sensors, and once through the pipeline for each named one of the settings.
+    over_line_s: when a wheel of vehicle 2 crosses the lane line, if it cuts in. lines None: the road has no paint."""
     warm_up()
-    settings = {name: with_changes(Params(), SOURCES[name]) for name in names}
+    chosen = {name: with_changes(Params(), settings[name]) for name in names}
     states = dict.fromkeys(names, State())
     rows: dict[str, list[tuple[Moment, Result]]] = {name: [] for name in names}
-    for moment in moments(scene, seen(scene), reach_m):
-        for name, params in settings.items():
+    for moment in moments(scene, seen(scene, lines), reach_m):
+        for name, params in chosen.items():
             given = only(moment.frame, "lidar") if name == LIDAR_ALONE else moment.frame
             states[name], result = step(states[name], given, params)
             rows[name].append((moment, result))

@@ -1,4 +1,4 @@
-"""Polygons of trees, buildings, guard rails, posts and signs."""
+"""Polygons of trees, buildings, guard rails, posts, signs, kerbs, hedges and walls."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ _TRUNK: Colour = (48, 62, 74)
 _WALLS: tuple[Colour, ...] = ((170, 190, 205), (196, 200, 200), (140, 158, 182), (178, 182, 170))
 _WINDOWS: Colour = (110, 96, 84)
 _STEEL, _POST_STEEL, _STEEL_LIGHT, _STEEL_DARK = (150, 152, 150), (104, 106, 104), (196, 198, 196), (112, 114, 112)
+_STRIPS: dict[str, Colour] = {"kerb": (168, 170, 170), "hedge": (44, 84, 52), "wall": (150, 162, 172)}
 _DETAIL_M = 90.0
 _STOREY_M = 3.2
 _TURN, _COARSE_TURN = (np.linspace(0.0, 2 * np.pi, steps, endpoint=False) for steps in (24, 10))
@@ -40,6 +41,8 @@ def add_thing(canvas: Canvas, thing: Thing, x: float, y: float, yaw: float) -> N
             _upright(canvas, (x, y + 0.06), (x, y - 0.06), 0.72, 0.90, (40, 40, 40))
         case "gantry_leg":
             _walls(canvas, thing, x, y, yaw, _STEEL, thing.low_m, thing.high_m)
+        case "kerb" | "hedge" | "wall":
+            _strip(canvas, thing, x, y, yaw)
 
 
 def _tree(canvas: Canvas, thing: Thing, x: float, y: float) -> None:
@@ -86,6 +89,16 @@ def _rail(canvas: Canvas, thing: Thing, x: float, y: float, yaw: float) -> None:
     _upright(canvas, start, end, RAIL_LOW_M, middle, _STEEL)
     _upright(canvas, start, end, middle, RAIL_HIGH_M, _STEEL_LIGHT)
     _upright(canvas, start, end, middle - 0.03, middle + 0.03, _STEEL_DARK)
+
+
+def _strip(canvas: Canvas, thing: Thing, x: float, y: float, yaw: float) -> None:
+    """Walls, and the top where the camera looks down on it."""
+    bgr = _STRIPS[thing.kind]
+    _walls(canvas, thing, x, y, yaw, bgr, 0.0, thing.high_m)
+    c, s = cos(yaw), sin(yaw)
+    corners = [(thing.length_m / 2 * a, thing.width_m / 2 * b) for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+    top = tuple((x + a * c - b * s, y + a * s + b * c, thing.high_m - LIDAR_HEIGHT_M) for a, b in corners)
+    canvas.add_face(top, bgr, (0.0, 0.0, 1.0))
 
 
 def _sign(canvas: Canvas, thing: Thing, x: float, y: float, yaw: float) -> None:

@@ -111,8 +111,10 @@ def _thing_boxes(thing: Thing, x: float, y: float, yaw: float) -> list[tuple[flo
             crown_from = thing.high_m - thing.length_m
             trunk = 0.3 / thing.length_m
             return [box(trunk, 0.0, crown_from, METAL), box(0.8, crown_from, thing.high_m, FOLIAGE)]
-        case "building":
+        case "building" | "wall" | "kerb":
             return [box(1.0, thing.low_m, thing.high_m, WALL)]
+        case "hedge":
+            return [box(1.0, thing.low_m, thing.high_m, FOLIAGE)]
         case "post":
             return [box(1.0, 0.0, thing.high_m, PLATE)]
         case _:

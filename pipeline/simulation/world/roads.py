@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cached_property
 from math import ceil
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -96,6 +96,17 @@ class Beacon(Strict):
     high_m: float = Field(default=1.05, ge=0.1, le=5.0)
 
 
+class Strip(Strict):
+    """A kerb with its pavement, a hedge or a wall along the road: where its middle runs, how wide and high it is."""
+
+    kind: Literal["kerb", "hedge", "wall"]
+    d_m: float
+    from_m: float = 0.0
+    to_m: float = Field(default=100_000.0, gt=0.0)
+    width_m: float = Field(default=0.3, ge=0.05, le=10.0)
+    high_m: float = Field(default=1.2, ge=0.03, le=6.0)
+
+
 class Road(Strict):
     segments: tuple[Segment, ...] = Field(min_length=1)
     crossings: tuple[Crossing, ...] = ()
@@ -108,6 +119,7 @@ class Road(Strict):
     """Least vertical radius of its crests and sags; None: it is level."""
     crests_every_m: float = Field(default=400.0, ge=50.0)
     beacons: tuple[Beacon, ...] = ()
+    strips: tuple[Strip, ...] = ()
 
     @model_validator(mode="after")
     def _wide_enough_bends(self) -> Road:

@@ -1,5 +1,6 @@
-"""Roadside items: guard rails, delineator posts, trees, buildings and sign gantries, placed by seed. They are placed in
-(s, d) once per scenario and looked up by s, so both sensors see the same items.
+"""Roadside items: guard rails, delineator posts, trees, buildings and sign gantries, placed by seed, and the strips
+that a scenario names: kerbs, hedges and walls. They are placed in (s, d) once per scenario and looked up by s, so both
+sensors see the same items.
 """
 
 from __future__ import annotations
@@ -13,14 +14,16 @@ from pipeline.simulation.world.roads import Road
 from pipeline.simulation.world.world_state import World
 from pipeline.types import F64
 
-ThingKind = Literal["rail", "post", "tree", "building", "gantry_leg", "gantry_sign"]
+ThingKind = Literal["rail", "post", "tree", "building", "gantry_leg", "gantry_sign", "kerb", "hedge", "wall"]
 
 RAIL_LENGTH_M = 12.0
 RAIL_LOW_M, RAIL_HIGH_M = 0.42, 0.75
 _POST_STEP_M = 25.0
 _GANTRY_STEP_M = 450.0
 SIGN_LOW_M, SIGN_HIGH_M = 5.3, 7.6
-_BY_THE_ROAD = frozenset({"rail", "post", "gantry_leg", "gantry_sign"})
+STRIP_PIECE_M = 2.0
+"""Strips are made of pieces so long: in a bend of 30 m radius a piece lies 2 cm beside the arc."""
+_BY_THE_ROAD = frozenset({"rail", "post", "gantry_leg", "gantry_sign", "kerb", "hedge", "wall"})
 """These belong to the road, so only crossings displace them."""
 _COURSE_STEP_M = 4.0
 _CORNER_M = 5.0
@@ -54,6 +57,7 @@ def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, .
         *(_gantries(start_m, end_m, right) if road.median_m >= _LEAST_MEDIAN_M or not road.lanes_oncoming else ()),
         *_trees(np.random.default_rng([seed, 1]), start_m, end_m, right, left),
         *(Thing("post", b.s_m, b.d_m, b.length_m, b.width_m, 0.0, b.high_m, 0.0) for b in road.beacons),
+        *_strips(road, start_m, end_m),
         *_buildings(np.random.default_rng([seed, 1, 1]), start_m, end_m, right, left),
     ]
     return tuple(sorted(_off_the_road(things, road, start_m, end_m), key=lambda thing: thing.s_m))
@@ -115,6 +119,17 @@ def _rails(road: Road, start_m: float, end_m: float) -> list[Thing]:
     return [
         Thing("rail", float(s), d, RAIL_LENGTH_M, 0.12, RAIL_LOW_M, RAIL_HIGH_M, 0.0) for s in middles for d in sides
     ]
+
+
+def _strips(road: Road, start_m: float, end_m: float) -> list[Thing]:
+    """Pieces of each strip; on the outside of a bend they are longer, so that no gaps open between them."""
+    things = []
+    for strip in road.strips:
+        first, last = max(strip.from_m, start_m), min(strip.to_m, end_m)
+        for s in np.arange(first + STRIP_PIECE_M / 2, last, STRIP_PIECE_M).tolist():
+            length = STRIP_PIECE_M * (1.0 - road.curvature_per_m(s) * strip.d_m) + 0.1
+            things.append(Thing(strip.kind, s, strip.d_m, length, strip.width_m, 0.0, strip.high_m, 0.0))
+    return things
 
 
 def _posts(start_m: float, end_m: float, right_m: float, left_m: float) -> list[Thing]:

@@ -153,6 +153,7 @@
  * @property {{center: Pixels, left: Pixels, right: Pixels}|null} path
  * @property {{left: Pixels, right: Pixels}|null} lanes
  * @property {{left: Point2[], right: Point2[]}|null} plan_lanes
+ * @property {Point2[]|null} plan_edges
  * @property {GroundPlanes|null} ground
  * @property {Record<string, {distance_m: number, sigma_m: number}>} vision_ranges  camera-only range estimates
  * @property {Ranked[]} ranking

@@ -20,7 +20,7 @@ const CHIPS = {
     ["planPoints", "Points", "LiDAR points", "cluster"],
     ["velocity", "Motion", "Relative motion over the next second", "fused"],
     ["trails", "Trails", "Relative positions over the last 3 seconds", "fused"],
-    ["planPath", "Path", "Path corridor with 1σ of its edges, and ego-lane lines", "path"],
+    ["planPath", "Path", "Path corridor with 1σ of its edges, ego-lane lines, and what runs beside the road where the path follows it", "path"],
   ],
 };
 const DEFAULTS = {

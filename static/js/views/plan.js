@@ -119,6 +119,7 @@ function draw() {
     if (layers.planPath) drawPath(ctx, view, frame.result.path);
     if (layers.planPoints) drawPoints(ctx, frame);
     if (layers.planPath && frame.display.plan_lanes) drawLanes(ctx, frame.display.plan_lanes);
+    if (layers.planPath && frame.display.plan_edges) drawEdges(ctx, frame.display.plan_edges);
     if (!modeNow() || get("labeling")?.hasObjects) drawObjects(ctx, frame, layers, labels);
     modeNow()?.draw(ctx, view, labels);
   }
@@ -181,6 +182,16 @@ function drawLanes(ctx, lanes) {
     trace(ctx, view, line);
     ctx.stroke();
   }
+}
+
+/**
+ * What runs beside the road, where the path is taken from it.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {import("../core/types.js").Point2[]} cells
+ */
+function drawEdges(ctx, cells) {
+  ctx.fillStyle = color("path");
+  for (const [x, y] of cells) ctx.fillRect(view.u(y) - 1, view.v(x) - 1, 3, 3);
 }
 
 /**

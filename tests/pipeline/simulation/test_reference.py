@@ -18,7 +18,7 @@ from pipeline.simulation.sensors.gnss_model import GnssModel, OdometryModel
 from pipeline.simulation.sensors.lidar_model import LidarModel
 from pipeline.simulation.world.actors import Actor, Brake
 from pipeline.simulation.world.intersection_ways import CrossingActor
-from pipeline.simulation.world.roads import Beacon, Crossing, Road, Segment
+from pipeline.simulation.world.roads import Beacon, Crossing, Road, Segment, Strip
 
 TEXT = (Path(scenario.__file__).parent / "scenarios" / "README.md").read_text(encoding="utf-8")
 PARTS: dict[str, type[BaseModel]] = {
@@ -26,6 +26,7 @@ PARTS: dict[str, type[BaseModel]] = {
     "road": Road,
     "segment": Segment,
     "crossing": Crossing,
+    "strip": Strip,
     "beacon": Beacon,
     "ego": Ego,
     "actor": Actor,

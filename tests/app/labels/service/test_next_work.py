@@ -17,7 +17,7 @@ def test_what_is_only_proposed_is_not_labelled_yet(sqlite_database: Database) ->
     labels.log.act("propose", "Ada", lambda draft: str(draft.add("lead", LeadRange(1, 5, "none", "proposed", by))))
     first, _, left = where_next(labels, LabelScores(), None, Asked("unlabelled", 0, 1))
     assert first is not None
-    assert (first.frame, first.why, left) == (1, "who leads is only proposed", len(labels.info.t_ns))
+    assert (first.frame, first.why, left) == (1, "lead only proposed", len(labels.info.t_ns))
     act(labels, kind="accept", items=[("lead", 1)])
     following, _, left = where_next(labels, LabelScores(), None, Asked("unlabelled", 0, 1))
     assert following is not None

@@ -41,3 +41,13 @@ def test_in_a_winding_road_no_tree_or_house_stands_on_another_stretch_of_it() ->
             nearest = np.hypot(*(course - pose[:2]).T).min()
             assert nearest > 3.5 + min(thing.length_m, thing.width_m) / 2, thing
     assert any(thing.kind == "tree" for thing in beside.things)
+
+
+def test_a_strip_runs_along_its_bend_without_gaps_as_far_as_it_is_said_to() -> None:
+    bend = {"length_m": 200, "radius_m": 40}
+    kerb = {"kind": "kerb", "d_m": -5.0, "from_m": 20.0, "to_m": 120.0, "high_m": 0.12}
+    _, beside = built(segments=[bend], strips=[kerb])
+    pieces = [thing for thing in beside.things if thing.kind == "kerb"]
+    assert {thing.d_m for thing in pieces} == {-5.0}
+    assert sum(thing.length_m for thing in pieces) >= 100.0 * (40.0 + 5.0) / 40.0
+    assert (pieces[0].s_m, pieces[-1].s_m) == pytest.approx((21.0, 119.0))

@@ -1,0 +1,109 @@
+"""Experiment: is the CIPV right in streets without paint and route, and what do the road's edges contribute?
+
+Bends of 30–150 m radius between parked rows, hedges and kerbs; a car drives ahead, or nothing does. Every frame goes
+through the pipeline with the road's edges and without. Detections are given, and the truth is that of ``curves``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.evaluation.report_sections import Cell, Section, Table
+from pipeline.experiments.curves.drives import BOXES, Frames, driven
+from pipeline.experiments.curves.experiment import longest_wrong_s, share_right
+from pipeline.experiments.experiment import Experiment, ExperimentDrive
+from pipeline.experiments.streets import scenarios
+from pipeline.experiments.streets.scenarios import BESIDE, REACH_M, SPEEDS_KMH, Street
+from pipeline.params import Params, with_changes
+from pipeline.simulation.sensors.detection_model import Detections
+
+WITH, WITHOUT = "edges", "no edges"
+SETTINGS = {
+    WITH: {"path.use_gnss": False, "path.use_edges": True},
+    WITHOUT: {"path.use_gnss": False, "path.use_edges": False},
+}
+
+
+@dataclass(frozen=True)
+class StreetCase:
+    """One drive through a street."""
+
+    street: Street
+    seed: int
+
+
+Outcome = dict[str, Frames]
+
+
+def cases(short: bool) -> list[StreetCase]:
+    """Every street, every other one bending to the left first."""
+    if short:
+        return [StreetCase(Street(50.0, "hedges", "lead"), 0)]
+    streets = [Street(r, beside, ahead) for r in SPEEDS_KMH for beside in BESIDE for ahead in ("lead", "nothing")]
+    return [StreetCase(street, n % 2) for n, street in enumerate(streets)]
+
+
+def run(case: StreetCase) -> Outcome:
+    scene = scenarios.scenario(case.street, case.seed)
+    return driven(scene, REACH_M, tuple(SETTINGS), settings=SETTINGS, lines=None)
+
+
+def as_drive(case: StreetCase, outcome: Outcome) -> ExperimentDrive:
+    """The drive with the road's edges."""
+    share, frames = share_right([outcome[WITH]])
+    street = case.street
+    return ExperimentDrive(
+        f"street_{street.radius_m:.0f}_{street.beside}_{street.ahead}_{case.seed}",
+        f"{street.title}, run {case.seed}",
+        (f"Right in {100.0 * share:.1f} % of {frames} decidable frames.",),
+        scenarios.scenario(street, case.seed),
+        with_changes(Params(), SETTINGS[WITH]),
+        "both",
+        (),
+        Detections(boxes=BOXES),
+    )
+
+
+def report(cases: Sequence[StreetCase], outcomes: Sequence[Outcome]) -> Section:
+    """By what is beside the road, and all together."""
+    return Section(
+        "streets",
+        "Streets without paint and route",
+        (
+            "Given detections and a simulated VLP-16 as in the curves, speed and yaw rate from the car's bus, leads to "
+            f"{REACH_M:.0f} m. Without anything ahead a frame is right when nothing leads.",
+        ),
+        (
+            Table(
+                "CIPV right, % of decidable frames",
+                ("beside the road", "ahead", "path", "right, %", "frames", "longest wrong, s", "path error at 30 m, m"),
+                tuple(_rows(cases, outcomes)),
+                decimals=2,
+            ),
+        ),
+    )
+
+
+def _rows(cases: Sequence[StreetCase], outcomes: Sequence[Outcome]) -> Iterator[tuple[Cell, ...]]:
+    groups = sorted({(case.street.beside, case.street.ahead) for case in cases})
+    for name in (WITHOUT, WITH):
+        for beside, ahead in groups:
+            chosen = [
+                outcome[name]
+                for case, outcome in zip(cases, outcomes, strict=True)
+                if (case.street.beside, case.street.ahead) == (beside, ahead)
+            ]
+            yield (beside, ahead, name, *_figures(chosen))
+        yield ("all", "all", name, *_figures([outcome[name] for outcome in outcomes]))
+
+
+def _figures(drives: Sequence[Frames]) -> tuple[Cell, ...]:
+    share, frames = share_right(drives)
+    errors = np.abs([row[1] for drive in drives for row in drive.errors_m])
+    return 100.0 * share, frames, max(longest_wrong_s(drive) for drive in drives), float(np.nanmean(errors))
+
+
+STREETS = Experiment("streets", "streets", "Streets", cases, run, report, as_drive)

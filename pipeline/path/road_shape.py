@@ -1,0 +1,287 @@
+"""The shape of a road from what runs beside it, as a line with a sigma at each distance.
+
+Kerbs, hedges, walls, rails and rows of parked cars are parallel to the road, each at its own distance. So of all shapes
+that the road may have, the true one is that from which the cells beside it lie at the fewest distances: the
+log-likelihood of their distances under their own histogram is highest (least entropy). Nothing has to be told apart as
+left or right, kerb or car, and gaps in a row do no harm. Weighed with what roads can be (a prior of curvature), all
+shapes together give the mean and its sigma at each distance: with little beside the road the sigma is the prior's.
+
+The line keeps to the distance from the edges that the car has now."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from pipeline.common.geometry import F64
+from pipeline.params import PathParams
+from pipeline.path.corridor import nearest
+from pipeline.path.estimates import arc, samples
+from pipeline.types import EgoState
+
+_NODES_M = (20.0, 40.0)
+"""A shape is a cubic: where it is aside at these two distances, and its heading at the car."""
+_TEMPER = 0.2
+"""Cells of one car or one hedge are not independent of each other: five are worth one."""
+_BAND_M = 12.0
+_IMPROBABLE = 12.0
+_CHANCE = 1.0
+"""How many of the cells are where they are by chance, against those that line up."""
+_EDGE_M, _EDGE_CELLS, _EDGE_SHARE = 0.5, 5, 0.3
+"""An edge is so wide a strip beside the road with so many cells, and with this share of the fullest one's."""
+_CLEAR_M = 0.9
+"""Half a car's width."""
+_SOON_PER_M, _LATER_PER_M = 0.01, 0.025
+"""How much a road's curvature over the next 6 and 20 m may differ from that of the way just driven."""
+_MODEL_SIGMA_PER_M2 = 0.0004
+"""A street is no cubic."""
+
+
+class Grid(NamedTuple):
+    """Which shapes are tried: how far aside at the two nodes (m) and the heading (rad), each from −most to most."""
+
+    first_m: tuple[float, float]
+    second_m: tuple[float, float]
+    heading: tuple[float, float]
+    bin_m: float
+
+
+_WIDE = Grid((8.0, 1.0), (24.0, 2.0), (0.0, 1.0), 1.5)
+_USUAL = Grid((4.0, 0.5), (15.0, 1.25), (0.02, 0.02), 1.0)
+_FINE = Grid((1.5, 0.25), (4.5, 0.5), (0.02, 0.02), 0.5)
+_MOST_CELLS, _MOST_FINE = 150, 200
+"""Keeps the time bounded; a sweep of 16 rings has 100 to 300."""
+
+
+class Prior(NamedTuple):
+    """What roads can be, before anything beside one is seen."""
+
+    bend_sigma: float
+    """Of the curvature over 20 m, 1/m."""
+    heading_sigma: float
+    """Of the road against the car, rad."""
+    own: float
+    """Curvature of the way just driven, 1/m."""
+    own_sigma: float
+    """Of the road's next metres against it."""
+
+
+class Starts(NamedTuple):
+    """Lines from which shapes are measured, (K, 2) each; one of them at least."""
+
+    own: F64 | None
+    """The arc of own motion: wherever the road goes, it begins along it. None: not tried again yet."""
+    before: F64 | None
+    """The shape of the frame before, moved on; None where there is none."""
+
+
+def begin(before: F64 | None, ego: EgoState, dt_s: float | None, anew: bool, params: PathParams) -> Starts:
+    """Where to look for the shape. anew: also as if nothing were known of it."""
+    s = samples(params.length_m)
+    moved = moved_on(before, ego, dt_s, s) if before is not None and dt_s else None
+    if moved is not None and not anew:
+        return Starts(None, moved)
+    turning = ego.speed_mps > params.min_speed_mps
+    return Starts(arc((ego.yaw_rate_radps or 0.0) / ego.speed_mps if turning else 0.0, s)[0], moved)
+
+
+def moved_on(shape: F64, ego: EgoState, dt_s: float, s: F64) -> F64:
+    """The shape of the frame before, from the car on, parallel to itself."""
+    turned, way = (ego.yaw_rate_radps or 0.0) * dt_s, ego.speed_mps * dt_s
+    c, sn = np.cos(turned), np.sin(turned)
+    away = shape - (way * np.cos(0.5 * turned), way * np.sin(0.5 * turned))
+    line = np.column_stack([away[:, 0] * c + away[:, 1] * sn, away[:, 1] * c - away[:, 0] * sn])
+    line = _resampled(line, s)
+    turned = np.arctan2(line[1, 1], line[1, 0])  # a road that the car is not along is not the road
+    turned = turned - np.clip(turned, -0.02, 0.02)
+    c, sn = np.cos(turned), np.sin(turned)
+    return np.column_stack([line[:, 0] * c + line[:, 1] * sn, line[:, 1] * c - line[:, 0] * sn])
+
+
+def _resampled(line: F64, s: F64) -> F64:
+    """The line from beside the origin on, at ``s``, moved so that it begins there; straight beyond its end."""
+    _, along = nearest(line, np.zeros((1, 2)))
+    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    at = s + max(float(along[0]), 0.0)
+    out = np.column_stack([np.interp(at, lengths, line[:, k]) for k in (0, 1)])
+    over = np.maximum(at - lengths[-1], 0.0)
+    way = line[-1] - line[-3]
+    out = out + over[:, None] * way / max(np.hypot(*way), 1e-9)
+    return out - out[0]
+
+
+def fitted(xy: F64, blocks: F64, starts: Starts, ego: EgoState, params: PathParams) -> tuple[F64, F64]:
+    """(K, 2) the most probable shape and (K,) its sigma.
+
+    Args:
+        xy: (M, 2) cells.
+        blocks: (M,) how strongly each says that no road leads through it, in log-likelihood.
+        starts: lines from which shapes are measured.
+        ego: own motion.
+        params: of the path.
+    """
+    s = samples(params.length_m)
+    speed2 = max(ego.speed_mps, params.min_speed_mps, 0.1) ** 2
+    curvature_sigma = min(params.lateral_accel_mps2 / speed2, 0.02)
+    speed = max(ego.speed_mps, params.min_speed_mps)
+    heading_sigma = max(params.lane_keeping_sigma_mps / speed, 0.01)
+    own = (ego.yaw_rate_radps or 0.0) / speed if ego.speed_mps > params.min_speed_mps else 0.0
+    own_sigma = float(np.hypot(2.0 * params.yaw_rate_sigma_radps / speed, _SOON_PER_M))
+    if ego.yaw_rate_radps is None:
+        own_sigma = 1.0
+    prior = Prior(curvature_sigma, heading_sigma, own, own_sigma)
+    begun = [starts.before] if starts.before is not None else []
+    if starts.own is not None:
+        begun.append(_round(starts.own, xy, blocks, _WIDE, prior, s)[0])
+    found = [_round(line, xy, blocks, _USUAL, prior, s) for line in begun]
+    best = max(found, key=lambda each: each[2])
+    line, sigma, _ = _round(best[0], xy, blocks, _FINE, prior, s)
+    return line, np.sqrt(sigma**2 + params.lane_keeping_sigma_m**2 + (_MODEL_SIGMA_PER_M2 * s * s) ** 2)
+
+
+def room(line: F64, xy: F64, usual_m: float) -> tuple[float, float]:
+    """How far the corridor reaches to the left and to the right of the line: half way between the car's own side and an
+    edge as near as that, for what stands beyond the middle belongs rather to the edge; else as usual."""
+    aside, along = nearest(line, xy)
+    near = aside[(along > 0.0) & (along < _NODES_M[1])]
+    left, right = (_nearest_edge_m(side[side > _CLEAR_M]) for side in (near, -near))
+    return min(usual_m, 0.5 * (_CLEAR_M + left)), min(usual_m, 0.5 * (_CLEAR_M + right))
+
+
+def _nearest_edge_m(aside: F64) -> float:
+    """Distance of the nearest edge with enough cells; infinite without one."""
+    counts = np.bincount((aside / _EDGE_M).astype(np.intp), minlength=1)
+    full = np.flatnonzero(counts >= max(_EDGE_CELLS, _EDGE_SHARE * counts.max()))
+    return float(full[0]) * _EDGE_M if len(full) else np.inf
+
+
+def _round(line: F64, xy: F64, blocks: F64, grid: Grid, prior: Prior, s: F64) -> tuple[F64, F64, float]:
+    """The line moved to the most probable shape around it, (K,) its sigma, and the log-evidence."""
+    aside, along = nearest(line, xy)
+    keep = np.flatnonzero((along > 0.0) & (along < _NODES_M[1] + 5.0) & (np.abs(aside) < 2.0 * _BAND_M))
+    keep = keep[:: -(-len(keep) // (_MOST_FINE if grid is _FINE else _MOST_CELLS)) or 1]
+    heading, bends = _bends(line)
+    first, second, turns = (_steps(*each) for each in (grid.first_m, grid.second_m, grid.heading))
+    weights, evidence = _weights(
+        along[keep], aside[keep], blocks[keep], first, second, turns, grid.bin_m, _BAND_M, _TEMPER,
+        heading, bends, *prior, _CHANCE, _CLEAR_M, _LATER_PER_M, _IMPROBABLE,
+    )  # fmt: skip
+    mean, sigma = _moments(s, first, second, turns, weights)
+    return _shifted(line, mean, s), sigma, evidence
+
+
+def _steps(most: float, step: float) -> F64:
+    count = round(most / step)
+    return np.asarray(np.arange(-count, count + 1) * step, np.float64)
+
+
+def _bends(line: F64) -> tuple[float, F64]:
+    """Heading at the car, and (3,) mean curvature from 0 to 6, from 0 to 20 and from 20 to 40 m."""
+    way = np.diff(line, axis=0)
+    heading = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
+    from_to = ((0, 6), (0, 19), (20, 39))
+    return float(heading[0]), np.array([(heading[b] - heading[a]) / (b - a) for a, b in from_to])
+
+
+def _shifted(line: F64, aside: F64, s: F64) -> F64:
+    """The line moved along its normals by (K,) metres."""
+    way = np.gradient(line, axis=0)
+    normal = np.column_stack([-way[:, 1], way[:, 0]]) / np.maximum(np.hypot(*way.T), 1e-9)[:, None]
+    return _resampled(line + aside[:, None] * normal, s)
+
+
+def _cubic(first: F64, second: F64, heading: F64) -> tuple[F64, F64]:
+    """a, b of heading·s + a·s² + b·s³ through the nodes."""
+    b = (second - 4.0 * first + 40.0 * heading) / 32000.0
+    return (first - 20.0 * heading - 8000.0 * b) / 400.0, b
+
+
+def _moments(s: F64, first: F64, second: F64, heading: F64, weights: F64) -> tuple[F64, F64]:
+    """Mean and standard deviation of how far aside the shape is at ``s``, straight beyond the last node."""
+    h, u, w = np.meshgrid(heading, first, second, indexing="ij")
+    a, b = _cubic(u, w, h)
+    near = np.minimum(s, _NODES_M[1])
+    over = s - near
+    rows = np.stack([near, near**2 + 2.0 * near * over, near**3 + 3.0 * near**2 * over])
+    rows[0] += over
+    p = weights.ravel()
+    terms = np.stack([h.ravel(), a.ravel(), b.ravel()])
+    mean = terms @ p
+    spread = (terms - mean[:, None]) * p @ (terms - mean[:, None]).T
+    return mean @ rows, np.sqrt(np.maximum(np.einsum("ik,ij,jk->k", rows, spread, rows), 0.0))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz", "contract", "reassoc"})
+def _weights(  # type: ignore[no-untyped-def]
+    s,
+    d,
+    blocks,
+    first,
+    second,
+    heading,
+    bin_m,
+    band_m,
+    temper,
+    heading0,
+    bends,
+    bend_sigma,
+    heading_sigma,
+    own,
+    own_sigma,
+    chance,
+    clear_m,
+    later,
+    improbable,
+):  # pragma: no cover
+    """(H, U, W) probability of each shape."""
+    bins = int(2.0 * band_m / bin_m) + 3
+    count = np.zeros(bins, np.int32)
+    by_chance = chance * max(len(s) / bins, 1.0)
+    logs = np.log(np.maximum(np.arange(4 * len(s) + 8) / 4.0 - 0.5, 0.0) / by_chance + 1.0)
+    out = np.empty((len(heading), len(first), len(second)))
+    likeliest = np.inf
+    for i in range(len(heading)):
+        for j in range(len(first)):
+            for k in range(len(second)):
+                b = (second[k] - 4.0 * first[j] + 40.0 * heading[i]) / 32000.0
+                a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
+                prior = ((bends[1] + 2.0 * a + 60.0 * b) / bend_sigma) ** 2
+                prior += ((bends[2] + 2.0 * a + 180.0 * b) / bend_sigma) ** 2
+                prior += ((bends[1] + 2.0 * a + 60.0 * b - own) / later) ** 2
+                prior += ((heading0 + heading[i]) / heading_sigma) ** 2
+                prior += ((bends[0] + 2.0 * a + 18.0 * b - own) / own_sigma) ** 2
+                out[i, j, k] = 0.5 * prior
+                likeliest = min(likeliest, out[i, j, k])
+    best = -np.inf
+    s2, s3 = s * s, s * s * s
+    per_m, middle, last = 1.0 / bin_m, band_m / bin_m + 1.0, bins - 1.0  # the outer bins hold what is out of the band
+    for i in range(len(heading)):
+        for j in range(len(first)):
+            for k in range(len(second)):
+                prior = out[i, j, k]
+                if prior > likeliest + improbable:
+                    out[i, j, k] = -np.inf
+                    continue
+                b = (second[k] - 4.0 * first[j] + 40.0 * heading[i]) / 32000.0
+                a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
+                count[:] = 0
+                blocked = 0.0
+                for n in range(len(s)):
+                    aside = d[n] - heading[i] * s[n] - a * s2[n] - b * s3[n]
+                    blocked += blocks[n] if abs(aside) < clear_m else 0.0
+                    count[int(min(max(aside * per_m + middle, 0.0), last))] += 1
+                total = -blocked
+                for c in range(1, bins - 1):
+                    if count[c]:
+                        total += count[c] * logs[count[c - 1] + 2 * count[c] + count[c + 1]]
+                out[i, j, k] = temper * total - prior
+                best = max(best, out[i, j, k])
+    whole = 0.0
+    for i in range(len(heading)):
+        for j in range(len(first)):
+            for k in range(len(second)):
+                out[i, j, k] = np.exp(out[i, j, k] - best)
+                whole += out[i, j, k]
+    return out / whole, best + np.log(whole)

@@ -1,0 +1,181 @@
+"""What stands beside the road, as cells on the ground: kerbs, hedges, walls, rails, and parked cars as a row.
+
+One sweep of 16 rings shows little of an edge: a kerb on two rings, of the row of parked cars the nearest corners. Cells
+of earlier sweeps, moved by own motion, complete it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from pipeline.types import F32, F64, GROUND, I32, U8, VEHICLES, EgoState, FusedObject, Ground
+from pipeline.types.arrays import Mask
+
+REACH_M, ASIDE_M = 48.0, 24.0
+"""Farther ahead, or farther to the side, a 16-channel LiDAR shows nothing of a road's edge."""
+_BEHIND_M = -8.0
+CELL_M = 0.5
+"""One vote a cell: rings lie so close on what is near that it would outvote all that is far."""
+_LOW_M, _HIGH_M = 0.3, 2.5
+"""Above the road's own unevenness, below the crowns of trees."""
+_STEP_M, _STEP_MOST_M = 0.05, 0.25
+"""Height of a kerb: from a lowered one up to where it counts as standing."""
+_FLAT_M, _FLAT_SHARE = 0.02, 0.05
+"""A stretch of a ring is level if its heights differ by no more than a road's roughness, over so much of its range."""
+_SLANT, _SLACK_M = 1.5, 0.4
+"""A ring that climbs by h comes nearer by its share h/H of the range, H being the sensor's height over the road, and
+takes so much way for it: what takes longer is the crown of the road, no kerb."""
+_KERBS_TO_M = 30.0
+_KEPT_S = 2.5
+"""Own motion places a cell as well as it was measured for as long: 1 % of 25 m, and 0.5° of heading."""
+_DRIVES_MPS = 4.0
+"""What the LiDAR alone takes for moving may be a hedge of which ever more is seen; faster it is a vehicle."""
+_LONG_M = 6.0
+_MARGIN_M = 0.8
+_BLOCKED, _PERHAPS_A_LEAD = 4.0, 1.5
+"""Nobody drives through a hedge. A car in the way may be a parked one in a bend, or a lead; a kerb, a crown."""
+
+
+class Cells(NamedTuple):
+    """Cells of structure."""
+
+    xy: F64
+    """(M, 2) ego x, y."""
+    blocks: F64
+    """(M,) how strongly each says that no road leads through it, in log-likelihood."""
+    age_s: F64
+    """(M,) time since each was last seen."""
+    stands: Mask
+    """(M,) bool, whether it stands up: a kerb does not."""
+
+
+NONE = Cells(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
+
+
+def moved(cells: Cells, ego: EgoState, dt_s: float) -> Cells:
+    """Where the cells of ``dt_s`` ago lie now, without those too old or too far behind."""
+    turned, way = (ego.yaw_rate_radps or 0.0) * dt_s, ego.speed_mps * dt_s
+    c, s = np.cos(turned), np.sin(turned)
+    away = cells.xy - (way * np.cos(0.5 * turned), way * np.sin(0.5 * turned))
+    xy = np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s])
+    age_s = cells.age_s + dt_s
+    keep = (xy[:, 0] > _BEHIND_M) & (age_s <= _KEPT_S)
+    return Cells(xy[keep], cells.blocks[keep], age_s[keep], cells.stands[keep])
+
+
+def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int], height_m: float) -> Cells:
+    """Cells of one sweep.
+
+    Args:
+        points: (N, 4) of the sweep.
+        kind: (N,) what each was taken for; ≥ 0 the number of its cluster.
+        ring: (N,) the channel of each.
+        ground: the road below them.
+        long: clusters that are too long for a car.
+        height_m: of the sensor over the road.
+    """
+    near = np.flatnonzero((points[:, 0] > 0.0) & (points[:, 0] < REACH_M) & (np.abs(points[:, 1]) < ASIDE_M))
+    points, kind, ring = points[near], kind[near], ring[near]
+    above = ground.above(points)
+    standing = (above > _LOW_M) & (above < _HIGH_M) & (kind != GROUND)
+    low = (above < _LOW_M) & (points[:, 0] < _KERBS_TO_M)
+    kerbs = _kerbs(points[low], ring[low], above[low], height_m)
+    xy = np.vstack([points[standing, :2], kerbs]).astype(np.float64)
+    blocks = np.full(len(xy), _PERHAPS_A_LEAD)
+    blocks[: len(xy) - len(kerbs)][np.isin(kind[standing], np.array(long, dtype=np.int64))] = _BLOCKED
+    return Cells(xy, blocks, np.zeros(len(xy)), np.arange(len(xy)) < len(xy) - len(kerbs))
+
+
+def merged(before: Cells, fresh: Cells) -> Cells:
+    """All cells, one in each square of the grid, the fresh ones first."""
+    xy, blocks, age_s, stands = (np.concatenate(pair) for pair in zip(fresh, before, strict=True))
+    if not len(xy):
+        return NONE
+    at = np.floor(xy / CELL_M).astype(np.int64)
+    _, first = np.unique(at[:, 0] * 100_003 + at[:, 1], return_index=True)
+    return Cells(xy[first], blocks[first], age_s[first], stands[first])
+
+
+def without(cells: Cells, objects: Sequence[FusedObject]) -> Cells:
+    """The cells that are in none of the objects, nor right beside them."""
+    keep = np.ones(len(cells.xy), np.bool_)
+    for item in objects:
+        if item.cuboid is not None:
+            (x, y, _), (length, width, _), yaw = item.cuboid.center, item.cuboid.size, item.cuboid.yaw_rad
+            c, s = np.cos(yaw), np.sin(yaw)
+            dx, dy = cells.xy[:, 0] - x, cells.xy[:, 1] - y
+            along, across = np.abs(dx * c + dy * s), np.abs(dy * c - dx * s)
+            keep &= (along > length / 2 + _MARGIN_M) | (across > width / 2 + _MARGIN_M)
+    return Cells(cells.xy[keep], cells.blocks[keep], cells.age_s[keep], cells.stands[keep])
+
+
+def drives(item: FusedObject) -> bool:
+    """Whether it surely is a vehicle that drives."""
+    if not item.moving or item.cuboid is None or (item.speed_over_ground_mps or 0.0) < _DRIVES_MPS:
+        return False
+    return item.label in VEHICLES or max(item.cuboid.size[:2]) < _LONG_M
+
+
+def long(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int]:
+    """Clusters that are too long for a car: hedges, walls, rails."""
+    return [
+        cluster_of[item.lidar_track]
+        for item in objects
+        if item.lidar_track in cluster_of
+        and item.cuboid is not None
+        and max(item.cuboid.size[:2]) > _LONG_M
+        and item.label not in VEHICLES
+    ]
+
+
+def _kerbs(points: F32, ring: U8, above: F64, height_m: float) -> F64:
+    """(M, 2) places on kerbs: between a flat stretch of a ring and the next that is higher or lower by a kerb's height.
+    A ring climbs a kerb slantwise, so that its points in between lie along it."""
+    if not len(points):
+        return np.zeros((0, 2))
+    order = np.argsort(ring, kind="stable")  # along a ring, points come in the order in which they were measured
+    xy = points[order, :2].astype(np.float64)
+    slant = _SLANT / height_m
+    on_kerb = _between_levels(
+        xy, ring[order], above[order], _FLAT_M, _FLAT_SHARE, _STEP_M, _STEP_MOST_M, slant, _SLACK_M
+    )
+    return np.asarray(xy[on_kerb])
+
+
+def warm_up() -> None:
+    """Compile the kernel, or load it from numba's cache."""
+    _kerbs(np.zeros((2, 4), np.float32), np.zeros(2, np.uint8), np.zeros(2), 1.0)
+
+
+@numba.njit(cache=True, nogil=True)
+def _between_levels(xy, ring, above, flat_m, flat_share, step, most, slant, slack):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(N,) bool, which points lie between two level stretches of their ring, one a kerb's height above the other."""
+    out = np.zeros(len(xy), np.bool_)
+    first, last_end, last_level = 0, -1, 0.0
+    while first < len(xy):
+        low = high = total = above[first]
+        end = first
+        while end + 1 < len(xy) and ring[end + 1] == ring[first]:
+            low_with, high_with = min(low, above[end + 1]), max(high, above[end + 1])
+            if high_with - low_with > flat_m:
+                break
+            low, high, total = low_with, high_with, total + above[end + 1]
+            end += 1
+        far = np.hypot(xy[first, 0], xy[first, 1])
+        span = np.hypot(xy[end, 0] - xy[first, 0], xy[end, 1] - xy[first, 1])
+        if end - first < 4 or span < flat_share * far:
+            if end + 1 < len(xy) and ring[end + 1] != ring[first] and end == first:
+                last_end = -1
+            first += 1
+            continue
+        level = total / (end - first + 1)
+        if last_end >= 0 and ring[last_end] == ring[first]:
+            gap = np.hypot(xy[first, 0] - xy[last_end, 0], xy[first, 1] - xy[last_end, 1])
+            if step < abs(level - last_level) < most and gap < slack + slant * abs(level - last_level) * far:
+                out[last_end : first + 1] = True
+        last_end, last_level = end, level
+        first = end + 1
+    return out

@@ -1,0 +1,67 @@
+"""The path by the road's edges: frame by frame, and only where neither paint nor a route shows the road."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.params import PathParams
+from pipeline.path import road_edges
+from pipeline.path.corridor import Evidence, PathState, predict
+from pipeline.path.estimates import PathEstimate, arc, samples
+from pipeline.path.road_edges import EdgeState, Surroundings
+from pipeline.types import EgoState, Ground, Moment
+from tests.pipeline.path.lines import straight_lane
+
+PARAMS = PathParams(use_edges=True)
+EGO = EgoState(0, 8.0, 0.0)
+NOW = Moment(0, 0.1, EGO, EGO)
+FLAT = Ground(np.zeros(0, np.bool_), np.array([[0.0, 0.0, 1.0, 0.5]]), np.array([-50.0, 50.0]), np.ones(1, np.bool_))
+
+
+def between_hedges() -> Surroundings:
+    """Points a metre apart on two hedges, 4 m to the left and 3 m to the right."""
+    x = np.arange(3.0, 40.0, 0.5)
+    sides = [np.column_stack([x, np.full_like(x, y), np.full_like(x, 0.5), np.zeros_like(x)]) for y in (4.0, -3.0)]
+    points = np.vstack(sides).astype(np.float32)
+    return Surroundings(points, np.zeros(len(points), np.int32), np.zeros(len(points), np.uint8), FLAT, (), (), 0.5)
+
+
+def test_the_path_runs_along_what_stands_beside_it_in_every_frame() -> None:
+    state = EdgeState()
+    for _ in range(5):
+        state, edges = road_edges.follow(state, between_hedges(), NOW, PARAMS)
+        assert edges is not None
+        assert edges.path.center[30] == pytest.approx([30.0, 0.0], abs=0.3)
+        assert len(edges.cells) > 100
+
+
+def test_without_own_motion_or_switched_off_there_are_no_edges() -> None:
+    state, _ = road_edges.follow(EdgeState(), between_hedges(), NOW, PARAMS)
+    assert road_edges.follow(state, between_hedges(), Moment(0, 0.1, None, None), PARAMS)[1] is None
+    off = PARAMS.model_copy(update={"use_edges": False})
+    assert road_edges.follow(state, between_hedges(), NOW, off)[1] is None
+
+
+def test_with_nothing_beside_the_road_there_are_no_edges() -> None:
+    bare = between_hedges()._replace(points=np.zeros((0, 4), np.float32), kind=np.zeros(0, np.int32), ring=None)
+    assert road_edges.follow(EdgeState(), bare, NOW, PARAMS)[1] is None
+
+
+def test_paint_outweighs_edges_that_go_another_way() -> None:
+    s = samples(PARAMS.length_m)
+    edges = PathEstimate("edges", arc(0.02, s)[0], np.full(len(s), 0.3))
+    _, alone = predict(PathState(), Evidence(edges=edges), NOW, PARAMS)
+    assert alone.source == "edges"
+    assert alone.center[30, 1] > 5.0
+    _, painted = predict(PathState(), Evidence(lane=straight_lane(), edges=edges), NOW, PARAMS)
+    assert "edges" not in painted.weights
+    assert abs(painted.center[30, 1]) < 0.2
+
+
+def test_edges_have_a_say_where_paint_ends_early() -> None:
+    s = samples(PARAMS.length_m)
+    edges = PathEstimate("edges", arc(0.002, s)[0], np.full(len(s), 0.3))
+    vague = straight_lane(sigma_m=3.0)
+    _, path = predict(PathState(), Evidence(lane=vague, edges=edges), NOW, PARAMS)
+    assert path.carried_by["30"]["edges"] > 0.5

@@ -1,0 +1,64 @@
+"""What stands beside the road: kerbs in the rings, cells of earlier sweeps, and without what drives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.path import road_structure
+from pipeline.path.road_structure import Cells
+from pipeline.simulation.sensors.lidar import Lidar
+from pipeline.types import F64, GROUND, EgoState, Ground, Sweep
+
+HEIGHT_M, KERB_M, KERB_HIGH_M = 0.5, 3.0, 0.12
+FLAT = Ground(
+    np.zeros(0, np.bool_), np.array([[0.0, 0.0, 1.0, HEIGHT_M]]), np.array([-50.0, 50.0]), np.ones(1, np.bool_)
+)
+
+
+def swept(boxes: F64, tilt: float = 0.0) -> Sweep:
+    return Lidar().sweep_of(boxes, np.array([-HEIGHT_M, 0.0, tilt]), np.random.default_rng(0), 0)
+
+
+def box(x: float, y: float, length: float, width: float, high: float) -> list[float]:
+    return [x, y, high / 2 - HEIGHT_M, length / 2, width / 2, high / 2, 1.0, 0.0, 6.0, 0.0, 0.0, 0.0, 1.0]
+
+
+def cells_of(sweep: Sweep) -> Cells:
+    kind = np.where(FLAT.above(sweep.points) < 0.25, GROUND, 0).astype(np.int32)
+    return road_structure.seen(sweep.points, kind, sweep.ring, FLAT, (), HEIGHT_M)
+
+
+def test_a_kerb_is_seen_along_its_line() -> None:
+    pavement = np.array([box(20.0, -KERB_M - 1.0, 60.0, 2.0, KERB_HIGH_M)])
+    xy = cells_of(swept(pavement)).xy
+    along = xy[(xy[:, 0] > 3.0) & (xy[:, 0] < 10.0)]
+    assert len(along) > 10
+    assert np.median(along[:, 1]) == pytest.approx(-KERB_M, abs=0.15)
+
+
+def test_the_fall_of_a_road_to_its_side_is_no_kerb() -> None:
+    assert len(cells_of(swept(np.zeros((0, 13)), tilt=0.025)).xy) == 0
+
+
+def test_what_stands_counts_and_walls_block_more_than_cars() -> None:
+    wall = swept(np.array([box(15.0, 5.0, 20.0, 0.4, 1.5)]))
+    kind = np.where(FLAT.above(wall.points) < 0.25, GROUND, 7).astype(np.int32)
+    as_car = road_structure.seen(wall.points, kind, wall.ring, FLAT, (), HEIGHT_M)
+    as_wall = road_structure.seen(wall.points, kind, wall.ring, FLAT, (7,), HEIGHT_M)
+    assert len(as_car.xy) == len(as_wall.xy) > 20
+    assert as_wall.blocks.max() > as_car.blocks.max()
+
+
+def test_cells_move_with_the_car_and_are_forgotten() -> None:
+    cells = Cells(np.array([[10.0, 2.0], [-7.5, 0.0]]), np.ones(2), np.zeros(2), np.ones(2, np.bool_))
+    moved = road_structure.moved(cells, EgoState(0, 10.0, 0.0), 0.1)
+    assert moved.xy == pytest.approx(np.array([[9.0, 2.0]])), "the other is too far behind"
+    assert len(road_structure.moved(cells, EgoState(0, 0.0, 0.0), 3.0).xy) == 0
+
+
+def test_one_cell_of_the_grid_is_one_vote() -> None:
+    before = Cells(np.array([[10.1, 2.1], [20.0, 2.0]]), np.ones(2), np.array([0.5, 0.5]), np.ones(2, np.bool_))
+    fresh = Cells(np.array([[10.2, 2.2], [10.3, 2.3]]), np.ones(2), np.zeros(2), np.ones(2, np.bool_))
+    merged = road_structure.merged(before, fresh)
+    assert sorted(merged.age_s.tolist()) == [0.0, 0.5]
