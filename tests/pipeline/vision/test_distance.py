@@ -181,7 +181,7 @@ def test_a_few_wrong_pairs_do_not_turn_the_law() -> None:
         ([50.0, 0.0], [30.0, 31.0], "positive"),
         ([50.0, 60.0], [30.0, -1.0], "positive"),
         ([50.0, math.nan], [30.0, 31.0], "positive"),
-        ([50.0, 60.0], [30.0], "no pairs"),
+        ([50.0, 60.0], [30.0], "2 heights but 1 distances"),
     ],
 )
 def test_a_law_cannot_be_fitted_to(heights: list[float], distances: list[float], complaint: str) -> None:
