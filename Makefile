@@ -9,7 +9,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: install demo test check check-types check-layers check-style fix bench docs screenshots suite soak fuzz sbom lock clean
 
-install: .venv/.installed
+install: .venv/.compiled
 
 # The lock pins every version; --no-deps-like strictness comes from installing it first and the project without deps.
 .venv/.installed: pyproject.toml requirements.lock
@@ -17,6 +17,9 @@ install: .venv/.installed
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "uv>=0.5"
 	@$(BIN)/uv pip install --quiet --python $(BIN)/python -r requirements.lock
 	@$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps -e .
+	@touch $@
+
+.venv/.compiled: .venv/.installed
 	@echo "compiling what a first start would wait for, once"
 	@$(BIN)/python -m app.commands.support.first_start
 	@touch $@
@@ -26,10 +29,11 @@ demo: install
 
 # A file's tests stay in one process: they share servers and browsers. Three processes on two cores too: many tests wait for
 # a browser or a sensor's next packet. tests/conftest.py orders the files, the long ones first.
-test: install check
+test: .venv/.installed
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync .venv/.compiled check-types check-layers check-style
 	@$(BIN)/python -m pytest -q --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder $(TESTS)
 
-check: install
+check: .venv/.installed
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync check-types check-layers check-style
 
 check-types:

@@ -9,6 +9,7 @@ hangs while it holds Python's own lock stops this watch, too; a supervisor that 
 from __future__ import annotations
 
 import logging
+import os
 import sys
 import threading
 import time
@@ -59,6 +60,15 @@ class _Heart:
     doing: str | None = None
     since_s: float = 0.0
     retired: bool = False
+
+
+def busy_share() -> float:
+    """How much more work the machine has than processors: so much longer everything may take. 0 where the system does
+    not say."""
+    try:
+        return os.getloadavg()[0] / (os.cpu_count() or 1)
+    except (AttributeError, OSError):
+        return 0.0
 
 
 class _OfThread(threading.local):
@@ -137,7 +147,8 @@ class Watchdog:
     def allowed_s(self, doing: str) -> float:
         """How long something may take."""
         took_s = self._took_s.get(doing, ())
-        return max(took_s) + self._patience_s if len(took_s) >= _FEWEST else self._first_s
+        idle_s = max(took_s) + self._patience_s if len(took_s) >= _FEWEST else self._first_s
+        return idle_s * max(1.0, busy_share())
 
     def look(self, now_s: float, late_s: float = 0.0) -> list[Stuck]:
         """Retire who hangs, and tell. late_s: how much later than wanted this look is."""

@@ -10,6 +10,17 @@ import pytest
 from app.core.watchdog import Retired, Stuck, Watchdog, at_work
 
 
+@pytest.fixture(autouse=True)
+def _idle_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.core.watchdog.os.getloadavg", lambda: (0.0, 0.0, 0.0))
+    monkeypatch.setattr("app.core.watchdog.os.cpu_count", lambda: 2)
+
+
+def test_on_a_busy_machine_everything_may_take_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.core.watchdog.os.getloadavg", lambda: (10.0, 4.0, 1.0))
+    assert Watchdog(first_s=30.0).allowed_s("the network") == pytest.approx(150.0)
+
+
 def worked(watchdog: Watchdog, doing: str, took_s: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
     """Each began and ended, on a clock that is put."""
     for took in took_s:
