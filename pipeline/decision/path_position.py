@@ -36,6 +36,8 @@ _WIDEST_M, _LONGEST_M = 3.2, 6.0
 _CAR_LENGTH_M, _SLOWEST_MPS, _MOST_TURNED = 4.5, 5.0, 0.2
 """A car that changes lanes faster than the second is turned by its sideways over its forward speed, at most the third;
 its nose is this car length further on."""
+_SURELY_RIGID = 0.5
+"""``rigid_mps`` is what is left of the slower side's speed after two standard deviations: less than the speed itself."""
 _NO_SIDES = ((nan, nan), (nan, nan))
 _SUREST_M = 0.01
 SURE = 4.0
@@ -117,11 +119,11 @@ def believed_mps(sideways_mps: float | None, item: FusedObject) -> float:
 
 
 def _rigid_share(item: FusedObject) -> float:
-    """How much of its sideways speed is motion of the whole object. Nothing is known of what the LiDAR does not
-    follow."""
+    """How much of its sideways speed is motion of the whole object: all of it where both sides surely move by half of
+    it or more. Nothing is known of what the LiDAR does not follow."""
     if item.rigid_mps is None or item.velocity_mps is None or not item.velocity_mps[1]:
         return 1.0
-    return min(max(item.rigid_mps / item.velocity_mps[1], 0.0), 1.0)
+    return min(max(item.rigid_mps / item.velocity_mps[1] / _SURELY_RIGID, 0.0), 1.0)
 
 
 def place(

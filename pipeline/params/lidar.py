@@ -49,7 +49,7 @@ class ClusterParams(Section):
 
     tolerance_m: float = slider(0.9, 0.1, 3.0, 0.05, "m", "Points closer together than this belong to one cluster")
     divide_m: float = slider(
-        0.6, 0.1, 3.0, 0.05, "m", "The same inside a cluster wider than any vehicle; equal to the tolerance: off"
+        0.7, 0.1, 3.0, 0.05, "m", "The same inside a cluster wider than any vehicle; equal to the tolerance: off"
     )
     z_weight: float = slider(0.4, 0.05, 1.0, 0.05, "", "Weight on height: below 1 joins rings that are 2° apart")
     min_points: int = slider(4, 1, 50, 1, "points", "Smaller clusters are dropped")

@@ -101,7 +101,11 @@ function show(fit) {
   values.replaceChildren(
     ...Object.entries(sigmas).flatMap(([name, sigma]) => [
       el("dt", { textContent: label(name) }),
-      el("dd", { textContent: number(name, Number(changes[name])) }, el("small", { textContent: ` ± ${number(name, sigma)}` })),
+      el(
+        "dd",
+        { textContent: number(name, Number(changes[name])) },
+        el("small", { textContent: ` ± ${number(name, sigma)}` }),
+      ),
     ]),
   );
   text(said, fit.result.text);

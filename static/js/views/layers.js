@@ -20,7 +20,12 @@ const CHIPS = {
     ["planPoints", "Points", "LiDAR points", "cluster"],
     ["velocity", "Motion", "Relative motion over the next second", "fused"],
     ["trails", "Trails", "Relative positions over the last 3 seconds", "fused"],
-    ["planPath", "Path", "Path corridor with 1σ of its edges, ego-lane lines, and what runs beside the road where the path follows it", "path"],
+    [
+      "planPath",
+      "Path",
+      "Path corridor with 1σ of its edges, ego-lane lines, and the road edges that the path follows",
+      "path",
+    ],
   ],
 };
 const DEFAULTS = {

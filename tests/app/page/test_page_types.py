@@ -16,6 +16,7 @@ from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
+from app.web.routes.alignment_fit import FitResult
 from app.web.server import create_app
 from tests.app.engine.recording_helpers import Recording
 from tests.app.web.serving import WAIT_S, running, serving
@@ -100,6 +101,7 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "Job": job,
         "AlignmentScore": get("/api/alignment/score"),
         "AlignmentFit": get("/api/alignment/fit"),
+        "AlignmentFitResult": dict.fromkeys(FitResult.model_fields),
         **labelled(engine, client),
     }
 

@@ -119,6 +119,7 @@ WORDS: dict[str, Rule] = {
     "selected": "people",
     "hides_3d": "people",
     "held": "people",
+    "own": "people",
 }
 
 
