@@ -37,7 +37,7 @@ _CAR_LENGTH_M, _SLOWEST_MPS, _MOST_TURNED = 4.5, 5.0, 0.2
 """A car that changes lanes faster than the second is turned by its sideways over its forward speed, at most the third;
 its nose is this car length further on."""
 _SURELY_RIGID = 0.5
-"""``rigid_mps`` is what is left of the slower side's speed after two standard deviations: less than the speed itself."""
+"""``rigid_mps`` is what is left of the slower side's speed after two standard deviations: less than that speed."""
 _NO_SIDES = ((nan, nan), (nan, nan))
 _SUREST_M = 0.01
 SURE = 4.0
