@@ -198,11 +198,15 @@ def _probable(who: Candidate) -> Answer:
     there = who.item.existence if who.item.existence is not None else 1.0
     in_path = _in_path_probability(who) if who.odds > 0.0 else 1.0  # what is out of the path has a gate for that
     asked = (
-        (there, params.stay_probability if who.leads else params.become_existence),
+        (there, _needed_existence(who)),
         (in_path, params.stay_probability if who.leads else params.become_probability),
     )
     probability, limit = min(asked, key=lambda pair: pair[0] - pair[1])
     return probability >= limit, probability, limit
+
+
+def _needed_existence(who: Candidate) -> float:
+    return who.params.stay_probability if who.leads else who.params.become_existence
 
 
 def _in_path_probability(who: Candidate) -> float:
@@ -213,7 +217,7 @@ def _in_path_probability(who: Candidate) -> float:
 
 def _improbable(who: Candidate) -> str:
     there = who.item.existence
-    if there is not None and there < (who.params.stay_probability if who.leads else who.params.become_existence):
+    if there is not None and there < _needed_existence(who):
         return f"only {100 * there:.0f} % likely to exist"
     return f"only {100 * _in_path_probability(who):.0f} % likely to be in path"
 
