@@ -32,8 +32,8 @@ CLEAR_SHARE = 0.8
 _SILENT_RAYS = 10
 """So many rays or more would have to be swallowed for a vehicle to be silent: two rings, 1° each."""
 _SILENT_M = 36.0
-"""Nearer than this the body of a vehicle returns rays, whatever its paint. Measured to 30 m (see ``existence``); a place
-at 30 m reaches this far behind it."""
+"""Nearer than this the body of a vehicle returns rays, whatever its paint. Measured for vehicles within 30 m (see
+``existence``), whose places reach this far."""
 _SLICE_M, _MOST_SLICES = 2.0, 24
 _AHEAD = 0.5
 """Elevations of the rings are measured within 27° of straight ahead (as a tangent)."""
