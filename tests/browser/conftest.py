@@ -7,11 +7,13 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Page, Request, ViewportSize, expect, sync_playwright
+from starlette.datastructures import MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.bench.page.devtools import CHROMIUM, FLAGS
 from app.core.server_address import listen_socket
@@ -26,6 +28,7 @@ from pipeline.types import U8, RawBoxes
 from pipeline.vision.detector import Detector
 
 WAIT_MS = 180_000
+ColorScheme = Literal["dark", "light"]
 START = 60
 """A frame of the scenario with traffic around."""
 expect.set_options(timeout=WAIT_MS)
@@ -55,6 +58,23 @@ class CountedDetector:
         return RawBoxes(self.name, np.zeros((0, 4), np.float32), np.zeros(0, np.float32), ())
 
 
+class FilesStay:
+    """Lets a browser keep the page's files, which nobody changes while tests run: asking about each of them again is
+    half of what opening a page costs. (What the server really says of them: tests/app/web/test_api.py.)"""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def say(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                MutableHeaders(scope=message)["cache-control"] = "max-age=3600"
+            await send(message)
+
+        stays = scope["type"] == "http" and scope["path"].endswith((".js", ".css", ".svg"))
+        await self._app(scope, receive, say if stays else send)
+
+
 @dataclass
 class Site:
     """A running dashboard. ``stop`` ends its server as a crash would for the pages."""
@@ -76,7 +96,9 @@ class Site:
     def start(self) -> None:
         bound, is_ready = listen_socket("127.0.0.1", self.port, strict=True), threading.Event()
         self.port = bound.getsockname()[1]
-        server = Server(create_app(self.engine), self.address, lambda _: is_ready.set())
+        app = create_app(self.engine)
+        app.add_middleware(FilesStay)
+        server = Server(app, self.address, lambda _: is_ready.set())
         self._server, self._thread = server, threading.Thread(target=lambda: server.run(sockets=[bound]))
         self._thread.start()
         assert is_ready.wait(60)
@@ -138,20 +160,22 @@ class Pages:
         self._browser = browser
         self._spare: list[Page] = []
 
-    def take(self, width: int, height: int, **context: Any) -> Page:
+    def take(self, width: int, height: int, color_scheme: ColorScheme, **context: Any) -> Page:
         """A page that remembers nothing; a new one for a context of its own."""
-        size = {"width": width, "height": height}
+        size = ViewportSize(width=width, height=height)
         if context or not self._spare:
-            return self._browser.new_page(**{"viewport": size, "color_scheme": "dark"} | context)
+            return self._browser.new_page(viewport=size, color_scheme=color_scheme, **context)
         page = self._spare.pop()
         page.set_viewport_size(size)
+        page.emulate_media(color_scheme=color_scheme)
         return page
 
     def put_back(self, page: Page, origin: str) -> None:
         """Without anything that it or its test left. origin: whose data it may hold."""
         if page.is_closed():
             return
-        page.goto("about:blank")  # first: a page may store something as it is left
+        # first: a page may store something as it is left. Of the same server: another's would take a process of its own
+        page.goto(f"{origin}/icon.svg")
         devtools = page.context.new_cdp_session(page)
         devtools.send("Storage.clearDataForOrigin", {"origin": origin, "storageTypes": "all"})
         devtools.detach()
@@ -184,7 +208,12 @@ def opening(pages: Pages, site: Site) -> Iterator[OpenPage]:
     opened: list[tuple[Page, dict[str, Callable[[Any], None]], bool]] = []
 
     def begin(
-        width: int = 1440, height: int = 900, address: str | None = None, expects: tuple[str, ...] = (), **context: Any
+        width: int = 1440,
+        height: int = 900,
+        address: str | None = None,
+        expects: tuple[str, ...] = (),
+        color_scheme: ColorScheme = "dark",
+        **context: Any,
     ) -> Page:
         own = (address or site.address).partition("/#")[0]
 
@@ -196,7 +225,7 @@ def opening(pages: Pages, site: Site) -> Iterator[OpenPage]:
             if _leaves(request.url, own):
                 complaints.append(request.url)
 
-        page = pages.take(width, height, **context)
+        page = pages.take(width, height, color_scheme, **context)
         listeners = {"console": said, "request": asked, "pageerror": lambda error: complaints.append(str(error))}
         opened.append((page, listeners, own == site.address and not context))
         page.set_default_timeout(WAIT_MS)
