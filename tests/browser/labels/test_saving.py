@@ -24,7 +24,7 @@ def test_two_people_see_each_other_and_choose_when_they_disagree(
     is_saved(hand.page)
     other = open_page()
     wait_for_frame(other, START)
-    second = begin(other, "Bob")
+    second = begin(other, "Cleo")  # has done nothing in other tests that could be taken back
     second.keys("Home")
     is_at(other, 0)
     is_at(hand.page, START)  # each has a playhead of its own, and watchers stay where they are
@@ -43,17 +43,17 @@ def test_two_people_see_each_other_and_choose_when_they_disagree(
     expect(hand.page.locator(f".track-row[data-id='{made}']")).to_contain_text("truck")
 
     line.deaf = True  # the other's change does not reach this page before its own act
-    labels.act("Bob", {"kind": "relabel", "track": made, "revision": labels.tracks[made]["revision"], "label": "bus"})
+    labels.act("Cleo", {"kind": "relabel", "track": made, "revision": labels.tracks[made]["revision"], "label": "bus"})
     hand.keys("Shift+T")
     dialog = hand.page.get_by_role("dialog", name="Two people changed the same label")
-    expect(dialog).to_contain_text("Bob")
+    expect(dialog).to_contain_text("Cleo")
     expect(dialog).to_contain_text("bus")
     assert labels.tracks[made]["label"] == "bus", "nothing was written"
     line.deaf = False
     dialog.get_by_role("button", name="Keep mine").click()
     labels.wait_for(lambda now: now.tracks[made]["label"] == "car")
     is_saved(hand.page)
-    assert [each["person"] for each in labels.get(f"/history?kind=track&id={made}")] == ["Ada", "Bob", "Bob", "Ada"]
+    assert [each["person"] for each in labels.get(f"/history?kind=track&id={made}")] == ["Ada", "Cleo", "Cleo", "Ada"]
 
 
 def test_leads_that_overlap_are_a_conflict_shown_with_both_ranges(hand: Hand, labels: Labels, line: Line):
