@@ -5,7 +5,7 @@ The LiDAR sits in the bumper, 1.6 m ahead of the camera and 0.8 m below it, so t
 
 from __future__ import annotations
 
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -41,14 +41,20 @@ def calibration(model: CameraModel = ORDINARY) -> CameraCalibration:
     return CameraCalibration(K, distortion, inverse(T_ego_camera), WIDTH, HEIGHT)
 
 
+@lru_cache(maxsize=2)
+def _prepared(model: CameraModel, seed: int) -> tuple[Sensor, backdrop.Ground]:
+    """What no picture changes, and takes as long as a dozen of them: who opens a scenario again has it at once."""
+    camera = calibration(model)
+    return Sensor(camera, model, seed), backdrop.Ground(camera, -LIDAR_HEIGHT_M, seed)
+
+
 class DrawnCamera:
     """Renders the world of one scenario. Static content is prepared once."""
 
     def __init__(self, road: Road, roadside: Roadside, seed: int, model: CameraModel = ORDINARY) -> None:
         self.camera = calibration(model)
-        self._sensor = Sensor(self.camera, model, seed)
+        self._sensor, self._ground = _prepared(model, seed)
         self._road, self._roadside = road, roadside
-        self._ground = backdrop.Ground(self.camera, -LIDAR_HEIGHT_M, seed)
         self._sky = backdrop.sky(WIDTH, self._ground.horizon, seed)
 
     def picture(self, world: World) -> U8:
