@@ -92,7 +92,9 @@ def _update(mean, cov, z, R):  # type: ignore[no-untyped-def]  # pragma: no cove
             for j in range(4):
                 keep[i, j] = (1.0 if i == j else 0.0) - (gain[i, j] if j < 2 else 0.0)
         joseph = keep @ cov[t] @ keep.T + gain @ R @ gain.T
-        new_cov[t] = (joseph + joseph.T) / 2
+        for i in range(4):
+            for j in range(4):
+                new_cov[t, i, j] = (joseph[i, j] + joseph[j, i]) / 2
     return new_mean, new_cov
 
 

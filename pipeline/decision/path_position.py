@@ -199,13 +199,18 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
     there, sideways speed, then the numbers of ``Place`` as far as ``sigma_m``. half_width: of a path that has no edges
     of its own, else 0."""
     middles = np.empty((len(rows), 2))
-    middles[:, 0] = 0.25 * (rows[:, 0] + rows[:, 2] + rows[:, 4] + rows[:, 6])
-    middles[:, 1] = 0.25 * (rows[:, 1] + rows[:, 3] + rows[:, 5] + rows[:, 7])
+    for n in range(len(rows)):
+        for k in range(2):
+            middles[n, k] = 0.25 * (rows[n, k] + rows[n, 2 + k] + rows[n, 4 + k] + rows[n, 6 + k])
     outlines = _outlines(rows, _headings(center, nearest(center, middles)[1], step))
     aside, reached = nearest(center, outlines)
     headings = _headings(center, reached[::5], step)
-    edges = np.ascontiguousarray(rows[:, 14:18]).reshape(-1, 2)
-    beside, _ = nearest(center, np.where(np.isfinite(edges), edges, 0.0))  # its kernel is told that nothing is NaN
+    edges = np.zeros((2 * len(rows), 2))
+    for n in range(len(edges)):
+        for k in range(2):
+            edge = rows[n // 2, 14 + 2 * (n % 2) + k]
+            edges[n, k] = edge if np.isfinite(edge) else 0.0  # the kernel below is told that nothing is NaN
+    beside, _ = nearest(center, edges)
     out = np.empty((len(rows), 11))
     for n in range(len(rows)):
         offsets, ahead = aside[5 * n : 5 * n + 5], reached[5 * n]

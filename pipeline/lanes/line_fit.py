@@ -165,7 +165,8 @@ def _vote(slope, inverse, weight, height, headings, bends, pitches):  # type: ig
                 if score > best_score:
                     best_score = score
                     best[0], best[1], best[2] = heading, bend, pitch
-                    best_histogram[:] = histogram
+                    for k in range(len(histogram)):
+                        best_histogram[k] = histogram[k]
     return best, best_histogram
 
 

@@ -99,7 +99,8 @@ def _fit(
     flat = np.array([0.0, 0.0, 1.0, 0.0])
     for s in range(segments):
         a, b = starts[s], starts[s + 1]
-        planes[s], raggedness[s] = refine(x[a:b], y[a:b], z[a:b], flat, iterations, lowest, seed_m, distance_m, min_nz)
+        plane, raggedness[s] = refine(x[a:b], y[a:b], z[a:b], flat, iterations, lowest, seed_m, distance_m, min_nz)
+        _set_row(planes, s, plane)
     fitted = np.isfinite(raggedness)
     if not fitted.any():
         planes[:] = np.nan
@@ -114,8 +115,15 @@ def _fit(
         a, b = starts[s], starts[s + 1]
         plane, ragged = refine(x[a:b], y[a:b], z[a:b], neighbour, iterations, lowest, seed_m, distance_m, min_nz)
         fitted[s] = np.isfinite(ragged) and _meets(plane, neighbour, shared, distance_m)
-        planes[s] = plane if fitted[s] else neighbour
+        _set_row(planes, s, plane if fitted[s] else neighbour)
     return planes, edges, fitted
+
+
+@numba.njit(cache=True, nogil=True)
+def _set_row(rows: F64, index: int, row: F64) -> None:
+    """rows[index] = row, which would take seconds to compile: numba's message for rows of another length does."""
+    for k in range(len(row)):
+        rows[index, k] = row[k]
 
 
 @numba.njit(cache=True, nogil=True)

@@ -45,7 +45,7 @@ def refine(
         normal, across, along = _flattest(cov)
         if along < MIN_SPREAD_M * MIN_SPREAD_M or normal[2] < min_nz:
             return plane, np.inf
-        plane[:3] = normal
+        plane[0], plane[1], plane[2] = normal[0], normal[1], normal[2]
         plane[3] = -(normal[0] * mean[0] + normal[1] * mean[1] + normal[2] * mean[2])
         raggedness = np.sqrt(max(across, 0.0)) * len(x) / count
         high = distance_m + max(seed_m - distance_m, 0.0) * max(iterations - 1 - k, 0) / max(iterations - 1, 1)

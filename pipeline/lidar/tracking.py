@@ -151,7 +151,8 @@ def _looks(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
         heading = yaw + np.pi / 2 if across else yaw
         reach = (width if across else length) / 2 * (1.0 if np.cos(heading) >= 0.0 else -1.0)
         place[i, 0], place[i, 1] = rows[i, 0] - reach * np.cos(heading), rows[i, 1] - reach * np.sin(heading)
-        shape[i] = rows[i, 7:]
+        for k in range(5):
+            shape[i, k] = rows[i, 7 + k]
         shape[i, 0] = max(points, MIN_GATE_POINTS)
         spread_over = length * width / (max(length, THINNEST_M) * max(width, THINNEST_M))
         shape[i, 1] *= spread_over * max(1.0, MIN_GATE_POINTS / max(points, 1.0))

@@ -123,6 +123,10 @@ def _measure(mean, cov, i, value, var):  # type: ignore[no-untyped-def]  # pragm
     """State i measured (Joseph form)."""
     gain = cov[:, i] / (cov[i, i] + var)
     keep = np.eye(3)
-    keep[:, i] -= gain
-    P = keep @ cov @ keep.T + var * np.outer(gain, gain)
+    for k in range(3):
+        keep[k, i] -= gain[k]
+    P = keep @ cov @ keep.T
+    for a in range(3):
+        for b in range(3):
+            P[a, b] += var * (gain[a] * gain[b])
     return mean + gain * (value - mean[i]), 0.5 * (P + P.T)

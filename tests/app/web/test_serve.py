@@ -139,7 +139,7 @@ def test_whoever_ends_it_its_recording_is_closed_first(tmp_path: Path, numbers: 
                     stream.recv(60)  # a frame or a state: something has happened
                 for number in numbers:
                     program.send_signal(number)
-                program.communicate(timeout=5)
+                program.communicate(timeout=60)
         assert program.returncode == 0
         (session,) = tmp_path.iterdir()
         assert session.read_bytes().endswith(b"\x89MCAP0\r\n"), "its index and its end are there"
