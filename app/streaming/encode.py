@@ -11,8 +11,9 @@
                         ``points`` × uint8         ring, 0 = lowest beam
                         ``points`` × uint8         ms before the sweep's newest point; 255 unknown
 
-The header holds ``state`` (playback), ``result`` (docs/reference/results.md) and ``display``: geometry projected by the
-alignment in use, in pixels of the sent picture, so that no view projects anything.
+The header holds ``state`` (playback), ``result`` (docs/reference/results.md), ``display``: geometry projected by the
+alignment in use, in pixels of the sent picture, so that no view projects anything, and of live sensors ``row``: the
+frame's value of each column of the timeline, which a recording's whole run gives otherwise.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from app.drive.frame_rows import row_json, row_of
 from app.engine.snapshot import Snapshot
 from app.streaming.picture import MAX_WIDTH_PX, SentPicture, encode_picture
 from app.streaming.points import point_arrays
@@ -58,6 +60,7 @@ class Encoder:
             "points": len(result.layers.points),
             "result": to_json(result),
             "display": display_json(result, aligned, scale),
+            "row": row_json(row_of(frame, result)) if snapshot.live else None,
         }
         return pack(header, picture.jpeg if picture else b"", point_arrays(frame, result, aligned, scale))
 

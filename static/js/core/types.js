@@ -184,6 +184,7 @@
  * @property {State} state
  * @property {Result} result
  * @property {Display} display
+ * @property {import("../drive/types.js").Row|null} row  of live sensors only
  * @property {boolean} [isLate]
  * @property {Picture|null} picture
  * @property {ImageBitmap|null} bitmap

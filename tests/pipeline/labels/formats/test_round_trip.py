@@ -15,6 +15,7 @@ from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats import base, native
 from pipeline.labels.formats.base import LabeledDrive
+from pipeline.labels.formats.parts import EVERYTHING
 from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.recording.rewrite import clip
@@ -33,16 +34,18 @@ def there_and_back(labels: LabelSet, here: LabeledDrive, name: FormatName, folde
 
 
 def wanted(labels: LabelSet, name: FormatName) -> LabelSet:
-    match name:
-        case "kitti" | "kitti-tracking":
-            return plain(labels)
-        case "nuscenes":
-            return plain(labels, boxes=False)
-        case "coco":
-            return plain(labels, cuboids=False)
-        case "csv":
-            return replace(plain(labels), tracks=(), leads=tuple(r for r in labels.leads if r.state != "rejected"))
-    return labels
+    """What a format can hold of the labels, by its registration."""
+    holds = FORMATS[name].holds
+    if holds == EVERYTHING:
+        return labels
+    if "leads" in holds:
+        return replace(plain(labels), tracks=(), leads=tuple(r for r in labels.leads if r.state != "rejected"))
+    return plain(labels, cuboids="cuboids" in holds, boxes="boxes" in holds)
+
+
+def is_anonymous(name: FormatName) -> bool:
+    """It does not say which sightings are of one track."""
+    return "identities" not in FORMATS[name].holds and "leads" not in FORMATS[name].holds
 
 
 @pytest.mark.parametrize("name", [name for name in FORMATS if name != "mcap"])
@@ -54,12 +57,12 @@ def test_what_can_be_held_comes_back(name: FormatName, monkeypatch: pytest.Monke
     @settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
     @given(label_sets())
     def holds(labels: LabelSet) -> None:
-        if name == "kitti" and not plain(labels).tracks:
+        if is_anonymous(name) and not plain(labels).tracks:
             return  # nothing labelled gives no file
         if name == "csv":
             labels = replace(labels, leads=_apart(labels.leads))
         with tempfile.TemporaryDirectory() as folder:
-            same = assert_same_alone if name == "kitti" else assert_same
+            same = assert_same_alone if is_anonymous(name) else assert_same
             same(there_and_back(labels, here, name, Path(folder)), wanted(labels, name), 2e-5)
 
     holds()
