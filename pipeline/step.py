@@ -82,7 +82,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     lidar_state, lidar_tracks = lidar_tracking.track(state.lidar, sweep.obstacles, now.dt_s, params.lidar_tracking)
     clock.lap("lidar_tracking")
 
-    # Camera: the detector's boxes, each with a distance from its height, followed from picture to picture
+    # Camera: the detector's boxes, each with a distance from its height, followed from image to image
     boxes = _measure_boxes(frame, aligned, params)
     boxes = returns.range_boxes(boxes, sweep, aligned, params.fusion)
     clock.lap("distance")
@@ -91,7 +91,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     )
     clock.lap("vision_tracking")
 
-    # Fusion: a cluster and a box that overlap in the picture are one object
+    # Fusion: a cluster and a box that overlap in the image are one object
     fusion_state, fused = fusion.fuse(
         state.fusion, lidar_tracks, vision_tracks, aligned, frame.picture_size, params.fusion
     )
@@ -227,5 +227,5 @@ def _measure_boxes(
 
 
 def _vehicle_boxes(boxes: tuple[VisionMeasurement, ...] | None) -> list[Box]:
-    """Where vehicles hide the road in the picture."""
+    """Where vehicles hide the road in the image."""
     return [each.detection.bbox for each in boxes or () if each.detection.label in VEHICLES]

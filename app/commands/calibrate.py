@@ -1,5 +1,5 @@
 """`cipv calibrate distance` fits the paper's regression from box height to distance for another camera, `cipv calibrate
-alignment` where LiDAR points are in the picture."""
+alignment` where LiDAR points are in the image."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Calibrate:
     """
 
     what: tyro.conf.Positional[Literal["distance", "alignment"]]
-    """What to fit: distance from box height, or where LiDAR points are in the picture"""
+    """What to fit: distance from box height, or where LiDAR points are in the image"""
     source: SourceOptions
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     truth: Literal["labels", "lidar"] = "labels"

@@ -32,7 +32,7 @@ class ConvertCalibration:
     to: Literal["kitti", "ros", "opencv", "rig"] = "rig"
     """Format to write"""
     size: Annotated[tuple[int, int] | None, tyro.conf.arg(metavar="WIDTH HEIGHT")] = None
-    """Size of the pictures, where the file does not say: KITTI's"""
+    """Size of the images, where the file does not say: KITTI's"""
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
 
     def __call__(self) -> int:

@@ -132,7 +132,7 @@ class Evaluate:
         return replace(truth, uri=source.uri, ticks=ticks, frames=frames)
 
     def _run(self, source: Source, wanted: list[Params]) -> list[list[Result]]:
-        """Run the pipeline with each set of parameters. The networks run once per picture."""
+        """Run the pipeline with each set of parameters. The networks run once per image."""
         if not wanted:
             return []
         detectors = self.pipeline.open_detectors(source, self.sensors)

@@ -58,7 +58,7 @@ class ServerOptions:
 
     def label_desk(self) -> LabelDesk:
         """DatabaseError when a database that was named cannot be opened. The local database is opened once the first
-        picture is shown; an error in it is shown in the dashboard."""
+        image is shown; an error in it is shown in the dashboard."""
         if self.labels or os.environ.get(URL_VARIABLE):
             return LabelDesk(_open_labels(self.labels))
         return LabelDesk(open_later=lambda: _open_labels(None))
@@ -91,7 +91,7 @@ class ServerOptions:
 
 def _open_labels(url: str | None) -> Database:
     from app.labels.store.database import (
-        open_database,  # SQLAlchemy takes most of a second to import: not before a picture
+        open_database,  # SQLAlchemy takes most of a second to import: not before an image
     )
 
     return open_database(url)

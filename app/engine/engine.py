@@ -46,7 +46,7 @@ _SAID_S = 60.0
 _COMPILING = "Preparing the pipeline … The first start after an installation takes about a minute."
 _ABLATION: dict[Sensors, tuple[str, ...]] = {
     "both": (),
-    "lidar": ("LiDAR only: no detection in the pictures",),
+    "lidar": ("LiDAR only: no detection in the images",),
     "camera": ("Camera only: LiDAR points are not used",),
 }
 """Notices about sensors that are left out."""
@@ -60,7 +60,7 @@ class OpenSource(Protocol):
 
 class Engine:
     """``start`` it, send wishes through ``control``, read ``snapshot`` or listen. ``open_detector`` gives the
-    one for a source's pictures; None runs without a camera's detector and says nothing about it; ``open_lanes`` gives
+    one for a source's images; None runs without a camera's detector and says nothing about it; ``open_lanes`` gives
     the lane detector, which looks at every ``lanes_every``-th frame. ``far_view_px``: side of the window of the second
     look, None for none. ``whole_drives``: a recording's whole drive is
     computed in the background (``drives``), so that any frame is shown as it is in it. ``desk``: where what is shown

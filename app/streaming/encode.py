@@ -2,9 +2,9 @@
 
     u32 little-endian   length of the header
     header              JSON, UTF-8, padded with spaces to a multiple of 4
-    picture             JPEG, ``picture.bytes`` long, padded to a multiple of 4
+    image             JPEG, ``picture.bytes`` long, padded to a multiple of 4
     points              ``points`` × int16 x y z   centimetres, ego frame
-                        ``points`` × int16 u v     pixels of the sent picture; -32768 where the camera cannot see it
+                        ``points`` × int16 u v     pixels of the sent image; -32768 where the camera cannot see it
                         ``points`` × uint16        1 + place in ``result.objects``; 0 belongs to none
                         ``points`` × uint8         0 ground, 1 unclustered, 2 cluster, 3 dropped
                         ``points`` × uint8         intensity
@@ -12,7 +12,7 @@
                         ``points`` × uint8         ms before the sweep's newest point; 255 unknown
 
 The header holds ``state`` (playback), ``result`` (docs/reference/results.md), ``display``: geometry projected by the
-alignment in use, in pixels of the sent picture, so that no view projects anything, and of live sensors ``row``: the
+alignment in use, in pixels of the sent image, so that no view projects anything, and of live sensors ``row``: the
 frame's value of each column of the timeline, which a recording's whole run gives otherwise.
 """
 
@@ -44,7 +44,7 @@ class Encoder:
         self._last: tuple[Picture, int, SentPicture] | None = None
 
     def message(self, snapshot: Snapshot, width_px: int = MAX_WIDTH_PX) -> bytes | None:
-        """The message for the snapshot's tick, its picture at most ``width_px`` wide; None when there is no tick."""
+        """The message for the snapshot's tick, its image at most ``width_px`` wide; None when there is no tick."""
         if snapshot.processed is None:
             return None
         frame, result = snapshot.processed.frame, snapshot.processed.result

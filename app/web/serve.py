@@ -1,7 +1,7 @@
 """The server and the engine as one program, until it is asked to end.
 
 The engine starts before FastAPI is imported, which takes half a second: it opens the recording and makes the first
-picture meanwhile.
+image meanwhile.
 """
 
 from __future__ import annotations

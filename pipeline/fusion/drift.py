@@ -23,7 +23,7 @@ from pipeline.params import FusionParams
 from pipeline.types import F64, VEHICLES, Box, FusedObject
 
 BORDER_PX = 3.0
-"""A box that ends this close to the picture's border is cut."""
+"""A box that ends this close to the image's border is cut."""
 LIKE_WIDTH = 0.35
 """A cluster whose width differs from its box's by a larger share is a part of the vehicle, or more than it."""
 NEAREST_M, FARTHEST_M = 5.0, 40.0

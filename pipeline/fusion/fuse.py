@@ -137,7 +137,7 @@ def _to_the_gaps(corners: F64, ranges_m: list[float], params: FusionParams) -> F
 
 
 def _overlap(vision: tuple[VisionTrack, ...], projected: list[Box | None]) -> F64:
-    """(n, m) IoU of vision boxes and projected LiDAR cuboids; zero for a cuboid outside the picture."""
+    """(n, m) IoU of vision boxes and projected LiDAR cuboids; zero for a cuboid outside the image."""
     nowhere = (0.0, 0.0, 0.0, 0.0)
     return iou_matrix(np.array([v.bbox for v in vision]), np.array([box or nowhere for box in projected]))
 

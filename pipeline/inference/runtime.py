@@ -40,7 +40,7 @@ class DetectorMissing(BadInput):
 
 
 class DetectorError(BadInput):
-    """A network that cannot be run, or an array that is not a picture. The text is a sentence for the user."""
+    """A network that cannot be run, or an array that is not an image. The text is a sentence for the user."""
 
 
 def find_graph(spec: str | None, task: model_registry.Task) -> Path | None:
@@ -89,7 +89,7 @@ def open_as(graph: bytes, way: Way) -> ort.InferenceSession:
     options.log_severity_level = _FATAL
     options.graph_optimization_level = getattr(ort.GraphOptimizationLevel, way.optimisation)
     options.enable_cpu_mem_arena = way.arena
-    # Spinning workers starve the LiDAR chain between two pictures.
+    # Spinning workers starve the LiDAR chain between two images.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.add_session_config_entry("session.set_denormal_as_zero", "1")
     return ort.InferenceSession(graph, options, providers=list(way.providers))
@@ -107,9 +107,9 @@ def _open(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
 
 
 def check_picture(bgr: U8) -> None:
-    """DetectorError for an array that is no picture (H, W, 3) uint8."""
+    """DetectorError for an array that is no image (H, W, 3) uint8."""
     if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
-        raise DetectorError(f"expected a picture of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
+        raise DetectorError(f"expected an image of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
 
 
 def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
@@ -127,8 +127,8 @@ def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
 
 
 def ways_of(path: Path) -> Callable[[Way], Callable[[], Sequence[F32]]]:
-    """For ``pipeline.inference.tuning``: the network in a file on the same noisy picture, one way after the other.
-    DetectorError when it takes no picture."""
+    """For ``pipeline.inference.tuning``: the network in a file on the same noisy image, one way after the other.
+    DetectorError when it takes no image."""
     model = with_empty_masks(with_unit_picture(read_graph(path)))  # each leaves the other's graphs as they are
     try:
         own = input_size(model)

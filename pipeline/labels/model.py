@@ -42,7 +42,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class Sighting:
-    """A track in one frame. cuboid: None where only the picture shows it. bbox: pixels of the raw picture; None where
+    """A track in one frame. cuboid: None where only the image shows it. bbox: pixels of the raw image; None where
     only the LiDAR shows it. keyframe: put there by a person or an import; otherwise interpolated between keyframes."""
 
     frame: int

@@ -10,7 +10,7 @@ from pipeline.params.declare import Section, choice, slider
 class DetectionParams(Section):
     """Which of the detector's boxes are kept."""
 
-    far_view: bool = choice(True, "Use the boxes of the second pass over the far part of the picture, in native pixels")
+    far_view: bool = choice(True, "Use the boxes of the second pass over the far part of the image, in native pixels")
     min_score: float = slider(0.3, 0.05, 0.95, 0.01, "", "Boxes with a lower score are dropped")
     nms_iou: float = slider(
         0.55, 0.1, 0.95, 0.01, "", "Of two boxes that overlap more, the one with the lower score is dropped"
@@ -84,7 +84,7 @@ class VisionTrackingParams(Section):
     )
     max_size_ratio: float = slider(2.0, 1.1, 5.0, 0.1, "", "kalman: largest change of a box's width between sightings")
     shift_px: float = slider(
-        4.0, 0.0, 40.0, 0.5, "px", "kalman: how far the whole picture may shift between frames, as the car pitches"
+        4.0, 0.0, 40.0, 0.5, "px", "kalman: how far the whole image may shift between frames, as the car pitches"
     )
     bearing_sigma_deg: float = slider(0.3, 0.05, 3.0, 0.05, "°", "kalman: noise of a box's direction")
     accel_sigma_mps2: float = slider(3.0, 0.1, 20.0, 0.1, "m/s²", "kalman: acceleration noise of objects")

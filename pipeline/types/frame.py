@@ -202,7 +202,7 @@ class RawBoxes:
     law: DistanceLaw = REAL_VEHICLES
     """Distance from box heights, where no parameter says otherwise."""
     far: Window | None = None
-    """The part of the picture that was looked at a second time, at native resolution; None: none."""
+    """The part of the image that was looked at a second time, at native resolution; None: none."""
     far_count: int = 0
     """How many of the candidates, the last ones, come from that look."""
 
@@ -218,7 +218,7 @@ class RawBoxes:
         )
 
     def without_far(self) -> RawBoxes:
-        """The candidates of the whole picture alone."""
+        """The candidates of the whole image alone."""
         count = len(self.boxes) - self.far_count
         return replace(
             self,
@@ -315,7 +315,7 @@ class Frame:
 
     @property
     def picture_size(self) -> tuple[int, int] | None:
-        """(width, height) of the picture, or of the calibration where the picture itself is missing."""
+        """(width, height) of the image, or of the calibration where the image itself is missing."""
         if self.picture is not None:
             return self.picture.bgr.shape[1], self.picture.bgr.shape[0]
         return (self.camera.width, self.camera.height) if self.camera is not None else None

@@ -68,8 +68,8 @@ class VisionMeasurement:
     position: Point2 | None
     """Ego x, y of the nearest face's centre."""
     noise_share: float | None = None
-    """Share of the distance by which it differs from picture to picture: the noise of the box's height. The rest of
-    ``sigma_m`` is the object's own unknown height, which no number of pictures averages out."""
+    """Share of the distance by which it differs from image to image: the noise of the box's height. The rest of
+    ``sigma_m`` is the object's own unknown height, which no number of images averages out."""
     size_share: float | None = None
     """The share of the distance by which vehicles of the class differ in height."""
     ranged_m: float | None = None
@@ -226,7 +226,7 @@ class FusedObject:
     """One physical object: the paper's Table 3 row, with what docs/reference/results.md adds; its frames and units
     apply.
 
-    A V object whose distance is not known (no law for its class, a box cut by the picture's edge, beyond the law's
+    A V object whose distance is not known (no law for its class, a box cut by the image's edge, beyond the law's
     reach) keeps its row; its place and distance are None, and it cannot be the CIPV.
 
     Stages ask for capabilities (``ranged``, ``seen_by_lidar``); the letters of ``source`` and ``seen_by`` are for the
@@ -242,7 +242,7 @@ class FusedObject:
     score: float | None
     """The detector's score of that class, 0–1."""
     bbox: Box | None
-    """Its image box, pixels; None outside the picture."""
+    """Its image box, pixels; None outside the image."""
     bev: tuple[Point2, Point2, Point2, Point2] | None
     """Its footprint from above: ego x, y of front left, front right, rear right, rear left."""
     cuboid: Cuboid | None

@@ -127,7 +127,7 @@ class PipelineOptions:
         return self.far_view_px or None
 
     def open_detectors(self, source: AnySource, sensors: Sensors = "both") -> Detectors:
-        """All detectors for the source's pictures; their notes are printed. None of them for LiDAR alone, and for
+        """All detectors for the source's images; their notes are printed. None of them for LiDAR alone, and for
         recordings that contain detections."""
         from pipeline.detection import Detectors, brings_detections, far_view_for, lanes_for
         from pipeline.lanes.open_detector import usual_every
@@ -144,7 +144,7 @@ class PipelineOptions:
         return Detectors(boxes, lanes, every or usual_every(lanes, source.rate_hz), far)
 
     def open_detector(self, source: AnySource, sensors: Sensors = "both") -> Detector | None:
-        """The detector for the source's pictures; its notes are printed. DetectorMissing when a named one is missing,
+        """The detector for the source's images; its notes are printed. DetectorMissing when a named one is missing,
         or any with ``sensors="camera"``; otherwise a message says so and LiDAR runs alone."""
         from pipeline.detection import detector_for
         from pipeline.inference.runtime import DetectorMissing

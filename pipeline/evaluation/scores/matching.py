@@ -106,7 +106,7 @@ def claims(
 
     A LiDAR object without a class does not claim to be a vehicle: it counts where it lies within ``within_m`` of a
     labelled vehicle that no classified object matches, and is otherwise ignored, like roadside returns. Also ignored is
-    an object far from every labelled position whose picture box matches one of ``unplaced``: there is a vehicle, but
+    an object far from every labelled position whose image box matches one of ``unplaced``: there is a vehicle, but
     its distance is unknown.
     """
     placed = [item for item in result.objects if item.bev is not None and item.distance_m is not None]

@@ -125,7 +125,7 @@ def report(cases: Sequence[BrakingCase], drives: Sequence[DriveRecord]) -> Secti
         (
             "Means over the runs; the smallest gap and the impact are the worst, and lead to that drive. Impact speed "
             "is relative to the target. Boxes: whose the camera's are, projected truth with a detector's errors or the "
-            "embedded network's on drawn pictures.",
+            "embedded network's on drawn images.",
             *(_verdict(manoeuvre, done) for manoeuvre in manoeuvres),
         ),
         (Table("Drives", _COLUMNS, tuple(rows)), closed_forms()),

@@ -1,7 +1,7 @@
 """Experiment: how often the pipeline fails in random traffic, by the thousand kilometres.
 
 Each case is a kilometre of its own (``traffic``). Boxes are the truth with the errors measured of a real detector, the
-LiDAR is cast, no picture is drawn. The rates have exact Poisson bounds, so a short run says how little it knows.
+LiDAR is cast, no image is drawn. The rates have exact Poisson bounds, so a short run says how little it knows.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def report(cases: Sequence[Kilometre], outcomes: Sequence[DriveOutcome]) -> Sect
         "Robustness: random traffic",
         (
             f"{len(outcomes)} drives, {km:.1f} km in {hours:.2f} h of streets, country roads and motorways, each with "
-            "sensor faults of its own. Boxes are the truth with the errors measured of a detector of real pictures, "
+            "sensor faults of its own. Boxes are the truth with the errors measured of a detector of real images, "
             "false boxes among them. Phantom: believed where no vehicle is in the driven path, or comes into it within "
             "3 s. Missed, late: a true lead within 60 m, in sight, not chosen for longer than 0.5 s.",
         ),

@@ -144,7 +144,7 @@ def test_a_picture_is_encoded_when_it_must_be_and_never_too_wide(width: int, own
 
 
 def _wide() -> U8:
-    """A picture of twice the width that is sent, with one red car."""
+    """An image of twice the width that is sent, with one red car."""
     bgr: U8 = np.zeros((360, 2560, 3), np.uint8)
     bgr[100:200, 600:900] = (20, 20, 220)
     return bgr

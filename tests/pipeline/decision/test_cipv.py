@@ -97,7 +97,7 @@ def test_a_carried_object_may_stay_the_lead_but_not_become_it() -> None:
 
 
 def test_a_box_too_near_to_be_measured_does_not_become_the_lead() -> None:
-    """The picture's edge cuts a passing car's box: it is seen, but how far it is now is only predicted."""
+    """The image's edge cuts a passing car's box: it is seen, but how far it is now is only predicted."""
     cut = dataclasses.replace(fused(1, 1.5, source="V"), measured=False)
     lead, why_not = decide(cut)
     assert lead is None

@@ -50,7 +50,7 @@ def is_anonymous(name: FormatName) -> bool:
 
 @pytest.mark.parametrize("name", [name for name in FORMATS if name != "mcap"])
 def test_what_can_be_held_comes_back(name: FormatName, monkeypatch: pytest.MonkeyPatch) -> None:
-    # boxes and cuboids made up apart lie apart in the picture; the check for that has tests of its own
+    # boxes and cuboids made up apart lie apart in the image; the check for that has tests of its own
     monkeypatch.setattr(base, "_FEWEST_PAIRS", 10**9)
     here = drive()
 
@@ -118,7 +118,7 @@ LOSSES: dict[FormatName, tuple[str, ...]] = {
         "1 track without sightings", "1 objects have no box", "truncation and occlusion", "3 frames have no file",
     ),
     "kitti-tracking": ("2 ranges of the lead", "2 labels left out: rejected", "1 event", "who made each label"),
-    "nuscenes": ("3 boxes in pictures not written", "1 sighting not written", "pictures and point"),
+    "nuscenes": ("3 boxes in images not written", "1 sighting not written", "pictures and point"),
     "coco": ("3 cuboids not written", "1 sighting not written", "1 frame tag"),
     "csv": ("4 tracks not written", "1 frame of the ego path", "1 rejected ranges", "'frozen'"),
 }  # fmt: skip

@@ -50,7 +50,7 @@ FRAMES: dict[str, Frame] = {
     "nothing": Frame(0, "empty", 0),
     "no LiDAR": replace(full(0), sweep=None),
     "no camera": replace(full(0), picture=None, camera=None),
-    "a picture that is no JPEG": replace(full(0), picture=picture(3, ".png", t_ns=5)),
+    "an image that is no JPEG": replace(full(0), picture=picture(3, ".png", t_ns=5)),
     "a camera without stamps": replace(full(0), picture=picture(3)),
     "a sweep without times of points": replace(full(0), sweep=sweep(1)),
     "an empty sweep": replace(full(0), sweep=sweep(1, points=0)),
@@ -91,7 +91,7 @@ def test_a_frame_comes_back_to_the_last_bit(frame: Frame, tmp_path: Path) -> Non
 def test_every_field_is_written() -> None:
     """A field that someone adds must be written too; then this list grows."""
     known = {
-        Frame: "index name t_ns sweep picture camera ego raw_boxes notes gnss raw_lanes route streams timing_ms "
+        Frame: "index name t_ns sweep image camera ego raw_boxes notes gnss raw_lanes route streams timing_ms "
         "detections_given",
         Sweep: "t_ns points ring channels time_s origin",
         Picture: "t_ns bgr encoded",
