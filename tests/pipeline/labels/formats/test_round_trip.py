@@ -118,7 +118,7 @@ LOSSES: dict[FormatName, tuple[str, ...]] = {
         "1 track without sightings", "1 objects have no box", "truncation and occlusion", "3 frames have no file",
     ),
     "kitti-tracking": ("2 ranges of the lead", "2 labels left out: rejected", "1 event", "who made each label"),
-    "nuscenes": ("3 boxes in images not written", "1 sighting not written", "pictures and point"),
+    "nuscenes": ("3 boxes in images not written", "1 sighting not written", "images and point"),
     "coco": ("3 cuboids not written", "1 sighting not written", "1 frame tag"),
     "csv": ("4 tracks not written", "1 frame of the ego path", "1 rejected ranges", "'frozen'"),
 }  # fmt: skip
