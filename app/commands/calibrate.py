@@ -75,7 +75,7 @@ class Calibrate:
         for name in (name for name, given in others.items() if given):
             raise BadInput(f"{name} does not belong to `cipv calibrate {self.what}`")
         if self.offset and self.model == "angular":
-            raise BadInput("--offset needs the pinhole model: the angular one has no place")
+            raise BadInput("--offset needs the pinhole model: the angular one has no position")
 
     def _fit_alignment(self, params: Params, source: Source, detector: Detector) -> int:
         def frame_of(index: int) -> Frame:

@@ -193,9 +193,9 @@ class Engine:
             self.control.change(target=self.snapshot.index)
 
     def _say_stuck(self, stuck: Stuck, more: str = "") -> None:
-        """On every page, the display in the car too, for a minute; what is off from now on, for good."""
-        text = f"{stuck.worker} hung for {stuck.seconds:.1f} s ({stuck.doing}) and was started anew"
-        text += "; the recording goes on" if self.desk.state is not None else ""
+        """On every page, the in-vehicle display too, for a minute; what is off from now on, for good."""
+        text = f"{stuck.worker} hung for {stuck.seconds:.1f} s ({stuck.doing}) and was restarted"
+        text += "; recording continues" if self.desk.state is not None else ""
         others = tuple(notice for notice in self.snapshot.notices if f"({stuck.doing})" not in notice.text)
         lasts_s = math.inf if more else _SAID_S
         said = Notice("error", text[0].upper() + text[1:] + more, time.monotonic() + lasts_s)

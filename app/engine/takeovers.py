@@ -14,7 +14,7 @@ from app.drive.compute_scheduler import ComputeScheduler
 
 _MOST_HANGS = 3
 """What hangs so often, of one source, is not tried again."""
-_GIVES_UP = ". It hangs again and again: networks are off and playback is paused until a source is opened"
+_GIVES_UP = ". It keeps hanging: networks are off and playback is paused until a source is opened"
 
 
 class Say(Protocol):

@@ -74,9 +74,8 @@ class Drift(NamedTuple):
         """For people, with what to do."""
         yaw = f"yaw {self.yaw_deg:+.1f}° ± {self.yaw_sigma_deg:.1f}°"
         pitch = f"pitch {self.pitch_deg:+.1f}° ± {self.pitch_sigma_deg:.1f}°"
-        return (
-            f"{self.vehicles} vehicles say that camera or LiDAR has turned: {yaw}, {pitch}. Check it with Align, Fit."
-        )
+        who = f"judging by {self.vehicles} vehicles"
+        return f"Camera or LiDAR has turned, {who}: {yaw}, {pitch}. Check with Align, then Fit."
 
 
 class DriftState(NamedTuple):

@@ -187,9 +187,8 @@ class AebParams(Section):
 class TimeParams(Section):
     """Where one clip of a recording ends and the next begins (``pipeline.common.clips``).
 
-    Within 1.5 s a car that brakes or speeds up by 3 m/s² as nobody saw is 3.4 m from where it was expected, nearly its
-    own length, and one that changes lanes is halfway there: after that a track is a guess about another moment, and a
-    drive with so many frames missing has lost its sensors, not a frame."""
+    In 1.5 s, a car that brakes or accelerates unseen at 3 m/s² ends up 3.4 m from where it was expected, nearly its own
+    length, and one that changes lanes is halfway across. After a longer gap, a track would be a guess."""
 
     reset_gap_s: float = slider(
         1.5, 0.2, 10.0, 0.1, "s", "All trackers reset after a longer gap, or a jump back in time"

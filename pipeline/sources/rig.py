@@ -63,7 +63,6 @@ def calibration_for(
     if (width, height) == (camera.width, camera.height):
         return camera
     notes.append(
-        f"pictures are {width}×{height}, but the calibration is for {camera.width}×{camera.height}: "
-        "calibration not used"
+        f"images are {width}×{height}, but the calibration is for {camera.width}×{camera.height}: calibration not used"
     )
     return None

@@ -100,9 +100,7 @@ class AlignmentFit:
 def overlap_sentence(fit: AlignmentFit) -> str:
     """What the fit gains, for people."""
     before = f"{100 * fit.before.mean_iou:.0f} % → " if fit.before is not None else ""
-    where = (
-        "of frames set aside" if fit.held_out else "of the fitted frames, since the drive is too short to set any aside"
-    )
+    where = "of held-out frames" if fit.held_out else "of the fitted frames; the drive is too short to hold any out"
     return f"Projected clusters cover {before}{100 * fit.after.mean_iou:.0f} % of {fit.after.boxes} boxes {where}"
 
 

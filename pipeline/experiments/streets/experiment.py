@@ -71,10 +71,10 @@ def report(cases: Sequence[StreetCase], outcomes: Sequence[Outcome]) -> Section:
     """By what is beside the road, and all together."""
     return Section(
         "streets",
-        "Streets without paint and route",
+        "Streets without lane markings and without a route",
         (
             "Given detections and a simulated VLP-16 as in the curves, speed and yaw rate from the car's bus, leads to "
-            f"{REACH_M:.0f} m. Without anything ahead a frame is right when nothing leads.",
+            f"{REACH_M:.0f} m. With nothing ahead, a frame is right when no lead is chosen.",
         ),
         (
             Table(

@@ -15,7 +15,7 @@ from pipeline.types.source import SourceError
 
 def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
     if size is None:
-        raise SourceError(f"{path.name}: KITTI's calibration does not say the size of the images; give it")
+        raise SourceError(f"{path.name}: KITTI's calibration does not store the image size; give it")
     return parse_object_calibration(read_bytes(path), path.name, size).camera
 
 

@@ -85,8 +85,8 @@ def test_a_network_that_hangs_for_ever_is_said_and_replaced_and_no_sensor_data_i
             tap.sweep(replace(sweep, points=sweep.points + k), 10**18 + sweep.t_ns + k)
         said = engine.wait_for(lambda s: any("hung for" in n.text for n in s.notices), WAIT_S)
         (notice,) = (n for n in said.notices if "hung for" in n.text)
-        assert notice.level == "error", "which the display in the car shows too"
-        assert "(the network counting) and was started anew; the recording goes on" in notice.text
+        assert notice.level == "error", "which the in-vehicle display shows too"
+        assert "(the network counting) and was restarted; recording continues" in notice.text
         after = shown_after(engine, sensors, 3)
         assert after.processed is not None
         assert {item.seen_by for item in after.processed.result.objects} == {"VL"}, "by a fresh network"

@@ -170,7 +170,7 @@ def test_a_picture_of_another_size_than_calibrated_is_not_projected_into() -> No
     events = (event for event in sent([], seconds=1.0) if event.sensor != "gnss")
     frame = bench.drive(events)[-1].frame
     assert frame.camera is None
-    assert "pictures are 64×48, but the calibration is for 1280×720: calibration not used" in frame.notes
+    assert "images are 64×48, but the calibration is for 1280×720: calibration not used" in frame.notes
 
 
 def test_offsets_are_turned_while_it_runs() -> None:
