@@ -20,6 +20,13 @@ OpenLanes = Callable[[AnySource], Detects[RawLanes] | None]
 
 _Kind = tuple[bool, tuple[int, int] | None]
 
+ABLATION_NOTICES: dict[Sensors, tuple[str, ...]] = {
+    "both": (),
+    "lidar": ("LiDAR only: no detection in the images",),
+    "camera": ("Camera only: LiDAR points are not used",),
+}
+"""Notices about sensors that are left out."""
+
 
 class DetectorPool:
     """``open_detector`` and ``open_lanes`` give those for a source's images; None: none, and nothing is said about

@@ -10,7 +10,9 @@ from pipeline.params.declare import Section, choice, slider
 class DetectionParams(Section):
     """Which of the detector's boxes are kept."""
 
-    far_view: bool = choice(True, "Use the boxes of the second pass over the far part of the image, in native pixels")
+    far_view: bool = choice(
+        True, "Use the boxes of the second pass over the far part of the image, at native resolution"
+    )
     min_score: float = slider(0.3, 0.05, 0.95, 0.01, "", "Boxes with a lower score are dropped")
     nms_iou: float = slider(
         0.55, 0.1, 0.95, 0.01, "", "Of two boxes that overlap more, the one with the lower score is dropped"

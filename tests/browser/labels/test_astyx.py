@@ -119,7 +119,7 @@ def judge_the_rest(hand: Hand, labels: Labels, objects: list[tuple[TruthObject, 
     box in the image is taken for one: what the camera has named is there."""
     page = hand.page
     page.get_by_role("button", name="To do", exact=True).click()
-    page.get_by_label("Least confidence of proposals").fill("0")
+    page.get_by_label("Minimum confidence of proposals").fill("0")
     left = sorted(number for number, track in labels.tracks.items() if track["state"] == "proposed")
     seen: dict[int, list[bool]] = {number: [] for number in left}
     for index, rows in labels.get(f"/frames?first=0&last={COUNT - 1}")["sightings"].items():
