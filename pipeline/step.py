@@ -96,10 +96,10 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         state.fusion, lidar_tracks, vision_tracks, aligned, frame.picture_size, params.fusion
     )
     vision_state = vision_tracking.learn_heights(vision_state, fused.ranged_boxes(), params.vision_tracking)
-    # A mount that was knocked: what both sensors see of the same vehicles lies apart
+    # A knocked mount: both sensors see the same vehicles, but apart
     drift_state, turned = drift.follow(state.drift, fused, aligned, frame.picture_size, frame.t_ns, params.fusion)
     clock.lap("fusion")
-    # Existence: what each sensor says for and against every object being where it is said to be
+    # Existence: the evidence of each sensor for and against every object being where it is reported
     existence_state, objects = existence.weigh(state.existence, fused.objects, sweep, now.dt_s, params.existence)
     clock.lap("existence")
     objects = object_motion.describe(objects, now.measured, params.motion)

@@ -25,6 +25,7 @@ class Candidate(NamedTuple):
     """An object with all that its conditions are checked by."""
 
     item: FusedObject
+    """The object."""
     place: Place | None
     """Where it is against the path; None where that is not known."""
     odds: float
@@ -34,7 +35,9 @@ class Candidate(NamedTuple):
     widening_m: float
     """By how much the path is wider for it, to either side."""
     path: Path
+    """The path ahead."""
     params: CipvParams
+    """Limits of the conditions."""
 
     @property
     def aside_m(self) -> float:
@@ -58,6 +61,7 @@ class Condition(NamedTuple):
     shown_as: str
     """Name of its gate, for display only."""
     check: Callable[[Candidate], Answer]
+    """Whether a candidate is it, with number and limit."""
     why_not: Callable[[Candidate], str]
     """The sentence that says why it failed. Only the first failure of an object is put in words."""
 

@@ -65,7 +65,9 @@ class Drift(NamedTuple):
     pitch_deg: float
     """Downwards."""
     yaw_sigma_deg: float
+    """Standard deviation of ``yaw_deg``."""
     pitch_sigma_deg: float
+    """Standard deviation of ``pitch_deg``."""
     vehicles: int
     """That say so."""
 
@@ -95,6 +97,7 @@ def follow(
     """The state after this frame, and the angles that it leaves little doubt of; None while there is no such doubt."""
     if aligned is None or picture_size is None:
         return DriftState(), None
+    # Each vehicle tells the angle between its box and its projected cuboid; those of the last seconds judge together
     known = {each.id: each for each in state.sightings if t_ns - each.t_ns <= params.drift_s * 1e9}
     for item in fused.objects:
         box = fused.vision_boxes.get(item.id)

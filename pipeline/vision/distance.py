@@ -91,13 +91,14 @@ def measure(
     params: DistanceParams,
     own: DistanceLaw = REAL_VEHICLES,
 ) -> tuple[VisionMeasurement, ...]:
-    """Each detection with its range, its uncertainty and its place; all three null where the box tells none: no law
+    """Each detection with its range, its uncertainty and its place; all three None where the box tells none: no law
     for its class, cut by the image's upper or lower edge (such a height is only a lower bound), or beyond ``max_m``.
-    Without an alignment there is no bearing: the depth stands for the range, and the place is null. own: the
+    Without an alignment there is no bearing: the depth stands for the range, and the place is None. own: the
     detector's law.
     """
     if not detections:
         return ()
+    # A power law of the box height gives the depth, and the bearing makes a range of it
     boxes = np.array([detection.bbox for detection in detections], dtype=np.float64)
     law = law_in_use(params, own)
     depth_m = _depths(detections, boxes, _focal_px(alignment, camera), camera, params, law)
@@ -105,13 +106,14 @@ def measure(
     if alignment is not None and params.depth_along_axis:
         range_m = range_at_depth(_centres(boxes), depth_m, alignment, camera)
     range_m = np.where(range_m <= params.max_m, range_m, np.nan)
-    # what changes from image to image is the box's height; what lasts is the object's own height
+    # Two errors: the height of the box changes from image to image; the unknown height of the vehicle lasts
     height_px = np.maximum(boxes[:, 3] - boxes[:, 1], 1.0)
     pixel_share = np.abs(law.exponent) * params.height_sigma_px / height_px
     noise_share = np.hypot(pixel_share, _NOISE_SHARE)
     sigma_m = range_m * np.hypot(pixel_share, params.size_spread)
     if params.binning:
         range_m = np.array([binned(float(value)) for value in range_m], dtype=np.float64)
+    # The place is that far along the line of sight through the middle of the box
     place = np.full((len(boxes), 2), np.nan)
     if alignment is not None:
         place = alignment.unproject(_centres(boxes), range_m)[:, :2]

@@ -51,14 +51,16 @@ def track(
     params: VisionTrackingParams,
     ego_speed_mps: float | None = None,
 ) -> tuple[VisionTrackerState, tuple[VisionTrack, ...]]:
-    """One tick. ``measurements`` null: the camera gave nothing, which counts as time but not as an image in which the
-    object was missing. ``dt_s`` null: the first tick. ``ego_speed_mps``: what a new object's speed is guessed from.
+    """One tick. ``measurements`` None: the camera gave nothing, which counts as time but not as an image in which the
+    object was missing. ``dt_s`` None: the first tick. ``ego_speed_mps``: what a new object's speed is guessed from.
     Tracks come by id."""
+    # Every track is predicted to now; without an image it is carried by that alone
     guess = _first_guess(ego_speed_mps)
     expected = [_predict(followed, dt_s or 0.0, params) for followed in state.followed]
     if measurements is None:
         kept = tuple(followed for followed in expected if followed.unseen_s <= params.max_missed_s)
         return evolve(state, followed=kept), tuple(followed.track for followed in kept)
+    # Tracks and boxes are matched one-to-one; a track without a box has missed this image
     partner = match([_expected(followed, params) for followed in expected], measurements, params)
     kept_list = [
         _seen(followed, measurements[partner[row]], guess, ego_speed_mps, params)
@@ -66,6 +68,7 @@ def track(
         else _missed(followed)
         for row, followed in enumerate(expected)
     ]
+    # Every box that no track took starts a new one; tracks missed for too long end
     taken = set(partner.values())
     fresh = [measurement for column, measurement in enumerate(measurements) if column not in taken]
     kept_list += [_new(state.next_id + index, measurement, guess, params) for index, measurement in enumerate(fresh)]
