@@ -16,7 +16,7 @@ from pipeline.lanes.horizon import horizon_share
 from pipeline.types import U8, CameraCalibration, RawLanes
 
 NAME = "classical"
-_NOTE = "lane lines by colour and gradient (classical), without a network"
+_NOTE = "Lane lines by colour and gradient (classical), without a network"
 _CAMERA_HEIGHT_M = 1.4
 """Of a camera behind a windshield; a tenth more or less changes the expected width of paint by as much."""
 _PAINT_WIDTH_M = 0.15

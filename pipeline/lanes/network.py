@@ -129,7 +129,7 @@ def _loaded(path: Path, threads: int, horizon: float) -> LaneNetwork:
     name = f"{path.stem}-{sha256[:12]}"
     if head.horizon is not None:
         name += f"-{horizon:.3f}"
-    notes = (f"lane lines by the network {path.stem}",)
+    notes = (f"Lane lines by the network {path.stem}",)
     count = session.get_session_options().intra_op_num_threads
     return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, count, horizon, sha256, session)
 
