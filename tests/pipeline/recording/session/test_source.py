@@ -91,7 +91,7 @@ def test_a_frame_comes_back_to_the_last_bit(frame: Frame, tmp_path: Path) -> Non
 def test_every_field_is_written() -> None:
     """A field that someone adds must be written too; then this list grows."""
     known = {
-        Frame: "index name t_ns sweep image camera ego raw_boxes notes gnss raw_lanes route streams timing_ms "
+        Frame: "index name t_ns sweep picture camera ego raw_boxes notes gnss raw_lanes route streams timing_ms "
         "detections_given",
         Sweep: "t_ns points ring channels time_s origin",
         Picture: "t_ns bgr encoded",
