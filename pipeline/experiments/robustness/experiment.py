@@ -143,7 +143,13 @@ def report(cases: Sequence[Kilometre], outcomes: Sequence[DriveOutcome]) -> Sect
             "Exact bounds of a Poisson rate (Garwood 1936).",
         ),
         Table("By cause", ("failure", "cause", "count"), tuple(_causes(outcomes))),
-        Table("By road", ("road", "km", *KINDS), tuple(_by_layout(cases, outcomes)), "Counts.", decimals=1),
+        Table(
+            "By road and event",
+            ("drives with", "km", *KINDS),
+            tuple(_by_layout(cases, outcomes)),
+            "Counts.",
+            decimals=1,
+        ),
         Table("Where", ("drive", "from s", "duration s", "what"), tuple(_where(cases, outcomes)), decimals=1),
     ]
     variants = list(outcomes[0].failures) if outcomes else []
