@@ -236,7 +236,9 @@ CONDITIONS = Conditions(
         "ahead", _ahead, lambda who: "position unknown" if who.place is None else "beside or behind the bumper"
     ),
     in_path=Condition("path_offset", _in_path, _out_of_path),
-    confirmed=Condition("hits", _confirmed, lambda who: f"seen {_sightings(who.item)} of {who.params.confirm_hits} times"),
+    confirmed=Condition(
+        "hits", _confirmed, lambda who: f"seen {_sightings(who.item)} of {who.params.confirm_hits} times"
+    ),
     seen=Condition("seen", _seen, _not_seen),
     placed=Condition("path_sigma", _placed, _uncertain),
     probable=Condition("lead_probability", _probable, _improbable),
