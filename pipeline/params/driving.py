@@ -39,7 +39,7 @@ class PathParams(Section):
     )
     use_traffic: bool = choice(
         True,
-        "Put the corridor along the headings of the vehicles that drive on the road, where no lines or route show it",
+        "Put the corridor along the headings of vehicles that drive on the road, where no line or route shows it",
     )
     min_speed_mps: float = slider(2.0, 0.0, 10.0, 0.5, "m/s", "Yaw rate and GNSS course are ignored below this speed")
     yaw_rate_sigma_radps: float = slider(

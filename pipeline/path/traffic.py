@@ -32,8 +32,9 @@ _SLOWEST_MPS = 4.0
 _LIDAR_HITS = 5
 """From so many sightings the LiDAR knows where a vehicle is going."""
 _TURNED_OFF_RAD = 0.6
-"""A vehicle that points further away from the arc on which it would be reached crosses the road, or leaves it. At 25 m
-a bend of 30 m radius that begins half way turns a car in it by 0.2 rad from that arc, the next lane by 0.3 rad."""
+"""A vehicle that points further away than this from where the car points, or from the arc on which it would be reached,
+crosses the road or leaves it, as far as anybody can tell: a bend of 50 m radius turns by so much over 30 m. At 25 m a
+bend of 30 m radius that begins half way turns a car in it by 0.2 rad from that arc, the next lane by 0.3 rad."""
 _KEPT_S, _BEHIND_M = 20.0, -5.0
 _USUAL_TIME_S = 3.0
 """Over this time ahead the curvature wanders as far as the lateral jerk of roads lets it change."""
@@ -113,7 +114,7 @@ def _with(state: TrafficState, item: FusedObject, ego: EgoState) -> TrafficState
     heading -= np.pi * np.round(heading / np.pi)
     on_arc = 2.0 * np.arctan2(y, x)
     mine = state.vehicle == item.id
-    if abs(heading - on_arc) > _TURNED_OFF_RAD:
+    if max(abs(heading), abs(heading - on_arc)) > _TURNED_OFF_RAD:
         keep = ~mine
         return TrafficState(state.xy[keep], state.heading_rad[keep], state.age_s[keep], state.vehicle[keep])
     if mine.any() and np.hypot(*(state.xy[mine][-1] - (x, y))) < _EVERY_M:

@@ -160,7 +160,7 @@ class Layers:
     edges: F64 | None = None
     """(M, 2) ego x, y of what runs beside the road, where the path is taken from it; None where it is not."""
     traffic: F64 | None = None
-    """(N, 3) ego x, y and heading in rad of vehicles that show where the road goes, now and before; None without any."""
+    """(N, 3) ego x, y and heading in rad of vehicles that show where the road goes, now and before; None without."""
 
 
 @dataclass(frozen=True)

@@ -77,6 +77,7 @@ def test_whichever_lane_it_is_in(other: FusedObject) -> None:
     [
         pytest.param(vehicle(25.0, 0.0, np.pi / 2), id="crosses"),
         pytest.param(vehicle(12.0, -3.0, -1.2), id="turns off"),
+        pytest.param(vehicle(18.0, 16.7, 1.45), id="crosses beside, where a sharp bend could lead"),
         pytest.param(vehicle(25.0, 0.0, 0.0, speed_mps=2.0), id="manoeuvres"),
         pytest.param(vehicle(25.0, 0.0, 0.0, speed_mps=0.0), id="stands"),
         pytest.param(replace(vehicle(25.0, 0.0, 0.0), seen_by="V", source="V"), id="only the camera has it"),
