@@ -86,8 +86,8 @@ def error_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:
 
 
 def sigma_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:
-    """The share of distance errors within 1, 2 and 3 of their sigmas, in %: by sensor over all ranges, then by range and
-    sensor. Empty groups are left out."""
+    """The share of distance errors within 1, 2 and 3 of their sigmas, in %: by sensor over all ranges, then by range
+    and sensor. Empty groups are left out."""
     every = [error for error in _all_errors(run) if error.distance_sigma_m]
     groups = [("all", source, [e for e in every if e.source == source]) for source in MOST_SENSORS_FIRST]
     for low in range(0, int(MAX_RANGE_M), SIGMA_BIN_M):
