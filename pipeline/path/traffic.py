@@ -21,21 +21,25 @@ import numpy as np
 from pipeline.common.geometry import F64
 from pipeline.params import PathParams
 from pipeline.path.estimates import SHARPEST_BEGIN_PER_M2, STEP_M, TIGHTEST_CURVATURE_PER_M, PathEstimate, samples
-from pipeline.types import I64, EgoState, FusedObject, Moment
+from pipeline.types import I64, VEHICLES, EgoState, FusedObject, Moment
 
 HEADING_SIGMA_RAD = 0.1
 """A lane change at 10 m/s, which takes some three seconds: what a heading says of the road is no surer."""
-_EVERY_M = 3.0
-"""One vehicle's headings are taken this far apart."""
+_LINK_M = 5.0
+"""A vehicle has driven when it has moved by this much over ground: more than its length, by which the place that is
+measured of a parked one may wander while the car passes."""
+_POINT_M = 1.0
+"""Places of one vehicle are kept this far apart."""
+_STRAYS_M, _STRAYS = 0.5, 0.2
+"""How far, and by what share of the way, a vehicle's places may stray from what its velocity says. A track that goes
+from one parked car to the next moves in jumps."""
 _SLOWEST_MPS = 4.0
 """What is slower over ground may be parking, or turning off."""
-_LIDAR_HITS = 5
-"""From so many sightings the LiDAR knows where a vehicle is going."""
 _TURNED_OFF_RAD = 0.6
 """A vehicle that points further away than this from where the car points, or from the arc on which it would be reached,
 crosses the road or leaves it, as far as anybody can tell: a bend of 50 m radius turns by so much over 30 m. At 25 m a
 bend of 30 m radius that begins half way turns a car in it by 0.2 rad from that arc, the next lane by 0.3 rad."""
-_KEPT_S, _BEHIND_M = 20.0, -5.0
+_KEPT_S, _BEHIND_M = 20.0, -10.0
 _USUAL_TIME_S = 3.0
 """Over this time ahead the curvature wanders as far as the lateral jerk of roads lets it change."""
 _WIDEST_RAD = 1.2
@@ -43,19 +47,17 @@ _WIDEST_RAD = 1.2
 
 @dataclass(frozen=True, eq=False)
 class TrafficState:
-    """What one frame leaves to the next: headings where they were seen, newest last."""
+    """What one frame leaves to the next: where vehicles were, newest last."""
 
     xy: F64
     """(N, 2) ego x, y."""
-    heading_rad: F64
-    """(N,) from ego x, of the vehicle's axis: an oncoming one's is turned round."""
     age_s: F64
     """(N,)"""
     vehicle: I64
-    """(N,) object id."""
+    """(N,) LiDAR track."""
 
 
-NONE = TrafficState(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
+NONE = TrafficState(np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int64))
 
 
 class Traffic(NamedTuple):
@@ -70,22 +72,23 @@ class Traffic(NamedTuple):
 def follow(
     state: TrafficState, objects: Sequence[FusedObject], now: Moment, params: PathParams
 ) -> tuple[TrafficState, Traffic | None]:
-    """One frame. objects: with velocity relative to ego, in ego axes. None without own motion, which places what was
-    seen before, and where no vehicle is followed that drives."""
+    """One frame. None without own motion, which tells driving from standing, and where no vehicle has driven yet."""
     ego, dt_s = now.ego, now.dt_s
     if ego is None or not params.use_traffic:
         return NONE, None
     kept = _moved(state, ego, dt_s) if dt_s else NONE
     for item in objects:
         kept = _with(kept, item, ego)
-    if not len(kept.xy):
+    headings = [row for vehicle in np.unique(kept.vehicle).tolist() for row in _headings(kept, vehicle)]
+    if not headings:
         return kept, None
-    return kept, Traffic(_along(kept, ego, params), np.column_stack([kept.xy, kept.heading_rad]))
+    seen = np.array(headings)
+    return kept, Traffic(_along(seen, ego, params), seen)
 
 
 def warm_up() -> None:
     """Compile the kernel."""
-    _smooth(np.zeros(2), np.ones(2), 5, STEP_M, 1e-4, np.ones(3))
+    _smooth(np.zeros(2), np.ones(2), 2, STEP_M, 1e-4, np.ones(3))
 
 
 def _moved(state: TrafficState, ego: EgoState, dt_s: float) -> TrafficState:
@@ -96,46 +99,65 @@ def _moved(state: TrafficState, ego: EgoState, dt_s: float) -> TrafficState:
     xy = np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s])
     age_s = state.age_s + dt_s
     keep = (xy[:, 0] > _BEHIND_M) & (age_s <= _KEPT_S)
-    return TrafficState(xy[keep], state.heading_rad[keep] - turned, age_s[keep], state.vehicle[keep])
+    return TrafficState(xy[keep], age_s[keep], state.vehicle[keep])
 
 
 def _with(state: TrafficState, item: FusedObject, ego: EgoState) -> TrafficState:
-    """With an object's heading, if it drives along the road; without all of its headings, if it has turned off."""
-    if not item.seen_by_lidar or item.lidar_hits < _LIDAR_HITS or item.velocity_mps is None:
+    """With where a vehicle is now, if it drives: one that the camera names, the LiDAR places, and whose velocity and
+    places tell the same."""
+    if not item.seen_by_lidar or item.label not in VEHICLES or item.lidar_track is None:
         return state
-    if item.closest_point is None or item.closest_point[0] <= 0.0:
+    if item.bev is None or item.velocity_mps is None:
         return state
-    x, y, _ = item.closest_point
+    x, y = place = np.mean(item.bev, axis=0)
     rate = ego.yaw_rate_radps or 0.0
-    along, across = item.velocity_mps[0] + ego.speed_mps - rate * y, item.velocity_mps[1] + rate * x
-    if np.hypot(along, across) < _SLOWEST_MPS:
-        return state
-    heading = float(np.arctan2(across, along))
-    heading -= np.pi * np.round(heading / np.pi)
-    on_arc = 2.0 * np.arctan2(y, x)
-    mine = state.vehicle == item.id
-    if max(abs(heading), abs(heading - on_arc)) > _TURNED_OFF_RAD:
-        keep = ~mine
-        return TrafficState(state.xy[keep], state.heading_rad[keep], state.age_s[keep], state.vehicle[keep])
-    if mine.any() and np.hypot(*(state.xy[mine][-1] - (x, y))) < _EVERY_M:
-        return state
+    velocity = np.array([item.velocity_mps[0] + ego.speed_mps - rate * y, item.velocity_mps[1] + rate * x])
+    mine = state.vehicle == item.lidar_track
+    if mine.any():
+        moved, waited_s = place - state.xy[mine][-1], state.age_s[mine][-1]
+        if np.hypot(*moved) < _POINT_M and np.hypot(*velocity) * waited_s < _LINK_M:
+            return state
+        if np.hypot(*(moved - velocity * waited_s)) > _STRAYS_M + _STRAYS * np.hypot(*moved):
+            mine = ~mine  # it is another vehicle now, or never drove
+            state = TrafficState(state.xy[mine], state.age_s[mine], state.vehicle[mine])
     return TrafficState(
-        np.vstack([state.xy, (x, y)]),
-        np.append(state.heading_rad, heading),
-        np.append(state.age_s, 0.0),
-        np.append(state.vehicle, item.id),
+        np.vstack([state.xy, place]), np.append(state.age_s, 0.0), np.append(state.vehicle, item.lidar_track)
     )
 
 
-def _along(state: TrafficState, ego: EgoState, params: PathParams) -> PathEstimate:
-    """The road from the car on. A heading is seen at the length of the arc that leads to its place."""
+def _headings(state: TrafficState, vehicle: int) -> list[tuple[float, float, float]]:
+    """x, y and heading of each link of one vehicle's way, newest first: of its axis, so that an oncoming one's is turned
+    round. None of one that has turned off, and none where it was too slow."""
+    mine = state.vehicle == vehicle
+    xy, age_s = state.xy[mine], state.age_s[mine]
+    found: list[tuple[float, float, float]] = []
+    last = len(xy) - 1
+    for k in range(last - 1, -1, -1):
+        dx, dy = (xy[last] - xy[k]).tolist()
+        way_m = float(np.hypot(dx, dy))
+        if way_m < _LINK_M:
+            continue
+        x, y = (0.5 * (xy[last] + xy[k])).tolist()
+        heading = float(np.arctan2(dy, dx))
+        heading -= np.pi * round(heading / np.pi)
+        if way_m / max(age_s[k] - age_s[last], 1e-3) >= _SLOWEST_MPS:
+            if x > 0.0 and max(abs(heading), abs(heading - 2.0 * np.arctan2(y, x))) > _TURNED_OFF_RAD:
+                return []
+            found.append((x, y, heading))
+        last = k
+    return found
+
+
+def _along(seen: F64, ego: EgoState, params: PathParams) -> PathEstimate:
+    """The road from the car on, by (N, 3) headings. Each is seen at the length of the arc that leads to its place."""
     s, speed = samples(params.length_m), max(ego.speed_mps, params.min_speed_mps, 0.1)
-    aside = np.clip(np.arctan2(state.xy[:, 1], state.xy[:, 0]), -_WIDEST_RAD, _WIDEST_RAD)
-    reached = np.hypot(state.xy[:, 0], state.xy[:, 1]) / np.sinc(aside / np.pi)
+    ahead = seen[seen[:, 0] > 0.0]
+    aside = np.clip(np.arctan2(ahead[:, 1], ahead[:, 0]), -_WIDEST_RAD, _WIDEST_RAD)
+    reached = np.hypot(ahead[:, 0], ahead[:, 1]) / np.sinc(aside / np.pi)
     at = np.clip(np.round(reached / STEP_M).astype(np.intp), 0, len(s) - 1)
     # headings seen at one place are one measurement of their mean
     count = np.bincount(at, minlength=len(s)).astype(np.float64)
-    total = np.bincount(at, weights=state.heading_rad, minlength=len(s))
+    total = np.bincount(at, weights=ahead[:, 2], minlength=len(s))
     begins = min(params.lateral_jerk_mps3 / speed**3, SHARPEST_BEGIN_PER_M2)
     start = np.array(
         [
