@@ -126,7 +126,7 @@ def _with(state: TrafficState, item: FusedObject, ego: EgoState) -> TrafficState
 
 
 def _headings(state: TrafficState, vehicle: int) -> list[tuple[float, float, float]]:
-    """x, y and heading of each link of one vehicle's way, newest first: of its axis, so that an oncoming one's is turned
+    """x, y and heading of each link of one vehicle's way, newest first: of its axis, an oncoming one's is turned
     round. None of one that has turned off, and none where it was too slow."""
     mine = state.vehicle == vehicle
     xy, age_s = state.xy[mine], state.age_s[mine]
