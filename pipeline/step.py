@@ -24,7 +24,7 @@ from pipeline.lanes import road_lines as lanes
 from pipeline.lidar import segmentation
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.params import Params
-from pipeline.path import corridor, road_edges, yaw_rate
+from pipeline.path import corridor, road_edges, traffic, yaw_rate
 from pipeline.types import (
     VEHICLES,
     Box,
@@ -61,6 +61,7 @@ class State:
     ground: Ground | None = None
     lanes: lanes.LaneState = lanes.LaneState()
     edges: road_edges.EdgeState = road_edges.EdgeState()
+    traffic: traffic.TrafficState = traffic.NONE
     path: corridor.PathState = corridor.PathState()
     cipv: cipv.CipvState = cipv.CipvState()
     acc: acc.AccState = acc.AccState()
@@ -104,7 +105,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     clock.lap("existence")
     objects = object_motion.describe(objects, now.measured, params.motion)
 
-    # Path: lane lines, the route, the yaw rate and the road's edges, each weighed by how sure it is
+    # Path: lane lines, the route, the yaw rate, the road's edges and other vehicles, each weighed by how sure it is
     road_z_m = frame.camera.road_z_m if frame.camera is not None else None
     view = lanes.RoadView(aligned, sweep.ground, road_z_m, _vehicle_boxes(boxes))
     lane_state, lane = lanes.follow(state.lanes, frame.raw_lanes, view, now, params.lanes)
@@ -115,7 +116,14 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     )
     edge_state, edges = road_edges.follow(state.edges, around, now, params.path)
     clock.lap("edges")
-    evidence = corridor.Evidence(lane, frame.gnss, frame.route, edges.path if edges is not None else None)
+    traffic_state, driving = traffic.follow(state.traffic, objects, now, params.path)
+    evidence = corridor.Evidence(
+        lane,
+        frame.gnss,
+        frame.route,
+        edges.path if edges is not None else None,
+        driving.path if driving is not None else None,
+    )
     path_state, path = corridor.predict(state.path, evidence, now, params.path)
     agreement_state = agreement.follow(state.agreement, objects, now.dt_s, params.fusion)
     path = agreement.heed(path, agreement_state, params.fusion)
@@ -142,6 +150,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         ground=sweep.ground,
         lanes=lane,
         edges=edges.cells if edges is not None else None,
+        traffic=driving.headings if driving is not None else None,
     )
     result = Result(
         frame=frame.name,
@@ -173,6 +182,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         ground=sweep.ground,
         lanes=lane_state,
         edges=edge_state,
+        traffic=traffic_state,
         path=path_state,
         cipv=cipv_state,
         acc=acc_state,

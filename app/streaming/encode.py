@@ -84,9 +84,9 @@ def display_json(result: Result, aligned: Alignment | None, scale: float) -> dic
     first; ``far_view`` is the window of the detector's second look, None without one; ``path`` is the corridor on the
     ground of the sweep, None without a ground. ``lanes`` are the ego lane's lines where the camera saw them, None
     without a lane detector; ``plan_lanes`` the same seen from above, x y in metres; ``plan_edges`` what runs beside the
-    road, likewise, None where the path is not taken from it; ``ground`` the planes under the
-    sweep, n·p + d = 0, and the segments of x in which they apply; ``ranking`` every object, best candidate for the CIPV
-    first."""
+    road, likewise, None where the path is not taken from it; ``plan_traffic`` x, y and heading in rad of the vehicles
+    that show where the road goes; ``ground`` the planes under the sweep, n·p + d = 0, and the segments of x in which
+    they apply; ``ranking`` every object, best candidate for the CIPV first."""
     layers = result.layers
     path = {"center": result.path.center, "left": result.path.left, "right": result.path.right}
     return {
@@ -97,6 +97,7 @@ def display_json(result: Result, aligned: Alignment | None, scale: float) -> dic
         "path": _on_ground(path, layers.ground, aligned, scale),
         **_lanes_json(layers.lanes, aligned, scale),
         "plan_edges": np.round(layers.edges, 2).tolist() if layers.edges is not None else None,
+        "plan_traffic": np.round(layers.traffic, 3).tolist() if layers.traffic is not None else None,
         "ground": _ground_json(layers.ground),
         "vision_ranges": _vision_ranges(result),
         "ranking": ranking_json(result),

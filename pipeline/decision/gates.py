@@ -114,8 +114,14 @@ def _distance(who: Candidate) -> Answer:
 def _confirmed(who: Candidate) -> Answer:
     """Two sensors that both see it now are enough at once; one alone must see it again. The lead is confirmed."""
     at_once = who.item.seen_by_two_sensors or who.leads
-    hits, needed = who.item.hits, 1 if at_once else who.params.confirm_hits
+    hits, needed = _sightings(who.item), 1 if at_once else who.params.confirm_hits
     return hits >= needed, hits, needed
+
+
+def _sightings(item: FusedObject) -> int:
+    """Of the object where it is now. A camera track whose place was reset, because its distances no longer fitted it,
+    may follow another vehicle than before: only the sightings since then confirm it."""
+    return min(item.hits, item.camera_ranges) if item.pictured and not item.ranged else item.hits
 
 
 def _seen(who: Candidate) -> Answer:
@@ -234,7 +240,9 @@ CONDITIONS = Conditions(
         "ahead", _ahead, lambda who: "position unknown" if who.place is None else "beside or behind the bumper"
     ),
     in_path=Condition("path_offset", _in_path, _out_of_path),
-    confirmed=Condition("hits", _confirmed, lambda who: f"seen {who.item.hits} of {who.params.confirm_hits} times"),
+    confirmed=Condition(
+        "hits", _confirmed, lambda who: f"seen {_sightings(who.item)} of {who.params.confirm_hits} times"
+    ),
     seen=Condition("seen", _seen, _not_seen),
     placed=Condition("path_sigma", _placed, _uncertain),
     probable=Condition("lead_probability", _probable, _improbable),

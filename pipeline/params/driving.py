@@ -37,6 +37,10 @@ class PathParams(Section):
     use_edges: bool = choice(
         False, "Put the corridor along what runs beside the road: kerbs, hedges, walls, rails, parked cars"
     )
+    use_traffic: bool = choice(
+        True,
+        "Put the corridor along the headings of vehicles that drive on the road, where no line or route shows it",
+    )
     min_speed_mps: float = slider(2.0, 0.0, 10.0, 0.5, "m/s", "Yaw rate and GNSS course are ignored below this speed")
     yaw_rate_sigma_radps: float = slider(
         0.007, 0.0005, 0.05, 0.0005, "rad/s", "Noise of the yaw rate, including small steering corrections"

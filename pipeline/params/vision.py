@@ -129,7 +129,13 @@ class ExistenceParams(Section):
 
     enabled: bool = choice(True, "Weigh the evidence for and against each object; off: every object exists")
     min_braking: float = slider(
-        0.8, 0.0, 0.99, 0.01, "", "A less probable object causes gentle deceleration only, no hard braking"
+        0.8,
+        0.0,
+        0.99,
+        0.01,
+        "",
+        "An object that is less likely to exist causes gentle deceleration only, no hard braking; so does one seen by "
+        "the camera alone that is less likely to be in the path",
     )
     camera_ranges: int = slider(
         8,

@@ -159,6 +159,7 @@ def _new(track_id: int, seen: VisionMeasurement, guess: SpeedGuess, params: Visi
         missed=0,
         carried=False,
         measured=seen.distance_m is not None,
+        ranges=int(seen.distance_m is not None),
     )
     noise, speed_sigma = _box_noise(detection.bbox, params), _box_speed_sigma(detection.bbox)
     box_filter = kalman.start(_centre(detection.bbox), noise, speed_sigma)
@@ -193,7 +194,8 @@ def _seen(
         measured=seen.distance_m is not None,
     )
     if params.filter == "queue":
-        track = evolve(track, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position)
+        ranges = track.ranges + 1 if seen.distance_m is not None else 0
+        track = evolve(track, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position, ranges=ranges)
     height = renamed(followed, label, seen)
     current = evolve(followed, track=track, unseen_s=0.0, votes=votes, box_filter=box_filter, height=height)
     return take_place(current, seen, guess, ego_speed_mps, params) if params.filter == "kalman" else current
