@@ -33,7 +33,7 @@ _METRES_A_DEGREE = 111_320.0
 
 
 class LabelRow(NamedTuple):
-    """One line of a label file, ego frame. kind: as KITTI calls it. bbox: pixels of the rectified picture. cuboid and
+    """One line of a label file, ego frame. kind: as KITTI calls it. bbox: pixels of the rectified image. cuboid and
     bbox are None where the line says that it knows none. said_more: it knew how far the object is cut or hidden."""
 
     kind: str

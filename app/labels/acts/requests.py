@@ -20,7 +20,7 @@ _MOST_ITEMS = 10_000
 
 
 class Placed(Strict):
-    """Where something is in one frame. bbox: x1 y1 x2 y2 in pixels of the raw picture."""
+    """Where something is in one frame. bbox: x1 y1 x2 y2 in pixels of the raw image."""
 
     frame: Index
     cuboid: CuboidShape | None = None
@@ -150,7 +150,7 @@ class AddTrack(Placed):
 
 
 class Lift(Strict):
-    """A vehicle from where it is in the picture: a box around it, or a pixel on it."""
+    """A vehicle from where it is in the image: a box around it, or a pixel on it."""
 
     kind: Literal["lift"]
     frame: Index

@@ -187,12 +187,12 @@ def _changes(labels: LabelSet, drive: LabeledDrive) -> tuple[str, ...]:
     ]
     cameras = [drive.shots[sighting.frame].camera for _, sighting in found if sighting.bbox is not None]
     if any(camera is not None and camera.distortion.size for camera in cameras):
-        changes.append("boxes are moved to the undistorted picture, as in KITTI")
+        changes.append("boxes are moved to the undistorted image, as in KITTI")
     if found:
         changes.append("truncation and occlusion are unknown: written as -1")
     without = sum(sighting.bbox is None for _, sighting in found)
     if without:
-        changes.append(f"{without:,} objects have no box in the picture: written as -1")
+        changes.append(f"{without:,} objects have no box in the image: written as -1")
     return tuple(changes)
 
 
