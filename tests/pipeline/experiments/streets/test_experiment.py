@@ -1,4 +1,4 @@
-"""The CIPV in a street without paint: one drive by the yaw rate alone, with other vehicles, and with the road's edges."""
+"""The CIPV in a street without paint: by the yaw rate alone, with other vehicles, and with the road's edges."""
 
 from __future__ import annotations
 
