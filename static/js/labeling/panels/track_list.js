@@ -7,7 +7,7 @@ import { get, paintAfter, set } from "../../core/store.js";
 import { mergeWith, propose, rejectHidden } from "../acts/commands.js";
 import { present } from "../state/draft.js";
 import { isKnown } from "../state/sightings.js";
-import { shown, trackOf } from "../state/labels.js";
+import { isSentBack, shown, stateWords, trackOf } from "../state/labels.js";
 import { isSure, parted, setThreshold, threshold } from "../state/threshold.js";
 import { isReviewing } from "../acts/review.js";
 
@@ -146,20 +146,21 @@ function create() {
 }
 
 /** @param {HTMLElement} row @param {LabelTrack} track */
-function update(row, { id, label, state, first, last, keyframes, origin, comment, reviewer, confidence }) {
+function update(row, track) {
+  const { id, label, state, first, last, keyframes, origin, comment, reviewer, confidence } = track;
   row.setAttribute("aria-selected", String(id === get("track")));
-  row.dataset.state = comment && state === "proposed" ? "sent-back" : state;
+  row.dataset.state = isSentBack(track) ? "sent-back" : state;
   const [mark, name, what, frames, who] = [...row.children];
   text(name, `#${id}`);
   text(
     mark,
     reviewer
       ? "✓✓"
-      : row.dataset.state === "sent-back"
+      : isSentBack(track)
         ? "↩"
         : { proposed: "?", accepted: "✓", corrected: "✎", rejected: "✕" }[state],
   );
-  mark.setAttribute("aria-label", reviewer ? "reviewed" : row.dataset.state === "sent-back" ? "sent back" : state);
+  mark.setAttribute("aria-label", stateWords(track));
   text(what, label);
   text(
     frames,
