@@ -43,12 +43,18 @@ class Origin:
 @dataclass(frozen=True)
 class Sighting:
     """A track in one frame. cuboid: None where only the picture shows it. bbox: pixels of the raw picture; None where
-    only the LiDAR shows it. keyframe: put there by a person or an import; otherwise interpolated between keyframes."""
+    only the LiDAR shows it. keyframe: put there by a person or an import; otherwise interpolated between keyframes.
+    box_set: a person or a file says what the box is; else it follows the cuboid, if there is one (``boxes.following``).
+    truncation: the share, 0–1, of it that lies outside the picture; occlusion: 0 visible, 1 partly, 2 largely hidden;
+    None where nobody said it."""
 
     frame: int
     cuboid: Cuboid | None
     bbox: Box | None = None
     keyframe: bool = True
+    box_set: bool = False
+    truncation: float | None = None
+    occlusion: int | None = None
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,11 @@
 /** Details of the selected track: actions, position in this frame, history. */
 import { el, text } from "../../core/dom.js";
-import { DASH, num, percent } from "../../core/format.js";
+import { num, percent } from "../../core/format.js";
 import { on, paint } from "../../core/store.js";
 import * as commands from "../acts/commands.js";
 import { CLASSES } from "../views/cuboid.js";
 import { presentOf } from "../state/draft.js";
+import { boxOf, isFollowing } from "../views/picture_drawing.js";
 import { chosen, nameOf } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
 import { Past } from "./history_list.js";
@@ -53,6 +54,7 @@ export function setUp(parent) {
       button("Turn round", "Shift X", "Front and rear are mistaken: turn the whole track round", commands.flip),
       button("Size along", "W", "Apply this size to the whole track", commands.sizeAlong),
       button("Keyframe", "K", "Set a keyframe in this frame", commands.keyframe),
+      button("Free box", "Shift S", "The image box follows the cuboid again", commands.boxFollows),
       button("Draw", "Shift G", "Draw the shape in this frame", () => setTool("shape")),
       button("Not here", "Del", "Remove from this frame or the marked frames", commands.notHere),
       button("Split", "X", "Split the track from this frame on", commands.splitHere),
@@ -62,7 +64,7 @@ export function setUp(parent) {
     past.node,
   );
   parent.append(panel);
-  paint(["track", "labels", "labelFrames", "frame", "draft"], show);
+  paint(["track", "labels", "labelFrames", "frame", "draft", "projected"], show);
   on(["track", "labels"], () => {
     const track = chosen();
     if (track) past.look("track", track.id, track.revision);
@@ -91,6 +93,12 @@ function show() {
   text(facts, [placeWords(track, presentOf(track.id)), HEADINGS[track.heading]].filter(Boolean).join(" · "));
 }
 
+/** @param {import("../state/types.js").LabelSighting} sighting */
+function boxWords(sighting) {
+  if (!isFollowing(sighting)) return " · box set by hand";
+  return boxOf(sighting.track) ? "" : " · outside the image";
+}
+
 /**
  * @param {import("../state/types.js").LabelTrack} track
  * @param {import("../state/types.js").LabelSighting|null} sighting
@@ -113,5 +121,5 @@ function placeWords({ keyframes, origin }, sighting) {
   } = sighting.cuboid;
   const place = `${num(x, 2)} m ahead, ${num(Math.abs(y), 2)} m ${y >= 0 ? "left" : "right"}`;
   const dimensions = `${size.map((each) => num(each, 1)).join(" × ")} m · ${num((yaw_rad * 180) / Math.PI, 0)}°`;
-  return `${kind} · ${place} · ${dimensions}${sighting.bbox ? "" : ` · box ${DASH}`}`;
+  return `${kind} · ${place} · ${dimensions}${boxWords(sighting)}`;
 }

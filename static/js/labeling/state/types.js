@@ -35,6 +35,7 @@
  * @property {Cuboid|null} cuboid
  * @property {Box|null} bbox
  * @property {boolean} keyframe
+ * @property {boolean} box_set somebody set the box; else it follows the cuboid, if there is one
  * @typedef {object} LeadRange both ends included
  * @property {number} id
  * @property {number} revision

@@ -64,7 +64,7 @@ function takes(from) {
   if (tool === "new") return drawing(from, (bbox) => lift(bbox ? { bbox } : { pixel: [from.u, from.v] }));
   if (tool === "shape" && track !== null) return drawing(from, (bbox) => (bbox ? shape(track, bbox) : drop()));
   if (track === null) return null;
-  const box = presentOf(track)?.bbox,
+  const box = boxOf(track),
     sides = box ? sidesAt(box, from, REACH_PX * perPane()) : null;
   if (!sides || sides.every(Boolean)) {
     const onRoad = road.takes(track, from);
@@ -73,7 +73,7 @@ function takes(from) {
   if (!box || !sides) return null;
   return {
     from,
-    moved: (to) => hold(track, { bbox: stretched(box, sides, to.u - from.u, to.v - from.v) }),
+    moved: (to) => hold(track, { bbox: stretched(box, sides, to.u - from.u, to.v - from.v), box_set: true }),
     ended: (isClick) => (isClick ? clicked(from) : release()),
   };
 }
@@ -91,7 +91,7 @@ function drawing(from, done) {
     from,
     moved: (to) => {
       box = ordered([from.u, from.v, to.u, to.v]);
-      set("draft", { track: null, frame: shown(), revision: 0, cuboid: null, bbox: box, settled: null });
+      set("draft", { track: null, frame: shown(), revision: 0, cuboid: null, bbox: box, box_set: true, settled: null });
     },
     ended: (isClick) => {
       setTool(null);
@@ -114,7 +114,7 @@ async function lift(from) {
 /** @param {number} track @param {Box} bbox */
 function shape(track, bbox) {
   drop();
-  hold(track, { bbox });
+  hold(track, { bbox, box_set: true });
   release();
 }
 

@@ -6,7 +6,8 @@ import { isSure } from "../state/threshold.js";
 
 /**
  * @typedef {{tint: string, dash: number[], width: number, isLead: boolean, isChosen: boolean, isFacing: boolean,
- *   name: string, role: "cipv"|"path"|"fused"|"warning"}} Look isFacing: front and rear are told apart; role: of its colour
+ *   name: string, role: "cipv"|"path"|"fused"|"warning"}} Look
+ *   isFacing: front and rear are told apart; role: of its colour
  */
 
 /** @param {number} id @param {boolean} isOnPicture @returns {Look|null} null if hidden */
