@@ -3,7 +3,7 @@ import { request } from "../../core/api.js";
 import { seekTo } from "../../drive/seek.js";
 import { get, set } from "../../core/store.js";
 import { act } from "./queue.js";
-import { CLASSES, grown, moved, turned } from "../views/cuboid.js";
+import { CLASSES, grown, moved, turned, usualSize } from "../views/cuboid.js";
 import * as draft from "../state/draft.js";
 import { chosen, leadAt, shown, trackOf } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
@@ -28,11 +28,29 @@ function withTrack(what) {
 export const refOf = ({ id, revision }) => ({ kind: "track", id, revision });
 
 /** Propose labels from the pipeline, in the marked frames or in all frames. */
-export function propose() {
+export async function propose() {
   const isMarked = get("marked") !== null,
     whole = { first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1) };
-  return span.over((frames) => act({ kind: "propose", ...(isMarked ? frames : whole), from: "run" }));
+  const answer = await span.over((frames) => act({ kind: "propose", ...(isMarked ? frames : whole), from: "run" }));
+  if (!answer) offerComputed();
+  return answer;
 }
+
+/** Offer to propose what is computed so far, until everything is. */
+function offerComputed() {
+  const done = computed(),
+    all = get("state")?.count ?? 0;
+  if (!done || done >= all) return;
+  set("offer", {
+    words: `Propose these ${done}`,
+    take: () => act({ kind: "propose", first: 0, last: done - 1, from: "run" }),
+    isOpen: () => computed() < all,
+    about: get("said") ?? "",
+  });
+}
+
+/** Frames of the recording that the present run has come to. */
+const computed = () => get("drive")?.now?.done ?? 0;
 
 /**
  * Accept or reject the selected track; without a selection, the lead range at this frame.
@@ -170,8 +188,19 @@ export const nextClass = (direction) =>
     relabel(CLASSES[(CLASSES.indexOf(label) + direction + CLASSES.length) % CLASSES.length]);
   });
 
-/** @param {string} label */
-export const relabel = (label) => withTrack(({ id, revision }) => act({ kind: "relabel", track: id, revision, label }));
+/** Change the class, and offer the new one's usual size. @param {string} label */
+export const relabel = (label) =>
+  withTrack(async ({ id, revision }) => {
+    const cuboid = draft.presentOf(id)?.cuboid,
+      size = usualSize(label);
+    const answer = await act({ kind: "relabel", track: id, revision, label });
+    if (!answer || !cuboid || !size || cuboid.size.every((side, axis) => side === size[axis])) return;
+    set("offer", {
+      words: `Size of a ${label}: ${size.join(" × ")} m`,
+      take: () => act({ kind: "size_along", track: id, revision: trackOf(id)?.revision ?? revision, size }),
+      isOpen: () => get("track") === id && trackOf(id)?.label === label,
+    });
+  });
 
 /** Start merging the selected track with the label that is clicked or selected next. */
 export const merge = () =>

@@ -54,7 +54,7 @@ export function setUp(parent) {
       button("Turn round", "Shift X", "Front and rear are mistaken: turn the whole track round", commands.flip),
       button("Size along", "W", "Apply this size to the whole track", commands.sizeAlong),
       button("Keyframe", "K", "Set a keyframe in this frame", commands.keyframe),
-      button("Free box", "Shift S", "The image box follows the cuboid again", commands.boxFollows),
+      button("Box follows", "Shift S", "The image box follows the cuboid again", commands.boxFollows),
       button("Draw", "Shift G", "Draw the shape in this frame", () => setTool("shape")),
       button("Not here", "Del", "Remove from this frame or the marked frames", commands.notHere),
       button("Split", "X", "Split the track from this frame on", commands.splitHere),
@@ -69,6 +69,13 @@ export function setUp(parent) {
     const track = chosen();
     if (track) past.look("track", track.id, track.revision);
   });
+}
+
+/** A class that people here cannot choose, from a file or a detector, is shown too. @param {string} label */
+function showClass(label) {
+  classes.querySelector(".foreign")?.remove();
+  if (!CLASSES.includes(label)) classes.append(el("option", { class: "foreign", value: label, textContent: label }));
+  classes.value = label;
 }
 
 /** How front and rear of a proposal were told apart. */
@@ -87,7 +94,7 @@ function show() {
   const sure = track.state === "proposed" && track.confidence !== null ? ` ${percent(track.confidence)}` : "";
   text(state, track.reviewer ? `reviewed by ${track.reviewer}` : track.state + sure);
   state.dataset.state = track.state;
-  if (document.activeElement !== classes) classes.value = track.label;
+  if (document.activeElement !== classes) showClass(track.label);
   text(comment, track.comment ? `Sent back: ${track.comment}` : "");
   text(how, track.origin.how ? `Placed by ${track.origin.name}: ${track.origin.how}` : "");
   text(facts, [placeWords(track, presentOf(track.id)), HEADINGS[track.heading]].filter(Boolean).join(" · "));
@@ -115,11 +122,11 @@ function placeWords({ keyframes, origin }, sighting) {
   if (!sighting.cuboid)
     return `${kind} · image box only, no LiDAR points. Draw a cuboid (Shift G), or fit one to points in the box (S)`;
   const {
-    center: [x, y],
+    center: [x, y, z],
     size,
     yaw_rad,
   } = sighting.cuboid;
-  const place = `${num(x, 2)} m ahead, ${num(Math.abs(y), 2)} m ${y >= 0 ? "left" : "right"}`;
+  const place = `${num(x, 2)} m ahead, ${num(Math.abs(y), 2)} m ${y >= 0 ? "left" : "right"}, middle at ${num(z, 2)} m`;
   const dimensions = `${size.map((each) => num(each, 1)).join(" × ")} m · ${num((yaw_rad * 180) / Math.PI, 0)}°`;
   return `${kind} · ${place} · ${dimensions}${boxWords(sighting)}`;
 }

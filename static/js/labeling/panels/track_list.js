@@ -73,6 +73,7 @@ export function setUp(parent) {
   );
   slider.addEventListener("input", () => setThreshold(slider.valueAsNumber));
   body.append(nothing, begin);
+  new ResizeObserver(bringIntoView).observe(body);
   body.addEventListener("click", (event) => pick(within(event, ".track-row")));
   const reflect = paintAfter(["labels", "labelFrames", "frame", "track", "labeling", "draft", "threshold"], show);
   /** @param {Which} key */
@@ -90,12 +91,17 @@ export function setUp(parent) {
     const found = fitting();
     text(count, found.length > MOST ? `${MOST} of ${found.length}` : String(found.length));
     list.show(found.slice(0, MOST));
-    if (get("track") !== scrolledTo) body.querySelector("[aria-selected=true]")?.scrollIntoView({ block: "nearest" });
+    if (get("track") !== scrolledTo) bringIntoView();
     scrolledTo = get("track") ?? null;
     nothing.hidden = found.length > 0;
     text(nothing, emptyWords());
     begin.hidden = (get("labels")?.tracks.size ?? 0) > 0;
   }
+}
+
+/** The selected row; again when the details below it take its place. */
+function bringIntoView() {
+  body.querySelector("[aria-selected=true]")?.scrollIntoView({ block: "nearest" });
 }
 
 /** The threshold and what it leaves, while there are proposals it applies to. */

@@ -29,6 +29,9 @@ const TYPICAL_M = {
   person: [0.6, 0.6, 1.75],
 };
 export const CLASSES = Object.keys(TYPICAL_M);
+
+/** Length, width, height; null where there is none. @param {string} label @returns {[number, number, number]|null} */
+export const usualSize = (label) => TYPICAL_M[label] ?? null;
 /** A shorter drag sets only the position, not length and heading. */
 const SAYS_FROM_M = 1;
 
@@ -111,7 +114,10 @@ export const moved = (cuboid, dx, dy, dz = 0) => ({
 
 /**
  * Longer, wider or higher. The side that the sensors see, and the bottom, stay.
- * @param {Cuboid} cuboid @param {number} axis length, width, height @param {number} by metres @returns {Cuboid}
+ * @param {Cuboid} cuboid
+ * @param {number} axis length, width, height
+ * @param {number} by metres
+ * @returns {Cuboid}
  */
 export function grown(cuboid, axis, by) {
   const size = /** @type {[number, number, number]} */ ([...cuboid.size]);

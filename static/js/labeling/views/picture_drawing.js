@@ -25,6 +25,10 @@ export function drawInPicture(ctx, frame, place) {
     Y = (/** @type {number} */ v) => place.y + v * scale;
   const pixels = projected?.frame === frame.state.index ? projected.pixels : new Map();
   const tags = new Labels(ctx, place.x + picture.width * place.scale, place.y, place.y + picture.height * place.scale);
+  for (const { track } of present()) {
+    const box = lookOf(track, true) && boxOf(track);
+    if (box) tags.keepFree(X(box[0]), Y(box[1]), (box[2] - box[0]) * scale, (box[3] - box[1]) * scale);
+  }
   for (const each of present()) {
     const look = lookOf(each.track, true),
       corners = pixels.get(each.track);

@@ -11,7 +11,7 @@ import { chosen, shown } from "../state/labels.js";
 import { lookOf } from "./style.js";
 import { isOn, setTool } from "../state/mode.js";
 import { newLabel } from "../state/new_class.js";
-import { boxOf } from "./picture_drawing.js";
+import { boxOf, isFollowing } from "./picture_drawing.js";
 import * as road from "./road_drag.js";
 
 /** @typedef {import("../state/types.js").Box} Box */
@@ -64,7 +64,8 @@ function takes(from) {
   if (tool === "new") return drawing(from, (bbox) => lift(bbox ? { bbox } : { pixel: [from.u, from.v] }));
   if (tool === "shape" && track !== null) return drawing(from, (bbox) => (bbox ? shape(track, bbox) : drop()));
   if (track === null) return null;
-  const box = boxOf(track),
+  const label = presentOf(track),
+    box = label && !isFollowing(label) ? label.bbox : null, // one that follows is drawn anew (Shift G)
     sides = box ? sidesAt(box, from, REACH_PX * perPane()) : null;
   if (!sides || sides.every(Boolean)) {
     const onRoad = road.takes(track, from);
