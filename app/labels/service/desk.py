@@ -110,6 +110,11 @@ class LabelDesk:
         return self._open.framed()
 
     @property
+    def params(self) -> Params:
+        """Those that are in use."""
+        return self._control.peek().params
+
+    @property
     def labels(self) -> DriveLabels:
         """Of the open recording. NoSuchLabel when none is open."""
         opened = self._open

@@ -9,6 +9,8 @@ import { boxOf, isFollowing } from "../views/picture_drawing.js";
 import { chosen, nameOf } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
 import { Past } from "./history_list.js";
+import * as closeUp from "./close_up.js";
+import * as numbers from "./numbers.js";
 import * as review from "../acts/review.js";
 
 const head = el("div", { class: "detail-head" }),
@@ -61,9 +63,13 @@ export function setUp(parent) {
       button("Merge", "M", "Merge with another label: click it, or select it with . and press Enter", commands.merge),
       button("Remove", "Shift Del", "Delete the track", commands.removeTrack),
     ),
+    numbers.node,
+    closeUp.node,
     past.node,
   );
   parent.append(panel);
+  numbers.setUp();
+  closeUp.setUp();
   paint(["track", "labels", "labelFrames", "frame", "draft", "projected"], show);
   on(["track", "labels"], () => {
     const track = chosen();

@@ -102,6 +102,11 @@
  * @property {string} what in a few words
  * @property {LabelsAnswer|null} changed
  * @property {string} note
+ * @typedef {object} Still one frame of a track's filmstrip
+ * @property {number} frame
+ * @property {"keyframe"|"end"|"fits worst"} why
+ * @property {number|null} inside points in its cuboid
+ * @property {number|null} beside points right beside it
  * @typedef {object} Found where there is something to do
  * @property {number|null} frame
  * @property {string} why
