@@ -164,6 +164,21 @@ class WholeTrack(StatedItem):
     sightings: list[PlacedFrame]
 
 
+class ProblemJson(BaseModel):
+    """What can hardly be so. track: what it is about; null for the lead alone."""
+
+    frame: int
+    track: int | None
+    words: str
+
+
+class ChecksJson(BaseModel):
+    """Of the labels as they were after act ``revision``."""
+
+    revision: int
+    problems: list[ProblemJson]
+
+
 class StillJson(BaseModel):
     """One frame of a track. inside, beside: points in its cuboid and right beside it; null without points or cuboid."""
 

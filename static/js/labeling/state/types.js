@@ -107,6 +107,10 @@
  * @property {"keyframe"|"end"|"fits worst"} why
  * @property {number|null} inside points in its cuboid
  * @property {number|null} beside points right beside it
+ * @typedef {object} Problem what can hardly be so
+ * @property {number} frame
+ * @property {number|null} track
+ * @property {string} words
  * @typedef {object} Found where there is something to do
  * @property {number|null} frame
  * @property {string} why
