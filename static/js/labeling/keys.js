@@ -6,6 +6,7 @@ import * as commands from "./acts/commands.js";
 import { bringHere } from "./acts/range_ends.js";
 import { cancel, isOn, setTool, toggleObjects } from "./state/mode.js";
 import * as review from "./acts/review.js";
+import { zoomBy } from "./views/picture_pointer.js";
 import * as span from "./state/marked_frames.js";
 import { toggleWhole } from "./acts/tags.js";
 
@@ -179,6 +180,8 @@ export const labelKeys = () => [
     mode: "labeling",
     title: "Labeling: shapes",
     bindings: [
+      key(">", ">", "zoom into the image at the selected label (or wheel, pinch)", () => zoomBy(1.6), "zoom in"),
+      key("<", "<", "zoom out", () => zoomBy(1 / 1.6)),
       key(".", ".", "next label in this frame", () => commands.selectNext(1), "next label"),
       key(",", ",", "previous label", () => commands.selectNext(-1)),
       during(

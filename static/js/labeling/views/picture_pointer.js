@@ -12,6 +12,7 @@ import { lookOf } from "./style.js";
 import { isOn, setTool } from "../state/mode.js";
 import { newLabel } from "../state/new_class.js";
 import { boxOf, isFollowing } from "./picture_drawing.js";
+import { isZoomed, pan, zoom } from "../../views/picture_zoom.js";
 import * as road from "./road_drag.js";
 
 /** @typedef {import("../state/types.js").Box} Box */
@@ -27,12 +28,13 @@ export function setUp() {
   /** @type {{x: number, y: number, hasMoved: boolean, drag: Drag|null}|null} */
   let down = null;
   canvas.addEventListener("pointerdown", (event) => {
-    if (!isOn() || get("taping")) return;
+    if (!isOn() || get("taping") || event.button !== 0) return;
     canvas.setPointerCapture(event.pointerId);
     down = { x: event.offsetX, y: event.offsetY, hasMoved: false, drag: takes(pixelAt(event)) };
   });
   canvas.addEventListener("pointermove", (event) => {
     if (!down) return;
+    if (!down.drag && down.hasMoved && isZoomed()) pan(place(), event.movementX, event.movementY);
     down.hasMoved ||= Math.hypot(event.offsetX - down.x, event.offsetY - down.y) >= CLICK_PX;
     if (down.hasMoved) down.drag?.moved(pixelAt(event));
   });
@@ -47,6 +49,12 @@ export function setUp() {
     down = null;
     drop();
   });
+}
+
+/** Zoom at the selected label, else at the middle. @param {number} by */
+export function zoomBy(by) {
+  const box = boxOf(get("track") ?? -1);
+  zoom(by, box && { u: (box[0] + box[2]) / 2, v: (box[1] + box[3]) / 2 }, place());
 }
 
 /** Camera pixels per canvas pixel. */
