@@ -41,8 +41,8 @@ class Problem:
 
 
 def problems(labels: LabelSet, drive: LabeledDrive) -> list[Problem]:
-    """By frame. Rejected labels are passed over; so are frames more than ``LONGEST_STEP_S`` apart."""
-    tracks = [track for track in labels.tracks if track.state != "rejected"]
+    """By frame. Proposals and rejected labels are passed over; so are frames more than ``LONGEST_STEP_S`` apart."""
+    tracks = [track for track in labels.tracks if track.state in ("accepted", "corrected")]
     found = [
         *(each for track in tracks for each in _of_track(track, drive.t_ns)),
         *_overlaps(tracks),
@@ -121,7 +121,7 @@ def _is_apart(sighting: Sighting, drive: LabeledDrive) -> bool:
 def _leads(labels: LabelSet) -> Iterator[Problem]:
     tracks = {track.id: track for track in labels.tracks}
     for lead in labels.leads:
-        if lead.state == "rejected" or not isinstance(lead.lead, int):
+        if lead.state in ("proposed", "rejected") or not isinstance(lead.lead, int):
             continue
         track = tracks.get(lead.lead)
         if track is None or track.state == "rejected":

@@ -48,7 +48,8 @@ def test_jumps_are_found_where_they_are(odd: Cuboid, said: str) -> None:
 
 def test_two_in_one_place_overlap() -> None:
     assert found(driven(), driven(2, 0.9))[0] == (0, "#1 car and #2 car overlap")
-    assert found(driven(), replace(driven(2, 0.9), state="rejected")) == []
+    for state in ("rejected", "proposed"):
+        assert found(driven(), replace(driven(2, 0.9), state=state)) == [], "nobody stands behind that"
 
 
 def test_a_lead_is_there_and_ahead_of_us() -> None:

@@ -193,12 +193,14 @@ function reflect() {
     .map((track) => /** @type {import("../state/types.js").LabelTrack} */ (track).id)
     .sort((a, b) => a - b);
   const shownLeads = /** @type {Lead[]} */ ([
+    "none",
+    "unknown",
     ...(typeof range?.lead === "number" && !numbers.includes(range.lead) ? [range.lead] : []),
     ...numbers,
   ]);
   keyed(
     leads,
-    /** @type {Lead[]} */ ([...shownLeads, "none", "unknown"]),
+    shownLeads,
     String,
     (lead) => el("button", { type: "button", textContent: leadName(lead), onclick: () => span.choose(lead) }),
     (button, lead) => {

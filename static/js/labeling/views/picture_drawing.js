@@ -2,6 +2,7 @@
 import { drawBox, drawCuboid } from "../../views/drawing/picture.js";
 import { get } from "../../core/store.js";
 import { presentOf, present } from "../state/draft.js";
+import { shown } from "../state/labels.js";
 import { lookOf } from "./style.js";
 import { isOn } from "../state/mode.js";
 import { NEW } from "./projection.js";
@@ -23,7 +24,8 @@ export function drawInPicture(ctx, frame, place) {
   const scale = place.scale * picture.scale;
   const X = (/** @type {number} */ u) => place.x + u * scale,
     Y = (/** @type {number} */ v) => place.y + v * scale;
-  const pixels = projected?.frame === frame.state.index ? projected.pixels : new Map();
+  const isProjected = projected?.frame === frame.state.index,
+    pixels = isProjected ? projected.pixels : new Map();
   const tags = new Labels(ctx, place.x + picture.width * place.scale, place.y, place.y + picture.height * place.scale);
   for (const { track } of present()) {
     const box = lookOf(track, true) && boxOf(track);
@@ -33,7 +35,7 @@ export function drawInPicture(ctx, frame, place) {
     const look = lookOf(each.track, true),
       corners = pixels.get(each.track);
     if (!look) continue;
-    const bbox = boxIn(each, corners, picture);
+    const bbox = boxIn(each, corners, picture, isProjected);
     ctx.setLineDash(look.dash);
     if (corners) drawCuboid(ctx, corners, look.tint, look.width, X, Y);
     ctx.setLineDash(isFollowing(each) ? FOLLOWING : look.dash);
@@ -79,17 +81,21 @@ export const isFollowing = ({ cuboid, box_set }) => cuboid !== null && !box_set;
 export function boxOf(track) {
   const label = presentOf(track),
     picture = get("frame")?.picture;
-  return label && picture ? boxIn(label, get("projected")?.pixels.get(track), picture) : null;
+  const projected = get("projected"),
+    isProjected = projected?.frame === shown();
+  if (!label || !picture) return null;
+  return boxIn(label, isProjected ? projected?.pixels.get(track) : undefined, picture, isProjected);
 }
 
 /**
  * @param {LabelSighting} label
  * @param {import("../../core/types.js").Pixels|undefined} corners
  * @param {import("../../core/types.js").Picture} picture
- * @returns {Box|null} null outside the image, or while the projection is not known yet
+ * @param {boolean} isProjected whether the projection of this frame is known; until then the stored box stands in
+ * @returns {Box|null} null outside the image
  */
-function boxIn(label, corners, { width, height, scale }) {
-  if (!isFollowing(label)) return label.bbox;
+function boxIn(label, corners, { width, height, scale }, isProjected) {
+  if (!isFollowing(label) || !isProjected) return label.bbox;
   const around = corners ? boundsOf(corners) : null;
   if (!around) return null;
   const [x1, y1, x2, y2] = around,
