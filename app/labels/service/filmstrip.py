@@ -10,8 +10,6 @@ import cv2
 import numpy as np
 
 from app.drive.open_recording import OpenRecording
-from app.labels.errors import NoSuchLabel
-from app.labels.wording import frames_text
 from pipeline.alignment.projection import resolve
 from pipeline.labels.close_up import Fit, close_up, fit_of
 from pipeline.labels.model import LabelTrack, Sighting
@@ -56,11 +54,11 @@ def sampled(sightings: Sequence[Sighting], most: int) -> list[Sighting]:
     return [sightings[place] for place in places]
 
 
-def close_up_jpeg(track: LabelTrack, index: int, recording: OpenRecording, params: Params) -> bytes:
-    """A track in one frame. NoSuchLabel where it is not there."""
+def close_up_jpeg(track: LabelTrack, index: int, recording: OpenRecording, params: Params) -> bytes | None:
+    """A track in one frame; None where it is not."""
     sighting = track.at(index)
     if sighting is None:
-        raise NoSuchLabel(f"#{track.id} is not in {frames_text(index)}")
+        return None
     frame = recording.as_read(index)
     drawn = close_up(frame, sighting, resolve(params.alignment, frame.camera))
     return cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1].tobytes()
