@@ -36,11 +36,7 @@ def label_close_ups_router(desk: LabelDesk) -> APIRouter:
             for each in stills
         ]
 
-    @router.get(
-        "/{number}/close_up",
-        response_class=Response,
-        responses={200: {"content": {"image/jpeg": {}}}, 204: {"description": "The track is not in that frame"}},
-    )
+    @router.get("/{number}/close_up", response_class=Response, responses={200: {"content": {"image/jpeg": {}}}})
     def close_up(number: Id, frame: Annotated[Index, Query()]) -> Response:
         """Get a picture of a track in a frame: the camera's, and its points from above, the side and behind. Nothing
         (204) where it is not, as while somebody else removes it."""
