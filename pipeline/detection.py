@@ -1,4 +1,4 @@
-"""Which detectors look at the pictures of a source, and when. Networks run here, before ``step``, and nowhere else:
+"""Which detectors look at the images of a source, and when. Networks run here, before ``step``, and nowhere else:
 their answers are part of the frame and can be cached, so that changing a parameter never waits for a network."""
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Seen_co = TypeVar("Seen_co", bound=RawBoxes | RawLanes, covariant=True)
 
 
 class Detects(Protocol[Seen_co]):
-    """Looks at one picture: a network, or anything that answers like one."""
+    """Looks at one image: a network, or anything that answers like one."""
 
     @property
     def name(self) -> str:
@@ -31,7 +31,7 @@ class Detects(Protocol[Seen_co]):
         ...
 
     def detect(self, bgr: U8) -> Seen_co:
-        """What is in a picture (H, W, 3) uint8."""
+        """What is in an image (H, W, 3) uint8."""
         ...
 
 
@@ -47,7 +47,7 @@ class Detectors:
     """Lane lines are looked for in every n-th frame, by its index, so in whatever order frames are asked for the
     answers are the same. In between the lane tracker predicts."""
     far: FarView | None = None
-    """Looks a second time at the far part of the picture; None: nobody does."""
+    """Looks a second time at the far part of the image; None: nobody does."""
     far_every: int = 1
     """In every n-th frame, by its index."""
 
@@ -83,7 +83,7 @@ class LiveDetectors:
         self._looked_far = False
 
     def of(self, frame: Frame) -> Detectors:
-        """The detectors for a tick; call it once for each. A tick without a picture passes its turn to the next."""
+        """The detectors for a tick; call it once for each. A tick without an image passes its turn to the next."""
         is_due = self._since_lanes >= self._detectors.lanes_every and frame.picture is not None
         self._since_lanes = 1 if is_due else self._since_lanes + 1
         lanes = self._detectors.lanes if is_due else None
@@ -99,7 +99,7 @@ class LiveDetectors:
 
 
 class Look(Protocol):
-    """How a detector is asked about a frame's picture: directly, or through a cache."""
+    """How a detector is asked about a frame's image: directly, or through a cache."""
 
     def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen: ...
 
@@ -110,7 +110,7 @@ def look(detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
 
 
 def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
-    """The frame with what the detectors see in its picture. A frame without a picture, or whose recording already holds
+    """The frame with what the detectors see in its image. A frame without an image, or whose recording already holds
     detections, is returned as it is."""
     if frame.picture is None or frame.detections_given:
         return frame
@@ -126,8 +126,8 @@ def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
 
 
 def detector_for(source: AnySource, spec: str | None = None) -> Detector:
-    """The named vehicle detector, its input fitted to the source's pictures. Without a name: the embedded network for
-    the simulator, whose pictures it was trained on; the default network for everything else.
+    """The named vehicle detector, its input fitted to the source's images. Without a name: the embedded network for
+    the simulator, whose images it was trained on; the default network for everything else.
 
     Raises DetectorMissing when it is not installed, DetectorError when it cannot be run.
     """
@@ -137,15 +137,15 @@ def detector_for(source: AnySource, spec: str | None = None) -> Detector:
 
 
 def far_view_for(source: AnySource, detector: Detects[RawBoxes] | None, size_px: int = WINDOW_PX) -> FarView | None:
-    """The far view of the same network for the source's pictures. None without a network, and where the pictures are
+    """The far view of the same network for the source's images. None without a network, and where the images are
     no larger than what it sees anyway. DetectorError when the network cannot be run at that size."""
     size = picture_size(source)
     return open_far_view(detector, size, size_px) if isinstance(detector, Detector) and size is not None else None
 
 
 def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None:
-    """The lane detector for the source's pictures (``pipeline.lanes.open_detector.open_lanes``). None for a source
-    without pictures, unless a detector is named."""
+    """The lane detector for the source's images (``pipeline.lanes.open_detector.open_lanes``). None for a source
+    without images, unless a detector is named."""
     if spec is None and picture_size(source) is None:
         return None
     camera = source.camera if is_live_source(source) else cast("Source", source).frame(0).camera
@@ -153,13 +153,13 @@ def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None
 
 
 def brings_detections(source: AnySource) -> bool:
-    """Whether a recording holds the detections of its pictures, so that no detector is needed."""
+    """Whether a recording holds the detections of its images, so that no detector is needed."""
     return not is_live_source(source) and cast("Source", source).frame(0).detections_given
 
 
 def picture_size(source: AnySource) -> tuple[int, int] | None:
-    """(width, height) of the source's pictures: from the first frame of a recording, from the calibration of live
-    sensors. None without picture and calibration."""
+    """(width, height) of the source's images: from the first frame of a recording, from the calibration of live
+    sensors. None without image and calibration."""
     if is_live_source(source):
         return (source.camera.width, source.camera.height) if source.camera is not None else None
     return cast("Source", source).frame(0).picture_size

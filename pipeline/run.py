@@ -18,14 +18,14 @@ from pipeline.warm_up import warm_up
 
 _SILENCE_S = 0.5
 _BESIDE = ThreadPoolExecutor(thread_name_prefix="own-motion")
-"""Own motion is measured while detectors look at the picture."""
+"""Own motion is measured while detectors look at the image."""
 _TRIES = 10
 
 Sensors = Literal["lidar", "camera", "both"]
 
 
 def only(frame: Frame, sensors: Sensors) -> Frame:
-    """The frame as a car with only these sensors would have it. The picture stays, because people still want to see
+    """The frame as a car with only these sensors would have it. The image stays, because people still want to see
     it; what detectors saw in it goes."""
     if sensors == "lidar":
         return replace(frame, raw_boxes=None, raw_lanes=None)
@@ -35,7 +35,7 @@ def only(frame: Frame, sensors: Sensors) -> Frame:
 
 
 def sensed(frame: Frame, detectors: Detectors, sensors: Sensors = "both", ask: Look = look) -> Frame:
-    """A frame of a source made ready for ``step``: detectors have looked at its picture, and sensors that are switched
+    """A frame of a source made ready for ``step``: detectors have looked at its image, and sensors that are switched
     off are gone. With LiDAR alone no detector is asked."""
     return only(frame if sensors == "lidar" else detect(frame, detectors, ask), sensors)
 
@@ -49,7 +49,7 @@ def advance(
         state: what the frame before left; ``State()`` at the start.
         frame: from the source.
         params: of this frame.
-        detectors: who looks at its picture.
+        detectors: who looks at its image.
         sensors: which sensors the car has.
         ask: how a detector is asked: directly, or through a cache.
 

@@ -24,7 +24,7 @@ from pipeline.lanes import road_lines as lanes
 from pipeline.lidar import segmentation
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.params import Params
-from pipeline.path import corridor, road_edges, yaw_rate
+from pipeline.path import corridor, road_edges, traffic, yaw_rate
 from pipeline.types import (
     VEHICLES,
     Box,
@@ -61,6 +61,7 @@ class State:
     ground: Ground | None = None
     lanes: lanes.LaneState = lanes.LaneState()
     edges: road_edges.EdgeState = road_edges.EdgeState()
+    traffic: traffic.TrafficState = traffic.NONE
     path: corridor.PathState = corridor.PathState()
     cipv: cipv.CipvState = cipv.CipvState()
     acc: acc.AccState = acc.AccState()
@@ -82,7 +83,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     lidar_state, lidar_tracks = lidar_tracking.track(state.lidar, sweep.obstacles, now.dt_s, params.lidar_tracking)
     clock.lap("lidar_tracking")
 
-    # Camera: the detector's boxes, each with a distance from its height, followed from picture to picture
+    # Camera: the detector's boxes, each with a distance from its height, followed from image to image
     boxes = _measure_boxes(frame, aligned, params)
     boxes = returns.range_boxes(boxes, sweep, aligned, params.fusion)
     clock.lap("distance")
@@ -91,20 +92,20 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     )
     clock.lap("vision_tracking")
 
-    # Fusion: a cluster and a box that overlap in the picture are one object
+    # Fusion: a cluster and a box that overlap in the image are one object
     fusion_state, fused = fusion.fuse(
         state.fusion, lidar_tracks, vision_tracks, aligned, frame.picture_size, params.fusion
     )
     vision_state = vision_tracking.learn_heights(vision_state, fused.ranged_boxes(), params.vision_tracking)
-    # A mount that was knocked: what both sensors see of the same vehicles lies apart
+    # A knocked mount: both sensors see the same vehicles, but apart
     drift_state, turned = drift.follow(state.drift, fused, aligned, frame.picture_size, frame.t_ns, params.fusion)
     clock.lap("fusion")
-    # Existence: what each sensor says for and against every object being where it is said to be
+    # Existence: the evidence of each sensor for and against every object being where it is reported
     existence_state, objects = existence.weigh(state.existence, fused.objects, sweep, now.dt_s, params.existence)
     clock.lap("existence")
     objects = object_motion.describe(objects, now.measured, params.motion)
 
-    # Path: lane lines, the route, the yaw rate and the road's edges, each weighed by how sure it is
+    # Path: lane lines, the route, the yaw rate, the road's edges and other vehicles, each weighed by how sure it is
     road_z_m = frame.camera.road_z_m if frame.camera is not None else None
     view = lanes.RoadView(aligned, sweep.ground, road_z_m, _vehicle_boxes(boxes))
     lane_state, lane = lanes.follow(state.lanes, frame.raw_lanes, view, now, params.lanes)
@@ -115,7 +116,14 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     )
     edge_state, edges = road_edges.follow(state.edges, around, now, params.path)
     clock.lap("edges")
-    evidence = corridor.Evidence(lane, frame.gnss, frame.route, edges.path if edges is not None else None)
+    traffic_state, driving = traffic.follow(state.traffic, objects, now, params.path)
+    evidence = corridor.Evidence(
+        lane,
+        frame.gnss,
+        frame.route,
+        edges.path if edges is not None else None,
+        driving.path if driving is not None else None,
+    )
     path_state, path = corridor.predict(state.path, evidence, now, params.path)
     agreement_state = agreement.follow(state.agreement, objects, now.dt_s, params.fusion)
     path = agreement.heed(path, agreement_state, params.fusion)
@@ -142,6 +150,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         ground=sweep.ground,
         lanes=lane,
         edges=edges.cells if edges is not None else None,
+        traffic=driving.headings if driving is not None else None,
     )
     result = Result(
         frame=frame.name,
@@ -173,6 +182,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         ground=sweep.ground,
         lanes=lane_state,
         edges=edge_state,
+        traffic=traffic_state,
         path=path_state,
         cipv=cipv_state,
         acc=acc_state,
@@ -227,5 +237,5 @@ def _measure_boxes(
 
 
 def _vehicle_boxes(boxes: tuple[VisionMeasurement, ...] | None) -> list[Box]:
-    """Where vehicles hide the road in the picture."""
+    """Where vehicles hide the road in the image."""
     return [each.detection.bbox for each in boxes or () if each.detection.label in VEHICLES]

@@ -15,7 +15,7 @@ from pipeline.decision import path_position
 from pipeline.ego_motion import registration, structure
 from pipeline.fusion import free_road
 from pipeline.lanes import road_lines
-from pipeline.path import corridor, road_edges
+from pipeline.path import corridor, road_edges, traffic
 from pipeline.vision import place_filter
 
 _LOCK = threading.Lock()
@@ -46,5 +46,6 @@ def _warm_up() -> None:
     road_lines.warm_up()
     corridor.warm_up()
     road_edges.warm_up()
+    traffic.warm_up()
     path_position.warm_up()
     collect_rarely()

@@ -1,4 +1,4 @@
-"""Detectors that look at each picture once: tests that drive the same recording again and again see the same in it."""
+"""Detectors that look at each image once: tests that drive the same recording again and again see the same in it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pipeline.vision.far_view import FarView, open_far_view
 
 
 class LooksOnce(Generic[Seen_co]):
-    """Answers as another detector did when it saw the same picture."""
+    """Answers as another detector did when it saw the same image."""
 
     def __init__(self, detector: Detects[Seen_co]) -> None:
         self.detector = detector
@@ -37,7 +37,7 @@ class LooksOnce(Generic[Seen_co]):
 
 @cache
 def yolox_nano(data_dir: Path, width: int, height: int) -> LooksOnce[RawBoxes]:
-    """The network of the data folder for pictures of a size, in px."""
+    """The network of the data folder for images of a size, in px."""
     return LooksOnce(open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (width, height)))
 
 

@@ -15,7 +15,7 @@ from pipeline.vision.detector import Detector
 
 
 def stages(pictures: Sequence[U8], detector: Detector, budget_s: float) -> dict[str, dict[str, Any]]:
-    """``{"detector": …}`` as ``cipv bench --json`` prints it, or nothing without a picture. pictures: (H, W, 3) uint8,
+    """``{"detector": …}`` as ``cipv bench --json`` prints it, or nothing without an image. pictures: (H, W, 3) uint8,
     taken in turn. The peer runs the same graph at the same size with the same number of threads; it is left out where
     it cannot."""
     if not pictures:

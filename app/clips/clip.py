@@ -66,6 +66,6 @@ def clip_frames(clip: Clip, progress: Progress, *, pictures: bool = True) -> Ite
 
 
 def one_frame(recording: OpenRecording, params: Params, index: int) -> tuple[Frame, Result]:
-    """A frame with its picture, and its result in the run over the whole drive."""
+    """A frame with its image, and its result in the run over the whole drive."""
     frame = recording.frame(index)
     return frame, step(recording.state_from_start(index, params), frame, params)[1]

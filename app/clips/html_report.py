@@ -1,4 +1,4 @@
-"""A clip as one HTML file: what happened, curves, pictures of the moments that matter, and what it was made with."""
+"""A clip as one HTML file: what happened, curves, images of the moments that matter, and what it was made with."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def write(clip: Clip, path: Path, progress: Progress) -> None:
 
 
 def clip_page(run: Iterable[tuple[Frame, Result]], draw: Callable[[int], U8], params: Params, info: ClipInfo) -> str:
-    """The whole file; it loads nothing. ``draw`` gives the picture of a frame of the drive with the overlay, BGR; it is
+    """The whole file; it loads nothing. ``draw`` gives the image of a frame of the drive with the overlay, BGR; it is
     asked for the first frame and for those of the weightiest events."""
     rows: list[Row] = []
     objects: list[Objects] = []
@@ -137,7 +137,7 @@ def _pictures(pictures: dict[int, tuple[bytes, str]], names: Sequence[str]) -> s
         f'src="data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"></figure>'
         for place, (jpeg, text) in pictures.items()
     )
-    return f'<section id="pictures"><h2>Pictures</h2>{figures}</section>'
+    return f'<section id="pictures"><h2>Images</h2>{figures}</section>'
 
 
 def _made_with(params: Params) -> str:

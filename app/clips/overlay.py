@@ -1,4 +1,4 @@
-"""The camera picture with the pipeline's result drawn over it, for films and reports."""
+"""The camera image with the pipeline's result drawn over it, for films and reports."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _STATES = {"warn": "WARNING", "partial_brake": "PARTIAL BRAKING", "full_brake": 
 
 def draw_frame(frame: Frame, result: Result, params: Params) -> U8:
     """(H, W, 3) uint8 BGR, at most ``WIDTH_PX`` wide, even in both sizes as films need it: path, boxes, cuboids of what
-    stands out, and a banner that names the CIPV. Without a picture the banner is over black, which says so."""
+    stands out, and a banner that names the CIPV. Without an image the banner is over black, which says so."""
     canvas, scale = _background(frame)
     aligned = resolve(params.alignment, frame.camera)
     display = display_json(result, aligned, scale)
@@ -36,13 +36,13 @@ def draw_frame(frame: Frame, result: Result, params: Params) -> U8:
         if stands_out(item, result):
             _draw_object(canvas, item, result, display)
     if frame.picture is None:
-        _text(canvas, "no picture in this frame", (24, canvas.shape[0] // 2), rgb("warning"), 0.9)
+        _text(canvas, "no image in this frame", (24, canvas.shape[0] // 2), rgb("warning"), 0.9)
     _draw_banner(canvas, frame, result)
     return canvas
 
 
 def _background(frame: Frame) -> tuple[U8, float]:
-    """A canvas and how many of its pixels one of the picture's takes."""
+    """A canvas and how many of its pixels one of the image's takes."""
     if frame.picture is None:
         return np.zeros((*_BLANK, 3), np.uint8), 1.0
     height, width = frame.picture.bgr.shape[:2]
@@ -87,7 +87,7 @@ def _draw_object(canvas: U8, item: FusedObject, result: Result, display: dict[st
         return
     x1, y1, x2, y2 = (round(value) for value in box)
     cv2.rectangle(canvas, (x1, y1), (x2, y2), _bgr(color), thick, cv2.LINE_AA)
-    # The names of everything that only the camera sees would hide the picture.
+    # The names of everything that only the camera sees would hide the image.
     if leads or item.in_path or item.tracked_by_two_sensors:
         _text(canvas, object_text(item), (x1, max(y1 - 6, _BANNER_PX + 14)), color, 0.5)
 
@@ -118,7 +118,7 @@ def _lead_text(result: Result) -> str:
 
 
 def _text(canvas: U8, text: str, at: tuple[int, int], color: Rgb, size: float) -> None:
-    """Letters on a darkened plate, readable on any picture."""
+    """Letters on a darkened plate, readable on any image."""
     (wide, high), below = cv2.getTextSize(_plain(text), _FONT, size, 1)
     x, y = max(at[0], 0), max(at[1], high)
     plate = canvas[max(y - high - 2, 0) : y + below, max(x - 2, 0) : x + wide + 2]

@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -16,6 +16,7 @@ from app.bench.demands import PAGE_DEMANDS, broken, page_rows
 from app.bench.other_load import load_warning, read_cpu_times
 from app.bench.page import measure as page_bench
 from app.bench.suite import run_all
+from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions
 from pipeline.common.errors import BadInput
 
@@ -34,9 +35,9 @@ class Bench:
     json: bool = False
     """Print the figures as JSON"""
     clients: int = 0
-    """Instead: measure the server load of N stream clients, e.g. 50"""
-    page: str | None = None
-    """Instead: measure the latency of the dashboard in a browser while it plays this source, e.g. sim:straight"""
+    """Measure the server load of N stream clients instead, e.g. 50"""
+    page: Annotated[str | None, option("SOURCE")] = None
+    """Measure the latency of the dashboard in a browser instead, while it plays this source, e.g. sim:straight"""
 
     def __call__(self) -> int:
         if self.clients < 0:

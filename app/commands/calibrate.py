@@ -1,5 +1,5 @@
 """`cipv calibrate distance` fits the paper's regression from box height to distance for another camera, `cipv calibrate
-alignment` where LiDAR points are in the picture."""
+alignment` where LiDAR points are in the image."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import tyro
 import yaml
 from rich.console import Console
 from rich.table import Table
 
+from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress, task_progress
 from pipeline.calibration.alignment.drive import fit_drive
@@ -39,7 +40,7 @@ class Calibrate:
     """
 
     what: tyro.conf.Positional[Literal["distance", "alignment"]]
-    """What to fit: distance from box height, or where LiDAR points are in the picture"""
+    """distance: the distance law, from box heights; alignment: the rotation between LiDAR and camera"""
     source: SourceOptions
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     truth: Literal["labels", "lidar"] = "labels"
@@ -49,13 +50,13 @@ class Calibrate:
     model: Literal["angular", "pinhole"] = "pinhole"
     """alignment: angular needs no calibration; pinhole corrects the mount of the recording's calibration"""
     offset: bool = False
-    """alignment: fit the pinhole camera's place too, sideways and in height; angles are then less sure"""
-    out: Path | None = None
+    """alignment: also fit the pinhole camera's lateral and vertical position; the angles become less certain"""
+    out: Annotated[Path | None, option("PATH")] = None
     """Write a preset file for `cipv run --params`"""
     keep: bool = False
     """Store the law with the detector; it is then used with that network unless a parameter overrides it"""
     json: bool = False
-    """Print what was fitted and its figures as JSON"""
+    """Print the figures as JSON"""
 
     def __call__(self) -> int:
         self._check()
@@ -74,7 +75,7 @@ class Calibrate:
         for name in (name for name, given in others.items() if given):
             raise BadInput(f"{name} does not belong to `cipv calibrate {self.what}`")
         if self.offset and self.model == "angular":
-            raise BadInput("--offset needs the pinhole model: the angular one has no place")
+            raise BadInput("--offset needs the pinhole model: the angular one has no position")
 
     def _fit_alignment(self, params: Params, source: Source, detector: Detector) -> int:
         def frame_of(index: int) -> Frame:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from app.commands.support.arguments import option
 from app.commands.support.open_with_progress import opened_recording
 from app.commands.support.options import PipelineOptions
 from pipeline.alignment.projection import corrected
@@ -24,15 +25,15 @@ class ConvertCalibration:
     """
 
     origin: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
-    """A recording, or with --format a file; of ROS the folder with camera_info.yaml and static_transform.yaml"""
+    """A recording, or with --format a file; for ROS, the folder with camera_info.yaml and static_transform.yaml"""
     out: Path
-    """File to write; for ROS the folder"""
-    format: Literal["kitti", "ros", "opencv"] | None = None
-    """Format of the file to read. Default: SOURCE is a recording"""
+    """File to write; for ROS, a folder"""
+    format: Annotated[Literal["kitti", "ros", "opencv"] | None, option("kitti|ros|opencv")] = None
+    """Format of the file to read. Without it, SOURCE is a recording"""
     to: Literal["kitti", "ros", "opencv", "rig"] = "rig"
     """Format to write"""
-    size: Annotated[tuple[int, int] | None, tyro.conf.arg(metavar="WIDTH HEIGHT")] = None
-    """Size of the pictures, where the file does not say: KITTI's"""
+    size: Annotated[tuple[int, int] | None, option("WIDTH HEIGHT")] = None
+    """Image size, for formats that do not store it: KITTI"""
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
 
     def __call__(self) -> int:

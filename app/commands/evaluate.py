@@ -13,6 +13,7 @@ from urllib.parse import quote, urlsplit
 
 import tyro
 
+from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 from app.reports.html import html
@@ -45,9 +46,9 @@ class Evaluate:
     Example: cipv evaluate astyx:PATH --set cluster.z_weight=0.4 --against default --report scores.html
     """
 
-    sources: tyro.conf.Positional[tuple[str, ...]]
+    sources: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
     """Labelled recordings; with two or more, figures get confidence intervals"""
-    truth: tuple[str, ...] = ("native",)
+    truth: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FILE")] = ("native",)
     """native: the labels that come with a recording; or one file of labels (cipv-labels JSON) per recording"""
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     sensors: Literal["lidar", "camera", "both"] = "both"
@@ -60,10 +61,10 @@ class Evaluate:
     """Compare with another run: results of `cipv run --out`, one per recording, or a preset by name or file (YAML)"""
     max_range_m: float = 60.0
     """Leads beyond this distance are ignored"""
-    report: Path | None = None
+    report: Annotated[Path | None, option("FILE")] = None
     """Write an HTML file with tables, charts and links to the worst frames"""
     dashboard: Annotated[str, tyro.conf.arg(metavar="URL")] = DASHBOARD
-    """Address that the report's links lead to, as `cipv serve` prints it"""
+    """Dashboard address for the report's links, as `cipv serve` prints it"""
     json: bool = False
     """Print the figures as JSON"""
 
@@ -132,7 +133,7 @@ class Evaluate:
         return replace(truth, uri=source.uri, ticks=ticks, frames=frames)
 
     def _run(self, source: Source, wanted: list[Params]) -> list[list[Result]]:
-        """Run the pipeline with each set of parameters. The networks run once per picture."""
+        """Run the pipeline with each set of parameters. The networks run once per image."""
         if not wanted:
             return []
         detectors = self.pipeline.open_detectors(source, self.sensors)

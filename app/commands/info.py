@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import asdict, dataclass
+from typing import Annotated
 
 import tyro
 from rich.console import Console
@@ -26,12 +27,12 @@ class ShowInfo:
     Example: cipv info drive.mcap --json
     """
 
-    source: tyro.conf.Positional[str]
+    source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
     """An MCAP file, or any other source"""
     json: bool = False
     """Print the figures as JSON"""
     quick: bool = False
-    """Do not check whether an MCAP file was changed, which reads all of it"""
+    """Skip the check for changes since recording, which reads the whole MCAP file"""
 
     def __call__(self) -> int:
         if self.source.lower().endswith(".mcap"):

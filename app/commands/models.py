@@ -48,7 +48,7 @@ class PullModel:
     Example: cipv models pull yolox_nano
     """
 
-    name: tyro.conf.Positional[str]
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
     """Name of a known network"""
 
     def __call__(self) -> int:
@@ -68,14 +68,14 @@ class RegisterModel:
     Example: cipv models register best.onnx my_yolo
     """
 
-    path: tyro.conf.Positional[Path]
+    path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """The ONNX file"""
-    name: tyro.conf.Positional[str]
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
     """Name to register it under"""
     task: Literal["detector", "lanes"] = "detector"
     """What the network does"""
     default: bool = True
-    """Whether it becomes the default, used when no network is named"""
+    """Use it when no network is named"""
 
     def __call__(self) -> int:
         file = own_file(self.path)
@@ -97,10 +97,10 @@ class TuneModel:
     Example: cipv models tune twinlitenet
     """
 
-    spec: tyro.conf.Positional[str]
+    spec: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
     """Name or ONNX file"""
     threads: int = 2
-    """Number of threads without tuning"""
+    """Threads of the untuned network that others are compared with"""
 
     def __call__(self) -> int:
         path = find_model(self.spec)

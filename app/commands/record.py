@@ -12,6 +12,7 @@ from typing import Annotated, cast
 
 import tyro
 
+from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 from app.commands.support.sensor_wait import Waiting
@@ -42,15 +43,15 @@ class Record:
 
     source: SourceOptions
     out: Annotated[Path, tyro.conf.arg(metavar="DIR|FILE.mcap")] = SESSIONS
-    """A folder, in which the file is named by title and time, or a new file"""
+    """A new file, or a folder in which the file is named by title and time"""
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
-    seconds: Annotated[float | None, tyro.conf.arg(metavar="S")] = None
+    seconds: Annotated[float | None, option("S")] = None
     """Stop after S seconds of the drive"""
     packets: bool = False
-    """Live: record the LiDAR's raw packets instead of point clouds; they are decoded when the session is opened"""
-    rotate_mb: Annotated[float | None, tyro.conf.arg(metavar="MB")] = None
+    """Live sensors: record raw LiDAR packets instead of point clouds; they are decoded when the session is opened"""
+    rotate_mb: Annotated[float | None, option("MB")] = None
     """Start a new file when this size is reached"""
-    rotate_minutes: Annotated[float | None, tyro.conf.arg(metavar="MIN")] = None
+    rotate_minutes: Annotated[float | None, option("MIN")] = None
     """Start a new file after MIN minutes of the drive"""
 
     def __call__(self) -> int:

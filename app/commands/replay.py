@@ -10,6 +10,7 @@ from typing import Annotated
 
 import tyro
 
+from app.commands.support.arguments import option
 from app.commands.support.options import SourceOptions
 from pipeline.common.errors import BadInput
 from pipeline.types.source import RawPackets
@@ -29,7 +30,7 @@ class Replay:
     """Playback rate; the LiDAR keeps its rotation rate, so rates above 1 skip sweeps"""
     loop: bool = False
     """Start again at the end, until Ctrl-C"""
-    faults: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    faults: Annotated[Path | None, option("FILE")] = None
     """YAML list of faults to inject, e.g. [{sensor: camera, kind: disconnect, from_s: 5, to_s: 7}]"""
 
     def __call__(self) -> int:

@@ -11,8 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Annotated, Literal, cast
 
-import tyro
-
+from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 from app.commands.support.sensor_wait import Waiting
@@ -37,11 +36,11 @@ class Run:
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     sensors: Literal["lidar", "camera", "both"] = "both"
     """Ablation: run as if the car had this sensor only"""
-    out: Path | None = None
+    out: Annotated[Path | None, option("PATH")] = None
     """Write one JSON object per frame to this file; - for standard output"""
-    frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    frames: Annotated[int | None, option("N")] = None
     """Stop after N frames; without it, live sensors run until Ctrl-C"""
-    rrd: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    rrd: Annotated[Path | None, option("FILE")] = None
     """Write a rerun recording to this file"""
 
     def __call__(self) -> int:

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from app.commands.support.arguments import option
 from app.commands.support.progress_bars import frames_progress
 from app.reports.experiment_drives import ReplayFolder
 from app.reports.html import html
@@ -35,24 +36,24 @@ class Scenarios:
     """
 
     what: tyro.conf.Positional[Literal["run"]]
-    """What to do"""
-    suite: str = "paper"
+    """Run the experiments"""
+    suite: Annotated[str, tyro.conf.arg(metavar="NAME")] = "paper"
     """paper, curves, streets, euroncap, iso, all, robustness, or the name of one experiment"""
     short: bool = False
-    """Run a few cases of each only: seconds instead of minutes"""
+    """Run only a few cases of each: seconds instead of minutes"""
     jobs: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Number of processes; 0 for one per core"""
-    km: int | None = None
-    """Robustness: kilometres of random traffic; 100 without"""
-    seed: int | None = None
-    """Robustness: another seed is other traffic; 0 without"""
+    km: Annotated[int | None, option("KM")] = None
+    """robustness: kilometres of random traffic; default: 100"""
+    seed: Annotated[int | None, option("N")] = None
+    """robustness: seed of the random traffic; default: 0"""
     ablation: bool = False
-    """Robustness: also with each rule against phantoms switched off in turn"""
-    report: Path | None = None
+    """robustness: repeat with each rule against false leads switched off in turn"""
+    report: Annotated[Path | None, option("FILE")] = None
     """Write an HTML file with tables and charts"""
-    drives: Path | None = None
-    """Save every drive in this folder (robustness: those with a failure, in robustness-failures without a name), listed
-    in index.html and linked from the report; open one as sim:<file>"""
+    drives: Annotated[Path | None, option("DIR")] = None
+    """Save every drive to this folder, listed in its index.html and linked from the report; open one as sim:<file>.
+    robustness: only drives with a failure; default: robustness-failures"""
     json: bool = False
     """Print the figures as JSON"""
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from app.commands.support.arguments import option
 from app.commands.support.open_with_progress import opened
 from app.commands.support.options import PipelineOptions, SourceName, planned
 from app.core.server_address import DEFAULT_PORT
@@ -37,28 +38,28 @@ if TYPE_CHECKING:
 class ServerOptions:
     """Where the dashboard listens."""
 
-    host: str = "127.0.0.1"
+    host: Annotated[str, tyro.conf.arg(metavar="ADDRESS")] = "127.0.0.1"
     """Address to listen on. With 0.0.0.0 other machines can connect, using the link with a token printed at startup"""
-    port: int | None = None
+    port: Annotated[int | None, option("PORT")] = None
     """Port to listen on; by default the first free one from 8420"""
-    allow_host: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
-    """Another host name that this server may be reached by, as behind a proxy (repeatable); requires the token"""
+    allow_host: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME")] = ()
+    """Another host name of this server, e.g. behind a proxy; requires the token"""
     token: bool = False
-    """Require a token on this machine too, where every other user could do everything otherwise"""
-    tls_cert: Annotated[Path | None, tyro.conf.arg(metavar="PEM")] = None
+    """Require a token on this machine too; without it, every local user has full access"""
+    tls_cert: Annotated[Path | None, option("PEM")] = None
     """Certificate to serve HTTPS with; needs --tls-key"""
-    tls_key: Annotated[Path | None, tyro.conf.arg(metavar="PEM")] = None
+    tls_key: Annotated[Path | None, option("PEM")] = None
     """Private key of the certificate"""
     browser: bool = False
     """Open a browser once the dashboard is ready"""
-    rerun: Annotated[str | None, tyro.conf.arg(metavar="URL")] = None
+    rerun: Annotated[str | None, option("URL")] = None
     """Also stream the shown frames to a running rerun viewer, e.g. rerun+http://127.0.0.1:9876/proxy"""
-    labels: Annotated[str | None, tyro.conf.arg(metavar="URL")] = None
+    labels: Annotated[str | None, option("URL")] = None
     """Label database, e.g. postgresql://person@host/cipv; default: $CIPV_LABELS_URL, then sessions/labels.db"""
 
     def label_desk(self) -> LabelDesk:
         """DatabaseError when a database that was named cannot be opened. The local database is opened once the first
-        picture is shown; an error in it is shown in the dashboard."""
+        image is shown; an error in it is shown in the dashboard."""
         if self.labels or os.environ.get(URL_VARIABLE):
             return LabelDesk(_open_labels(self.labels))
         return LabelDesk(open_later=lambda: _open_labels(None))
@@ -91,7 +92,7 @@ class ServerOptions:
 
 def _open_labels(url: str | None) -> Database:
     from app.labels.store.database import (
-        open_database,  # SQLAlchemy takes most of a second to import: not before a picture
+        open_database,  # SQLAlchemy takes most of a second to import: not before an image
     )
 
     return open_database(url)
@@ -117,7 +118,7 @@ class Serve:
     """Ablation: run as if the car had this sensor only"""
     rings: int = 16
     """KITTI: LiDAR channels to keep: 16, like a VLP-16, or 64 for all"""
-    route: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    route: Annotated[Path | None, option("FILE")] = None
     """Planned route, on which GNSS places the car: CSV, GPX, an NMEA log or an earlier session"""
 
     def __call__(self) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 import tyro
 
 from app.commands.info import size_text
+from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress, task_progress
 from app.core.playback_clock import timeline_s
@@ -50,15 +51,15 @@ class Export:
     """
 
     source: SourceOptions
-    from_s: Annotated[float | None, tyro.conf.arg(name="from", metavar="S")] = None
+    from_s: Annotated[float | None, option("S", name="from")] = None
     """Start S seconds into the drive"""
-    to_s: Annotated[float | None, tyro.conf.arg(name="to", metavar="S")] = None
+    to_s: Annotated[float | None, option("S", name="to")] = None
     """End S seconds into the drive"""
-    rrd: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    rrd: Annotated[Path | None, option("FILE")] = None
     """Write a rerun recording; the pipeline runs again, with the recorded parameters unless others are given"""
-    mcap: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    mcap: Annotated[Path | None, option("FILE")] = None
     """Write a session"""
-    csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    csv: Annotated[Path | None, option("FILE")] = None
     """Write one row per object and frame: the recorded results, or those of a new run if there are none"""
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
 
@@ -97,7 +98,7 @@ class Recover:
 
     file: tyro.conf.Positional[Path]
     """The file to read; it is not changed"""
-    out: Path | None = None
+    out: Annotated[Path | None, option("PATH")] = None
     """The file to write; default: <name>_recovered.mcap next to it"""
 
     def __call__(self) -> int:

@@ -1,4 +1,4 @@
-"""What detectors found, kept so that no network looks at the same picture twice."""
+"""What detectors found, kept so that no network looks at the same image twice."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class DetectionCache:
         self._answers: BoundedCache[tuple[str, int, str], RawBoxes | RawLanes] = BoundedCache(limit, lambda _: 1)
 
     def look_at(self, uri: str) -> CachedLook:
-        """How detectors are asked about the pictures of one source, as its files are now."""
+        """How detectors are asked about the images of one source, as its files are now."""
         return CachedLook(self, fingerprint(uri))
 
     def get(self, key: tuple[str, int, str]) -> RawBoxes | RawLanes | None:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Generic, Literal, TypeVar
 
-from pipeline.common.errors import BadInput
+from pipeline.common.errors import BadInput, first_line
 from pipeline.common.progress import Progress
 
 logger = logging.getLogger("cipv.jobs")
@@ -120,7 +120,7 @@ class BackgroundJob(Generic[ResultT]):
             self._end("failed", error=str(error))
         except Exception as error:  # one job that fails takes nothing else with it
             logger.exception("%s", self._name)
-            self._end("failed", error=f"{type(error).__name__}: {_first_line(error)}")
+            self._end("failed", error=f"{type(error).__name__}: {first_line(error)}")
         else:
             self._end("done", result)
 
@@ -143,7 +143,3 @@ class BackgroundJob(Generic[ResultT]):
                 self._result = result  # before the state, so that a job that is done has its result
                 self._status = replace(self._status, state=state, error=error)
         self._on_change()
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error).splitlines() or ["no reason given"])[0]

@@ -130,7 +130,7 @@ class Watchdog:
         try:
             yield
         except Retired:
-            logger.warning("%s is back and ends: another has taken its place", name)
+            logger.warning("%s responds again, but has been replaced; it ends", name)
         finally:
             _of_thread.heart = _of_thread.watchdog = None
             with self._lock:
@@ -166,7 +166,7 @@ class Watchdog:
             try:
                 heart.on_stuck(stuck)
             except Exception:  # the watch goes on, whatever becomes of one worker
-                logger.exception("%s could not be started anew", heart.name)
+                logger.exception("%s could not be restarted", heart.name)
         return [stuck for _, stuck in found]
 
     def _watch(self) -> None:

@@ -36,7 +36,7 @@ class AlignmentFitting:
             return self._job[1] if self._job is not None and self._job[0] is self._drives.recording else None
 
     def begin(self, recording: OpenRecording, model: ModelName, params: Params, offset: bool) -> FitJob:
-        """FitRefused while another one runs, and where nothing looks at pictures."""
+        """FitRefused while another one runs, and where nothing looks at images."""
         if recording.setup.detectors.boxes is None and not recording.as_read(0).detections_given:
             raise FitRefused("a fit needs boxes of vehicles, but no detector is running")
         with self._lock:

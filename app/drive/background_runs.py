@@ -50,7 +50,7 @@ class DriveState:
     """Frames of the drive."""
     running: bool = False
     phase: Phase = "done"
-    """``detect`` while networks run on pictures for the first time, ``run`` afterwards."""
+    """``detect`` while networks run on images for the first time, ``run`` afterwards."""
     note: str = ""
     """Why the run failed."""
 

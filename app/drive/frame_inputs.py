@@ -1,6 +1,6 @@
-"""What whole drives are computed from again and again: their frames without the pictures' pixels.
+"""What whole drives are computed from again and again: their frames without the images' pixels.
 
-The networks have looked at a picture before the pipeline runs (``pipeline.detection.detect``), and no stage needs its
+The networks have looked at an image before the pipeline runs (``pipeline.detection.detect``), and no stage needs its
 pixels. So a frame of 300 KB is all that another run with other parameters asks for, and no network, disk or simulator.
 """
 
@@ -20,7 +20,7 @@ _LIMIT_BYTES = 384e6
 
 
 def without_pixels(frame: Frame) -> Frame:
-    """The frame with a picture of the same size and stamp that takes no memory and shows nothing."""
+    """The frame with an image of the same size and stamp that takes no memory and shows nothing."""
     if frame.picture is None:
         return frame
     blank = np.broadcast_to(np.zeros((), np.uint8), frame.picture.bgr.shape)

@@ -168,6 +168,11 @@ def columns_json(rows: Sequence[Row]) -> dict[str, list[Any]]:
     return own | {name: [_plain(row.extra[place]) for row in rows] for place, name in enumerate(EXTRA_COLUMNS)}
 
 
+def row_json(row: Row) -> dict[str, Any]:
+    """One frame's value of each column, as ``columns_json`` writes it."""
+    return {name: values[0] for name, values in columns_json([row]).items()}
+
+
 def object_json(frames: Iterable[tuple[int, Objects]], object_id: int) -> dict[str, list[Any]]:
     """One object's curve over the frames, each with its index, in which it was."""
     found = [(index, records[records["id"] == object_id]) for index, records in frames]

@@ -95,7 +95,7 @@ def digest(uri: str, detectors: Sequence[str], sensors: str, params: Params) -> 
 
 
 def calibration_digest(camera: CameraCalibration | None, params: Params) -> str:
-    """Twelve characters that are the same when, and only when, pictures and points are laid on each other the same."""
+    """Twelve characters that are the same when, and only when, images and points are laid on each other the same."""
     numbers = [] if camera is None else [camera.K, camera.distortion, camera.T_camera_ego]
     made_from = [[each.tolist() for each in numbers], params.alignment.model_dump(mode="json")]
     return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:12]

@@ -94,12 +94,12 @@ class OpenRecording:
         return self._onwards(self.last_known_state(index, params), index, params)
 
     def input(self, index: int) -> Frame:
-        """A frame as ``step`` takes it; its picture may be without pixels."""
+        """A frame as ``step`` takes it; its image may be without pixels."""
         held = self.inputs.get(index)
         return held if held is not None else self.frame(index)
 
     def frame(self, index: int) -> Frame:
-        """A frame as ``step`` takes it, from the source, with its picture."""
+        """A frame as ``step`` takes it, from the source, with its image."""
         frame = sensed(self.as_read(index), self.setup.detectors, self.setup.sensors, self._ask)
         self.inputs.offer(frame)
         return frame
@@ -153,7 +153,7 @@ class OpenRecording:
         return digest(self.setup.uri, self.setup.detectors.names, self.setup.sensors, params)
 
     def calibration_digest(self, params: Params) -> str:
-        """With which calibration pictures and points are laid on each other, as twelve characters."""
+        """With which calibration images and points are laid on each other, as twelve characters."""
         return calibration_digest(self.at_hand(0).camera, params)
 
     def _onwards(self, known: KnownState, index: int, params: Params) -> State:

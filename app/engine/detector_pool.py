@@ -1,4 +1,4 @@
-"""The detectors for a source's pictures: opened once for each kind of picture, and what there is to say about them.
+"""The detectors for a source's images: opened once for each kind of image, and what there is to say about them.
 
 Lane detectors are opened anew for each source, because the classical one knows the camera; that takes a moment only."""
 
@@ -20,9 +20,16 @@ OpenLanes = Callable[[AnySource], Detects[RawLanes] | None]
 
 _Kind = tuple[bool, tuple[int, int] | None]
 
+ABLATION_NOTICES: dict[Sensors, tuple[str, ...]] = {
+    "both": (),
+    "lidar": ("LiDAR only: no detection in the images",),
+    "camera": ("Camera only: LiDAR points are not used",),
+}
+"""Notices about sensors that are left out."""
+
 
 class DetectorPool:
-    """``open_detector`` and ``open_lanes`` give those for a source's pictures; None: none, and nothing is said about
+    """``open_detector`` and ``open_lanes`` give those for a source's images; None: none, and nothing is said about
     it. lanes_every: lanes are looked for in every n-th frame; None: as the lane detector is quick. far_view_px: side of
     the far view's window; None: no far view."""
 
@@ -47,7 +54,7 @@ class DetectorPool:
         self._opened, self._opened_far = {}, {}
 
     def both_for(self, source: AnySource, notices: list[Notice]) -> Detectors:
-        """What looks at the source's pictures; what is missing is None, and a notice says so. Nothing where detections
+        """What looks at the source's images; what is missing is None, and a notice says so. Nothing where detections
         come with them."""
         if brings_detections(source):
             return Detectors()
@@ -57,7 +64,7 @@ class DetectorPool:
         return Detectors(boxes, lanes, every, self.far_view_for(source, boxes))
 
     def far_view_for(self, source: AnySource, boxes: Detects[RawBoxes] | None) -> FarView | None:
-        """The detector's second look at the source's pictures; None where it is off or adds nothing."""
+        """The detector's second look at the source's images; None where it is off or adds nothing."""
         if self._far_view_px is None or boxes is None:
             return None
         kind = _kind_of(source)

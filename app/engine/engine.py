@@ -7,11 +7,10 @@ its player's: ``app/playing/``.
 from __future__ import annotations
 
 import logging
-import math
 import time
 from dataclasses import replace
 from functools import partial
-from typing import Protocol, cast
+from typing import cast
 
 from app.core.control import Control, Wish
 from app.core.detection_cache import DetectionCache
@@ -19,17 +18,18 @@ from app.core.jobs import BackgroundJob, JobStatus
 from app.core.watchdog import Stuck, Watchdog, at_work
 from app.drive.background_runs import BackgroundRuns
 from app.drive.open_recording import RunSetup
-from app.engine.detector_pool import DetectorPool, OpenDetector, OpenLanes
+from app.engine.detector_pool import ABLATION_NOTICES, DetectorPool, OpenDetector, OpenLanes
 from app.engine.page_frames import PageFrames
-from app.engine.player import Player
+from app.engine.player import OpenSource, Player
 from app.engine.processed_frame import ProcessedFrame
 from app.engine.recorded_player import RecordedPlayer
 from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Notice, Snapshot
 from app.engine.snapshot_publisher import SnapshotPublisher
-from app.engine.takeovers import Takeovers
+from app.engine.takeovers import Takeovers, stuck_notice
 from app.labels.service.desk import LabelDesk
+from pipeline.common.errors import first_line
 from pipeline.common.progress import Progress
 from pipeline.detection import Detectors
 from pipeline.params import Params
@@ -41,26 +41,12 @@ logger = logging.getLogger("cipv.engine")
 
 _PATIENCE_S = 2.0
 _TELL_EVERY_S = 0.25
-_SAID_S = 60.0
-"""How long a worker that hung is spoken of."""
 _COMPILING = "Preparing the pipeline … The first start after an installation takes about a minute."
-_ABLATION: dict[Sensors, tuple[str, ...]] = {
-    "both": (),
-    "lidar": ("LiDAR only: no detection in the pictures",),
-    "camera": ("Camera only: LiDAR points are not used",),
-}
-"""Notices about sensors that are left out."""
-
-
-class OpenSource(Protocol):
-    """As ``pipeline.sources.open_any``."""
-
-    def __call__(self, uri: str, /, *, progress: Progress) -> AnySource: ...
 
 
 class Engine:
     """``start`` it, send wishes through ``control``, read ``snapshot`` or listen. ``open_detector`` gives the
-    one for a source's pictures; None runs without a camera's detector and says nothing about it; ``open_lanes`` gives
+    one for a source's images; None runs without a camera's detector and says nothing about it; ``open_lanes`` gives
     the lane detector, which looks at every ``lanes_every``-th frame. ``far_view_px``: side of the window of the second
     look, None for none. ``whole_drives``: a recording's whole drive is
     computed in the background (``drives``), so that any frame is shown as it is in it. ``desk``: where what is shown
@@ -155,7 +141,7 @@ class Engine:
                 self._serve(wish)
             except Exception as error:  # the worker outlives whatever a recording or a network does
                 logger.exception("while serving %s", self.snapshot.uri)
-                self._fail(f"{type(error).__name__}: {_first_line(error)}")
+                self._fail(f"{type(error).__name__}: {first_line(error)}")
 
     def _serve(self, wish: Wish) -> None:
         """All in front, but for the wait for sensors: others may work then."""
@@ -193,12 +179,9 @@ class Engine:
             self.control.change(target=self.snapshot.index)
 
     def _say_stuck(self, stuck: Stuck, more: str = "") -> None:
-        """On every page, the display in the car too, for a minute; what is off from now on, for good."""
-        text = f"{stuck.worker} hung for {stuck.seconds:.1f} s ({stuck.doing}) and was started anew"
-        text += "; the recording goes on" if self.desk.state is not None else ""
+        """On every page, the in-vehicle display too, for a minute; what is off from now on, for good."""
         others = tuple(notice for notice in self.snapshot.notices if f"({stuck.doing})" not in notice.text)
-        lasts_s = math.inf if more else _SAID_S
-        said = Notice("error", text[0].upper() + text[1:] + more, time.monotonic() + lasts_s)
+        said = stuck_notice(stuck, more, is_recording=self.desk.state is not None)
         self._publisher.publish(replace(self.snapshot, notices=(*others, said)))
 
     # ------------------------------------------------------------ opening
@@ -222,7 +205,7 @@ class Engine:
             self._fail(job.status.error)
         if source is None:
             return False
-        notices = [Notice("info", text) for text in (*source.notes, *_ABLATION[self._sensors])]
+        notices = [Notice("info", text) for text in (*source.notes, *ABLATION_NOTICES[self._sensors])]
         detectors = self._detectors.both_for(source, notices)
         self.desk.stop()
         self._close()
@@ -231,26 +214,16 @@ class Engine:
         player.open()
         self._player, self.detectors = player, detectors
         self.labels.open(uri, self.drives.recording)
+        opened = self.snapshot.opened(uri, player, detectors)
+        busy = None if is_warm() else _COMPILING
         self._publisher.publish(
             replace(
-                self.snapshot,
-                uri=uri,
-                title=source.title,
-                rate_hz=source.rate_hz,
-                live=player.live,
-                streams=(),
-                count=player.count,
-                duration_s=player.duration_s,
-                index=0,
-                time_s=0.0,
+                opened,
                 drive=self.drives.state,
                 recording=self.desk.state,
                 labels=self.labels.state,
-                detector=detectors.boxes.name if detectors.boxes else None,
-                lane_detector=detectors.lanes.name if detectors.lanes else None,
                 notices=tuple(notices),
-                processed=None,
-                busy=None if is_warm() else _COMPILING,
+                busy=busy,
             )
         )
         return True
@@ -337,7 +310,3 @@ class Engine:
         self._publisher.publish(shown)
         if processed is not None:
             self.labels.shown()
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error).splitlines() or ["no reason given"])[0]

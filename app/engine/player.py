@@ -7,9 +7,16 @@ from typing import Protocol
 from app.core.control import Wish
 from app.engine.processed_frame import ProcessedFrame
 from app.engine.snapshot import Snapshot
+from pipeline.common.progress import Progress
 from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.types.source import AnySource
+
+
+class OpenSource(Protocol):
+    """As ``pipeline.sources.open_any``."""
+
+    def __call__(self, uri: str, /, *, progress: Progress) -> AnySource: ...
 
 
 class Player(Protocol):

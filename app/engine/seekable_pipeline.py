@@ -33,7 +33,7 @@ def _nothing_known(index: int, params: Params) -> State | None:
 
 
 class SeekablePipeline:
-    """The pipeline, a source, the detectors for its pictures, and their caches. For one thread, except ``prepare``.
+    """The pipeline, a source, the detectors for its images, and their caches. For one thread, except ``prepare``.
 
     ``state_before`` gives the state with which a run over the whole drive arrives at a frame, None where unknown."""
 

@@ -25,7 +25,7 @@ class SessionRecorder:
     """At most one recording at a time, of one source, into ``folder``. Any thread; ``take`` on the engine's.
 
     A recording holds what was shown: playing a drive at double speed or seeking leaves out what was skipped. Of live
-    sensors it contains every tick that the pipeline ran on, also while playback is paused, and every sweep, picture,
+    sensors it contains every tick that the pipeline ran on, also while playback is paused, and every sweep, image,
     fix and own motion that came in between. A frame whose result is not exact yet waits, with its marks, for the exact
     one, until the next frame comes or recording ends."""
 

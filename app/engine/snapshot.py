@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from app.drive.background_runs import DriveState
@@ -14,6 +14,8 @@ from pipeline.types import StreamHealth
 from pipeline.types.result_json import streams_json
 
 if TYPE_CHECKING:
+    from app.engine.player import Player
+    from pipeline.detection import Detectors
     from pipeline.recording.recorder import RecordingState
 
 
@@ -71,6 +73,24 @@ class Snapshot:
     streams: tuple[StreamHealth, ...] = ()
     """Health of each live sensor, updated also while no tick arrives."""
     recording: RecordingState | None = None
+
+    def opened(self, uri: str, player: Player, detectors: Detectors) -> Snapshot:
+        """The next snapshot once something else was opened: of the parameters and of playback it is the same."""
+        return replace(
+            self,
+            uri=uri,
+            title=player.source.title,
+            rate_hz=player.source.rate_hz,
+            live=player.live,
+            streams=(),
+            count=player.count,
+            duration_s=player.duration_s,
+            index=0,
+            time_s=0.0,
+            detector=detectors.boxes.name if detectors.boxes else None,
+            lane_detector=detectors.lanes.name if detectors.lanes else None,
+            processed=None,
+        )
 
     def state_json(self) -> dict[str, Any]:
         """The state without the result, as the page and ``/api/state`` read it."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -11,10 +13,22 @@ from typing import Protocol
 
 from app.core.watchdog import NETWORK, Stuck, Watchdog
 from app.drive.compute_scheduler import ComputeScheduler
+from app.engine.snapshot import Notice
 
 _MOST_HANGS = 3
 """What hangs so often, of one source, is not tried again."""
-_GIVES_UP = ". It hangs again and again: networks are off and playback is paused until a source is opened"
+_GIVES_UP = ". It keeps hanging: networks are off and playback is paused until a source is opened"
+
+_SAID_S = 60.0
+"""How long a worker that hung is spoken of."""
+
+
+def stuck_notice(stuck: Stuck, more: str, *, is_recording: bool) -> Notice:
+    """What is said of a worker that hung, for a minute; with ``more``, of what is off from now on, for good."""
+    goes_on = "; recording continues" if is_recording else ""
+    text = f"{stuck.worker} hung for {stuck.seconds:.1f} s ({stuck.doing}) and was restarted{goes_on}"
+    until_s = math.inf if more else time.monotonic() + _SAID_S
+    return Notice("error", text[0].upper() + text[1:] + more, until_s)
 
 
 class Say(Protocol):

@@ -23,7 +23,7 @@ from pipeline.params import to_yaml as params_to_yaml
 from pipeline.simulation.drive_as_scenario import to_yaml
 
 _BY_NETWORK = (
-    "The embedded network detected vehicles in the rendered pictures, as it does here, but no lane lines. A dashboard "
+    "The embedded network detected vehicles in the rendered images, as it does here, but no lane lines. A dashboard "
     "that detects lane lines may estimate another path."
 )
 _LINK = """<p id="open" hidden>If a dashboard is open on this machine, <a href="">open the drive there</a> with the

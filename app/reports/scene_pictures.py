@@ -1,4 +1,4 @@
-"""What a simulated scene looks like, for a report: a plan from above with everybody's way, and the camera's picture."""
+"""What a simulated scene looks like, for a report: a plan from above with everybody's way, and the camera's image."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PICTURE_PX, _JPEG_QUALITY = (640, 360), 75
 
 
 def scene_html(scene: Scene) -> str:
-    """A figure with the plan and, below it, the first camera's picture of the same moment."""
+    """A figure with the plan and, below it, the first camera's image of the same moment."""
     now = world_state.at(scene.scenario, scene.t_s)
     title = f"{scene.title}, at {scene.t_s:.1f} s"
     return (
@@ -111,7 +111,7 @@ def _points(points: F64) -> str:
 
 
 def _picture(scenario: Scenario, now: World) -> str:
-    """As an address that holds the picture itself."""
+    """As an address that holds the image itself."""
     sensors = Sensors(scenario, now.s_m)
     drawn = sensors.frame(now, 0, round(now.t_s * 1e9)).picture
     assert drawn is not None

@@ -2,17 +2,18 @@
 
     u32 little-endian   length of the header
     header              JSON, UTF-8, padded with spaces to a multiple of 4
-    picture             JPEG, ``picture.bytes`` long, padded to a multiple of 4
+    image             JPEG, ``picture.bytes`` long, padded to a multiple of 4
     points              ``points`` × int16 x y z   centimetres, ego frame
-                        ``points`` × int16 u v     pixels of the sent picture; -32768 where the camera cannot see it
+                        ``points`` × int16 u v     pixels of the sent image; -32768 where the camera cannot see it
                         ``points`` × uint16        1 + place in ``result.objects``; 0 belongs to none
                         ``points`` × uint8         0 ground, 1 unclustered, 2 cluster, 3 dropped
                         ``points`` × uint8         intensity
                         ``points`` × uint8         ring, 0 = lowest beam
                         ``points`` × uint8         ms before the sweep's newest point; 255 unknown
 
-The header holds ``state`` (playback), ``result`` (docs/reference/results.md) and ``display``: geometry projected by the
-alignment in use, in pixels of the sent picture, so that no view projects anything.
+The header holds ``state`` (playback), ``result`` (docs/reference/results.md), ``display``: geometry projected by the
+alignment in use, in pixels of the sent image, so that no view projects anything, and of live sensors ``row``: the
+frame's value of each column of the timeline, which a recording's whole run gives otherwise.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from app.drive.frame_rows import row_json, row_of
 from app.engine.snapshot import Snapshot
 from app.streaming.picture import MAX_WIDTH_PX, SentPicture, encode_picture
 from app.streaming.points import point_arrays
@@ -42,7 +44,7 @@ class Encoder:
         self._last: tuple[Picture, int, SentPicture] | None = None
 
     def message(self, snapshot: Snapshot, width_px: int = MAX_WIDTH_PX) -> bytes | None:
-        """The message for the snapshot's tick, its picture at most ``width_px`` wide; None when there is no tick."""
+        """The message for the snapshot's tick, its image at most ``width_px`` wide; None when there is no tick."""
         if snapshot.processed is None:
             return None
         frame, result = snapshot.processed.frame, snapshot.processed.result
@@ -58,6 +60,7 @@ class Encoder:
             "points": len(result.layers.points),
             "result": to_json(result),
             "display": display_json(result, aligned, scale),
+            "row": row_json(row_of(frame, result)) if snapshot.live else None,
         }
         return pack(header, picture.jpeg if picture else b"", point_arrays(frame, result, aligned, scale))
 
@@ -81,9 +84,9 @@ def display_json(result: Result, aligned: Alignment | None, scale: float) -> dic
     first; ``far_view`` is the window of the detector's second look, None without one; ``path`` is the corridor on the
     ground of the sweep, None without a ground. ``lanes`` are the ego lane's lines where the camera saw them, None
     without a lane detector; ``plan_lanes`` the same seen from above, x y in metres; ``plan_edges`` what runs beside the
-    road, likewise, None where the path is not taken from it; ``ground`` the planes under the
-    sweep, n·p + d = 0, and the segments of x in which they apply; ``ranking`` every object, best candidate for the CIPV
-    first."""
+    road, likewise, None where the path is not taken from it; ``plan_traffic`` x, y and heading in rad of the vehicles
+    that show where the road goes; ``ground`` the planes under the sweep, n·p + d = 0, and the segments of x in which
+    they apply; ``ranking`` every object, best candidate for the CIPV first."""
     layers = result.layers
     path = {"center": result.path.center, "left": result.path.left, "right": result.path.right}
     return {
@@ -94,6 +97,7 @@ def display_json(result: Result, aligned: Alignment | None, scale: float) -> dic
         "path": _on_ground(path, layers.ground, aligned, scale),
         **_lanes_json(layers.lanes, aligned, scale),
         "plan_edges": np.round(layers.edges, 2).tolist() if layers.edges is not None else None,
+        "plan_traffic": np.round(layers.traffic, 3).tolist() if layers.traffic is not None else None,
         "ground": _ground_json(layers.ground),
         "vision_ranges": _vision_ranges(result),
         "ranking": ranking_json(result),

@@ -18,7 +18,7 @@ _JPEG = b"\xff\xd8"
 
 @dataclass(frozen=True)
 class SentPicture:
-    """The JPEG of a picture and its size; scale is sent pixels per picture pixel."""
+    """The JPEG of an image and its size; scale is sent pixels per image pixel."""
 
     jpeg: bytes
     width: int

@@ -18,7 +18,7 @@ U8 = npt.NDArray[np.uint8]
 
 
 def point_arrays(frame: Frame, result: Result, aligned: Alignment | None, scale: float) -> bytes:
-    """The message's last part; ``app.streaming.encode`` lays it out. ``scale``: sent pixels per picture pixel."""
+    """The message's last part; ``app.streaming.encode`` lays it out. ``scale``: sent pixels per image pixel."""
     points, kind = result.layers.points, result.layers.kind
     places = points[:, :3].astype(np.float64)
     xyz = np.clip(np.round(places * 100.0), -_LIMIT, _LIMIT).astype("<i2")

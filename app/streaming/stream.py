@@ -6,7 +6,7 @@ state, so the state is sent separately only when it is newer than the newest fra
 
 Buffers of the system between here and a page hold many frames, which would be a queue after all. A page therefore asks
 for ``?paced=1`` and says ``{"painted": true}`` once for each frame it got; no more than ``FRAMES_UNDER_WAY`` are sent
-ahead of that. With ``{"picture_px": 833}`` it says how wide it shows the picture: the one that all get is
+ahead of that. With ``{"picture_px": 833}`` it says how wide it shows the image: the one that all get is
 as wide as the widest of them needs. It may come with ``?picture_px=833`` too.
 ``{"own": 12}`` is a page with a playhead of its own, at that frame; ``{"own": null}`` follows the others again.
 
@@ -157,7 +157,7 @@ class Stream:
         slot.own.show(index)
 
     def _newest(self) -> tuple[Snapshot | None, int]:
-        """What all are shown, and how wide pictures are sent. Any thread."""
+        """What all are shown, and how wide images are sent. Any thread."""
         return self._snapshot, self._width_px
 
     def _tell_own(self, slot: Slot, message: bytes, order: int) -> None:

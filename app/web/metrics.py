@@ -33,7 +33,7 @@ class Metrics:
         )
         self._detector = Histogram(
             "cipv_detector_seconds",
-            "Detector time for one picture that was not cached",
+            "Detector time for one image that was not cached",
             buckets=_BUCKETS_S,
             registry=to,
         )

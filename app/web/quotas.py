@@ -79,6 +79,6 @@ async def while_waited_for(request: Request, threads: Executor, work: Callable[[
                 gone.set()
         return working.result()
     except Cancelled:
-        raise HTTPException(499, "the client has left") from None
+        raise HTTPException(499, "the client disconnected") from None
     finally:
         gone.set()

@@ -1,13 +1,14 @@
 """The server and the engine as one program, until it is asked to end.
 
 The engine starts before FastAPI is imported, which takes half a second: it opens the recording and makes the first
-picture meanwhile.
+image meanwhile.
 """
 
 from __future__ import annotations
 
 import socket
 import sys
+import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -50,6 +51,8 @@ def serve(
         print(f"cipv: port {port} is in use; using {number}", file=sys.stderr)
     address = f"{'http' if tls is None else 'https'}://{reachable(host)}:{number}"
     engine.labels.kept.station = f"{socket.gethostname()}:{number}"  # two on one machine have parameters of their own
+    # FastAPI silences this of its own use of pydantic, which a thread that silences something else at once undoes
+    warnings.filterwarnings("ignore", message="The 'alias' attribute with value")
     with asked_to_stop() as asked:
         engine.start()
         try:

@@ -158,8 +158,8 @@ class Server(uvicorn.Server):
             link = self._address
             if self._tokens is not None:
                 link = f"{self._address}/?token={self._tokens.person}"
-                print(f"everything:         {self._address}/?token={self._tokens.shown('person')}", flush=True)
-                print(f"display in the car: {self._address}/drive/?token={self._tokens.shown('display')}", flush=True)
+                print(f"full access:        {self._address}/?token={self._tokens.shown('person')}", flush=True)
+                print(f"in-vehicle display: {self._address}/drive/?token={self._tokens.shown('display')}", flush=True)
             if self._on_ready is not None:
                 await asyncio.to_thread(self._on_ready, link)
 

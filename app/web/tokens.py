@@ -1,4 +1,4 @@
-"""Who somebody is, where the server can be reached from other machines: a person, or the display in the car.
+"""Who somebody is, where the server can be reached from other machines: a person, or the in-vehicle display.
 
 A token is a capability: whoever has it is let in. It comes by link once, stays in a cookie that scripts cannot read,
 and is only ever compared in constant time.

@@ -1,4 +1,4 @@
-"""Projection of ego points into the picture, and back: the paper's ``angular`` model, and ``pinhole``.
+"""Projection of ego points into the image, and back: the paper's ``angular`` model, and ``pinhole``.
 
 Both have the same interface, so every stage and view works with either:
 
@@ -42,7 +42,7 @@ class Alignment(Protocol):
 
 @dataclass(frozen=True)
 class Angular:
-    """Pixels proportional to angles (paper, Eq. alignment). Exact only for an equirectangular picture taken at the ego
+    """Pixels proportional to angles (paper, Eq. alignment). Exact only for an equirectangular image taken at the ego
     origin."""
 
     h_res_rad: float
@@ -157,7 +157,7 @@ def _correction(params: AlignmentParams, camera: CameraCalibration) -> F64:
 
 
 def project_cuboids(alignment: Alignment, corners: F64, width: int, height: int) -> list[Box | None]:
-    """Image boxes around the (M, 8, 3) corners of cuboids, clipped to the picture; None for one outside of it.
+    """Image boxes around the (M, 8, 3) corners of cuboids, clipped to the image; None for one outside of it.
 
     Paper: "the cuboid of the bounding box … is projected onto the image". All at once, because a sweep has dozens."""
     uv = alignment.project(corners.reshape(-1, 3)).reshape(-1, 8, 2)

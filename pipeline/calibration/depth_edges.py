@@ -1,9 +1,9 @@
-"""Where the LiDAR sees something end, and how strongly the picture changes there.
+"""Where the LiDAR sees something end, and how strongly the image changes there.
 
 Where a car ends and the road behind it begins, both sensors see a border (Levinson and Thrun 2013, "Automatic Online
-Calibration of Cameras and Lasers"). As there, edges of the picture are spread with an inverse distance transform, so
+Calibration of Cameras and Lasers"). As there, edges of the image are spread with an inverse distance transform, so
 that a border a little off still meets some of one. Unlike there, only changes from left to right count, since a border
-along a ring is an upright one, and each is taken relative to how busy the picture is around it: a fence or a tree is no
+along a ring is an upright one, and each is taken relative to how busy the image is around it: a fence or a tree is no
 better a match than the side of a car.
 """
 
@@ -22,9 +22,9 @@ NEAREST_M, FARTHEST_M = 2.0, 50.0
 WIDEST_STEP_RAD = np.radians(1.0)
 """Neighbours farther apart than this have returns that were lost between them, as against the sky: both are borders."""
 SPREAD_WIDTHS = 0.0035
-"""An edge is felt this far to its sides, in picture widths, with 1/e of its strength: 4 px at 1280."""
+"""An edge is felt this far to its sides, in image widths, with 1/e of its strength: 4 px at 1280."""
 AROUND_WIDTHS = 0.05
-"""How far around an edge the picture's busyness is taken from, in picture widths."""
+"""How far around an edge the image's busyness is taken from, in image widths."""
 FLAT = 20.0
 """A change of brightness (Sobel) no stronger than this is noise of the camera."""
 STRONGEST = 4.0
@@ -34,7 +34,7 @@ STRONGEST = 4.0
 @dataclass(frozen=True, eq=False)
 class EdgeScene:
     """What of one frame no alignment changes. points: (E, 3) depth edges, ego. strength: (H, W) uint8, how near and how
-    strong an upright edge of the picture is. usual: (H,) the mean strength of each row."""
+    strong an upright edge of the image is. usual: (H,) the mean strength of each row."""
 
     points: F64
     strength: U8
@@ -47,7 +47,7 @@ def edge_scene(sweep: Sweep, bgr: U8) -> EdgeScene:
 
 
 def scene_of(points: F64, bgr: U8) -> EdgeScene:
-    """Depth edges (E, 3) and a picture (H, W, 3) uint8 that belong together."""
+    """Depth edges (E, 3) and an image (H, W, 3) uint8 that belong together."""
     strength = upright_edges(bgr)
     return EdgeScene(points, strength, strength.mean(axis=1, dtype=np.float32))
 

@@ -1,4 +1,4 @@
-"""How well LiDAR and pictures lie on each other: do borders in depth fall on edges of the picture, more than with the
+"""How well LiDAR and images lie on each other: do borders in depth fall on edges of the image, more than with the
 mount turned a little?
 
 How strong the edges under the borders are says little by itself: it differs from road to road more than from a right
@@ -26,15 +26,15 @@ REACH_DEG, YAW_STEP_DEG, PITCH_STEP_DEG = 3.0, 0.25, 0.5
 ROLLS_DEG = (-4.0, -2.0, -1.0, 1.0, 2.0, 4.0)
 ZOOMS = (0.9, 0.95, 1.05, 1.1)
 MARGIN = 0.2
-"""Borders this far outside the picture, in its sizes, may come in when the mount is turned."""
+"""Borders this far outside the image, in its sizes, may come in when the mount is turned."""
 STANDS_OUT = 4.8
 """Robust standard deviations that the best must be above the usual one. With 20 frames of Astyx (16 rings) or 12 of
-KITTI, right mounts within reach have 4.86 and more, mounts 6° and more off and other pictures 4.6 at most."""
+KITTI, right mounts within reach have 4.86 and more, mounts 6° and more off and other images 4.6 at most."""
 CLEARLY = 1.5
 """Standard deviations that the best must be above the present one to be told of: less is what edges cannot tell. On
 Astyx and KITTI that is less than 0.5° in yaw and 1° in pitch."""
 FEWEST = 100
-"""Borders in the pictures; with fewer nothing is said."""
+"""Borders in the images; with fewer nothing is said."""
 MOST = 8000
 """Borders of one camera that are looked at: of more, every second, third …"""
 
@@ -43,7 +43,7 @@ MOST = 8000
 class EdgeScore:
     """score: 0–1, 1 where no alignment near is better, 0 where the usual one of them is as good. better: changes of
     parameters (``AlignmentParams``; of h_res_deg and v_res_deg a factor) that lead to the best one near, if that is
-    clearly better. sigmas: how far the best stands out. borders: depth edges in the pictures. score is None where too
+    clearly better. sigmas: how far the best stands out. borders: depth edges in the images. score is None where too
     few borders are seen (sigmas None), or where no alignment near stands out."""
 
     score: float | None
@@ -116,7 +116,7 @@ def _turned(params: AlignmentParams, camera: CameraCalibration | None, turn: Map
 
 
 def _slid(present: Angular, yaw_deg: float, pitch_deg: float) -> Near:
-    """The model that has no mount of its own: the cloud slides over the picture instead."""
+    """The model that has no mount of its own: the cloud slides over the image instead."""
     u, v = round(np.radians(yaw_deg) / present.h_res_rad), round(np.radians(pitch_deg) / present.v_res_rad)
     change = {name: float(by) for name, by in (("cx_px", u), ("cy_px", v)) if by}
     return Near(change, replace(present, cx=present.cx + u, cy=present.cy + v))
@@ -128,7 +128,7 @@ def _zoomed(present: Angular, by: float) -> Near:
 
 
 def _by_camera(scenes: Iterable[Seen]) -> list[tuple[CameraCalibration | None, list[EdgeScene]]]:
-    """Frames of one camera (the same numbers) and picture size together: their borders are projected at once."""
+    """Frames of one camera (the same numbers) and image size together: their borders are projected at once."""
     groups: dict[object, tuple[CameraCalibration | None, list[EdgeScene]]] = {}
     for scene, camera in scenes:
         numbers = camera and tuple(a.tobytes() for a in (camera.K, camera.distortion, camera.T_camera_ego))
@@ -139,7 +139,7 @@ def _by_camera(scenes: Iterable[Seen]) -> list[tuple[CameraCalibration | None, l
 @dataclass(frozen=True, eq=False)
 class _Pictures:
     """Pictures of one camera under each other, and the borders that may fall into them. first_row: (E,) of the border's
-    own picture."""
+    own image."""
 
     points: F64
     first_row: I64

@@ -1,7 +1,7 @@
-"""The one place where a compressed picture becomes pixels: of a file, a bag, a session or a stream.
+"""The one place where a compressed image becomes pixels: of a file, a bag, a session or a stream.
 
 A decoder takes a header at its word: a PNG of 130 kB may ask for 6 GB, a JPEG for a thousand passes over its pixels. So
-the header is read first, and what would take more than a camera's picture may is never given to the decoder.
+the header is read first, and what would take more than a camera's image may is never given to the decoder.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ import numpy.typing as npt
 MOST_PIXELS = 50_000_000
 """About four times the 12 megapixels of the largest automotive cameras; 150 MB as blue, green and red."""
 LARGEST_BYTES = 64 << 20
-"""More than such a picture takes as a PNG that hardly shrinks."""
+"""More than such an image takes as a PNG that hardly shrinks."""
 _MOST_PASSES = 1_000_000_000
 """Pixels times scans of a progressive JPEG, which each scan goes over: seconds. Encoders make about ten scans."""
 _PNG, _PNG_HEADER = b"\x89PNG\r\n\x1a\n", struct.Struct(">I4sII")
 _JPEG, _SCAN = b"\xff\xd8", b"\xff\xda"
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
-"""JPEG's markers that a picture's size stands behind (ITU-T T.81, table B.1)."""
+"""JPEG's markers that an image's size stands behind (ITU-T T.81, table B.1)."""
 _BARE = frozenset({0x01, *range(0xD0, 0xD9)})
 """Those without a length."""
 
 
 class TooMuch(ValueError):
-    """A picture beyond the budget, or of no kind whose size is known before it is decoded; the text is why."""
+    """An image beyond the budget, or of no kind whose size is known before it is decoded; the text is why."""
 
 
 def decode_within_budget(data: bytes) -> npt.NDArray[np.uint8] | None:
@@ -41,9 +41,9 @@ def decode_within_budget(data: bytes) -> npt.NDArray[np.uint8] | None:
 
 
 def check_budget(data: bytes) -> None:
-    """TooMuch when a compressed picture would take more bytes, pixels or time than any camera's."""
+    """TooMuch when a compressed image would take more bytes, pixels or time than any camera's."""
     if len(data) > LARGEST_BYTES:
-        raise TooMuch(f"a picture larger than {LARGEST_BYTES >> 20} MiB")
+        raise TooMuch(f"an image larger than {LARGEST_BYTES >> 20} MiB")
     size = _size_of(data)
     if size is None:
         raise TooMuch("neither a JPEG nor a PNG")
@@ -53,9 +53,9 @@ def check_budget(data: bytes) -> None:
 
 
 def check_pixels(width: int, height: int) -> None:
-    """TooMuch when a picture, or a video's, is larger than any camera's."""
+    """TooMuch when an image, or a video's, is larger than any camera's."""
     if width * height > MOST_PIXELS:
-        raise TooMuch(f"a picture of {width}×{height} pixels")
+        raise TooMuch(f"an image of {width}×{height} pixels")
 
 
 def _size_of(data: bytes) -> tuple[int, int] | None:

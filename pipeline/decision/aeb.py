@@ -67,6 +67,7 @@ def guard(
     ego = situation.now.ego
     if ego is None or command is None or not params.enabled:
         return AebState(), command
+    # The threat that needs the hardest braking decides the stage, which is held until the danger has passed
     threats = find_threats(situation, params)
     worst = max(threats, key=lambda threat: (_level(threat, params), threat.required_mps2), default=None)
     state = _next(state, worst, ego, situation.now.dt_s or 0.0, params)

@@ -2,7 +2,8 @@
 
 A wrong full braking is a rear-end collision from behind, so what a sensor merely believes must not cause one. Slowing
 down comfortably costs little and may be done for any lead. Braking in an emergency takes either the LiDAR, which
-measures range and closing speed, or a camera that has followed the object for long enough to know its closing speed.
+measures range and closing speed, or a camera that has followed the object for long enough to know its closing speed,
+and only while it is surely in the path: an oncoming car in a bend is ahead of us until the road turns.
 """
 
 from __future__ import annotations
@@ -32,4 +33,5 @@ def _justified(item: FusedObject, params: ExistenceParams) -> Braking:
     if item.ranged:
         # a camera track, however long, does not make one LiDAR sighting a measured speed
         return Braking.FULL if item.lidar_hits >= RANGED_SIGHTINGS else Braking.PARTIAL
-    return Braking.PARTIAL if is_steady else Braking.COMFORT
+    is_in_path = (item.in_path_probability or 0.0) >= params.min_braking
+    return Braking.PARTIAL if is_steady and is_in_path else Braking.COMFORT

@@ -25,6 +25,7 @@ class Candidate(NamedTuple):
     """An object with all that its conditions are checked by."""
 
     item: FusedObject
+    """The object."""
     place: Place | None
     """Where it is against the path; None where that is not known."""
     odds: float
@@ -34,7 +35,9 @@ class Candidate(NamedTuple):
     widening_m: float
     """By how much the path is wider for it, to either side."""
     path: Path
+    """The path ahead."""
     params: CipvParams
+    """Limits of the conditions."""
 
     @property
     def aside_m(self) -> float:
@@ -58,6 +61,7 @@ class Condition(NamedTuple):
     shown_as: str
     """Name of its gate, for display only."""
     check: Callable[[Candidate], Answer]
+    """Whether a candidate is it, with number and limit."""
     why_not: Callable[[Candidate], str]
     """The sentence that says why it failed. Only the first failure of an object is put in words."""
 
@@ -110,8 +114,14 @@ def _distance(who: Candidate) -> Answer:
 def _confirmed(who: Candidate) -> Answer:
     """Two sensors that both see it now are enough at once; one alone must see it again. The lead is confirmed."""
     at_once = who.item.seen_by_two_sensors or who.leads
-    hits, needed = who.item.hits, 1 if at_once else who.params.confirm_hits
+    hits, needed = _sightings(who.item), 1 if at_once else who.params.confirm_hits
     return hits >= needed, hits, needed
+
+
+def _sightings(item: FusedObject) -> int:
+    """Of the object where it is now. A camera track whose place was reset, because its distances no longer fitted it,
+    may follow another vehicle than before: only the sightings since then confirm it."""
+    return min(item.hits, item.camera_ranges) if item.pictured and not item.ranged else item.hits
 
 
 def _seen(who: Candidate) -> Answer:
@@ -230,7 +240,9 @@ CONDITIONS = Conditions(
         "ahead", _ahead, lambda who: "position unknown" if who.place is None else "beside or behind the bumper"
     ),
     in_path=Condition("path_offset", _in_path, _out_of_path),
-    confirmed=Condition("hits", _confirmed, lambda who: f"seen {who.item.hits} of {who.params.confirm_hits} times"),
+    confirmed=Condition(
+        "hits", _confirmed, lambda who: f"seen {_sightings(who.item)} of {who.params.confirm_hits} times"
+    ),
     seen=Condition("seen", _seen, _not_seen),
     placed=Condition("path_sigma", _placed, _uncertain),
     probable=Condition("lead_probability", _probable, _improbable),

@@ -194,7 +194,7 @@ def _numbers(item: FusedObject) -> tuple[float, ...]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _against(rows, center, left, right, half_width, profile, step, overlap, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _against(rows, center, left, right, half_width, profile, step, overlap, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]
     """(N, 11) of (N, 19) rows as ``_numbers`` gives them: distances from the centre to the left and to the right edge
     there, sideways speed, then the numbers of ``Place`` as far as ``sigma_m``. half_width: of a path that has no edges
     of its own, else 0."""
@@ -238,7 +238,7 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
 
 
 @numba.njit(cache=True, nogil=True)
-def _reach(offsets, has_sides, first, second, flank, turn):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _reach(offsets, has_sides, first, second, flank, turn):  # type: ignore[no-untyped-def]
     """From where to where an object reaches across the path. offsets: (5,) of its outline. first, second: of its box's
     sides. flank: how much of one that drives along may show, m. turn: of the object against the path, rad.
 
@@ -255,7 +255,7 @@ def _reach(offsets, has_sides, first, second, flank, turn):  # type: ignore[no-u
 
 
 @numba.njit(cache=True, nogil=True)
-def _headings(center, along, step):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _headings(center, along, step):  # type: ignore[no-untyped-def]
     """(N,) directions of a line at path lengths (N,)."""
     out = np.empty(len(along))
     for n in range(len(along)):
@@ -265,7 +265,7 @@ def _headings(center, along, step):  # type: ignore[no-untyped-def]  # pragma: n
 
 
 @numba.njit(cache=True, nogil=True)
-def _outlines(rows, along):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _outlines(rows, along):  # type: ignore[no-untyped-def]
     """(5·N, 2): of each row the middle of the side that faces the ego origin, and the corners in their order around it,
     those of that side first: of the two at the nearest corner the one more square to the direction ``along`` (N,)."""
     outlines = np.empty((5 * len(rows), 2))
@@ -289,14 +289,14 @@ def _outlines(rows, along):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 @numba.njit(cache=True, nogil=True)
-def _square(row, a, b, along):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _square(row, a, b, along):  # type: ignore[no-untyped-def]
     """How square the side between corners a and b is to a direction: |sin| of the angle between them."""
     dx, dy = row[2 * b] - row[2 * a], row[2 * b + 1] - row[2 * a + 1]
     return abs(dy * np.cos(along) - dx * np.sin(along)) / max(np.hypot(dx, dy), 1e-9)
 
 
 @numba.njit(cache=True, nogil=True)
-def _sigma_m(near_x, near_y, cos, sin, distance_sigma, by_camera, carried):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _sigma_m(near_x, near_y, cos, sin, distance_sigma, by_camera, carried):  # type: ignore[no-untyped-def]
     """Of an object's place across the path. A wrong distance moves it along the line of sight, which in a bend is not
     the way the path goes there."""
     distance = max(np.hypot(near_x, near_y), 0.1)

@@ -90,10 +90,12 @@ def measure(
     """
     if params.source == "off":
         return Measured(OwnMotionState(), None, None, ())
+    # What the car and its receiver measured
     courses, received = before.courses, None
     if frame.gnss is not None and (recorded is None or recorded.source != "gnss"):
         courses, received = from_gnss.follow(courses, frame.gnss)
     given = [each for each in (recorded, received) if each is not None]
+    # LiDAR odometry, where those leave something to be desired
     odometry, placed, note = OdometryState(), None, ""
     if _asks_the_lidar(params, given):
         prior = seen.motion if seen.motion is not None else recorded
@@ -108,6 +110,7 @@ def measure(
         trusted = [each for each in trusted if each.source != "gnss"]  # as good as the car's own, but later
     if not trusted:
         return Measured(state, None, None, notes)
+    # Of speed and yaw rate, each comes from the source that is surest of it
     speed = min(trusted, key=lambda each: each.speed_sigma_mps)
     turns = [each for each in trusted if each.yaw_rate_sigma_radps is not None]
     turning = min(turns, key=lambda each: each.yaw_rate_sigma_radps or 0.0) if turns else None

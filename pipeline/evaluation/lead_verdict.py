@@ -106,7 +106,7 @@ def judge_lead(result: Result, lead: TruthObject | None, rule: LeadRule) -> Judg
 
 
 def judge_lead_box(result: Result, bbox: Box) -> Judged:
-    """One frame's CIPV against a lead that is labelled in the picture only: correct when the IoU of their boxes is at
+    """One frame's CIPV against a lead that is labelled in the image only: correct when the IoU of their boxes is at
     least one half. Its distance is unknown."""
     chosen = result.chosen()
     if chosen is None:

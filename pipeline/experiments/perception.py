@@ -16,7 +16,7 @@ from pipeline.vision.far_view import FarView, open_far_view
 
 Boxes = Literal["truth", "network"]
 """Source of the camera's boxes: projected truth with a detector's errors, or the embedded network on rendered
-pictures."""
+images."""
 SENSORS: Mapping[Sensors, str] = {"lidar": "LiDAR", "camera": "camera", "both": "fused"}
 """Their names in reports."""
 COMPARED: tuple[Sensors, ...] = ("lidar", "both")
@@ -30,13 +30,13 @@ GIVEN_SAID = (
 
 @cache
 def embedded() -> Detector:
-    """The embedded network for rendered pictures. One per process, since loading takes a while."""
+    """The embedded network for rendered images. One per process, since loading takes a while."""
     return open_detector(EMBEDDED, (WIDTH, HEIGHT))
 
 
 @cache
 def embedded_far_view() -> FarView | None:
-    """Its second look at the same pictures."""
+    """Its second look at the same images."""
     return open_far_view(embedded(), (WIDTH, HEIGHT))
 
 

@@ -38,7 +38,7 @@ _UNKNOWN = "is its extrinsic inverted?"
 
 
 def looks_ahead(K: F64, T_camera_ego: F64, size: tuple[int, int]) -> bool:
-    """Whether ego +x falls inside the picture of (width, height) widened by half its size on every side."""
+    """Whether ego +x falls inside the image of (width, height) widened by half its size on every side."""
     forward = T_camera_ego[:3, 0]
     if forward[2] <= 1e-3:
         return False
@@ -47,7 +47,7 @@ def looks_ahead(K: F64, T_camera_ego: F64, size: tuple[int, int]) -> bool:
 
 
 def is_upright(T_camera_ego: F64) -> bool:
-    """Whether ego +z is up in the picture."""
+    """Whether ego +z is up in the image."""
     return bool(T_camera_ego[1, 2] < -_UPRIGHT)
 
 

@@ -88,7 +88,7 @@ def decode_picture(path: Path) -> tuple[U8, bytes | None]:
 
 
 def picture_size(paths: Iterable[Path]) -> tuple[int, int] | None:
-    """Width and height of the first readable picture; None where there is none."""
+    """Width and height of the first readable image; None where there is none."""
     for path in paths:
         try:
             bgr, _ = decode_picture(path)
@@ -99,28 +99,28 @@ def picture_size(paths: Iterable[Path]) -> tuple[int, int] | None:
 
 
 def decode_image(data: bytes, name: str) -> tuple[U8, bytes | None]:
-    """(H, W, 3) uint8 blue green red, and the data itself where it is a JPEG. SourceError when it is no whole picture.
+    """(H, W, 3) uint8 blue green red, and the data itself where it is a JPEG. SourceError when it is no whole image.
 
     A JPEG or PNG without its end marker is refused: its lower part would be a flat grey that a detector takes for road.
     """
     is_jpeg = data.startswith(_JPEG_START)
     for start, end in _MARKERS:
         if data.startswith(start) and end not in data[-_END_BYTES:]:
-            raise SourceError(f"{name}: the picture is truncated")
+            raise SourceError(f"{name}: the image is truncated")
     try:
         picture = decode_within_budget(data)
     except TooMuch as error:
-        raise SourceError(f"{name}: not a readable picture: {error}") from None
+        raise SourceError(f"{name}: not a readable image: {error}") from None
     if picture is None:
-        raise SourceError(f"{name}: not a readable picture")
+        raise SourceError(f"{name}: not a readable image")
     return picture, data if is_jpeg else None
 
 
 def picture_of(path: Path | None, t_ns: int | None, size: tuple[int, int], notes: list[str]) -> Picture | None:
-    """The picture of a frame; None, and ``notes`` says why, when there is no file, when it is damaged or when it is not
+    """The image of a frame; None, and ``notes`` says why, when there is no file, when it is damaged or when it is not
     of the size (width, height) of the recording's others."""
     if path is None:
-        notes.append("no picture for this frame")
+        notes.append("no image for this frame")
         return None
     try:
         bgr, encoded = decode_picture(path)
@@ -170,7 +170,7 @@ def camera_matrix(values: npt.ArrayLike, what: str) -> F64:
 
 
 def check_looks_ahead(camera: CameraCalibration, what: str) -> None:
-    """SourceError unless ego +x falls inside the picture widened by half its size on every side.
+    """SourceError unless ego +x falls inside the image widened by half its size on every side.
 
     A front camera sees where the car drives. The usual mistake, an extrinsic given the wrong way round, throws ego +x
     far to the side or behind; the text names the mistake where undoing it helps.

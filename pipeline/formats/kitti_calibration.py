@@ -1,7 +1,7 @@
 """KITTI's calibration files, both kinds: one file a frame (object benchmark) and two a day (raw data).
 
 Geiger et al. 2013, "Vision meets Robotics: The KITTI Dataset", section 3 and Eq. 3–6: a Velodyne point goes to the
-rectified camera 0 by R0_rect · Tr_velo_to_cam, and to the picture of camera 2 by P2, whose last column carries the
+rectified camera 0 by R0_rect · Tr_velo_to_cam, and to the image of camera 2 by P2, whose last column carries the
 baseline from camera 0 to camera 2.
 """
 

@@ -49,7 +49,7 @@ _METRES_A_DEGREE = 111_320.0
 
 
 class LabelRow(NamedTuple):
-    """One line of a label file, ego frame. kind: as KITTI calls it. bbox: pixels of the rectified picture. cuboid and
+    """One line of a label file, ego frame. kind: as KITTI calls it. bbox: pixels of the rectified image. cuboid and
     bbox are None where the line says that it knows none; so are truncation (0–1) and occlusion (0–2)."""
 
     kind: str

@@ -1,4 +1,4 @@
-"""A video file whose pictures can be had by their time, anywhere, without keeping any."""
+"""A video file whose images can be had by their time, anywhere, without keeping any."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".mjpeg", ".ts")
 _FORMATS = "mov,mp4,m4a,3gp,3g2,mj2,avi,matroska,webm,mjpeg,mjpeg_2000,mpegts,mpeg,mpegvideo,h264,hevc,ogg,flv,asf"
 _NS = 1_000_000_000
 _DECODE_ON_NS = 2 * _NS
-"""A picture this little later is reached sooner by decoding on than by seeking."""
+"""An image this little later is reached sooner by decoding on than by seeking."""
 _TELL_EVERY = 256
-"""Pictures between two words of progress."""
+"""Images between two words of progress."""
 _PLACES = 2
 """What is shown, and what is computed beside it."""
 
 
 def open_video(path: Path) -> av.container.InputContainer:
-    """A video file, ready to be decoded within the budget of a picture. OSError for what is no regular file. What a
+    """A video file, ready to be decoded within the budget of an image. OSError for what is no regular file. What a
     playlist in it names is not opened: FFmpeg would fetch it from any server."""
     check_regular(path)
     container = av.open(str(path.resolve()), options={"protocol_whitelist": "file", "format_whitelist": _FORMATS})
@@ -38,14 +38,14 @@ def open_video(path: Path) -> av.container.InputContainer:
 
 
 def within_budget(container: av.container.InputContainer) -> None:
-    """Have FFmpeg refuse pictures that are larger than any camera's, also where their size changes on the way."""
+    """Have FFmpeg refuse images that are larger than any camera's, also where their size changes on the way."""
     for stream in container.streams.video:
         stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
 
 
 class VideoFile:
-    """times_ns: (N,) int64, ascending, of every picture since the first. Times come from the container; where it has
-    none, the pictures are evenly spaced at its rate. Any thread: two that read on at different places do not make each
+    """times_ns: (N,) int64, ascending, of every image since the first. Times come from the container; where it has
+    none, the images are evenly spaced at its rate. Any thread: two that read on at different places do not make each
     other seek."""
 
     def __init__(self, path: Path, progress: Progress = silent) -> None:
@@ -56,7 +56,7 @@ class VideoFile:
         except (av.FFmpegError, OSError, ValueError) as error:
             raise SourceError(f"{path.name}: not a readable video: {reason_of(error)}") from None
         if not len(stamps):
-            raise SourceError(f"{path.name}: no pictures")
+            raise SourceError(f"{path.name}: no images")
         first = int(stamps[0])
         self.times_ns: Times = np.rint((stamps - first) * tick_ns).astype(np.int64)
         self._lock = Lock()
@@ -73,7 +73,7 @@ class VideoFile:
             with overload_told_apart():
                 return place.picture(wanted_ns)
         except (av.FFmpegError, OSError, ValueError, StopIteration) as error:
-            raise SourceError(f"{self.path.name}: picture {index} cannot be decoded: {reason_of(error)}") from None
+            raise SourceError(f"{self.path.name}: image {index} cannot be decoded: {reason_of(error)}") from None
 
 
 class _Place:
@@ -92,7 +92,7 @@ class _Place:
         return self._frames is not None and self._at_ns < wanted_ns <= self._at_ns + _DECODE_ON_NS
 
     def picture(self, wanted_ns: int) -> U8:
-        """The picture of a time. Whatever the library raises; the next one is then read from the file anew."""
+        """The image of a time. Whatever the library raises; the next one is then read from the file anew."""
         with self._lock:
             try:
                 return self._decode(wanted_ns)
@@ -129,13 +129,13 @@ class _Place:
 
 
 def _stamps(container: av.container.InputContainer, progress: Progress) -> tuple[np.ndarray, float]:
-    """Presentation stamps of every picture, ascending, and nanoseconds a tick; nothing is decoded. progress: of the
+    """Presentation stamps of every image, ascending, and nanoseconds a tick; nothing is decoded. progress: of the
     file's bytes."""
     if not container.streams.video:
         raise ValueError("no video stream")
     stream = container.streams.video[0]
     if stream.time_base is None:
-        raise ValueError("its pictures have no times")
+        raise ValueError("its images have no times")
     stamps = []
     for count, packet in enumerate(container.demux(stream)):
         if packet.pts is not None:

@@ -32,6 +32,7 @@ def follow(
     state: AgreementState, objects: tuple[FusedObject, ...], dt_s: float | None, params: FusionParams
 ) -> AgreementState:
     """The share after this frame; as it was where nothing near is seen by either."""
+    # Of the near objects, the share that one sensor has alone where the other should see them too; averaged over time
     near = [item for item in objects if item.distance_m is not None and item.distance_m <= _REACH_M]
     joined = sum(item.seen_by_two_sensors for item in near)
     apart = _come_apart(near)

@@ -23,7 +23,7 @@ from pipeline.params import FusionParams
 from pipeline.types import F64, VEHICLES, Box, FusedObject
 
 BORDER_PX = 3.0
-"""A box that ends this close to the picture's border is cut."""
+"""A box that ends this close to the image's border is cut."""
 LIKE_WIDTH = 0.35
 """A cluster whose width differs from its box's by a larger share is a part of the vehicle, or more than it."""
 NEAREST_M, FARTHEST_M = 5.0, 40.0
@@ -65,7 +65,9 @@ class Drift(NamedTuple):
     pitch_deg: float
     """Downwards."""
     yaw_sigma_deg: float
+    """Standard deviation of ``yaw_deg``."""
     pitch_sigma_deg: float
+    """Standard deviation of ``pitch_deg``."""
     vehicles: int
     """That say so."""
 
@@ -74,9 +76,8 @@ class Drift(NamedTuple):
         """For people, with what to do."""
         yaw = f"yaw {self.yaw_deg:+.1f}° ± {self.yaw_sigma_deg:.1f}°"
         pitch = f"pitch {self.pitch_deg:+.1f}° ± {self.pitch_sigma_deg:.1f}°"
-        return (
-            f"{self.vehicles} vehicles say that camera or LiDAR has turned: {yaw}, {pitch}. Check it with Align, Fit."
-        )
+        who = f"judging by {self.vehicles} vehicles"
+        return f"Camera or LiDAR has turned, {who}: {yaw}, {pitch}. Check with Align, then Fit."
 
 
 class DriftState(NamedTuple):
@@ -96,6 +97,7 @@ def follow(
     """The state after this frame, and the angles that it leaves little doubt of; None while there is no such doubt."""
     if aligned is None or picture_size is None:
         return DriftState(), None
+    # Each vehicle tells the angle between its box and its projected cuboid; those of the last seconds judge together
     known = {each.id: each for each in state.sightings if t_ns - each.t_ns <= params.drift_s * 1e9}
     for item in fused.objects:
         box = fused.vision_boxes.get(item.id)

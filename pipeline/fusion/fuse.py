@@ -70,16 +70,19 @@ def fuse(
 ) -> tuple[FusionState, Fusion]:
     """One row per physical object. ``picture_size`` is (width, height) in pixels; without it or without an alignment
     nothing can be compared, and every track keeps a row of its own."""
+    # LiDAR cuboids are projected into the image, where they can be compared with boxes
     corners = corners_of([track.obstacle.cuboid for track in lidar])
     ranges_m, sigmas_m = [range_m(track) for track in lidar], [lidar_sigma_m(track) for track in lidar]
     projected: list[Box | None] = [None] * len(lidar)
     if alignment is not None and picture_size is not None:
         projected = project_cuboids(alignment, _to_the_gaps(corners, ranges_m, params), *picture_size)
+    # What overlaps, agrees in range and has a plausible size may be joined; the best pairs are
     overlap = _overlap(vision, projected)
     joinable, gates = _gates(overlap, vision, lidar, ranges_m, sigmas_m, params)
     partner = _assign(overlap, joinable, params)
     nearest_of_vision, nearest_of_lidar = _most_overlapping(overlap), _most_overlapping(overlap.T)
 
+    # Every pair, and everything that is alone, is one object, under the id that its tracks had before
     pairs: list[tuple[int | None, int | None]] = [(i, partner.get(i)) for i in range(len(vision))]
     claimed = set(partner.values())
     pairs += [(None, j) for j in range(len(lidar)) if j not in claimed]
@@ -137,7 +140,7 @@ def _to_the_gaps(corners: F64, ranges_m: list[float], params: FusionParams) -> F
 
 
 def _overlap(vision: tuple[VisionTrack, ...], projected: list[Box | None]) -> F64:
-    """(n, m) IoU of vision boxes and projected LiDAR cuboids; zero for a cuboid outside the picture."""
+    """(n, m) IoU of vision boxes and projected LiDAR cuboids; zero for a cuboid outside the image."""
     nowhere = (0.0, 0.0, 0.0, 0.0)
     return iou_matrix(np.array([v.bbox for v in vision]), np.array([box or nowhere for box in projected]))
 

@@ -1,8 +1,8 @@
 """Giving a detector's ONNX graph another input size than the one it was exported with.
 
 A fully convolutional network works at any size that its strides divide. Exports fix one all the same, usually a square,
-in which a wide picture of the road is mostly padding. Rewriting the declared shapes in memory lets the same weights see
-the picture at its own aspect.
+in which a wide image of the road is mostly padding. Rewriting the declared shapes in memory lets the same weights see
+the image at its own aspect.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ MIN_BUDGET = 640 * 384
 
 
 def fitting_size(picture_size: tuple[int, int], own: Size | None) -> Size:
-    """Input (height, width) for a picture (width, height): its aspect, sides multiples of 32, as large as the budget
-    (the export's own number of pixels, at least 640×384) and the picture itself allow.
+    """Input (height, width) for an image (width, height): its aspect, sides multiples of 32, as large as the budget
+    (the export's own number of pixels, at least 640×384) and the image itself allow.
 
     2048×618 → 256×832, 1242×375 → 256×832, 1280×720 → 384×640 (height × width) for a 416×416 export.
     """
@@ -39,12 +39,12 @@ def fitting_size(picture_size: tuple[int, int], own: Size | None) -> Size:
 
 
 def input_size(model: onnx.ModelProto) -> Size | None:
-    """The graph's fixed input (height, width), None when it is free. ValueError when it takes no 1×3×H×W picture."""
+    """The graph's fixed input (height, width), None when it is free. ValueError when it takes no 1×3×H×W image."""
     weights = {tensor.name for tensor in model.graph.initializer}
     inputs = [value for value in model.graph.input if value.name not in weights]
     dims = inputs[0].type.tensor_type.shape.dim if len(inputs) == 1 else []
     if len(dims) != 4 or dims[0].dim_value > 1 or dims[1].dim_value not in (0, 3):
-        raise ValueError("its input is not one picture of 1×3×height×width")
+        raise ValueError("its input is not one image of 1×3×height×width")
     if inputs[0].type.tensor_type.elem_type != onnx.TensorProto.FLOAT:
         raise ValueError("its input is not float32")
     height, width = dims[2].dim_value, dims[3].dim_value
@@ -52,7 +52,7 @@ def input_size(model: onnx.ModelProto) -> Size | None:
 
 
 def with_unit_picture(model: onnx.ModelProto) -> onnx.ModelProto:
-    """A graph whose second input is the size of the original picture (N, 2), as DETR exports have it, with that bound
+    """A graph whose second input is the size of the original image (N, 2), as DETR exports have it, with that bound
     to 1 × 1: its boxes become shares of the input's sides. Any other graph as it is."""
     weights = {tensor.name for tensor in model.graph.initializer}
     inputs = [value for value in model.graph.input if value.name not in weights]
@@ -72,8 +72,8 @@ def with_unit_picture(model: onnx.ModelProto) -> onnx.ModelProto:
 
 
 def with_empty_masks(model: onnx.ModelProto) -> onnx.ModelProto:
-    """A copy whose inputs beside the picture, of 1×1×height×width, are zeros of its own: masks that say which part of
-    the picture is padding, and here none is. The model itself where it has none."""
+    """A copy whose inputs beside the image, of 1×1×height×width, are zeros of its own: masks that say which part of
+    the image is padding, and here none is. The model itself where it has none."""
     weights = {tensor.name for tensor in model.graph.initializer}
     inputs = [value for value in model.graph.input if value.name not in weights]
     shapes = {value.name: [dim.dim_value for dim in value.type.tensor_type.shape.dim] for value in inputs}

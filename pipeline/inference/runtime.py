@@ -14,12 +14,13 @@ import numpy as np
 import onnx
 import onnxruntime as ort
 
-from pipeline.common.errors import BadInput
+from pipeline.common.errors import BadInput, first_line
 from pipeline.common.fast_replace import evolve
 from pipeline.inference import model_registry
 from pipeline.inference.cancellation import Stopped, of_this_thread
 from pipeline.inference.denormals import flush_to_zero, flush_weights
 from pipeline.inference.graph import Size, input_size, with_empty_masks, with_input_size, with_unit_picture
+from pipeline.inference.known_networks import Task
 from pipeline.inference.tuning import Way, kept_way
 from pipeline.types import F32, U8
 
@@ -40,10 +41,10 @@ class DetectorMissing(BadInput):
 
 
 class DetectorError(BadInput):
-    """A network that cannot be run, or an array that is not a picture. The text is a sentence for the user."""
+    """A network that cannot be run, or an array that is not an image. The text is a sentence for the user."""
 
 
-def find_graph(spec: str | None, task: model_registry.Task) -> Path | None:
+def find_graph(spec: str | None, task: Task) -> Path | None:
     """The file of a network by name or path; without either the task's default. None when it is not installed;
     DetectorMissing when the folder of networks is damaged."""
     try:
@@ -60,7 +61,7 @@ def read_graph(path: Path) -> onnx.ModelProto:
     except model_registry.ModelError as error:
         raise DetectorError(str(error)) from None
     except Exception as error:  # protobuf's own errors have no common base class
-        raise DetectorError(f"{path} is not an ONNX file: {_first_line(error)}") from None
+        raise DetectorError(f"{path} is not an ONNX file: {first_line(error)}") from None
     flush_weights(model)
     return model
 
@@ -89,7 +90,7 @@ def open_as(graph: bytes, way: Way) -> ort.InferenceSession:
     options.log_severity_level = _FATAL
     options.graph_optimization_level = getattr(ort.GraphOptimizationLevel, way.optimisation)
     options.enable_cpu_mem_arena = way.arena
-    # Spinning workers starve the LiDAR chain between two pictures.
+    # Spinning workers starve the LiDAR chain between two images.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.add_session_config_entry("session.set_denormal_as_zero", "1")
     return ort.InferenceSession(graph, options, providers=list(way.providers))
@@ -103,13 +104,13 @@ def _open(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
             return open_as(graph, evolve(way, providers=way.providers[first:]))
         except Exception as error:  # onnxruntime raises a class for each status code, without a common base
             refusal = error
-    raise DetectorError(f"{path.name} cannot be run: {_first_line(refusal)}")
+    raise DetectorError(f"{path.name} cannot be run: {first_line(refusal)}")
 
 
 def check_picture(bgr: U8) -> None:
-    """DetectorError for an array that is no picture (H, W, 3) uint8."""
+    """DetectorError for an array that is no image (H, W, 3) uint8."""
     if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
-        raise DetectorError(f"expected a picture of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
+        raise DetectorError(f"expected an image of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
 
 
 def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
@@ -122,13 +123,13 @@ def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
         except Exception as error:
             if stop.is_set:
                 raise Stopped from None
-            raise DetectorError(f"the network failed: {_first_line(error)}") from None
+            raise DetectorError(f"the network failed: {first_line(error)}") from None
     return [np.asarray(output) for output in outputs]
 
 
 def ways_of(path: Path) -> Callable[[Way], Callable[[], Sequence[F32]]]:
-    """For ``pipeline.inference.tuning``: the network in a file on the same noisy picture, one way after the other.
-    DetectorError when it takes no picture."""
+    """For ``pipeline.inference.tuning``: the network in a file on the same noisy image, one way after the other.
+    DetectorError when it takes no image."""
     model = with_empty_masks(with_unit_picture(read_graph(path)))  # each leaves the other's graphs as they are
     try:
         own = input_size(model)
@@ -142,7 +143,3 @@ def ways_of(path: Path) -> Callable[[Way], Callable[[], Sequence[F32]]]:
         return lambda: run_session(session, noise)
 
     return run
-
-
-def _first_line(error: Exception | None) -> str:
-    return (str(error).splitlines() or ["no reason given"])[0]

@@ -1,4 +1,4 @@
-"""A vehicle that somebody points at in the picture, as a cuboid: from the points that are seen there or, where there
+"""A vehicle that somebody points at in the image, as a cuboid: from the points that are seen there or, where there
 are too few, from how tall it looks.
 """
 
@@ -22,19 +22,19 @@ from pipeline.types import F32, I32, REAL_VEHICLES, Box, Detection, Frame, Mask,
 from pipeline.vision.distance import measure
 
 _CLICK_SHARE = 0.015
-"""How near to a click, in widths of the picture, a point must fall."""
+"""How near to a click, in widths of the image, a point must fall."""
 _CLUSTERS = ClusterParams(front_only=False, min_points=FEWEST_POINTS)
 _OWN_SHARE = 0.5
 """A cluster that lies mostly outside the box is something behind or before it."""
 
 
 class NothingThere(BadInput):
-    """Neither points nor picture tell where it is."""
+    """Neither points nor image tell where it is."""
 
 
 @dataclass(frozen=True)
 class Lifted:
-    """how: one sentence. points: that it was laid on, 0 when its distance comes from the picture. bbox: None when
+    """how: one sentence. points: that it was laid on, 0 when its distance comes from the image. bbox: None when
     nobody drew one and none was detected there."""
 
     cuboid: Cuboid
@@ -46,7 +46,7 @@ class Lifted:
 def lift(
     frame: Frame, params: Params, label: str, bbox: Box | None = None, pixel: tuple[float, float] | None = None
 ) -> Lifted:
-    """What is at ``bbox`` (pixels of the raw picture) or at ``pixel``, as a cuboid of a class.
+    """What is at ``bbox`` (pixels of the raw image) or at ``pixel``, as a cuboid of a class.
 
     A pixel stands for the smallest detection it is in. NothingThere when neither points nor the box tell where it is.
     """
@@ -68,7 +68,7 @@ def lift(
     law = _by_height(frame, params, alignment, label, bbox)
     if law.distance_m is None or law.sigma_m is None:
         raise NothingThere(f"no points there, and a {label}'s box like this gives no distance")
-    how = f"no points there: about {law.distance_m:.0f} ± {law.sigma_m:.0f} m by its height in the picture"
+    how = f"no points there: about {law.distance_m:.0f} ± {law.sigma_m:.0f} m by its height in the image"
     return Lifted(_at_height(alignment, label, bbox, law, ground), bbox, 0, how)
 
 

@@ -5,7 +5,7 @@ the short way, its middle follows a monotone cubic (Fritsch and Carlson, *Monoto
 through the keyframes in time, which never swings beyond them. Beyond the outermost keyframes nobody has said how it
 moves: what was there is kept, and shifted as the keyframe was.
 
-A picture box is corrected by itself: a detector's own boxes are right in most frames, and a person who turns a cuboid
+An image box is corrected by itself: a detector's own boxes are right in most frames, and a person who turns a cuboid
 has said nothing of them.
 """
 
@@ -66,7 +66,7 @@ def resized(cuboid: Cuboid, size: tuple[float, float, float]) -> Cuboid:
 
 
 def _between(track: dict[int, Sighting], t_ns: Sequence[int]) -> dict[int, Sighting]:
-    """Every cuboid between two keyframes anew. A keyframe that only the picture shows ends what is followed."""
+    """Every cuboid between two keyframes anew. A keyframe that only the image shows ends what is followed."""
     for run in _runs(track):
         inside = [f for f in track if run[0] < f < run[-1] and not track[f].keyframe]
         if inside:

@@ -9,7 +9,7 @@ its box alone is kept. So it is with what was seen in one frame only: one cluste
 Who leads is proposed where the pipeline has chosen somebody who is proposed. Where it has not, ``none`` is proposed
 only if a vehicle in the path would have been noticed as far as ``FARTHEST_LEAD_M``; else one can't tell.
 
-What the camera alone sees is proposed as a box in the picture, without a cuboid. One from how tall it looks, as
+What the camera alone sees is proposed as a box in the image, without a cuboid. One from how tall it looks, as
 ``pipeline.labels.cuboid_from_pixel`` makes where somebody points, was tried: on Astyx its middle was 14 m off (median
 of 55 that have truth, at 68 m), two in three did not even touch the vehicle; and a distance that nobody measured must
 not become the truth by which distances are scored.
@@ -110,7 +110,7 @@ def propose(
 
 def known_as(proposals: Sequence[LabelTrack], known: Sequence[LabelTrack]) -> dict[int, int]:
     """Which proposals are vehicles that are labelled already, one to one: their numbers there. Two are the same when
-    they are in the same place, ego frame or picture, in half of the frames that both are in."""
+    they are in the same place, ego frame or image, in half of the frames that both are in."""
     there = {(track.id, each.frame): each for track in known for each in track.sightings}
     by_frame: dict[int, list[int]] = {}
     for number, frame in there:

@@ -1,6 +1,6 @@
 """Lane lines without a network: paint is brighter or yellower than the road on both of its sides.
 
-Bertozzi and Broggi, "GOLD" (IEEE Trans. Image Processing 7(1), 1998): in a row of the picture a marking is a bright
+Bertozzi and Broggi, "GOLD" (IEEE Trans. Image Processing 7(1), 1998): in a row of the image a marking is a bright
 band of the width that perspective gives it there, darker to the left and to the right. What is no line among the
 answers (a car's edge, a kerb) is left to the robust fit in ground coordinates (``pipeline.lanes.line_fit``).
 """
@@ -16,13 +16,13 @@ from pipeline.lanes.horizon import horizon_share
 from pipeline.types import U8, CameraCalibration, RawLanes
 
 NAME = "classical"
-_NOTE = "lane lines by colour and gradient (classical), without a network"
+_NOTE = "Lane lines by colour and gradient (classical), without a network"
 _CAMERA_HEIGHT_M = 1.4
 """Of a camera behind a windshield; a tenth more or less changes the expected width of paint by as much."""
 _PAINT_WIDTH_M = 0.15
 _ROWS = 90
 _BELOW_HORIZON, _ABOVE_EDGE = 0.03, 0.02
-"""Shares of the picture's height left out below the horizon and above the lower edge."""
+"""Shares of the image's height left out below the horizon and above the lower edge."""
 _MIN_CONTRAST, _FULL_CONTRAST = 9.0, 60.0
 """Grey levels by which paint must be brighter than both sides, and by which it is surely paint."""
 _PER_ROW = 12
@@ -30,14 +30,14 @@ _PER_ROW = 12
 
 @dataclass(frozen=True)
 class ClassicalLanes:
-    """The detector for pictures of one camera. horizon: row of the horizon as a share of the picture's height."""
+    """The detector for images of one camera. horizon: row of the horizon as a share of the image's height."""
 
     name: str
     horizon: float
     notes: tuple[str, ...] = (_NOTE,)
 
     def detect(self, bgr: U8) -> RawLanes:
-        """Centres of what may be paint, in some ninety rows of a picture (H, W, 3) uint8; not grouped to lines."""
+        """Centres of what may be paint, in some ninety rows of an image (H, W, 3) uint8; not grouped to lines."""
         height, width = bgr.shape[:2]
         horizon_px = self.horizon * height
         rows = np.linspace(horizon_px + _BELOW_HORIZON * height, (1.0 - _ABOVE_EDGE) * height - 2, _ROWS)
@@ -50,7 +50,7 @@ class ClassicalLanes:
 
 
 def open_classical(camera: CameraCalibration | None) -> ClassicalLanes:
-    """For the pictures of a calibrated camera, or of an unknown one on a dashboard."""
+    """For the images of a calibrated camera, or of an unknown one on a dashboard."""
     horizon = horizon_share(camera)
     return ClassicalLanes(NAME if camera is None else f"{NAME}-{horizon:.3f}", horizon)
 
@@ -107,5 +107,5 @@ def _paint(bgr, rows, paint_px, min_contrast, full_contrast):  # type: ignore[no
 
 
 def warm_up() -> None:
-    """Compile the kernel before the first picture."""
+    """Compile the kernel before the first image."""
     open_classical(None).detect(np.zeros((72, 128, 3), np.uint8))

@@ -8,7 +8,7 @@ from pipeline.common.geometry import F64
 from pipeline.types import CameraCalibration
 
 _UNCALIBRATED = 0.57
-"""Share of the picture's height at which a dashboard camera sees it, where no calibration says it."""
+"""Share of the image's height at which a dashboard camera sees it, where no calibration says it."""
 
 
 def horizon_row(camera: CameraCalibration) -> float:
@@ -18,5 +18,5 @@ def horizon_row(camera: CameraCalibration) -> float:
 
 
 def horizon_share(camera: CameraCalibration | None) -> float:
-    """The same as a share of the picture's height; of an unknown camera that of one on a dashboard."""
+    """The same as a share of the image's height; of an unknown camera that of one on a dashboard."""
     return horizon_row(camera) / camera.height if camera is not None else _UNCALIBRATED

@@ -1,7 +1,7 @@
 """Points on the ground to lines, robustly: first the one heading and bend that all lines of a road share, then each
 line for itself.
 
-A point is kept as its bearing and its inverse distance from the camera, because that is what a picture measures:
+A point is kept as its bearing and its inverse distance from the camera, because that is what an image measures:
 
     slope = y/x      inverse = 1/x      (x, y metres on flat ground from the foot of the camera)
 
@@ -69,7 +69,7 @@ class FittedLine:
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """Points of a picture on the road. slope, inverse: (M,) float64 as in this module's first lines. weight: (M,)
+    """Points of an image on the road. slope, inverse: (M,) float64 as in this module's first lines. weight: (M,)
     float64, 0–1. height_m: the camera's over the road."""
 
     slope: F64

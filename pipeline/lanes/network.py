@@ -1,4 +1,4 @@
-"""A lane network in an ONNX file as one function: picture in, points on painted lines out.
+"""A lane network in an ONNX file as one function: image in, points on painted lines out.
 
 The paper takes ENet-SAD; any network whose outputs ``pipeline.lanes.heads`` knows will do.
 """
@@ -32,7 +32,7 @@ _FREE_SIZE: Size = (360, 640)
 _PADDING = 114
 _MIN_SCORE = 0.3
 _MOST_SKY = 0.6
-"""More of a picture than this is never cut off, whatever its calibration says."""
+"""More of an image than this is never cut off, whatever its calibration says."""
 
 
 @dataclass(frozen=True)
@@ -49,14 +49,14 @@ class LaneNetwork:
     notes: tuple[str, ...]
     threads: int
     horizon: float
-    """Where the camera sees the horizon, as a share of its picture's height."""
+    """Where the camera sees the horizon, as a share of its image's height."""
     sha256: str
     _session: ort.InferenceSession = field(repr=False, compare=False)
 
     def detect(self, bgr: U8) -> RawLanes:
-        """Points on lines in a picture (H, W, 3) uint8, in its pixels.
+        """Points on lines in an image (H, W, 3) uint8, in its pixels.
 
-        DetectorError for an array that is no such picture or a network that fails on it.
+        DetectorError for an array that is no such image or a network that fails on it.
         """
         check_picture(bgr)
         placed = _placed((bgr.shape[0], bgr.shape[1]), self.input_size, self.head, self.horizon)
@@ -83,7 +83,7 @@ class LaneNetwork:
 
 @dataclass(frozen=True)
 class _Placed:
-    """Where a picture lies in the input: its rows from ``top`` on, scaled (x, y), its corner at ``shift`` (x, y)."""
+    """Where an image lies in the input: its rows from ``top`` on, scaled (x, y), its corner at ``shift`` (x, y)."""
 
     top: int
     size: Size
@@ -93,7 +93,7 @@ class _Placed:
 
 def open_lane_network(spec: str | None, threads: int = 2, camera: CameraCalibration | None = None) -> LaneNetwork:
     """Load a lane network by name or path; None: the default one (``pipeline.inference.model_registry``). camera: of
-    the pictures; None where it is not known.
+    the images; None where it is not known.
 
     DetectorMissing when there is no file, DetectorError when the file is not a lane network that can be run.
     """
@@ -108,7 +108,7 @@ def open_lane_network(spec: str | None, threads: int = 2, camera: CameraCalibrat
 
 
 def _loaded(path: Path, threads: int, horizon: float) -> LaneNetwork:
-    """The network, proven by a run on a grey picture."""
+    """The network, proven by a run on a grey image."""
     model = with_empty_masks(read_graph(path))
     try:
         own = input_size(model)
@@ -129,7 +129,7 @@ def _loaded(path: Path, threads: int, horizon: float) -> LaneNetwork:
     name = f"{path.stem}-{sha256[:12]}"
     if head.horizon is not None:
         name += f"-{horizon:.3f}"
-    notes = (f"lane lines by the network {path.stem}",)
+    notes = (f"Lane lines by the network {path.stem}",)
     count = session.get_session_options().intra_op_num_threads
     return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, count, horizon, sha256, session)
 

@@ -20,7 +20,7 @@ _REMEDY = "; for real roads pull a network with `cipv models pull twinlitenet`"
 
 def usual_every(lanes: object, rate_hz: float) -> int:
     """The default of ``Detectors.lanes_every`` at ``rate_hz`` frames a second: every how many frames a lane detector
-    looks at the picture."""
+    looks at the image."""
     if not isinstance(lanes, LaneNetwork):
         return 1
     return max(1, min(_NETWORK_EVERY, int(_NETWORK_EVERY_S * rate_hz + 1e-6)))
@@ -28,8 +28,8 @@ def usual_every(lanes: object, rate_hz: float) -> int:
 
 def open_lanes(spec: str | None, camera: CameraCalibration | None, drawn: bool = False) -> LaneDetector | None:
     """The named lane detector: a network's name or file, ``classical``, or ``off``, which is none. Without a name: the
-    default network if one is here, except for drawn pictures, whose paint the classical one sees as well at a tenth of
-    the cost. camera: of the pictures; None where it is not known.
+    default network if one is here, except for drawn images, whose paint the classical one sees as well at a tenth of
+    the cost. camera: of the images; None where it is not known.
 
     DetectorMissing when the named one is not here, DetectorError when it cannot be run.
     """

@@ -1,6 +1,6 @@
-"""What a lane detector saw in the picture, as lines on the road in metres.
+"""What a lane detector saw in the image, as lines on the road in metres.
 
-``measure``    points of one picture → ground → lines, with the pitch that makes them parallel
+``measure``    points of one image → ground → lines, with the pitch that makes them parallel
 ``follow``     the same, and the lines tracked from frame to frame: the stage that ``step`` runs
 ``polylines``  an ``EgoLane`` as points on the road, and ``in_picture`` as pixels, for views
 
@@ -63,7 +63,7 @@ class Pitch:
 
 @dataclass(frozen=True, eq=False)
 class LaneMeasurement:
-    """The lines of one picture in the ego frame, strongest first, and the pitch under which they were mapped."""
+    """The lines of one image in the ego frame, strongest first, and the pitch under which they were mapped."""
 
     source: str
     lines: tuple[FittedLine, ...]
@@ -86,16 +86,16 @@ class LaneState:
 
 
 class RoadView(NamedTuple):
-    """How the road lies in one picture."""
+    """How the road lies in one image."""
 
     aligned: Alignment | None
-    """Where ego points fall in the picture; None: not known, and nothing can be measured."""
+    """Where ego points fall in the image; None: not known, and nothing can be measured."""
     ground: Ground | None = None
     """The ground of this frame's sweep, if any."""
     road_z_m: float | None = None
     """The road below the car in the ego frame, as the calibration has it; None: as the parameter has it."""
     vehicles: Sequence[Box] = ()
-    """Boxes in the picture, pixels, that hide the road."""
+    """Boxes in the image, pixels, that hide the road."""
 
 
 def follow(
@@ -107,7 +107,7 @@ def follow(
     level_m = view.road_z_m if view.road_z_m is not None else -params.mount_height_m
     road = plane if plane is not None else np.array([0.0, 0.0, level_m])
 
-    # A picture that a detector looked at gives lines on the road, and the pitch that makes them parallel
+    # An image that a detector looked at gives lines on the road, and the pitch that makes them parallel
     pitch = _drifted(state.pitch, now.dt_s, params)
     measured = None
     if raw is not None and view.aligned is not None:
@@ -126,9 +126,9 @@ def follow(
 def measure(
     raw: RawLanes, aligned: Alignment, plane: F64, pitch: Pitch, params: LaneParams, expected: Shape | None = None
 ) -> LaneMeasurement:
-    """Lines on the road from points in the picture; none where too few points lie on it.
+    """Lines on the road from points in the image; none where too few points lie on it.
 
-    plane: (3,) as in ``LaneState``. pitch: as believed before this picture. expected: the shape of the tracked lines,
+    plane: (3,) as in ``LaneState``. pitch: as believed before this image. expected: the shape of the tracked lines,
     around which the search is then narrow; None searches wide.
     """
     nothing = LaneMeasurement(raw.model, (), pitch)
@@ -209,7 +209,7 @@ def _polyline(line: LaneLine | None) -> F64:
 
 
 def warm_up() -> None:
-    """Compile the kernels before the first picture."""
+    """Compile the kernels before the first image."""
     seen = Sightings(np.zeros(20), np.linspace(0.05, 0.2, 20), np.ones(20), 1.0)
     shape, _ = line_fit.shared_shape(seen, Shape())
     line_fit.fit_line(seen, 0.0, shape, 1e-3)

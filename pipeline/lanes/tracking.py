@@ -97,7 +97,7 @@ def predict(tracks: LaneTracks, ego: EgoState | None, dt_s: float | None, params
 
 
 def update(tracks: LaneTracks, source: str, measured: tuple[FittedLine, ...], params: LaneParams) -> LaneTracks:
-    """The lines after a picture. A line that was not found in it fades; a new one starts with its measured quality."""
+    """The lines after an image. A line that was not found in it fades; a new one starts with its measured quality."""
     pairs = _pairs(tracks.lines, measured, params.gate_m)
     lines = [_joined(line, measured[pairs[i]]) if i in pairs else _faded(line) for i, line in enumerate(tracks.lines)]
     new = [found for j, found in enumerate(measured) if j not in pairs.values()]

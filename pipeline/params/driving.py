@@ -37,6 +37,10 @@ class PathParams(Section):
     use_edges: bool = choice(
         False, "Put the corridor along what runs beside the road: kerbs, hedges, walls, rails, parked cars"
     )
+    use_traffic: bool = choice(
+        True,
+        "Put the corridor along the headings of vehicles that drive on the road, where no line or route shows it",
+    )
     min_speed_mps: float = slider(2.0, 0.0, 10.0, 0.5, "m/s", "Yaw rate and GNSS course are ignored below this speed")
     yaw_rate_sigma_radps: float = slider(
         0.007, 0.0005, 0.05, 0.0005, "rad/s", "Noise of the yaw rate, including small steering corrections"
@@ -187,9 +191,8 @@ class AebParams(Section):
 class TimeParams(Section):
     """Where one clip of a recording ends and the next begins (``pipeline.common.clips``).
 
-    Within 1.5 s a car that brakes or speeds up by 3 m/s² as nobody saw is 3.4 m from where it was expected, nearly its
-    own length, and one that changes lanes is halfway there: after that a track is a guess about another moment, and a
-    drive with so many frames missing has lost its sensors, not a frame."""
+    In 1.5 s, a car that brakes or accelerates unseen at 3 m/s² ends up 3.4 m from where it was expected, nearly its own
+    length, and one that changes lanes is halfway across. After a longer gap, a track would be a guess."""
 
     reset_gap_s: float = slider(
         1.5, 0.2, 10.0, 0.1, "s", "All trackers reset after a longer gap, or a jump back in time"

@@ -10,7 +10,7 @@ from pipeline.params.declare import Section, choice, slider
 class DeskewParams(Section):
     """Motion compensation of the sweep by ego speed and yaw rate."""
 
-    enabled: bool = choice(False, "Correct points for ego motion during the sweep; vehicles that move are distorted")
+    enabled: bool = choice(False, "Correct points for ego motion during the sweep; distorts moving vehicles")
 
 
 class DownsampleParams(Section):

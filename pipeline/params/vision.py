@@ -10,7 +10,9 @@ from pipeline.params.declare import Section, choice, slider
 class DetectionParams(Section):
     """Which of the detector's boxes are kept."""
 
-    far_view: bool = choice(True, "Use the boxes of the second pass over the far part of the picture, in native pixels")
+    far_view: bool = choice(
+        True, "Use the boxes of the second pass over the far part of the image, at native resolution"
+    )
     min_score: float = slider(0.3, 0.05, 0.95, 0.01, "", "Boxes with a lower score are dropped")
     nms_iou: float = slider(
         0.55, 0.1, 0.95, 0.01, "", "Of two boxes that overlap more, the one with the lower score is dropped"
@@ -80,11 +82,11 @@ class VisionTrackingParams(Section):
     gate_px: float = slider(80.0, 5.0, 400.0, 1.0, "px", "dist_th: largest movement of a box's centre between frames")
     gate_sizes: float = slider(1.0, 0.1, 5.0, 0.1, "", "kalman: largest movement in box widths, if that is more")
     gate_sigmas: float = slider(
-        4.0, 1.0, 10.0, 0.1, "σ", "kalman: a box farther from the expected place and size is another object"
+        4.0, 1.0, 10.0, 0.1, "σ", "kalman: a box farther from the expected position and size is another object"
     )
     max_size_ratio: float = slider(2.0, 1.1, 5.0, 0.1, "", "kalman: largest change of a box's width between sightings")
     shift_px: float = slider(
-        4.0, 0.0, 40.0, 0.5, "px", "kalman: how far the whole picture may shift between frames, as the car pitches"
+        4.0, 0.0, 40.0, 0.5, "px", "kalman: how far the whole image may shift between frames, as the car pitches"
     )
     bearing_sigma_deg: float = slider(0.3, 0.05, 3.0, 0.05, "°", "kalman: noise of a box's direction")
     accel_sigma_mps2: float = slider(3.0, 0.1, 20.0, 0.1, "m/s²", "kalman: acceleration noise of objects")
@@ -92,7 +94,12 @@ class VisionTrackingParams(Section):
         True, "kalman: learn a vehicle's height while the LiDAR ranges it; off: assume that of its class"
     )
     max_nis: float = slider(
-        13.8, 3.0, 1000.0, 0.1, "", "kalman: largest NIS of a distance; 13.8 is the 99.9 % quantile of χ² (2 degrees)"
+        13.8,
+        3.0,
+        1000.0,
+        0.1,
+        "",
+        "kalman: largest NIS of a distance; 13.8 is the 99.9 % quantile of χ² (2 degrees of freedom)",
     )
     restart_after: int = slider(
         3, 1, 30, 1, "frames", "kalman: consecutive rejected distances after which a track's position is reset"
@@ -113,16 +120,22 @@ class AlignmentParams(Section):
     yaw_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount to the left")
     pitch_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount downwards")
     roll_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount clockwise")
-    left_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: correction of the camera's place to the left")
-    up_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: correction of the camera's place upwards")
+    left_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: shift of the camera position to the left")
+    up_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: shift of the camera position upwards")
 
 
 class ExistenceParams(Section):
-    """Whether an object is really there: evidence of both sensors for and against it."""
+    """Whether an object is really there: evidence from both sensors for and against it."""
 
     enabled: bool = choice(True, "Weigh the evidence for and against each object; off: every object exists")
     min_braking: float = slider(
-        0.8, 0.0, 0.99, 0.01, "", "A less probable object causes gentle deceleration only, no hard braking"
+        0.8,
+        0.0,
+        0.99,
+        0.01,
+        "",
+        "An object that is less likely to exist causes gentle deceleration only, no hard braking; so does one seen by "
+        "the camera alone that is less likely to be in the path",
     )
     camera_ranges: int = slider(
         8,
@@ -154,7 +167,12 @@ class FusionParams(Section):
         "Boxes that overlap more skip the range gate: a car 1.8 times as far away cannot overlap this much",
     )
     range_gate_sigmas: float = slider(
-        1.5, 0.5, 10.0, 0.1, "σ", "Largest difference of the two distances: 1.5 σ of a box's distance is 30 % of it"
+        1.5,
+        0.5,
+        10.0,
+        0.1,
+        "σ",
+        "Largest difference between the two distances; 1.5 σ of a box's distance is 30 % of it",
     )
     single_returns: bool = choice(
         True, "Range far vehicles by single LiDAR returns inside their boxes, too few for a cluster"
@@ -163,7 +181,7 @@ class FusionParams(Section):
         True, "Do not join a box with a cluster longer than any vehicle of its class: hedges, walls, rails"
     )
     drift_s: float = slider(
-        30.0, 5.0, 120.0, 1.0, "s", "A turned mount is told by the vehicles of the last so many seconds"
+        30.0, 5.0, 120.0, 1.0, "s", "Time over which vehicles are compared to detect a turned mount"
     )
     drift_sigmas: float = slider(
         4.0, 2.0, 10.0, 0.1, "σ", "A turned mount is reported when its angle is this many standard deviations from zero"

@@ -4,6 +4,7 @@
     GNSS on a route ──────┤
     yaw rate's arc ───────┼─► compare, weigh ─► blend with the frame before ─► Path
     the road's edges ─────┤
+    other vehicles ───────┤
     (else straight ahead) ┘
 
 The paper uses lane centres on straights and a GPS path in curves, chosen by hand. Here every source gives its sigma at
@@ -61,6 +62,8 @@ class Evidence(NamedTuple):
     """The road it follows."""
     edges: PathEstimate | None = None
     """The path along what runs beside the road."""
+    traffic: PathEstimate | None = None
+    """The path along the headings of other vehicles."""
 
 
 def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParams) -> tuple[PathState, Path]:
@@ -77,7 +80,7 @@ def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParam
     seen = (*surest, yaw_rate.ahead(yaw, ego, params))
     estimates = [each for each in seen if each is not None]
     if not any(_shows_the_road(each, params) for each in surest):
-        estimates += [evidence.edges] if evidence.edges is not None else []
+        estimates += [each for each in (evidence.edges, evidence.traffic) if each is not None]
     guess = straight(ego, params)
     if all(each.sigma_m[0] > guess.sigma_m[0] for each in estimates) or _fades(ego, estimates):
         estimates.append(guess)  # of the next metres a vague route tells less than that the car goes where it points
@@ -114,8 +117,8 @@ def warm_up() -> None:
 
 
 def _shows_the_road(each: PathEstimate | None, params: PathParams) -> bool:
-    """Whether paint or a route shows the road well. Then its edges add nothing, and may not outvote it: a car keeps to
-    its lane where the kerb goes another way."""
+    """Whether paint or a route shows the road well. Then its edges and other vehicles add nothing, and may not outvote
+    it: a car keeps to its lane where the kerb goes another way, or where others turn off."""
     return each is not None and float(each.sigma_m[int(_LOOK_AHEAD_M[1] / STEP_M)]) <= params.good_sigma_m
 
 

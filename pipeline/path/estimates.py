@@ -18,8 +18,8 @@ from pipeline.params import PathParams
 from pipeline.types import EgoState
 from pipeline.types.lane import EgoLane, LaneLine
 
-SourceName = Literal["lane", "gnss", "yaw_rate", "straight", "edges"]
-SOURCES: tuple[SourceName, ...] = ("lane", "gnss", "yaw_rate", "straight", "edges")
+SourceName = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "traffic"]
+SOURCES: tuple[SourceName, ...] = ("lane", "gnss", "yaw_rate", "straight", "edges", "traffic")
 STEP_M = 1.0
 UNKNOWN_SIGMA_M = 1e3
 """Sigma of a position about which a source says nothing."""
@@ -27,7 +27,7 @@ UNKNOWN_SIGMA_M = 1e3
 _STRAIGHT_CURVATURE = 1e-6
 _FASTEST_CURVATURE_PER_M = 1.0 / 500.0
 """Curvature assumed possible where the speed is not known: a road for 100 km/h has curves down to a 500 m radius."""
-_TIGHTEST_CURVATURE_PER_M = 0.02
+TIGHTEST_CURVATURE_PER_M = 0.02
 _LANE_WIDTH_SIGMA_M = 0.3
 """Uncertainty of a lane's width where only one of its lines is seen."""
 _USUAL_LANE_M = 3.5
@@ -87,7 +87,7 @@ def straight(ego: EgoState | None, params: PathParams) -> PathEstimate:
         curvature_sigma = _FASTEST_CURVATURE_PER_M
     else:
         speed2 = max(ego.speed_mps, params.min_speed_mps, 0.1) ** 2
-        curvature_sigma = min(params.lateral_accel_mps2 / speed2, _TIGHTEST_CURVATURE_PER_M)
+        curvature_sigma = min(params.lateral_accel_mps2 / speed2, TIGHTEST_CURVATURE_PER_M)
     center = np.column_stack([s, np.zeros_like(s)])
     bends_by = np.minimum(0.5 * curvature_sigma * s * s, SHARPEST_BEGIN_PER_M2 / 6.0 * s**3)
     return PathEstimate("straight", center, np.hypot(params.lane_keeping_sigma_m, bends_by))

@@ -71,16 +71,19 @@ def follow(state: EdgeState, around: Surroundings, now: Moment, params: PathPara
     ego, dt_s = now.ego, now.dt_s
     if ego is None or not params.use_edges:
         return EdgeState(), None
+    # What stood beside the road in earlier sweeps, moved on by own motion; some frames only predict, to save time
     before = road_structure.moved(state.cells, ego, dt_s) if dt_s else NONE
     turn = (state.turn + 1) % _ANEW_EVERY
     if state.turn % _EVERY and dt_s and state.shape is not None and state.sigma_m is not None:
         shape = road_shape.moved_on(state.shape, ego, dt_s, samples(params.length_m))
         return _found(EdgeState(before, shape, state.sigma_m, state.room_m, turn))
+    # With what this sweep sees there, but without what drives
     cells = road_structure.merged(before, _seen(around))
     driving = [item for item in around.objects if road_structure.drives(item)]
     cells = road_structure.without(cells, driving)
     if len(cells.xy) < _FEWEST_CELLS:
         return EdgeState(cells), None
+    # The shape along which most of it lies at the same distance is the road's, and the nearest of it is its room
     starts = road_shape.begin(state.shape, ego, dt_s, state.turn == 0, params)
     shape, sigma_m = road_shape.fitted(cells.xy, cells.blocks, starts, ego, params)
     room_m = road_shape.room(shape, cells.xy[cells.stands], params.half_width_m)

@@ -30,11 +30,11 @@ logger = logging.getLogger("cipv.recording")
 
 FLUSH_S, SYNC_S = 1.0, 5.0
 _QUEUED = 64
-"""Six seconds of frames at 10 Hz; with pictures of 1280×720 that is 200 MB at worst."""
+"""Six seconds of frames at 10 Hz; with images of 1280×720 that is 200 MB at worst."""
 _QUEUED_BYTES = 200_000_000
 """Of what comes between frames; the JPEGs and clouds of ten seconds are 120 MB."""
 _UNPACKED_BYTES, _SMALL_BYTES = 3_000_000, 500
-"""A picture of a camera that sends video, and a sample of own motion or GNSS, as they wait."""
+"""An image of a camera that sends video, and a sample of own motion or GNSS, as they wait."""
 
 _BATCH = 76
 """A VLP-16 sends about so many packets a rotation."""
@@ -44,7 +44,7 @@ _PATIENCE_S = 15.0
 loaded machine is slow, and that is not the disk's fault."""
 
 _Do = Callable[[Segments], None]
-_Kind = Literal["frames", "packets", "sweeps", "pictures", "samples"]
+_Kind = Literal["frames", "packets", "sweeps", "images", "samples"]
 
 
 class _Job(NamedTuple):
@@ -56,7 +56,7 @@ class _Job(NamedTuple):
 @dataclass(frozen=True)
 class RecordingState:
     """How a recording does. file: the newest of ``files``. seconds, bytes: over all of them. dropped: frames, batches
-    of packets, sweeps, pictures and samples that did not fit. error: why it ended by itself, None while all is well."""
+    of packets, sweeps, images and samples that did not fit. error: why it ended by itself, None while all is well."""
 
     file: Path
     files: tuple[Path, ...]
@@ -141,9 +141,9 @@ class Recorder:
             self._put(lambda segments: segments.write_sweep(sweep, arrived_ns), "sweeps", _bytes_of(sweep))
 
     def picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
-        """Every picture, not only those of frames."""
+        """Every image, not only those of frames."""
         size = len(shot.encoded) if shot.encoded is not None else _UNPACKED_BYTES
-        self._put(lambda segments: segments.write_picture(shot, t_ns, arrived_ns), "pictures", size)
+        self._put(lambda segments: segments.write_picture(shot, t_ns, arrived_ns), "images", size)
 
     def ego(self, ego: EgoState, arrived_ns: int) -> None:
         self._put(lambda segments: segments.write_ego(ego, arrived_ns), "samples", _SMALL_BYTES)

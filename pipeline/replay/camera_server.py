@@ -1,4 +1,4 @@
-"""A camera on the network: MJPEG over HTTP, each picture with its stamp, as mjpg-streamer sends it."""
+"""A camera on the network: MJPEG over HTTP, each image with its stamp, as mjpg-streamer sends it."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class CameraServer:
             client.close()
 
     def send(self, jpeg: bytes, stamp_ns: int) -> None:
-        """Give the picture to whoever watches."""
+        """Give the image to whoever watches."""
         head = (
             f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n"
             f"X-Timestamp: {stamp_ns / 1e9:.6f}\r\n\r\n"
@@ -82,7 +82,7 @@ class CameraServer:
             threading.Thread(target=self._greet, args=(client,), daemon=True).start()
 
     def _greet(self, client: socket.socket) -> None:
-        """Answer the request whatever it asks for; from then on the client gets pictures."""
+        """Answer the request whatever it asks for; from then on the client gets images."""
         try:
             client.settimeout(_SEND_TIMEOUT_S)
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -25,7 +25,7 @@ class Message(NamedTuple):
 
 
 def of_recording(source: Source, first: int = 0, last: int | None = None) -> Iterator[Message]:
-    """Frames ``first`` to ``last`` as messages. A picture without a stamp is taken at its frame's tick. A capture's
+    """Frames ``first`` to ``last`` as messages. An image without a stamp is taken at its frame's tick. A capture's
     LiDAR packets are sent as they were."""
     if isinstance(source, RawPackets):
         packets = (Message(t_ns, "lidar", payload) for t_ns, payload in source.packets())

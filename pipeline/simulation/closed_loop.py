@@ -35,7 +35,7 @@ STEP_S = 0.005
 
 
 class Eyes(Protocol):
-    """Finds vehicles in the picture."""
+    """Finds vehicles in the image."""
 
     @property
     def needs_picture(self) -> bool: ...
@@ -47,7 +47,7 @@ class Eyes(Protocol):
 
 @dataclass(frozen=True)
 class TruthEyes:
-    """Projected truth with a detector's errors: no picture, no network."""
+    """Projected truth with a detector's errors: no image, no network."""
 
     noise: BoxNoise = BoxNoise()
     needs_picture: bool = False
@@ -59,7 +59,7 @@ class TruthEyes:
 
 @dataclass(frozen=True)
 class NetworkEyes:
-    """A real network on the rendered picture."""
+    """A real network on the rendered image."""
 
     detector: Detector
     far: FarView | None = None

@@ -43,7 +43,7 @@ Moment = tuple[float, float, float, float, float, float]
 class Scenario(Strict):
     """driven: the ego vehicle's motion as a closed loop drove it, a moment a tick; where it is given, the ego
     vehicle moves so and not by its script. sensors: those that the pipeline is given. detections: what is found in the
-    pictures; None: what detectors find that look at them. faults: what is wrong with the sensors."""
+    images; None: what detectors find that look at them. faults: what is wrong with the sensors."""
 
     title: str
     seed: int = Field(default=0, ge=0)

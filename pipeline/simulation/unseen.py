@@ -1,4 +1,4 @@
-"""A scenario as the pipeline senses it, without a picture being drawn: for suites that drive very many kilometres."""
+"""A scenario as the pipeline senses it, without an image being drawn: for suites that drive very many kilometres."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pipeline.types import Frame
 
 
 def frames(scenario: Scenario) -> Iterator[tuple[World, Frame]]:
-    """The truth and what is sensed of it, tick by tick: all but the pictures is as ``sim:`` gives it."""
+    """The truth and what is sensed of it, tick by tick: all but the images is as ``sim:`` gives it."""
     end_m = world_state.at(scenario, scenario.duration_s).s_m
     sensors, senses = Sensors(scenario, end_m), Senses(scenario)
     step_ns = round(1e9 / scenario.rate_hz)

@@ -38,7 +38,7 @@ _CHANNELS = 16
 _HALF_ROTATION_NS = 50_000_000
 _NOMINAL_STEP_NS = 300_000_000
 _NOMINAL_SIZE = (2048, 618)
-"""What the calibration files do not say, where no picture does."""
+"""What the calibration files do not say, where no image does."""
 _ROAD_Z_M = -1.55
 """The radar's height above the road, which the files do not say: the median over its own sweeps' ground."""
 _COLUMNS = 6  # X Y Z Reflectivity LaserID Timestamp

@@ -1,4 +1,4 @@
-"""Pictures without a LiDAR: a video file, or a folder of pictures, with a GNSS track beside it if there is one.
+"""Pictures without a LiDAR: a video file, or a folder of images, with a GNSS track beside it if there is one.
 
 Without a calibration the camera is taken for a dash cam: looking straight ahead, with a diagonal field of view of 78°,
 1.3 m above the road. The notes say so; ``NAME.yaml`` beside the recording, or ``hfov_deg``, gives the real one."""
@@ -32,7 +32,7 @@ _RATE_HZ = 10.0
 """Frames a second that are taken of a video: more add nothing to tracking, and cost a network's time each."""
 _DIAGONAL_DEG, _HEIGHT_M = 78.0, 1.3
 _EPOCH_NS = 631_152_000 * 1_000_000_000
-"""1990: smaller names count pictures."""
+"""1990: smaller names count images."""
 _STAMP = re.compile(r"^\d{16}(\d{3})?$")
 
 
@@ -47,7 +47,7 @@ def open_video(uri: str, rest: str, how: Opening) -> CameraAlone:
     recorded_hz = 1e9 / float(np.median(steps)) if len(steps) else wanted_hz
     every = max(1, round(recorded_hz / wanted_hz))
     taken = range(0, len(video.times_ns), every)
-    notes = [f"{recorded_hz:.0f} pictures a second; every {_ordinal(every)} is used"] if every > 1 else []
+    notes = [f"{recorded_hz:.0f} images a second; every {_ordinal(every)} is used"] if every > 1 else []
     return CameraAlone(
         uri, file, options, video.times_ns[::every].tolist(), lambda index: (video.picture(taken[index]), None), notes
     )
@@ -60,7 +60,7 @@ def open_pictures(uri: str, rest: str, how: Opening) -> CameraAlone:
     folder = recording_folder(path)
     files = files_by_name(folder, PICTURE_SUFFIXES)
     if not files:
-        raise SourceError(f"{path}: no pictures in it; they are .jpg, .jpeg or .png")
+        raise SourceError(f"{path}: no images in it; they are .jpg, .jpeg or .png")
     names, paths = list(files), list(files.values())
     times = [_stamp_ns(name) for name in names]
     stamped = all(times) and bool(np.all(np.diff(times) > 0))
@@ -71,7 +71,7 @@ def open_pictures(uri: str, rest: str, how: Opening) -> CameraAlone:
 
 
 class CameraAlone:
-    """A recording of pictures. ticks: ns of each, ascending. read: (picture, JPEG file or None) of each."""
+    """A recording of images. ticks: ns of each, ascending. read: (image, JPEG file or None) of each."""
 
     def __init__(
         self,
@@ -93,7 +93,7 @@ class CameraAlone:
             # a video's clock starts at zero: the track is taken to begin with it
             begin = fixes[0].t_ns + round(number_option(options, "gnss_offset_s", 0.0) * 1e9)
             ticks = [begin + tick - ticks[0] for tick in ticks]
-            notes.append("the GNSS track is assumed to start with the pictures; ?gnss_offset_s= shifts it")
+            notes.append("the GNSS track is assumed to start with the images; ?gnss_offset_s= shifts it")
         self._ticks = ticks
         steps = np.diff(ticks)
         self.rate_hz = round(1e9 / float(np.median(steps)), 2) if len(steps) else _RATE_HZ
@@ -144,7 +144,7 @@ class CameraAlone:
         return Picture(t_ns, bgr, encoded)
 
     def _assumed(self, options: dict[str, str], notes: list[str]) -> CameraCalibration | None:
-        """A dash cam's calibration for the first readable picture."""
+        """A dash cam's calibration for the first readable image."""
         for index in range(len(self)):
             picture = self._picture(index, 0, [])
             if picture is not None:
@@ -191,7 +191,7 @@ def _positive(options: dict[str, str], name: str, otherwise: float) -> float:
 
 
 def _stamp_ns(name: str) -> int:
-    """The time that a picture's name is; 0 when it is none."""
+    """The time that an image's name is; 0 when it is none."""
     if not _STAMP.match(name):
         return 0
     t_ns = int(name) * (1000 if len(name) == 16 else 1)

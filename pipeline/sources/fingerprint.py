@@ -39,7 +39,7 @@ def content_key(t_ns: Sequence[int], frame: Callable[[int], Frame]) -> str:
 
 
 def _as_sent(frame: Frame) -> bytes:
-    """The intensities of a sweep, which no mount changes; where there are none the picture, or else the places."""
+    """The intensities of a sweep, which no mount changes; where there are none the image, or else the places."""
     intensity = frame.sweep.points[:, 3] if frame.sweep is not None else np.empty(0)
     if (intensity != intensity[:1]).any():
         return intensity.tobytes()

@@ -52,7 +52,7 @@ class KittiSource:
         self._names = self._files.names
         if not self._names:
             raise SourceError(f"{path}: not a KITTI recording: {_what_it_holds(folder)}")
-        # object calibration files do not say how large the pictures are
+        # object calibration files do not say how large the images are
         self._size = picture_size(self._files.pictures.values()) or _NOMINAL_SIZE
         self._calibration = self._first_calibration(path)
         self._ticks = _ticks(self._names, self._files)
@@ -247,4 +247,4 @@ def _what_it_holds(folder: Path) -> str:
     drives = sorted(path.name for path in folder.glob("*_drive_*") if path.is_dir())
     if drives:
         return f"it holds drives; open one of them, for example kitti:{folder / drives[0]}"
-    return "neither velodyne/*.bin nor velodyne_points/data/*.bin nor pictures in it"
+    return "neither velodyne/*.bin nor velodyne_points/data/*.bin nor images in it"

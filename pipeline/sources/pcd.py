@@ -1,7 +1,7 @@
-"""A folder of PCD files as a recording, in order of name, with pictures of the same names beside them.
+"""A folder of PCD files as a recording, in order of name, with images of the same names beside them.
 
 A name that is a number of nanoseconds, microseconds or seconds since 1970 is the sweep's time; else sweeps are taken as
-10 Hz. Pictures lie in the same folder, or in one named ``images``, ``image``, ``camera`` or ``image_02``.
+10 Hz. Images lie in the same folder, or in one named ``images``, ``image``, ``camera`` or ``image_02``.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class PcdSource:
         return Frame(index, name, t_ns, sweep, picture, camera, notes=tuple(notes))
 
     def outlines(self) -> Iterator[Frame]:
-        """A camera's pictures are of one size: the first one tells whether the calibration is theirs."""
+        """A camera's images are of one size: the first one tells whether the calibration is theirs."""
         first = picture_of(next(iter(self._pictures.values()), None), None, self._size, []) if self._pictures else None
         camera = rig_files.calibration_for(self._camera, first, [])
         return (Frame(index, name, self.t_ns(index), camera=camera) for index, name in enumerate(self._names))

@@ -56,14 +56,13 @@ def load_rig(path: Path) -> Rig:
 def calibration_for(
     camera: CameraCalibration | None, picture: Picture | None, notes: list[str]
 ) -> CameraCalibration | None:
-    """The calibration, if it is of the picture's size; else None, and ``notes`` says so."""
+    """The calibration, if it is of the image's size; else None, and ``notes`` says so."""
     if camera is None or picture is None:
         return camera
     height, width = picture.bgr.shape[:2]
     if (width, height) == (camera.width, camera.height):
         return camera
     notes.append(
-        f"pictures are {width}×{height}, but the calibration is for {camera.width}×{camera.height}: "
-        "calibration not used"
+        f"images are {width}×{height}, but the calibration is for {camera.width}×{camera.height}: calibration not used"
     )
     return None

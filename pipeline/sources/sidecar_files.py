@@ -64,14 +64,14 @@ class Beside:
             self.notes.append("no ego speed recorded")
 
     def frame(self, index: int, t_ns: int, sweep: Sweep | None, notes: list[str]) -> Frame:
-        """The frame at ``t_ns``: with the nearest picture within 0.1 s and the last fix within 1.5 s."""
+        """The frame at ``t_ns``: with the nearest image within 0.1 s and the last fix within 1.5 s."""
         picture = self._picture(t_ns, notes)
         camera = rig_files.calibration_for(self._camera, picture, notes)
         outline = self._outline(index, t_ns, camera)
         return evolve(outline, sweep=sweep, picture=picture, notes=tuple(notes))
 
     def outlines(self, times_ns: Sequence[int]) -> Iterator[Frame]:
-        """As ``frame`` without sweep and picture, one for each of these times. A video's pictures are of one size: the
+        """As ``frame`` without sweep and image, one for each of these times. A video's images are of one size: the
         first one tells whether the calibration is theirs."""
         first = self._picture(self._video_begins_ns, []) if self._video is not None else None
         camera = rig_files.calibration_for(self._camera, first, [])
@@ -89,7 +89,7 @@ class Beside:
             return None
         index = nearest(self._video.times_ns, t_ns - self._video_begins_ns, _PICTURE_WITHIN_NS)
         if index is None:
-            notes.append("no picture within 0.1 s")
+            notes.append("no image within 0.1 s")
             return None
         try:
             bgr = self._video.picture(index)
@@ -101,7 +101,7 @@ class Beside:
     def _open_video(self, path: Path | None, progress: Progress) -> video_files.VideoFile | None:
         if path is None:
             return None
-        self.notes.append(f"pictures from {path.name}")
+        self.notes.append(f"images from {path.name}")
         return video_files.VideoFile(path, progress)
 
 

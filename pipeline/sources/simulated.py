@@ -75,7 +75,7 @@ class SimulatedSource:
 
 def _notes(scene: scenario.Scenario) -> Iterator[str]:
     if scene.sensors == "lidar":
-        yield "This drive uses the LiDAR alone; its pictures are shown but not analysed."
+        yield "This drive uses the LiDAR alone; its images are shown but not analysed."
         return
     if scene.sensors == "camera":
         yield "This drive uses the camera alone; it has no LiDAR."

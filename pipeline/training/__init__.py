@@ -1,4 +1,4 @@
-"""How the embedded detector is made: random simulated pictures, their labels, a small network and its training.
+"""How the embedded detector is made: random simulated images, their labels, a small network and its training.
 
 Nothing here runs in the product. ``network``, ``loss`` and ``train`` need PyTorch (``pip install '.[train]'``).
 """

@@ -1,4 +1,4 @@
-"""Random views of a training picture: a window at a random scale, mirrored, with other exposure, blur and noise."""
+"""Random views of a training image: a window at a random scale, mirrored, with other exposure, blur and noise."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _AIMED = 0.75
 
 
 def view(rng: np.random.Generator, picture: U8, rows: F32, size: Size) -> tuple[U8, F32]:
-    """A window of (height, width) of a picture and its label rows (``dataset.COLUMNS``), boxes and visible shares cut
+    """A window of (height, width) of an image and its label rows (``dataset.COLUMNS``), boxes and visible shares cut
     to the window. A vertical shift simulates a pitching car, a scale another distance."""
     scale = float(rng.uniform(_FARTHEST_SCALE, _NEAREST_SCALE))
     left, top = _corner(rng, picture, rows, size, scale)
@@ -36,7 +36,7 @@ def view(rng: np.random.Generator, picture: U8, rows: F32, size: Size) -> tuple[
 
 
 def _corner(rng: np.random.Generator, picture: U8, rows: F32, size: Size, scale: float) -> tuple[float, float]:
-    """Upper left corner of the window in the scaled picture, mostly such that it contains a vehicle."""
+    """Upper left corner of the window in the scaled image, mostly such that it contains a vehicle."""
     free = np.array([picture.shape[1] * scale - size[1], picture.shape[0] * scale - size[0]])
     if len(rows) and rng.random() < _AIMED:
         box = rows[int(rng.integers(len(rows))), 2:6] * scale

@@ -1,4 +1,4 @@
-"""The training set as files: pictures at the network's scale as JPEG, labels as one table.
+"""The training set as files: images at the network's scale as JPEG, labels as one table.
 
 ``python -m pipeline.training.dataset FOLDER --count 4000 --seed 1``
 """
@@ -17,13 +17,13 @@ from pipeline.training.scenes import moments
 from pipeline.types import F32
 
 SCALE = 0.5
-"""Network pixels per picture pixel: 1280×720 becomes 640×360."""
+"""Network pixels per image pixel: 1280×720 becomes 640×360."""
 COLUMNS = ("picture", "class", "x1", "y1", "x2", "y2", "visible", "distance_m")
 _JPEG_QUALITY = 96
 
 
 def write(folder: Path, count: int, seed: int) -> None:
-    """``count`` pictures as 000000.jpg …, and ``labels.npy`` (N, 8) float32 of ``COLUMNS``, boxes in network pixels."""
+    """``count`` images as 000000.jpg …, and ``labels.npy`` (N, 8) float32 of ``COLUMNS``, boxes in network pixels."""
     folder.mkdir(parents=True, exist_ok=True)
     camera = calibration()
     rows = []
@@ -37,7 +37,7 @@ def write(folder: Path, count: int, seed: int) -> None:
 
 
 def read_labels(folder: Path) -> list[F32]:
-    """For each picture its (M, 8) rows of ``COLUMNS``."""
+    """For each image its (M, 8) rows of ``COLUMNS``."""
     table = np.load(folder / "labels.npy")
     count = len(list(folder.glob("*.jpg")))
     return [table[table[:, 0] == number] for number in range(count)]

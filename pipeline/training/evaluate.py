@@ -149,7 +149,7 @@ def _print(title: str, bins: list[Bin]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("model", nargs="?", default="embedded")
-    parser.add_argument("--count", type=int, default=100, help="pictures of each seed")
+    parser.add_argument("--count", type=int, default=100, help="images of each seed")
     parser.add_argument("--seeds", type=int, nargs="+", default=JUDGE_SEEDS)
     options = parser.parse_args()
     detector = open_detector(options.model, (WIDTH, HEIGHT))
@@ -157,7 +157,7 @@ def main() -> None:
     for seed, bins in of_seeds.items():
         near = within(bins, LEAD_M)
         print(f"seed {seed}: lead within {LEAD_M:.0f} m {near.leads_found} of {near.leads}")
-    _print(f"{options.count} random pictures of each seed", pooled(of_seeds.values()))
+    _print(f"{options.count} random images of each seed", pooled(of_seeds.values()))
     of_scenarios = {name: evaluate(detector, drive(name, 1.0)) for name in names()}
     for name, bins in of_scenarios.items():
         _print(f"scenario {name}", bins)

@@ -1,4 +1,4 @@
-"""The labels of a rendered picture: every vehicle's box, and how much of it is visible."""
+"""The labels of a rendered image: every vehicle's box, and how much of it is visible."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _WIDEST_TAN = 1.1
 
 @dataclass(frozen=True)
 class Label:
-    """One vehicle in a picture.
+    """One vehicle in an image.
 
-    box: around its whole outline including hidden parts, clipped to the picture, since the height gives the distance.
-    visible: share of the outline inside the picture that nearer vehicles do not cover. distance_m: range from the ego
+    box: around its whole outline including hidden parts, clipped to the image, since the height gives the distance.
+    visible: share of the outline inside the image that nearer vehicles do not cover. distance_m: range from the ego
     origin to the nearest corner of its footprint. ahead: its centre is straight ahead, no more than 1.5 m to either
-    side. cut: the outline leaves the picture.
+    side. cut: the outline leaves the image.
     """
 
     actor_id: int
@@ -42,7 +42,7 @@ class Label:
 
 
 def labels(world: World, camera: CameraCalibration) -> tuple[Label, ...]:
-    """Every vehicle that touches the picture, nearest first."""
+    """Every vehicle that touches the image, nearest first."""
     owners = np.zeros((camera.height, camera.width), dtype=np.int32)
     found = []
     for number, state in enumerate(world.actors, start=1):  # farthest first
@@ -85,7 +85,7 @@ def _outline(state: ActorState, camera: CameraCalibration) -> F64:
 
 
 def through_lens(flat: F64, camera: CameraCalibration) -> F64:
-    """(K, 2) points of the image plane at distance 1 as the lens bends them (k1, k2). Beyond the picture, where the
+    """(K, 2) points of the image plane at distance 1 as the lens bends them (k1, k2). Beyond the image, where the
     polynomial may turn back, the distortion stays that of the edge."""
     if not camera.distortion.size:
         return flat
@@ -96,7 +96,7 @@ def through_lens(flat: F64, camera: CameraCalibration) -> F64:
 
 
 def _inside(outline: F64, camera: CameraCalibration) -> F64:
-    """(K, 2): the part of a convex outline inside the picture; empty when none is, or less than a pixel across."""
+    """(K, 2): the part of a convex outline inside the image; empty when none is, or less than a pixel across."""
     if len(outline) < 3:
         return np.empty((0, 2))
     w, h = camera.width, camera.height

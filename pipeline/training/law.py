@@ -1,4 +1,4 @@
-"""The distance law of a detector of simulated vehicles, fitted to pictures it was not trained on, and its errors.
+"""The distance law of a detector of simulated vehicles, fitted to images it was not trained on, and its errors.
 
 ``python -m pipeline.training.law [MODEL]`` prints both and saves the law next to the network.
 """
@@ -106,7 +106,7 @@ def _rows(found: Iterable[SeenPair], law: DistanceLaw) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("model", nargs="?", default=EMBEDDED)
-    parser.add_argument("--count", type=int, default=120, help="pictures of each seed to fit to")
+    parser.add_argument("--count", type=int, default=120, help="images of each seed to fit to")
     parser.add_argument("--dry", action="store_true", help="keep nothing")
     options = parser.parse_args()
     detector = open_detector(options.model, (WIDTH, HEIGHT))
@@ -121,7 +121,7 @@ def main() -> None:
     for title, lines in rows.items():
         print(title, *lines, sep="\n  ")
     if not options.dry:
-        what = f"{len(seen)} clear vehicles in {options.count} random pictures of each of the seeds {FIT_SEEDS}"
+        what = f"{len(seen)} clear vehicles in {options.count} random images of each of the seeds {FIT_SEEDS}"
         print(keep_law(detector.path, law, {"to": what, "cars": rows}))
 
 

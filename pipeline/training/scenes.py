@@ -35,15 +35,15 @@ Models = dict[str, list[Size]]
 
 @dataclass(frozen=True)
 class Moment:
-    """A picture (720, 1280, 3) uint8 blue green red and the world it shows."""
+    """An image (720, 1280, 3) uint8 blue green red and the world it shows."""
 
     picture: U8
     world: world_state.World
 
 
 def moments(seed: int, count: int, wanted: Callable[[world_state.World], bool] = lambda _: True) -> Iterator[Moment]:
-    """The pictures out of ``count`` whose world is ``wanted``; the others are not rendered. Equal seeds give equal
-    pictures; different seeds share no road, traffic or backdrop."""
+    """The images out of ``count`` whose world is ``wanted``; the others are not rendered. Equal seeds give equal
+    images; different seeds share no road, traffic or backdrop."""
     rng = np.random.default_rng([seed, 11])
     models = size_models(rng)
     for number in range(count):

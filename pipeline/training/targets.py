@@ -23,7 +23,7 @@ BACKGROUND, IGNORED = -1, -2
 
 @dataclass(frozen=True)
 class Targets:
-    """For the N cells of a picture: labels (N,) int64 a class, ``BACKGROUND`` or ``IGNORED``; boxes (N, 4) float32
+    """For the N cells of an image: labels (N,) int64 a class, ``BACKGROUND`` or ``IGNORED``; boxes (N, 4) float32
     x1 y1 x2 y2 in network pixels, zero where there is no class."""
 
     labels: npt.NDArray[np.int64]

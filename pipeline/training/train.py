@@ -24,7 +24,7 @@ from pipeline.training.targets import assign
 from pipeline.types import F32
 
 _WINDOWS: tuple[tuple[Size, int], ...] = (((192, 320), 20), (INPUT_SIZE, 5))
-"""Sizes of training windows with the batch that costs about the same; the small one is four times as cheap a picture,
+"""Sizes of training windows with the batch that costs about the same; the small one is four times as cheap an image,
 and far vehicles are what needs the many examples."""
 _SMALL_SHARE = 0.75
 _DECAY, _WARM_UP_STEPS = 0.02, 60
@@ -45,7 +45,7 @@ class Examples:
         self._order: list[int] = []
 
     def batch(self, size: Size, count: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Pictures (B, 3, H, W), labels (B, N), boxes (B, N, 4)."""
+        """Images (B, 3, H, W), labels (B, N), boxes (B, N, 4)."""
         windows, labels, boxes = [], [], []
         for _ in range(count):
             window, rows = self._one(size)

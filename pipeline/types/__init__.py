@@ -18,11 +18,11 @@ from pipeline.types.arrays import (
     Point3,
     Window,
 )
+from pipeline.types.conditions import Braking, Conditions, Eligibility, Gate
+from pipeline.types.detections import REAL_VEHICLES, DistanceLaw, RawBoxes, RawLanes
 from pipeline.types.frame import (
-    REAL_VEHICLES,
     CameraCalibration,
     Coasting,
-    DistanceLaw,
     EgoState,
     Frame,
     GnssFix,
@@ -31,19 +31,13 @@ from pipeline.types.frame import (
     MotionSource,
     OwnMotion,
     Picture,
-    RawBoxes,
-    RawLanes,
     Route,
     StreamHealth,
     Sweep,
 )
 from pipeline.types.objects import (
-    Braking,
-    Conditions,
     Detection,
-    Eligibility,
     FusedObject,
-    Gate,
     Ground,
     LidarTrack,
     Obstacle,

@@ -1,4 +1,4 @@
-"""A picture as the camera sent it, decoded only when it is needed: of a 60 Hz camera five in six are not."""
+"""An image as the camera sent it, decoded only when it is needed: of a 60 Hz camera five in six are not."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _END_BYTES = 64
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """A picture in one of three forms."""
+    """An image in one of three forms."""
 
     encoded: bytes | None = None
     """The JPEG file."""
@@ -26,7 +26,7 @@ class Shot:
     """(H, W, 3) uint8, blue green red."""
 
     def bgr(self) -> U8 | None:
-        """(H, W, 3) uint8; None when the picture is damaged."""
+        """(H, W, 3) uint8; None when the image is damaged."""
         if self.pixels is not None:
             return self.pixels
         try:

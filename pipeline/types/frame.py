@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-
-from pipeline.types.arrays import F32, F64, I32, U8, Window
+from pipeline.types.arrays import F32, F64, U8
+from pipeline.types.detections import RawBoxes, RawLanes
 
 
 @dataclass(frozen=True)
@@ -152,99 +151,6 @@ class GnssFix:
 
 
 @dataclass(frozen=True)
-class DistanceLaw:
-    """Distance from the height of a detector's boxes: depth of a car in metres = coefficient · height ^ exponent.
-
-    How tightly a network draws its boxes, and how tall the vehicles it meets are, is in these numbers, so each detector
-    has its own law.
-    """
-
-    coefficient: float
-    """Depth in metres at a height of one pixel."""
-    exponent: float
-    """−1 for an ideal pinhole camera."""
-    focal_px: float
-    """Focal length of the camera that heights refer to."""
-    truck_ratio: float
-    """Height of a truck's box relative to a car's at the same depth."""
-    bus_ratio: float
-    """The same of a bus."""
-    motorcycle_ratio: float
-    """The same of a motorcycle."""
-
-    def at_focal(self, focal_px: float) -> DistanceLaw:
-        """The same law for heights in the images of a camera of another focal length."""
-        factor = (self.focal_px / focal_px) ** self.exponent
-        return replace(self, coefficient=self.coefficient * factor, focal_px=focal_px)
-
-
-REAL_VEHICLES = DistanceLaw(1444.0, -1.0, 907.0, truck_ratio=1.6, bus_ratio=2.0, motorcycle_ratio=0.75)
-"""The law of a detector that has no law of its own. Fitted by ``pipeline.calibration.distance`` to YOLOX's boxes of 38
-labelled cars, 1.59 m tall, of two real cameras (Astyx 047–051 and 057–059, KITTI 2011_09_26 drive 0052). 907 px is 720p
-with a 78° diagonal. Motorcycles are boxed without their riders."""
-
-
-@dataclass(frozen=True)
-class RawBoxes:
-    """A detector's candidates above a low floor, before thresholds and non-maximum suppression.
-
-    Thresholds are parameters of the pipeline and the network is not, so this is what is cached per image and model.
-    """
-
-    model: str
-    """The detector's name: equal names give equal boxes."""
-    boxes: F32
-    """(M, 4) float32 ``x1 y1 x2 y2``, pixels of the raw image."""
-    scores: F32
-    """(M,) float32, 0–1."""
-    labels: tuple[str, ...]
-    """M class names in COCO's spelling."""
-    law: DistanceLaw = REAL_VEHICLES
-    """Distance from box heights, where no parameter says otherwise."""
-    far: Window | None = None
-    """The part of the picture that was looked at a second time, at native resolution; None: none."""
-    far_count: int = 0
-    """How many of the candidates, the last ones, come from that look."""
-
-    def with_far(self, far: RawBoxes) -> RawBoxes:
-        """The candidates of both looks. Doubles go with the other doubles in non-maximum suppression."""
-        return replace(
-            self,
-            boxes=np.concatenate([self.boxes, far.boxes]),
-            scores=np.concatenate([self.scores, far.scores]),
-            labels=self.labels + far.labels,
-            far=far.far,
-            far_count=far.far_count,
-        )
-
-    def without_far(self) -> RawBoxes:
-        """The candidates of the whole picture alone."""
-        count = len(self.boxes) - self.far_count
-        return replace(
-            self,
-            boxes=self.boxes[:count],
-            scores=self.scores[:count],
-            labels=self.labels[:count],
-            far=None,
-            far_count=0,
-        )
-
-
-@dataclass(frozen=True)
-class RawLanes:
-    """What a lane detector saw in one image, before any geometry; cached per image and model like ``RawBoxes``."""
-
-    model: str
-    """The detector's name: equal names give equal points."""
-    points: F32
-    """(M, 2) float32 ``u v`` on painted lines, pixels of the raw image."""
-    scores: F32
-    """(M,) float32, 0–1."""
-    line: I32
-    """(M,) int32, which line each point belongs to; −1 where the detector does not group its points."""
-
-
-@dataclass(frozen=True)
 class Route:
     """A planned or previously driven road as a line on the Earth (WGS 84), in driving order."""
 
@@ -315,7 +221,7 @@ class Frame:
 
     @property
     def picture_size(self) -> tuple[int, int] | None:
-        """(width, height) of the picture, or of the calibration where the picture itself is missing."""
+        """(width, height) of the image, or of the calibration where the image itself is missing."""
         if self.picture is not None:
             return self.picture.bgr.shape[1], self.picture.bgr.shape[0]
         return (self.camera.width, self.camera.height) if self.camera is not None else None

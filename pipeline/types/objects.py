@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import IntEnum
-from typing import Generic, Literal, NamedTuple, TypeVar
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.common.geometry import Cuboid
 from pipeline.types.arrays import F64, Box, Mask, Point2, Point3
+from pipeline.types.conditions import Braking, Eligibility, Gate
 from pipeline.types.sensors import ObjectSource, are_several, is_camera_in, is_lidar_in, is_ranging_in
 
 
@@ -68,8 +68,8 @@ class VisionMeasurement:
     position: Point2 | None
     """Ego x, y of the nearest face's centre."""
     noise_share: float | None = None
-    """Share of the distance by which it differs from picture to picture: the noise of the box's height. The rest of
-    ``sigma_m`` is the object's own unknown height, which no number of pictures averages out."""
+    """Share of the distance by which it differs from image to image: the noise of the box's height. The rest of
+    ``sigma_m`` is the object's own unknown height, which no number of images averages out."""
     size_share: float | None = None
     """The share of the distance by which vehicles of the class differ in height."""
     ranged_m: float | None = None
@@ -161,64 +161,8 @@ class VisionTrack:
     """LiDAR returns inside its box that its distance was measured by in this frame."""
 
 
-class Gate(NamedTuple):
-    """One test an object went through, for people to read. No decision looks at gates: decisions read ``Conditions``,
-    and gates are made from the same answers."""
-
-    name: str
-    """What the test is called where it is shown."""
-    value: float | None
-    """The number that was tested; None when there was nothing to test."""
-    limit: float
-    """What it was held against."""
-    passed: bool
-    """Whether the object passed."""
-
-
-Each = TypeVar("Each")
-
-
-class Conditions(NamedTuple, Generic[Each]):
-    """One value for each condition that a lead must meet, in the order in which the first failure is the reason given:
-    what the object is, where it is, and only then how well it is known. So nothing in the next lane is said to wait for
-    its third sighting."""
-
-    vehicle: Each
-    """Its class is a vehicle's, or not known."""
-    distance: Each
-    """Its distance is known."""
-    size: Each
-    """It is as large as a vehicle, where only its size says what it is."""
-    ahead: Each
-    """It is ahead of the bumper."""
-    in_path: Each
-    """Its sightings so far say that it is in the path."""
-    confirmed: Each
-    """It was seen often enough."""
-    seen: Each
-    """It was seen in this frame, and its distance measured."""
-    placed: Each
-    """Its place against the path is known well enough."""
-    probable: Each
-    """It exists and is in the path with enough probability."""
-
-
-class Braking(IntEnum):
-    """How hard the car brakes."""
-
-    COMFORT = 0
-    """As adaptive cruise control does for any lead."""
-    PARTIAL = 1
-    """As emergency braking begins."""
-    FULL = 2
-    """As hard as it can."""
-
-
 DistanceFrom = Literal["cluster", "returns", "box"] | None
 """A LiDAR cluster; single LiDAR returns inside its image box; the height of that box; None: nothing in this frame."""
-
-Eligibility = Conditions[bool]
-"""Which conditions of a lead an object meets (``pipeline.decision.gates`` decides)."""
 
 
 @dataclass(frozen=True)
@@ -226,7 +170,7 @@ class FusedObject:
     """One physical object: the paper's Table 3 row, with what docs/reference/results.md adds; its frames and units
     apply.
 
-    A V object whose distance is not known (no law for its class, a box cut by the picture's edge, beyond the law's
+    A V object whose distance is not known (no law for its class, a box cut by the image's edge, beyond the law's
     reach) keeps its row; its place and distance are None, and it cannot be the CIPV.
 
     Stages ask for capabilities (``ranged``, ``seen_by_lidar``); the letters of ``source`` and ``seen_by`` are for the
@@ -242,7 +186,7 @@ class FusedObject:
     score: float | None
     """The detector's score of that class, 0–1."""
     bbox: Box | None
-    """Its image box, pixels; None outside the picture."""
+    """Its image box, pixels; None outside the image."""
     bev: tuple[Point2, Point2, Point2, Point2] | None
     """Its footprint from above: ego x, y of front left, front right, rear right, rear left."""
     cuboid: Cuboid | None

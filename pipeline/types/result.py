@@ -12,7 +12,7 @@ from pipeline.types.frame import EgoState, Frame, OwnMotion, StreamHealth
 from pipeline.types.lane import EgoLane
 from pipeline.types.objects import FusedObject, Ground, LidarTrack, Obstacle, VisionTrack
 
-PathSource = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "fused"]
+PathSource = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "traffic", "fused"]
 
 
 @dataclass(frozen=True)
@@ -159,6 +159,8 @@ class Layers:
     """The road under the sweep; None without one."""
     edges: F64 | None = None
     """(M, 2) ego x, y of what runs beside the road, where the path is taken from it; None where it is not."""
+    traffic: F64 | None = None
+    """(N, 3) ego x, y and heading in rad of vehicles that show where the road goes, now and before; None without."""
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ class TruthObject:
     id: int | None = None
     """The same from frame to frame; None where the labels follow no identity over time."""
     bbox: Box | None = None
-    """Pixels of the raw picture; None where the labels have no box."""
+    """Pixels of the raw image; None where the labels have no box."""
     called: str = ""
     """The labels' own word for the class where it differs from ``label``, so that it can be written again."""
     truncation: float | None = None
@@ -100,7 +100,7 @@ class LiveSource(Protocol):
     notes: tuple[str, ...]
     """What a user should know about all of it; what is wrong with one tick is in ``Frame.notes``."""
     camera: CameraCalibration | None
-    """Calibration of the pictures; None without one."""
+    """Calibration of the images; None without one."""
     dropped: int
     """Ticks that were not taken in time."""
 
@@ -110,7 +110,7 @@ class LiveSource(Protocol):
 
     def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
         """The newest tick not returned yet; None when none arrives in time. A tick is a whole LiDAR sweep with the
-        nearest picture, or a picture alone while the LiDAR is silent. params: how sensors are synchronised."""
+        nearest image, or an image alone while the LiDAR is silent. params: how sensors are synchronised."""
         ...
 
     @property
@@ -173,7 +173,7 @@ class InParts(Protocol):
     """A source that can read parts of a frame without reading the rest."""
 
     def outlines(self) -> Iterator[Frame]:
-        """Every frame, in order, without sweep, picture, route and given detections, and without the notes that reading
+        """Every frame, in order, without sweep, image, route and given detections, and without the notes that reading
         them would add."""
         ...
 
@@ -193,7 +193,7 @@ class RawPackets(Protocol):
 
 @runtime_checkable
 class Simulated(Protocol):
-    """A source that knows whether the simulator drew its pictures, which detectors of real pictures do worse on."""
+    """A source that knows whether the simulator drew its images, which detectors of real images do worse on."""
 
     is_simulated: bool
 
@@ -217,5 +217,5 @@ def is_live_source(source: AnySource) -> TypeGuard[LiveSource]:
 
 
 def is_simulated(source: AnySource) -> bool:
-    """Whether the simulator drew its pictures, also where they were recorded since."""
+    """Whether the simulator drew its images, also where they were recorded since."""
     return isinstance(source, Simulated) and source.is_simulated

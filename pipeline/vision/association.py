@@ -1,4 +1,4 @@
-"""Which followed object each box of a picture is (paper, Algorithm 1): one-to-one, the least unlike of all choices."""
+"""Which followed object each box of an image is (paper, Algorithm 1): one-to-one, the least unlike of all choices."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pipeline.types import VEHICLES, VisionMeasurement, VisionTrack
 
 _NOMINAL_DT_S = 0.1
 _MAX_GROWTH = 3.0
-"""The outer gate is meant for pictures 0.1 s apart; it widens with the time since the last sighting, thrice at most."""
+"""The outer gate is meant for images 0.1 s apart; it widens with the time since the last sighting, thrice at most."""
 
 
 class Expected(NamedTuple):
@@ -24,7 +24,7 @@ class Expected(NamedTuple):
     track: VisionTrack
     """With the predicted box."""
     centre_sigma_px: float
-    """Standard deviation of a sighting's centre from the predicted one, along each axis of the picture."""
+    """Standard deviation of a sighting's centre from the predicted one, along each axis of the image."""
     unseen_s: float
     """Since its last sighting."""
 
@@ -36,7 +36,7 @@ def match(
 ) -> dict[int, int]:
     """Index of followed object → index of measurement: the one-to-one choice of least total cost, where leaving a pair
     apart costs as much as a pair at its gate. (Making as many pairs as possible would shift a whole row of cars by one
-    when the first leaves the picture.)"""
+    when the first leaves the image.)"""
     if not expected or not measurements:
         return {}
     cost = _costs(expected, measurements, params)

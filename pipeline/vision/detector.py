@@ -1,4 +1,4 @@
-"""Any ONNX network of the YOLO family as one function: picture in, candidate boxes out (paper, Object Detection).
+"""Any ONNX network of the YOLO family as one function: image in, candidate boxes out (paper, Object Detection).
 
 The paper runs YOLOv3 under TensorRT; here the best available provider runs it: TensorRT, CUDA or CPU.
 """
@@ -37,7 +37,7 @@ FLOOR_SCORE = 0.05
 PADDING = 114
 """Grey that fills the rest of the input, as the YOLO family is trained."""
 _FREE_SIZE: Size = (384, 640)
-"""Input of a graph without a fixed size when the pictures are not known yet: 16:9."""
+"""Input of a graph without a fixed size when the images are not known yet: 16:9."""
 _SIMULATED_ONLY = (
     "using the embedded detector, trained on simulated cars only; get a real one with `cipv models pull yolox_nano`"
 )
@@ -73,15 +73,15 @@ class Detector:
     _decoder: Decoder = field(repr=False, compare=False)
 
     def detect(self, bgr: U8) -> RawBoxes:
-        """Candidates scored at least ``FLOOR_SCORE`` in a picture (H, W, 3) uint8, boxes clipped to it, best first.
+        """Candidates scored at least ``FLOOR_SCORE`` in an image (H, W, 3) uint8, boxes clipped to it, best first.
 
-        DetectorError for an array that is no such picture or a network that fails on it.
+        DetectorError for an array that is no such image or a network that fails on it.
         """
         check_picture(bgr)
         return self.decode(run_session(self._session, self.blob(bgr)), (bgr.shape[0], bgr.shape[1]))
 
     def blob(self, bgr: U8) -> F32:
-        """The picture as the network's input: (1, 3, h, w) float32, scaled to fit the upper left, the rest grey."""
+        """The image as the network's input: (1, 3, h, w) float32, scaled to fit the upper left, the rest grey."""
         scale = _scale((bgr.shape[0], bgr.shape[1]), self.input_size)
         height, width = (max(1, min(round(n * scale), m)) for n, m in zip(bgr.shape[:2], self.input_size, strict=True))
         filled = np.full((*self.input_size, 3), PADDING, np.uint8)
@@ -90,7 +90,7 @@ class Detector:
         return np.asarray(blob, dtype=np.float32)
 
     def decode(self, outputs: Sequence[F32], picture: Size) -> RawBoxes:
-        """The network's raw outputs for a picture of (height, width) as boxes in that picture's pixels."""
+        """The network's raw outputs for an image of (height, width) as boxes in that image's pixels."""
         boxes, scores, classes = self._decoder.decode(outputs, self.input_size, FLOOR_SCORE)
         height, width = picture
         edges = np.array([width, height, width, height], np.float32)
@@ -110,7 +110,7 @@ def open_detector(
     """Load a network by name or path. Without one the default (``pipeline.inference.model_registry``), with a note when
     that is the embedded network.
 
-    picture_size (width, height): the input is given the picture's aspect where the graph permits. input_size (height,
+    picture_size (width, height): the input is given the image's aspect where the graph permits. input_size (height,
     width), multiples of 32: that size instead, or DetectorError. DetectorMissing when there is no file, DetectorError
     when the file is no YOLO network that can be run.
     """
@@ -153,7 +153,7 @@ def _own_size(model: onnx.ModelProto, path: Path) -> Size | None:
 def _at_size(
     model: onnx.ModelProto, path: Path, own: Size | None, size: Size, threads: int, notes: tuple[str, ...] = ()
 ) -> Detector:
-    """The detector at one input size, proven by a run on a grey picture."""
+    """The detector at one input size, proven by a run on a grey image."""
     try:
         graph = (model if own == size else with_input_size(model, size)).SerializeToString()
     except ValueError as error:
@@ -195,5 +195,5 @@ def _name_of(law: DistanceLaw | None) -> str:
 
 
 def _scale(picture: Size, size: Size) -> float:
-    """Input pixels per picture pixel, both (height, width)."""
+    """Input pixels per image pixel, both (height, width)."""
     return min(size[0] / picture[0], size[1] / picture[1])

@@ -24,11 +24,11 @@ from pipeline.types import REAL_VEHICLES, Box, CameraCalibration, Detection, Dis
 
 BIN_M, BIN_LOW_M, BIN_HIGH_M = 10.0, 5.0, 60.0
 _BORDER_PX, _BORDER_SHARE = 1.0, 0.02
-"""A box ends at the picture's edge when it is nearer than a pixel or this share of its own height: so exact are the
+"""A box ends at the image's edge when it is nearer than a pixel or this share of its own height: so exact are the
 sides that a network draws."""
 _NEAREST_M = 0.5
 _NOISE_SHARE = 0.03
-"""Of a box's height, what a detector changes from picture to picture however large the box is. Measured on labelled
+"""Of a box's height, what a detector changes from image to image however large the box is. Measured on labelled
 KITTI cars within 20 m: 2.9 %."""
 _HUBER = 1.345
 """Residuals beyond this many standard deviations weigh less: 95 % efficiency on clean data (Huber 1981, section 4)."""
@@ -91,13 +91,14 @@ def measure(
     params: DistanceParams,
     own: DistanceLaw = REAL_VEHICLES,
 ) -> tuple[VisionMeasurement, ...]:
-    """Each detection with its range, its uncertainty and its place; all three null where the box tells none: no law
-    for its class, cut by the picture's upper or lower edge (such a height is only a lower bound), or beyond ``max_m``.
-    Without an alignment there is no bearing: the depth stands for the range, and the place is null. own: the
+    """Each detection with its range, its uncertainty and its place; all three None where the box tells none: no law
+    for its class, cut by the image's upper or lower edge (such a height is only a lower bound), or beyond ``max_m``.
+    Without an alignment there is no bearing: the depth stands for the range, and the place is None. own: the
     detector's law.
     """
     if not detections:
         return ()
+    # A power law of the box height gives the depth, and the bearing makes a range of it
     boxes = np.array([detection.bbox for detection in detections], dtype=np.float64)
     law = law_in_use(params, own)
     depth_m = _depths(detections, boxes, _focal_px(alignment, camera), camera, params, law)
@@ -105,13 +106,14 @@ def measure(
     if alignment is not None and params.depth_along_axis:
         range_m = range_at_depth(_centres(boxes), depth_m, alignment, camera)
     range_m = np.where(range_m <= params.max_m, range_m, np.nan)
-    # what changes from picture to picture is the box's height; what lasts is the object's own height
+    # Two errors: the height of the box changes from image to image; the unknown height of the vehicle lasts
     height_px = np.maximum(boxes[:, 3] - boxes[:, 1], 1.0)
     pixel_share = np.abs(law.exponent) * params.height_sigma_px / height_px
     noise_share = np.hypot(pixel_share, _NOISE_SHARE)
     sigma_m = range_m * np.hypot(pixel_share, params.size_spread)
     if params.binning:
         range_m = np.array([binned(float(value)) for value in range_m], dtype=np.float64)
+    # The place is that far along the line of sight through the middle of the box
     place = np.full((len(boxes), 2), np.nan)
     if alignment is not None:
         place = alignment.unproject(_centres(boxes), range_m)[:, :2]
@@ -164,7 +166,7 @@ def height_at_reference(box: Box, focal_px: float | None, params: DistanceParams
 
 
 def is_cut(box: Box, camera: CameraCalibration | None) -> bool:
-    """Whether the picture's upper or lower edge cuts the box. The lower one is known from the calibration only."""
+    """Whether the image's upper or lower edge cuts the box. The lower one is known from the calibration only."""
     near_px = max(_BORDER_PX, _BORDER_SHARE * (box[3] - box[1]))
     return box[1] <= near_px or (camera is not None and box[3] >= camera.height - near_px)
 
@@ -208,7 +210,7 @@ def _centres(boxes: F64) -> F64:
 
 
 def _focal_px(alignment: Alignment | None, camera: CameraCalibration | None) -> float | None:
-    """Pixels per radian down the picture: of the calibration, else of the angular model's own numbers."""
+    """Pixels per radian down the image: of the calibration, else of the angular model's own numbers."""
     if camera is not None:
         return float(camera.K[1, 1])
     return 1.0 / alignment.v_res_rad if isinstance(alignment, Angular) else None

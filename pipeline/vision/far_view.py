@@ -1,7 +1,7 @@
-"""A second look at what is far: the part of the picture around the road's vanishing point at the picture's own
+"""A second look at what is far: the part of the image around the road's vanishing point at the image's own
 resolution.
 
-A detector sees a wide picture scaled down: a car at 80 m, 40 px wide in a picture of 2048 px, is 16 px wide in its
+A detector sees a wide image scaled down: a car at 80 m, 40 px wide in an image of 2048 px, is 16 px wide in its
 input. In a window of native pixels the same network finds it. The window is the smallest that holds the road ahead: a
 square around where the car is heading, moved sideways with the bend that own motion tells of. It depends on the frame
 alone, never on tracks, so boxes can be cached and computed ahead, and a wrong track cannot turn the view away.
@@ -22,13 +22,13 @@ from pipeline.vision.detector import Detector, open_detector
 WINDOW_PX = 416
 """Side of the window: YOLOX-nano's own input. At 1800 px of focal length ±6.6°, at 720 px ±16°."""
 LOOK_AHEAD_M = 60.0
-"""Where on the bend the window is centred: about where a whole picture stops showing vehicles."""
+"""Where on the bend the window is centred: about where a whole image stops showing vehicles."""
 _GRID_PX = 16
 """The window moves in steps of this, so that the noise of a yaw rate does not move it."""
 _SLOWEST_MPS = 3.0
 """Below this the yaw rate over the speed says nothing of the road."""
 _WORTH_IT = 0.8
-"""Where the whole picture already has this share of the native resolution, a second look adds nothing."""
+"""Where the whole image already has this share of the native resolution, a second look adds nothing."""
 _CUT_PX = 3.0
 """A box that ends this near to an inner edge of the window goes on beyond it."""
 
@@ -42,7 +42,7 @@ class Network(Protocol):
         ...
 
     def detect(self, bgr: U8) -> RawBoxes:
-        """What is in a picture (H, W, 3) uint8."""
+        """What is in an image (H, W, 3) uint8."""
         ...
 
 
@@ -53,7 +53,7 @@ class FarView:
     detector: Network
     """At the window's input size."""
     size_px: int = WINDOW_PX
-    """Side of the window, in pixels of the picture."""
+    """Side of the window, in pixels of the image."""
 
     @property
     def name(self) -> str:
@@ -61,7 +61,7 @@ class FarView:
         return f"{self.detector.name}-far{self.size_px}"
 
     def of(self, frame: Frame | None) -> FarLook:
-        """The look at one frame's picture; at the middle of a picture of which nothing else is known for None."""
+        """The look at one frame's image; at the middle of an image of which nothing else is known for None."""
         return FarLook(self, frame)
 
 
@@ -79,12 +79,12 @@ class FarLook:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Nothing that the detector does not say of the whole picture."""
+        """Nothing that the detector does not say of the whole image."""
         return ()
 
     def detect(self, bgr: U8) -> RawBoxes:
-        """Candidates in the window of a picture (H, W, 3) uint8, in the picture's pixels. Those that the window cuts
-        off are left out: the whole picture shows them whole."""
+        """Candidates in the window of an image (H, W, 3) uint8, in the image's pixels. Those that the window cuts
+        off are left out: the whole image shows them whole."""
         window = window_of(self.frame, (bgr.shape[1], bgr.shape[0]), self.view.size_px)
         x1, y1, x2, y2 = window
         seen = self.view.detector.detect(np.ascontiguousarray(bgr[y1:y2, x1:x2]))
@@ -103,7 +103,7 @@ class FarLook:
 
 
 def open_far_view(detector: Detector, picture_size: tuple[int, int], size_px: int = WINDOW_PX) -> FarView | None:
-    """The far view by the same network as ``detector`` in pictures of (width, height). None where the whole picture
+    """The far view by the same network as ``detector`` in images of (width, height). None where the whole image
     already reaches the network at nearly its own resolution."""
     width, height = picture_size
     if min(detector.input_size[0] / height, detector.input_size[1] / width) >= _WORTH_IT:
@@ -117,8 +117,8 @@ def open_far_view(detector: Detector, picture_size: tuple[int, int], size_px: in
 
 
 def window_of(frame: Frame | None, picture_size: tuple[int, int], size_px: int = WINDOW_PX) -> Window:
-    """The window in a picture of (width, height): around the vanishing point of the way ahead, inside the picture. The
-    picture's middle where the camera is not known."""
+    """The window in an image of (width, height): around the vanishing point of the way ahead, inside the image. The
+    image's middle where the camera is not known."""
     width, height = picture_size
     u, v = width / 2, height / 2
     camera = frame.camera if frame is not None else None
@@ -142,7 +142,7 @@ def _bend_bearing(frame: Frame | None) -> float:
 
 
 def _is_whole(boxes: F32, window: Window, picture_size: tuple[int, int]) -> Mask:
-    """(M,) whether the window shows all of each box that the picture shows."""
+    """(M,) whether the window shows all of each box that the image shows."""
     x1, y1, x2, y2 = window
     width, height = picture_size
     low = (np.array([x1, y1]) > 0) & (boxes[:, :2] < np.array([x1, y1]) + _CUT_PX)

@@ -26,7 +26,7 @@ _SETTLED = 3
 
 @dataclass(frozen=True)
 class Followed:
-    """One object between two pictures."""
+    """One object between two images."""
 
     track: VisionTrack
     unseen_s: float
@@ -46,7 +46,7 @@ class Followed:
     height: Height = Height()
     """How tall it is for its class."""
     seen: VisionMeasurement | None = None
-    """This picture's sighting with a distance; None without one."""
+    """This image's sighting with a distance; None without one."""
 
 
 class SpeedGuess(NamedTuple):
@@ -82,7 +82,7 @@ def take_place(
         if followed.place_filter is not None:
             return evolve(followed, track=with_place(followed.track, followed.place_filter, followed.placed))
         return evolve(followed, track=evolve(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m))
-    # a truck that is called a car in one picture is as tall as before
+    # a truck that is called a car in one image is as tall as before
     by_class_m = seen.distance_as(followed.track.label) or seen.distance_m
     share, own_m = seen.sigma_m / seen.distance_m, by_class_m * followed.height.factor
     if seen.size_share is not None:

@@ -30,7 +30,7 @@ class Sighting(NamedTuple):
     bearing_rad: float
     """Counter-clockwise from straight ahead."""
     range_share: float
-    """Standard deviation of ln(range): of what changes from picture to picture, not of the law's lasting error."""
+    """Standard deviation of ln(range): of what changes from image to image, not of the law's lasting error."""
     bearing_sigma_rad: float
     """Standard deviation of the bearing."""
 

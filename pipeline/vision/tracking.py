@@ -1,8 +1,8 @@
-"""Boxes followed from picture to picture (paper, Algorithm 1), as a pure function: state in, state out.
+"""Boxes followed from image to image (paper, Algorithm 1), as a pure function: state in, state out.
 
 The printed algorithm measures half widths where it means centres, takes the first candidate under the threshold and
 gives a new number for every one that fails. Here a box goes to its nearest candidate, one-to-one, and a new object is
-numbered once. An object not seen is carried, says so, and ends after ``queue_frames`` pictures or ``max_missed_s``.
+numbered once. An object not seen is carried, says so, and ends after ``queue_frames`` images or ``max_missed_s``.
 
 Two filters. ``queue`` is the paper's: the newest box of each object stands for it, its distance is the last one
 measured, and it has no velocity. ``kalman`` predicts both the box and the place, each with a constant-velocity filter.
@@ -27,18 +27,18 @@ from pipeline.vision.followed import Followed, SpeedGuess, learned, predict_plac
 SPEED_SIGMA_MPS = 8.0
 """How fast a new object may be closing in or away, before a second sighting tells."""
 _CAR_WIDTH_M = 1.8
-"""Turns box widths into metres, so that a box's motion in the picture is as lively as its object's on the road."""
+"""Turns box widths into metres, so that a box's motion in the image is as lively as its object's on the road."""
 _CENTRE_NOISE = 0.04
 """Noise of a box's centre, in box widths."""
 _EDGE_PX = 2.0
 """Noise of a box's edges, however small it is."""
 _TURN_PXPS2 = 150.0
-"""How hard the picture may begin to turn: 0.2 rad/s² of the car through a lens of 720 px."""
+"""How hard the image may begin to turn: 0.2 rad/s² of the car through a lens of 720 px."""
 
 
 @dataclass(frozen=True)
 class VisionTrackerState:
-    """All that one picture leaves to the next."""
+    """All that one image leaves to the next."""
 
     next_id: int = 1
     followed: tuple[Followed, ...] = field(default=())
@@ -51,14 +51,16 @@ def track(
     params: VisionTrackingParams,
     ego_speed_mps: float | None = None,
 ) -> tuple[VisionTrackerState, tuple[VisionTrack, ...]]:
-    """One tick. ``measurements`` null: the camera gave nothing, which counts as time but not as a picture in which the
-    object was missing. ``dt_s`` null: the first tick. ``ego_speed_mps``: what a new object's speed is guessed from.
+    """One tick. ``measurements`` None: the camera gave nothing, which counts as time but not as an image in which the
+    object was missing. ``dt_s`` None: the first tick. ``ego_speed_mps``: what a new object's speed is guessed from.
     Tracks come by id."""
+    # Every track is predicted to now; without an image it is carried by that alone
     guess = _first_guess(ego_speed_mps)
     expected = [_predict(followed, dt_s or 0.0, params) for followed in state.followed]
     if measurements is None:
         kept = tuple(followed for followed in expected if followed.unseen_s <= params.max_missed_s)
         return evolve(state, followed=kept), tuple(followed.track for followed in kept)
+    # Tracks and boxes are matched one-to-one; a track without a box has missed this image
     partner = match([_expected(followed, params) for followed in expected], measurements, params)
     kept_list = [
         _seen(followed, measurements[partner[row]], guess, ego_speed_mps, params)
@@ -66,6 +68,7 @@ def track(
         else _missed(followed)
         for row, followed in enumerate(expected)
     ]
+    # Every box that no track took starts a new one; tracks missed for too long end
     taken = set(partner.values())
     fresh = [measurement for column, measurement in enumerate(measurements) if column not in taken]
     kept_list += [_new(state.next_id + index, measurement, guess, params) for index, measurement in enumerate(fresh)]
@@ -83,7 +86,7 @@ def learn_heights(
     state: VisionTrackerState, ranges: Mapping[int, tuple[float, float]], params: VisionTrackingParams
 ) -> VisionTrackerState:
     """Take in what the LiDAR measured of the objects that it shares with the camera. What an object's height is learned
-    to be holds from the next picture on; its place moves with it, so that it does not seem to approach.
+    to be holds from the next image on; its place moves with it, so that it does not seem to approach.
 
     ranges: distance and its standard deviation in metres, by id of the vision track.
     """
@@ -156,6 +159,7 @@ def _new(track_id: int, seen: VisionMeasurement, guess: SpeedGuess, params: Visi
         missed=0,
         carried=False,
         measured=seen.distance_m is not None,
+        ranges=int(seen.distance_m is not None),
     )
     noise, speed_sigma = _box_noise(detection.bbox, params), _box_speed_sigma(detection.bbox)
     box_filter = kalman.start(_centre(detection.bbox), noise, speed_sigma)
@@ -171,7 +175,7 @@ def _seen(
     ego_speed_mps: float | None,
     params: VisionTrackingParams,
 ) -> Followed:
-    """The object with this picture's box and distance taken in."""
+    """The object with this image's box and distance taken in."""
     detection = seen.detection
     label, votes, box_filter = detection.label, followed.votes, followed.box_filter
     if params.filter == "kalman":
@@ -190,7 +194,8 @@ def _seen(
         measured=seen.distance_m is not None,
     )
     if params.filter == "queue":
-        track = evolve(track, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position)
+        ranges = track.ranges + 1 if seen.distance_m is not None else 0
+        track = evolve(track, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position, ranges=ranges)
     height = renamed(followed, label, seen)
     current = evolve(followed, track=track, unseen_s=0.0, votes=votes, box_filter=box_filter, height=height)
     return take_place(current, seen, guess, ego_speed_mps, params) if params.filter == "kalman" else current

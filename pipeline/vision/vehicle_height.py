@@ -1,7 +1,7 @@
 """How tall one vehicle is for its class, learned while a LiDAR ranges it and kept afterwards.
 
 A law turns the height of a box into a distance as if all cars were equally tall; most of its error is that they are
-not, and stays the same from picture to picture. Where the LiDAR has the vehicle's range, the ratio of that to the law's
+not, and stays the same from image to image. Where the LiDAR has the vehicle's range, the ratio of that to the law's
 distance is the vehicle's own: a scalar Kalman filter in ln(ratio), whose prior is the spread of heights within the
 class. A lead that leaves the LiDAR's reach keeps a camera distance that is as good as its box.
 """
@@ -50,8 +50,8 @@ def learn(
 
     Args:
         height: what was known.
-        law_m: the law's own distance, from the box in the same picture.
-        noise_share: standard deviation of ln(law_m) from picture to picture.
+        law_m: the law's own distance, from the box in the same image.
+        noise_share: standard deviation of ln(law_m) from image to image.
         size_share: the same for the heights within the class: the prior.
         range_m, range_sigma_m: the measured distance.
     """

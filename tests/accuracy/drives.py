@@ -65,7 +65,7 @@ def drive(
 ) -> Drive:
     """Run a recording of the data folder with YOLOX-nano and, as the command line does where it is, TwinLiteNet.
     ``changes``: dotted parameters on top of the preset. lanes: another lane detector, as on the command line; it looks
-    at every ``lanes_every``-th picture, None: as often as usual. own_motion off: as if the car told nothing of it."""
+    at every ``lanes_every``-th image, None: as often as usual. own_motion off: as if the car told nothing of it."""
     uri = f"{SCHEMES[kind]}:{folder / FOLDERS[kind]}"
     source, frames = open_source(uri), _frames(uri)
     if not own_motion:
@@ -92,7 +92,7 @@ def drive(
 
 @cache
 def _frames(uri: str) -> tuple[Frame, ...]:
-    """Read once: reading a picture takes longer than running the pipeline on it."""
+    """Read once: reading an image takes longer than running the pipeline on it."""
     source = open_source(uri)
     return tuple(source.frame(index) for index in range(len(source)))
 

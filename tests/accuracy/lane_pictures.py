@@ -1,7 +1,7 @@
-"""Lane lines on pictures whose camera nobody calibrated: drawn for people, and compared with marks made by hand.
+"""Lane lines on images whose camera nobody calibrated: drawn for people, and compared with marks made by hand.
 
-Such a picture is given a camera that a dashboard usually has. Metres are then a guess, but the way from the picture to
-the road and back is the pipeline's own, so the place of a line in the picture is the pipeline's estimate.
+Such an image is given a camera that a dashboard usually has. Metres are then a guess, but the way from the image to
+the road and back is the pipeline's own, so the place of a line in the image is the pipeline's estimate.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Miss:
 
 
 def guessed_camera(width: int, height: int) -> CameraCalibration:
-    """A level dashboard camera of 58° across, its own place the ego origin; its picture's horizon a little low."""
+    """A level dashboard camera of 58° across, its own place the ego origin; its image's horizon a little low."""
     focal = _FOCAL_SHARE * width
     K = np.array([[focal, 0.0, width / 2], [0.0, focal, _HORIZON_SHARE * height], [0.0, 0.0, 1.0]])
     T = np.eye(4)
@@ -49,7 +49,7 @@ def guessed_camera(width: int, height: int) -> CameraCalibration:
 
 
 def alone(raw: RawLanes, width: int, height: int) -> tuple[EgoLane | None, Alignment]:
-    """The ego lane of a single uncalibrated picture, and the guessed camera it was seen with."""
+    """The ego lane of a single uncalibrated image, and the guessed camera it was seen with."""
     camera = guessed_camera(width, height)
     aligned = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
     _, lane = follow(LaneState(), raw, RoadView(aligned), Moment(0, None, None, None), UNSURE)
@@ -57,7 +57,7 @@ def alone(raw: RawLanes, width: int, height: int) -> tuple[EgoLane | None, Align
 
 
 def misses(name: str, lane: EgoLane | None, aligned: Alignment, marks: Marks) -> list[Miss]:
-    """Every mark of one picture compared with the line detected there."""
+    """Every mark of one image compared with the line detected there."""
     lines = in_picture(lane, aligned) if lane is not None else {}
     found = []
     for row, sides in marks[name].items():
@@ -69,7 +69,7 @@ def misses(name: str, lane: EgoLane | None, aligned: Alignment, marks: Marks) ->
 
 
 def draw(bgr: U8, raw: RawLanes, lane: EgoLane | None, aligned: Alignment, text: str = "") -> U8:
-    """A copy of the picture with what the detector saw (dots) and what is believed (left red, right green)."""
+    """A copy of the image with what the detector saw (dots) and what is believed (left red, right green)."""
     drawn = bgr.copy()
     for (u, v), score in zip(raw.points.tolist(), raw.scores.tolist(), strict=True):
         cv2.circle(drawn, (round(u), round(v)), 2, (255, round(255 * score), 0), cv2.FILLED)
@@ -90,7 +90,7 @@ def summary(lane: EgoLane | None) -> str:
 
 
 def tiles(pictures: Sequence[U8], columns: int = 3, width: int = 640) -> U8:
-    """Many pictures in one, each ``width`` wide and 16:9."""
+    """Many images in one, each ``width`` wide and 16:9."""
     size = (width, width * 9 // 16)
     small = [cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in pictures]
     small += [np.zeros_like(small[0])] * (-len(small) % columns)

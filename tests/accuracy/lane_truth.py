@@ -1,6 +1,6 @@
 """How far tracked lane lines are from the painted ones in the simulator, where the truth is known to the millimetre.
 
-The whole line runs on drawn pictures and LiDAR sweeps; what is judged is the ego lane that it hands to the corridor.
+The whole line runs on drawn images and LiDAR sweeps; what is judged is the ego lane that it hands to the corridor.
 """
 
 from __future__ import annotations

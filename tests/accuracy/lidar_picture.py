@@ -1,4 +1,4 @@
-"""A picture of real and simulated sweeps side by side: from above, as rings and bearings, and points per car."""
+"""An image of real and simulated sweeps side by side: from above, as rings and bearings, and points per car."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _pixels(places: npt.NDArray[np.floating]) -> npt.NDArray[np.int32]:
 
 
 def _rings(sweep: Sweep, colour: tuple[int, int, int]) -> U8:
-    """Rings over bearing, the highest ring at the top: what the sensor's own picture would be."""
+    """Rings over bearing, the highest ring at the top: what the sensor's own image would be."""
     sheet = _sheet(_RINGS, _WIDTH)
     ahead = sweep.points[:, 0] > 0.0
     bearing = np.degrees(np.arctan2(sweep.points[ahead, 1], sweep.points[ahead, 0]))

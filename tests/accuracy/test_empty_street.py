@@ -28,7 +28,7 @@ class Labelled(NamedTuple):
     """A labelled vehicle."""
 
     box: Box
-    """Its cuboid in the picture."""
+    """Its cuboid in the image."""
     nearest_m: float
     """Of its corners."""
 

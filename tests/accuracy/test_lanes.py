@@ -1,6 +1,6 @@
 """Lane lines against a person's eye, against each other in metres, and against the simulator's paint.
 
-The pictures that these tests judge are written to ``build/lanes``, for people to look at.
+The images that these tests judge are written to ``build/lanes``, for people to look at.
 """
 
 from __future__ import annotations
@@ -59,13 +59,13 @@ def photographs(folder: Path, kind: str) -> tuple[tuple[str, U8, EgoLane | None,
 
 
 def _in_shares(miss: Miss, bgr: U8) -> Miss:
-    """The miss in shares of the picture's width: the photographs are of two sizes."""
+    """The miss in shares of the image's width: the photographs are of two sizes."""
     error = None if miss.error_px is None else abs(miss.error_px) / bgr.shape[1]
     return Miss(miss.picture, miss.row, miss.side, error)
 
 
 FLOORS = {
-    # kind: marks found, of 64; median, 90th percentile and largest distance in shares of the picture's width
+    # kind: marks found, of 64; median, 90th percentile and largest distance in shares of the image's width
     "classical": (61, 0.0015, 0.005, 0.010),
     "twinlitenet": (63, 0.0025, 0.005, 0.013),
     "twinlitenetplus_small": (63, 0.0025, 0.006, 0.020),

@@ -1,4 +1,4 @@
-"""The simulated VLP-16 against real sweeps of the same cars, with a table and a picture in build/."""
+"""The simulated VLP-16 against real sweeps of the same cars, with a table and an image in build/."""
 
 from __future__ import annotations
 

@@ -62,8 +62,8 @@ def _table(scores: dict[str, LeadScore], made_up: dict[str, int]) -> Iterator[st
 
 
 def _alignment_cost(data_dir: Path) -> Iterator[str]:
-    """Pixels between the paper's angular model, set from the calibration at the picture's centre, and the calibrated
-    pinhole, over all LiDAR points that fall into the picture, by their bearing."""
+    """Pixels between the paper's angular model, set from the calibration at the image's centre, and the calibrated
+    pinhole, over all LiDAR points that fall into the image, by their bearing."""
     yield "| bearing | Astyx, f = 1818 px | KITTI, f = 721 px |"
     yield "|---|---|---|"
     columns = [_by_bearing(open_source(f"{kind}:{data_dir / name}")) for kind, name in _CALIBRATED]

@@ -9,6 +9,7 @@ import pytest
 pytest.importorskip("trackeval", reason="the extra `scores` is not installed")
 
 from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive
+from pipeline.evaluation.scores.error_tables import sigma_rows
 from pipeline.evaluation.scores.figures import measure
 from pipeline.evaluation.scores.truth import of_source
 from pipeline.sources import open_source
@@ -18,6 +19,8 @@ AT_LEAST = {
     "astyx": {"cipv_correct": 97.0, "recall": 54.0, "precision": 56.0, "mota": 10.0, "idf1": 46.0, "hota": 49.0},
     "kitti": {"cipv_correct": 100.0, "recall": 70.0, "idf1": 50.0, "hota": 54.0},
 }
+_WELL_KNOWN = 20
+"""Errors in a cell of a table from which a share is worth something."""
 AT_MOST = {
     "astyx": {"lead_missed": 0.0, "lead_distance": 0.1, "switches": 0.0, "drop_outs": 0.0, "distance": 1.3},
     "kitti": {"lead_distance": 0.1, "switches": 0.0, "distance": 0.5, "lateral": 0.5},
@@ -39,6 +42,15 @@ def test_floors(data_dir: Path, kind: str) -> None:
         value = values[name]
         assert value is not None, name
         assert value <= most, name
+
+
+def test_sigmas_are_honest(data_dir: Path) -> None:
+    """Two sigmas hold nine of ten errors, for each sensor and every 20 m that are well known."""
+    rows = sigma_rows([score_of(data_dir, "astyx"), score_of(data_dir, "kitti")])
+    well_known = [row for row in rows if row[0] != "all" and row[2] >= _WELL_KNOWN]
+    print(*rows, sep="\n")
+    assert len(well_known) >= 3
+    assert all(row[4] >= 90.0 for row in well_known), well_known
 
 
 def test_two_drives_have_intervals_that_hold_their_figures(data_dir: Path) -> None:

@@ -1,4 +1,5 @@
-"""A kind of event, a timeline column, an export, a command and an API route: one new module and one registration."""
+"""A kind of event, a timeline column, an export, a command and an API route: one new module and one registration. A
+parameter: one field."""
 
 from __future__ import annotations
 
@@ -15,19 +16,23 @@ from app import cli
 from app.clips.clip import Clip
 from app.clips.export_queue import ExportQueue
 from app.clips.exports import EXPORTERS, submit, write_clip
+from app.commands.support.options import PipelineOptions
 from app.drive.events import FINDERS, event_kinds, find_events
 from app.drive.events.event import Event, EventFinder, RunRows
 from app.drive.frame_rows import column_names, columns_json, row_of
 from app.drive.timeline_columns import EXTRA_COLUMNS
 from app.web.routers import ROUTERS, Services
+from app.web.routes.params import describe
 from app.web.server import create_app
 from pipeline.common.progress import silent
 from pipeline.detection import Detectors
-from pipeline.params import Params
+from pipeline.params import CipvParams, Params, ParamsError, flat, from_yaml, to_yaml, with_changes
+from pipeline.params.declare import slider
 from pipeline.run import run
 from tests.app.drive.rows import drive, objects
 from tests.app.engine.recording_helpers import CountingDetector, Recording
 from tests.app.web.serving import WAIT_S, running, serving
+from tests.docs.reference_pages import parameters_page
 
 
 @pytest.fixture
@@ -113,6 +118,27 @@ def test_a_command(
     with pytest.raises(SystemExit):
         cli.main(["--help"])
     assert "greet" in capsys.readouterr().out
+
+
+def test_a_parameter(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    class WithWaiting(CipvParams):
+        wait_s: float = slider(0.5, 0.0, 3.0, 0.1, "s", "A new lead waits this long")
+
+    class Wider(Params):
+        cipv: WithWaiting = WithWaiting()
+
+    for user in ("pipeline.params", "app.web.routes.params", "tests.docs.reference_pages"):
+        monkeypatch.setattr(f"{user}.Params", Wider)
+    changed = PipelineOptions(set=("cipv.wait_s=1.5",)).parameters()
+    assert flat(changed)["cipv.wait_s"] == 1.5
+    (tmp_path / "mine.yaml").write_text(to_yaml(changed), encoding="utf-8")
+    assert from_yaml(tmp_path / "mine.yaml", Wider()) == changed
+    with pytest.raises(ParamsError, match=r"cipv\.wait_s"):
+        with_changes(changed, {"cipv.wait_s": 4.0})
+    (section,) = (each for each in describe() if each["name"] == "cipv")
+    (slider_of_it,) = (each for each in section["params"] if each["key"] == "wait_s")
+    assert (slider_of_it["min"], slider_of_it["max"], slider_of_it["unit"]) == (0.0, 3.0, "s")
+    assert "| `cipv.wait_s` | 0.5 |  | 0 – 3 | s | A new lead waits this long |" in parameters_page()
 
 
 def test_an_api_route(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,7 +24,7 @@ def test_it_opens_and_shows_the_frame_everywhere(open_page: OpenPage, site: Site
     assert frame_name(page) == tick.result.frame
     assert page.locator("#objects tbody tr").count() == len(tick.result.objects)
     pixels(page, "#camera")
-    assert colours(page, "#camera") > 1000, "a picture"
+    assert colours(page, "#camera") > 1000, "an image"
     assert colours(page, "#bev") > 8, "a plan with points and objects"
     expect(page.locator("#link")).to_have_text("live")
 

@@ -1,4 +1,4 @@
-"""How the page looks and is reached: every view's picture, contrast, touch, keys, layouts."""
+"""How the page looks and is reached: every view's image, contrast, touch, keys, layouts."""
 
 from __future__ import annotations
 
@@ -232,7 +232,7 @@ def test_a_gate_leads_to_the_parameter_behind_its_limit(open_page: OpenPage, sit
     expect(focused).to_be_focused()
     page.keyboard.press("ArrowRight")
     site.engine.wait_for(lambda s: s.params.path.half_width_m > Params().path.half_width_m, WAIT_S)
-    assert repainted(page, "#camera", camera), "the corridor is wider in the picture too"
+    assert repainted(page, "#camera", camera), "the corridor is wider in the image too"
 
 
 def test_live_sensors_draw_what_came_and_let_go_of_the_oldest(open_page: OpenPage, site: Site):

@@ -37,7 +37,7 @@ def on_plan(page: Page, x_m: float, y_m: float) -> tuple[float, float]:
 
 
 def in_picture(page: Page, u: float, v: float) -> tuple[float, float]:
-    """Where a pixel of the sent picture is on the screen."""
+    """Where a pixel of the sent image is on the screen."""
     box = box_of(page.locator("#camera"))
     place = page.evaluate("async () => (await import('/js/views/camera.js')).place()")
     return box["x"] + place["x"] + u * place["scale"], box["y"] + place["y"] + v * place["scale"]
@@ -95,7 +95,7 @@ def test_the_tape_holds_on_to_lidar_points_in_the_picture(open_page: OpenPage):
     points = of_store(
         page,
         """(() => {
-          const { count, uv, xyz, kind, picture } = get("frame"), found = [];
+          const { count, uv, xyz, kind, image } = get("frame"), found = [];
           for (let i = 0; i < count; i++) {
             const u = uv[2 * i], v = uv[2 * i + 1];
             const isInside = u > 0.3 * picture.width && u < 0.7 * picture.width && v > 30 && v < picture.height - 60;
@@ -154,7 +154,7 @@ def test_what_lies_under_the_pointer_is_named(open_page: OpenPage, site: Site):
 
 
 def test_a_failed_test_of_the_selected_object_is_drawn_with_its_number(open_page: OpenPage, site: Site):
-    """In the picture at its box, in the plan as a dimension from the path's middle."""
+    """In the image at its box, in the plan as a dimension from the path's middle."""
     page = opened(open_page)
     tick = site.engine.snapshot.processed
     assert tick is not None

@@ -143,9 +143,11 @@ def _cli_lines() -> Iterator[str]:
         "",
         "| variable | meaning |",
         "|---|---|",
-        "| `CIPV_DATA` | folder of data sets and networks (`models/`) of this machine |",
-        "| `CIPV_LABELS_URL` | database that labels are kept in; `--labels` and `--database` override it |",
-        "| `CIPV_TOKEN`, `CIPV_DISPLAY_TOKEN` | tokens of the links for other machines, at least 16 characters |",
+        "| `CIPV_DATA` | folder with this machine's data sets and networks (`models/`) |",
+        "| `CIPV_HOME` | folder for downloaded and registered networks and caches; default: `~/.cache/cipv` |",
+        "| `CIPV_FOLDERS` | folders that the page and the API may open files from, separated by `:` |",
+        "| `CIPV_LABELS_URL` | label database; `--labels` and `--database` override it |",
+        "| `CIPV_TOKEN`, `CIPV_DISPLAY_TOKEN` | tokens for the links that other machines use, at least 16 characters |",
         "| `CIPV_DEBUG` | when set, an unexpected error shows its traceback |",
     )
     for title, about, name, prefixes in _SHARED:
@@ -158,14 +160,14 @@ def _cli_lines() -> Iterator[str]:
 
 
 _SHARED = (
-    ("Source options", "Of every command that opens a recording through the pipeline.", "run", ("source.",)),
+    ("Source options", "For every command that opens a recording.", "run", ("source.",)),
     (
         "Pipeline options",
-        "Of every command that runs the pipeline: its parameters and its networks.",
+        "For every command that runs the pipeline: parameters and networks.",
         "run",
         ("pipeline.", "line."),
     ),
-    ("Server options", "Of the commands that serve the dashboard.", "serve", ("server.",)),
+    ("Server options", "For the commands that serve the dashboard.", "serve", ("server.",)),
 )
 """Options that several commands share: title, about, a command that has them, prefixes of their names in the parser."""
 
@@ -212,7 +214,7 @@ def _command_lines(name: str) -> Iterator[str]:
         if any(action.dest.startswith(prefixes) and action.option_strings for action in parser._actions)
     ]
     if shared:
-        yield from ("", f"Takes the {', the '.join(shared)} too.")
+        yield from ("", f"Also takes the {' and the '.join(shared)}.")
 
 
 def _table(rows: list[tuple[str, str, str]]) -> Iterator[str]:
@@ -257,7 +259,7 @@ def _spelled(action: argparse.Action, is_switch: bool, is_on: bool) -> str:
     """The option as it is typed, with what it takes."""
     takes = str(action.metavar or "").replace("{None}|", "").replace("{", "").replace("}", "")
     if not action.option_strings:
-        return f"`{action.dest.rpartition('.')[2].upper()}`"
+        return f"`{takes if takes.isupper() else action.dest.rpartition('.')[2].upper()}`"
     if is_switch:  # what changes the default
         return f"`{next(each for each in action.option_strings if each.startswith('--no-') == is_on)}`"
     return f"`{action.option_strings[0]} {takes}`"

@@ -29,7 +29,7 @@ MOMENT = 60
 QUALITY = 78
 """Of the JPEGs: a whole page stays below 300 kB, and its text can be read."""
 WAIT_MS = 600_000
-"""On a busy machine the whole drive takes minutes: networks look at every picture."""
+"""On a busy machine the whole drive takes minutes: networks look at every image."""
 DESK, DISPLAY = (1440, 900), (1024, 600)
 
 
@@ -141,7 +141,7 @@ def painted(page: Page) -> None:
 
 
 def save(what: Page | Locator, name: str) -> None:
-    """Write a picture of the page, or of a part of it."""
+    """Write an image of the page, or of a part of it."""
     path = IMAGES / f"{name}.jpg"
     what.screenshot(path=path, type="jpeg", quality=QUALITY)
     print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB")

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from pipeline.decision.gates import CONDITIONS
 from tests.docs.pages import DOCS, code_spans
 from tests.docs.reference_pages import pages
 from tests.pipeline.types.test_result_json import FIELDS
@@ -23,3 +24,10 @@ def test_a_made_page_is_up_to_date(name: str) -> None:
 def test_the_results_page_has_every_field(path: str) -> None:
     said = {word for span in code_spans(RESULTS) for word in re.split(r"[^\w]+", span)}
     assert set(FIELDS[path].split()) <= said
+
+
+def test_every_condition_of_a_lead_is_explained_in_its_order() -> None:
+    names = [condition.shown_as for condition in CONDITIONS]
+    table = (DOCS / "reference/results.md").read_text(encoding="utf-8").partition("### gates")[2].partition("\n## ")[0]
+    assert [name for name in re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE) if name in names] == names
+    assert set(names) <= set(code_spans("docs/guides/why.md"))

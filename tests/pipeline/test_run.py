@@ -1,4 +1,4 @@
-"""Which network sees which pictures."""
+"""Which network sees which images."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_nothing_looks_for_lanes_in_a_recording_without_pictures() -> None:
 
 
 class _Seen:
-    """A detector that says which pictures it was asked about."""
+    """A detector that says which images it was asked about."""
 
     notes = ()
 

@@ -32,7 +32,7 @@ LEAD_M = (22.0, 25.5)
 
 
 def clip() -> tuple[list[Frame], list[bytes]]:
-    """``SPAN`` frames of the LiDAR, and three pictures to each."""
+    """``SPAN`` frames of the LiDAR, and three images to each."""
     drive = scenario.load(SCENARIO)
     sensors = Sensors(drive, world_state.at(drive, drive.duration_s).s_m)
     frames, jpegs = [], []

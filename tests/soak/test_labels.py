@@ -158,7 +158,7 @@ def _write_session(path: Path, folder: Path) -> None:
 
 
 def _with_boxes(labels: LabelSet) -> LabelSet:
-    """Each sighting with a box of the picture too."""
+    """Each sighting with a box of the image too."""
     box = (500.0, 150.0, 600.0, 220.0)
     return replace(
         labels,

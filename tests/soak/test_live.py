@@ -20,7 +20,7 @@ from tests.soak.live_run import KINDS, for_real_roads, soak
 
 ALLOWED_SHARE, ALLOWED_BYTES = 0.02, 32e6
 """Of growth, in ten minutes; in half a minute, which has hardly a warm-up: on a busy machine 8 MB are a queue that was
-empty before. A sweep kept of each tick would be 100 MB, a picture 800."""
+empty before. A sweep kept of each tick would be 100 MB, an image 800."""
 P99_MS, RECOVERY_S = 150.0, 1.0
 
 

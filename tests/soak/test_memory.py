@@ -22,7 +22,7 @@ from tests.conftest import ROOT
 PAGE = os.sysconf("SC_PAGE_SIZE")
 ALLOWED_SHARE = 0.02
 ALLOWED_BYTES = 8e6
-"""A malloc arena or two; a frame's picture alone is 3 MB."""
+"""A malloc arena or two; a frame's image alone is 3 MB."""
 
 
 def resident_bytes() -> int:

@@ -32,7 +32,7 @@ from dataclasses import replace
 from pathlib import Path
 import cv2, numpy as np
 from pipeline.recording.session.writer import SessionWriter
-from pipeline.types import Picture
+from pipeline.types import Image
 from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, sweep
 
 path, frames, limit = sys.argv[1], *map(int, sys.argv[2:])
@@ -98,12 +98,12 @@ def report(name: str, figures: dict[str, object]) -> None:
 
 FRAMES = 36_000
 FRAME_BYTES = 900_000, 1_200_000
-"""A full sweep of a VLP-16 (28,000 points) and a picture of 1280×720."""
+"""A full sweep of a VLP-16 (28,000 points) and an image of 1280×720."""
 
 
 @pytest.mark.timeout(3600)
 def test_any_frame_of_an_hour_is_near_and_memory_is_bounded(tmp_path: Path) -> None:
-    """An hour at 10 Hz of full sweeps and pictures, 36 GB: larger than the memory that holds files."""
+    """An hour at 10 Hz of full sweeps and images, 36 GB: larger than the memory that holds files."""
     free = shutil.disk_usage(tmp_path).free
     if free < 1.1 * FRAMES * FRAME_BYTES[1]:
         pytest.skip(f"an hour of full frames takes 36 GB, and {free / 1e9:.0f} GB are free in {tmp_path}")

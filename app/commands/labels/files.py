@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from app.commands.support.arguments import option
 from app.commands.support.open_with_progress import opened_recording
 from app.commands.support.options import RecordingName
 from app.commands.support.progress_bars import frames_progress, task_progress
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 _NOBODY_KNOWS_WHEN = 0
 """The truth of a recording was made before it was opened; the same recording gives the same file."""
 
-Database = Annotated[str | None, tyro.conf.arg(metavar="URL")]
+Database = Annotated[str | None, option("URL")]
 Person = Annotated[str, tyro.conf.arg(metavar="NAME")]
 
 
@@ -50,7 +51,7 @@ class ExportLabels:
     """File format"""
     out: Path
     """The file or folder to write; must not exist"""
-    labels: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    labels: Annotated[Path | None, option("FILE")] = None
     """A file of labels in the native format"""
     version: Annotated[str, tyro.conf.arg(metavar="NAME")] = WORKING
     """A frozen version of the labels in the database; default: their present state"""
@@ -94,7 +95,7 @@ class ImportLabels:
     """The file or folder to read"""
     format: FormatName
     """File format"""
-    out: Path | None = None
+    out: Annotated[Path | None, option("PATH")] = None
     """The file to write; must not exist"""
     database: Database = None
     """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""

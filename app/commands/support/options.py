@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import tyro
 
+from app.commands.support.arguments import option
 from pipeline.common.errors import BadInput
 from pipeline.common.user_file_errors import parse_yaml
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
@@ -23,8 +24,10 @@ if TYPE_CHECKING:
     from pipeline.vision.detector import Detector
 
 S = TypeVar("S", "Source", "AnySource")
-SourceName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(help=f"What to open: {usages()}")]
-RecordingName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(help=f"The recording: {usages(live=False)}")]
+SourceName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE", help=f"What to open: {usages()}")]
+RecordingName = Annotated[
+    str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE", help=f"The recording: {usages(live=False)}")
+]
 
 
 def planned(file: Path | None) -> Route | None:
@@ -43,7 +46,7 @@ class SourceOptions:
     source: SourceName
     rings: int = 16
     """KITTI: LiDAR channels to keep: 16, like a VLP-16, or 64 for all"""
-    route: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    route: Annotated[Path | None, option("FILE")] = None
     """Planned route, on which GNSS places the car: CSV (degrees, or metres of a UTM zone: r.csv?epsg=32632),
     GPX, an NMEA log or an earlier session"""
 
@@ -74,26 +77,28 @@ class PipelineOptions:
 
     preset: Literal["default", "paper"] = "default"
     """Parameters to start from"""
-    params: Path | None = None
+    params: Annotated[Path | None, option("FILE")] = None
     """A preset file (YAML), e.g. one saved from the dashboard"""
     set: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME=VALUE")] = ()
-    """Change one parameter, e.g. cluster.z_weight=0.4 (repeatable; `cipv params` lists them)"""
-    own_motion: Literal["auto", "can", "gnss", "lidar", "off"] | None = None
+    """Change one parameter, e.g. cluster.z_weight=0.4; `cipv params` lists them"""
+    own_motion: Annotated[Literal["auto", "can", "gnss", "lidar", "off"] | None, option("auto|can|gnss|lidar|off")] = (
+        None
+    )
     """Where ego speed and yaw rate come from (motion.source). auto: what is recorded, and LiDAR odometry where that is
     missing; can: vehicle bus, odometry or IMU; gnss: GNSS receiver; lidar: LiDAR odometry alone; off: none"""
-    detector: str | None = None
+    detector: Annotated[str | None, option("NAME")] = None
     """Name or path of an ONNX detector. Default: the registered one, then $CIPV_DATA/models, then the embedded
     one, trained on simulated cars only, which is the default for sim:"""
-    lanes: str | None = None
+    lanes: Annotated[str | None, option("NAME")] = None
     """Name or path of an ONNX lane network, `classical` for detection without a network, or `off`. Default: the
     registered one, then $CIPV_DATA/models, then `classical`, which is the default for sim:. Use `classical` for
     live sensors on two cores, where TwinLiteNet delays every third result by 180 ms"""
-    lanes_every: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    lanes_every: Annotated[int | None, option("N")] = None
     """Run the lane detector on every N-th frame only and predict lanes in between. Default: every third frame
     for a network, more often below 10 Hz, and every frame for the classical detector"""
     far_view_px: Annotated[int, tyro.conf.arg(metavar="PX")] = 416
-    """Look a second time at the far part of the road, in a window of so many native pixels; 0: never. Where live
-    sensors outrun the machine, the second look sits out every other frame"""
+    """Run the detector a second time on the far part of the road, in a window this many native pixels wide; 0: never.
+    Every other frame skips it when live sensors outpace the machine"""
 
     def parameters(self) -> Params:
         """The preset, changed by --params, then by each --set. ParamsError names the first invalid one."""
@@ -127,7 +132,7 @@ class PipelineOptions:
         return self.far_view_px or None
 
     def open_detectors(self, source: AnySource, sensors: Sensors = "both") -> Detectors:
-        """All detectors for the source's pictures; their notes are printed. None of them for LiDAR alone, and for
+        """All detectors for the source's images; their notes are printed. None of them for LiDAR alone, and for
         recordings that contain detections."""
         from pipeline.detection import Detectors, brings_detections, far_view_for, lanes_for
         from pipeline.lanes.open_detector import usual_every
@@ -144,7 +149,7 @@ class PipelineOptions:
         return Detectors(boxes, lanes, every or usual_every(lanes, source.rate_hz), far)
 
     def open_detector(self, source: AnySource, sensors: Sensors = "both") -> Detector | None:
-        """The detector for the source's pictures; its notes are printed. DetectorMissing when a named one is missing,
+        """The detector for the source's images; its notes are printed. DetectorMissing when a named one is missing,
         or any with ``sensors="camera"``; otherwise a message says so and LiDAR runs alone."""
         from pipeline.detection import detector_for
         from pipeline.inference.runtime import DetectorMissing

@@ -33,8 +33,8 @@ def measured(
 
 
 def refitted(labels: DriveLabels, frame: Frame, params: Params, act: Refit) -> tuple[SetSighting, str]:
-    """The track's cuboid in a frame laid on the points in and near it; where only the picture shows it, on those seen
-    in its box. ActRefused where it is not, or the picture alone would tell how far it is; BadInput where there are too
+    """The track's cuboid in a frame laid on the points in and near it; where only the image shows it, on those seen
+    in its box. ActRefused where it is not, or the image alone would tell how far it is; BadInput where there are too
     few points."""
     track = labels.track(act.track).value
     assert isinstance(track, LabelTrack)
@@ -65,8 +65,8 @@ def refitted(labels: DriveLabels, frame: Frame, params: Params, act: Refit) -> t
 
 
 def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddMeasured, str]:
-    """A new track from where something is in the picture, with the parameters that are in use. BadInput where neither
-    points nor picture tell where it is."""
+    """A new track from where something is in the image, with the parameters that are in use. BadInput where neither
+    points nor image tell where it is."""
     if (act.bbox is None) == (act.pixel is None):
         raise BadAct("provide either a box or a pixel")
     if act.bbox is not None and not (act.bbox[0] < act.bbox[2] and act.bbox[1] < act.bbox[3]):

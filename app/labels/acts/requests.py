@@ -20,7 +20,7 @@ _MOST_ITEMS = 10_000
 
 
 class Placed(Strict):
-    """Where something is in one frame. bbox: x1 y1 x2 y2 in pixels of the raw picture. box_set: the person set it;
+    """Where something is in one frame. bbox: x1 y1 x2 y2 in pixels of the raw image. box_set: the person set it;
     else it follows the cuboid."""
 
     frame: Index
@@ -153,7 +153,7 @@ class AddTrack(Placed):
 
 
 class Lift(Strict):
-    """A vehicle from where it is in the picture: a box around it, or a pixel on it."""
+    """A vehicle from where it is in the image: a box around it, or a pixel on it."""
 
     kind: Literal["lift"]
     frame: Index

@@ -1,7 +1,7 @@
 """The labels of what is open: acts on them, how far they are, and what others do to them meanwhile.
 
 Whatever speaks with a database is imported when labels are first asked for: SQLAlchemy takes most of a second, and the
-first picture does not wait for it.
+first image does not wait for it.
 """
 
 from __future__ import annotations

@@ -25,6 +25,7 @@ from app.labels import URL_VARIABLE
 from app.labels.errors import DatabaseError
 from app.labels.store.migrations import HEAD
 from app.labels.store.tables import Base
+from pipeline.common.errors import first_line
 
 logger = logging.getLogger("cipv.labels")
 
@@ -49,7 +50,7 @@ class Database:
             brought = ", which `make install` brings" if error.name == "psycopg" else ""
             raise DatabaseError(f"labels: {error.name or error} is not installed{brought}") from None
         except (ArgumentError, NoSuchModuleError) as error:
-            raise DatabaseError(f"labels: invalid database address: {_first_line(error)}") from None
+            raise DatabaseError(f"labels: invalid database address: {first_line(error)}") from None
         self.is_sqlite = self._engine.dialect.name == "sqlite"
         with self.writing() as connection:
             if not self.is_sqlite:
@@ -111,7 +112,7 @@ class Database:
         try:
             yield
         except DBAPIError as error:
-            raise DatabaseError(f"labels, {self.name}: {_first_line(error.orig or error)}") from None
+            raise DatabaseError(f"labels, {self.name}: {first_line(error.orig or error)}") from None
 
     def _migrate(self, connection: Connection) -> None:
         """To the newest schema, in the transaction."""
@@ -167,7 +168,3 @@ def _as_sqlite(connection: Any, _: Any) -> None:
 def _begin_sqlite(connection: Connection) -> None:
     writes = connection.get_execution_options().get("writes", False)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error).strip().splitlines() or ["no reason given"])[0]

@@ -1,4 +1,4 @@
-"""What a replay is made of: objects, boxes, lines and pictures as rerun's own types, None when there are none."""
+"""What a replay is made of: objects, boxes, lines and images as rerun's own types, None when there are none."""
 
 from __future__ import annotations
 

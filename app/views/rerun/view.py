@@ -46,7 +46,7 @@ class RerunSink:
     """Writes each frame and its result to ``target``: a file's path, an open binary stream, which stays open and
     gets the whole replay on closing, or a running viewer.
 
-    ``title`` names the recording in the viewer; ``params`` says which model projects the points into the picture.
+    ``title`` names the recording in the viewer; ``params`` says which model projects the points into the image.
     Timelines: ``frame`` (index) and ``sensor_time`` (the frame's tick), never the time of writing. ReplayError when the
     file cannot be made. Use it in a ``with`` block: a replay is complete once closed. One thread at a time.
     """

@@ -186,7 +186,7 @@ class ViserView:
             color_by = gui.add_dropdown("Colour by", get_args(scene.ColorBy), initial_value=start.color_by)
             size = gui.add_slider("Point size (m)", 0.02, 0.4, 0.01, start.point_size_m)
             labels = gui.add_dropdown("Labels", _LABELS, initial_value=start.labels)
-            picture = gui.add_checkbox("Camera picture", start.picture)
+            picture = gui.add_checkbox("Camera image", start.picture)
 
         def chosen(_: Any) -> None:
             with self._lock:

@@ -1,4 +1,4 @@
-"""/api/alignment: how well LiDAR and pictures lie on each other with the present parameters."""
+"""/api/alignment: how well LiDAR and images lie on each other with the present parameters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pipeline.types import Frame
 
 FRAMES = 20
 """Frames that are looked at, over the whole drive or the last shown ones: one sweep of 16 rings has few borders."""
-_NOTHING = "No frame has both a picture and LiDAR points in it"
+_NOTHING = "No frame has both an image and LiDAR points in it"
 APART_NS = 500_000_000
 """Of live sensors, frames nearer to each other than this show the same once more."""
 
@@ -44,7 +44,7 @@ def alignment_router(engine: Engine) -> APIRouter:
 
     @router.get("/score")
     def score() -> Score:
-        """Score the alignment of LiDAR and camera. Compares how well depth borders match picture edges with the same
+        """Score the alignment of LiDAR and camera. Compares how well depth borders match image edges with the same
         for the mount rotated by up to 3°. Uses frames of the whole recording, which takes a second the first time; for
         live sensors, the frames shown at each request. 404 when nothing is shown."""
         recording, shown = engine.drives.recording, engine.snapshot
@@ -117,12 +117,12 @@ def _brief(found: EdgeScore) -> str:
 
 def _sentence(found: EdgeScore) -> str:
     if found.borders < FEWEST:
-        return "Too few LiDAR depth borders in the pictures for a score"
+        return "Too few LiDAR depth borders in the images for a score"
     if found.score is None:
-        return f"No mount rotation within {REACH_DEG:.0f}° matches the picture edges clearly best; no score"
+        return f"No mount rotation within {REACH_DEG:.0f}° matches the image edges clearly best; no score"
     if found.better:
-        return f"LiDAR depth borders match the picture edges better with {_words(found.better)}"
-    return f"No mount rotation within {REACH_DEG:.0f}° matches the picture edges clearly better than the current one"
+        return f"LiDAR depth borders match the image edges better with {_words(found.better)}"
+    return f"No mount rotation within {REACH_DEG:.0f}° matches the image edges clearly better than the current one"
 
 
 def _words(better: Mapping[str, float]) -> str:

@@ -23,12 +23,12 @@ class FitChoice(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     model: Annotated[ModelName, Field(description="angular needs no calibration")] = "pinhole"
-    offset: bool = Field(False, description="Pinhole: fit the camera's place too, sideways and in height")
+    offset: bool = Field(False, description="pinhole: also fit the camera's lateral and vertical position")
 
 
 class FitResult(BaseModel):
     """changes: parameters by dotted name, as PATCH /api/params takes them. sigmas: standard deviation of each value.
-    iou_before, iou_after: mean overlap of boxes and projected clusters, of frames set aside where the drive has enough;
+    iou_before, iou_after: mean overlap of boxes and projected clusters, of held-out frames if the drive is long enough;
     null without an alignment before. text: that in a sentence. warnings: what the drive cannot tell."""
 
     changes: dict[str, float | str]

@@ -1,4 +1,4 @@
-"""/api/project: project cuboids to the shown picture and cast rays from its pixels, for drawing cuboids in the page."""
+"""/api/project: project cuboids to the shown image and cast rays from its pixels, for drawing cuboids in the page."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class Given(BaseModel):
 
 
 class Projected(BaseModel):
-    """For each cuboid the pixels of its 8 corners in the original picture, the bottom four first; null for a corner
+    """For each cuboid the pixels of its 8 corners in the original image, the bottom four first; null for a corner
     behind the camera. pixels is null without an extrinsic calibration of LiDAR and camera."""
 
     pixels: list[list[Pixel | None]] | None
 
 
 class GivenPixel(BaseModel):
-    """A pixel of the original picture."""
+    """A pixel of the original image."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -52,7 +52,7 @@ def project_router(engine: Engine) -> APIRouter:
 
     @router.post("/project")
     def project(body: Given) -> Projected:
-        """Project cuboids to the shown picture with the present parameters."""
+        """Project cuboids to the shown image with the present parameters."""
         shown = engine.snapshot
         processed = shown.processed
         aligned = resolve(shown.params.alignment, processed.frame.camera) if processed is not None else None
@@ -67,7 +67,7 @@ def project_router(engine: Engine) -> APIRouter:
 
     @router.post("/project/ray")
     def ray(body: GivenPixel) -> Ray:
-        """Get the viewing ray of a pixel in the shown picture with the present parameters."""
+        """Get the viewing ray of a pixel in the shown image with the present parameters."""
         shown = engine.snapshot
         aligned = resolve(shown.params.alignment, shown.processed.frame.camera) if shown.processed is not None else None
         if aligned is None:

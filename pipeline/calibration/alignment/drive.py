@@ -27,7 +27,7 @@ def fit_drive(
 ) -> AlignmentFit:
     """The alignment of a drive of ``count`` frames. An exception of ``progress`` ends it.
 
-    frame_of: a frame by its index, with what a detector saw in its picture. offset: fit the camera's place too.
+    frame_of: a frame by its index, with what a detector saw in its image. offset: fit the camera's place too.
     NothingToFit where too little is seen.
     """
     indices = np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int)).tolist()

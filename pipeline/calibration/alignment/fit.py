@@ -100,9 +100,7 @@ class AlignmentFit:
 def overlap_sentence(fit: AlignmentFit) -> str:
     """What the fit gains, for people."""
     before = f"{100 * fit.before.mean_iou:.0f} % → " if fit.before is not None else ""
-    where = (
-        "of frames set aside" if fit.held_out else "of the fitted frames, since the drive is too short to set any aside"
-    )
+    where = "of held-out frames" if fit.held_out else "of the fitted frames; the drive is too short to hold any out"
     return f"Projected clusters cover {before}{100 * fit.after.mean_iou:.0f} % of {fit.after.boxes} boxes {where}"
 
 
@@ -132,7 +130,7 @@ def fit_alignment(
     spread = _bootstrap(table, model, vector, blocks, progress)
     warnings = warnings_of(table, model, found, model.spread(spread))
     if looks_undistorted(table, model, vector, blocks):
-        warnings += ("the boxes lie better without the lens distortion: are the pictures undistorted already?",)
+        warnings += ("the boxes lie better without the lens distortion: are the images undistorted already?",)
     judged = PairTable.of([scenes[k] for k in held]) if held else table
     start = model.vector(present)
     after, *before = _overlaps(judged, model, [vector, *([start] if start is not None else [])])
@@ -231,7 +229,7 @@ def _prior(model: FitModel, vector: F64) -> F64:
 
 
 def looks_undistorted(table: PairTable, model: FitModel, vector: F64, blocks: list[I64]) -> bool:
-    """Whether the boxes lie better on a camera without the calibration's distortion, as in pictures that were
+    """Whether the boxes lie better on a camera without the calibration's distortion, as in images that were
     undistorted already: in sum over the blocks of the drive clearly, by what single blocks say."""
     if model.name != "pinhole" or model.camera is None or not np.any(model.camera.distortion):
         return False
@@ -280,9 +278,9 @@ def _overlaps(table: PairTable, model: FitModel, vectors: Sequence[F64]) -> list
 
 
 def _of_one_camera(scenes: Sequence[FitScene]) -> list[FitScene]:
-    """Frames with the picture size of most. NothingToFit without any."""
+    """Frames with the image size of most. NothingToFit without any."""
     if not scenes:
-        raise NothingToFit("no frame has a LiDAR sweep with clusters and a picture with vehicles in it")
+        raise NothingToFit("no frame has a LiDAR sweep with clusters and an image with vehicles in it")
     sizes = [each.size for each in scenes]
     usual = max(set(sizes), key=sizes.count)
     return [each for each in scenes if each.size == usual]

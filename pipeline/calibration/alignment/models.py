@@ -41,7 +41,7 @@ class FitModel:
     camera: CameraCalibration | None
     """The recording's calibration; the angular model does without."""
     size: tuple[int, int]
-    """Width and height of the pictures."""
+    """Width and height of the images."""
     offset: bool = False
     """Pinhole: the camera's place is fitted too, sideways and in height. Along the optical axis boxes say nothing."""
 

@@ -1,6 +1,6 @@
 """What of one frame no alignment changes: the boxes that a detector drew, and the outlines of what the LiDAR saw.
 
-A box is four edges; an outline is the points whose projections bound a cluster in the picture. Both sensors are coarse
+A box is four edges; an outline is the points whose projections bound a cluster in the image. Both sensors are coarse
 in their own way, and an outline says so: a car's side lies between the last beam that hit it and the next one that did
 not, its roof between two rings, and its foot, where the box ends below, on the road, which the beams may have missed.
 """
@@ -22,14 +22,14 @@ from pipeline.types import F32, F64, VEHICLES, CameraCalibration, Frame, Sweep
 from pipeline.vision.nms import select
 
 NEAREST_M, FARTHEST_M = 4.0, 60.0
-"""Nearer a car no longer fits the picture; farther 16 rings leave one or two of them on it."""
+"""Nearer a car no longer fits the image; farther 16 rings leave one or two of them on it."""
 LONGEST_M, LOWEST_M = 14.0, 0.6
 """Longer clusters are walls and hedges, lower ones kerbs."""
 FEWEST_POINTS = 5
 MIN_SCORE = 0.4
 """Boxes of lower scores are often of something else."""
 BORDER_PX = 3.0
-"""A box that ends this close to the picture's border is cut: its edge there says nothing."""
+"""A box that ends this close to the image's border is cut: its edge there says nothing."""
 OUTLINE, ENDS = 12, 4
 """Points that an outline keeps of its hull."""
 _WIDEST_GAP_RAD = np.radians(4.0)
@@ -41,9 +41,9 @@ class FitScene:
     """A frame's boxes (n) and clusters (m)."""
 
     boxes: F64
-    """(n, 4) x1 y1 x2 y2, pixels of the raw picture."""
+    """(n, 4) x1 y1 x2 y2, pixels of the raw image."""
     whole: np.ndarray
-    """(n, 4) bool, which edges are an object's and not the picture's border."""
+    """(n, 4) bool, which edges are an object's and not the image's border."""
     outline: F64
     """(m, OUTLINE, 3) points around what was hit, widened by half a beam to both sides; ego. The first ENDS are its
     right, left, top and bottom one."""
@@ -54,7 +54,7 @@ class FitScene:
     range_m: F64
     """(m,) of the nearest point, horizontal."""
     size: tuple[int, int]
-    """Width and height of the picture."""
+    """Width and height of the image."""
     camera: CameraCalibration | None
     """The recording's calibration; None without one."""
     t_ns: int

@@ -30,7 +30,8 @@ _NEVER = 1e6
 
 class Error(NamedTuple):
     """One matched vehicle in one frame: the sensors, its true range, and estimated minus true distance, position of the
-    nearest face's middle (lateral, longitudinal) and velocity along the ego car's axis; metres, m/s."""
+    nearest face's middle (lateral, longitudinal) and velocity along the ego car's axis; metres, m/s. Last, the standard
+    deviation that was given with the distance."""
 
     source: ObjectSource
     range_m: float
@@ -38,6 +39,7 @@ class Error(NamedTuple):
     lateral_m: float
     longitudinal_m: float
     speed_mps: float | None
+    distance_sigma_m: float | None = None
 
 
 def vehicles(objects: Iterable[TruthObject]) -> list[TruthObject]:
@@ -93,9 +95,8 @@ def _error(item: FusedObject, true: TruthObject, truth: FrameTruth) -> Error:
     velocity = (truth.velocity_mps or {}).get(true.id) if true.id is not None else None
     known = velocity is not None and item.velocity_mps is not None
     speed = item.velocity_mps[0] - velocity[0] if known else None  # type: ignore[index]
-    return Error(
-        item.source, range_m, float(item.distance_m or 0.0) - range_m, float(y - true_y), float(x - true_x), speed
-    )
+    distance_m = float(item.distance_m or 0.0) - range_m
+    return Error(item.source, range_m, distance_m, float(y - true_y), float(x - true_x), speed, item.distance_sigma_m)
 
 
 def claims(
@@ -106,7 +107,7 @@ def claims(
 
     A LiDAR object without a class does not claim to be a vehicle: it counts where it lies within ``within_m`` of a
     labelled vehicle that no classified object matches, and is otherwise ignored, like roadside returns. Also ignored is
-    an object far from every labelled position whose picture box matches one of ``unplaced``: there is a vehicle, but
+    an object far from every labelled position whose image box matches one of ``unplaced``: there is a vehicle, but
     its distance is unknown.
     """
     placed = [item for item in result.objects if item.bev is not None and item.distance_m is not None]

@@ -9,7 +9,7 @@ from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.evaluation.report_sections import Linked, Section, Table
 from pipeline.evaluation.scores import tracking
 from pipeline.evaluation.scores.drive import DriveScore
-from pipeline.evaluation.scores.error_tables import COLUMNS, error_rows, errors_section
+from pipeline.evaluation.scores.error_tables import COLUMNS, SIGMA_COLUMNS, error_rows, errors_section, sigma_rows
 from pipeline.evaluation.scores.figures import Compared, Drives, Interval, Measured, compare, measure
 from pipeline.evaluation.scores.matching import MAX_RANGE_M
 from pipeline.evaluation.scores.worst import Bad, changed, worst
@@ -45,6 +45,7 @@ def as_json(run: Drives, base: Drives | None = None) -> dict[str, Any]:
         ],
         "figures": {each.figure.name: _measured_json(each) for each in measure(run)},
         "errors": [dict(zip(COLUMNS, row, strict=True)) for row in error_rows(run)],
+        "sigmas": [dict(zip(SIGMA_COLUMNS, row, strict=True)) for row in sigma_rows(run)],
         "cut_ins": [_cut_in_json(drive, n) for drive in run for n in range(len(drive.cut_ins))],
     }
     if base is not None:

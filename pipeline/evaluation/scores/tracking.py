@@ -1,6 +1,6 @@
 """Detection and tracking of vehicles: precision, recall, MOTA, IDF1 and HOTA, as trackeval counts them.
 
-Positions are compared, not picture boxes: the similarity of two is 1 − d/4 m, d between the middles of their nearest
+Positions are compared, not image boxes: the similarity of two is 1 − d/4 m, d between the middles of their nearest
 faces, so the usual threshold of 0.5 is the 2 m of nuScenes. HOTA averages over d = 3.8 … 0.2 m.
 """
 

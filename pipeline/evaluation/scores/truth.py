@@ -34,8 +34,8 @@ class NoTruth(BadInput):
 class FrameTruth:
     """A labelled frame. lead: None where there is none. lead_known: false where the lead is unclear, or its position is
     not labelled. velocity_mps: relative to ego in the turning ego frame, by object id, for those that neighbouring
-    frames show. lead_box: the lead's id and picture box where it is labelled in the picture only; ``lead`` is None
-    then. whole: every vehicle in it is labelled. unplaced: picture boxes of labelled vehicles whose position is
+    frames show. lead_box: the lead's id and image box where it is labelled in the image only; ``lead`` is None
+    then. whole: every vehicle in it is labelled. unplaced: image boxes of labelled vehicles whose position is
     unknown."""
 
     t_ns: int
@@ -213,7 +213,7 @@ def _objects_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[Truth
 
 
 def _unplaced_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[Box, ...]]:
-    """Boxes of vehicles that are labelled in the picture only."""
+    """Boxes of vehicles that are labelled in the image only."""
     found: dict[int, tuple[Box, ...]] = {}
     for track in tracks.values():
         for seen in track.sightings:

@@ -137,16 +137,17 @@ def report(cases: Sequence[CurveCase], outcomes: Sequence[Outcome]) -> Section:
         "curves",
         "Curves: the CIPV at up to 3 m/s² lateral, by path source",
         (
-            "Given detections: true boxes with the errors measured for the embedded detector (3 % of the height that "
-            "stays with a vehicle, 3 % and 0.7 px new in each frame, half missed at 105 m), a simulated VLP-16, lane "
-            "lines with 1.5 px of noise to 55 m, RTK GNSS on a surveyed route with 0.3° of course noise, yaw rate with "
-            "0.0024 rad/s of noise and 0.0005 rad/s of bias. A lead that came into sight fewer frames ago than "
-            f"confirmation asks ({CipvParams().confirm_hits}) and is not chosen yet is not counted.",
+            "Given detections: ground-truth boxes with the errors measured for the embedded detector (3 % of the "
+            "height that stays with a vehicle, 3 % and 0.7 px new in each frame, half missed at 105 m), a simulated "
+            "VLP-16, lane lines with 1.5 px of noise to 55 m, RTK GNSS on a surveyed route with 0.3° of course noise, "
+            "yaw rate with 0.0024 rad/s of noise and 0.0005 rad/s of bias. Frames in which the lead has been "
+            f"visible for fewer frames than confirmation needs ({CipvParams().confirm_hits}) and is not chosen yet do "
+            "not count.",
             *(_verdict(name, drives) for name, drives in follows.items()),
         ),
         (
             Table("CIPV right, % of decidable frames", _CHOICE_COLUMNS, tuple(_choice_rows(follows)), decimals=1),
-            Table("Path compared with the path really driven", _PATH_COLUMNS, tuple(_path_rows(follows)), decimals=2),
+            Table("Path compared with the path actually driven", _PATH_COLUMNS, tuple(_path_rows(follows)), decimals=2),
             Table(
                 "Cut-in: recognised before its wheel crosses the line, s",
                 ("road", "drives", "least", "mean"),

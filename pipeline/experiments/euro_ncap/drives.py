@@ -37,7 +37,7 @@ NETWORK_SAMPLE: tuple[tuple[Test, float, int], ...] = (
     *(("CCRs", 40.0, overlap) for overlap in (-50, 50)),
     *(("CCRm", speed, 100) for speed in (40.0, 60.0, 80.0)),
 )
-"""Cells that are also driven with the embedded network on rendered pictures, besides the lead that brakes at 6 m/s² 40
+"""Cells that are also driven with the embedded network on rendered images, besides the lead that brakes at 6 m/s² 40
 m ahead."""
 
 

@@ -45,7 +45,7 @@ def report(cases: Sequence[EuroNcapCase], results: Sequence[Result]) -> Section:
         (
             f"Every run starts {RUN_UP_S:g} s before TTC {START_TTC_S:g} s with the speed held; the camera's boxes "
             "are projected truth with a detector's errors, and in a sample of the cells (network) the embedded "
-            "network's on rendered pictures. AEB: a robot holds the speed and only AEB brakes. ACC: the "
+            "network's on rendered images. AEB: a robot holds the speed and only AEB brakes. ACC: the "
             "paper's speed law alone, set to the test speed. Cells are relative impact speeds in km/h; 0 is avoided. "
             "Colours are those of Euro NCAP's protocol of 2026, whose bands depend on the test speed: green avoided, "
             "then yellow, orange, brown, red. Grey: the approach did not meet the protocol.",

@@ -173,11 +173,11 @@ def report(cases: Sequence[FollowingCase], outcomes: Sequence[Outcome]) -> Secti
         "iso",
         "ACC, modelled on ISO 15622",
         (
-            f"ACC alone, braking at {ACC_BRAKE_MPS2:g} m/s² at most. Acquisition: the range at which the lead first is "
-            "the CIPV (mean). Kept: share of the frames from then on in which it still is. Passed: no contact, kept in "
+            f"ACC alone, braking at {ACC_BRAKE_MPS2:g} m/s² at most. Acquisition: the mean range at which the lead "
+            "first becomes the CIPV. Kept: share of the later frames in which it still is. Passed: no contact, kept in "
             f"{100 * _KEPT:.0f} % of the frames, time gap never under {SMALLEST_TIME_GAP_S} s. Curves are driven at "
             f"{CURVE_LATERAL_MPS2:g} m/s² of lateral acceleration, and kept counts from where the radius is constant, "
-            "as in the standard: in the transition before it the yaw rate of the moment bends the path too little.",
+            "as in the standard: in the transition before it, the current yaw rate bends the path too little.",
             GIVEN_SAID,
             *_verdicts(groups),
         ),

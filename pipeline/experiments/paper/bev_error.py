@@ -79,7 +79,7 @@ class Error:
 
 
 def cases(short: bool) -> list[BevCase]:
-    """The network runs in one layout only: rendering a picture takes ten times as long as everything else."""
+    """The network runs in one layout only: rendering an image takes ten times as long as everything else."""
     given = [BevCase(each.layout, each.seed, sensors) for sensors in COMPARED for each in layouts.cases(short)]
     return given if short else given + [BevCase("a", seed, boxes="network") for seed in range(_BY_NETWORK)]
 
@@ -111,7 +111,7 @@ def _scenario(case: BevCase) -> Scenario:
 
 
 def sighting(tick: LoopStep) -> Sighting | None:
-    """The errors of the object that matches the target: the one whose picture box overlaps the target's most, whatever
+    """The errors of the object that matches the target: the one whose image box overlaps the target's most, whatever
     its distance. Carried objects do not count. None beyond 60 m and beside the car."""
     target, camera = target_of(tick), tick.frame.camera
     assert camera is not None
@@ -153,16 +153,17 @@ def report(cases: Sequence[BevCase], runs: Sequence[list[Sighting]]) -> Section:
         "bev_error",
         "Position of fused objects (Table 4)",
         (
-            "Measured over all ranges to 60 m. VL is the LiDAR's place and so exists within its reach; V is the "
-            "camera's, mostly beyond it: its error is what a few pixels of box height are worth at that range. The "
-            "printed vision rows equal the rounding error of a whole metre and are no measurement of a camera.",
+            "Measured over all ranges up to 60 m. VL is the position by the LiDAR, so it exists within the LiDAR's "
+            "range. V is the position by the camera, mostly beyond that; its error is what a few pixels of box height "
+            "amount to at that range. The published vision rows equal the error of rounding to whole metres and are "
+            "not measurements of a camera.",
             "The camera's boxes are given: projected truth with assumed errors, near those measured of the embedded "
-            'detector. Rows with "network": the embedded network looked at drawn pictures of the first '
-            f"{_BY_NETWORK} runs. An object stands for the car when the two overlap most in the picture (IoU over "
-            f'{_SAME_IOU:g}), however far off it is placed. "Without" counts the frames in which none does: they have '
-            "no error to count.",
+            'detector. Rows with "network": the embedded network looked at drawn images of the first '
+            f"{_BY_NETWORK} runs. The object that overlaps the car most in the image is compared with it (IoU over "
+            f'{_SAME_IOU:g}), however wrong its position. "Without" counts the frames without such an object; they '
+            "have no error.",
             "Lateral and longitudinal errors are of the middle of the nearest face. The LiDAR sees a car in another "
-            "lane from its corner, so a box fitted to few points may lie askew.",
+            "lane from its corner, so a box fitted to few points may be skewed.",
             *(_verdict(layout, by_kind) for layout in LAYOUTS),
         ),
         (Table("Errors, m", _COLUMNS, tuple(rows), decimals=3),),

@@ -123,9 +123,9 @@ def report(cases: Sequence[BrakingCase], drives: Sequence[DriveRecord]) -> Secti
         "braking",
         "Braking: CCRs, CCRm and CCRb in the closed loop",
         (
-            "Means over the runs; the smallest gap and the impact are the worst, and lead to that drive. Impact speed "
-            "is relative to the target. Boxes: whose the camera's are, projected truth with a detector's errors or the "
-            "embedded network's on drawn pictures.",
+            "Means over the runs; the smallest gap and the impact speed are those of the worst run and link to it. "
+            "Impact speed is relative to the target. Boxes: where the camera's boxes come from, projected ground truth "
+            "with a detector's errors or the embedded network on rendered images.",
             *(_verdict(manoeuvre, done) for manoeuvre in manoeuvres),
         ),
         (Table("Drives", _COLUMNS, tuple(rows)), closed_forms()),

@@ -152,11 +152,12 @@ def report(cases: Sequence[ChoiceCase], runs: Sequence[list[Frame]]) -> Section:
         "choosing",
         "Choosing the CIPV: straight, left turn, turns across",
         (
-            "Correct: the right vehicle, or rightly none. Missed: there is one, none is chosen. False: there is none, "
-            "one is chosen. Wrong: another one is chosen. New: the lead came into sight fewer frames ago than "
-            f"confirmation asks ({CipvParams().confirm_hits}), and is not chosen yet. Such frames are not among those "
-            "counted, nor are those in which it is hidden or at the edge of the path. The path is the route's, as the "
-            "paper's was a map's, placed by simulated RTK GNSS, fused with the yaw rate.",
+            "Correct: the right vehicle, or none if there is no lead. Missed: there is a lead, but none is chosen. "
+            "False: one is chosen, but there is no lead. Wrong: another vehicle is chosen. New: the lead has been "
+            f"visible for fewer frames than confirmation needs ({CipvParams().confirm_hits}) and is not chosen yet. "
+            "Such frames do not count, nor do those in which the lead is hidden or at the edge of the path. The path "
+            "is that of the route (the paper's was from a map), located by simulated RTK GNSS and fused with the yaw "
+            "rate.",
             GIVEN_SAID,
             *(_verdict(scene, groups) for scene in scenes),
         ),

@@ -92,7 +92,7 @@ def report(cases: Sequence[LayoutCase], runs: Sequence[list[Sample]]) -> Section
         (
             f"Fitted here: d = {free.coefficient:.1f} · h^{free.exponent:.3f}; with the pinhole exponent "
             f"{pinhole.coefficient:.1f} · h^−1. Printed: 1829.1 · h^−1.093. The law of YOLOX is fitted to real cars, "
-            "which are 1.59 m tall; these are 1.48 m. Depth is along the optical axis. Boxes cut by the picture's edge "
+            "which are 1.59 m tall; these are 1.48 m. Depth is along the optical axis. Boxes cut by the image's edge "
             "are left out.",
             GIVEN_SAID,
             "No comparison with the LiDAR: this experiment uses the camera's boxes only.",

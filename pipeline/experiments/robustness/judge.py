@@ -21,6 +21,7 @@ from pipeline.simulation.sensors.truth_boxes import in_picture
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.types import CameraCalibration, FusedObject, Path, Point2, Result
+from pipeline.types.sensors import SENSOR_NAMES, are_several
 
 Kind = Literal[
     "phantom full braking",
@@ -253,14 +254,16 @@ def _what(met: Sequence[ActorState]) -> str:
         return "vehicle in the next lane"
     if number >= _ONCOMING:
         return "oncoming vehicle"
-    return "parked vehicle" if number >= _PARKED else "vehicle of another lane"
+    return "parked vehicle" if number >= _PARKED else "vehicle in another lane"
 
 
 def _seen_by(item: FusedObject | None) -> str:
-    return {"V": "camera", "L": "LiDAR", "VL": "both", None: "nobody"}[item.source if item is not None else None]
+    if item is None:
+        return "nobody"
+    return "both" if are_several(item.source) else SENSOR_NAMES[item.source]
 
 
 def _why_missed(lead: ActorState, chosen: FusedObject | None) -> str:
     away_m = hypot(*lead.cuboid.center[:2]) - lead.cuboid.size[0] / 2
     what = "no lead" if chosen is None else "another object leads"
-    return f"{what}, true one within {20 * ceil(away_m / 20)} m"
+    return f"{what}, true lead within {20 * ceil(away_m / 20)} m"

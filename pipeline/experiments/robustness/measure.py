@@ -87,7 +87,7 @@ def truths(source: Source, labels: str) -> Iterator[tuple[TruthObject, ...] | No
 
 
 def left_out(labels: str) -> dict[int, list[Box]]:
-    """By frame, the parts of the picture that KITTI's labellers left out: what is there is neither true nor false."""
+    """By frame, the parts of the image that KITTI's labellers left out: what is there is neither true nor false."""
     found: dict[int, list[Box]] = {}
     for line in Path(labels).read_text(encoding="utf-8").splitlines() if labels else ():
         frame, _, kind, _, _, _, x1, y1, x2, y2, *_ = line.split()
@@ -159,7 +159,7 @@ def _compare(
 
 
 def summed_up(counted: Counted, measured_on: Sequence[str]) -> MeasuredNoise:
-    """The model's numbers. Of edges, what is the same in all boxes (a cuboid's projection is larger than its picture)
+    """The model's numbers. Of edges, what is the same in all boxes (a cuboid's projection is larger than its image)
     is taken off first."""
     bins = [_between(counted.seen, low, high) for low, high in pairwise(RANGES_M)]
     found = tuple(
@@ -220,7 +220,7 @@ def _white(seen: Sequence[Seen]) -> F64:
 
 
 def _white_px(seen: Sequence[Seen]) -> float:
-    """Of the vehicles that are lowest in the picture, where pixels count and not shares."""
+    """Of the vehicles that are lowest in the image, where pixels count and not shares."""
     low = sorted(_followed(seen), key=lambda pair: pair[0].height_px)
     low = low[: max(len(low) // 3, 1)]
     steps = [(b.offs - a.offs) * a.height_px for a, b in low if a.offs is not None and b.offs is not None]

@@ -138,7 +138,7 @@ def scenario(seed: int, number: int) -> Scenario:
 
 
 def _faults(rng: np.random.Generator) -> dict[str, Any]:
-    """Of one drive: calibration within half a degree, pictures within 50 ms, a dead ring in a tenth of the drives."""
+    """Of one drive: calibration within half a degree, images within 50 ms, a dead ring in a tenth of the drives."""
 
     def angle() -> float:
         return round(float(np.clip(rng.normal(0.0, 0.2), -0.5, 0.5)), 3)

@@ -1,7 +1,8 @@
-"""Experiment: is the CIPV right in streets without paint and route, and what do the road's edges contribute?
+"""Experiment: is the CIPV right in streets without paint and route, and what do the road's edges and other vehicles
+contribute?
 
 Bends of 30–150 m radius between parked rows, hedges and kerbs; a car drives ahead, or nothing does. Every frame goes
-through the pipeline with the road's edges and without. Detections are given, and the truth is that of ``curves``.
+through the pipeline as it is by default, with the road's edges too, and without either. Detections are given, and the truth is that of ``curves``.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from pipeline.experiments.streets.scenarios import BESIDE, REACH_M, SPEEDS_KMH, 
 from pipeline.params import Params, with_changes
 from pipeline.simulation.sensors.detection_model import Detections
 
-WITH, WITHOUT = "edges", "no edges"
+NEITHER, WITHOUT, WITH = "yaw rate", "with vehicles", "with vehicles and edges"
 SETTINGS = {
-    WITH: {"path.use_gnss": False, "path.use_edges": True},
-    WITHOUT: {"path.use_gnss": False, "path.use_edges": False},
+    WITH: {"path.use_gnss": False, "path.use_traffic": True, "path.use_edges": True},
+    WITHOUT: {"path.use_gnss": False, "path.use_traffic": True, "path.use_edges": False},
+    NEITHER: {"path.use_gnss": False, "path.use_traffic": False, "path.use_edges": False},
 }
 
 
@@ -71,10 +73,10 @@ def report(cases: Sequence[StreetCase], outcomes: Sequence[Outcome]) -> Section:
     """By what is beside the road, and all together."""
     return Section(
         "streets",
-        "Streets without paint and route",
+        "Streets without lane markings and without a route",
         (
             "Given detections and a simulated VLP-16 as in the curves, speed and yaw rate from the car's bus, leads to "
-            f"{REACH_M:.0f} m. Without anything ahead a frame is right when nothing leads.",
+            f"{REACH_M:.0f} m. With nothing ahead, a frame is right when no lead is chosen.",
         ),
         (
             Table(
@@ -89,7 +91,7 @@ def report(cases: Sequence[StreetCase], outcomes: Sequence[Outcome]) -> Section:
 
 def _rows(cases: Sequence[StreetCase], outcomes: Sequence[Outcome]) -> Iterator[tuple[Cell, ...]]:
     groups = sorted({(case.street.beside, case.street.ahead) for case in cases})
-    for name in (WITHOUT, WITH):
+    for name in (NEITHER, WITHOUT, WITH):
         for beside, ahead in groups:
             chosen = [
                 outcome[name]

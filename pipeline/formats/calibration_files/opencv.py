@@ -30,7 +30,7 @@ def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
     finally:
         storage.release()
     if len(distortion) not in _LENGTHS or not np.all(np.isfinite(distortion)):
-        raise SourceError(f"{path.name}: {len(distortion)} numbers of distortion; 4, 5 or 8 are supported")
+        raise SourceError(f"{path.name}: {len(distortion)} distortion coefficients; 4, 5 or 8 are supported")
     if (width, height) == (0, 0) and size is not None:
         width, height = size
     if min(width, height) < 16:

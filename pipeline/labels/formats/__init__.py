@@ -9,7 +9,7 @@ session.py    labels inside an MCAP session
 openlabel/    ASAM OpenLABEL 1.0
 nuscenes/     nuScenes' JSON tables
 kitti/        KITTI object and tracking labels
-coco.py       COCO boxes in pictures
+coco.py       COCO boxes in images
 lead_csv.py   the lead of each frame as a table
 points.py     LiDAR points in each cuboid
 """

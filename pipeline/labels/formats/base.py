@@ -29,7 +29,7 @@ class Shot:
     camera: CameraCalibration | None = None
     """None where the camera has no calibration."""
     size: tuple[int, int] | None = None
-    """Width and height of its picture in pixels."""
+    """Width and height of its image in pixels."""
     T_rect_ego: F64 | None = None
     """(4, 4), takes ego points to the frame of KITTI's labels: the recording's rectified camera 0 if it has one, else
     the camera itself."""
@@ -75,8 +75,8 @@ def drive_of(
     progress: Progress = silent,
     frame_of: Callable[[int], Frame] | None = None,
 ) -> LabeledDrive:
-    """What is known of every frame, without points and pictures where the source can tell it so. frame_of: who may
-    have whole frames already; a picture's pixels are not asked for."""
+    """What is known of every frame, without points and images where the source can tell it so. frame_of: who may
+    have whole frames already; an image's pixels are not asked for."""
     read = frame_of or source.frame
     shots = []
     for index, frame in enumerate(source.outlines() if isinstance(source, InParts) else map(read, range(len(source)))):
@@ -96,7 +96,7 @@ def drive_of(
 
 
 def _size(frame: Frame) -> tuple[int, int] | None:
-    """Of the picture, where no calibration tells it."""
+    """Of the image, where no calibration tells it."""
     return (frame.picture.bgr.shape[1], frame.picture.bgr.shape[0]) if frame.picture is not None else None
 
 
@@ -118,7 +118,7 @@ Read = Callable[[Path, LabeledDrive, Origin], Imported]
 
 
 def check_extrinsic(labels: LabelSet, drive: LabeledDrive, what: str) -> None:
-    """BadInput when cuboids and boxes of the same sightings lie apart in the picture: the sign of an extrinsic that was
+    """BadInput when cuboids and boxes of the same sightings lie apart in the image: the sign of an extrinsic that was
     taken the wrong way round, or of labels of another recording."""
     count, apart = 0, 0
     for frame, pairs in _pairs(labels).items():
@@ -131,7 +131,7 @@ def check_extrinsic(labels: LabelSet, drive: LabeledDrive, what: str) -> None:
             apart += sum(not _touch(one, box) for one, (_, box) in zip(seen, pairs, strict=True))
     if count >= _FEWEST_PAIRS and apart > count / 2:
         raise BadInput(
-            f"{what}: {apart} of {count} cuboids do not project onto their boxes in the picture; "
+            f"{what}: {apart} of {count} cuboids do not project onto their boxes in the image; "
             "is an extrinsic inverted?"
         )
 

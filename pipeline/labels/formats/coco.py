@@ -1,7 +1,7 @@
-"""Boxes in pictures as COCO has them (Lin et al. 2014; cocodataset.org, "Data format"), with the ``videos`` and
+"""Boxes in images as COCO has them (Lin et al. 2014; cocodataset.org, "Data format"), with the ``videos`` and
 ``tracks`` that TAO adds for objects over time (Dave et al. 2020).
 
-``bbox`` is left, top, width, height in pixels of the raw picture. ``id`` of an image is 1 + the frame.
+``bbox`` is left, top, width, height in pixels of the raw image. ``id`` of an image is 1 + the frame.
 """
 
 from __future__ import annotations
@@ -51,11 +51,11 @@ _FILE = TypeAdapter(_Coco)
 
 
 def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
-    """BadInput when the recording has no pictures, whose size the format wants."""
+    """BadInput when the recording has no images, whose size the format wants."""
     categories = {name: place for place, name in enumerate(sorted({track.label for track in labels.tracks}), start=1)}
     size = next((shot.size for shot in drive.shots if shot.size is not None), None)
     if size is None:
-        raise BadInput("COCO labels pictures; this recording has none")
+        raise BadInput("COCO labels images; this recording has none")
     names = drive.file_names()
     content = {
         "info": {"description": drive.uri, "version": "1.0"},

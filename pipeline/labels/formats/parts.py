@@ -97,7 +97,7 @@ def _lost(labels: LabelSet, holds: frozenset[Part]) -> list[str]:
         lost.append(
             _count(
                 sum(s.bbox is not None for s in sightings),
-                "{} in pictures not written: the format cannot hold them",
+                "{} in images not written: the format cannot hold them",
                 "box",
             )
         )

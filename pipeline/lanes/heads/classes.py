@@ -8,7 +8,7 @@ from pipeline.lanes.heads.masks import from_masks
 
 _CULANE = ((0.3598, 0.3653, 0.3662), (0.2573, 0.2663, 0.2756))
 _CUT_ASPECT = 4.0
-"""An input wider than this is for pictures whose sky was cut off (CULane at 976×208)."""
+"""An input wider than this is for images whose sky was cut off (CULane at 976×208)."""
 
 
 def recognise(answer: Answer) -> Head | None:

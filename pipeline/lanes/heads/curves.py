@@ -1,9 +1,9 @@
 """A curve for each line, (1, n, 8), beside (1, n, 2) scores of nothing and of a line: LSTR (TuSimple, RGB, ImageNet's
 mean and spread).
 
-A line on a flat road that bends as a cubic is, in the picture, x(y) = k / (y − f)² + m / (y − f) + n + b·y − c
+A line on a flat road that bends as a cubic is, in the image, x(y) = k / (y − f)² + m / (y − f) + n + b·y − c
 (Liu et al., *End-to-end Lane Shape Prediction with Transformers*, WACV 2021, Eq. 5). The eight numbers are the upper
-and lower end in y, k, f, m, n, b and c; x and y in shares of the picture."""
+and lower end in y, k, f, m, n, b and c; x and y in shares of the image."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from pipeline.lanes.heads.head import IMAGENET, Answer, Head, Points
 from pipeline.types import F32
 
 _SAMPLES = 60
-"""A line of half a picture's height is then read every three rows."""
+"""A line of half an image's height is then read every three rows."""
 _TUSIMPLE_HORIZON = 0.33
-"""The network has learnt it: where a picture's horizon lies lower, its lines are too high by as much. Measured on 11
+"""The network has learnt it: where an image's horizon lies lower, its lines are too high by as much. Measured on 11
 photographs with the horizon at 0.57: lines lie 3.4 % of the width off, and 0.4 % with that much sky cut off."""
 _HORIZON = 1e-3
-"""Nearer to the horizon than this share of the picture the curve runs to infinity."""
+"""Nearer to the horizon than this share of the image the curve runs to infinity."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What all heads share: how a network takes its picture, which of its outputs holds the lines, and their points."""
+"""What all heads share: how a network takes its image, which of its outputs holds the lines, and their points."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 from pipeline.types import F32, F64, I32
 
 Fit = Literal["stretch", "letterbox", "lower"]
-"""How a picture is fitted to the input: stretched; scaled whole onto grey; its lower part, in the input's aspect."""
+"""How an image is fitted to the input: stretched; scaled whole onto grey; its lower part, in the input's aspect."""
 Colour = tuple[float, float, float]
 IMAGENET: tuple[Colour, Colour] = ((0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
-"""Mean and spread of the pictures that most networks were first trained on."""
+"""Mean and spread of the images that most networks were first trained on."""
 _THERE = 0.5
 """A line is there when its probability is higher."""
 
@@ -49,7 +49,7 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True)
 class Head:
-    """How one family of networks takes its picture (RGB), and how its answer is read."""
+    """How one family of networks takes its image (RGB), and how its answer is read."""
 
     name: str
     """For people."""
@@ -61,11 +61,11 @@ class Head:
     exists: int | None = None
     """Which output holds the probability that each line is there; None: no output does."""
     mean: Colour = (0.0, 0.0, 0.0)
-    """Taken from the picture's 0–1."""
+    """Taken from the image's 0–1."""
     spread: Colour = (1.0, 1.0, 1.0)
     """What the difference is divided by."""
     horizon: float | None = None
-    """Where its training pictures had the horizon, as a share of their height: so much sky is cut off that the input
+    """Where its training images had the horizon, as a share of their height: so much sky is cut off that the input
     has it there too. None: it does not care."""
 
     def points(self, outputs: Sequence[F32]) -> Points:

@@ -19,7 +19,7 @@ from pipeline.recording.topics import PROFILE, Channel
 
 CHUNK_BYTES = 1280 * 1024
 """A chunk is what a crash can cost and what a seek must unpack. What would make one larger begins the next: a frame of
-a full sweep (0.6 MB) and its picture (0.4 MB) is one chunk, and a seek reads nothing else."""
+a full sweep (0.6 MB) and its image (0.4 MB) is one chunk, and a seek reads nothing else."""
 _NEVER = 2**62
 """The library's own limit, which counts after the message: ours alone decides."""
 

@@ -2,7 +2,7 @@
 
 Viewers need Foxglove's schemas, which cannot hold all of a ``Frame`` exactly (a rotation becomes a quaternion, a course
 has no place). So a tick keeps the small things itself, number for number, and names the messages of the point cloud,
-the picture and the route by their log times, which are unique within a topic.
+the image and the route by their log times, which are unique within a topic.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class SweepRef:
 
 @dataclass(frozen=True)
 class PictureRef:
-    """The picture stored at ``at_ns``; t_ns None where the camera gave no stamp."""
+    """The image stored at ``at_ns``; t_ns None where the camera gave no stamp."""
 
     at_ns: Nanoseconds
     t_ns: Nanoseconds | None

@@ -1,5 +1,5 @@
 """Sensor data to messages in well-known schemas, and back. Nothing is lost on the way: floats keep their bits, a JPEG
-stays the camera's own bytes, any other picture becomes a PNG."""
+stays the camera's own bytes, any other image becomes a PNG."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def jpeg_message(data: bytes, t_ns: int) -> bytes:
 
 
 def jpeg_of(shot: Shot) -> bytes | None:
-    """A picture that came as none; None when it is damaged."""
+    """An image that came as none; None when it is damaged."""
     bgr = shot.bgr()
     return None if bgr is None else cv2.imencode(".jpg", bgr, _JPEG_GOOD)[1].tobytes()
 
@@ -97,14 +97,14 @@ def _compressed(data: bytes, kind: Literal["jpeg", "png"], t_ns: int) -> bytes:
 
 
 def picture_from(data: bytes, t_ns: int | None) -> Picture:
-    """The picture of a message of ``image_message``. Damaged when it cannot be decoded."""
+    """The image of a message of ``image_message``. Damaged when it cannot be decoded."""
     message = _parse(topics.IMAGE, data)
     try:
         pixels = decode_within_budget(message.data)
     except TooMuch as error:
-        raise Damaged(f"the picture cannot be decoded: {error}") from None
+        raise Damaged(f"the image cannot be decoded: {error}") from None
     if pixels is None:
-        raise Damaged("the picture cannot be decoded")
+        raise Damaged("the image cannot be decoded")
     return Picture(t_ns, pixels, message.data if message.format == "jpeg" else None)
 
 

@@ -24,7 +24,7 @@ class About:
     notes: tuple[str, ...] = ()
     """What a person should know about the whole recording."""
     networks: dict[str, str] = field(default_factory=dict)
-    """SHA-256 of the file of each network that looked at the pictures, by its name."""
+    """SHA-256 of the file of each network that looked at the images, by its name."""
     version: int = VERSION
     """Of the session's form."""
 

@@ -47,7 +47,7 @@ def _entity(
     each: dict[str, Any], box: tuple[list[float], list[float], float], *, is_lead: bool, t_ns: int
 ) -> dict[str, Any]:
     (x, y, z), size, yaw_rad = box
-    color = _CIPV_COLOR if is_lead else _COLOR[each["source"]]
+    color = _CIPV_COLOR if is_lead else _COLOR.get(each["source"], _COLOR["VL"])
     r, g, b = (int(color[at : at + 2], 16) / 255 for at in (1, 3, 5))
     distance = "" if each.get("distance_m") is None else f" {each['distance_m']:.1f} m"
     name = f"{'CIPV ' if is_lead else ''}#{each['id']} {each.get('type') or each['source']}{distance}"

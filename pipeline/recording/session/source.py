@@ -132,7 +132,7 @@ class SessionSource:
         return tuple(found)
 
     def fixes(self) -> tuple[GnssFix, ...]:
-        """Where the car was, frame by frame; points and pictures are left packed."""
+        """Where the car was, frame by frame; points and images are left packed."""
         ticks = (tick or self._read_record(index, []) for index, tick in self._listed())
         return tuple(tick.gnss for tick in ticks if tick is not None and tick.gnss is not None)
 
@@ -210,7 +210,7 @@ class SessionSource:
         return sweep_from(self.file.message(topics.POINTS, ref.at_ns).data, ref.t_ns, ref.channels, ref.origin)
 
     def _read_picture(self, ref: PictureRef | None) -> Picture | None:
-        """One picture may serve several ticks, and is the same object then."""
+        """One image may serve several ticks, and is the same object then."""
         if ref is None:
             return None
         held = self._picture

@@ -50,7 +50,7 @@ class SessionWriter:
     """Writes one file. Not for several threads; ``Recorder`` is. OSError when the file can take no more.
 
     raw_lidar: clouds are not stored; their packets are, by ``write_packets``, and make the clouds anew when read.
-    What stays the same from frame to frame (calibration, route, parameters, a picture shown twice) is written once.
+    What stays the same from frame to frame (calibration, route, parameters, an image shown twice) is written once.
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class SessionWriter:
             self._add_sweep(sweep, self._clock.log_time(sweep.t_ns, arrived_ns))
 
     def write_picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
-        """A picture when it came, whether or not a tick shows it: the JPEG as it is; of a camera that gives none, one
+        """An image when it came, whether or not a tick shows it: the JPEG as it is; of a camera that gives none, one
         of good quality. A frame with this very JPEG then refers to it."""
         data = shot.encoded if shot.encoded is not None else jpeg_of(shot)
         if data is None:

@@ -33,7 +33,7 @@ _CLEAREST_FAR = 0.5  # fields at the horizon keep a colour, or they would look l
 
 @lru_cache(maxsize=4)
 def sky(width: int, horizon: int, seed: int) -> U8:
-    """(horizon + 2, 3·width, 3): a panorama three pictures wide, cropped by the heading."""
+    """(horizon + 2, 3·width, 3): a panorama three images wide, cropped by the heading."""
     rng = np.random.default_rng([seed, 3])
     rows, columns = horizon + 2, 3 * width
     height = np.linspace(1.0, 0.0, rows, dtype=np.float32)[:, None]

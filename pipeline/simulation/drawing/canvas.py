@@ -1,6 +1,6 @@
-"""Filling polygons of the ego frame into a picture: projection, clipping at the near plane, daylight and haze.
+"""Filling polygons of the ego frame into an image: projection, clipping at the near plane, daylight and haze.
 
-Polygons are collected first, then shaded, projected and clipped together; a picture has about a thousand of them.
+Polygons are collected first, then shaded, projected and clipped together; an image has about a thousand of them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SUN = np.array([-0.55, 0.45, 0.70])
 """Direction of the light, ego axes: from behind, the left and above; unit length."""
 _SHIFT = 4  # OpenCV takes coordinates in 1/16 px
 _FAR_OUTSIDE_PX = 20_000.0
-_PIECE_PX, _MOST_PIECES = 160.0, 64  # an edge of 160 px in the picture's corner is bent by a quarter of a pixel
+_PIECE_PX, _MOST_PIECES = 160.0, 64  # an edge of 160 px in the image's corner is bent by a quarter of a pixel
 
 Colour = tuple[float, float, float]
 Point = tuple[float, float, float]
@@ -44,7 +44,7 @@ def lit(bgr: F64, normals: F64) -> F64:
 
 
 class Canvas:
-    """A picture under a camera. ``add`` gathers polygons, ``paint`` fills them in the order they were added."""
+    """An image under a camera. ``add`` gathers polygons, ``paint`` fills them in the order they were added."""
 
     def __init__(self, bgr: U8, camera: CameraCalibration) -> None:
         self.bgr = bgr
@@ -132,7 +132,7 @@ class Canvas:
         return fine, np.add.reduceat(pieces, starts)
 
     def _inside(self, fixed: npt.NDArray[np.int32], starts: Ints) -> npt.NDArray[np.bool_]:
-        """Which polygons touch the picture and are not smaller than a fifth of a pixel."""
+        """Which polygons touch the image and are not smaller than a fifth of a pixel."""
         low, high = np.minimum.reduceat(fixed, starts), np.maximum.reduceat(fixed, starts)
         size = np.array([self.bgr.shape[1], self.bgr.shape[0]]) << _SHIFT
         touches: npt.NDArray[np.bool_] = np.all((high >= 0) & (low <= size), axis=1) & np.any(high - low > 3, axis=1)

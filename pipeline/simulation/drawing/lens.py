@@ -11,7 +11,7 @@ from pipeline.types import F64, U8, CameraCalibration
 
 _EXPOSURE_PERIOD_S = 7.3
 _NOISE_ROOM_PX = 64
-_WIDEST_TAN = 1.1  # tangent of the angle off the axis to which the lens is modelled; the picture's corner is at 0.81
+_WIDEST_TAN = 1.1  # tangent of the angle off the axis to which the lens is modelled; the image's corner is at 0.81
 
 
 class CameraModel(Strict):
@@ -31,7 +31,7 @@ class CameraModel(Strict):
         radius = np.linspace(0.0, _WIDEST_TAN, 200)
         if np.any(1.0 + 3.0 * self.k1 * radius**2 + 5.0 * self.k2 * radius**4 <= 0.1):
             raise ValueError(
-                f"k1 = {self.k1:g}, k2 = {self.k2:g}: the lens model folds over at the corners of the picture"
+                f"k1 = {self.k1:g}, k2 = {self.k2:g}: the lens model folds over at the corners of the image"
             )
         return self
 
@@ -51,7 +51,7 @@ def distorted(flat: F64, distortion: F64) -> F64:
 
 
 def undistorted(flat: F64, distortion: F64) -> F64:
-    """The inverse of ``distorted`` within the picture. The radial law has no closed-form inverse, so it is tabulated
+    """The inverse of ``distorted`` within the image. The radial law has no closed-form inverse, so it is tabulated
     and interpolated backwards."""
     if not distortion.size:
         return flat
@@ -69,7 +69,7 @@ class Sensor:
         self._grain = _grain(camera, model.noise, seed)
 
     def expose(self, seen: U8, t_s: float) -> U8:
-        """(H, W, 3) uint8 as the camera delivers it at time t, from the ideal picture."""
+        """(H, W, 3) uint8 as the camera delivers it at time t, from the ideal image."""
         if self._model.blur_px > 0.0:
             seen = np.asarray(cv2.GaussianBlur(seen, (0, 0), self._model.blur_px), dtype=np.uint8)
         gain = 2.0 ** (self._model.exposure_stops * np.sin(2 * np.pi * t_s / _EXPOSURE_PERIOD_S + self._seed))
@@ -80,7 +80,7 @@ class Sensor:
 
 
 def _grain(camera: CameraCalibration, sigma: float, seed: int) -> U8:
-    """Noise around 128, somewhat larger than a picture, so that every picture gets its own crop."""
+    """Noise around 128, somewhat larger than an image, so that every image gets its own crop."""
     rng = np.random.default_rng([seed, 6])
     shape = (camera.height + _NOISE_ROOM_PX, camera.width + _NOISE_ROOM_PX, 3)
     return np.clip(np.round(128.0 + sigma * rng.standard_normal(shape, dtype=np.float32)), 0, 255).astype(np.uint8)

@@ -30,7 +30,7 @@ _BRAKE_ON, _BRAKE_OFF = (70.0, 60.0, 255.0), (36.0, 30.0, 150.0)
 
 
 def calibration(model: CameraModel = ORDINARY) -> CameraCalibration:
-    """The exact calibration of its pictures: pinhole with radial distortion."""
+    """The exact calibration of its images: pinhole with radial distortion."""
     focal = float(np.hypot(WIDTH, HEIGHT) / 2 / np.tan(np.radians(DIAGONAL_FOV_DEG / 2)))
     K = np.array([[focal, 0.0, WIDTH / 2], [0.0, focal, HEIGHT / 2], [0.0, 0.0, 1.0]])
     axes = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # columns: camera x, y, z in level ego axes
@@ -56,7 +56,7 @@ class DrawnCamera:
         return self._sensor.expose(self._drawn(world), world.t_s)
 
     def _drawn(self, world: World) -> U8:
-        """The ideal picture: sharp and without noise."""
+        """The ideal image: sharp and without noise."""
         bgr = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
         canvas = Canvas(bgr, self.camera)
         horizon = self._ground.horizon

@@ -1,4 +1,4 @@
-"""Simulated detections in a scenario's pictures, without a network: the ``detections`` part of a scenario file. True
+"""Simulated detections in a scenario's images, without a network: the ``detections`` part of a scenario file. True
 boxes and lane lines with a detector's errors (``truth_boxes``, ``truth_lanes``)."""
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ class BoxNoise(Strict):
     vehicles missed per frame. reach_m, fall_off_m: distance at which half are missed, and width of that transition.
     visible_share: vehicles less visible than this are not found.
 
-    The defaults are near what the embedded detector does on drawn pictures (six scenarios, 500 clear vehicles): box
+    The defaults are near what the embedded detector does on drawn images (six scenarios, 500 clear vehicles): box
     heights 6 % off to 40 m and 7 % beyond, 1.5 px at least; 2 % missed to 80 m, half beyond 105 m. The reach is set
-    shorter, as real pictures' is.
+    shorter, as real images' is.
     """
 
     lasting_share: float = Field(default=0.03, ge=0.0, le=1.0)
@@ -39,7 +39,7 @@ class LineNoise(Strict):
 
 class Detections(Strict):
     """Vehicles and lane lines, with their errors; None: none are looked for. measured: instead of ``boxes``, those with
-    the errors measured of a detector of real pictures (``real_detector``), false ones among them."""
+    the errors measured of a detector of real images (``real_detector``), false ones among them."""
 
     measured: bool = False
     boxes: BoxNoise | None = None

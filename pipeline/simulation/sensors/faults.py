@@ -39,7 +39,7 @@ class Faults(Strict):
     sweeps_lost: float = Field(default=0.0, ge=0.0, le=0.9)
     """Share of sweeps that do not come."""
     pictures_lost: float = Field(default=0.0, ge=0.0, le=0.9)
-    """Share of pictures that do not come."""
+    """Share of images that do not come."""
 
 
 NONE = Faults()

@@ -1,4 +1,4 @@
-"""What a detector of real pictures was measured to do wrong: the form of ``measured_noise.json``, which holds every
+"""What a detector of real images was measured to do wrong: the form of ``measured_noise.json``, which holds every
 number and says what it was measured on. ``python -m pipeline.experiments.robustness.measure`` writes it anew."""
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The boxes that a detector of real pictures would draw, without pictures: true vehicles with the errors that
+"""The boxes that a detector of real images would draw, without images: true vehicles with the errors that
 ``measured_noise.json`` holds, and boxes where no vehicle is.
 
 Misses come in bursts, edges are off by a part that lasts and one new in each frame, scores fall with range, cars are
@@ -62,7 +62,7 @@ class RealDetector:
         self._middles_m = (middles[:-1] + middles[1:]) / 2
 
     def boxes(self, now: World, camera: CameraCalibration, index: int) -> RawBoxes:
-        """What is found in the picture that ``camera`` takes of the world ``now``. index: of the frame."""
+        """What is found in the image that ``camera`` takes of the world ``now``. index: of the frame."""
         found, scores, labels = [], [], []
         rng = np.random.default_rng([self._scenario.seed, 13, index])
         for seen in in_picture(now, camera):
@@ -144,7 +144,7 @@ class RealDetector:
     def _false_box(
         self, thing: FalseThing, now: World, camera: CameraCalibration, rng: np.random.Generator
     ) -> F64 | None:
-        """The box of a thing where it is now; None where it is out of the picture."""
+        """The box of a thing where it is now; None where it is out of the image."""
         jitter = rng.standard_normal(4)
         x, y = now.to_ego(np.array([[thing.x, thing.y]]))[0].tolist()
         middle = camera.T_camera_ego @ np.array([x, y, thing.height_m / 2 - LIDAR_HEIGHT_M, 1.0])

@@ -33,7 +33,7 @@ class Sensors:
         )
 
     def frame(self, now: World, index: int, t_ns: int, picture: bool = True) -> Frame:
-        """What the sensors deliver at one tick. picture: render the camera's picture; without it the frame is made ten
+        """What the sensors deliver at one tick. picture: render the camera's image; without it the frame is made ten
         times faster and still has the camera calibration."""
         return evolve(
             self.outline(now, index, t_ns),
@@ -43,7 +43,7 @@ class Sensors:
         )
 
     def outline(self, now: World, index: int, t_ns: int) -> Frame:
-        """The same without sweep, picture and route, which take nearly all the time."""
+        """The same without sweep, image and route, which take nearly all the time."""
         return Frame(
             index,
             f"{index:06d}",

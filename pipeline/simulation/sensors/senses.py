@@ -1,6 +1,6 @@
 """What the pipeline is given of what the sensors see: a scenario's faults, its detections, the sensors in use.
 
-Recorded scenarios and suites without pictures go through this one place, so a drive of a suite that is opened again
+Recorded scenarios and suites without images go through this one place, so a drive of a suite that is opened again
 gives the same frames.
 """
 
@@ -30,7 +30,7 @@ class Senses:
         self._faults = scenario.faults
 
     def sensed(self, frame: Frame, now: World) -> Frame:
-        """The frame as far as the scenario's car senses it, with the detections that the scenario gives. The picture
+        """The frame as far as the scenario's car senses it, with the detections that the scenario gives. The image
         stays where nobody looks at it: people still want to see it."""
         scene = self._scenario
         if self._faults != NONE and frame.sweep is not None:

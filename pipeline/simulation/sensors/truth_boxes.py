@@ -1,4 +1,4 @@
-"""A detector's boxes without a network: true vehicles projected into the picture, with a detector's errors. The fast
+"""A detector's boxes without a network: true vehicles projected into the image, with a detector's errors. The fast
 path of the closed loop. The errors of a network are modelled: box edges are off by a share of the height (one part
 constant per vehicle, since a network misjudges the same shape in the same way, and one part new in every frame),
 farther objects are missed more often, and hidden ones are not seen. There are no false positives.
@@ -34,7 +34,7 @@ _SAMPLES = 12
 
 @dataclass(frozen=True)
 class Seen:
-    """A vehicle in the picture: its box, and the share of it that nothing nearer covers."""
+    """A vehicle in the image: its box, and the share of it that nothing nearer covers."""
 
     actor: ActorState
     bbox: Box
@@ -64,7 +64,7 @@ def boxes(now: World, camera: CameraCalibration, noise: BoxNoise, seed: int, ind
 
 
 def in_picture(now: World, camera: CameraCalibration) -> tuple[Seen, ...]:
-    """Every vehicle ahead whose cuboid falls into the picture, nearest first."""
+    """Every vehicle ahead whose cuboid falls into the image, nearest first."""
     alignment = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
     corners = corners_of([state.cuboid for state in reversed(now.actors)])
     if not len(corners):

@@ -1,4 +1,4 @@
-"""A lane detector's points without a network: the road's true lane lines projected into the picture, with noise.
+"""A lane detector's points without a network: the road's true lane lines projected into the image, with noise.
 
 The counterpart of ``truth_boxes`` for lines. Every line of the carriageway that the ego car drives on is seen up to
 where paint is a few pixels wide; each point has its own sideways error, and some are missed. Vehicles do not hide paint

@@ -20,7 +20,7 @@ _ENOUGH_HZ = 5.0
 class SensorReport:
     """clock_offset_ms: host time less the sensor's, the shortest delay on the way included; of a VLP-16, which counts
     from the full hour, at most half an hour either way; None where the sensor sends no time. pps: what the LiDAR says
-    of the pulse per second; None where it says nothing. skew_ms: median of picture less sweep, over the ticks. cost:
+    of the pulse per second; None where it says nothing. skew_ms: median of image less sweep, over the ticks. cost:
     what it costs that a receiver whose speed is the own speed sends so seldom; None where it costs nothing."""
 
     health: StreamHealth

@@ -22,7 +22,7 @@ Sensor = Literal["lidar", "camera", "gnss", "ego"]
 
 class StreamStats:
     """Counts one sensor's messages. Times are of the host's timeline. note: what its reader has to say (why a device
-    cannot be opened, where its times come from). hung: how often its driver or decoder hung and was started anew.
+    cannot be opened, where its times come from). hung: how often its driver or decoder hung and was restarted.
     refused: packets by reason. remarks: each is asked what else there is to say of it, and answers with an empty text
     when nothing is."""
 
@@ -80,7 +80,7 @@ class StreamStats:
     def _said(self, impossible: int) -> str:
         refused = say_refused(self.refused.copy())  # at once: a reader's thread may meet a new reason meanwhile
         times = f"{impossible} refused whose time cannot be" if impossible else ""
-        again = f"hung {self.hung} {'time' if self.hung == 1 else 'times'} and was started anew" if self.hung else ""
+        again = f"hung {self.hung} {'time' if self.hung == 1 else 'times'} and was restarted" if self.hung else ""
         return "; ".join(text for text in (self.note, again, *(ask() for ask in self.remarks), times, refused) if text)
 
 

@@ -30,7 +30,7 @@ from pipeline.types.source import Opening, Tap
 T = TypeVar("T")
 
 _LOOK_AGAIN_S = 0.005
-"""How often a tick that waits for its picture, or for the LiDAR's silence, is looked at when nothing arrives."""
+"""How often a tick that waits for its image, or for the LiDAR's silence, is looked at when nothing arrives."""
 
 
 def open_sensors(uri: str, rest: str, how: Opening) -> LiveSensors:
@@ -217,7 +217,7 @@ class LiveSensors:
         shot = together.picture.value
         bgr = shot.bgr()
         if bgr is None:
-            notes.append("the picture is damaged")
+            notes.append("the image is damaged")
             return None
         return Picture(together.picture.t_ns, bgr, shot.encoded)
 

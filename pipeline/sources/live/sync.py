@@ -1,4 +1,4 @@
-"""Which messages belong together: a tick is a LiDAR sweep with the picture and own motion nearest to it in time.
+"""Which messages belong together: a tick is a LiDAR sweep with the image and own motion nearest to it in time.
 
 Without LiDAR the camera ticks, without camera the LiDAR goes on. Nothing is queued: a tick that nobody took is replaced
 by the next. No thread and no clock in here; whoever calls says what time it is, on the host's timeline.
@@ -81,7 +81,7 @@ class Stream(Generic[T]):
 
 @dataclass(frozen=True)
 class Together(Generic[P]):
-    """The messages of one tick. skew_ns: picture minus sweep. replaced: ticks before it that nobody took in time.
+    """The messages of one tick. skew_ns: image minus sweep. replaced: ticks before it that nobody took in time.
     arrived_ns: when the message that ticks was complete. notes: what is missing and why."""
 
     t_ns: int
@@ -96,7 +96,7 @@ class Together(Generic[P]):
 
 
 class Synchroniser(Generic[P]):
-    """``P`` is what a picture is here: anything. A sensor that is not configured is simply never added."""
+    """``P`` is what an image is here: anything. A sensor that is not configured is simply never added."""
 
     def __init__(self) -> None:
         self.sweeps: Stream[Sweep] = Stream()
@@ -107,7 +107,7 @@ class Synchroniser(Generic[P]):
         self._taken = (0, 0)
 
     def tick(self, now_ns: int, params: SyncParams) -> Together[P] | None:
-        """The newest tick not given yet; None when there is none, or its picture is still on the way."""
+        """The newest tick not given yet; None when there is none, or its image is still on the way."""
         sweep = self._newer(self.sweeps.newest())
         if sweep is not None:
             if self._picture_is_coming(sweep, now_ns, params):
@@ -134,7 +134,7 @@ class Synchroniser(Generic[P]):
         return item if is_new else None
 
     def _picture_is_coming(self, sweep: Stamped[Sweep], now_ns: int, params: SyncParams) -> bool:
-        """The camera delivers, and none of its pictures is from after the sweep yet; worth a short wait."""
+        """The camera delivers, and none of its images is from after the sweep yet; worth a short wait."""
         newest = self._shifted(self.pictures.newest(), params)
         if newest is None or newest.t_ns >= sweep.t_ns or now_ns - newest.arrived_ns > _PATIENCE_NS:
             return False
@@ -145,7 +145,7 @@ class Synchroniser(Generic[P]):
         return self._shifted(self.pictures.nearest(t_ns - offset_ns), params)
 
     def _shifted(self, picture: Stamped[P] | None, params: SyncParams) -> Stamped[P] | None:
-        """The picture with the camera's offset added to its time."""
+        """The image with the camera's offset added to its time."""
         if picture is None:
             return None
         return Stamped(picture.t_ns + round(params.camera_offset_ms * 1e6), picture.value, picture.arrived_ns)
@@ -157,7 +157,7 @@ class Synchroniser(Generic[P]):
         notes = []
         skew_ns = picture.t_ns - t_ns if picture is not None and sweep is not None else None
         if picture is not None and skew_ns is not None and abs(skew_ns) > params.max_skew_ms * 1e6:
-            notes.append(f"no picture within {params.max_skew_ms:g} ms: the nearest is {skew_ns / 1e6:+.0f} ms off")
+            notes.append(f"no image within {params.max_skew_ms:g} ms: the nearest is {skew_ns / 1e6:+.0f} ms off")
             picture = skew_ns = None
         return Together(
             t_ns,

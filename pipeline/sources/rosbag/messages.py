@@ -91,7 +91,7 @@ def picture(message: Any, t_ns: int) -> Picture:
     data = np.asarray(message.data, dtype=np.uint8)
     if not hasattr(message, "encoding"):
         try:
-            bgr, encoded = decode_image(data.tobytes(), str(getattr(message, "format", "picture")) or "picture")
+            bgr, encoded = decode_image(data.tobytes(), str(getattr(message, "format", "image")) or "image")
         except SourceError as error:
             raise BadMessage(str(error)) from None
         return Picture(t_ns, bgr, encoded)
@@ -106,13 +106,13 @@ def _raw_picture(message: Any, data: npt.NDArray[np.uint8]) -> U8:
         raise BadMessage(f"unsupported image encoding {message.encoding}")
     channels = _CHANNELS.get(encoding, 1)
     if not (0 < width <= 16384 and 0 < height <= 16384) or step < width * channels or len(data) < height * step:
-        raise BadMessage("a truncated picture")
+        raise BadMessage("a truncated image")
     pixels = data[: height * step].reshape(height, step)[:, : width * channels]
     pixels = np.ascontiguousarray(pixels).reshape((height, width, channels) if channels > 1 else (height, width))
     try:
         bgr = pixels if encoding == "bgr8" else cv2.cvtColor(pixels, _CONVERSIONS[encoding])
     except cv2.error:
-        raise BadMessage(f"a picture that is not in {message.encoding}") from None
+        raise BadMessage(f"an image that is not in {message.encoding}") from None
     return np.ascontiguousarray(bgr, dtype=np.uint8)
 
 

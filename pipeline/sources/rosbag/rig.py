@@ -77,7 +77,7 @@ def calibration(
         distortion = _distortion(info)
         size = int(info.width), int(info.height)
         if min(size) < 16:
-            raise SourceError("a picture without size")
+            raise SourceError("an image without size")
         T_camera_ego = T_camera_lidar @ inverse(T_ego_lidar)
         return _looking_ahead(K, distortion, T_camera_ego, size)
     except (SourceError, ValueError) as error:

@@ -1,4 +1,4 @@
-"""A ROS bag as a recording: a frame a LiDAR sweep (a picture, where there is no LiDAR), times by messages' headers."""
+"""A ROS bag as a recording: a frame a LiDAR sweep (an image, where there is no LiDAR), times by messages' headers."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class RosbagSource:
         self._bag, self._lock = Bag(file), Lock()
         topics = map_topics(self._bag.topics, options)
         if topics.lidar is None and topics.camera is None:
-            raise SourceError(f"{path}: no LiDAR and no picture topic; its topics are {_listed(self._bag)}")
+            raise SourceError(f"{path}: no LiDAR and no image topic; its topics are {_listed(self._bag)}")
         self._index = BagIndex(self._bag, topics, progress)
         self._ticks = self._ticking(path)
         notes = [topics.about(self._bag.topics), *self._about_times()]
@@ -75,7 +75,7 @@ class RosbagSource:
         return evolve(self._outline(index, camera), sweep=sweep, picture=picture, notes=tuple(notes))
 
     def outlines(self) -> Iterator[Frame]:
-        """A camera's pictures are of one size: the first one tells whether the calibration is theirs."""
+        """A camera's images are of one size: the first one tells whether the calibration is theirs."""
         pictures = self._index.camera
         first = (
             self._picture(int(pictures.times_ns[0]), []) if pictures is not None and len(pictures.times_ns) else None
@@ -105,7 +105,7 @@ class RosbagSource:
             model = counts.models.most_common(1)[0][0]
             raise SourceError(f"{path}: packets of a Velodyne {model}; only the VLP-16 is supported")
         why = self._index.damage or (counts.about_refused() if counts is not None else "")
-        raise SourceError(f"{path}: no complete sweep or picture{'; ' + why if why else ''}")
+        raise SourceError(f"{path}: no complete sweep or image{'; ' + why if why else ''}")
 
     def _place(self, rig: rig_files.Rig, notes: list[str]) -> None:
         """Where sensors sit: by a rig file, else by what the bag says."""
@@ -189,7 +189,7 @@ class RosbagSource:
             return None
         index = nearest(camera.times_ns, t_ns, _PICTURE_WITHIN_NS)
         if index is None:
-            notes.append("no picture within 0.1 s")
+            notes.append("no image within 0.1 s")
             return None
         wanted_ns = int(camera.times_ns[index])
         try:

@@ -73,7 +73,7 @@ def _rank(role: str, topic: Topic) -> tuple[int, int, int, int, str]:
 
 
 def _info_of(camera: str | None, topics: Mapping[str, Topic]) -> str | None:
-    """The ``CameraInfo`` beside the pictures: ROS puts it into the same namespace."""
+    """The ``CameraInfo`` beside the images: ROS puts it into the same namespace."""
     infos = sorted(topic.name for topic in topics.values() if topic.kind == "CameraInfo" and topic.held)
     if camera is None or not infos:
         return None

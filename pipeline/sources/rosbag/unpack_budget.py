@@ -19,7 +19,7 @@ from pipeline.recording.mcap.chunk import LARGEST_CHUNK_BYTES
 
 _LARGEST_FILE_BYTES, _LARGEST_RATIO = 1 << 30, 50
 """Of a bag that is compressed as one file: what it may unpack to whatever its size, and how many times its size. Clouds
-and pictures shrink to a third, logs to a twentieth."""
+and images shrink to a third, logs to a twentieth."""
 
 Unpack = Callable[[bytes], bytes]
 

@@ -31,7 +31,7 @@ those that would take its answers for theirs."""
 
 
 def pick_decoder(outputs: Sequence[F32], size: Size, metadata: Mapping[str, str] | None = None) -> Decoder:
-    """The decoder for a network, by what the network gave for any picture.
+    """The decoder for a network, by what the network gave for any image.
 
     Args:
         outputs: the network's raw outputs. Their values are needed beside their shapes: YOLOX and its variant decoded

@@ -30,7 +30,7 @@ class UnknownHead(ValueError):
 
 @dataclass(frozen=True)
 class Decoder:
-    """What a network's outputs mean, and what picture it was trained on."""
+    """What a network's outputs mean, and what image it was trained on."""
 
     name: str
     """The head's name, for people."""
@@ -47,7 +47,7 @@ class Decoder:
 
 
 class Answer(NamedTuple):
-    """What a network gave for some picture, to recognise its head by."""
+    """What a network gave for some image, to recognise its head by."""
 
     outputs: Sequence[F32]
     size: Size

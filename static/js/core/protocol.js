@@ -22,6 +22,7 @@ export function decode(buffer) {
     state: header.state,
     result: header.result,
     display: header.display,
+    row: header.row,
     picture: header.picture,
     bitmap: null,
     count,

@@ -154,6 +154,7 @@
  * @property {{left: Pixels, right: Pixels}|null} lanes
  * @property {{left: Point2[], right: Point2[]}|null} plan_lanes
  * @property {Point2[]|null} plan_edges
+ * @property {[number, number, number][]|null} plan_traffic  x, y, heading of vehicles that show where the road goes
  * @property {GroundPlanes|null} ground
  * @property {Record<string, {distance_m: number, sigma_m: number}>} vision_ranges  camera-only range estimates
  * @property {Ranked[]} ranking
@@ -184,6 +185,7 @@
  * @property {State} state
  * @property {Result} result
  * @property {Display} display
+ * @property {import("../drive/types.js").Row|null} row  of live sensors only
  * @property {boolean} [isLate]
  * @property {Picture|null} picture
  * @property {ImageBitmap|null} bitmap

@@ -5,8 +5,6 @@
 import { newestOnly, request } from "../core/api.js";
 import { get, on, set } from "../core/store.js";
 
-/** @typedef {import("./types.js").Columns} Columns */
-/** @typedef {import("../core/types.js").Frame} Frame */
 /** @typedef {import("./types.js").DriveEvent} DriveEvent */
 
 /** Shown where a feature needs a recording. */
@@ -15,33 +13,12 @@ export const NO_DRIVE = "Not available with live sensors. Record a session, then
 const MOST_FRAMES = 1200;
 const SAME_S = 0.001;
 
-/** @type {{[K in keyof Columns]: (frame: Frame) => Columns[K][number]}} */
-const OF_FRAME = {
-  cipv_id: ({ result }) => result.cipv?.id ?? null,
-  source: (frame) => lead(frame)?.source ?? null,
-  carried: (frame) => lead(frame)?.carried ?? null,
-  distance_m: ({ result }) => result.cipv?.distance_m ?? null,
-  closing_speed_mps: ({ result }) => result.cipv?.closing_speed_mps ?? null,
-  ttc_s: ({ result }) => result.cipv?.ttc_s ?? null,
-  path_offset_m: (frame) => lead(frame)?.path_offset_m ?? null,
-  speed_mps: ({ result }) => result.ego?.speed_mps ?? null,
-  desired_speed_mps: ({ result }) => result.acc?.desired_speed_mps ?? null,
-  accel_mps2: ({ result }) => result.acc?.accel_mps2 ?? null,
-  brake: ({ result }) => result.acc?.brake ?? null,
-  acc_state: ({ result }) => result.acc?.state ?? null,
-  next_cipv_id: ({ result }) => result.next_cipv?.id ?? null,
-  objects: ({ result }) => result.objects.length,
-  gaps: () => "",
-  vl_disagreement_m: () => null,
-  notes: ({ result }) => result.notes.length,
-};
-const NAMES = /** @type {(keyof Columns)[]} */ (Object.keys(OF_FRAME));
-
 /** @type {string|null} */
 let uri = null;
 /** @type {number[]} */
 let times = [];
-let columns = empty();
+/** @type {Record<string, unknown[]>} a key of `Columns` each */
+let columns = {};
 /**
  * @type {DriveEvent[]} replaced only when marks change; their index changes as old frames are dropped
  */
@@ -68,29 +45,21 @@ function followMarks() {
   fetchMarks(key);
 }
 
-/** @param {Frame} frame */
-const lead = ({ result }) => result.objects.find(({ id }) => id === result.cipv?.id);
-
-/** @returns {Columns} */
-function empty() {
-  return /** @type {any} */ (Object.fromEntries(NAMES.map((name) => [name, []])));
-}
-
 function remember() {
   const frame = get("frame");
-  if (!frame?.state.live) return;
+  if (!frame?.row) return;
   if (frame.state.uri !== uri) {
     uri = frame.state.uri;
     times = [];
-    columns = empty();
+    columns = {};
     marks = [];
   }
   if (frame.state.time_s === times.at(-1)) return;
   times.push(frame.state.time_s);
-  for (const name of NAMES) /** @type {unknown[]} */ (columns[name]).push(OF_FRAME[name](frame));
+  for (const [name, value] of Object.entries(frame.row)) (columns[name] ??= []).push(value);
   if (times.length > MOST_FRAMES) {
     times.shift();
-    for (const name of NAMES) columns[name].shift();
+    for (const values of Object.values(columns)) values.shift();
   }
   for (const mark of marks) mark.index = placeOf(mark.t_s);
   set("drive", {
@@ -98,7 +67,7 @@ function remember() {
     count: times.length,
     t_s: times,
     clips: [],
-    now: { run: -1, done: times.length, columns },
+    now: { run: -1, done: times.length, columns: /** @type {any} */ (columns) },
     base: null,
     events: marks,
     comparison: null,

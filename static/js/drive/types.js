@@ -22,6 +22,7 @@
  * @property {string[]} gaps
  * @property {(number|null)[]} vl_disagreement_m
  * @property {number[]} notes
+ * @typedef {{[K in keyof Columns]: Columns[K][number]}} Row one frame's value of each column
  * @typedef {object} ColumnsAnswer
  * @property {number} run
  * @property {string} uri

@@ -212,7 +212,7 @@ export const labelKeys = () => [
       key("e", "E", "rotate 1° right; Shift: 10°", () => commands.turn(-TURN_DEG)),
       key("Shift+Q", "Shift Q", "", () => commands.turn(FAR_DEG)),
       key("Shift+E", "Shift E", "", () => commands.turn(-FAR_DEG)),
-      key("Shift+X", "Shift X", "turn the track round: front and rear are mistaken", commands.flip, "turn round"),
+      key("Shift+X", "Shift X", "turn the track round: front and rear are swapped", commands.flip, "turn round"),
       key("s", "S", "fit the cuboid to the points", commands.snap, "snap"),
       key("Shift+S", "Shift S", "the image box follows the cuboid again", commands.boxFollows),
       key("w", "W", "apply this size to the whole track", commands.sizeAlong, "size along"),

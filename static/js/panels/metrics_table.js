@@ -18,7 +18,7 @@ const JUDGES = {
 export function metricsTable({ metrics, truth, judged }, isAlone = false) {
   const judge = truth
     ? `Evaluated on ${judged} ${judged === 1 ? "frame" : "frames"} against ${JUDGES[truth]}`
-    : "No labels: metrics that need none";
+    : "No labels: only metrics that need none";
   const head = (isAlone ? [] : ["", "before", "after", "change"]).map((words) =>
     el("th", { scope: "col", textContent: words }),
   );

@@ -12,7 +12,7 @@ const CHIPS = {
     ["cuboids", "Cuboids", "Cuboids of LiDAR objects", "lidar"],
     ["lidarBoxes", "L boxes", "LiDAR boxes in the image, as used by fusion", "lidar"],
     ["visionBoxes", "V boxes", "Tracked detector boxes", "vision"],
-    ["farView", "Far", "Where the detector looks a second time, in native pixels", "vision"],
+    ["farView", "Far", "Window of the detector's second pass, at native resolution", "vision"],
     ["path", "Path", "Path corridor on the ground", "path"],
     ["lanes", "Lanes", "Estimated ego-lane lines", "lane"],
   ],
@@ -23,7 +23,7 @@ const CHIPS = {
     [
       "planPath",
       "Path",
-      "Path corridor with 1σ of its edges, ego-lane lines, and the road edges that the path follows",
+      "Path corridor with 1σ of its edges, ego-lane lines, and the road edges and headings of vehicles it follows",
       "path",
     ],
   ],

@@ -11,7 +11,7 @@ import { EVERYTHING, PANES, change, toggle } from "./panes.js";
 /** @type {Record<string, Saved>} */
 const BUILT_IN = {
   Everything: {},
-  Picture: { hidden: ["objects", "params", "plan"] },
+  Camera: { hidden: ["objects", "params", "plan"] },
   Charts: { hidden: ["objects", "plan", "params"], sizes: { timeline: 420 } },
   Tuning: { hidden: ["objects"], sizes: { timeline: 260 } },
 };

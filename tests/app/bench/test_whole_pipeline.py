@@ -21,7 +21,7 @@ from tests.pipeline.vision import networks
 
 
 class Paint:
-    """A lane detector that counts the pictures."""
+    """A lane detector that counts the images."""
 
     name = "paint"
 

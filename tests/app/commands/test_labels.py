@@ -44,7 +44,7 @@ def test_truth_goes_out_and_comes_back(drive: Path, tmp_path: Path, capsys: pyte
 
 
 READ: dict[FormatName, tuple[int, int]] = {
-    # sweeps and pictures that are decoded of a drive of three frames
+    # sweeps and images that are decoded of a drive of three frames
     "native": (0, 0), "csv": (0, 0), "openlabel": (0, 0), "coco": (0, 0), "kitti": (0, 0), "kitti-tracking": (0, 0),
     "nuscenes": (3, 0),
 }  # fmt: skip

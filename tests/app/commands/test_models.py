@@ -9,6 +9,7 @@ import pytest
 
 from app.commands.models import ListModels, RegisterModel
 from pipeline.inference import model_registry
+from pipeline.inference.known_networks import Task
 
 
 def test_the_printed_list_has_every_address_and_command_whole(
@@ -25,9 +26,9 @@ def test_the_printed_list_has_every_address_and_command_whole(
     assert "● embedded  detector" in said, "the one that is used where no other is"
 
 
-@pytest.mark.parametrize("task", get_args(model_registry.Task))
+@pytest.mark.parametrize("task", get_args(Task))
 @pytest.mark.parametrize("path", ["/nope.onnx", "embedded"], ids=["a path", "the name of another"])
-def test_a_missing_file_to_register_is_just_missing(task: model_registry.Task, path: str) -> None:
+def test_a_missing_file_to_register_is_just_missing(task: Task, path: str) -> None:
     with pytest.raises(model_registry.ModelError) as refused:
         RegisterModel(Path(path), "mine", task)()
     assert str(refused.value) == f"no file at {path}"

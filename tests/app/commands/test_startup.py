@@ -1,4 +1,4 @@
-"""What a start waits for: the libraries that are imported before the first picture, and before a command's help."""
+"""What a start waits for: the libraries that are imported before the first image, and before a command's help."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def at(index: int) -> Callable[[Snapshot], bool]:
 
 
 def played(recording: Recording, first: int, last: int, params: Params, looked_from: int = 0) -> Result:
-    """What the plain line says at ``last``, run from a fresh state at ``first``; nobody looked at the pictures before
+    """What the plain line says at ``last``, run from a fresh state at ``first``; nobody looked at the images before
     ``looked_from``."""
     detector, state = CountingDetector(), State()
     for index in range(first, last + 1):

@@ -1,4 +1,4 @@
-"""What looks at a source's pictures, and what the page says about it."""
+"""What looks at a source's images, and what the page says about it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_the_page_says_which_lane_detector_works() -> None:
     assert detectors.lanes is not None
     assert detectors.lanes.name == "classical"
     assert [notice.level for notice in notices] == ["info"]
-    assert "lane lines by colour and gradient" in notices[0].text
+    assert "Lane lines by colour and gradient" in notices[0].text
 
 
 def test_a_missing_lane_network_is_said_and_boxes_go_on() -> None:

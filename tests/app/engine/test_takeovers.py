@@ -85,8 +85,8 @@ def test_a_network_that_hangs_for_ever_is_said_and_replaced_and_no_sensor_data_i
             tap.sweep(replace(sweep, points=sweep.points + k), 10**18 + sweep.t_ns + k)
         said = engine.wait_for(lambda s: any("hung for" in n.text for n in s.notices), WAIT_S)
         (notice,) = (n for n in said.notices if "hung for" in n.text)
-        assert notice.level == "error", "which the display in the car shows too"
-        assert "(the network counting) and was started anew; the recording goes on" in notice.text
+        assert notice.level == "error", "which the in-vehicle display shows too"
+        assert "(the network counting) and was restarted; recording continues" in notice.text
         after = shown_after(engine, sensors, 3)
         assert after.processed is not None
         assert {item.seen_by for item in after.processed.result.objects} == {"VL"}, "by a fresh network"
@@ -111,7 +111,7 @@ def test_a_disk_that_hangs_is_said_and_playback_pauses_when_it_does_so_again_and
     try:
         engine.wait_for(lambda s: s.index > 1, WAIT_S)
         recording.gate.clear()
-        shown = engine.wait_for(lambda s: any("again and again" in n.text for n in s.notices), WAIT_S)
+        shown = engine.wait_for(lambda s: any("keeps hanging" in n.text for n in s.notices), WAIT_S)
         assert any("(reading a frame)" in n.text for n in shown.notices)
         assert engine.wait_for(lambda s: not s.playing, WAIT_S).uri == recording.uri
         assert engine.alive

@@ -1,4 +1,4 @@
-"""Scenes in a report: everybody in the plan, where they are, and the picture of the same moment."""
+"""Scenes in a report: everybody in the plan, where they are, and the image of the same moment."""
 
 from __future__ import annotations
 

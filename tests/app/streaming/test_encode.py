@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from app.core.detection_cache import DetectionCache
+from app.drive.frame_rows import column_names
 from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
@@ -70,6 +71,18 @@ def test_the_header_holds_the_contracts_result_and_the_state():
     assert header["result"] == json.loads(json.dumps(to_json(shown.processed.result)))
     assert header["state"]["index"] == 3
     assert header["state"]["frame"] == "000003"
+
+
+def test_a_frame_of_live_sensors_brings_its_row_of_the_timeline():
+    assert taken_apart(Encoder().message(snapshot()) or b"")[0]["row"] is None
+    live = replace(snapshot(), live=True)
+    row = taken_apart(Encoder().message(live) or b"")[0]["row"]
+    assert live.processed is not None
+    lead = live.processed.result.cipv
+    assert lead is not None
+    assert set(row) == set(column_names())
+    assert row["cipv_id"] == lead.id
+    assert row["distance_m"] == round(lead.distance_m, 4)
 
 
 def test_points_are_the_sweep_in_centimetres_and_where_the_alignment_puts_them():
@@ -131,7 +144,7 @@ def test_a_picture_is_encoded_when_it_must_be_and_never_too_wide(width: int, own
 
 
 def _wide() -> U8:
-    """A picture of twice the width that is sent, with one red car."""
+    """An image of twice the width that is sent, with one red car."""
     bgr: U8 = np.zeros((360, 2560, 3), np.uint8)
     bgr[100:200, 600:900] = (20, 20, 220)
     return bgr

@@ -78,7 +78,7 @@ def site() -> Iterator[Site]:
 
 
 def _first() -> Snapshot:
-    """A frame with a picture wider than any page needs, of noise: its JPEG is large."""
+    """A frame with an image wider than any page needs, of noise: its JPEG is large."""
     pipeline = _pipeline()
     tick = pipeline.seek(0, Params())
     assert tick is not None

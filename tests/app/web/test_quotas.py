@@ -108,7 +108,7 @@ def test_a_client_that_leaves_is_no_error_of_the_program() -> None:
             threading.Event().wait(0.01)
             progress(0, 1)
 
-    with ThreadPoolExecutor(1) as threads, pytest.raises(HTTPException, match="the client has left"):
+    with ThreadPoolExecutor(1) as threads, pytest.raises(HTTPException, match="the client disconnected"):
         asyncio.run(quotas.while_waited_for(cast("Request", Gone()), threads, work))
 
 

@@ -100,8 +100,8 @@ def test_for_other_machines_it_shows_links_with_tokens_and_lets_nobody_else_in()
         address, person, display = (program.stdout.readline().strip() for _ in range(3))
         port = urlsplit(address).port
         assert "0.0.0.0" not in address
-        assert person.startswith(f"everything:         {address}/?token=")
-        assert display == f"display in the car: {address}/drive/?token=$CIPV_DISPLAY_TOKEN"
+        assert person.startswith(f"full access:        {address}/?token=")
+        assert display == f"in-vehicle display: {address}/drive/?token=$CIPV_DISPLAY_TOKEN"
         here = f"http://127.0.0.1:{port}"
         assert httpx.get(f"{here}/api/state", timeout=60).status_code == 401
         assert httpx.get(f"{here}/healthz", timeout=60).status_code == 200

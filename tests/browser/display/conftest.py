@@ -1,4 +1,4 @@
-"""The display in the car, opened by touch, and a dashboard that a test has for itself."""
+"""The in-vehicle display, opened by touch, and a dashboard that a test has for itself."""
 
 from __future__ import annotations
 

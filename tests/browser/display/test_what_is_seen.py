@@ -70,7 +70,7 @@ def test_it_fits_a_finger_finds_it_and_it_can_be_read(open_display: OpenDisplay,
             assert min(box["width"], box["height"]) >= FINGER_PX
             assert box["right"] <= width
             assert box["bottom"] <= height
-        for words in ("0.0", "188", "88.8", shown):  # the widest; then its own again, for the next pictures
+        for words in ("0.0", "188", "88.8", shown):  # the widest; then its own again, for the next images
             distance.evaluate("(node, words) => (node.textContent = words)", words)
             assert page.evaluate(CUT_OFF) == []
 
@@ -115,7 +115,7 @@ SHOW = """async (change) => {
   hold();
   await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
 }"""
-"""Another command with the shown frame, also when the server sends that again with a picture of another size."""
+"""Another command with the shown frame, also when the server sends that again with an image of another size."""
 
 ALARM_PIXELS = """(selector) => {
   const canvas = document.querySelector(selector), ctx = canvas.getContext("2d");

@@ -116,10 +116,10 @@ def errors_m(labels: Labels, track: int, truth: list[Cuboid]) -> dict[str, float
 
 def judge_the_rest(hand: Hand, labels: Labels, objects: list[tuple[TruthObject, ...]]) -> None:
     """Every track that is left, from the list of what is to do: accepted where a vehicle is, rejected where none is. A
-    box in the picture is taken for one: what the camera has named is there."""
+    box in the image is taken for one: what the camera has named is there."""
     page = hand.page
     page.get_by_role("button", name="To do", exact=True).click()
-    page.get_by_label("Least confidence of proposals").fill("0")
+    page.get_by_label("Minimum confidence of proposals").fill("0")
     left = sorted(number for number, track in labels.tracks.items() if track["state"] == "proposed")
     seen: dict[int, list[bool]] = {number: [] for number in left}
     for index, rows in labels.get(f"/frames?first=0&last={COUNT - 1}")["sightings"].items():

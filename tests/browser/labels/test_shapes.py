@@ -1,4 +1,4 @@
-"""Cuboids and boxes under a hand: in the plan, in the picture, in 3D."""
+"""Cuboids and boxes under a hand: in the plan, in the image, in 3D."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_a_cuboid_is_drawn_moved_turned_and_resized_in_the_plan(hand: Hand, labe
     drawn = labels.cuboid(made, START)
     assert drawn["center"][:2] == pytest.approx((LEAD_X, LEAD_Y), abs=0.2)
     assert drawn["size"][0] == pytest.approx(4.4, abs=0.3)
-    assert repainted(page, "#camera", empty), "its edges are in the picture"
+    assert repainted(page, "#camera", empty), "its edges are in the image"
 
     hand.drag(hand.plan(LEAD_X, LEAD_Y), hand.plan(LEAD_X + 2, LEAD_Y + 1))
     labels.wait_for(lambda now: now.cuboid(made, START)["center"][0] > LEAD_X + 1)
@@ -181,7 +181,7 @@ def test_a_cuboid_is_dragged_over_the_road_in_the_picture(hand: Hand, labels: La
     after = labels.cuboid(made, START)
     assert foot_of(labels, after) == pytest.approx((u + 30, v + 8), abs=1.5), "its foot is under the hand"
     assert (after["size"], after["yaw_rad"]) == (before["size"], before["yaw_rad"])
-    assert after["center"][0] < before["center"][0] - 1, "lower in the picture is nearer"
+    assert after["center"][0] < before["center"][0] - 1, "lower in the image is nearer"
     assert after["center"][1] < before["center"][1] - 0.5
 
 

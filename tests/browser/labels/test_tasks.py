@@ -150,7 +150,7 @@ def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, 
 def only_sure_ones_are_listed(hand: Hand, labels: Labels) -> None:
     """The slider, from nothing to everything; one is turned round, and taken back."""
     page, count = hand.page, len(labels.tracks)
-    slider = page.get_by_label("Least confidence of proposals")
+    slider = page.get_by_label("Minimum confidence of proposals")
     slider.fill("1")
     expect(page.locator(".sureness .above")).to_have_text(f"≥ 100 %: 0 proposed, {count} hidden")
     expect(page.locator(".track-row")).to_have_count(0)

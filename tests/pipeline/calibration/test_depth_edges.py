@@ -1,4 +1,4 @@
-"""Where sweeps and pictures have borders."""
+"""Where sweeps and images have borders."""
 
 from __future__ import annotations
 

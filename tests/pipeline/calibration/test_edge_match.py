@@ -136,7 +136,7 @@ ANGULAR = {"model": "angular", "h_res_deg": 0.1, "v_res_deg": 0.1, "cx_px": 320.
 
 
 def posts(true: AlignmentParams, camera: CameraCalibration | None, frames: int = 4) -> list[Seen]:
-    """Bright posts of all heights, 12 m to 25 m ahead, as 16 rings and a picture under the true alignment see them."""
+    """Bright posts of all heights, 12 m to 25 m ahead, as 16 rings and an image under the true alignment see them."""
     aligned, rng = resolve(true, camera), np.random.default_rng(0)
     assert aligned is not None
     scenes: list[Seen] = []

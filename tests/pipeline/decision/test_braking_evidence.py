@@ -12,7 +12,7 @@ from pipeline.types import Braking, FusedObject
 from tests.pipeline.build import fused
 
 PARAMS = ExistenceParams()
-CAMERA = replace(fused(1, 30.0, source="V"), existence=0.95)
+CAMERA = replace(fused(1, 30.0, source="V"), existence=0.95, in_path_probability=0.95)
 BOTH = replace(fused(1, 30.0), existence=0.95, lidar_hits=5)
 
 
@@ -22,10 +22,18 @@ BOTH = replace(fused(1, 30.0), existence=0.95, lidar_hits=5)
         pytest.param(replace(CAMERA, camera_ranges=3), Braking.COMFORT, id="the camera alone, for a moment"),
         pytest.param(replace(CAMERA, camera_ranges=8), Braking.PARTIAL, id="the camera alone, for long"),
         pytest.param(replace(CAMERA, camera_ranges=99, existence=0.6), Braking.COMFORT, id="for long, but doubtful"),
+        pytest.param(
+            replace(CAMERA, camera_ranges=99, in_path_probability=0.51),
+            Braking.COMFORT,
+            id="for long, but hardly in the path: an oncoming car before a bend",
+        ),
         pytest.param(replace(BOTH, lidar_hits=1), Braking.PARTIAL, id="the LiDAR, once"),
         pytest.param(replace(BOTH, lidar_hits=3), Braking.FULL, id="the LiDAR, three times"),
         pytest.param(replace(BOTH, lidar_hits=1, camera_ranges=8), Braking.PARTIAL, id="for long, now measured"),
         pytest.param(replace(BOTH, existence=0.5), Braking.COMFORT, id="measured, but doubtful"),
+        pytest.param(
+            replace(BOTH, in_path_probability=0.2), Braking.FULL, id="measured beside the path: it may be crossing"
+        ),
     ],
 )
 def test_what_it_justifies(item: FusedObject, hardest: Braking) -> None:

@@ -79,6 +79,17 @@ def test_the_gate_that_stopped_it_carries_number_and_limit() -> None:
     assert len(failed) == 1
 
 
+def test_a_camera_track_whose_place_was_reset_must_be_seen_again() -> None:
+    """The first distance after a reset may be another vehicle's, however long the track's number has lived."""
+    reset = dataclasses.replace(fused(1, 20.0, source="V", hits=29), camera_ranges=1)
+    lead, why_not = decide(reset)
+    assert lead is None
+    assert why_not == {1: "seen 1 of 3 times"}
+    assert decide(reset, last=1)[0] is not None, "the lead stays it"
+    assert decide(dataclasses.replace(reset, camera_ranges=3))[0] is not None
+    assert decide(dataclasses.replace(fused(1, 20.0, source="L", hits=29)))[0] is not None, "the LiDAR counts its own"
+
+
 def test_hysteresis_holds_the_lead_at_the_edge_but_takes_in_nobody_new() -> None:
     at_edge = fused(1, 20.0, 1.7)
     assert decide(at_edge, last=None)[0] is None
@@ -97,7 +108,7 @@ def test_a_carried_object_may_stay_the_lead_but_not_become_it() -> None:
 
 
 def test_a_box_too_near_to_be_measured_does_not_become_the_lead() -> None:
-    """The picture's edge cuts a passing car's box: it is seen, but how far it is now is only predicted."""
+    """The image's edge cuts a passing car's box: it is seen, but how far it is now is only predicted."""
     cut = dataclasses.replace(fused(1, 1.5, source="V"), measured=False)
     lead, why_not = decide(cut)
     assert lead is None

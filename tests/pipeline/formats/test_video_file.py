@@ -37,7 +37,7 @@ def test_a_video_that_goes_away(tmp_path: Path) -> None:
     write_video(tmp_path / "a.avi", 3)
     video = VideoFile(tmp_path / "a.avi")
     (tmp_path / "a.avi").unlink()
-    with pytest.raises(SourceError, match=r"a\.avi: picture 1 cannot be decoded"):
+    with pytest.raises(SourceError, match=r"a\.avi: image 1 cannot be decoded"):
         video.picture(1)
 
 

@@ -100,7 +100,7 @@ def test_boxes_apart_stay_two_objects() -> None:
 
 
 def test_a_far_car_over_the_roof_of_a_near_one_is_not_joined_with_it() -> None:
-    """Their boxes overlap in the picture, their ranges do not; the L row says which test kept them apart."""
+    """Their boxes overlap in the image, their ranges do not; the L row says which test kept them apart."""
     near = lidar_track(1, 15.0)
     x1, y1, x2, y2 = box_of(near)
     far = vision_track(1, (x1 + 20, y1 - 10, x2 - 25, (y1 + y2) / 2), 50.0, sigma_m=3.0)

@@ -1,4 +1,4 @@
-"""Cuboids from the sensors' data: laid on points, lifted out of the picture. Made-up scenes, and real cars."""
+"""Cuboids from the sensors' data: laid on points, lifted out of the image. Made-up scenes, and real cars."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def sweep_of(car: Cuboid, *, faces: str = "both") -> F32:
 
 
 def box_in_picture(frame: Frame, cuboid: Cuboid) -> Box | None:
-    """Where a cuboid is in the picture; null outside it."""
+    """Where a cuboid is in the image; null outside it."""
     assert frame.camera is not None
     alignment = resolve(Params().alignment, frame.camera)
     assert alignment is not None
@@ -85,12 +85,12 @@ def test_too_few_points_are_said() -> None:
         refit(sweep_of(standing(15.0, 4.0)), standing(30.0, -5.0))
 
 
-# ------------------------------------------------------------ out of the picture
+# ------------------------------------------------------------ out of the image
 
 
 @pytest.fixture(scope="module")
 def frame() -> Frame:
-    """A car's rear 26 m ahead, with points and picture."""
+    """A car's rear 26 m ahead, with points and image."""
     return Recording().frame(10)
 
 
@@ -121,7 +121,7 @@ def test_without_points_it_is_as_far_as_it_looks(frame: Frame) -> None:
     found = lift(blind, Params(), "car", bbox=bbox)
     assert found.points == 0
     assert found.how.startswith("no points there: about")
-    assert found.how.endswith("by its height in the picture")
+    assert found.how.endswith("by its height in the image")
     assert found.cuboid.center[0] == pytest.approx(40.0, rel=0.2)
     assert found.cuboid.center[1] == pytest.approx(0.0, abs=0.5)
 

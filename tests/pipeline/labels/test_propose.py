@@ -42,7 +42,7 @@ def frames_of(track: LabelTrack) -> list[int]:
     ids=[
         "a car",
         "once",
-        "once, in the picture",
+        "once, in the image",
         "a return beside the road",
         "in the path",
         "no road user",

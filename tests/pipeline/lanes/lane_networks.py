@@ -1,4 +1,4 @@
-"""Tiny ONNX lane networks: real graphs that onnxruntime runs, whose lines are the red and the green of the picture."""
+"""Tiny ONNX lane networks: real graphs that onnxruntime runs, whose lines are the red and the green of the image."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lane networks of every kind, run for real, on pictures whose red and green are the lines."""
+"""Lane networks of every kind, run for real, on images whose red and green are the lines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From points in a picture to lines on the road, and back."""
+"""From points in an image to lines on the road, and back."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SURE, UNSURE = Pitch(0.0, 1e-4), Pitch(0.0, 0.014)
 
 
 def seen(raw: RawLanes, through=None, params: LaneParams = PARAMS, **more) -> EgoLane:
-    """The ego lane of one picture alone."""
+    """The ego lane of one image alone."""
     _, lane = follow(LaneState(), raw, RoadView(through or aligned(), **more), moment(), params)
     assert lane is not None
     return lane
@@ -95,7 +95,7 @@ def test_clutter_does_not_move_a_line() -> None:
 
 
 def test_clutter_alone_is_no_lane() -> None:
-    """Points anywhere, others in each picture: a line found by chance in one is weak, and gone in the next."""
+    """Points anywhere, others in each image: a line found by chance in one is weak, and gone in the next."""
     state, sure = LaneState(), 0
     for seed in range(12):
         raw = paint((), clutter=150, seed=seed)

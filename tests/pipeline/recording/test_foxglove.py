@@ -44,7 +44,7 @@ WELL_KNOWN = {
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Everything a live recording holds: frames with results, pictures and samples between them, packets, a mark."""
+    """Everything a live recording holds: frames with results, images and samples between them, packets, a mark."""
     path, state = tmp_path_factory.mktemp("foxglove") / "a.mcap", State()
     recorder = Recorder(path, ABOUT)
     for index in range(FRAMES):

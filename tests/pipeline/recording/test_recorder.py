@@ -97,7 +97,7 @@ def test_a_slow_disk_holds_nobody_up_and_what_is_dropped_is_counted_and_noted(
 
 
 def test_what_comes_between_frames_is_recorded_when_it_came(tmp_path: Path) -> None:
-    """Three pictures a frame, own motion twice, a fix; the frame refers to the picture it shows, moved by 4 ms."""
+    """Three images a frame, own motion twice, a fix; the frame refers to the image it shows, moved by 4 ms."""
     recorder = Recorder(tmp_path / "a.mcap", ABOUT)
     began_ns, frames = 10**18, [full(index) for index in range(4)]
     for index, frame in enumerate(frames):
@@ -176,7 +176,7 @@ def test_what_a_slow_disk_leaves_no_room_for_is_counted_by_kind(
         state = recorder.stop()
     session = SessionSource("a", str(tmp_path / "a.mcap"))
     notes = b"".join(stored.data for stored in session.file.messages(("/notes",)))
-    assert b"1 frames, 2 pictures were dropped here" in notes
+    assert b"1 frames, 2 images were dropped here" in notes
     assert len(list(session.file.messages(("/camera/image",)))) == state.frames + 3
 
 

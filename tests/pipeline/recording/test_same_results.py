@@ -42,7 +42,7 @@ def test_real_recordings(kind: str, folder: str, frames: int, data_dir: Path, tm
 
 
 def test_the_simulator(tmp_path: Path) -> None:
-    """Own motion and GNSS too, with the detector that the simulator's pictures call for."""
+    """Own motion and GNSS too, with the detector that the simulator's images call for."""
     source = open_source("sim:straight")
     session = imported(source, tmp_path, frames=4)
     detector = detector_for(session)

@@ -30,7 +30,7 @@ def braking() -> Scenario:
 
 
 def believed(result: Result) -> dict[str, Any]:
-    """All but how long it took, and that the replay has a picture too."""
+    """All but how long it took, and that the replay has an image too."""
     return {key: value for key, value in to_json(result).items() if key not in ("timing_ms", "sensors")}
 
 
@@ -40,7 +40,7 @@ class Unwanted:
     name, notes = "unwanted", ()
 
     def detect(self, bgr: U8) -> Never:
-        pytest.fail("it was asked to look at a picture")
+        pytest.fail("it was asked to look at an image")
 
 
 @pytest.mark.parametrize("sensors", ["lidar", "camera", "both"])

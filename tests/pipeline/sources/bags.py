@@ -201,7 +201,7 @@ OPTICAL = (-0.5, 0.5, -0.5, 0.5)
 
 
 def write_bag(path: Path, kind: Kind = "db3", sweeps: int = 3) -> Path:
-    """A car at 12 m/s: clouds, pictures 20 ms after them, fixes, odometry, a camera 0.3 m above the LiDAR, which is
+    """A car at 12 m/s: clouds, images 20 ms after them, fixes, odometry, a camera 0.3 m above the LiDAR, which is
     turned 90° to the left on the car."""
     with BagWriter(path, kind) as bag:
         half = float(np.sqrt(0.5))
@@ -234,7 +234,7 @@ def write_packet_bag(path: Path, kind: Kind = "db3", sweeps: int = 4) -> Path:
 
 
 def write_long_bag(path: Path, sweeps: int) -> Path:
-    """Clouds and raw 720p pictures, 3 MB of both ten times a second."""
+    """Clouds and raw 720p images, 3 MB of both ten times a second."""
     pixels = np.random.default_rng(0).integers(0, 255, (720, 1280, 3), dtype=np.uint8)
     with BagWriter(path, "mcap") as bag:
         for index in range(sweeps):

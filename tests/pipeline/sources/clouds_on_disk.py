@@ -78,7 +78,7 @@ def lzf(data: bytes) -> bytes:
 
 
 def write_clouds(folder: Path, encoding: str = "binary") -> Path:
-    """Two sweeps named by their times, and their pictures."""
+    """Two sweeps named by their times, and their images."""
     (folder / "images").mkdir(parents=True)
     for index, stamp in enumerate(STAMPS_NS):
         rows = rows_of(ring_wall(0, 10.0 - index))[:: 1 if encoding != "ascii" else 20]

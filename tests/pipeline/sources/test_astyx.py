@@ -87,9 +87,9 @@ def test_an_index_outside_is_refused(astyx: Path) -> None:
         (lambda folder: (folder / "lidar_vlp16/000002.txt").unlink(), "no LiDAR file for this frame"),
         (lambda folder: (folder / "lidar_vlp16/000002.txt").write_bytes(b""), "000002.txt: no LiDAR points"),
         (lambda folder: (folder / "lidar_vlp16/000002.txt").write_bytes(bytes(range(256)) * 9), "no LiDAR points"),
-        (lambda folder: (folder / "camera_front/000002.jpg").unlink(), "no picture for this frame"),
-        (lambda folder: (folder / "camera_front/000002.jpg").write_bytes(b""), "000002.jpg: not a readable picture"),
-        (lambda folder: (folder / "camera_front/000002.jpg").write_bytes(b"\xff\xd8\xff\xe0x"), "picture is truncated"),
+        (lambda folder: (folder / "camera_front/000002.jpg").unlink(), "no image for this frame"),
+        (lambda folder: (folder / "camera_front/000002.jpg").write_bytes(b""), "000002.jpg: not a readable image"),
+        (lambda folder: (folder / "camera_front/000002.jpg").write_bytes(b"\xff\xd8\xff\xe0x"), "image is truncated"),
         (lambda folder: (folder / "calibration/000002.json").write_text("{"), "first calibration is used"),
     ],
 )

@@ -19,7 +19,7 @@ GPX = """<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/1" ver
 
 @pytest.fixture
 def video(tmp_path: Path) -> Path:
-    """Two seconds at 30 Hz, in which the picture's brightness counts."""
+    """Two seconds at 30 Hz, in which the image's brightness counts."""
     file = tmp_path / "drive.mp4"
     with av.open(str(file), "w") as container:
         stream = container.add_stream("mpeg4", rate=30)
@@ -45,7 +45,7 @@ def test_a_bare_video_is_a_recording_of_ten_frames_a_second(video: Path) -> None
     assert (len(source), source.rate_hz) == (20, pytest.approx(10.0, abs=0.1))
     frame = source.frame(7)
     assert frame.picture is not None
-    assert frame.picture.bgr.mean() == pytest.approx(4 * 21, abs=6), "the picture of its time"
+    assert frame.picture.bgr.mean() == pytest.approx(4 * 21, abs=6), "the image of its time"
     assert frame.t_ns - source.t_ns(0) == pytest.approx(0.7e9, abs=2e6)
     assert frame.camera is not None
     assert frame.camera.K[0, 0] == pytest.approx(226.7, abs=0.1), "78° over the diagonal of 367 px"
@@ -90,7 +90,7 @@ def test_a_folder_of_pictures(tmp_path: Path) -> None:
     assert picture is not None
     assert picture.bgr[0, 0, 0] == 2
     (tmp_path / "1700000000900000000.png").write_bytes(b"\x89PNG cut")
-    assert open_source(str(tmp_path)).frame(3).notes == ("1700000000900000000.png: the picture is truncated",)
+    assert open_source(str(tmp_path)).frame(3).notes == ("1700000000900000000.png: the image is truncated",)
 
 
 def test_what_is_no_video_and_no_track_is_said_in_one_line(video: Path, tmp_path: Path) -> None:

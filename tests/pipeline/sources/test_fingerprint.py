@@ -82,7 +82,7 @@ def test_a_recording_has_the_same_key_wherever_it_lies_and_whatever_form_it_has(
 
 def test_another_recording_has_another_key() -> None:
     class Darker(Recording):
-        """Another first picture."""
+        """Another first image."""
 
         def frame(self, index: int) -> Frame:
             frame = super().frame(index)

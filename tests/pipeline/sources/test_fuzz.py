@@ -27,12 +27,12 @@ def small_bag(folder: Path, kind: Kind = "db3") -> Path:
 
 FILES = {
     "astyx lidar": (write_astyx, "astyx:{folder}", "lidar_vlp16/000002.txt"),
-    "astyx picture": (write_astyx, "astyx:{folder}", "camera_front/000002.jpg"),
+    "astyx image": (write_astyx, "astyx:{folder}", "camera_front/000002.jpg"),
     "astyx first calibration": (write_astyx, "astyx:{folder}", "calibration/000001.json"),
     "astyx calibration": (write_astyx, "astyx:{folder}", "calibration/000002.json"),
     "astyx labels": (write_astyx, "astyx:{folder}", "groundtruth_obj3d/000002.json"),
     "kitti velodyne": (write_kitti, "kitti:{folder}", "velodyne/0000000001.bin"),
-    "kitti picture": (write_kitti, "kitti:{folder}", "image_02/0000000001.png"),
+    "kitti image": (write_kitti, "kitti:{folder}", "image_02/0000000001.png"),
     "kitti calibration": (write_kitti, "kitti:{folder}", "calib/0000000001.txt"),
     "kitti labels": (write_kitti, "kitti:{folder}", "label_2/0000000001.txt"),
     "kitti oxts": (write_kitti_raw, "kitti:{folder}", "oxts/data/0000000001.txt"),

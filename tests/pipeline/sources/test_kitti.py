@@ -169,7 +169,7 @@ def test_a_cut_picture_says_so(kitti: Path) -> None:
     path.write_bytes(path.read_bytes()[:-20])
     frame = open_source(f"kitti:{kitti}").frame(2)
     assert frame.picture is None
-    assert frame.notes == ("0000000002.png: the picture is truncated",)
+    assert frame.notes == ("0000000002.png: the image is truncated",)
 
 
 @pytest.mark.parametrize(
@@ -233,7 +233,7 @@ def test_a_drive_whose_sweeps_end_out_of_order_has_its_lidar(data_dir: Path) -> 
 
 
 def test_real_labels_land_on_their_2d_boxes(data_dir: Path) -> None:
-    """Independent of our own chain: each label line also holds the box that a person drew in the picture."""
+    """Independent of our own chain: each label line also holds the box that a person drew in the image."""
     folder = data_dir / "kitti_0052"
     source = open_source(f"kitti:{folder}")
     overlaps = []
@@ -245,7 +245,7 @@ def test_real_labels_land_on_their_2d_boxes(data_dir: Path) -> None:
         lines = (folder / "label_2" / f"{frame.name}.txt").read_text().splitlines()
         drawn = [line.split() for line in lines if not line.startswith("DontCare")]
         for words, item in zip(drawn, truth, strict=True):
-            if float(words[1]) > 0.0:  # cut by the picture's edge
+            if float(words[1]) > 0.0:  # cut by the image's edge
                 continue
             box = project_cuboid(alignment, item.cuboid.corners(), 1242, 375)
             assert box is not None

@@ -1,4 +1,4 @@
-"""Tiny ONNX networks for tests: real graphs that onnxruntime runs, whose answers follow from the picture itself."""
+"""Tiny ONNX networks for tests: real graphs that onnxruntime runs, whose answers follow from the image itself."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def yolox(path: Path, size: tuple[int | str, int | str] = (64, 64), baked_size: 
 
 
 def yolov8(path: Path, size: tuple[int, int] = (64, 64)) -> Path:
-    """A v8-shaped network whose grid is a constant of its own size, with one sure "lorry" per picture: the box around
-    the whole input. Its score is the picture's mean red, which tells RGB from BGR and 0–1 from 0–255."""
+    """A v8-shaped network whose grid is a constant of its own size, with one sure "lorry" per image: the box around
+    the whole input. Its score is the image's mean red, which tells RGB from BGR and 0–1 from 0–255."""
     cells = sum((size[0] // s) * (size[1] // s) for s in (8, 16, 32))
     boxes = np.zeros((1, 4, cells), np.float32)
     boxes[0, :, 0] = (size[1] / 2, size[0] / 2, size[1], size[0])
@@ -92,8 +92,8 @@ def yolov8(path: Path, size: tuple[int, int] = (64, 64)) -> Path:
 
 
 def detr(path: Path) -> Path:
-    """A DETR-shaped network of 64×64 with a second input for the size of the picture, in whose pixels its boxes are: a
-    car in the left upper quarter and a person on the right. Both score the picture's mean red."""
+    """A DETR-shaped network of 64×64 with a second input for the size of the image, in whose pixels its boxes are: a
+    car in the left upper quarter and a person on the right. Both score the image's mean red."""
     weights = [
         _constant("shares", np.array([[[0.0, 0.0, 0.5, 0.5], [0.75, 0.0, 1.0, 1.0]]], np.float32)),
         _constant("numbers", np.array([[2, 0]], np.int64)),

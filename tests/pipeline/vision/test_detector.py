@@ -22,7 +22,7 @@ def _no_installed_models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def _road(height: int, width: int, lamp: tuple[int, int]) -> np.ndarray:
-    """A black picture with one bright patch of 16×16 pixels, its upper left corner at ``lamp`` x, y."""
+    """A black image with one bright patch of 16×16 pixels, its upper left corner at ``lamp`` x, y."""
     picture = np.zeros((height, width, 3), np.uint8)
     picture[lamp[1] : lamp[1] + 16, lamp[0] : lamp[0] + 16] = 255
     return picture
@@ -47,7 +47,7 @@ def test_input_size_follows_the_picture(
 
 @pytest.mark.parametrize("size", [(64, 64), ("height", "width")], ids=["fixed", "free"])
 def test_a_bright_patch_is_found_where_it_is(tmp_path: Path, size: tuple[int | str, int | str]) -> None:
-    """The picture is 512×128 and the input 256×64 or larger: boxes come back in picture pixels."""
+    """The image is 512×128 and the input 256×64 or larger: boxes come back in image pixels."""
     detector = open_detector(str(networks.yolox(tmp_path / "tiny.onnx", size)), (512, 128))
     assert detector.input_size == (128, 512)
     raw = detector.detect(_road(128, 512, (320, 64)))
@@ -110,7 +110,7 @@ def test_a_detr_gives_boxes_in_the_pictures_pixels(tmp_path: Path) -> None:
 
 
 def test_the_rest_of_the_input_is_grey(tmp_path: Path) -> None:
-    """A black picture that fills a quarter of the input leaves a mean of three quarters of 114."""
+    """A black image that fills a quarter of the input leaves a mean of three quarters of 114."""
     detector = open_detector(str(networks.yolov8(tmp_path / "v8.onnx")), None)
     raw = detector.detect(np.zeros((16, 64, 3), np.uint8))
     assert raw.scores[0] == pytest.approx(0.75 * 114 / 255, abs=1e-5)
@@ -177,7 +177,7 @@ def test_an_impossible_input_size_is_refused(tmp_path: Path, size: tuple[int, in
 )
 def test_what_is_no_picture_is_refused(tmp_path: Path, picture: np.ndarray) -> None:
     detector = open_detector(str(networks.yolox(tmp_path / "tiny.onnx")), None)
-    with pytest.raises(DetectorError, match="expected a picture"):
+    with pytest.raises(DetectorError, match="expected an image"):
         detector.detect(picture)
 
 

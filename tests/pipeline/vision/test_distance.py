@@ -111,7 +111,7 @@ def test_in_print_only_cars_have_a_distance() -> None:
     ids=[
         "cut above",
         "cut below",
-        "filling the picture but for a network's error",
+        "filling the image but for a network's error",
         "cut at the side",
         "whole",
         "no height",

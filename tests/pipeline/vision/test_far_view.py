@@ -32,9 +32,9 @@ def frame(ego: EgoState | None = None, seen_by: CameraCalibration | None = None)
 @pytest.mark.parametrize(
     ("case", "of", "expected"),
     [
-        ("no camera: the middle of the picture", None, (816, 96, 1232, 512)),
+        ("no camera: the middle of the image", None, (816, 96, 1232, 512)),
         ("around the vanishing point", frame(None, camera()), (800, 96, 1216, 512)),
-        ("at the picture's edge it stays inside", frame(None, camera(2000.0, 20.0)), (1632, 0, 2048, 416)),
+        ("at the image's edge it stays inside", frame(None, camera(2000.0, 20.0)), (1632, 0, 2048, 416)),
         ("a bend to the left of 200 m", frame(EgoState(0, 20.0, 0.1), camera()), (528, 96, 944, 512)),
         ("the same to the right", frame(EgoState(0, 20.0, -0.1), camera()), (1072, 96, 1488, 512)),
         ("noise of the yaw rate", frame(EgoState(0, 20.0, 0.001), camera()), (800, 96, 1216, 512)),
@@ -97,7 +97,7 @@ def raw(boxes: list[list[float]], scores: list[float]) -> RawBoxes:
 
 
 class Answers:
-    """Gives the same boxes for every picture, and counts."""
+    """Gives the same boxes for every image, and counts."""
 
     notes: tuple[str, ...] = ()
 

@@ -53,7 +53,7 @@ def _yolox() -> list[np.ndarray]:
 
 def _rows_with_objectness(count: int) -> list[np.ndarray]:
     out = np.zeros((1, count, 5 + CLASSES), np.float32)
-    out[0, :, :2] = 40.0  # centres of what scores nothing lie in the picture, as in a real output
+    out[0, :, :2] = 40.0  # centres of what scores nothing lie in the image, as in a real output
     out[0, [7, 20]] = np.column_stack([_centre_size(), _class_rows(True)])
     return [out]
 

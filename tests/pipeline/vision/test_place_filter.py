@@ -32,7 +32,7 @@ def seen(range_m: float, u: float = 600.0, height_px: float | None = None) -> Vi
 
 
 def follow(pictures: list[list[VisionMeasurement]], ego_mps: float | None = 10.0) -> list[tuple[VisionTrack, ...]]:
-    """Every picture's tracks, ten pictures a second."""
+    """Every image's tracks, ten images a second."""
     state, shown = VisionTrackerState(), []
     for k, boxes in enumerate(pictures):
         state, tracks = track(state, tuple(boxes), 0.1 if k else None, PARAMS, ego_mps)
@@ -63,7 +63,7 @@ def test_a_growing_box_is_a_closing_speed() -> None:
 
 
 def test_a_small_box_does_not_become_its_neighbour() -> None:
-    """Parked cars 55 m away, 30 px apart: when one is missed for three pictures, its number does not go to the next."""
+    """Parked cars 55 m away, 30 px apart: when one is missed for three images, its number does not go to the next."""
     left, right = (lambda k: seen(55.0 - k, 560.0)), (lambda k: seen(55.0 - k, 590.0))
     shown = follow([[left(k)] for k in range(5)] + [[right(k)] for k in range(5, 8)])
     (first,) = shown[4]
@@ -73,7 +73,7 @@ def test_a_small_box_does_not_become_its_neighbour() -> None:
 
 
 def test_one_wrong_height_is_refused_and_the_place_kept() -> None:
-    """For one picture the network draws the upper half of the car: twice as far, by its height."""
+    """For one image the network draws the upper half of the car: twice as far, by its height."""
     shown = follow([[seen(24.0)]] * 8 + [[seen(42.0, height_px=29.0)]] + [[seen(24.0)]], 0.0)
     assert [each.id for each in shown[8]] == [shown[0][0].id], "it keeps its number"
     assert not shown[8][0].measured
@@ -82,7 +82,7 @@ def test_one_wrong_height_is_refused_and_the_place_kept() -> None:
 
 
 def test_a_place_that_is_contradicted_for_long_begins_anew() -> None:
-    """The filter was wrong, not the pictures: it must be called back, with its speed to be measured again."""
+    """The filter was wrong, not the images: it must be called back, with its speed to be measured again."""
     shown = follow([[seen(12.0, height_px=60.0)]] * 8 + [[seen(45.0, height_px=45.0)]] * 4, 0.0)
     assert shown[-1][0].distance_m == pytest.approx(45.0, rel=0.05)
     assert shown[-1][0].ranges < 4

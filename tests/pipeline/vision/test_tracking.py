@@ -149,7 +149,7 @@ def test_kalman_follows_a_box_that_crosses_the_picture() -> None:
 
 
 def test_one_absurd_distance_hardly_moves_the_track() -> None:
-    """A box of half the car doubles its distance for one picture, as it happens on real ones."""
+    """A box of half the car doubles its distance for one image, as it happens on real ones."""
     steady = [(_car(24.0),)] * 8
     good = _car(24.0)
     half = VisionMeasurement(good.detection, 44.0, 2.2, (44.0, 0.0))
@@ -221,7 +221,7 @@ def test_every_detection_is_in_one_track_and_tracks_are_bounded(
 
 
 def test_a_standing_car_ahead_of_a_fast_ego_car_is_soon_known_to_stand() -> None:
-    """Twelve pictures of a car that 28 m/s bring nearer: with the own speed known, its closing speed is right soon."""
+    """Twelve images of a car that 28 m/s bring nearer: with the own speed known, its closing speed is right soon."""
 
     def closing_mps(ego_speed_mps: float | None) -> float:
         state = VisionTrackerState()
@@ -236,7 +236,7 @@ def test_a_standing_car_ahead_of_a_fast_ego_car_is_soon_known_to_stand() -> None
 
 
 def test_a_carried_box_on_a_seen_one_is_a_ghost() -> None:
-    """A car jumps in the picture by more than the gate and gets a new number: the old one must not stay beside it."""
+    """A car jumps in the image by more than the gate and gets a new number: the old one must not stay beside it."""
     gone = [(_car(20.0, 0.0),)] * 3 + [(_car(20.0, 0.0), _car(20.0, 6.0))] * 2
     shown = _drive([*gone, (_car(21.0, 0.1, label="person"), _car(20.0, 6.0))], KALMAN)
     assert [track.carried for track in shown[-1]] == [True, False, False], "another kind of object is no ghost's heir"

@@ -68,7 +68,7 @@ FACTORS = {"car": 1.0, "truck": 2.4}
 
 
 def called(label: str, range_m: float) -> VisionMeasurement:
-    """A truck at a range, by whatever name the detector gives it in this picture."""
+    """A truck at a range, by whatever name the detector gives it in this image."""
     one = seen(range_m / FACTORS["truck"] * FACTORS[label])
     box = seen(range_m / FACTORS["truck"]).detection.bbox
     return replace(one, detection=Detection(box, label, 0.8), class_factors=FACTORS)

@@ -46,9 +46,9 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         drive: Annotated[str, Query(max_length=LONGEST_ITEM)],
         format: FormatName = "native",
     ) -> Response:
-        """Import labels that another tool made. The body is the file; for a format that is a folder, a .zip of
-        it. They come beside those that are there, as one act. state.labels.task tells how far it is. drive: id of the
-        recording that is meant; 409 when another one is open."""
+        """Import labels that another tool wrote. The body is the file, or a .zip of the folder. They are added to the
+        labels that exist, as one act; state.labels.task has the progress. drive: id of the recording; 409 when another
+        one is open."""
         path = _new_file()
         try:
             with path.open("wb") as file:

@@ -209,7 +209,7 @@ def _changes(labels: LabelSet, drive: LabeledDrive) -> tuple[str, ...]:
     ]
     cameras = [drive.shots[sighting.frame].camera for _, sighting in found if sighting.bbox is not None]
     if any(camera is not None and camera.distortion.size for camera in cameras):
-        changes.append("boxes are moved to the undistorted picture, as in KITTI")
+        changes.append("boxes are moved to the undistorted image, as in KITTI")
     hidden = sum(sighting.cuboid is not None and sighting.occlusion is None for _, sighting in found)
     if hidden:
         changes.append(f"occlusion of {hidden:,} objects is unknown: written as 3")
@@ -218,7 +218,7 @@ def _changes(labels: LabelSet, drive: LabeledDrive) -> tuple[str, ...]:
         changes.append(f"{flat:,} objects have a box but no cuboid: written as {DONT_CARE}, which trainers ignore")
     without = sum(sighting.bbox is None for _, sighting in found)
     if without:
-        changes.append(f"{without:,} objects have no box in the picture: written as -1")
+        changes.append(f"{without:,} objects have no box in the image: written as -1")
     return tuple(changes)
 
 

@@ -1,7 +1,7 @@
 """Lines of KITTI's label files (devkit_object/readme.txt, devkit_tracking/readme.txt).
 
 ``type truncated occluded alpha x1 y1 x2 y2 height width length x y z rotation_y``; tracking puts the frame and the
-track in front. Pictures are rectified there: boxes of a lens that bends are moved to where a straight one would see
+track in front. Images are rectified there: boxes of a lens that bends are moved to where a straight one would see
 them. What is not known is −1, −1000 for places and −10 for angles, as in ``DontCare`` lines.
 """
 
@@ -55,7 +55,7 @@ def to_line(label: str, sighting: Sighting, T_rect_ego: F64, camera: CameraCalib
 
 
 def from_fields(fields: list[str], T_rect_ego: F64, camera: CameraCalibration | None, what: str) -> LabelRow:
-    """One line that was split at its blanks, its box in the raw picture. BadInput, beginning with ``what``, when it is
+    """One line that was split at its blanks, its box in the raw image. BadInput, beginning with ``what``, when it is
     none."""
     try:
         row = parse_row(fields, inverse(T_rect_ego))
@@ -65,7 +65,7 @@ def from_fields(fields: list[str], T_rect_ego: F64, camera: CameraCalibration | 
 
 
 def straightened(box: Box, camera: CameraCalibration) -> Box:
-    """Two corners of a box in the raw picture, where they are in the undistorted one (same K)."""
+    """Two corners of a box in the raw image, where they are in the undistorted one (same K)."""
     if not camera.distortion.size:
         return box
     corners = np.array(box, dtype=np.float64).reshape(-1, 1, 2)

@@ -249,7 +249,7 @@ def _poses(drive: LabeledDrive) -> tuple[list[F64], bool]:
 
 
 def _changes(labels: LabelSet, drive: LabeledDrive, is_known: bool) -> tuple[str, ...]:
-    changes = ["pictures and point clouds are not written, only their file names"]
+    changes = ["images and point clouds are not written, only their file names"]
     if not is_known:
         changes.append("ego speed or yaw rate is unknown: the global frame is each frame's ego frame")
     if any(shot.camera is not None and shot.camera.distortion.size for shot in drive.shots):

@@ -1,7 +1,7 @@
 """ASAM OpenLABEL 1.0: tracks are objects with a cuboid and a bbox a frame, the lead is a relation to the ego vehicle.
 
 Cuboids are ``x y z qx qy qz qw sx sy sz`` in the coordinate system ``ego``, bboxes ``x y w h`` around their centre,
-in pixels of the raw picture. What a relation has no place for (states, who made it, that nobody leads) is an action of
+in pixels of the raw image. What a relation has no place for (states, who made it, that nobody leads) is an action of
 the same number. Frame intervals include both ends. Nothing of a label set is lost.
 """
 

@@ -1,4 +1,4 @@
-"""A camera of any kind as one input: its pictures, with the time at which each was taken as well as it can be known."""
+"""A camera of any kind as one input: its images, with the time at which each was taken as well as it can be known."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from pipeline.sources.live.devices.sensor_input import Deliver
 from pipeline.sources.live.health import StreamStats
 from pipeline.types.camera_shot import Shot, is_whole_jpeg
 
-_ARRIVAL = "sends no time stamps: pictures are stamped on arrival"
+_ARRIVAL = "sends no time stamps: images are stamped on arrival"
 
 
 class CameraInput:
-    """A camera that stamps its pictures is followed by its own clock; of others, a picture's time is when it came."""
+    """A camera that stamps its images is followed by its own clock; of others, an image's time is when it came."""
 
     def __init__(self, config: CameraConfig, clock: HostClock, deliver: Deliver[Shot]) -> None:
         self.stats = StreamStats("camera")

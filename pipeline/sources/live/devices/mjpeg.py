@@ -12,7 +12,7 @@ from pipeline.sources.live.devices.device_reader import CONNECT_S, SILENCE_S, De
 _LARGEST = 32 << 20
 _LONGEST_LINE = 8192
 _MOST_LINES = 100
-"""Between two pictures: a part's headers are a handful."""
+"""Between two images: a part's headers are a handful."""
 _STAMPS = ("x-timestamp", "x-sendtimestamp")
 """Seconds since 1970, as mjpg-streamer, µStreamer and others send it."""
 

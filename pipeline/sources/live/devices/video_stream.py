@@ -54,7 +54,7 @@ def play_file(path: Path, receive: Receive, stop: Stop) -> None:
         except (av.FFmpegError, OSError, ValueError) as error:
             raise DeviceLost(f"{path}: {_reason(error)}") from None
         if not shown:
-            raise DeviceLost(f"{path}: no pictures")
+            raise DeviceLost(f"{path}: no images")
 
 
 def read_device(device: int | str, receive: Receive, stop: Stop) -> None:
@@ -69,7 +69,7 @@ def read_device(device: int | str, receive: Receive, stop: Stop) -> None:
         while not stop:
             ok, pixels = capture.read()
             if not ok or pixels is None:
-                raise DeviceLost(f"camera {device}: delivers no pictures")
+                raise DeviceLost(f"camera {device}: delivers no images")
             receive(Shot(pixels=np.ascontiguousarray(pixels, dtype=np.uint8)))
     finally:
         capture.release()
@@ -87,7 +87,7 @@ def device_number(device: int | str) -> int:
 
 
 def _shots(container: av.container.InputContainer) -> Iterator[tuple[Shot, float]]:
-    """Each picture with its time in the video, seconds. JPEGs are handed on as they are."""
+    """Each image with its time in the video, seconds. JPEGs are handed on as they are."""
     if not container.streams.video:
         raise ValueError("no video stream")
     stream = container.streams.video[0]

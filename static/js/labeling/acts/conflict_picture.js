@@ -1,4 +1,4 @@
-/** What two people said of the same frames, as pictures: from above among the points, in the image, or as a range. */
+/** What two people said of the same frames, as images: from above among the points, in the image, or as a range. */
 import { el } from "../../core/dom.js";
 import { ui } from "../../core/colors.js";
 import { get } from "../../core/store.js";

@@ -45,9 +45,9 @@ export function exportButton() {
 }
 
 const ONLY = /** @type {const} */ ([
-  ["all", "All", "Everything, with each label's state where the format has one"],
-  ["accepted", "Accepted", "What somebody has accepted or corrected"],
-  ["reviewed", "Reviewed", "What a second person has found right"],
+  ["all", "All", "All labels, with their state if the format has a field for it"],
+  ["accepted", "Accepted", "Labels that somebody accepted or corrected"],
+  ["reviewed", "Reviewed", "Labels that a second person approved"],
 ]);
 /** Which labels are exported. @type {"all"|"accepted"|"reviewed"} */
 let only = "all";

@@ -53,7 +53,7 @@ export function setUp(parent) {
       button("Send back", "H", "Send back with a comment", review.sendBack),
       button("Reviewed", "Shift H", "Approve as a second annotator", review.reviewOk),
       button("Snap", "S", "Fit the cuboid to the points", commands.snap),
-      button("Turn round", "Shift X", "Front and rear are mistaken: turn the whole track round", commands.flip),
+      button("Turn round", "Shift X", "Front and rear are swapped: turn the whole track round", commands.flip),
       button("Size along", "W", "Apply this size to the whole track", commands.sizeAlong),
       button("Keyframe", "K", "Set a keyframe in this frame", commands.keyframe),
       button("Box follows", "Shift S", "The image box follows the cuboid again", commands.boxFollows),
@@ -87,9 +87,9 @@ function showClass(label) {
 /** How front and rear of a proposal were told apart. */
 const HEADINGS = {
   "": "",
-  motion: "faces the way it drives",
-  lane: "faces the way of the lane",
-  unknown: "front and rear not told apart: turn it round (Shift X), or accept it as it is",
+  motion: "heading from its motion",
+  lane: "heading assumed from the lane",
+  unknown: "front and rear unclear: turn it round (Shift X), or accept it as it is",
 };
 
 function show() {

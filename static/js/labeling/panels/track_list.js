@@ -38,8 +38,8 @@ const slider = el("input", {
     min: "0",
     max: "1",
     step: "0.05",
-    title: "How sure a proposal must be to be listed and drawn",
-    aria: { label: "Least confidence of proposals" },
+    title: "Proposals below this confidence are hidden",
+    aria: { label: "Minimum confidence of proposals" },
   }),
   above = el("span", { class: "facts above" }),
   reject = el("button", {

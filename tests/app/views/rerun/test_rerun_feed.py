@@ -57,7 +57,7 @@ def test_shown_frames_reach_a_viewer_also_one_that_comes_late(engine: Engine, tm
         finally:
             viewer.kill()
             viewer.wait()
-    assert saved.stat().st_size > 20_000, "a sweep and a picture"
+    assert saved.stat().st_size > 20_000, "a sweep and an image"
 
 
 @pytest.mark.parametrize("url", ["", "nowhere", "http://127.0.0.1:9876", "rerun+http://127.0.0.1/proxy"])

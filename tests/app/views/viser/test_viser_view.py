@@ -260,7 +260,7 @@ def test_display_choices_redraw_the_frame_that_is_shown(
     client.move(client.inputs("Labels")[0]["uuid"], "all")
     client.read_until(lambda each: each.get("name") == "/labels/2" and "props" in each)
     assert client.texts() == ["#7 car 19.9 m", "#8 obstacle 15.9 m", "#9 truck 45.0 m carried"]
-    client.move(client.inputs("Camera picture")[0]["uuid"], False)
+    client.move(client.inputs("Camera image")[0]["uuid"], False)
     client.read_until(lambda each: each.get("name") == "/camera/picture" and each.get("visible") is False)
 
 

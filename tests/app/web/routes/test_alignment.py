@@ -34,4 +34,4 @@ def test_a_score_in_words(found: EdgeScore, brief: str, told: str):
 def test_without_a_picture_there_is_nothing_to_match():
     said = _json(EdgeScore(None, None, 0), 0)
     assert (said.score, said.brief) == (None, "nothing to match")
-    assert "both a picture and LiDAR points" in said.text
+    assert "both an image and LiDAR points" in said.text

@@ -310,7 +310,7 @@ def test_every_route_of_the_timeline_is_described(client: httpx.Client):
 
 
 def test_the_alignment_is_scored(client: httpx.Client):
-    """Each picture of the small recording has one car's sides, and its points' borders lie elsewhere."""
+    """Each image of the small recording has one car's sides, and its points' borders lie elsewhere."""
     found = client.get("/api/alignment/score").json()
     assert set(found) == {"score", "sigmas", "borders", "better", "brief", "text"}
     assert found["borders"] >= FEWEST

@@ -1,4 +1,4 @@
-"""Where a cuboid lies in the shown picture, as the page asks while a hand moves it."""
+"""Where a cuboid lies in the shown image, as the page asks while a hand moves it."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ def test_undistorted_pictures_with_the_distortion_of_raw_ones_are_noticed(are_un
 
 def test_a_fit_in_words():
     fit = fit_alignment(made(), "pinhole", AlignmentParams())
-    assert "boxes of frames set aside" in overlap_sentence(fit)
+    assert "boxes of held-out frames" in overlap_sentence(fit)
     assert "too short" in overlap_sentence(replace(fit, held_out=False, before=None))
 
 

@@ -27,7 +27,7 @@ from pipeline.simulation.unseen import frames
 from pipeline.sources.simulated import SimulatedSource
 from pipeline.step import State, step
 
-BROKEN = "existence not weighed"
+BROKEN = "no existence estimate"
 SHORT_S = 8.0
 
 
@@ -79,7 +79,7 @@ def test_rates_come_with_bounds_and_a_demand_fails_only_when_it_surely_does() ->
     assert poisson_bounds(0) == pytest.approx((0.0, 3.689), abs=1e-3)  # Garwood's table
     assert poisson_bounds(10) == pytest.approx((4.795, 18.390), abs=1e-3)
     full = Failure("phantom full braking", "nothing there, by camera", 1.0, 1.4, "#7")
-    missed = Failure("lead missed", "no lead, true one within 20 m", 3.0, 4.0, "car 1")
+    missed = Failure("lead missed", "no lead, true lead within 20 m", 3.0, 4.0, "car 1")
     cases = [Kilometre(0, number) for number in range(2)]
     outcomes = [DriveOutcome(1.0, 60.0, {AS_IS: (full, missed)}), DriveOutcome(1.0, 60.0, {AS_IS: ()})]
     section = report(cases, outcomes)

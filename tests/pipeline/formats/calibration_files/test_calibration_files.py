@@ -54,7 +54,7 @@ def test_a_rig_file_is_that_of_captures(tmp_path: Path):
 
 
 def test_kitti_needs_the_size(tmp_path: Path):
-    with pytest.raises(SourceError, match="size of the pictures"):
+    with pytest.raises(SourceError, match="image size"):
         FORMATS["kitti"].read(written("kitti", STRAIGHT, tmp_path), None)  # type: ignore[misc]
 
 

@@ -117,7 +117,7 @@ def test_labels_that_cannot_be_are_not_written(what: str, tmp_path: Path) -> Non
 
 
 def seen_set(here: LabeledDrive) -> LabelSet:
-    """Four cars with the boxes that they have in the picture."""
+    """Four cars with the boxes that they have in the image."""
     eye = here.shots[0].camera
     assert eye is not None
     tracks = []

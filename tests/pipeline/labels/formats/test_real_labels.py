@@ -68,7 +68,7 @@ def test_kitti_lines_are_what_they_were(kitti: tuple[Path, LabeledDrive], tmp_pa
 def test_the_truth_of_a_kitti_recording_is_what_its_label_files_say(
     kitti: tuple[Path, LabeledDrive], tmp_path: Path
 ) -> None:
-    """Boxes in the picture, who is who, and what is taken for another class: also of a session made of it."""
+    """Boxes in the image, who is who, and what is taken for another class: also of a session made of it."""
     folder, drive = kitti
     found = import_labels(folder / "label_2", drive, "kitti", IMPORT)
     source = open_source(f"kitti:{folder}")

@@ -16,6 +16,7 @@ from pipeline.common.geometry import Cuboid
 from pipeline.labels.boxes import following
 from pipeline.labels.formats import base, native
 from pipeline.labels.formats.base import LabeledDrive
+from pipeline.labels.formats.parts import EVERYTHING
 from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.recording.rewrite import clip
@@ -34,18 +35,21 @@ def there_and_back(labels: LabelSet, here: LabeledDrive, name: FormatName, folde
 
 
 def wanted(labels: LabelSet, name: FormatName) -> LabelSet:
-    if name not in ("native", "nuscenes"):
+    """What a format can hold of the labels, by its registration."""
+    holds = FORMATS[name].holds
+    if "boxes" in holds and not FORMATS[name].as_stored:
         labels = following(labels, drive())
-    match name:
-        case "kitti" | "kitti-tracking":
-            return regions_named(plain(labels), by_frame=name == "kitti")
-        case "nuscenes":
-            return plain(labels, boxes=False)
-        case "coco":
-            return plain(labels, cuboids=False)
-        case "csv":
-            return replace(plain(labels), tracks=(), leads=tuple(r for r in labels.leads if r.state != "rejected"))
-    return labels
+    if holds == EVERYTHING:
+        return labels
+    if "leads" in holds:
+        return replace(plain(labels), tracks=(), leads=tuple(r for r in labels.leads if r.state != "rejected"))
+    kept = plain(labels, cuboids="cuboids" in holds, boxes="boxes" in holds)
+    return regions_named(kept, by_frame=name == "kitti") if name.startswith("kitti") else kept
+
+
+def is_anonymous(name: FormatName) -> bool:
+    """It does not say which sightings are of one track."""
+    return "identities" not in FORMATS[name].holds and "leads" not in FORMATS[name].holds
 
 
 def regions_named(labels: LabelSet, by_frame: bool) -> LabelSet:
@@ -65,19 +69,19 @@ def regions_named(labels: LabelSet, by_frame: bool) -> LabelSet:
 
 @pytest.mark.parametrize("name", [name for name in FORMATS if name != "mcap"])
 def test_what_can_be_held_comes_back(name: FormatName, monkeypatch: pytest.MonkeyPatch) -> None:
-    # boxes and cuboids made up apart lie apart in the picture; the check for that has tests of its own
+    # boxes and cuboids made up apart lie apart in the image; the check for that has tests of its own
     monkeypatch.setattr(base, "_FEWEST_PAIRS", 10**9)
     here = drive()
 
     @settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
     @given(label_sets())
     def holds(labels: LabelSet) -> None:
-        if name == "kitti" and not plain(labels).tracks:
+        if is_anonymous(name) and not plain(labels).tracks:
             return  # nothing labelled gives no file
         if name == "csv":
             labels = replace(labels, leads=_apart(labels.leads))
         with tempfile.TemporaryDirectory() as folder:
-            same = assert_same_alone if name == "kitti" else assert_same
+            same = assert_same_alone if is_anonymous(name) else assert_same
             same(there_and_back(labels, here, name, Path(folder)), wanted(labels, name), 2e-5)
 
     holds()
@@ -133,7 +137,7 @@ LOSSES: dict[FormatName, tuple[str, ...]] = {
         "1 track without sightings", "occlusion of 3 objects is unknown", "3 frames have no file",
     ),
     "kitti-tracking": ("2 ranges of the lead", "2 labels left out: rejected", "1 event", "who made each label"),
-    "nuscenes": ("3 boxes in pictures not written", "1 sighting not written", "pictures and point"),
+    "nuscenes": ("3 boxes in images not written", "1 sighting not written", "images and point"),
     "coco": ("3 cuboids not written", "1 frame tag"),
     "csv": ("4 tracks not written", "1 frame of the ego path", "1 rejected ranges", "'frozen'"),
 }  # fmt: skip

@@ -50,7 +50,7 @@ FRAMES: dict[str, Frame] = {
     "nothing": Frame(0, "empty", 0),
     "no LiDAR": replace(full(0), sweep=None),
     "no camera": replace(full(0), picture=None, camera=None),
-    "a picture that is no JPEG": replace(full(0), picture=picture(3, ".png", t_ns=5)),
+    "an image that is no JPEG": replace(full(0), picture=picture(3, ".png", t_ns=5)),
     "a camera without stamps": replace(full(0), picture=picture(3)),
     "a sweep without times of points": replace(full(0), sweep=sweep(1)),
     "an empty sweep": replace(full(0), sweep=sweep(1, points=0)),

@@ -1,4 +1,4 @@
-"""What the lens does to a picture: geometry against OpenCV's own distortion, noise and exposure by the numbers."""
+"""What the lens does to an image: geometry against OpenCV's own distortion, noise and exposure by the numbers."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_nothing_far_outside_folds_back_into_the_picture() -> None:
 
 @pytest.mark.parametrize(("k1", "k2"), LENSES)
 def test_long_straight_edges_are_drawn_bent(k1: float, k2: float) -> None:
-    """A bar across the upper part of the picture, of one polygon with four corners: its middle line against OpenCV."""
+    """A bar across the upper part of the image, of one polygon with four corners: its middle line against OpenCV."""
     model = calibration(CameraModel(**{**PERFECT, "k1": k1, "k2": k2}))
     picture = np.zeros((720, 1280, 3), dtype=np.uint8)
     canvas = Canvas(picture, model)

@@ -69,6 +69,6 @@ def test_false_boxes_stand_in_the_world_and_are_as_many_as_measured() -> None:
     boxes = [detector.boxes(world_state.at(scene, n / 10.0), CAMERA, n).boxes for n in range(scene.frame_count())]
     counts = np.array([len(each) for each in boxes])
     of = measured().false_boxes
-    assert 0.5 * of.per_frame < counts.mean() < 1.2 * of.per_frame  # some are outside of this narrower picture
+    assert 0.5 * of.per_frame < counts.mean() < 1.2 * of.per_frame  # some are outside of this narrower image
     lasting = [(iou_matrix(a, b).max(axis=1) > 0.25).mean() for a, b in pairwise(boxes) if len(a) and len(b)]
     assert np.mean(lasting) == pytest.approx(of.lasts, abs=0.15)

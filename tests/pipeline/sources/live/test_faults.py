@@ -45,7 +45,7 @@ def after(taken: list[Taken]) -> list[Taken]:
 
 
 def assert_well(taken: list[Taken]) -> None:
-    """Sweep with picture and own motion, ten times a second."""
+    """Sweep with image and own motion, ten times a second."""
     assert len(taken) >= 4
     assert all(each.frame.sweep is not None and each.frame.picture is not None for each in taken)
     assert all(each.frame.ego is not None and each.frame.gnss is not None for each in taken)
@@ -159,7 +159,7 @@ def test_a_picture_that_is_damaged_inside_is_said() -> None:
     events = [event._replace(payload=broken) if event.sensor == "camera" else event for event in events]
     taken = bench.drive(iter(events))
     assert all(each.frame.picture is None for each in taken)
-    assert "the picture is damaged" in taken[-1].frame.notes
+    assert "the image is damaged" in taken[-1].frame.notes
 
 
 def test_a_picture_of_another_size_than_calibrated_is_not_projected_into() -> None:
@@ -170,7 +170,7 @@ def test_a_picture_of_another_size_than_calibrated_is_not_projected_into() -> No
     events = (event for event in sent([], seconds=1.0) if event.sensor != "gnss")
     frame = bench.drive(events)[-1].frame
     assert frame.camera is None
-    assert "pictures are 64×48, but the calibration is for 1280×720: calibration not used" in frame.notes
+    assert "images are 64×48, but the calibration is for 1280×720: calibration not used" in frame.notes
 
 
 def test_offsets_are_turned_while_it_runs() -> None:
@@ -181,7 +181,7 @@ def test_offsets_are_turned_while_it_runs() -> None:
     both = sorted(moved.keys() & stood.keys())
     assert len(both) > 20
     steps = {round((moved[t] - stood[t]) / 1e6) for t in both}
-    assert steps <= {-15, 18}, "15 ms earlier, or the next picture of 33 ms"
+    assert steps <= {-15, 18}, "15 ms earlier, or the next image of 33 ms"
 
 
 def test_whoever_takes_too_late_gets_the_newest_and_the_rest_is_counted() -> None:

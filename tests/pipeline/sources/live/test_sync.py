@@ -163,7 +163,7 @@ def test_the_camera_takes_over_when_lidar_falls_silent_and_gives_back_when_it_re
     assert "LCCC" in kinds
     assert kinds.rstrip("L").endswith("C")
     first_camera = next(arrived for t, kind, arrived in ticked if kind == "C" and t > 300)
-    assert first_camera - 351.0 < 400.0, "not longer than three periods and a picture"
+    assert first_camera - 351.0 < 400.0, "not longer than three periods and an image"
     assert ticked[-1][1] == "L"
     assert ticked[-1][2] - 1251.0 <= 101.0, "the LiDAR ticks again within a sweep of its return"
 

@@ -206,7 +206,7 @@ WRONG = {
     "no such topic": ("rosbag:{0}/drive?lidar=/nope", "lidar=/nope: no such topic; there are /fix, /front/camera_info"),
     "wrong kind": ("rosbag:{0}/drive?lidar=/fix", "lidar=/fix: its messages are NavSatFix, not PointCloud2 or"),
     "no option": ("rosbag:{0}/drive?radar=/x", "unknown option 'radar'"),
-    "nothing left": ("rosbag:{0}/drive?lidar=none&camera=none", "no LiDAR and no picture topic; its topics are"),
+    "nothing left": ("rosbag:{0}/drive?lidar=none&camera=none", "no LiDAR and no image topic; its topics are"),
 }
 
 

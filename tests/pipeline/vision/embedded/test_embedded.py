@@ -1,4 +1,4 @@
-"""The built-in detector, on pictures it was not trained on: a few of each of the seeds of which
+"""The built-in detector, on images it was not trained on: a few of each of the seeds of which
 ``python -m pipeline.training.evaluate`` draws many more. The lead's floor is what the card claims."""
 
 from __future__ import annotations

@@ -86,7 +86,7 @@ def test_pictures_come_as_they_are(
         ("not found", b"HTTP/1.0 404 Not Found\r\n\r\n", "HTTP 404"),
         ("no HTTP", b"\x00\x01\x02\r\n\r\n", "unexpected response"),
         ("nothing", b"", "unexpected response"),
-        ("cut in a picture", MULTIPART + part(small_jpeg(), "Content-Length: 99999"), "closed the connection"),
+        ("cut in an image", MULTIPART + part(small_jpeg(), "Content-Length: 99999"), "closed the connection"),
         ("headers without end", MULTIPART + b"A: b\r\n" * 1000 + part(small_jpeg()), "headers without end"),
         ("a line without end", MULTIPART + b"A:" + b"b" * 100_000 + b"\n" + part(small_jpeg()), "headers without end"),
         ("garbage for parts", MULTIPART + bytes(range(256)) * 64, "closed the connection"),
@@ -98,7 +98,7 @@ def test_what_is_no_camera_is_said(case: str, answer: bytes, complaint: str) -> 
     assert complaint in str(error)
 
 
-@pytest.mark.parametrize("look", [2, 3, 6], ids=["before the headers", "among the headers", "in the picture"])
+@pytest.mark.parametrize("look", [2, 3, 6], ids=["before the headers", "among the headers", "in the image"])
 def test_it_ends_when_asked_in_the_middle_of_a_part(look: int) -> None:
     assert received(MULTIPART + part(small_jpeg()), StopAtLook(look)) == ([], None)
 

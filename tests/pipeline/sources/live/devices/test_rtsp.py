@@ -60,7 +60,7 @@ def test_a_camera_that_speaks_rtsp(codec: str) -> None:
                     assert np.median(picture.bgr[:, 110:]) == pytest.approx(80, abs=12)
                     assert (picture.encoded is not None) == (codec == "mjpeg"), "a JPEG stays as it came"
                 (health,) = source.health()
-                assert (health.sensor, health.note != "") == ("camera", True), "its pictures have no times of their own"
+                assert (health.sensor, health.note != "") == ("camera", True), "its images have no times of their own"
     finally:
         source.close()
 

@@ -46,7 +46,7 @@ def test_a_video_file_is_a_camera(sensors: list[LiveSensors], tmp_path: Path) ->
     frames_until(source, lambda frame: len(seen) > 7, seen)
     shades = {round(float(each.picture.bgr.mean()) / 60) for each in seen if each.picture is not None}
     assert len(shades) >= 3, "it plays, and begins again at its end"
-    assert "pictures are stamped on arrival" in seen[-1].streams[0].note
+    assert "images are stamped on arrival" in seen[-1].streams[0].note
 
 
 def test_what_is_not_a_video_is_said_and_tried_again(sensors: list[LiveSensors], tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ def test_a_camera_that_is_not_plugged_in_is_said(sensors: list[LiveSensors]) -> 
 
 
 def film(path: Path, count: int) -> None:
-    """A video of grey pictures, each brighter than the one before."""
+    """A video of grey images, each brighter than the one before."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("mpeg4", rate=25)
         stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
