@@ -8,11 +8,13 @@ Buffers of the system between here and a page hold many frames, which would be a
 for ``?paced=1`` and says ``{"painted": true}`` once for each frame it got; no more than ``FRAMES_UNDER_WAY`` are sent
 ahead of that. With ``{"picture_px": 833}`` it says how wide it shows the image: the one that all get is
 as wide as the widest of them needs. It may come with ``?picture_px=833`` too.
-``{"selected": 7}`` and ``{"hides_3d": true}`` are for the views that the server draws. So is ``{"held": {"track": 7,
-"cuboid": …}}``, a label that may be dragged in 3D, or None; the page that holds it hears of the drag as
-``{"type": "held", "track": 7, "cuboid": …, "ended": true}``. ``{"own": 12}`` is a page with a playhead of its own, at
-that frame; ``{"own": null}`` follows the others again. What is picked in 3D comes to all as
-``{"type": "selected", "id": 7}``.
+``{"own": 12}`` is a page with a playhead of its own, at that frame; ``{"own": null}`` follows the others again.
+
+The rest is for the page's own 3D view, which the server draws (``scene_requests``): ``{"page_3d": "<its name>"}``,
+``{"selected": 7}``, ``{"hides_3d": true}``, ``{"labels_3d": {"labels": […], "alone": true}}``, and
+``{"held": {"track": 7, "cuboid": …}}``, a label that may be dragged there, or None. The page hears of the drag as
+``{"type": "held", "track": 7, "cuboid": …, "ended": true}``, and of what was picked as ``{"type": "selected",
+"id": 7}``.
 """
 
 from __future__ import annotations
@@ -26,17 +28,16 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import BaseModel, Field, ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.core.client_role import is_display
-from app.core.request_shapes import CuboidShape
 from app.core.shared_view_state import HeldCuboid, SharedViewState
 from app.engine.page_frames import PageFrames
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
 from app.streaming.own_playhead import OwnPlayhead
 from app.streaming.picture import MAX_WIDTH_PX, width_for
+from app.streaming.scene_requests import hear, is_id_or_null
 from app.streaming.slot import Slot, Traffic
 
 DISPLAY_MAY_SAY = frozenset({"ping", "picture_px", "painted"})
@@ -44,14 +45,6 @@ DISPLAY_MAY_SAY = frozenset({"ping", "picture_px", "painted"})
 _LARGEST_PING = 1e15
 """Milliseconds; a page sends its own clock."""
 _WIDEST_PX = 4096
-
-
-class _Held(BaseModel):
-    """A label that may be dragged in the 3D view."""
-
-    track: int = Field(ge=0, lt=2**53)
-    frame: int = Field(ge=0, lt=2**53)
-    cuboid: CuboidShape
 
 
 @dataclass(frozen=True)
@@ -122,8 +115,7 @@ class Stream:
             pass  # the client left while something was being sent to it
         finally:
             self._slots.remove(slot)
-            self._looks.hide(slot, False)
-            self._looks.let_go(slot)
+            self._looks.leave(slot)
             if slot.own is not None:
                 slot.own.leave()
             self._fit_width()
@@ -145,13 +137,8 @@ class Stream:
                     await self._put_newest(slot, self._snapshot)
             if said.get("painted") is True:
                 slot.painted()
-            if "selected" in said and _is_id_or_null(said["selected"]):
-                self._looks.select(said["selected"])
-            if isinstance(said.get("hides_3d"), bool):
-                self._looks.hide(slot, said["hides_3d"])
-            if "held" in said:
-                self._hold(slot, said["held"])
-            if "own" in said and _is_id_or_null(said["own"]):
+            hear(self._looks, slot, said)
+            if "own" in said and is_id_or_null(said["own"]):
                 await self._go(slot, said["own"])
 
     async def _go(self, slot: Slot, index: int | None) -> None:
@@ -179,22 +166,10 @@ class Stream:
             with suppress(RuntimeError):  # the server closed its loop
                 self._loop.call_soon_threadsafe(slot.put_own, message, order)
 
-    def _hold(self, slot: Slot, said: Any) -> None:
-        """None for anything that is not a valid label."""
-        try:
-            held = _Held.model_validate(said)
-        except ValidationError:
-            self._looks.let_go(slot)
-        else:
-            self._looks.hold(HeldCuboid(slot, held.track, held.frame, held.cuboid.value()))
-
     def _tell_dragged(self, held: HeldCuboid, ended: bool) -> None:
         """Tell the page that edits the label. Called on a thread of the 3D view."""
         said = {"track": held.track, "frame": held.frame, "cuboid": held.cuboid._asdict(), "ended": ended}
-        message = _dump({"type": "held", **said})
-        if self._loop is not None and isinstance(held.page, Slot):
-            with suppress(RuntimeError):  # the server closed its loop
-                self._loop.call_soon_threadsafe(held.page.put, "held", message)
+        self._put(held.page, "held", _dump({"type": "held", **said}))
 
     async def _put_newest(self, slot: Slot, snapshot: Snapshot) -> None:
         """The frame, and the state as it is now: the one in the frame may be older than what was told meanwhile."""
@@ -225,15 +200,15 @@ class Stream:
                 self._frame = _Encoded(snapshot.sequence, message, snapshot)
             return self._frame
 
-    def _picked(self, number: int | None) -> None:
-        """Tell every page what was picked in the 3D view. Any thread."""
-        loop, message = self._loop, _dump({"type": "selected", "id": number})
-        if loop is not None and not loop.is_closed():
-            loop.call_soon_threadsafe(self._tell, "selected", message)
+    def _picked(self, page: object, number: int | None) -> None:
+        """Tell a page what was picked in its 3D view. Any thread."""
+        self._put(page, "selected", _dump({"type": "selected", "id": number}))
 
-    def _tell(self, kind: str, message: str) -> None:
-        for slot in self._slots:
-            slot.put(kind, message)
+    def _put(self, page: object, kind: str, message: str) -> None:
+        """To one page. Any thread."""
+        if self._loop is not None and isinstance(page, Slot):
+            with suppress(RuntimeError):  # the server closed its loop
+                self._loop.call_soon_threadsafe(page.put, kind, message)
 
     def _distribute(self, snapshot: Snapshot, state: str, frame: _Encoded) -> None:
         """state: of the snapshot. The frame may include an older one, when it was encoded again for a wider page."""
@@ -274,10 +249,6 @@ def _object(text: str | None) -> dict[str, Any]:
 def _number(value: Any, limit: float) -> float | None:
     """A number within ±limit, otherwise None; input from clients is not trusted."""
     return value if isinstance(value, int | float) and -limit < value < limit else None
-
-
-def _is_id_or_null(value: Any) -> bool:
-    return value is None or (isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**53)
 
 
 def _number_of(text: str | None) -> int | None:

@@ -23,7 +23,13 @@ class SceneFeed:
     def __init__(self, engine: Engine, looks: SharedViewState | None = None) -> None:
         self._engine = engine
         self._looks = looks or SharedViewState()
-        self._view = ViserView(engine.snapshot.params, self._moved, on_drag=self._looks.drag, on_pick=self._looks.pick)
+        self._view = ViserView(
+            engine.snapshot.params,
+            self._moved,
+            on_drag=self._looks.drag,
+            on_pick=self._looks.pick,
+            view_of=self._looks.view_of_name,
+        )
         self._newest = Newest[Snapshot]()
         self.drawn = 0
         self._thread = threading.Thread(target=self._work, name="cipv-scene", daemon=True)
@@ -59,8 +65,7 @@ class SceneFeed:
         while (newest := self._newest.take()) is not None:
             if self._view.watchers <= self._looks.hiding:
                 continue
-            self._view.select(self._looks.selected)
-            self._view.hold(self._looks.held)
+            self._view.look()
             if drawn is None or newest.params is not drawn.params:
                 self._view.set_params(newest.params)
             if newest.processed is not None and (drawn is None or newest.processed is not drawn.processed):

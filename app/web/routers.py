@@ -23,6 +23,7 @@ from app.web.routes.drive import drive_router
 from app.web.routes.health import health_router
 from app.web.routes.help import help_router
 from app.web.routes.labels.acts import label_acts_router
+from app.web.routes.labels.close_ups import label_close_ups_router
 from app.web.routes.labels.files import label_files_router
 from app.web.routes.labels.reading import labels_router
 from app.web.routes.params import params_router
@@ -54,6 +55,7 @@ ROUTERS: list[Callable[[Services], APIRouter]] = [
     lambda on: drive_router(on.engine, on.engine.drives, on.marks),
     lambda on: runs_router(on.engine, on.engine.drives),
     lambda on: labels_router(on.engine.labels),
+    lambda on: label_close_ups_router(on.engine.labels),
     lambda on: label_acts_router(on.engine.labels),
     lambda on: label_files_router(on.engine.labels),
     lambda on: clips_router(on.engine, on.exports),

@@ -13,10 +13,26 @@ from pipeline.common.geometry import Cuboid, inverse, transform
 from pipeline.types import F64, Box, GnssQuality
 from pipeline.types.source import SourceError, TruthObject
 
-_LABELS = {"van": "car", "pedestrian": "person", "person_sitting": "person", "cyclist": "bicycle", "tram": "train"}
-_KINDS = {"car": "Car", "truck": "Truck", "person": "Pedestrian", "bicycle": "Cyclist", "train": "Tram"}
 DONT_CARE = "DontCare"
 """A region of which the labels say nothing."""
+UNLABELLED = "dont care"
+"""What such a region is called here."""
+_LABELS = {
+    "dontcare": UNLABELLED,
+    "van": "car",
+    "pedestrian": "person",
+    "person_sitting": "person",
+    "cyclist": "bicycle",
+    "tram": "train",
+}
+_KINDS = {
+    UNLABELLED: DONT_CARE,
+    "car": "Car",
+    "truck": "Truck",
+    "person": "Pedestrian",
+    "bicycle": "Cyclist",
+    "train": "Tram",
+}
 NO_CUBOID = (-1.0, -1.0, -1.0, -1000.0, -1000.0, -1000.0, -10.0)
 NO_BOX = (-1.0, -1.0, -1.0, -1.0)
 _LABEL_FIELDS = 15
@@ -34,13 +50,14 @@ _METRES_A_DEGREE = 111_320.0
 
 class LabelRow(NamedTuple):
     """One line of a label file, ego frame. kind: as KITTI calls it. bbox: pixels of the rectified image. cuboid and
-    bbox are None where the line says that it knows none. said_more: it knew how far the object is cut or hidden."""
+    bbox are None where the line says that it knows none; so are truncation (0–1) and occlusion (0–2)."""
 
     kind: str
     label: str
     cuboid: Cuboid | None
     bbox: Box | None
-    said_more: bool
+    truncation: float | None = None
+    occlusion: int | None = None
 
 
 def parse_labels(data: bytes, T_rect_ego: F64) -> tuple[TruthObject, ...]:
@@ -66,7 +83,7 @@ def parse_labels(data: bytes, T_rect_ego: F64) -> tuple[TruthObject, ...]:
 def truth_of(row: LabelRow, cuboid: Cuboid) -> TruthObject:
     """A labelled object of a row whose place is known."""
     called = row.kind if row.kind != kind_of(row.label) else ""
-    return TruthObject(row.label, cuboid, None, row.bbox, called)
+    return TruthObject(row.label, cuboid, None, row.bbox, called, row.truncation, row.occlusion)
 
 
 def parse_row(fields: Sequence[str], T_ego_rect: F64) -> LabelRow:
@@ -82,7 +99,9 @@ def parse_row(fields: Sequence[str], T_ego_rect: F64) -> LabelRow:
         raise SourceError("a KITTI label with invalid numbers")
     cuboid = cuboid_from_label(place, T_ego_rect) if tuple(place) != NO_CUBOID else None
     seen = box if box != NO_BOX else None
-    return LabelRow(fields[0], label_name(fields[0]), cuboid, seen, said_more=truncated > 0.0 or occluded > 0.0)
+    cut = truncated if 0.0 <= truncated <= 1.0 and cuboid is not None else None
+    hidden = int(occluded) if occluded in (0.0, 1.0, 2.0) and cuboid is not None else None
+    return LabelRow(fields[0], label_name(fields[0]), cuboid, seen, cut, hidden)
 
 
 def label_name(kind: str) -> str:

@@ -56,6 +56,12 @@ class Sighting:
     """Pixels of the raw image; None where only the LiDAR shows it."""
     keyframe: bool = True
     """Put there by a person or an import; otherwise interpolated between keyframes."""
+    box_set: bool = False
+    """A person or a file says what the box is; else it follows the cuboid, if there is one (``boxes.following``)."""
+    truncation: float | None = None
+    """The share of it, 0–1, that lies outside the image; None where nobody said it."""
+    occlusion: int | None = None
+    """0 visible, 1 partly, 2 largely hidden; None where nobody said it."""
 
 
 @dataclass(frozen=True)

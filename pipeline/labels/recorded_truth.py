@@ -72,7 +72,12 @@ def _without_id(objects: tuple[TruthObject, ...]) -> tuple[TruthObject, ...]:
 def _add(each: TruthObject, number: int, index: int, known: dict[int, tuple[str, list[Sighting]]]) -> None:
     sightings = known.setdefault(number, (canonical(each.label), []))[1]
     if not sightings or sightings[-1].frame < index:
-        sightings.append(Sighting(index, each.cuboid, each.bbox))
+        box_set = each.bbox is not None
+        sightings.append(
+            Sighting(
+                index, each.cuboid, each.bbox, box_set=box_set, truncation=each.truncation, occlusion=each.occlusion
+            )
+        )
 
 
 def _notes(objects: Mapping[int, tuple[TruthObject, ...]], count: int) -> list[str]:

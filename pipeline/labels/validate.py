@@ -86,6 +86,10 @@ def _wrong_with(sighting: Sighting) -> str:
         x1, y1, x2, y2 = sighting.bbox
         if not (_below(sighting.bbox, _LARGEST_PX) and x1 < x2 and y1 < y2):
             return "invalid box"
+    if sighting.truncation is not None and not 0.0 <= sighting.truncation <= 1.0:
+        return "a truncation is between 0 and 1"
+    if sighting.occlusion not in (None, 0, 1, 2):
+        return "an occlusion is 0, 1 or 2"
     return ""
 
 

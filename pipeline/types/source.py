@@ -33,6 +33,10 @@ class TruthObject:
     """Pixels of the raw image; None where the labels have no box."""
     called: str = ""
     """The labels' own word for the class where it differs from ``label``, so that it can be written again."""
+    truncation: float | None = None
+    """The share of it outside the picture, 0–1; None where the labels do not say it."""
+    occlusion: int | None = None
+    """0 visible, 1 partly, 2 largely hidden; None where the labels do not say it."""
 
 
 class Source(Protocol):

@@ -199,7 +199,7 @@ def test_an_address_that_could_not_be_opened_is_there_to_be_mended(open_page: Op
 
 def test_the_3d_view_keeps_the_keys_that_fly_and_leaves_the_page_the_others(open_page: OpenPage, site: Site):
     page = open_page()
-    page.route("**/viser/", lambda route: route.fulfill(body="<input>", content_type="text/html"))
+    page.route("**/viser/**", lambda route: route.fulfill(body="<input>", content_type="text/html"))
     theme = "() => document.documentElement.dataset.theme ?? null"
     before = page.evaluate(theme)
     page.keyboard.press("3")

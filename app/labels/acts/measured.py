@@ -59,6 +59,7 @@ def refitted(labels: DriveLabels, frame: Frame, params: Params, act: Refit) -> t
         frame=act.frame,
         cuboid=_given(cuboid),
         bbox=sighting.bbox,
+        box_set=sighting.box_set,
     )
     return placed, note
 

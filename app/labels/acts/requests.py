@@ -20,17 +20,20 @@ _MOST_ITEMS = 10_000
 
 
 class Placed(Strict):
-    """Where something is in one frame. bbox: x1 y1 x2 y2 in pixels of the raw image."""
+    """Where something is in one frame. bbox: x1 y1 x2 y2 in pixels of the raw image. box_set: the person set it;
+    else it follows the cuboid."""
 
     frame: Index
     cuboid: CuboidShape | None = None
     bbox: tuple[Finite, Finite, Finite, Finite] | None = None
+    box_set: bool = False
 
     def sighting(self) -> Sighting:
         """As a keyframe. BadAct for a box that is none, or when nothing is there."""
         if self.cuboid is None and self.bbox is None:
             raise BadAct("provide a cuboid or a box")
-        sighting = Sighting(self.frame, self.cuboid.value() if self.cuboid else None, self.bbox)
+        cuboid = self.cuboid.value() if self.cuboid else None
+        sighting = Sighting(self.frame, cuboid, self.bbox, box_set=self.box_set and self.bbox is not None)
         try:
             return check_sighting(sighting, frames_text(self.frame))
         except BadInput as error:

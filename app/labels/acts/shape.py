@@ -18,7 +18,8 @@ from pipeline.labels.model import Sighting
 def set_sighting(draft: Draft, scope: Scope, act: SetSighting) -> str:
     scope.check(act.frame)
     track = track_of(draft, act.track, act.revision)
-    old, new = draft.sightings(track.id), act.sighting()
+    old = draft.sightings(track.id)
+    new = _with_what_was_said(act.sighting(), old.get(act.frame))
     after = interpolate.put_keyframe(old, new, scope.t_ns, interpolate=act.interpolate)
     _put(draft, track.id, old, after)
     before = old.get(act.frame)
@@ -82,11 +83,19 @@ def _put(draft: Draft, track: int, old: Mapping[int, Sighting], new: Mapping[int
     draft.put_sightings(track, changed)
 
 
+def _with_what_was_said(new: Sighting, old: Sighting | None) -> Sighting:
+    """What a hand that moves it says nothing of. A truncation that was read is of the shape that it had."""
+    if old is None:
+        return new
+    is_same = (old.cuboid, old.bbox) == (new.cuboid, new.bbox)
+    return replace(new, occlusion=old.occlusion, truncation=old.truncation if is_same else None)
+
+
 def _verb(old: Sighting | None, new: Sighting) -> str:
     if old is None:
         return "placed"
     if (old.cuboid, old.bbox) == (new.cuboid, new.bbox):
-        return "held"
+        return "held" if old.box_set == new.box_set else "boxed"
     if old.cuboid is None or new.cuboid is None or old.cuboid == new.cuboid:
         return "boxed" if old.bbox != new.bbox else "placed"
     if old.cuboid.center != new.cuboid.center and old.cuboid.size == new.cuboid.size:

@@ -59,6 +59,7 @@ def placed_json(sighting: Sighting) -> dict[str, Any]:
         "cuboid": cuboid._asdict() if cuboid is not None else None,
         "bbox": sighting.bbox,
         "keyframe": sighting.keyframe,
+        "box_set": sighting.box_set,
     }
 
 

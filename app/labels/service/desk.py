@@ -26,6 +26,7 @@ from pipeline.labels.formats.registry import FormatName
 from pipeline.params import Params
 
 if TYPE_CHECKING:
+    from app.labels.service.checks import LabelChecks
     from app.labels.service.scoring import LabelScores
     from app.labels.store.act_log import Acted
     from app.labels.store.database import Database
@@ -108,6 +109,17 @@ class LabelDesk:
     def recording(self) -> OpenRecording:
         """What can be labelled. NoSuchLabel when nothing can."""
         return self._open.framed()
+
+    @cached_property
+    def checks(self) -> LabelChecks:
+        from app.labels.service.checks import LabelChecks  # what it looks with is not needed to drive
+
+        return LabelChecks()
+
+    @property
+    def params(self) -> Params:
+        """Those that are in use."""
+        return self._control.peek().params
 
     @property
     def labels(self) -> DriveLabels:

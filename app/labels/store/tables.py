@@ -6,7 +6,7 @@ that an act changed, before and after it, so that every act can be taken back an
 
 from __future__ import annotations
 
-from sqlalchemy import BigInteger, Boolean, Double, ForeignKey, Index, Integer, LargeBinary, String, Text
+from sqlalchemy import BigInteger, Boolean, Double, ForeignKey, Index, Integer, LargeBinary, String, Text, false
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 from app.labels.store.values import LONGEST_ITEM, LONGEST_NAME
@@ -44,7 +44,8 @@ class ItemRow(Base):
 
 
 class SightingRow(Base):
-    """A track in one frame. Ego frame, metres, radians; box in pixels; None where there is none."""
+    """A track in one frame. Ego frame, metres, radians; box in pixels; None where there is none. The rest is as of a
+    ``Sighting``."""
 
     __tablename__ = "sighting"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
@@ -62,6 +63,9 @@ class SightingRow(Base):
     y1_px: Mapped[float | None] = mapped_column(Double)
     x2_px: Mapped[float | None] = mapped_column(Double)
     y2_px: Mapped[float | None] = mapped_column(Double)
+    box_set: Mapped[bool] = mapped_column(Boolean, server_default=false())
+    truncation: Mapped[float | None] = mapped_column(Double)
+    occlusion: Mapped[int | None] = mapped_column(Integer)
     __table_args__ = (Index("sighting_by_track", "drive_id", "track", "frame", "keyframe"),)
 
 

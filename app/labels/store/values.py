@@ -90,6 +90,9 @@ def sighting_to_json(sighting: Sighting) -> dict[str, Any]:
         "cuboid": list(cuboid) if cuboid is not None else None,
         "bbox": list(sighting.bbox) if sighting.bbox is not None else None,
         "keyframe": sighting.keyframe,
+        "box_set": sighting.box_set,
+        "truncation": sighting.truncation,
+        "occlusion": sighting.occlusion,
     }
 
 
@@ -97,14 +100,17 @@ def row_of(drive_id: int, track: int, sighting: Sighting) -> tuple[Any, ...]:
     """In the order of the table's columns."""
     cuboid, bbox = sighting.cuboid, sighting.bbox
     place = (*cuboid.center, *cuboid.size, cuboid.yaw_rad) if cuboid is not None else (None,) * 7
-    return (drive_id, sighting.frame, track, sighting.keyframe, *place, *(bbox if bbox is not None else (None,) * 4))
+    sides = bbox if bbox is not None else (None,) * 4
+    more = (sighting.box_set, sighting.truncation, sighting.occlusion)
+    return (drive_id, sighting.frame, track, sighting.keyframe, *place, *sides, *more)
 
 
 def sighting_of(row: Any) -> Sighting:
     """row: as ``row_of`` makes it."""
-    _, frame, _, keyframe, x, y, z, length, width, height, yaw, x1, y1, x2, y2 = row
+    _, frame, _, keyframe, x, y, z, length, width, height, yaw, x1, y1, x2, y2, box_set, truncation, occlusion = row
     cuboid = Cuboid((x, y, z), (length, width, height), yaw) if x is not None else None
-    return Sighting(frame, cuboid, (x1, y1, x2, y2) if x1 is not None else None, bool(keyframe))
+    bbox = (x1, y1, x2, y2) if x1 is not None else None
+    return Sighting(frame, cuboid, bbox, bool(keyframe), bool(box_set), truncation, occlusion)
 
 
 def pack_content(kind: ItemKind, content: Content) -> bytes | None:

@@ -13,6 +13,7 @@ import secrets
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 import websockets.asyncio.server
@@ -23,6 +24,10 @@ from websockets.http11 import Request, Response
 _NAME = "x-cipv-internal"
 HEADERS = {_NAME: secrets.token_urlsafe(32)}
 """What the proxy sends with every request."""
+PAGE_HEADER = "x-cipv-page"
+"""With which the proxy says whose page the 3D view is in."""
+PAGE: ContextVar[str] = ContextVar("page", default="")
+"""That page's name, in whatever viser runs on its event loop for this browser; empty where nobody said."""
 _starting = threading.Lock()
 Answer = Callable[[ServerConnection, Request], Response | None]
 
@@ -53,6 +58,7 @@ def _checked(answer: Answer) -> Answer:
         given = request.headers.get_all(_NAME)
         if len(given) != 1 or not hmac.compare_digest(given[0].encode(), HEADERS[_NAME].encode()):
             return Response(http.HTTPStatus.FORBIDDEN, "Forbidden", Headers({"Content-Length": "0"}), b"")
+        PAGE.set(request.headers.get(PAGE_HEADER, ""))
         return answer(connection, request)
 
     return process_request

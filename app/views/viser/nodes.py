@@ -101,9 +101,8 @@ def lanes(scene: viser.SceneApi, found: Sequence[F64], floor_m: float) -> None:
     lines(scene, "/path/lanes", Strokes(parts, [rgb("lane")] * len(parts)), 4.0)
 
 
-def label(scene: viser.SceneApi, place: int, text: str, position: Point3 | None) -> None:
-    """The label at one of the numbered places; hidden without a position."""
-    name = f"/labels/{place}"
+def name_tag(scene: viser.SceneApi, name: str, text: str, position: Point3 | None) -> None:
+    """A text in the scene; hidden without a position."""
     if position is None:
         return _hide(scene, name)
     handle = scene.get_handle_by_name(name)

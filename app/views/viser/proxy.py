@@ -3,13 +3,15 @@
 viser's own server has no idea of origins or tokens, so it listens on loopback only, answers nobody but this proxy
 (``internal_port``), and people reach it through here.
 Its client opens ``ws://host/viser`` from a page at ``http://host/viser/`` (it drops the trailing slash) and asks for
-the subprotocol ``viser-v<version>``, which its server refuses to do without: both go through as they are.
+the subprotocol ``viser-v<version>``, which its server refuses to do without: both go through as they are. A page of the
+dashboard opens ``/viser/of/<its name>/``, so that the 3D view shows it its own labels and selection.
 """
 
 from __future__ import annotations
 
 import asyncio
 import http.client
+import re
 from collections.abc import Callable, Coroutine
 from urllib.parse import urlsplit
 
@@ -23,7 +25,7 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.frames import CloseCode
 from websockets.typing import Data, Subprotocol
 
-from app.views.viser.internal_port import HEADERS
+from app.views.viser.internal_port import HEADERS, PAGE_HEADER
 
 PREFIX = "/viser"
 POLICY = (
@@ -37,6 +39,7 @@ reads its scene in a worker made from a blob, and fetches a light map and a deco
 _OWN_HEADERS = {"content-security-policy": POLICY, "x-content-type-options": "nosniff", "cache-control": "no-cache"}
 _PASSED_ON = ("content-type", "content-encoding")
 _TIMEOUT_S = 5.0
+_NAME = re.compile(r"[0-9a-f]{1,64}")
 _GONE = "The 3D view is not running."
 
 
@@ -55,6 +58,10 @@ def viser_router(get_port: Callable[[], int | None], allowed: Callable[[HTTPConn
         query = f"?{request.url.query}" if request.url.query else ""
         return RedirectResponse(f"{PREFIX}/{query}")
 
+    @router.get(PREFIX + "/of/{name}/{path:path}", include_in_schema=False)
+    async def page_of(name: str, path: str, request: Request) -> Response:
+        return await page(path, request)
+
     @router.get(PREFIX + "/{path:path}", include_in_schema=False)
     async def page(path: str, request: Request) -> Response:
         if not allowed(request):
@@ -66,11 +73,12 @@ def viser_router(get_port: Callable[[], int | None], allowed: Callable[[HTTPConn
 
     @router.websocket(PREFIX)
     @router.websocket(PREFIX + "/")
-    async def scene(browser: WebSocket) -> None:
+    @router.websocket(PREFIX + "/of/{name}")
+    async def scene(browser: WebSocket, name: str = "") -> None:
         if not (_same_origin(browser) and allowed(browser)):
             await browser.close(CloseCode.POLICY_VIOLATION)
             return
-        await _bridge(browser, await run_in_threadpool(get_port))
+        await _bridge(browser, await run_in_threadpool(get_port), name)
 
     return router
 
@@ -95,8 +103,9 @@ def _fetch(port: int, path: str, accept_encoding: str) -> Response:
         connection.close()
 
 
-async def _bridge(browser: WebSocket, port: int | None) -> None:
-    """Connect the browser to viser until either leaves. Each direction waits for its receiver, so nothing queues up."""
+async def _bridge(browser: WebSocket, port: int | None, page: str) -> None:
+    """Connect the browser to viser until either leaves. Each direction waits for its receiver, so nothing queues up.
+    page: the name of the page that shows it."""
     offered = [Subprotocol(name) for name in browser.scope.get("subprotocols", [])]
     try:
         if port is None:
@@ -104,7 +113,7 @@ async def _bridge(browser: WebSocket, port: int | None) -> None:
         viser = await connect(
             f"ws://127.0.0.1:{port}",
             subprotocols=offered or None,
-            additional_headers=HEADERS,
+            additional_headers=HEADERS | ({PAGE_HEADER: page} if _NAME.fullmatch(page) else {}),
             compression=None,  # the scene is compressed already; deflating it again costs 4 ms a frame
             max_size=None,
             proxy=None,

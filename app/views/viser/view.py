@@ -16,19 +16,20 @@ import numpy as np
 import rich
 import viser
 
-from app.core.shared_view_state import HeldCuboid, OnDrag
+from app.core.shared_view_state import NOTHING, OnDrag, PageView
 from app.views import scene
 from app.views.colors import Role, rgb
 from app.views.ray_picking import object_on_ray
 from app.views.viser import nodes as viser_nodes
-from app.views.viser.gizmo import CuboidGizmo
+from app.views.viser.browser_scene import BrowserScene
 from app.views.viser.gui import OnChange, ParamsGui
-from app.views.viser.internal_port import demanding_the_secret
+from app.views.viser.internal_port import PAGE, demanding_the_secret
 from app.views.viser.nodes import Strokes
 from pipeline.params import Params
 from pipeline.types import Frame, FusedObject, Point3, Result
 
-OnPick = Callable[[int | None], None]
+OnPick = Callable[[str, int | None], None]
+ViewOf = Callable[[str], PageView]
 HOST = "127.0.0.1"
 CAMERA_FOV_DEG = 48.0
 _LABELS = ("vehicles and in path", "all", "none")
@@ -64,8 +65,8 @@ class _Display:
 class ViserView:
     """Starts the server at once. ``port`` 0 takes a free one; an occupied port silently becomes the next: read
     ``port``. Callbacks, on a thread of viser: ``on_change(name, value)`` for every slider that the user moves,
-    ``on_drag(held, ended)`` for a dragged cuboid, ``on_pick(id)`` for every click into the scene, with the object that
-    was hit or None.
+    ``on_drag(held, ended)`` for a dragged cuboid, ``on_pick(page, id)`` for every click into the scene, with the object
+    that was hit or None. Pages go by their names; ``view_of(page)`` says what one of them wants to see.
     """
 
     def __init__(
@@ -74,13 +75,15 @@ class ViserView:
         on_change: OnChange = lambda name, value: None,
         port: int = 0,
         on_drag: OnDrag = lambda held, ended: None,
-        on_pick: OnPick = lambda number: None,
+        on_pick: OnPick = lambda page, number: None,
+        view_of: ViewOf = lambda page: NOTHING,
     ) -> None:
         self._lock = threading.Lock()
         self._shown: tuple[Frame, Result] | None = None
         self._display = _Display()
         self._labels = 0
-        self._selected: int | None = None
+        self._view_of, self._on_drag, self._on_pick = view_of, on_drag, on_pick
+        self._browsers: dict[int, tuple[str, BrowserScene]] = {}
         with _silent(), demanding_the_secret():
             self._server = viser.ViserServer(HOST, port, label="CIPV Studio", verbose=False)
         self._server.gui.configure_theme(
@@ -91,13 +94,13 @@ class ViserView:
         camera.position, camera.look_at, camera.up = POSES["Follow"]
         camera.fov = math.radians(CAMERA_FOV_DEG)
         self._scene = self._server.scene
-        self._gizmo = CuboidGizmo(self._scene, on_drag)
+        self._server.on_client_connect(self._came)
         self._server.on_client_disconnect(self._left)
         self._add_static()
         self._add_cameras()
         self._add_display_options()
         self._params = ParamsGui(self._server.gui, params, on_change)
-        self._scene.on_click()(lambda click: on_pick(self._met(click.ray_origin, click.ray_direction)))
+        self._scene.on_click()(self._clicked)
 
     @property
     def watchers(self) -> int:
@@ -119,16 +122,10 @@ class ViserView:
             self._shown = (frame, result)
             self._draw()
 
-    def select(self, number: int | None) -> None:
-        """Highlight this object, or none."""
+    def look(self) -> None:
+        """Draw what pages want to see by now."""
         with self._lock:
-            if number != self._selected:
-                self._selected = number
-                self._draw()
-
-    def hold(self, held: HeldCuboid | None) -> None:
-        """Show a cuboid with handles to move, turn and resize it by; None for none."""
-        self._gizmo.hold(held)
+            self._draw_browsers()
 
     def set_params(self, params: Params) -> None:
         """Set the sliders to these parameters, without calling ``on_change``."""
@@ -139,8 +136,22 @@ class ViserView:
         with _silent():
             self._server.stop()
 
+    async def _came(self, client: viser.ClientHandle) -> None:
+        """On the loop, where ``PAGE`` tells whose page it is in."""
+        with self._lock:
+            self._browsers[client.client_id] = PAGE.get(), BrowserScene(client, self._on_drag)
+            self._draw_browsers()
+
     async def _left(self, client: viser.ClientHandle) -> None:  # on the loop: after whatever it said before
-        self._gizmo.leave(client.client_id)
+        with self._lock:
+            _, browser = self._browsers.pop(client.client_id, (None, None))
+        if browser is not None:
+            browser.leave()
+
+    def _clicked(self, click: viser.SceneClickEvent) -> None:
+        with self._lock:
+            page, _ = self._browsers.get(click.client_id, ("", None))
+        self._on_pick(page, self._met(click.ray_origin, click.ray_direction))
 
     def _met(self, origin: Point3, direction: Point3) -> int | None:
         """The object that a click's ray hits."""
@@ -201,6 +212,15 @@ class ViserView:
             viser_nodes.lanes(self._scene, scene.lane_lines(result), floor_m)
             viser_nodes.floor(self._scene, floor_m)
             viser_nodes.picture(self._scene, frame, self._display.picture)
+        self._draw_browsers()
+
+    def _draw_browsers(self) -> None:
+        if self._shown is None:
+            return
+        _, result = self._shown
+        floor_m = scene.ground_height_m(result) or 0.0
+        for page, browser in self._browsers.values():
+            browser.draw(self._view_of(page), result, floor_m)
 
     def _draw_points(self, result: Result) -> None:
         points = result.layers.points
@@ -232,7 +252,6 @@ class ViserView:
         marked: tuple[tuple[str, int | None, Role, float], ...] = (
             ("/cipv", scene.cipv_id(result), "cipv", 0.25),
             ("/next_cipv", following, "cipv", 0.08),
-            ("/selection", self._selected, "ego", 0.2),
         )
         for name, number, role, opacity in marked:
             found = None if number is None else by_id.get(number)
@@ -244,13 +263,15 @@ class ViserView:
         for place in range(max(len(named), self._labels)):
             if place < len(named):
                 each = named[place]
-                viser_nodes.label(self._scene, place, scene.object_text(each), scene.top_of(each, floor_m))
+                viser_nodes.name_tag(
+                    self._scene, f"/labels/{place}", scene.object_text(each), scene.top_of(each, floor_m)
+                )
             else:
-                viser_nodes.label(self._scene, place, "", None)
+                viser_nodes.name_tag(self._scene, f"/labels/{place}", "", None)
         self._labels = max(len(named), self._labels)
 
     def _has_label(self, each: FusedObject, result: Result) -> bool:
-        if self._display.labels == "all" or each.id == self._selected:
+        if self._display.labels == "all":
             return True
         return self._display.labels == _LABELS[0] and scene.stands_out(each, result)
 

@@ -1,7 +1,8 @@
-"""Our own file, ``cipv-labels`` version 3: JSON with every field of ``LabelSet`` under its own name; nothing is lost.
+"""Our own file, ``cipv-labels`` version 4: JSON with every field of ``LabelSet`` under its own name; nothing is lost.
 
 A reader of this version takes what it does not know for a mistake, and a newer version for one it cannot read. In
-version 1 a tag was of one frame; up to version 2 tracks had neither confidence nor heading.
+version 1 a tag was of one frame; up to version 2 tracks had neither confidence nor heading;
+up to version 3 nothing told boxes that were set, nor truncation and occlusion.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, Le
 from pipeline.labels.validate import check
 
 KIND = "cipv-labels"
-VERSION = 3
+VERSION = 4
 _LABELS = TypeAdapter(LabelSet)
 _AtFrame = TypeVar("_AtFrame", PathLabel, EventLabel)
 _Range = TypeVar("_Range", LeadRange, FrameTag)

@@ -37,6 +37,8 @@ class Format:
     """``module:function`` that writes labels, see ``base.Write``."""
     reader: str
     """``module:function`` that reads them back, see ``base.Read``."""
+    as_stored: bool = False
+    """Our own: boxes that follow cuboids are left to whoever reads it."""
 
     def write(self, labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
         """Write labels that hold nothing but what the format can. Returns sentences about what was written otherwise
@@ -66,9 +68,9 @@ FORMATS: dict[str, Format] = {
     each.name: each
     for each in (
         Format("native", "CIPV Studio", "all labels", ".json", EVERYTHING,
-               f"{_OURS}.native:write", f"{_OURS}.native:read"),
+               f"{_OURS}.native:write", f"{_OURS}.native:read", as_stored=True),
         Format("mcap", "MCAP session", "labels as a channel", ".mcap", EVERYTHING,
-               f"{_OURS}.session:write", f"{_OURS}.session:read"),
+               f"{_OURS}.session:write", f"{_OURS}.session:read", as_stored=True),
         Format("openlabel", "OpenLABEL", "ASAM OpenLABEL 1.0", ".json", EVERYTHING,
                f"{_OURS}.openlabel.write:write", f"{_OURS}.openlabel.read:read"),
         Format("nuscenes", "nuScenes", "JSON tables", "", _TRACKED,
@@ -98,12 +100,15 @@ def export_labels(labels: LabelSet, drive: LabeledDrive, name: FormatName, out: 
     BadInput when the labels are of another recording or are not valid, when ``out`` exists, or when the format needs
     what the recording does not have (KITTI: a camera).
     """
+    from pipeline.labels.boxes import following
     from pipeline.labels.formats.native import onto  # pydantic's adapter of a whole label set
 
     kind = FORMATS[name]
     with gc_paused():
         placed = onto(check(labels, "these labels"), drive, "these labels")
-        kept, lost = reduce(placed.labels, kind.holds)
+        follows = "boxes" in kind.holds and not kind.as_stored
+        whole = following(placed.labels, drive) if follows else placed.labels
+        kept, lost = reduce(whole, kind.holds)
         return (*placed.notes, *lost, *kind.write(kept, drive, out))
 
 

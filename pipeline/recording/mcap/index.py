@@ -89,6 +89,10 @@ def _read_profile(file: BinaryIO) -> str:
     file.seek(0)
     start = file.read(4096)
     if not start.startswith(MAGIC):
+        file.seek(0, io.SEEK_END)
+        file.seek(max(0, file.tell() - len(MAGIC)))
+        if file.read() == MAGIC:
+            raise Unreadable("a damaged MCAP file: its beginning is overwritten")
         raise Unreadable("not an MCAP file")
     try:
         opcode, _ = RECORD_HEAD.unpack_from(start, len(MAGIC))
@@ -96,7 +100,7 @@ def _read_profile(file: BinaryIO) -> str:
     except Exception:  # see below
         opcode = None
     if opcode != Opcode.HEADER:
-        raise Unreadable("an MCAP file without a header")
+        raise Unreadable("a damaged MCAP file: it has no header")
     return header.profile
 
 

@@ -45,10 +45,7 @@ export function showPictureAt(width) {
   if (steps > 0) tell("picture_px", steps * WIDTH_STEP_PX);
 }
 
-/**
- * @typedef {number|boolean|null|{track: number, frame: number, cuboid: import("../labeling/state/types.js").Cuboid}}
- *   Told
- */
+/** @typedef {number|boolean|string|null|object} Told */
 
 /** Tell the server something about this page, now and after each reconnection. Sent only when the value changes.
  * @param {string} name @param {Told} value */

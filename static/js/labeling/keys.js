@@ -6,6 +6,7 @@ import * as commands from "./acts/commands.js";
 import { bringHere } from "./acts/range_ends.js";
 import { cancel, isOn, setTool, toggleObjects } from "./state/mode.js";
 import * as review from "./acts/review.js";
+import { zoomBy } from "./views/picture_pointer.js";
 import * as span from "./state/marked_frames.js";
 import { toggleWhole } from "./acts/tags.js";
 
@@ -79,6 +80,20 @@ const arrows = (tool, words, act) =>
       key(`Shift+Arrow${name}`, `Shift ${name}`, "", () => act(right, up, true)),
     ),
   ]);
+
+/**
+ * A pair of bindings that make the cuboid larger and smaller.
+ * @param {string} prefix
+ * @param {string} shown
+ * @param {[string, string]} names
+ * @param {0|1|2} axis
+ * @param {string} words
+ * @returns {LabelBinding[]}
+ */
+const sizes = (prefix, shown, [more, less], axis, words) => [
+  selected(key(prefix + more, shown, words, () => commands.grow(axis, STEP_M))),
+  selected(key(prefix + less, `${shown.split(" ")[0]} ${less}`, "", () => commands.grow(axis, -STEP_M))),
+];
 
 /**
  * A pair of bindings, the second with Shift for the other direction.
@@ -165,6 +180,8 @@ export const labelKeys = () => [
     mode: "labeling",
     title: "Labeling: shapes",
     bindings: [
+      key(">", ">", "zoom into the image at the selected label (or wheel, pinch)", () => zoomBy(1.6), "zoom in"),
+      key("<", "<", "zoom out", () => zoomBy(1 / 1.6)),
       key(".", ".", "next label in this frame", () => commands.selectNext(1), "next label"),
       key(",", ",", "previous label", () => commands.selectNext(-1)),
       during(
@@ -186,12 +203,18 @@ export const labelKeys = () => [
       selected(key("Shift+ArrowDown", "Shift ↓", "", () => commands.nudge(-FAR_M, 0))),
       selected(key("Shift+ArrowLeft", "Shift ←", "", () => commands.nudge(0, FAR_M))),
       selected(key("Shift+ArrowRight", "Shift →", "", () => commands.nudge(0, -FAR_M))),
+      selected(key("PageUp", "Page ↑", "move up 0.1 m", () => commands.nudge(0, 0, STEP_M))),
+      selected(key("PageDown", "Page ↓", "move down", () => commands.nudge(0, 0, -STEP_M))),
+      ...sizes("Ctrl+Arrow", "Ctrl ↑ ↓", ["Up", "Down"], 0, "longer or shorter by 0.1 m; the near side stays"),
+      ...sizes("Ctrl+Arrow", "Ctrl → ←", ["Right", "Left"], 1, "wider or narrower"),
+      ...sizes("Shift+Page", "Shift Page ↑ ↓", ["Up", "Down"], 2, "higher or lower; the bottom stays"),
       key("q", "Q", "rotate 1° left; Shift: 10°", () => commands.turn(TURN_DEG)),
       key("e", "E", "rotate 1° right; Shift: 10°", () => commands.turn(-TURN_DEG)),
       key("Shift+Q", "Shift Q", "", () => commands.turn(FAR_DEG)),
       key("Shift+E", "Shift E", "", () => commands.turn(-FAR_DEG)),
       key("Shift+X", "Shift X", "turn the track round: front and rear are swapped", commands.flip, "turn round"),
       key("s", "S", "fit the cuboid to the points", commands.snap, "snap"),
+      key("Shift+S", "Shift S", "the image box follows the cuboid again", commands.boxFollows),
       key("w", "W", "apply this size to the whole track", commands.sizeAlong, "size along"),
       key("k", "K", "set keyframe", commands.keyframe, "keyframe"),
       key("Shift+K", "Shift K", "remove keyframe", commands.dropKeyframe),

@@ -73,9 +73,9 @@ function standing() {
   return infos.length ? [...rest, { level: "info", text: infos.join(" · ") }] : rest;
 }
 
-/** Notes of the current frame. @returns {Shown[]} */
+/** Notes of the current frame; one that is dismissed stays away in other frames too. @returns {Shown[]} */
 function ofFrame() {
-  return (get("frame")?.result.notes ?? []).map((words) => ({ level: "warning", text: words, fixed: true }));
+  return (get("frame")?.result.notes ?? []).map((words) => ({ level: "warning", text: words }));
 }
 
 /** @param {Shown} notice */

@@ -11,6 +11,7 @@ import { nearestPoint, ownerOf } from "./drawing/hit_test.js";
 import { GROUND, tints } from "./drawing/point_colors.js";
 import { DotRaster } from "./drawing/dot_raster.js";
 import { get, on, paint, select, set } from "../core/store.js";
+import { placed, setUp as setUpZoom } from "./picture_zoom.js";
 import { Surface } from "./drawing/surface.js";
 import { drawTape, measure } from "./measuring_tape.js";
 
@@ -19,6 +20,8 @@ import { drawTape, measure } from "./measuring_tape.js";
 /** @typedef {(ctx: CanvasRenderingContext2D, frame: Frame, place: Place) => void} Layer */
 
 const UNSEEN = -32768;
+/** From here on single pixels are shown. */
+const SINGLE_PX = 3;
 const PICK_PX = 8,
   HOLD_PX = 16;
 
@@ -77,6 +80,7 @@ export function setUp() {
     () => (get("labeling")?.tool ? "crosshair" : ""),
   );
   followTape();
+  setUpZoom(canvas, place, invalidate);
   on(["taping"], () => (canvas.style.cursor = get("taping") ? "crosshair" : ""));
 }
 
@@ -96,6 +100,7 @@ function draw() {
   const align = get("align"),
     blend = align?.on ? align.blend : null;
   if (blend !== null) ctx.globalAlpha = Math.min(1, 2 * (1 - blend));
+  ctx.imageSmoothingEnabled = laid.scale < SINGLE_PX;
   if (frame.bitmap) ctx.drawImage(frame.bitmap, laid.x, laid.y, width * laid.scale, height * laid.scale);
   else message(ctx, "Could not decode the camera image of this frame");
   ctx.globalAlpha = 1;
@@ -143,9 +148,9 @@ function layOut({ width, height }) {
   const aspect = (width / height).toFixed(3),
     workspace = $("#workspace");
   if (workspace.style.getPropertyValue("--aspect") !== aspect) workspace.style.setProperty("--aspect", aspect);
-  const scale = Math.min(surface.width / width, surface.height / height);
-  laid = { x: (surface.width - width * scale) / 2, y: (surface.height - height * scale) / 2, scale };
-  showPictureAt(width * scale * surface.ratio);
+  laid = placed(surface, { width, height });
+  const full = (get("frame")?.picture?.full_width ?? width) + 1; // more pixels than the camera has show nothing more
+  showPictureAt(Math.min(width * laid.scale * surface.ratio, full));
 }
 
 /** @param {Frame} frame */
@@ -163,17 +168,21 @@ function drawPoints(ctx, frame) {
   const { width, height } = picture,
     { scale } = laid;
   const colors = tints(frame, get("colorBy")?.camera ?? "range", onPicture, 0.7);
-  raster.begin(width * scale, height * scale);
+  const left = Math.max(0, laid.x),
+    top = Math.max(0, laid.y);
+  const right = Math.min(surface.width, laid.x + width * scale),
+    bottom = Math.min(surface.height, laid.y + height * scale);
+  raster.begin(right - left, bottom - top);
   for (const isGround of [true, false]) {
     const size = isGround ? 1 : 2;
     for (let i = 0; i < count; i++) {
       const u = uv[2 * i],
         v = uv[2 * i + 1];
       if ((kind[i] === GROUND) === isGround && u >= 0 && v >= 0 && u < width && v < height)
-        raster.dot(u * scale, v * scale, size, colors[i]);
+        raster.dot(X(u) - left, Y(v) - top, size, colors[i]);
     }
   }
-  raster.drawOn(ctx, laid.x, laid.y);
+  raster.drawOn(ctx, left, top);
 }
 
 /** @param {CanvasRenderingContext2D} ctx @param {import("../core/types.js").Pixels} lane */

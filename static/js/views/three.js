@@ -1,7 +1,12 @@
-/** Tells the server's 3D view what is selected, and whether it is visible. */
+/** The 3D view, which the server draws for this page: what is selected here, and whether it is visible. */
 import { tell } from "../core/connection.js";
-import { $ } from "../core/dom.js";
+import { $, el } from "../core/dom.js";
 import { get, on } from "../core/store.js";
+
+/** By which the server knows whose 3D view it draws. */
+const NAME = [...crypto.getRandomValues(new Uint8Array(16))].map((each) => each.toString(16).padStart(2, "0")).join("");
+/** In a narrower frame the 3D view's own panel opens over the scene, so a narrower one is scaled down. */
+const LEAST_PX = 600;
 
 export function setUp() {
   const body = $("#three-body");
@@ -9,8 +14,28 @@ export function setUp() {
   const say = () => tell("hides_3d", body.firstChild !== null && (!isShown || document.hidden));
   new ResizeObserver(([{ contentRect }]) => {
     isShown = contentRect.width > 0 && contentRect.height > 0;
+    if (isShown) fit(body, contentRect.width, contentRect.height);
     say();
   }).observe(body);
   document.addEventListener("visibilitychange", say);
   on(["selection"], () => tell("selected", get("selection")));
+}
+
+/** Load the 3D view, with a note until its page is there. */
+export function open() {
+  const body = $("#three-body");
+  if (body.firstChild) return;
+  tell("page_3d", NAME);
+  const note = el("p", { class: "busy", aria: { role: "status" }, textContent: "Opening the 3D view …" });
+  const view = el("iframe", { src: `viser/of/${NAME}/`, title: "3D view" });
+  view.addEventListener("load", () => note.remove());
+  body.append(note, view);
+}
+
+/** @param {HTMLElement} body @param {number} width @param {number} height */
+function fit(body, width, height) {
+  const scale = Math.min(1, width / LEAST_PX);
+  body.style.setProperty("--three-width", `${width / scale}px`);
+  body.style.setProperty("--three-height", `${height / scale}px`);
+  body.style.setProperty("--three-scale", String(scale));
 }

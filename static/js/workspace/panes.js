@@ -1,7 +1,8 @@
 /** Visible panes, the maximized pane, and the tab of the plan pane. */
-import { $, el, memory, press } from "../core/dom.js";
+import { $, memory, press } from "../core/dom.js";
 import { icon } from "../core/icons.js";
 import { get, on, set } from "../core/store.js";
+import { open as openThree } from "../views/three.js";
 import { showRerun } from "./rerun_tab.js";
 
 /** @typedef {"camera"|"plan"|"objects"|"why"|"params"|"timeline"} Pane */
@@ -141,17 +142,8 @@ function reflectTab(shown) {
     $(`#${button.getAttribute("aria-controls")}`).hidden = !isShown;
   }
   $("#bev-layers").hidden = shown !== "plan";
-  const three = $("#three-body");
-  if (shown === "3d" && !three.firstChild) three.append(...threeView());
+  if (shown === "3d") openThree();
   if (shown === "rerun") showRerun($("#rerun-body"));
-}
-
-/** The 3D view, with a note until its page is there. */
-function threeView() {
-  const note = el("p", { class: "busy", aria: { role: "status" }, textContent: "Opening the 3D view …" });
-  const view = el("iframe", { src: "viser/", title: "3D view" });
-  view.addEventListener("load", () => note.remove());
-  return [note, view];
 }
 
 /** @param {KeyboardEvent} event */

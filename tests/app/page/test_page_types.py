@@ -156,6 +156,8 @@ def labelled(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "Sizes": score["errors"][0]["distance"],
         "BadFrame": score["worst"][0],
         "Found": get("/next?what=unlabelled&frame=0"),
+        "Still": get(f"/tracks/{track['id']}/filmstrip")[0],
+        "Problem": get("/checks")["problems"][0],
     }
 
 

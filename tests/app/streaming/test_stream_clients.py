@@ -246,53 +246,69 @@ def test_a_nonsense_width_in_the_address_changes_nothing(site: Site, said: str):
         assert next_header(client)["picture"]["width"] == MAX_WIDTH_PX
 
 
+CUBOID = {"center": [20, 0, 1], "size": [4, 2, 1.5], "yaw_rad": 0.5}
+NAME, OTHER = "a" * 32, "b" * 32
+
+
 def test_what_a_page_looks_at_is_heard_until_it_leaves(site: Site):
     looks = site.stream._looks
+    label = {"track": 7, "cuboid": CUBOID, "text": "#7 car, accepted", "role": "fused", "facing": True}
+    labels = {"labels": [label], "alone": True}
     with site.connected() as page:
-        page.send(json.dumps({"selected": 7, "hides_3d": True}))
+        page.send(json.dumps({"page_3d": NAME, "selected": 7, "hides_3d": True, "labels_3d": labels}))
         _heard(page)
-        assert (looks.selected, looks.hiding) == (7, 1)
+        view = looks.view_of_name(NAME)
+        assert (view.selected, looks.hiding) == (7, 1)
+        assert view.labels is not None
+        assert [each.text for each in view.labels.labels] == ["#7 car, accepted"]
         for nonsense in ('{"selected": "7"}', '{"selected": -1}', '{"selected": 1e400}', '{"hides_3d": 2}'):
             page.send(nonsense)
         _heard(page)
-        assert (looks.selected, looks.hiding) == (7, 1)
-        page.send(json.dumps({"selected": None}))
+        assert (looks.view_of_name(NAME).selected, looks.hiding) == (7, 1)
+        page.send(json.dumps({"selected": None, "labels_3d": {**labels, "alone": 5}, "hides_3d": False}))
         _heard(page)
-        assert looks.selected is None
+        assert (looks.view_of_name(NAME).selected, looks.view_of_name(NAME).labels) == (None, None)
+        page.send(json.dumps({"labels_3d": labels}))
+        _heard(page)
+        assert looks.view_of_name(NAME).labels is not None
     with site.connected() as other:
         next_header(other)
         for _ in range(100):
             _heard(other)
-            if looks.hiding == 0:
+            if looks.view_of_name(NAME).labels is None:
                 break
-    assert looks.hiding == 0
+    assert looks.view_of_name(NAME).labels is None
 
 
 def test_a_label_that_is_held_in_3d_is_followed_by_its_page_alone(site: Site):
-    looks, cuboid = site.stream._looks, {"center": [20, 0, 1], "size": [4, 2, 1.5], "yaw_rad": 0.5}
+    looks = site.stream._looks
     with site.connected() as page, site.connected() as other:
-        page.send(json.dumps({"held": {"track": 7, "frame": 3, "cuboid": cuboid}}))
+        page.send(json.dumps({"page_3d": NAME, "held": {"track": 7, "frame": 3, "cuboid": CUBOID}}))
         _heard(page)
-        held = looks.held
+        held = looks.view_of_name(NAME).held
         assert held is not None
         assert (held.track, held.frame, held.cuboid) == (7, 3, Cuboid((20.0, 0.0, 1.0), (4.0, 2.0, 1.5), 0.5))
-        other.send(json.dumps({"held": {"track": 9, "frame": 3, "cuboid": cuboid}}))
+        other.send(json.dumps({"page_3d": OTHER, "held": {"track": 9, "frame": 3, "cuboid": CUBOID}}))
         _heard(other)
         looks.drag(replace(held, cuboid=held.cuboid._replace(yaw_rad=1.0)), True)
-        said = {"type": "held", "track": 7, "frame": 3, "cuboid": cuboid | {"yaw_rad": 1.0}, "ended": True}
+        said = {"type": "held", "track": 7, "frame": 3, "cuboid": CUBOID | {"yaw_rad": 1.0}, "ended": True}
         assert next(message for message in _texts(page) if message["type"] == "held") == said
-        assert (looks.held and looks.held.track) == 9, "the other's stays where it is"
-        looks.hold(held)
+        others = looks.view_of_name(OTHER).held
+        assert (others and others.track) == 9, "the other's stays where it is"
         other.send(json.dumps({"held": None}))
         _heard(other)
-        assert looks.held is not None, "another page holds nothing of this one's"
-        for nonsense in ({"track": "7", "cuboid": 3}, {"track": 7, "cuboid": cuboid}, 5):
+        assert looks.view_of_name(OTHER).held is None
+        assert looks.view_of_name(NAME).held is not None, "another page holds nothing of this one's"
+        looks.pick(NAME, 4)
+        assert next(message for message in _texts(page) if message["type"] == "selected")["id"] == 4
+        assert looks.view_of_name(OTHER).selected is None
+        for nonsense in ({"track": "7", "cuboid": 3}, {"track": 7, "cuboid": CUBOID}, 5):
             page.send(json.dumps({"held": nonsense}))
             _heard(page)
-            assert looks.held is None
-            page.send(json.dumps({"held": {"track": 7, "frame": 3, "cuboid": cuboid}}))
+            assert looks.view_of_name(NAME).held is None
+            page.send(json.dumps({"held": {"track": 7, "frame": 3, "cuboid": CUBOID}}))
         _heard(page)
-        assert looks.held is not None
+        assert looks.view_of_name(NAME).held is not None
 
 
 def _texts(client: ClientConnection) -> Iterator[dict[str, Any]]:

@@ -16,7 +16,7 @@ import zstandard
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from app.views.viser.internal_port import HEADERS
+from app.views.viser.internal_port import HEADERS, PAGE_HEADER
 from pipeline.common.geometry import Cuboid
 from pipeline.types import (
     GROUND,
@@ -191,12 +191,17 @@ class SceneClient:
                 seen.pop(each["name"], None)
         return seen
 
+    def owned(self, name: str) -> bool:
+        """Whether this browser has a node of its own of that name, which it shows rather than everybody's."""
+        of_name = [each for each in self.messages if each.get("name") == name and each.get("owner")]
+        return bool(of_name) and of_name[-1]["type"] != "RemoveSceneNodeMessage"
+
     def texts(self) -> list[str]:
         """The labels that are shown."""
         words: dict[str, str] = {}
         for each in self.messages:
             written = each.get("props", each.get("updates", {}))
-            if each.get("name", "").startswith("/labels/") and "text" in written:
+            if each.get("name", "").startswith(("/labels/", "/own/names/", "/own/selected")) and "text" in written:
                 words[each["name"]] = written["text"]
         return [words[name] for name, shown in self.nodes().items() if shown and name in words]
 
@@ -231,9 +236,11 @@ def open_scene() -> Iterator[OpenScene]:
     """Connect to ``ws://127.0.0.1:<port><path>`` as viser's own page does."""
     with ExitStack() as stack:
 
-        def opening(port: int, path: str = "", version: str = viser.__version__, **options: Any) -> SceneClient:
+        def opening(
+            port: int, path: str = "", version: str = viser.__version__, page: str = "", **options: Any
+        ) -> SceneClient:
             if not path:  # viser's own port, as the proxy reaches it
-                options["additional_headers"] = HEADERS
+                options["additional_headers"] = HEADERS | {PAGE_HEADER: page}
             connection = connect(
                 f"ws://127.0.0.1:{port}{path}",
                 subprotocols=[Subprotocol(f"viser-v{version}")],

@@ -60,36 +60,39 @@ def test_a_page_that_hides_its_3d_view_costs_nothing_until_it_shows_it_again(eng
     assert feed.drawn == 2, "the first one and the last one"
 
 
-def test_what_is_clicked_in_the_3d_view_is_selected_everywhere(engine: Engine, open_scene: Any) -> None:
+def test_what_is_clicked_in_a_pages_3d_view_is_selected_at_that_page(engine: Engine, open_scene: Any) -> None:
     tick = engine.snapshot.processed
     assert tick is not None
     target = next(each for each in tick.result.objects if each.cuboid is not None)
     assert target.cuboid is not None
     x, y, _ = target.cuboid.center
-    picked: queue.Queue[int | None] = queue.Queue()
-    looks = SharedViewState()
-    looks.on_pick(picked.put)
+    picked: queue.Queue[tuple[object, int | None]] = queue.Queue()
+    looks, page, other = SharedViewState(), object(), object()
+    looks.name(page, "a1")
+    looks.name(other, "b2")
+    looks.on_pick(lambda *what: picked.put(what))
     with SceneFeed(engine, looks) as feed:
-        client = open_scene(feed.port)
+        client = open_scene(feed.port, page="a1")
         client.look()
         client.read_until(_is_cloud)
         client.click((x, y, 50.0), (0.0, 0.0, -1.0))
-        assert picked.get(timeout=WAIT_S) == target.id
+        assert picked.get(timeout=WAIT_S) == (page, target.id)
         client.read_until(lambda message: message.get("name") == "/selection")
         client.click((x, y, 50.0), (0.0, 0.0, 1.0))
-        assert picked.get(timeout=WAIT_S) is None, "beside everything"
-    assert looks.selected is None
+        assert picked.get(timeout=WAIT_S) == (page, None), "beside everything"
+    assert (looks.view_of(page).selected, looks.view_of(other).selected) == (None, None)
 
 
 def test_what_is_selected_at_a_page_is_marked_in_the_3d_view(engine: Engine, open_scene: Any) -> None:
     tick = engine.snapshot.processed
     assert tick is not None
-    looks = SharedViewState()
+    looks, page = SharedViewState(), object()
+    looks.name(page, "a1")
     with SceneFeed(engine, looks) as feed:
-        client = open_scene(feed.port)
+        client = open_scene(feed.port, page="a1")
         client.look()
         client.read_until(_is_cloud)
-        looks.select(tick.result.objects[0].id)
+        looks.select(page, tick.result.objects[0].id)
         client.read_until(lambda message: message.get("name") == "/selection")
 
 

@@ -155,11 +155,13 @@ def test_bad_input_is_refused_with_one_sentence(client: httpx.Client, name: str)
     assert client.get("/api/params").json()["values"] == before
 
 
-def test_what_is_picked_in_the_3d_view_comes_to_the_pages(
+def test_what_is_picked_in_the_3d_view_comes_to_its_page(
     looks: SharedViewState, stream: Callable[..., ClientConnection]
 ):
     page = stream()
     page.recv(timeout=WAIT_S)
-    looks.pick(7)
+    page.send(json.dumps({"page_3d": "a" * 32, "ping": 1}))
+    next(words for words in page if isinstance(words, str) and '"pong"' in words)
+    looks.pick("a" * 32, 7)
     told = (json.loads(words) for words in page if isinstance(words, str))
     assert next(word for word in told if word["type"] == "selected") == {"type": "selected", "id": 7}

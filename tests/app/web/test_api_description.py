@@ -26,6 +26,7 @@ FILES = {
     "/palette.css",
     "/viser",
     "/viser/{path:path}",
+    "/viser/of/{name}/{path:path}",
     "/rerun/",
     "/rerun/re_viewer.js",
     "/rerun/re_viewer_bg.wasm",

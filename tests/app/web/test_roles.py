@@ -14,6 +14,7 @@ from starlette.routing import Mount
 from starlette.types import Message, Receive, Scope, Send
 
 from app.engine.engine import Engine
+from app.streaming.scene_requests import hear
 from app.streaming.stream import DISPLAY_MAY_SAY, Stream
 from app.web.access import Access, Guard
 from app.web.server import create_app
@@ -30,7 +31,9 @@ GET /api/healthz · GET /metrics · GET /api/state · GET /api/result · GET /ap
 GET /api/params.yaml · GET /api/recording · POST /api/recording · GET /api/drive · GET /api/drive/object/{object_id} ·
 GET /api/drive/events · POST /api/marks · GET /api/runs · GET /api/runs/{number}/columns ·
 GET /api/runs/{number}/params.yaml · GET /api/compare · GET /api/labels · GET /api/labels/frames ·
-GET /api/labels/tracks/{number} · GET /api/labels/next · GET /api/labels/score · GET /api/labels/history ·
+GET /api/labels/tracks/{number} · GET /api/labels/tracks/{number}/filmstrip ·
+GET /api/labels/tracks/{number}/close_up · GET /api/labels/checks ·
+GET /api/labels/next · GET /api/labels/score · GET /api/labels/history ·
 GET /api/labels/formats · GET /api/labels/export · GET /api/labels/export/notes · GET /api/labels/versions ·
 GET /api/labels/versions/{name} · GET /api/jobs · GET /api/jobs/{number} · GET /api/jobs/{number}/file ·
 GET /api/alignment/score · GET /api/alignment/fit · GET /api/alignment/fit.yaml ·
@@ -45,7 +48,7 @@ POST /api/runs/{number}/base · POST /api/runs/{number}/use · DELETE /api/runs/
 POST /api/labels/undo · POST /api/labels/redo · POST /api/labels/import · POST /api/labels/versions · POST /api/clip ·
 DELETE /api/jobs/{number} · POST /api/alignment/fit · DELETE /api/alignment/fit ·
 POST /api/project · POST /api/project/ray · WEBSOCKET /viser · WEBSOCKET /viser/ ·
-GET /viser · GET /viser/{path:path}
+WEBSOCKET /viser/of/{name} · GET /viser/of/{name}/{path:path} · GET /viser · GET /viser/{path:path}
 """
 RULES: dict[str, Rule] = {
     door.strip(): rule
@@ -119,11 +122,14 @@ WORDS: dict[str, Rule] = {
     "selected": "people",
     "hides_3d": "people",
     "held": "people",
+    "page_3d": "people",
+    "labels_3d": "people",
     "own": "people",
 }
 
 
 def test_every_word_of_the_stream_has_a_rule():
-    heard = set(re.findall(r"""said(?:\.get\(|\[)"(\w+)\"""", inspect.getsource(Stream._receive)))
+    source = inspect.getsource(Stream._receive) + inspect.getsource(hear)
+    heard = set(re.findall(r"""said(?:\.get\(|\[)"(\w+)\"""", source))
     assert heard == set(WORDS)
     assert {word for word, rule in WORDS.items() if rule == "whoever looks"} == DISPLAY_MAY_SAY

@@ -70,6 +70,49 @@ def test_a_hand_in_the_3d_view_moves_it_in_every_view(hand: Hand, labels: Labels
     )
 
 
+def test_numbers_are_typed_a_key_held_down_is_one_act_and_a_class_offers_its_size(hand: Hand, labels: Labels):
+    page = hand.page
+    made = draw(hand, labels)
+    is_saved(page)
+    drawn, before = labels.cuboid(made, START), labels.everything["revision"]
+    for _ in range(5):
+        page.keyboard.down("ArrowUp")
+    page.keyboard.up("ArrowUp")
+    labels.wait_for(lambda now: now.cuboid(made, START) != drawn)
+    assert labels.cuboid(made, START)["center"][0] == pytest.approx(drawn["center"][0] + 0.5)
+    assert labels.everything["revision"] == before + 1
+    hand.keys("Shift+PageUp")
+    labels.wait_for(lambda now: now.cuboid(made, START)["size"][2] == pytest.approx(drawn["size"][2] + 0.1))
+    page.get_by_label("Length, metres").fill("6.25")
+    page.keyboard.press("Enter")
+    labels.wait_for(lambda now: now.cuboid(made, START)["size"][0] == 6.25)
+    page.get_by_label("Heading, degrees to the left").fill("90")
+    page.keyboard.press("Enter")
+    labels.wait_for(lambda now: now.cuboid(made, START)["yaw_rad"] == pytest.approx(math.pi / 2))
+    hand.keys("t")
+    page.get_by_role("button", name="Size of a truck").click()
+    labels.wait_for(lambda now: now.cuboid(made, START)["size"] == [8.0, 2.5, 3.2])
+    expect(page.get_by_role("button", name="Size of a truck")).to_be_hidden()
+    page.get_by_role("tab", name="Checks").click()
+    expect(page.locator("#label-checks")).to_contain_text("suspicious")
+    is_saved(page)
+
+
+def test_a_box_follows_its_cuboid_until_it_is_set_and_again_when_freed(hand: Hand, labels: Labels):
+    page = hand.page
+    made = draw(hand, labels)
+    is_saved(page)
+    facts = page.locator(".track-detail .facts").first
+    expect(facts).not_to_contain_text("box set by hand")
+    hand.keys("Shift+G", "Enter")
+    labels.wait_for(lambda now: now.sighting(made, START)["bbox"] is not None)
+    assert labels.sighting(made, START)["box_set"]
+    expect(facts).to_contain_text("box set by hand")
+    hand.keys("Escape", "Shift+S")
+    labels.wait_for(lambda now: not now.sighting(made, START)["box_set"])
+    expect(facts).not_to_contain_text("box set by hand")
+
+
 def test_what_the_picture_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, site: Site):
     page = hand.page
     tick = site.engine.snapshot.processed

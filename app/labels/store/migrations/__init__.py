@@ -1,4 +1,4 @@
 """The schema's history: every form that the tables have had."""
 
-HEAD = "0004"
+HEAD = "0005"
 """The revision that this program works with."""

@@ -14,7 +14,15 @@ from app.labels.service.next_work import Asked, What, where_next
 from app.labels.store.values import HistoryEntry, ItemKind
 from app.web.routes.drive import current
 from app.web.routes.labels.score_shapes import BadFrameJson, ScoreJson, errors_json
-from app.web.routes.labels.shapes import ItemKey, LabelsOfPerson, NextJson, WholeTrack, Window
+from app.web.routes.labels.shapes import (
+    ChecksJson,
+    ItemKey,
+    LabelsOfPerson,
+    NextJson,
+    ProblemJson,
+    WholeTrack,
+    Window,
+)
 from app.web.routes.refusals import refusing
 from app.web.routes.shapes import MetricJson
 
@@ -88,6 +96,13 @@ def labels_router(desk: LabelDesk) -> APIRouter:
                     for each in found.worst
                 ],
             )
+
+    @router.get("/checks")
+    def checks() -> ChecksJson:
+        """List what can hardly be so: jumps, overlaps, empty cuboids, boxes apart, leads without a track."""
+        with refusing():
+            found = desk.checks.of(desk.labels, desk.recording)
+        return ChecksJson(revision=found.revision, problems=[ProblemJson(**vars(each)) for each in found.problems])
 
     @router.get("/history", responses={200: {"model": list[HistoryEntry]}})
     def history(kind: ItemKind, number: Annotated[Id, Query(alias="id")]) -> Response:

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import BaseModel
 
+from app.labels.service.filmstrip import Why
 from app.labels.store.values import ItemKind
 from app.web.routes.shapes import CuboidJson, Point
 from pipeline.labels.model import Heading, State
@@ -126,11 +127,13 @@ class LabelsOfPerson(LabelChanges):
 
 
 class PlacedJson(BaseModel):
-    """keyframe: a person or a file put it there; else it follows those that are."""
+    """keyframe: a person or a file put it there; else it follows those that are. box_set: somebody set the box; else it
+    is where the cuboid is in the picture."""
 
     cuboid: CuboidJson | None
     bbox: tuple[float, float, float, float] | None
     keyframe: bool
+    box_set: bool
 
 
 class PlacedTrack(PlacedJson):
@@ -159,6 +162,30 @@ class WholeTrack(StatedItem):
     confidence: float | None
     heading: Heading
     sightings: list[PlacedFrame]
+
+
+class ProblemJson(BaseModel):
+    """What can hardly be so. track: what it is about; null for the lead alone."""
+
+    frame: int
+    track: int | None
+    words: str
+
+
+class ChecksJson(BaseModel):
+    """Of the labels as they were after act ``revision``."""
+
+    revision: int
+    problems: list[ProblemJson]
+
+
+class StillJson(BaseModel):
+    """One frame of a track. inside, beside: points in its cuboid and right beside it; null without points or cuboid."""
+
+    frame: int
+    why: Why
+    inside: int | None
+    beside: int | None
 
 
 class NextJson(BaseModel):

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.common.errors import BadInput
 from pipeline.formats.file_reading import check_looks_ahead, files_by_name
 from pipeline.formats.kitti_calibration import parse_object_calibration
-from pipeline.formats.kitti_records import DONT_CARE, LabelRow, kind_of, truth_of
+from pipeline.formats.kitti_records import DONT_CARE, UNLABELLED, LabelRow, kind_of, truth_of
 from pipeline.labels.formats.base import Imported, LabeledDrive, Shot, make_folder
 from pipeline.labels.formats.kitti import rows as kitti_rows
 from pipeline.labels.formats.reading import read_bytes
@@ -27,6 +27,8 @@ _OBJECT, _TRACKING, _CALIBRATION = "label_2", "label_02", "calib"
 _SEQUENCE = "0000"
 _USUAL_SIZE = (1242, 375)
 _LARGEST_ID = 2**63
+_NO_TRACK = "-1"
+"""Of a region that belongs to nothing."""
 
 
 def write_objects(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
@@ -86,15 +88,16 @@ def read_objects(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     }
     tracks = tracks_of(objects, drive.t_ns, origin)
     flat = [(frame, row) for frame, found in rows.items() for row in found if row.cuboid is None]
+    first = max((track.id for track in tracks), default=0) + 1
     alone = tuple(
-        LabelTrack(len(tracks) + n, row.label, (Sighting(frame, None, row.bbox),), "accepted", origin)
-        for n, (frame, row) in enumerate(flat, start=1)
+        LabelTrack(n, row.label, (Sighting(frame, None, row.bbox, box_set=True),), "accepted", origin)
+        for n, (frame, row) in enumerate(flat, start=first)
     )
     unknown = len(files) - len(known)
     notes = (
         f"{unknown} files match no frame of this recording: left out" if unknown else "",
         LINKED if tracks else "",
-        f"{len(flat):,} objects without a cuboid become a track each" if flat else "",
+        f"{len(flat):,} regions without a cuboid become a track each" if flat else "",
     )
     labels = replace(drive.empty(), tracks=(*tracks, *alone))
     return Imported(labels, (*filter(None, notes), *_notes([row for found in rows.values() for row in found])))
@@ -110,20 +113,39 @@ def read_tracking(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     T_rect_ego, camera = _view_beside(home, name, shot)
     found: dict[int, tuple[str, dict[int, Sighting]]] = {}
     rows: list[LabelRow] = []
+    regions: list[tuple[int, LabelRow]] = []
     for (frame_text, id_text, *fields), what in _lines(file, skip=2):
-        frame, number = _whole(frame_text, len(drive.shots), what), _whole(id_text, _LARGEST_ID, what)
+        frame = _whole(frame_text, len(drive.shots), what)
+        if id_text == _NO_TRACK:
+            regions.append((frame, kitti_rows.from_fields(fields, T_rect_ego, camera, what)))
+            continue
+        number = _whole(id_text, _LARGEST_ID, what)
         row = kitti_rows.from_fields(fields, T_rect_ego, camera, what)
         label, sightings = found.setdefault(number, (row.label, {}))
-        if frame in sightings or label != row.label:
+        if label == UNLABELLED:  # a track may begin where the picture alone shows it
+            label = row.label
+            found[number] = label, sightings
+        if frame in sightings or row.label not in (label, UNLABELLED):
             raise BadInput(f"{what}: track {number} occurs twice, or with two classes")
-        sightings[frame] = Sighting(frame, row.cuboid, row.bbox)
+        sightings[frame] = _sighting_of(frame, row)
         rows.append(row)
     tracks = [
         LabelTrack(number, label, tuple(sightings[frame] for frame in sorted(sightings)), "accepted", origin)
         for number, (label, sightings) in sorted(found.items())
     ]
+    first = max(found, default=0) + 1
+    tracks += [
+        LabelTrack(n, row.label, (_sighting_of(frame, row),), "accepted", origin)
+        for n, (frame, row) in enumerate(regions, start=first)
+    ]
     labels = replace(drive.empty(), tracks=tuple(tracks))
-    return Imported(labels, _notes(rows))
+    return Imported(labels, _notes([*rows, *(row for _, row in regions)]))
+
+
+def _sighting_of(frame: int, row: LabelRow) -> Sighting:
+    return Sighting(
+        frame, row.cuboid, row.bbox, box_set=row.bbox is not None, truncation=row.truncation, occlusion=row.occlusion
+    )
 
 
 def _sightings(labels: LabelSet) -> Iterator[tuple[LabelTrack, Sighting]]:
@@ -162,12 +184,12 @@ def _files(path: Path, folder: str) -> tuple[Path, dict[str, Path]]:
 
 
 def _lines(file: Path, skip: int = 0) -> Iterator[tuple[list[str], str]]:
-    """(fields, where) of each line; regions of which KITTI says nothing are passed over."""
+    """(fields, where) of each line."""
     for number, line in enumerate(read_bytes(file).decode("utf-8", "replace").splitlines(), start=1):
         fields, what = line.split(), f"{file}, line {number}"
         if 0 < len(fields) <= skip:
             raise BadInput(f"{what}: not a KITTI label")
-        if fields and fields[skip] != DONT_CARE:
+        if fields:
             yield fields, what
 
 
@@ -188,8 +210,12 @@ def _changes(labels: LabelSet, drive: LabeledDrive) -> tuple[str, ...]:
     cameras = [drive.shots[sighting.frame].camera for _, sighting in found if sighting.bbox is not None]
     if any(camera is not None and camera.distortion.size for camera in cameras):
         changes.append("boxes are moved to the undistorted image, as in KITTI")
-    if found:
-        changes.append("truncation and occlusion are unknown: written as -1")
+    hidden = sum(sighting.cuboid is not None and sighting.occlusion is None for _, sighting in found)
+    if hidden:
+        changes.append(f"occlusion of {hidden:,} objects is unknown: written as 3")
+    flat = sum(sighting.cuboid is None and track.label != UNLABELLED for track, sighting in found)
+    if flat:
+        changes.append(f"{flat:,} objects have a box but no cuboid: written as {DONT_CARE}, which trainers ignore")
     without = sum(sighting.bbox is None for _, sighting in found)
     if without:
         changes.append(f"{without:,} objects have no box in the image: written as -1")
@@ -198,9 +224,6 @@ def _changes(labels: LabelSet, drive: LabeledDrive) -> tuple[str, ...]:
 
 def _notes(rows: list[LabelRow]) -> tuple[str, ...]:
     notes = renamed((row.kind, row.label) for row in rows if row.kind != kind_of(row.label))
-    more = sum(row.said_more for row in rows)
-    if more:
-        notes.append(f"truncation and occlusion of {more:,} objects are dropped: labels cannot hold them")
     return tuple(notes)
 
 

@@ -30,21 +30,28 @@ from pipeline.labels.model import Sighting
 from pipeline.types import F64, Box, CameraCalibration
 from pipeline.types.source import SourceError
 
+_UNKNOWN = 3
+"""How far an object is hidden when nobody said it."""
 _ENOUGH = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
 
 
 def is_kept(label: str) -> bool:
     """Whether a class is the same after it was written and read."""
-    return label_name(kind_of(label)) == label and kind_of(label) != DONT_CARE
+    return label_name(kind_of(label)) == label
 
 
 def to_line(label: str, sighting: Sighting, T_rect_ego: F64, camera: CameraCalibration) -> str:
-    """One line without frame and track."""
+    """One line without frame and track. What the picture alone shows is a region of which nothing is said: a trainer
+    would take an object without a place for one at −1000 m."""
     place = cuboid_to_label(sighting.cuboid, T_rect_ego) if sighting.cuboid is not None else NO_CUBOID
     box = straightened(sighting.bbox, camera) if sighting.bbox is not None else NO_BOX
     alpha = _wrapped(place[6] - math.atan2(place[3], place[5])) if sighting.cuboid is not None else -10.0
     numbers = " ".join(f"{value + 0.0:.6f}" for value in (alpha, *box, *place))
-    return f"{kind_of(label)} -1 -1 {numbers}"
+    if sighting.cuboid is None:
+        return f"{DONT_CARE} -1 -1 {numbers}"
+    cut = "-1" if sighting.truncation is None else f"{sighting.truncation:.2f}"
+    hidden = _UNKNOWN if sighting.occlusion is None else sighting.occlusion
+    return f"{kind_of(label)} {cut} {hidden} {numbers}"
 
 
 def from_fields(fields: list[str], T_rect_ego: F64, camera: CameraCalibration | None, what: str) -> LabelRow:

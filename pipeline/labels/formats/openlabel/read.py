@@ -107,8 +107,15 @@ class _Reading:
         if data.bbox:
             x, y, width, height = _of_length(data.bbox[0].val, (4,), f"{self.what}: a bbox")
             bbox = (x - width / 2, y - height / 2, x + width / 2, y + height / 2)
-        keyframe = data.said("keyframe")
-        return Sighting(frame, cuboid, bbox, keyframe if isinstance(keyframe, bool) else True)
+        keyframe, box_set = data.said("keyframe"), data.said("box_set")
+        return Sighting(
+            frame,
+            cuboid,
+            bbox,
+            keyframe if isinstance(keyframe, bool) else True,
+            box_set is True or (not self.is_ours and bbox is not None),
+            *_hidden(data),
+        )
 
     def _cuboid(self, shape: Shape) -> Cuboid:
         """Nine numbers with Euler angles, or ten with a quaternion; only its turn about z is kept."""
@@ -245,6 +252,13 @@ class _Reading:
 
 def _is_track(uid: str, each: Element) -> bool:
     return uid != ol.EGO_UID and each.type not in (ol.PATH_TYPE, ol.EGO_TYPE)
+
+
+def _hidden(data: Data) -> tuple[float | None, int | None]:
+    """(truncation, occlusion); None where the file does not say them."""
+    cut, hidden = data.said("truncation"), data.said("occlusion")
+    is_cut = isinstance(cut, (int, float)) and not isinstance(cut, bool)
+    return (float(cut) if is_cut else None), (hidden if type(hidden) is int else None)
 
 
 def _reviewed(data: Data) -> tuple[str, str]:

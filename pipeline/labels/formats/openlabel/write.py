@@ -139,6 +139,11 @@ def _frames(labels: LabelSet, drive: LabeledDrive) -> dict[str, Element]:
 
 def _seen(sighting: Sighting) -> Element:
     data: Element = {"boolean": [{"name": "keyframe", "val": sighting.keyframe}]}
+    if sighting.box_set:
+        data["boolean"].append({"name": "box_set", "val": True})
+    numbers = (("truncation", sighting.truncation), ("occlusion", sighting.occlusion))
+    if said := [{"name": name, "val": val} for name, val in numbers if val is not None]:
+        data["num"] = said
     if sighting.cuboid is not None:
         half_rad = sighting.cuboid.yaw_rad / 2
         turn = (0.0, 0.0, math.sin(half_rad), math.cos(half_rad))

@@ -3,7 +3,7 @@ import { request } from "../../core/api.js";
 import { seekTo } from "../../drive/seek.js";
 import { get, set } from "../../core/store.js";
 import { act } from "./queue.js";
-import { CLASSES, moved, turned } from "../views/cuboid.js";
+import { CLASSES, grown, moved, turned, usualSize } from "../views/cuboid.js";
 import * as draft from "../state/draft.js";
 import { chosen, leadAt, shown, trackOf } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
@@ -28,11 +28,29 @@ function withTrack(what) {
 export const refOf = ({ id, revision }) => ({ kind: "track", id, revision });
 
 /** Propose labels from the pipeline, in the marked frames or in all frames. */
-export function propose() {
+export async function propose() {
   const isMarked = get("marked") !== null,
     whole = { first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1) };
-  return span.over((frames) => act({ kind: "propose", ...(isMarked ? frames : whole), from: "run" }));
+  const answer = await span.over((frames) => act({ kind: "propose", ...(isMarked ? frames : whole), from: "run" }));
+  if (!answer) offerComputed();
+  return answer;
 }
+
+/** Offer to propose what is computed so far, until everything is. */
+function offerComputed() {
+  const done = computed(),
+    all = get("state")?.count ?? 0;
+  if (!done || done >= all) return;
+  set("offer", {
+    words: `Propose these ${done}`,
+    take: () => act({ kind: "propose", first: 0, last: done - 1, from: "run" }),
+    isOpen: () => computed() < all,
+    about: get("said") ?? "",
+  });
+}
+
+/** Frames of the recording that the present run has come to. */
+const computed = () => get("drive")?.now?.done ?? 0;
 
 /**
  * Accept or reject the selected track; without a selection, the lead range at this frame.
@@ -76,10 +94,12 @@ export function selectNext(direction) {
   set("track", ids[next] ?? null);
 }
 
-/** @param {number} dx @param {number} dy metres, ego frame */
-export const nudge = (dx, dy) => change((cuboid) => moved(cuboid, dx, dy));
+/** @param {number} dx @param {number} dy @param {number} [dz] metres, ego frame */
+export const nudge = (dx, dy, dz = 0) => change((cuboid) => moved(cuboid, dx, dy, dz));
 /** @param {number} deg to the left */
 export const turn = (deg) => change((cuboid) => turned(cuboid, (deg * Math.PI) / 180));
+/** @param {0|1|2} axis length, width, height @param {number} by metres */
+export const grow = (axis, by) => change((cuboid) => grown(cuboid, axis, by));
 
 /** @param {(cuboid: import("../state/types.js").Cuboid) => import("../state/types.js").Cuboid} how */
 function change(how) {
@@ -88,8 +108,35 @@ function change(how) {
   if (!track) return say("Select a label first");
   if (!cuboid) return say(`#${track.id} has no cuboid in this frame; draw one (Shift G)`);
   draft.hold(track.id, { cuboid: how(cuboid) });
+  releaseSoon();
+}
+
+/** A key in the 3D view is not heard going up. */
+const IDLE_MS = 400;
+let idle = 0;
+
+/** Send what a key changed once it is let go: while it is held down, that is one act. */
+function releaseSoon() {
+  if (!idle) addEventListener("keyup", release, { once: true });
+  clearTimeout(idle);
+  idle = setTimeout(release, IDLE_MS);
+}
+
+function release() {
+  clearTimeout(idle);
+  idle = 0;
+  removeEventListener("keyup", release);
   draft.release();
 }
+
+/** The image box follows the cuboid again. */
+export const boxFollows = () =>
+  withTrack(({ id }) => {
+    const shape = draft.presentOf(id);
+    if (!shape?.cuboid) return say(`#${id} has no cuboid in this frame; draw one (Shift G)`);
+    draft.hold(id, { bbox: null, box_set: false });
+    draft.release();
+  });
 
 export const snap = () => withTrack(({ id, revision }) => act({ kind: "refit", track: id, revision, frame: shown() }));
 /** Turn the track's cuboids round, in every frame: front and rear were mistaken. */
@@ -107,14 +154,14 @@ export const keyframe = () =>
     const frame = shown(),
       shape = draft.presentOf(id) ?? (await nearestShape(id, frame));
     if (!shape || shown() !== frame) return say(`#${id} has no shape yet; draw one`);
-    draft.hold(id, { cuboid: shape.cuboid, bbox: shape.bbox });
+    draft.hold(id, { cuboid: shape.cuboid, bbox: shape.bbox, box_set: shape.box_set });
     draft.release();
   });
 
 /**
  * @param {number} id
  * @param {number} frame
- * @returns {Promise<Pick<import("../state/types.js").LabelSighting, "cuboid"|"bbox">|null>}
+ * @returns {Promise<Pick<import("../state/types.js").LabelSighting, "cuboid"|"bbox"|"box_set">|null>}
  */
 async function nearestShape(id, frame) {
   /** @type {{sightings: (import("../state/types.js").LabelSighting & {frame: number})[]}} */
@@ -141,8 +188,19 @@ export const nextClass = (direction) =>
     relabel(CLASSES[(CLASSES.indexOf(label) + direction + CLASSES.length) % CLASSES.length]);
   });
 
-/** @param {string} label */
-export const relabel = (label) => withTrack(({ id, revision }) => act({ kind: "relabel", track: id, revision, label }));
+/** Change the class, and offer the new one's usual size. @param {string} label */
+export const relabel = (label) =>
+  withTrack(async ({ id, revision }) => {
+    const cuboid = draft.presentOf(id)?.cuboid,
+      size = usualSize(label);
+    const answer = await act({ kind: "relabel", track: id, revision, label });
+    if (!answer || !cuboid || !size || cuboid.size.every((side, axis) => side === size[axis])) return;
+    set("offer", {
+      words: `Size of a ${label}: ${size.join(" × ")} m`,
+      take: () => act({ kind: "size_along", track: id, revision: trackOf(id)?.revision ?? revision, size }),
+      isOpen: () => get("track") === id && trackOf(id)?.label === label,
+    });
+  });
 
 /** Start merging the selected track with the label that is clicked or selected next. */
 export const merge = () =>

@@ -74,7 +74,7 @@ export function boxAround() {
   if (!track) return say("Select a label first");
   const bbox = boxOf(track.id) ?? middleBox();
   if (!bbox) return say("This frame has no image");
-  draft.hold(track.id, { bbox });
+  draft.hold(track.id, { bbox, box_set: true });
   draft.release();
   return bbox;
 }
@@ -105,12 +105,12 @@ function middleBox() {
 export function changeBox(du, dv, isSize) {
   const track = chosen(),
     step = (pictureWidth() ?? 0) * STEP_SHARE;
-  const box = track && (draft.presentOf(track.id)?.bbox ?? boxAround());
+  const box = track && (boxOf(track.id) ?? boxAround());
   if (!track || !box) return;
   const [x1, y1, x2, y2] = box,
     [dx, dy] = [du * step, dv * step];
   const [left, top] = isSize ? [x1, y1] : [x1 + dx, y1 + dy];
-  draft.hold(track.id, { bbox: [left, top, Math.max(left + 1, x2 + dx), Math.max(top + 1, y2 + dy)] });
+  draft.hold(track.id, { bbox: [left, top, Math.max(left + 1, x2 + dx), Math.max(top + 1, y2 + dy)], box_set: true });
   draft.release();
 }
 

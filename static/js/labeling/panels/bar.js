@@ -12,17 +12,18 @@ import { labelKeys } from "../keys.js";
 import { setTool, toggleFollows } from "../state/mode.js";
 import { newLabel, setNewLabel } from "../state/new_class.js";
 import { askName, knownName } from "../state/person.js";
+import * as offer from "./offer.js";
 import * as review from "../acts/review.js";
 import * as span from "../state/marked_frames.js";
 
 /** @typedef {import("../state/types.js").Lead} Lead */
 
-/** Maximum number of lead buttons in the bar; other tracks are chosen by typing their number. */
-const MOST_LEADS = 7;
 /** The last task whose end was reported, or that ended before this page loaded. @type {number|null} */
 let ended = null;
 /** Frame of the status message; it is cleared when the user moves on. */
 let about = -1;
+/** The lead button that was scrolled into view. @type {Element|null} */
+let inSight = null;
 
 const where = el("span", { class: "facts where" }),
   leads = el("span", { class: "joined leads", aria: { role: "group", label: "Lead" } });
@@ -157,7 +158,7 @@ export function setUp() {
       forth,
       name,
     ),
-    el("div", { class: "label-row label-line" }, reviewed, said, task, saved, again, discarded),
+    el("div", { class: "label-row label-line" }, reviewed, said, offer.setUp(), task, saved, again, discarded),
   );
   $("#label-keys").append(
     el("span", {}, el("kbd", { textContent: "?" }), " all shortcuts"),
@@ -192,12 +193,14 @@ function reflect() {
     .map((track) => /** @type {import("../state/types.js").LabelTrack} */ (track).id)
     .sort((a, b) => a - b);
   const shownLeads = /** @type {Lead[]} */ ([
+    "none",
+    "unknown",
     ...(typeof range?.lead === "number" && !numbers.includes(range.lead) ? [range.lead] : []),
     ...numbers,
-  ]).slice(0, MOST_LEADS);
+  ]);
   keyed(
     leads,
-    /** @type {Lead[]} */ ([...shownLeads, "none", "unknown"]),
+    shownLeads,
     String,
     (lead) => el("button", { type: "button", textContent: leadName(lead), onclick: () => span.choose(lead) }),
     (button, lead) => {
@@ -213,6 +216,9 @@ function reflect() {
               : `Set #${lead} as lead (type its number)`;
     },
   );
+  const pressed = leads.querySelector("[aria-pressed=true]");
+  if (pressed !== inSight) pressed?.scrollIntoView({ block: "nearest", inline: "nearest" });
+  inSight = pressed;
   const { first, last } = span.span();
   text(
     where,

@@ -2,7 +2,7 @@
  * Label files: export (with what each format loses), import, ground truth of the recording, and versions.
  */
 import { Refused, request } from "../../core/api.js";
-import { el, press, text } from "../../core/dom.js";
+import { $, el, press, text } from "../../core/dom.js";
 import { get } from "../../core/store.js";
 import { attachMenu, refill } from "../../workspace/menu.js";
 import { act } from "../acts/queue.js";
@@ -79,7 +79,20 @@ function exportRows(again) {
     return link;
   });
   const which = el("div", { class: "list-bar" }, el("div", { class: "joined" }, ...choices));
-  return [el("h3", { textContent: "Export labels" }), which, ...links];
+  const suspicious = el("button", { type: "button", class: "quiet", hidden: true, onclick: goToChecks });
+  tellProblems(suspicious);
+  return [el("h3", { textContent: "Export labels" }), which, suspicious, ...links];
+}
+
+const goToChecks = () => $("#tab-label-checks").click();
+
+/** What the checks have found is said before anything is exported. @param {HTMLElement} node */
+async function tellProblems(node) {
+  /** @type {{problems: unknown[]}|null} */
+  const found = await request("api/labels/checks").catch(() => null);
+  if (!found?.problems.length) return;
+  node.hidden = false;
+  text(node, `⚠ ${found.problems.length} to look at first`);
 }
 
 /** Ask the server which formats it reads and writes; without an answer the next look asks again. */

@@ -1,5 +1,6 @@
 /** The labels panel in the inspector column: tracks, frame, score and files. */
 import { $, el } from "../../core/dom.js";
+import * as checks from "./checks_tab.js";
 import * as detail from "./track_detail.js";
 import * as files from "./files_tab.js";
 import * as moment from "./frame_tab.js";
@@ -9,6 +10,7 @@ import * as tracks from "./track_list.js";
 const TABS = /** @type {const} */ ([
   ["tracks", "Tracks"],
   ["moment", "Frame"],
+  ["checks", "⚠"],
   ["score", "Score"],
   ["files", "Files"],
 ]);
@@ -16,6 +18,7 @@ const TABS = /** @type {const} */ ([
 const bodies = {
   tracks: el("div", { class: "label-tracks" }),
   moment: el("div", { class: "label-files" }),
+  checks: el("div", { class: "label-files" }),
   score: el("div", { class: "label-score" }),
   files: el("div", { class: "label-files" }),
 };
@@ -27,7 +30,8 @@ export function setUp() {
       id: `tab-label-${key}`,
       textContent: words,
       data: { tab: key },
-      aria: { role: "tab", controls: `label-${key}` },
+      title: key === "checks" ? "Checks" : "",
+      aria: { role: "tab", controls: `label-${key}`, ...(key === "checks" ? { label: "Checks" } : {}) },
       onclick: () => show(key),
     }),
   );
@@ -45,6 +49,7 @@ export function setUp() {
   tracks.setUp(bodies.tracks);
   detail.setUp(bodies.tracks);
   moment.setUp(bodies.moment);
+  checks.setUp(bodies.checks);
   score.setUp(bodies.score);
   files.setUp(bodies.files);
   show("tracks");
@@ -56,6 +61,7 @@ function show(shown) {
     bodies[key].hidden = key !== shown;
     $(`#tab-label-${key}`).setAttribute("aria-selected", String(key === shown));
   }
+  if (shown === "checks") checks.look(undefined);
   if (shown === "score") score.look(undefined);
   if (shown === "files") files.look();
 }

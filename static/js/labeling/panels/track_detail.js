@@ -1,13 +1,16 @@
 /** Details of the selected track: actions, position in this frame, history. */
 import { el, text } from "../../core/dom.js";
-import { DASH, num, percent } from "../../core/format.js";
+import { num, percent } from "../../core/format.js";
 import { on, paint } from "../../core/store.js";
 import * as commands from "../acts/commands.js";
 import { CLASSES } from "../views/cuboid.js";
 import { presentOf } from "../state/draft.js";
+import { boxOf, isFollowing } from "../views/picture_drawing.js";
 import { chosen, nameOf } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
 import { Past } from "./history_list.js";
+import * as closeUp from "./close_up.js";
+import * as numbers from "./numbers.js";
 import * as review from "../acts/review.js";
 
 const head = el("div", { class: "detail-head" }),
@@ -53,20 +56,32 @@ export function setUp(parent) {
       button("Turn round", "Shift X", "Front and rear are swapped: turn the whole track round", commands.flip),
       button("Size along", "W", "Apply this size to the whole track", commands.sizeAlong),
       button("Keyframe", "K", "Set a keyframe in this frame", commands.keyframe),
+      button("Box follows", "Shift S", "The image box follows the cuboid again", commands.boxFollows),
       button("Draw", "Shift G", "Draw the shape in this frame", () => setTool("shape")),
       button("Not here", "Del", "Remove from this frame or the marked frames", commands.notHere),
       button("Split", "X", "Split the track from this frame on", commands.splitHere),
       button("Merge", "M", "Merge with another label: click it, or select it with . and press Enter", commands.merge),
       button("Remove", "Shift Del", "Delete the track", commands.removeTrack),
     ),
+    numbers.node,
+    closeUp.node,
     past.node,
   );
   parent.append(panel);
-  paint(["track", "labels", "labelFrames", "frame", "draft"], show);
+  numbers.setUp();
+  closeUp.setUp();
+  paint(["track", "labels", "labelFrames", "frame", "draft", "projected"], show);
   on(["track", "labels"], () => {
     const track = chosen();
     if (track) past.look("track", track.id, track.revision);
   });
+}
+
+/** A class that people here cannot choose, from a file or a detector, is shown too. @param {string} label */
+function showClass(label) {
+  classes.querySelector(".foreign")?.remove();
+  if (!CLASSES.includes(label)) classes.append(el("option", { class: "foreign", value: label, textContent: label }));
+  classes.value = label;
 }
 
 /** How front and rear of a proposal were told apart. */
@@ -85,10 +100,16 @@ function show() {
   const sure = track.state === "proposed" && track.confidence !== null ? ` ${percent(track.confidence)}` : "";
   text(state, track.reviewer ? `reviewed by ${track.reviewer}` : track.state + sure);
   state.dataset.state = track.state;
-  if (document.activeElement !== classes) classes.value = track.label;
+  if (document.activeElement !== classes) showClass(track.label);
   text(comment, track.comment ? `Sent back: ${track.comment}` : "");
   text(how, track.origin.how ? `Placed by ${track.origin.name}: ${track.origin.how}` : "");
   text(facts, [placeWords(track, presentOf(track.id)), HEADINGS[track.heading]].filter(Boolean).join(" · "));
+}
+
+/** @param {import("../state/types.js").LabelSighting} sighting */
+function boxWords(sighting) {
+  if (!isFollowing(sighting)) return " · box set by hand";
+  return boxOf(sighting.track) ? "" : " · outside the image";
 }
 
 /**
@@ -107,11 +128,11 @@ function placeWords({ keyframes, origin }, sighting) {
   if (!sighting.cuboid)
     return `${kind} · image box only, no LiDAR points. Draw a cuboid (Shift G), or fit one to points in the box (S)`;
   const {
-    center: [x, y],
+    center: [x, y, z],
     size,
     yaw_rad,
   } = sighting.cuboid;
-  const place = `${num(x, 2)} m ahead, ${num(Math.abs(y), 2)} m ${y >= 0 ? "left" : "right"}`;
+  const place = `${num(x, 2)} m ahead, ${num(Math.abs(y), 2)} m ${y >= 0 ? "left" : "right"}, middle at ${num(z, 2)} m`;
   const dimensions = `${size.map((each) => num(each, 1)).join(" × ")} m · ${num((yaw_rad * 180) / Math.PI, 0)}°`;
-  return `${kind} · ${place} · ${dimensions}${sighting.bbox ? "" : ` · box ${DASH}`}`;
+  return `${kind} · ${place} · ${dimensions}${boxWords(sighting)}`;
 }

@@ -7,7 +7,7 @@ import { get, paintAfter, set } from "../../core/store.js";
 import { mergeWith, propose, rejectHidden } from "../acts/commands.js";
 import { present } from "../state/draft.js";
 import { isKnown } from "../state/sightings.js";
-import { shown, trackOf } from "../state/labels.js";
+import { isSentBack, shown, stateWords, trackOf } from "../state/labels.js";
 import { isSure, parted, setThreshold, threshold } from "../state/threshold.js";
 import { isReviewing } from "../acts/review.js";
 
@@ -73,6 +73,7 @@ export function setUp(parent) {
   );
   slider.addEventListener("input", () => setThreshold(slider.valueAsNumber));
   body.append(nothing, begin);
+  new ResizeObserver(bringIntoView).observe(body);
   body.addEventListener("click", (event) => pick(within(event, ".track-row")));
   const reflect = paintAfter(["labels", "labelFrames", "frame", "track", "labeling", "draft", "threshold"], show);
   /** @param {Which} key */
@@ -90,12 +91,17 @@ export function setUp(parent) {
     const found = fitting();
     text(count, found.length > MOST ? `${MOST} of ${found.length}` : String(found.length));
     list.show(found.slice(0, MOST));
-    if (get("track") !== scrolledTo) body.querySelector("[aria-selected=true]")?.scrollIntoView({ block: "nearest" });
+    if (get("track") !== scrolledTo) bringIntoView();
     scrolledTo = get("track") ?? null;
     nothing.hidden = found.length > 0;
     text(nothing, emptyWords());
     begin.hidden = (get("labels")?.tracks.size ?? 0) > 0;
   }
+}
+
+/** The selected row; again when the details below it take its place. */
+function bringIntoView() {
+  body.querySelector("[aria-selected=true]")?.scrollIntoView({ block: "nearest" });
 }
 
 /** The threshold and what it leaves, while there are proposals it applies to. */
@@ -146,20 +152,21 @@ function create() {
 }
 
 /** @param {HTMLElement} row @param {LabelTrack} track */
-function update(row, { id, label, state, first, last, keyframes, origin, comment, reviewer, confidence }) {
+function update(row, track) {
+  const { id, label, state, first, last, keyframes, origin, comment, reviewer, confidence } = track;
   row.setAttribute("aria-selected", String(id === get("track")));
-  row.dataset.state = comment && state === "proposed" ? "sent-back" : state;
+  row.dataset.state = isSentBack(track) ? "sent-back" : state;
   const [mark, name, what, frames, who] = [...row.children];
   text(name, `#${id}`);
   text(
     mark,
     reviewer
       ? "✓✓"
-      : row.dataset.state === "sent-back"
+      : isSentBack(track)
         ? "↩"
         : { proposed: "?", accepted: "✓", corrected: "✎", rejected: "✕" }[state],
   );
-  mark.setAttribute("aria-label", reviewer ? "reviewed" : row.dataset.state === "sent-back" ? "sent back" : state);
+  mark.setAttribute("aria-label", stateWords(track));
   text(what, label);
   text(
     frames,

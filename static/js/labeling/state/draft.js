@@ -16,6 +16,7 @@ import { shown, trackOf } from "./labels.js";
  * @property {number} revision  of the track when editing began
  * @property {Cuboid|null} cuboid
  * @property {Box|null} bbox
+ * @property {boolean} box_set
  * @property {number|null} settled  revision of the act that saved it
  */
 
@@ -44,7 +45,8 @@ function presentIn(frame) {
   const draft = get("draft"),
     known = sightingsAt(frame);
   if (!draft || draft.frame !== frame || draft.track === null) return known;
-  const held = { track: draft.track, cuboid: draft.cuboid, bbox: draft.bbox, keyframe: true };
+  const { cuboid, bbox, box_set } = draft,
+    held = { track: draft.track, cuboid, bbox, box_set, keyframe: true };
   return [...known.filter(({ track }) => track !== held.track), held];
 }
 
@@ -54,7 +56,7 @@ export const presentOf = (track) => (track === null ? null : (present().find((ea
 /**
  * Change a track's label in the draft.
  * @param {number} track
- * @param {{cuboid?: Cuboid|null, bbox?: Box|null}} shape
+ * @param {{cuboid?: Cuboid|null, bbox?: Box|null, box_set?: boolean}} shape
  * @param {number} [frame]
  */
 export function hold(track, shape, frame = shown()) {
@@ -68,6 +70,7 @@ export function hold(track, shape, frame = shown()) {
     revision,
     cuboid: before?.cuboid ?? null,
     bbox: before?.bbox ?? null,
+    box_set: before?.box_set ?? false,
     ...shape,
     settled: null,
   });
@@ -77,8 +80,8 @@ export function hold(track, shape, frame = shown()) {
 export async function release() {
   const draft = get("draft");
   if (!draft || draft.track === null || draft.settled !== null) return;
-  const { track, frame, revision, cuboid, bbox } = draft;
-  const answer = await act({ kind: "set_sighting", track, revision, frame, cuboid, bbox, interpolate: true });
+  const { track, frame, revision, cuboid, bbox, box_set } = draft;
+  const answer = await act({ kind: "set_sighting", track, revision, frame, cuboid, bbox, box_set, interpolate: true });
   const now = get("draft");
   if (now?.track !== track || now.frame !== frame) return;
   const left = answer?.changed?.tracks.find(({ id }) => id === track)?.revision ?? revision;

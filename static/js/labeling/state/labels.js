@@ -71,6 +71,12 @@ export const leadAt = (frame) =>
 /** The displayed frame, which acts refer to. */
 export const shown = () => get("frame")?.state.index ?? 0;
 
+/** @param {LabelTrack} track */
+export const isSentBack = ({ state, comment }) => Boolean(comment) && state === "proposed";
+
+/** What people have said of it. @param {LabelTrack} track */
+export const stateWords = (track) => (track.reviewer ? "reviewed" : isSentBack(track) ? "sent back" : track.state);
+
 /** @param {LabelTrack|null} track */
 export const nameOf = (track) => (track ? `#${track.id} ${track.label}` : "nothing");
 

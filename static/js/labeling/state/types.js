@@ -35,6 +35,7 @@
  * @property {Cuboid|null} cuboid
  * @property {Box|null} bbox
  * @property {boolean} keyframe
+ * @property {boolean} box_set somebody set the box; else it follows the cuboid, if there is one
  * @typedef {object} LeadRange both ends included
  * @property {number} id
  * @property {number} revision
@@ -101,6 +102,15 @@
  * @property {string} what in a few words
  * @property {LabelsAnswer|null} changed
  * @property {string} note
+ * @typedef {object} Still one frame of a track's filmstrip
+ * @property {number} frame
+ * @property {"keyframe"|"end"|"fits worst"} why
+ * @property {number|null} inside points in its cuboid
+ * @property {number|null} beside points right beside it
+ * @typedef {object} Problem what can hardly be so
+ * @property {number} frame
+ * @property {number|null} track
+ * @property {string} words
  * @typedef {object} Found where there is something to do
  * @property {number|null} frame
  * @property {string} why

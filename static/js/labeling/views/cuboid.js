@@ -29,6 +29,9 @@ const TYPICAL_M = {
   person: [0.6, 0.6, 1.75],
 };
 export const CLASSES = Object.keys(TYPICAL_M);
+
+/** Length, width, height; null where there is none. @param {string} label @returns {[number, number, number]|null} */
+export const usualSize = (label) => TYPICAL_M[label] ?? null;
 /** A shorter drag sets only the position, not length and heading. */
 const SAYS_FROM_M = 1;
 
@@ -103,11 +106,29 @@ export function gripAt(cuboid, place, reach, beyond) {
   return "move";
 }
 
-/** @param {Cuboid} cuboid @param {number} dx @param {number} dy @returns {Cuboid} */
-export const moved = (cuboid, dx, dy) => ({
+/** @param {Cuboid} cuboid @param {number} dx @param {number} dy @param {number} [dz] @returns {Cuboid} */
+export const moved = (cuboid, dx, dy, dz = 0) => ({
   ...cuboid,
-  center: [cuboid.center[0] + dx, cuboid.center[1] + dy, cuboid.center[2]],
+  center: [cuboid.center[0] + dx, cuboid.center[1] + dy, cuboid.center[2] + dz],
 });
+
+/**
+ * Longer, wider or higher. The side that the sensors see, and the bottom, stay.
+ * @param {Cuboid} cuboid
+ * @param {number} axis length, width, height
+ * @param {number} by metres
+ * @returns {Cuboid}
+ */
+export function grown(cuboid, axis, by) {
+  const size = /** @type {[number, number, number]} */ ([...cuboid.size]);
+  size[axis] = Math.max(SMALLEST_M, size[axis] + by);
+  const half = (size[axis] - cuboid.size[axis]) / 2;
+  if (axis === 2) return moved({ ...cuboid, size }, 0, 0, half);
+  const ego = own(cuboid, { x: 0, y: 0 }),
+    away = (axis === 0 ? ego.along : ego.across) > 0 ? -half : half;
+  const [x, y] = placeOf(cuboid, axis === 0 ? away : 0, axis === 0 ? 0 : away);
+  return { ...cuboid, size, center: [x, y, cuboid.center[2]] };
+}
 
 /** @param {Cuboid} cuboid @param {number} by_rad @returns {Cuboid} */
 export const turned = (cuboid, by_rad) => ({

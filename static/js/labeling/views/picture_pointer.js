@@ -11,7 +11,8 @@ import { chosen, shown } from "../state/labels.js";
 import { lookOf } from "./style.js";
 import { isOn, setTool } from "../state/mode.js";
 import { newLabel } from "../state/new_class.js";
-import { boxOf } from "./picture_drawing.js";
+import { boxOf, isFollowing } from "./picture_drawing.js";
+import { isZoomed, pan, zoom } from "../../views/picture_zoom.js";
 import * as road from "./road_drag.js";
 
 /** @typedef {import("../state/types.js").Box} Box */
@@ -27,12 +28,13 @@ export function setUp() {
   /** @type {{x: number, y: number, hasMoved: boolean, drag: Drag|null}|null} */
   let down = null;
   canvas.addEventListener("pointerdown", (event) => {
-    if (!isOn() || get("taping")) return;
+    if (!isOn() || get("taping") || event.button !== 0) return;
     canvas.setPointerCapture(event.pointerId);
     down = { x: event.offsetX, y: event.offsetY, hasMoved: false, drag: takes(pixelAt(event)) };
   });
   canvas.addEventListener("pointermove", (event) => {
     if (!down) return;
+    if (!down.drag && down.hasMoved && isZoomed()) pan(place(), event.movementX, event.movementY);
     down.hasMoved ||= Math.hypot(event.offsetX - down.x, event.offsetY - down.y) >= CLICK_PX;
     if (down.hasMoved) down.drag?.moved(pixelAt(event));
   });
@@ -47,6 +49,12 @@ export function setUp() {
     down = null;
     drop();
   });
+}
+
+/** Zoom at the selected label, else at the middle. @param {number} by */
+export function zoomBy(by) {
+  const box = boxOf(get("track") ?? -1);
+  zoom(by, box && { u: (box[0] + box[2]) / 2, v: (box[1] + box[3]) / 2 }, place());
 }
 
 /** Camera pixels per canvas pixel. */
@@ -64,7 +72,8 @@ function takes(from) {
   if (tool === "new") return drawing(from, (bbox) => lift(bbox ? { bbox } : { pixel: [from.u, from.v] }));
   if (tool === "shape" && track !== null) return drawing(from, (bbox) => (bbox ? shape(track, bbox) : drop()));
   if (track === null) return null;
-  const box = presentOf(track)?.bbox,
+  const label = presentOf(track),
+    box = label && !isFollowing(label) ? label.bbox : null, // one that follows is drawn anew (Shift G)
     sides = box ? sidesAt(box, from, REACH_PX * perPane()) : null;
   if (!sides || sides.every(Boolean)) {
     const onRoad = road.takes(track, from);
@@ -73,7 +82,7 @@ function takes(from) {
   if (!box || !sides) return null;
   return {
     from,
-    moved: (to) => hold(track, { bbox: stretched(box, sides, to.u - from.u, to.v - from.v) }),
+    moved: (to) => hold(track, { bbox: stretched(box, sides, to.u - from.u, to.v - from.v), box_set: true }),
     ended: (isClick) => (isClick ? clicked(from) : release()),
   };
 }
@@ -91,7 +100,7 @@ function drawing(from, done) {
     from,
     moved: (to) => {
       box = ordered([from.u, from.v, to.u, to.v]);
-      set("draft", { track: null, frame: shown(), revision: 0, cuboid: null, bbox: box, settled: null });
+      set("draft", { track: null, frame: shown(), revision: 0, cuboid: null, bbox: box, box_set: true, settled: null });
     },
     ended: (isClick) => {
       setTool(null);
@@ -114,7 +123,7 @@ async function lift(from) {
 /** @param {number} track @param {Box} bbox */
 function shape(track, bbox) {
   drop();
-  hold(track, { bbox });
+  hold(track, { bbox, box_set: true });
   release();
 }
 

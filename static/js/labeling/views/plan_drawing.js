@@ -42,6 +42,7 @@ export function drawInPlan(ctx, view, tags) {
       isLead: false,
       isChosen: true,
       isFacing: true,
+      role: "path",
       name: "",
     });
 }

@@ -58,7 +58,10 @@ function drawing(from, track) {
   const shape = (/** @type {Place} */ to) => drawn(from, to, label, ground_m);
   const show = (/** @type {Place} */ to) => {
     if (track !== null) hold(track, { cuboid: shape(to) });
-    else set("draft", { track: null, frame: shown(), revision: 0, cuboid: shape(to), bbox: null, settled: null });
+    else {
+      const fresh = { track: null, revision: 0, bbox: null, box_set: false, settled: null };
+      set("draft", { ...fresh, frame: shown(), cuboid: shape(to) });
+    }
   };
   show(from);
   return {

@@ -27,11 +27,11 @@ const project = newestOnly(async (/** @type {{frame: number, cuboids: Map<number
   });
 });
 
-/** Maximum number of projected cuboids: the nearest ones, and the selected one. */
+/** Maximum number of cuboids that the server projects or draws. */
 const MOST = 150;
 
-/** @param {[number, Cuboid][]} cuboids @returns {[number, Cuboid][]} */
-function nearest(cuboids) {
+/** The nearest ones, and the selected one. @param {[number, Cuboid][]} cuboids @returns {[number, Cuboid][]} */
+export function nearest(cuboids) {
   if (cuboids.length <= MOST) return cuboids;
   const away = (
     /** @type {[number, Cuboid]} */ [

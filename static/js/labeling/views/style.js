@@ -6,7 +6,8 @@ import { isSure } from "../state/threshold.js";
 
 /**
  * @typedef {{tint: string, dash: number[], width: number, isLead: boolean, isChosen: boolean, isFacing: boolean,
- *   name: string}} Look isFacing: front and rear are told apart
+ *   name: string, role: "cipv"|"path"|"fused"|"warning"}} Look
+ *   isFacing: front and rear are told apart; role: of its colour
  */
 
 /** @param {number} id @param {boolean} isOnPicture @returns {Look|null} null if hidden */
@@ -16,16 +17,11 @@ export function lookOf(id, isOnPicture) {
   if (!track || (!isChosen && (track.state === "rejected" || !isSure(track)))) return null;
   const isLead = leadAt(shown())?.lead === id;
   const shade = (/** @type {string} */ role) => (isOnPicture ? onPicture(role) : color(role));
-  const tint =
-    track.state === "rejected"
-      ? ui("danger")
-      : isLead
-        ? shade("cipv")
-        : track.state === "proposed"
-          ? shade("path")
-          : shade("fused");
+  const role =
+    track.state === "rejected" ? "warning" : isLead ? "cipv" : track.state === "proposed" ? "path" : "fused";
   return {
-    tint,
+    tint: track.state === "rejected" ? ui("danger") : shade(role),
+    role,
     dash: track.state === "proposed" ? [5, 4] : track.state === "rejected" ? [2, 4] : [],
     width: isChosen ? 2.5 : 1.5,
     isLead,

@@ -22,6 +22,11 @@ export class Labels {
     this.taken = [];
   }
 
+  /** Keep a rectangle free of labels. @param {number} x @param {number} y @param {number} w @param {number} h */
+  keepFree(x, y, w, h) {
+    this.taken.push({ x, y, w, h });
+  }
+
   /**
    * Draw a label with its bottom left corner at (x, y), moved up to avoid others.
    * @param {string} words @param {number} x @param {number} y @param {string} tint @param {Weight} [weight]

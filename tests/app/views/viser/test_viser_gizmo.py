@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.core.shared_view_state import HeldCuboid
+from app.core.shared_view_state import HeldCuboid, PageView
 from app.views.viser.gizmo import FACES, NODE, moved
 from app.views.viser.view import ViserView
 from pipeline.common.geometry import Cuboid
 from pipeline.params import Params
+from pipeline.types import Frame, Result
 
 CAR = Cuboid((20.0, 1.0, 0.8), (4.0, 2.0, 1.5), 0.4)
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-WAIT_S = 180.0
+WAIT_S = 15.0
 Drags = queue.Queue[tuple[HeldCuboid, bool]]
 PAGE = object()
 
@@ -28,11 +29,30 @@ def drags() -> Drags:
     return queue.Queue()
 
 
+class Scene:
+    """A 3D view that shows one cuboid to every page."""
+
+    def __init__(self, drags: Drags) -> None:
+        self._wanted = PageView()
+        self.view = ViserView(
+            Params(), on_drag=lambda held, ended: drags.put((held, ended)), view_of=lambda page: self._wanted
+        )
+
+    @property
+    def port(self) -> int:
+        return self.view.port
+
+    def hold(self, held: HeldCuboid | None) -> None:
+        self._wanted = PageView(held=held)
+        self.view.look()
+
+
 @pytest.fixture
-def view(drags: Drags) -> Iterator[ViserView]:
-    view = ViserView(Params(), on_drag=lambda held, ended: drags.put((held, ended)))
-    yield view
-    view.close()
+def view(drags: Drags, frame: Frame, result: Result) -> Iterator[Scene]:
+    scene = Scene(drags)
+    scene.view.show(frame, result)
+    yield scene
+    scene.view.close()
 
 
 def turned(yaw_rad: float) -> np.ndarray:
@@ -80,7 +100,13 @@ def test_the_gizmo_moves_and_turns(yaw_rad: float) -> None:
 
 
 def drag(client: Any, name: str, position: tuple[float, ...]) -> None:
-    client._send("TransformControlsUpdateMessage", name=f"{NODE}/{name}", wxyz=(1.0, 0.0, 0.0, 0.0), position=position)
+    place = {"wxyz": (1.0, 0.0, 0.0, 0.0), "position": position}
+    client._send("TransformControlsUpdateMessage", name=f"{NODE}/{name}", **place, owner=owner(client))
+
+
+def owner(client: Any) -> str:
+    """A handle is in the scene of one browser, and says so."""
+    return next(str(each["owner"]) for each in client.messages if each.get("name", "").startswith(NODE))
 
 
 def held(track: int, cuboid: Cuboid) -> HeldCuboid:
@@ -88,40 +114,40 @@ def held(track: int, cuboid: Cuboid) -> HeldCuboid:
 
 
 def grab(client: Any, name: str) -> None:
-    client._send("TransformControlsDragStartMessage", name=f"{NODE}/{name}")
+    client._send("TransformControlsDragStartMessage", name=f"{NODE}/{name}", owner=owner(client))
 
 
-def test_a_browser_drags_it_and_the_hand_is_right_until_it_lets_go(
-    view: ViserView, drags: Drags, open_scene: Any
-) -> None:
+def test_a_browser_drags_it_and_the_hand_is_right_until_it_lets_go(view: Scene, drags: Drags, open_scene: Any) -> None:
     view.hold(held(7, CAR._replace(yaw_rad=0.0)))
     client = open_scene(view.port)
-    client.read_present_state()
+    client.look()
+    client.read_until(lambda each: each.get("name") == f"{NODE}/edges")
     assert {f"{NODE}/{name}" for name in ("move", "edges", *FACES)} <= set(client.nodes())
     grab(client, "front")
     drag(client, "front", (23.0, 1.0, 0.8))
     assert drags.get(timeout=WAIT_S) == (held(7, Cuboid((20.5, 1.0, 0.8), (5.0, 2.0, 1.5), 0.0)), False)
     view.hold(held(9, CAR))
     drag(client, "front", (24.0, 1.0, 0.8))
-    client._send("TransformControlsDragEndMessage", name=f"{NODE}/front")
+    client._send("TransformControlsDragEndMessage", name=f"{NODE}/front", owner=owner(client))
     longest = held(7, Cuboid((21.0, 1.0, 0.8), (6.0, 2.0, 1.5), 0.0))
     assert drags.get(timeout=WAIT_S) == (longest, False), "another label is held by now: the hand has the first"
     assert drags.get(timeout=WAIT_S) == (longest, True)
     grab(client, "front")
     drag(client, "move", (5.0, 1.0, 0.8))
     assert drags.get(timeout=WAIT_S)[0].track == 9, "what was held meanwhile is there when the hand is free"
-    client._send("TransformControlsDragEndMessage", name=f"{NODE}/move")
+    client._send("TransformControlsDragEndMessage", name=f"{NODE}/move", owner=owner(client))
     assert drags.get(timeout=WAIT_S)[1]
     view.hold(None)
     client.read_until(lambda each: each["type"] == "RemoveSceneNodeMessage" and each["name"] == f"{NODE}/edges")
     assert not {name for name, shown in client.nodes().items() if name.startswith(f"{NODE}/") and shown}
 
 
-def test_a_browser_that_goes_away_lets_go(view: ViserView, drags: Drags, open_scene: Any) -> None:
+def test_a_browser_that_goes_away_lets_go(view: Scene, drags: Drags, open_scene: Any) -> None:
     view.hold(held(7, CAR._replace(yaw_rad=0.0)))
     client, other = open_scene(view.port), open_scene(view.port)
-    client.read_present_state()
-    other.read_present_state()
+    for each in (client, other):
+        each.look()
+        each.read_until(lambda said: said.get("name") == f"{NODE}/edges")
     grab(client, "front")
     drag(client, "front", (23.0, 1.0, 0.8))
     brought = held(7, Cuboid((20.5, 1.0, 0.8), (5.0, 2.0, 1.5), 0.0))

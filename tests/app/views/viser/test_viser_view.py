@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.core.shared_view_state import HeldCuboid, LabelInView, LabelsInView, PageView
 from app.views.viser.gui import ParamsGui
 from app.views.viser.view import POSES, ViserView
+from pipeline.common.geometry import Cuboid
 from pipeline.params import Params, with_changes
 from pipeline.types import Cipv, Frame, Layers, Result
 from pipeline.types.lane import EgoLane, LaneLine
@@ -89,18 +91,51 @@ def test_labels_and_the_ego_car_follow_the_newest_frame(
     assert placed[-1]["position"][2] == pytest.approx(-1.2 + 0.5 + 1.5 / 2, abs=1e-3), "on this frame's ground"
 
 
-def test_the_selected_object_is_marked_and_named_until_another_one_is(
-    view: ViserView, frame: Frame, result: Result, open_scene: Any
+def test_each_page_sees_its_own_selection_and_labels(frame: Frame, result: Result, open_scene: Any) -> None:
+    label = LabelInView(3, Cuboid((20.0, 1.0, 0.8), (4.0, 2.0, 1.5), 0.4), "lead #3 car, accepted", "cipv", True)
+    views = {"a1": PageView(selected=8, labels=LabelsInView((label,), True))}
+    view = ViserView(Params(), view_of=lambda page: views.get(page, PageView()))
+    try:
+        view.show(frame, result)
+        mine, other = open_scene(view.port, page="a1"), open_scene(view.port, page="b2")
+        other.read_present_state()
+        mine.look()
+        mine.read_until(lambda each: each.get("name") == "/own/names/0" and "props" in each)
+        assert sorted(mine.texts()) == ["#7 car 19.9 m", "#8 obstacle 15.9 m", "lead #3 car, accepted"]
+        assert mine.nodes()["/selection"]
+        assert mine.nodes()["/own/cuboids"]
+        assert mine.owned("/cuboids"), "the pipeline's objects are covered, for this page"
+        assert not other.owned("/cuboids")
+        assert not {name for name in other.nodes() if name.startswith(("/own", "/selection"))}
+        views["a1"] = PageView()
+        view.look()
+        mine.read_until(lambda each: each["type"] == "SetSceneNodeVisibilityMessage" and each["name"] == "/own/names/0")
+        assert mine.texts() == ["#7 car 19.9 m"]
+        assert not mine.nodes()["/selection"]
+        assert not mine.owned("/cuboids")
+    finally:
+        view.close()
+
+
+def test_the_camera_goes_to_a_label_when_it_is_selected_and_then_stays(
+    frame: Frame, result: Result, open_scene: Any
 ) -> None:
-    view.show(frame, result)
-    view.select(8)
-    client = open_scene(view.port)
-    client.read_present_state()
-    assert client.nodes()["/selection"]
-    assert sorted(client.texts()) == ["#7 car 19.9 m", "#8 obstacle 15.9 m"]
-    view.select(None)
-    client.read_until(lambda each: each["type"] == "SetSceneNodeVisibilityMessage" and each["name"] == "/selection")
-    assert not client.nodes()["/selection"]
+    car = Cuboid((20.0, 10.0, 0.8), (4.0, 2.0, 1.5), 0.4)
+    views = {"a1": PageView(held=HeldCuboid(None, 3, 0, car))}
+    view = ViserView(Params(), view_of=lambda page: views[page])
+    try:
+        view.show(frame, result)
+        client = open_scene(view.port, page="a1")
+        client.look()
+        went = client.read_until(lambda each: each["type"] == "SetCameraLookAtMessage" and not each.get("initial"))
+        assert went["look_at"] == pytest.approx(car.center)
+        client.messages.clear()
+        views["a1"] = PageView(held=HeldCuboid(None, 3, 1, car._replace(center=(30.0, 10.0, 0.8))))
+        view.look()
+        client.read_until(lambda each: each.get("name") == "/held/edges")
+        assert not [each for each in client.messages if each["type"] == "SetCameraLookAtMessage"]
+    finally:
+        view.close()
 
 
 def test_lanes_and_the_next_vehicle_are_drawn_where_there_are_any(

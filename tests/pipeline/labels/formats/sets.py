@@ -80,7 +80,11 @@ def label_sets(draw: st.DrawFn) -> LabelSet:
     for number in ids:
         frames = sorted(draw(st.sets(FRAMES)))
         seen = tuple(
-            Sighting(i, draw(st.none() | CUBOIDS), draw(st.none() | BOXES), draw(st.booleans())) for i in frames
+            Sighting(
+                i, draw(st.none() | CUBOIDS), box := draw(st.none() | BOXES), draw(st.booleans()), box is not None, *cut
+            )
+            for i in frames
+            for cut in (draw(st.sampled_from([(None, None), (0.25, 2), (0.0, 0)])),)
         )
         tracks.append(
             LabelTrack(

@@ -24,7 +24,8 @@ def written(name: FormatName, folder: Path) -> Any:
 def test_coco(tmp_path: Path) -> None:
     coco = written("coco", tmp_path)
     assert [each["name"] for each in coco["categories"]] == ["bus", "car"]
-    first, second = coco["annotations"]
+    first, second, bus = coco["annotations"]
+    assert (bus["track_id"], bus["image_id"]) == (5, 3), "it had no box: around its cuboid's projection"
     assert first["bbox"] == [500.0, 300.0, 200.0, 120.0], "left, top, width, height"
     assert (first["area"], first["iscrowd"], first["track_id"], first["category_id"]) == (24000.0, 0, 3, 2)
     assert [first["image_id"], second["image_id"]] == [1, 2]
@@ -40,7 +41,7 @@ def test_openlabel(tmp_path: Path) -> None:
         [20.0, 0.0, 0.5, 0.0, 0.0, 0.0499792, 0.9987503, 4.0, 1.8, 1.5], abs=1e-6
     ), "place, x y z w, length width height"
     assert seen["bbox"][0]["val"] == [600.0, 360.0, 200.0, 120.0], "around the centre"
-    assert seen["boolean"] == [{"name": "keyframe", "val": False}]
+    assert seen["boolean"] == [{"name": "keyframe", "val": False}, {"name": "box_set", "val": True}]
     assert openlabel["objects"]["3"]["frame_intervals"] == [{"frame_start": 0, "frame_end": 1}]
     relation = openlabel["relations"]["0"]
     assert relation["type"] == "isLeadVehicleOf"

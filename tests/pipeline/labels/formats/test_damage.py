@@ -125,7 +125,7 @@ def seen_set(here: LabeledDrive) -> LabelSet:
         cuboid = Cuboid((25.0, y_m, 0.0), (4.0, 1.8, 1.5), 0.1)
         box = project_cuboid(Pinhole(eye.K, eye.distortion, eye.T_camera_ego), cuboid.corners(), eye.width, eye.height)
         assert box is not None
-        tracks.append(LabelTrack(number, "car", (Sighting(0, cuboid, box),), "accepted", IMPORT))
+        tracks.append(LabelTrack(number, "car", (Sighting(0, cuboid, box, box_set=True),), "accepted", IMPORT))
     return replace(here.empty(), tracks=tuple(tracks))
 
 

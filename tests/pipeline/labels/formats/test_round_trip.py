@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
+from pipeline.labels.boxes import following
 from pipeline.labels.formats import base, native
 from pipeline.labels.formats.base import LabeledDrive
 from pipeline.labels.formats.parts import EVERYTHING
@@ -36,16 +37,34 @@ def there_and_back(labels: LabelSet, here: LabeledDrive, name: FormatName, folde
 def wanted(labels: LabelSet, name: FormatName) -> LabelSet:
     """What a format can hold of the labels, by its registration."""
     holds = FORMATS[name].holds
+    if "boxes" in holds and not FORMATS[name].as_stored:
+        labels = following(labels, drive())
     if holds == EVERYTHING:
         return labels
     if "leads" in holds:
         return replace(plain(labels), tracks=(), leads=tuple(r for r in labels.leads if r.state != "rejected"))
-    return plain(labels, cuboids="cuboids" in holds, boxes="boxes" in holds)
+    kept = plain(labels, cuboids="cuboids" in holds, boxes="boxes" in holds)
+    return regions_named(kept, by_frame=name == "kitti") if name.startswith("kitti") else kept
 
 
 def is_anonymous(name: FormatName) -> bool:
     """It does not say which sightings are of one track."""
     return "identities" not in FORMATS[name].holds and "leads" not in FORMATS[name].holds
+
+
+def regions_named(labels: LabelSet, by_frame: bool) -> LabelSet:
+    """What has no cuboid anywhere, or none in a frame, is a region of which KITTI says nothing."""
+    tracks = []
+    for track in labels.tracks:
+        flat = [each for each in track.sightings if each.cuboid is None]
+        if not by_frame:
+            is_flat = len(flat) == len(track.sightings)
+            tracks.append(replace(track, label="dont care") if is_flat else track)
+            continue
+        solid = tuple(each for each in track.sightings if each.cuboid is not None)
+        tracks += [replace(track, sightings=(each,), label="dont care") for each in flat]
+        tracks += [replace(track, sightings=solid)] if solid else []
+    return replace(labels, tracks=tuple(tracks))
 
 
 @pytest.mark.parametrize("name", [name for name in FORMATS if name != "mcap"])
@@ -88,7 +107,7 @@ def test_kitti_boxes_are_of_the_undistorted_picture(distortion: tuple[float, ...
 
 def full_set() -> LabelSet:
     by = Origin("pipeline", "run", 5, "p", "c")
-    seen = Sighting(0, Cuboid((20.0, 0.0, 0.5), (4.0, 1.8, 1.5), 0.1), (500.0, 300.0, 700.0, 420.0))
+    seen = Sighting(0, Cuboid((20.0, 0.0, 0.5), (4.0, 1.8, 1.5), 0.1), (500.0, 300.0, 700.0, 420.0), box_set=True)
     tracks = (
         LabelTrack(
             3, "car", (seen, replace(seen, frame=1, keyframe=False)), "proposed", by, "look again", "", 0.625, "unknown"
@@ -115,11 +134,11 @@ LOSSES: dict[FormatName, tuple[str, ...]] = {
         "2 ranges of the lead", "1 frame of the ego path", "1 event", "1 frame tag", "2 comments", "2 reviews",
         "1 track lose their identity", "1 interpolated position", "2 labels left out: rejected",
         "1 label written as if accepted", "1 corrected label", "who made each label", "'frozen'", "tracks' numbers",
-        "1 track without sightings", "1 objects have no box", "truncation and occlusion", "3 frames have no file",
+        "1 track without sightings", "occlusion of 3 objects is unknown", "3 frames have no file",
     ),
     "kitti-tracking": ("2 ranges of the lead", "2 labels left out: rejected", "1 event", "who made each label"),
     "nuscenes": ("3 boxes in images not written", "1 sighting not written", "images and point"),
-    "coco": ("3 cuboids not written", "1 sighting not written", "1 frame tag"),
+    "coco": ("3 cuboids not written", "1 frame tag"),
     "csv": ("4 tracks not written", "1 frame of the ego path", "1 rejected ranges", "'frozen'"),
 }  # fmt: skip
 

@@ -263,7 +263,11 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "a folder": (lambda path: path.mkdir(), "Is a directory"),
     "empty": (lambda path: path.write_bytes(b""), "not an MCAP file"),
     "text": (lambda path: path.write_text("hello"), "not an MCAP file"),
-    "no more than the magic": (lambda path: path.write_bytes(b"\x89MCAP0\r\n"), "without a header"),
+    "no more than the magic": (
+        lambda path: path.write_bytes(b"\x89MCAP0\r\n"),
+        "a damaged MCAP file: it has no header",
+    ),
+    "overwritten": (lambda path: path.write_bytes(b"x" * 99 + b"\x89MCAP0\r\n"), "a damaged MCAP file: its beginning"),
     "of ROS 2": (lambda path: _foreign(path, "ros2"), "try rosbag:"),
     "of someone else": (lambda path: _foreign(path, ""), "not a session of CIPV Studio"),
     "without frames": (lambda path: SessionWriter(path, ABOUT).close(), "holds no frames"),

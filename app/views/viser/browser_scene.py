@@ -1,0 +1,115 @@
+"""What one browser alone sees of the 3D view: its page's selection, its labels, and the cuboid that it edits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import viser
+
+from app.core.shared_view_state import LabelInView, LabelsInView, OnDrag, PageView
+from app.views import scene
+from app.views.colors import rgb
+from app.views.viser import nodes as viser_nodes
+from app.views.viser.gizmo import CuboidGizmo
+from app.views.viser.nodes import Strokes
+from pipeline.common.geometry import Cuboid
+from pipeline.types import F64, Point3, Result
+
+LABELS = "/own"
+OBJECTS = ("/cuboids", "/footprints", "/rays", "/velocities", "/cipv", "/next_cipv", "/labels")
+"""What everybody sees of the pipeline's objects."""
+_LIFT_M = 0.3
+_WIDTH_PX = {False: 2.0, True: 4.0}
+_BACK, _LEAST_BACK_M = 2.5, 9.0
+"""How far from a selected label the camera goes, in its longest sides, and at least."""
+_UP = 0.5
+"""How far above it, in that distance."""
+
+
+class BrowserScene:
+    """Draws into the scene of one browser. ``on_drag`` as of ``CuboidGizmo``."""
+
+    def __init__(self, client: viser.ClientHandle, on_drag: OnDrag) -> None:
+        self._client, self._scene = client, client.scene
+        self._gizmo = CuboidGizmo(client.scene, on_drag)
+        self._names = 0
+        self._covers: list[viser.FrameHandle] = []
+        self._drawn: tuple[LabelsInView | None, int | None] = (None, None)
+        self._followed: int | None = None
+
+    def leave(self) -> None:
+        """The browser is gone."""
+        self._gizmo.leave(self._client.client_id)
+
+    def draw(self, view: PageView, result: Result, floor_m: float) -> None:
+        """What the page wants to see. While the recording plays, its labels come a moment after the frame."""
+        found = next((each for each in result.objects if each.id == view.selected), None)
+        viser_nodes.filled(self._scene, "/selection", found, rgb("ego"), 0.2, floor_m)
+        at = scene.top_of(found, floor_m) if found is not None and found.bev is not None else None
+        viser_nodes.name_tag(self._scene, f"{LABELS}/selected", "" if found is None else scene.object_text(found), at)
+        self._hide_objects(view.labels is not None and view.labels.alone)
+        wanted = (view.labels, None if view.held is None else view.held.track)
+        if wanted != self._drawn:
+            self._draw_labels(() if view.labels is None else view.labels.labels, wanted[1])
+            self._drawn = wanted
+        self._gizmo.hold(view.held)
+        self._follow(view)
+
+    def _hide_objects(self, hides: bool) -> None:
+        """A browser shows its own node rather than everybody's of that name: an empty one hides it."""
+        if hides and not self._covers:
+            self._covers = [self._scene.add_frame(name, show_axes=False, visible=False) for name in OBJECTS]
+        elif not hides:
+            for cover in self._covers:
+                cover.remove()
+            self._covers = []
+
+    def _draw_labels(self, labels: tuple[LabelInView, ...], chosen: int | None) -> None:
+        for is_chosen, width_px in _WIDTH_PX.items():
+            strokes = Strokes()
+            for each in labels:
+                if (each.track == chosen) is is_chosen:
+                    strokes.add(_outline(each), rgb(each.role))
+            viser_nodes.lines(self._scene, f"{LABELS}/{'chosen' if is_chosen else 'cuboids'}", strokes, width_px)
+        for place in range(max(len(labels), self._names)):
+            at = labels[place] if place < len(labels) else None
+            text, top = ("", None) if at is None else (at.text, _top(at.cuboid))
+            viser_nodes.name_tag(self._scene, f"{LABELS}/names/{place}", text, top)
+        self._names = max(len(labels), self._names)
+
+    def _follow(self, view: PageView) -> None:
+        """The camera goes to a label when it is selected; after that it is the user's."""
+        track = None if view.held is None else view.held.track
+        if track is not None and track != self._followed and view.held is not None:
+            eye, target = looking_at(view.held.cuboid)
+            camera = self._client.camera
+            with self._client.atomic():
+                camera.up_direction, camera.position, camera.look_at = (0.0, 0.0, 1.0), eye, target
+        self._followed = track
+
+
+def looking_at(cuboid: Cuboid) -> tuple[Point3, Point3]:
+    """Where the camera goes to see a cuboid, and what it looks at: from the ego car's side of it, from above."""
+    x, y, z = cuboid.center
+    away_m = math.hypot(x, y)
+    toward = (x / away_m, y / away_m) if away_m > 1.0 else (1.0, 0.0)
+    back_m = max(_LEAST_BACK_M, _BACK * max(cuboid.size))
+    return (x - toward[0] * back_m, y - toward[1] * back_m, z + back_m * _UP), (x, y, z)
+
+
+def _outline(label: LabelInView) -> F64:
+    """(12 or 13, 2, 3) edges, and where the front is known a line to it on the roof."""
+    edges = scene.cuboid_edges(label.cuboid)
+    if not label.facing:
+        return edges
+    x, y, _ = label.cuboid.center
+    top = label.cuboid.center[2] + label.cuboid.size[2] / 2
+    ahead = label.cuboid.size[0] / 2
+    nose = (x + math.cos(label.cuboid.yaw_rad) * ahead, y + math.sin(label.cuboid.yaw_rad) * ahead, top)
+    return np.concatenate([edges, np.array([[(x, y, top), nose]])])
+
+
+def _top(cuboid: Cuboid) -> Point3:
+    x, y, z = cuboid.center
+    return x, y, z + cuboid.size[2] / 2 + _LIFT_M

@@ -1,0 +1,123 @@
+"""A label from close by: the picture around it, and its points from above, from the side and from behind.
+
+Also how well a cuboid fits its points, by which the frames to look at first are found.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from pipeline.alignment.projection import Alignment
+from pipeline.common.geometry import Cuboid
+from pipeline.labels.model import Sighting
+from pipeline.types import F32, F64, U8, Frame
+
+WIDTH_PX, HEIGHT_PX = 160, 110
+"""Of one of the four views."""
+_BESIDE_M = 0.6
+"""Points so near to a cuboid are of its vehicle, or of what stands by it."""
+_ROAD_M = 0.2
+"""Points so near to its bottom may be of the road."""
+_SHOWN_M = 1.5
+_PICTURE_MARGIN = 0.4
+_BACK, _POINT, _BESIDE, _EDGE, _TEXT = (24, 20, 17), (235, 225, 215), (90, 150, 255), (140, 220, 120), (190, 190, 190)
+_VIEWS = (("top", 0, 1), ("side", 0, 2), ("rear", 1, 2))
+_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Points in a cuboid, and right beside it, without those of the road."""
+
+    inside: int
+    beside: int
+
+    @property
+    def share_beside(self) -> float | None:
+        """0 where all are inside; None without points."""
+        count = self.inside + self.beside
+        return self.beside / count if count else None
+
+
+def fit_of(points: F32, cuboid: Cuboid) -> Fit:
+    """points: (N, 4) float32 ``x y z intensity``, ego frame."""
+    own = _in_own_frame(points, cuboid)
+    half = np.array(cuboid.size) / 2
+    is_high = own[:, 2] > -half[2] + _ROAD_M
+    near = is_high & np.all(np.abs(own) <= half + _BESIDE_M, axis=1)
+    inside = int((near & np.all(np.abs(own) <= half + 0.02, axis=1)).sum())
+    return Fit(inside, int(near.sum()) - inside)
+
+
+def close_up(frame: Frame, sighting: Sighting, alignment: Alignment | None) -> U8:
+    """(2·HEIGHT_PX, 2·WIDTH_PX, 3) BGR: picture, top and, below, side and rear. What a frame lacks stays empty.
+    alignment: where points lie in the picture; None where that is not known."""
+    views = [_in_picture(frame, sighting, alignment)]
+    for name, across, up in _VIEWS:
+        views.append(_projected(name, frame.sweep.points if frame.sweep is not None else None, sighting, across, up))
+    return np.vstack([np.hstack(views[:2]), np.hstack(views[2:])])
+
+
+def _in_own_frame(points: F32, cuboid: Cuboid) -> F64:
+    """(N, 3) metres from the middle of the cuboid, along its length, width and height."""
+    c, s = math.cos(cuboid.yaw_rad), math.sin(cuboid.yaw_rad)
+    away = points[:, :3].astype(np.float64) - cuboid.center
+    return np.column_stack([c * away[:, 0] + s * away[:, 1], c * away[:, 1] - s * away[:, 0], away[:, 2]])
+
+
+def _projected(name: str, points: F32 | None, sighting: Sighting, across: int, up: int) -> U8:
+    """The points around a cuboid along two of its axes: length to the right and width up, or height up; from behind,
+    the left side is on the left."""
+    view = _empty(name)
+    if sighting.cuboid is None:
+        return view
+    half = np.array(sighting.cuboid.size) / 2
+    scale = min(WIDTH_PX / 2 / (half[across] + _SHOWN_M), HEIGHT_PX / 2 / (half[up] + _SHOWN_M))
+    turn = -1.0 if across == 1 else 1.0
+    own = _in_own_frame(points, sighting.cuboid) if points is not None else np.empty((0, 3))
+    own = own[np.all(np.abs(own) <= half + _SHOWN_M, axis=1)]
+    is_inside = np.all(np.abs(own) <= half + 0.02, axis=1)
+    u = np.rint(WIDTH_PX / 2 + turn * own[:, across] * scale).astype(int)
+    v = np.rint(HEIGHT_PX / 2 - own[:, up] * scale).astype(int)
+    for x, y, inside in zip(u.tolist(), v.tolist(), is_inside.tolist(), strict=True):
+        cv2.circle(view, (x, y), 1, _POINT if inside else _BESIDE, -1)
+    corner = np.array([half[across], half[up]]) * scale
+    low, high = np.array([WIDTH_PX, HEIGHT_PX]) / 2 - corner, np.array([WIDTH_PX, HEIGHT_PX]) / 2 + corner
+    cv2.rectangle(view, np.rint(low).astype(int).tolist(), np.rint(high).astype(int).tolist(), _EDGE, 1)
+    if across == 0:  # its front is to the right
+        cv2.line(view, (WIDTH_PX // 2, HEIGHT_PX // 2), (round(high[0]), HEIGHT_PX // 2), _EDGE, 1)
+    return view
+
+
+def _in_picture(frame: Frame, sighting: Sighting, alignment: Alignment | None) -> U8:
+    view = _empty("picture")
+    pixels = None
+    if sighting.cuboid is not None and alignment is not None:
+        pixels = alignment.project(sighting.cuboid.corners())
+        pixels = None if np.isnan(pixels).any() else pixels
+    if frame.picture is None or (pixels is None and sighting.bbox is None):
+        return view
+    around = pixels if pixels is not None else np.array(sighting.bbox).reshape(2, 2)
+    low, high = around.min(axis=0), around.max(axis=0)
+    middle, half = (low + high) / 2, (high - low) / 2 * (1.0 + _PICTURE_MARGIN)
+    scale = min(WIDTH_PX / 2 / max(half[0], 4.0), HEIGHT_PX / 2 / max(half[1], 4.0))
+    onto = np.array([[scale, 0.0, WIDTH_PX / 2 - scale * middle[0]], [0.0, scale, HEIGHT_PX / 2 - scale * middle[1]]])
+    shown = cv2.warpAffine(frame.picture.bgr, onto, (WIDTH_PX, HEIGHT_PX), flags=cv2.INTER_LINEAR, borderValue=_BACK)
+    if pixels is not None:
+        at = np.rint(pixels * scale + onto[:, 2]).astype(int)
+        for a, b in _EDGES:
+            cv2.line(shown, at[a].tolist(), at[b].tolist(), _EDGE, 1, cv2.LINE_AA)
+    elif sighting.bbox is not None:
+        ends = np.rint(around * scale + onto[:, 2]).astype(int)
+        cv2.rectangle(shown, ends[0].tolist(), ends[1].tolist(), _EDGE, 1)
+    return np.asarray(shown, dtype=np.uint8)
+
+
+def _empty(name: str) -> U8:
+    view = np.full((HEIGHT_PX, WIDTH_PX, 3), _BACK, dtype=np.uint8)
+    cv2.putText(view, name, (4, HEIGHT_PX - 5), cv2.FONT_HERSHEY_SIMPLEX, 0.35, _TEXT, 1, cv2.LINE_AA)
+    return view
