@@ -8,7 +8,7 @@ import { followHover } from "./hover.js";
 import { Labels } from "./drawing/text_labels.js";
 import { addTool } from "./layers.js";
 import { nearestPoint, ownerOf } from "./drawing/hit_test.js";
-import { drawArrow, drawOutline, drawPath, drawRing, drawSigma, drawTrail, trace } from "./drawing/plan.js";
+import { drawArrow, drawOutline, drawPath, drawRing, drawSigma, drawTraffic, drawTrail, trace } from "./drawing/plan.js";
 import { CLUSTER, tints } from "./drawing/point_colors.js";
 import { DotRaster } from "./drawing/dot_raster.js";
 import { get, paint, select, set } from "../core/store.js";
@@ -120,7 +120,7 @@ function draw() {
     if (layers.planPoints) drawPoints(ctx, frame);
     if (layers.planPath && frame.display.plan_lanes) drawLanes(ctx, frame.display.plan_lanes);
     if (layers.planPath && frame.display.plan_edges) drawEdges(ctx, frame.display.plan_edges);
-    if (layers.planPath && frame.display.plan_traffic) drawTraffic(ctx, frame.display.plan_traffic);
+    if (layers.planPath && frame.display.plan_traffic) drawTraffic(ctx, view, frame.display.plan_traffic);
     if (!modeNow() || get("labeling")?.hasObjects) drawObjects(ctx, frame, layers, labels);
     modeNow()?.draw(ctx, view, labels);
   }
@@ -193,24 +193,6 @@ function drawLanes(ctx, lanes) {
 function drawEdges(ctx, cells) {
   ctx.fillStyle = color("path");
   for (const [x, y] of cells) ctx.fillRect(view.u(y) - 1, view.v(x) - 1, 3, 3);
-}
-
-/**
- * The headings of other vehicles that the path follows: a dash of two metres each.
- * @param {CanvasRenderingContext2D} ctx
- * @param {[number, number, number][]} headings
- */
-function drawTraffic(ctx, headings) {
-  ctx.strokeStyle = color("path");
-  ctx.lineWidth = 2;
-  ctx.beginPath();
-  for (const [x, y, heading] of headings) {
-    const dx = Math.cos(heading),
-      dy = Math.sin(heading);
-    ctx.moveTo(view.u(y - dy), view.v(x - dx));
-    ctx.lineTo(view.u(y + dy), view.v(x + dx));
-  }
-  ctx.stroke();
 }
 
 /**

@@ -175,3 +175,22 @@ export function drawRing(ctx, view, { bev }, tint, dash = []) {
   ctx.strokeRect(left - 5, top - 5, Math.max(...us) - left + 10, Math.max(...vs) - top + 10);
   ctx.setLineDash([]);
 }
+
+/**
+ * The headings of other vehicles that the path follows: a dash of two metres each.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Viewport} view
+ * @param {[number, number, number][]} headings
+ */
+export function drawTraffic(ctx, view, headings) {
+  ctx.strokeStyle = color("path");
+  ctx.lineWidth = 2;
+  ctx.beginPath();
+  for (const [x, y, heading] of headings) {
+    const dx = Math.cos(heading),
+      dy = Math.sin(heading);
+    ctx.moveTo(view.u(y - dy), view.v(x - dx));
+    ctx.lineTo(view.u(y + dy), view.v(x + dx));
+  }
+  ctx.stroke();
+}
