@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.fusion.existence import ExistenceState, weigh
 from pipeline.params import ExistenceParams
-from pipeline.types import F32, U8, FusedObject, Ground, Point3
+from pipeline.types import F32, I32, U8, FusedObject, Ground, Point3
 from tests.pipeline.build import fused
 
 PARAMS = ExistenceParams()
@@ -24,6 +24,12 @@ class Rays:
     points: F32
     ground: Ground | None = ROAD
     origin: Point3 = (0.0, 0.0, 0.0)
+    cluster: int = -2
+    """Of every point; negative: none."""
+
+    @property
+    def kind(self) -> I32:
+        return np.full(len(self.points), self.cluster, np.int32)
 
     @property
     def ring(self) -> U8:
@@ -95,6 +101,16 @@ def test_silence_speaks_against_it(points: list[F32], range_m: float, exists: bo
     found = after(camera_car(range_m, sigma_m=1.2), Rays(np.concatenate(points)))
     assert found.existence is not None
     assert (found.existence > 0.5, gate(found)) == (exists, said)
+
+
+@pytest.mark.parametrize(
+    ("range_m", "exists"), [pytest.param(12.0, False, id="near"), pytest.param(30.0, True, id="too far to have one")]
+)
+def test_near_by_a_vehicle_has_a_cluster_of_its_own(range_m: float, exists: bool) -> None:
+    """A second box beside a parked car: what rays find there is the parked car, which another object is."""
+    found = after(camera_car(range_m), Rays(returns(range_m + 0.5), cluster=3))
+    assert found.existence is not None
+    assert (found.existence > 0.5) == exists
 
 
 def test_rays_start_at_the_sensor() -> None:
