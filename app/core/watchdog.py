@@ -1,9 +1,10 @@
 """Notices worker threads that hang: in a network, in a decoder, in a file system that does not answer.
 
 Each worker says what it begins (``at_work``) and so, by ending it, how long that takes. What takes ``PATIENCE_S``
-longer than it ever has is taken to hang. A thread that hangs in native code cannot be killed: it is retired, that is
-left to itself, and ends by ``Retired`` should it ever come back; whoever owns the worker starts a fresh one. Code that
-hangs while it holds Python's own lock stops this watch, too; a supervisor that asks ``/healthz`` notices that.
+longer than it ever has is taken to hang; the time in which the machine did not let its thread run does not count. A
+thread that hangs in native code cannot be killed: it is retired, that is left to itself, and ends by ``Retired`` should
+it ever come back; whoever owns the worker starts a fresh one. Code that hangs while it holds Python's own lock stops
+this watch, too; a supervisor that asks ``/healthz`` notices that.
 """
 
 from __future__ import annotations
@@ -60,6 +61,21 @@ class _Heart:
     doing: str | None = None
     since_s: float = 0.0
     retired: bool = False
+    native_id: int = field(default_factory=threading.get_native_id)
+    delayed_s: float | None = None
+    """How long its thread had waited for a processor when it was last looked at; None before that, or where the system
+    does not say."""
+    starved_s: float = 0.0
+    """How much of the time since ``since_s`` that was."""
+
+
+def waited_s(native_id: int) -> float | None:
+    """How long a thread has waited for a processor in its life (Linux); None where the system does not say."""
+    try:
+        with open(f"/proc/self/task/{native_id}/schedstat", encoding="ascii") as file:
+            return int(file.read().split()[1]) / 1e9
+    except (OSError, ValueError, IndexError):
+        return None
 
 
 def busy_share() -> float:
@@ -142,7 +158,7 @@ class Watchdog:
         with self._lock:
             if heart.doing is not None:
                 self._took_s.setdefault(heart.doing, deque(maxlen=_KEPT)).append(now_s - heart.since_s)
-            heart.doing, heart.since_s = doing, now_s
+            heart.doing, heart.since_s, heart.starved_s = doing, now_s, 0.0
 
     def allowed_s(self, doing: str) -> float:
         """How long something may take."""
@@ -157,7 +173,10 @@ class Watchdog:
             for heart in self._hearts:
                 if late_s > _LATE_S:
                     heart.since_s += late_s
-                if heart.doing is None or heart.retired or now_s - heart.since_s <= self.allowed_s(heart.doing):
+                _count_starved(heart)
+                if heart.doing is None or heart.retired:
+                    continue
+                if now_s - heart.since_s - heart.starved_s <= self.allowed_s(heart.doing):
                     continue
                 heart.retired = True
                 found.append((heart, Stuck(heart.name, heart.doing, now_s - heart.since_s, heart.thread_id)))
@@ -175,6 +194,13 @@ class Watchdog:
             now_s = time.monotonic()
             self.look(now_s, now_s - looked_s - _LOOK_EVERY_S)
             looked_s = now_s
+
+
+def _count_starved(heart: _Heart) -> None:
+    delayed_s = waited_s(heart.native_id)
+    if delayed_s is not None and heart.delayed_s is not None:
+        heart.starved_s += delayed_s - heart.delayed_s
+    heart.delayed_s = delayed_s
 
 
 def _told(stuck: Stuck) -> tuple[str, str, float]:

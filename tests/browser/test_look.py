@@ -245,10 +245,12 @@ def test_live_sensors_draw_what_came_and_let_go_of_the_oldest(open_page: OpenPag
         """async () => {
           const { get, set } = await import("/js/core/store.js");
           const frame = get("frame"), counts = [];
+              const columns = Object.entries(get("drive").now.columns);
+              const row = Object.fromEntries(columns.map(([name, values]) => [name, values[0]]));
           for (let k = 0; k < 1300; k++) {
             const state = { ...frame.state, live: true, uri: "live:car.yaml", time_s: k / 10, count: 0, index: k };
             set("state", state);
-            set("frame", { ...frame, state });
+            set("frame", { ...frame, state, row });
             counts.push(get("drive").count);
           }
           await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));

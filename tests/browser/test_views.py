@@ -95,7 +95,7 @@ def test_the_tape_holds_on_to_lidar_points_in_the_picture(open_page: OpenPage):
     points = of_store(
         page,
         """(() => {
-          const { count, uv, xyz, kind, image } = get("frame"), found = [];
+          const { count, uv, xyz, kind, picture } = get("frame"), found = [];
           for (let i = 0; i < count; i++) {
             const u = uv[2 * i], v = uv[2 * i + 1];
             const isInside = u > 0.3 * picture.width && u < 0.7 * picture.width && v > 30 && v < picture.height - 60;

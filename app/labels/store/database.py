@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import logging
 import os
+import sqlite3
 import tempfile
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,6 +33,7 @@ logger = logging.getLogger("cipv.labels")
 
 FILE = SESSIONS / "labels.db"
 _BUSY_S = 30.0
+_AGAIN_S = 0.02
 _CONNECT_S = 3
 """A server that is away must not keep anybody waiting: parameters are changed while driving."""
 _MIGRATION_LOCK = 0x63697076
@@ -160,9 +163,23 @@ def _engine(url: URL) -> Engine:
 
 def _as_sqlite(connection: Any, _: Any) -> None:
     connection.isolation_level = None  # we say BEGIN ourselves: the driver would let a transaction begin too late
-    connection.execute("PRAGMA journal_mode=WAL")
+    _write_ahead(connection)
     connection.execute("PRAGMA synchronous=FULL")
     connection.execute("PRAGMA foreign_keys=ON")
+
+
+def _write_ahead(connection: Any) -> None:
+    """Switch to the write-ahead log. While another connection switches a new file, SQLite refuses at once instead of
+    waiting: then it is tried again, for as long as a writer would wait."""
+    until_s = time.monotonic() + _BUSY_S
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode=WAL")
+            return
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > until_s:
+                raise
+            time.sleep(_AGAIN_S)
 
 
 def _begin_sqlite(connection: Connection) -> None:

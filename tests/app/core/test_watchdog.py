@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
-from app.core.watchdog import Retired, Stuck, Watchdog, at_work
+from app.core.watchdog import Retired, Stuck, Watchdog, at_work, waited_s
 
 
 @pytest.fixture(autouse=True)
@@ -50,6 +51,31 @@ def test_a_call_may_take_its_worst_time_and_the_patience_more(monkeypatch: pytes
     (stuck,) = told
     assert (stuck.worker, stuck.doing) == ("a worker", "the network")
     assert stuck.thread_id == threading.get_ident()
+
+
+def test_time_in_which_the_machine_did_not_let_it_run_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    watchdog, waited_s = Watchdog(first_s=1.0), [5.0]
+    monkeypatch.setattr("app.core.watchdog.waited_s", lambda native_id: waited_s[-1])
+    with watchdog.watching("a worker", lambda stuck: None):
+        assert watchdog.look(time.monotonic()) == []
+        with pytest.raises(Retired):
+            _starved(watchdog, waited_s)
+
+
+def _starved(watchdog: Watchdog, waited_s: list[float]) -> None:
+    with at_work("reading"):
+        waited_s.append(8.0)
+        assert watchdog.look(time.monotonic() + 3.5) == [], "3 of the 3.5 s it waited for a processor"
+        assert watchdog.look(time.monotonic() + 4.5) != []
+
+
+def test_the_system_tells_how_long_a_thread_waited_for_a_processor() -> None:
+    if not Path("/proc/self/schedstat").exists():
+        pytest.skip("only Linux tells")
+    waited = waited_s(threading.get_native_id())
+    assert waited is not None
+    assert 0.0 <= waited < 3600.0
+    assert waited_s(2**30) is None
 
 
 def test_who_waits_for_work_does_not_hang_nor_who_was_asleep_with_the_machine() -> None:

@@ -7,7 +7,7 @@ import { get, on, set } from "../../core/store.js";
  * @typedef {{words: string, take: () => unknown, isOpen: () => boolean, about?: string}} Offer
  */
 
-const button = el("button", { type: "button", class: "offer", hidden: true, onclick: take });
+const button = el("button", { type: "button", class: "offer", hidden: true, title: "Do this next", onclick: take });
 
 export function setUp() {
   on(["offer", "drive", "state", "track", "labels", "labeling"], reflect);
