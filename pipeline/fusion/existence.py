@@ -31,7 +31,7 @@ _MEAN_S = 0.5
 _CLUSTER, _STOPPED, _PIERCED, _SILENT, _TAKEN = 2.0, 1.0, -3.0, -2.0, -2.0
 """What one sweep adds: a cluster on the object; rays that ended where it is said to be; rays that passed through; rays
 that came back from nowhere; near the car, rays that ended there but in the cluster of something else. Of 394 labelled
-vehicles within 30 m in 126 frames of a VLP-16, with a place as vague as a box's height makes it, none was looked through
+vehicles within 30 m in 126 frames of a VLP-16, with a place as vague as a box makes it, none was looked through
 and 6 were silent; with one as sure as it gets, none and 10. Sweeps follow each other too soon to be that many
 witnesses, so one is worth less."""
 
