@@ -126,8 +126,8 @@ def _with(state: TrafficState, item: FusedObject, ego: EgoState) -> TrafficState
 
 
 def _headings(state: TrafficState, vehicle: int) -> list[tuple[float, float, float]]:
-    """x, y and heading of each link of one vehicle's way, newest first: of its axis, an oncoming one's is turned
-    round. None of one that has turned off, and none where it was too slow."""
+    """x, y and heading of each link of one vehicle's way ahead of the car, newest first: of its axis, an oncoming one's
+    is turned round. None of one that has turned off, and none where it was too slow."""
     mine = state.vehicle == vehicle
     xy, age_s = state.xy[mine], state.age_s[mine]
     found: list[tuple[float, float, float]] = []
@@ -143,7 +143,8 @@ def _headings(state: TrafficState, vehicle: int) -> list[tuple[float, float, flo
         if way_m / max(age_s[k] - age_s[last], 1e-3) >= _SLOWEST_MPS:
             if x > 0.0 and max(abs(heading), abs(heading - 2.0 * np.arctan2(y, x))) > _TURNED_OFF_RAD:
                 return []
-            found.append((x, y, heading))
+            if x > 0.0:
+                found.append((x, y, heading))
         last = k
     return found
 
@@ -151,13 +152,12 @@ def _headings(state: TrafficState, vehicle: int) -> list[tuple[float, float, flo
 def _along(seen: F64, ego: EgoState, params: PathParams) -> PathEstimate:
     """The road from the car on, by (N, 3) headings. Each is seen at the length of the arc that leads to its place."""
     s, speed = samples(params.length_m), max(ego.speed_mps, params.min_speed_mps, 0.1)
-    ahead = seen[seen[:, 0] > 0.0]
-    aside = np.clip(np.arctan2(ahead[:, 1], ahead[:, 0]), -_WIDEST_RAD, _WIDEST_RAD)
-    reached = np.hypot(ahead[:, 0], ahead[:, 1]) / np.sinc(aside / np.pi)
+    aside = np.clip(np.arctan2(seen[:, 1], seen[:, 0]), -_WIDEST_RAD, _WIDEST_RAD)
+    reached = np.hypot(seen[:, 0], seen[:, 1]) / np.sinc(aside / np.pi)
     at = np.clip(np.round(reached / STEP_M).astype(np.intp), 0, len(s) - 1)
     # headings seen at one place are one measurement of their mean
     count = np.bincount(at, minlength=len(s)).astype(np.float64)
-    total = np.bincount(at, weights=ahead[:, 2], minlength=len(s))
+    total = np.bincount(at, weights=seen[:, 2], minlength=len(s))
     begins = min(params.lateral_jerk_mps3 / speed**3, SHARPEST_BEGIN_PER_M2)
     start = np.array(
         [
