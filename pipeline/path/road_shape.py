@@ -19,6 +19,7 @@ from pipeline.common.geometry import F64
 from pipeline.params import PathParams
 from pipeline.path.corridor import nearest
 from pipeline.path.estimates import arc, samples
+from pipeline.path.ground_points import now_at
 from pipeline.types import EgoState
 
 _NODES_M = (20.0, 40.0)
@@ -89,11 +90,7 @@ def begin(before: F64 | None, ego: EgoState, dt_s: float | None, anew: bool, par
 
 def moved_on(shape: F64, ego: EgoState, dt_s: float, s: F64) -> F64:
     """The shape of the frame before, from the car on, parallel to itself."""
-    turned, way = (ego.yaw_rate_radps or 0.0) * dt_s, ego.speed_mps * dt_s
-    c, sn = np.cos(turned), np.sin(turned)
-    away = shape - (way * np.cos(0.5 * turned), way * np.sin(0.5 * turned))
-    line = np.column_stack([away[:, 0] * c + away[:, 1] * sn, away[:, 1] * c - away[:, 0] * sn])
-    line = _resampled(line, s)
+    line = _resampled(now_at(shape, ego, dt_s), s)
     turned = np.arctan2(line[1, 1], line[1, 0])  # a road that the car is not along is not the road
     turned = turned - np.clip(turned, -0.02, 0.02)
     c, sn = np.cos(turned), np.sin(turned)

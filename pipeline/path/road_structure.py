@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from pipeline.path.ground_points import now_at
 from pipeline.types import F32, F64, GROUND, I32, U8, VEHICLES, EgoState, FusedObject, Ground
 from pipeline.types.arrays import Mask
 
@@ -57,10 +58,7 @@ NONE = Cells(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
 
 def moved(cells: Cells, ego: EgoState, dt_s: float) -> Cells:
     """Where the cells of ``dt_s`` ago lie now, without those too old or too far behind."""
-    turned, way = (ego.yaw_rate_radps or 0.0) * dt_s, ego.speed_mps * dt_s
-    c, s = np.cos(turned), np.sin(turned)
-    away = cells.xy - (way * np.cos(0.5 * turned), way * np.sin(0.5 * turned))
-    xy = np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s])
+    xy = now_at(cells.xy, ego, dt_s)
     age_s = cells.age_s + dt_s
     keep = (xy[:, 0] > _BEHIND_M) & (age_s <= _KEPT_S)
     return Cells(xy[keep], cells.blocks[keep], age_s[keep], cells.stands[keep])

@@ -21,6 +21,7 @@ import numpy as np
 from pipeline.common.geometry import F64
 from pipeline.params import PathParams
 from pipeline.path.estimates import SHARPEST_BEGIN_PER_M2, STEP_M, TIGHTEST_CURVATURE_PER_M, PathEstimate, samples
+from pipeline.path.ground_points import now_at
 from pipeline.types import I64, VEHICLES, EgoState, FusedObject, Moment
 
 HEADING_SIGMA_RAD = 0.1
@@ -93,10 +94,7 @@ def warm_up() -> None:
 
 def _moved(state: TrafficState, ego: EgoState, dt_s: float) -> TrafficState:
     """What was kept of the frame before, where it is now."""
-    turned, way = (ego.yaw_rate_radps or 0.0) * dt_s, ego.speed_mps * dt_s
-    c, s = np.cos(turned), np.sin(turned)
-    away = state.xy - (way * np.cos(0.5 * turned), way * np.sin(0.5 * turned))
-    xy = np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s])
+    xy = now_at(state.xy, ego, dt_s)
     age_s = state.age_s + dt_s
     keep = (xy[:, 0] > _BEHIND_M) & (age_s <= _KEPT_S)
     return TrafficState(xy[keep], age_s[keep], state.vehicle[keep])
