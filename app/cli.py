@@ -19,9 +19,9 @@ from pipeline.common.errors import BadInput
 COMMANDS = {
     "demo": "app.commands.serve:Demo",
     "serve": "app.commands.serve:Serve",
-    "run": "app.commands.run:Run",
+    "run": "app.commands.run:RunPipeline",
     "record": "app.commands.record:Record",
-    "import": "app.commands.sessions:Import",
+    "import": "app.commands.sessions:ImportRecording",
     "export": "app.commands.sessions:Export",
     "info": "app.commands.info:ShowInfo",
     "recover": "app.commands.sessions:Recover",
@@ -36,6 +36,11 @@ COMMANDS = {
     "calibration": "app.commands.calibration:ConvertCalibration",
     "scenarios": "app.commands.scenarios:Scenarios",
     "evaluate": "app.commands.evaluate:Evaluate",
+    "batch": "app.commands.batch:Batch",
+    "sweep": "app.commands.sweep:ParameterSweep",
+    "find": "app.commands.find:Find",
+    "compare": "app.commands.compare:Compare",
+    "scores": "app.commands.scores:Scores",
     "bench": "app.commands.bench:Bench",
 }
 """What is typed → module and class. Only that is imported: all together take seconds, and of a group's commands one

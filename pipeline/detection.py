@@ -3,11 +3,13 @@ their answers are part of the frame and can be cached, so that changing a parame
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar, cast
 
 from pipeline.inference.model_registry import EMBEDDED
-from pipeline.lanes.open_detector import LaneDetector, open_lanes
+from pipeline.inference.runtime import DetectorMissing
+from pipeline.lanes.open_detector import LaneDetector, open_lanes, usual_every
 from pipeline.types import U8, Frame, RawBoxes, RawLanes
 from pipeline.types.source import AnySource, Source, is_live_source, is_simulated
 from pipeline.vision.detector import Detector, open_detector
@@ -163,3 +165,51 @@ def picture_size(source: AnySource) -> tuple[int, int] | None:
     if is_live_source(source):
         return (source.camera.width, source.camera.height) if source.camera is not None else None
     return cast("Source", source).frame(0).picture_size
+
+
+@dataclass(frozen=True)
+class DetectorChoice:
+    """Which detectors a person asked for."""
+
+    boxes: str | None = None
+    """Name or path of the vehicle detector; None: the usual one."""
+    lanes: str | None = None
+    """Name or path of the lane network, ``classical`` or ``off``; None: the usual one."""
+    lanes_every: int | None = None
+    """Lanes are looked for in every n-th frame; None: as the lane detector is quick."""
+    far_px: int | None = WINDOW_PX
+    """Side of the far view's window in native pixels; None: no far view."""
+
+
+def open_detectors(
+    source: AnySource, choice: DetectorChoice, sensors: str = "both", say: Callable[[str], object] = lambda _: None
+) -> Detectors:
+    """All detectors for the source's images: none for LiDAR alone, and for recordings that contain detections.
+
+    say: told, in sentences, what a user should know about them. DetectorMissing when a named one is missing, or any
+    with ``sensors="camera"``; otherwise that is said and LiDAR runs alone.
+    """
+    if sensors == "lidar" or brings_detections(source):
+        return Detectors()
+    lanes = lanes_for(source, choice.lanes)
+    for note in lanes.notes if lanes is not None else ():
+        say(note)
+    boxes = open_boxes(source, choice.boxes, sensors, say)
+    far = far_view_for(source, boxes, choice.far_px) if choice.far_px is not None else None
+    return Detectors(boxes, lanes, choice.lanes_every or usual_every(lanes, source.rate_hz), far)
+
+
+def open_boxes(
+    source: AnySource, spec: str | None, sensors: str = "both", say: Callable[[str], object] = lambda _: None
+) -> Detector | None:
+    """The vehicle detector alone, as ``open_detectors`` opens it."""
+    try:
+        detector = detector_for(source, spec)
+    except DetectorMissing as missing:
+        if spec is not None or sensors == "camera":
+            raise
+        say(str(missing))
+        return None
+    for note in detector.notes:
+        say(note)
+    return detector

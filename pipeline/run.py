@@ -63,10 +63,11 @@ def advance(
 
 
 def run(
-    source: Source, params: Params, detectors: Detectors, sensors: Sensors = "both"
+    source: Source, params: Params, detectors: Detectors, sensors: Sensors = "both", ask: Look = look
 ) -> Iterator[tuple[Frame, Result]]:
-    """Each frame of a recording with its result. Without detectors the LiDAR works alone."""
-    return through((_patiently(source, index) for index in range(len(source))), params, detectors, sensors)
+    """Each frame of a recording with its result. Without detectors the LiDAR works alone. ask: how a detector is asked:
+    directly, or by what it answered before."""
+    return through((patiently(source, index) for index in range(len(source))), params, detectors, sensors, ask)
 
 
 def run_live(
@@ -81,7 +82,7 @@ def run_live(
     return _through(_ticks(source, params, on_silence), params, LiveDetectors(detectors).of, sensors)
 
 
-def _patiently(source: Source, index: int) -> Frame:
+def patiently(source: Source, index: int) -> Frame:
     """A frame, read again for a while where the system cannot read at this moment. Overloaded after that."""
     for _ in range(_TRIES):
         try:
@@ -92,23 +93,30 @@ def _patiently(source: Source, index: int) -> Frame:
 
 
 def through(
-    frames: Iterable[Frame], params: Params, detectors: Detectors, sensors: Sensors = "both"
+    frames: Iterable[Frame], params: Params, detectors: Detectors, sensors: Sensors = "both", ask: Look = look
 ) -> Iterator[tuple[Frame, Result]]:
     """Each of these frames with its result, starting from an empty state."""
-    return _through(frames, params, lambda _: detectors, sensors)
+    return _through(frames, params, lambda _: detectors, sensors, ask)
 
 
 def _through(
-    frames: Iterable[Frame], params: Params, detectors_of: Callable[[Frame], Detectors], sensors: Sensors
+    frames: Iterable[Frame],
+    params: Params,
+    detectors_of: Callable[[Frame], Detectors],
+    sensors: Sensors,
+    ask: Look = look,
 ) -> Iterator[tuple[Frame, Result]]:
     warm_up()
     state = State()
     for frame in frames:
-        asked = detectors_of(frame)
-        if not params.detection.far_view:
-            asked = replace(asked, far=None)
-        seen, state, result = advance(state, frame, params, asked, sensors)
+        asked = used(detectors_of(frame), params)
+        seen, state, result = advance(state, frame, params, asked, sensors, ask)
         yield seen, result
+
+
+def used(detectors: Detectors, params: Params) -> Detectors:
+    """Those of the detectors that these parameters ask for."""
+    return detectors if params.detection.far_view else replace(detectors, far=None)
 
 
 def _ticks(source: LiveSource, params: Params, on_silence: Callable[[], None]) -> Iterator[Frame]:

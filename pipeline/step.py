@@ -50,22 +50,39 @@ class State:
     """Everything one frame leaves to the next, stage by stage."""
 
     t_ns: int | None = None
+    """Of the last frame; None before the first."""
     lidar: lidar_tracking.LidarTrackerState = lidar_tracking.LidarTrackerState()
+    """Tracks of the LiDAR's clusters."""
     vision: vision_tracking.VisionTrackerState = vision_tracking.VisionTrackerState()
+    """Tracks of the camera's boxes."""
     fusion: fusion.FusionState = fusion.FusionState()
+    """Which object each track belongs to."""
     existence: existence.ExistenceState = existence.ExistenceState()
+    """Evidence for and against each object."""
     agreement: agreement.AgreementState = agreement.AgreementState()
+    """How often camera and LiDAR agree."""
     drift: drift.DriftState = drift.DriftState()
+    """By which angle they come apart."""
     own: EgoState | None = None
+    """Ego motion of the last frame, measured or coasted; None while unknown."""
     measured: own_motion.OwnMotionState = own_motion.OwnMotionState()
+    """Odometry and GNSS courses of earlier frames."""
     ground: Ground | None = None
+    """Of the last sweep; LiDAR odometry stands on it."""
     lanes: lanes.LaneState = lanes.LaneState()
+    """Tracked lines and the camera's pitch."""
     edges: road_edges.EdgeState = road_edges.EdgeState()
+    """Structure beside the road, moved along with the car."""
     traffic: traffic.TrafficState = traffic.NONE
+    """Where vehicles drove, moved along with the car."""
     path: corridor.PathState = corridor.PathState()
+    """Smoothed path and place on the route."""
     cipv: cipv.CipvState = cipv.CipvState()
+    """Who leads, and the odds that each object is in the path."""
     acc: acc.AccState = acc.AccState()
+    """The speed controller's memory."""
     aeb: aeb.AebState = aeb.AebState()
+    """The active stage of emergency braking, and what called for it."""
 
 
 def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured | None = None) -> tuple[State, Result]:
@@ -101,7 +118,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     drift_state, turned = drift.follow(state.drift, fused, aligned, frame.picture_size, frame.t_ns, params.fusion)
     clock.lap("fusion")
     # Existence: the evidence of each sensor for and against every object being where it is reported
-    existence_state, objects = existence.weigh(state.existence, fused.objects, sweep, now.dt_s, params.existence)
+    existence_state, objects = existence.weigh(state.existence, fused.objects, sweep, frame, now, params.existence)
     clock.lap("existence")
     objects = object_motion.describe(objects, now.measured, params.motion)
 
@@ -134,7 +151,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     clock.lap("cipv")
     objects = braking_evidence.judge(chosen.objects, params.existence)
     situation = Situation(now, path, objects, chosen.lead)
-    acc_state, command = acc.control(state.acc, situation, params.acc)
+    acc_state, command = acc.control(state.acc, situation, params.acc, params.aeb)
     clock.lap("acc")
     aeb_state, command = aeb.guard(state.aeb, command, situation, params.aeb, params.acc)
     clock.lap("aeb")
@@ -198,7 +215,7 @@ def _note_of(turned: drift.Drift | None) -> tuple[str, ...]:
 def measure_own_motion(state: State, frame: Frame, params: Params) -> own_motion.Measured:
     """Own motion in a frame, from whatever measures it. It needs nothing of the networks, so it may run beside them."""
     dt_s = _since(state, frame, params)
-    seen = own_motion.Seen(state.ground, state.lidar.tracks, coasting.recent(state.own, params.motion))
+    seen = own_motion.OdometryContext(state.ground, state.lidar.tracks, coasting.recent(state.own, params.motion))
     before = state.measured if dt_s is not None else own_motion.OwnMotionState()
     clock = Stopwatch()
     found = own_motion.measure(before, frame, yaw_rate.believable(frame.ego), seen, dt_s, params.motion)

@@ -26,18 +26,22 @@ _OPEN_TIMEOUT_S = 30.0
 
 @dataclass
 class Client:
-    """Seconds from the creation of each frame to its arrival here."""
+    """What one client of the stream received."""
 
     lags_s: list[float] = field(default_factory=list)
+    """From the creation of each frame to its arrival here."""
 
 
 @dataclass(frozen=True)
-class Run:
+class ClientRun:
     """What the clients received, and the server's CPU time for it."""
 
     clients: list[Client]
+    """One entry per connection."""
     cpu_s: float
+    """Of the server's process."""
     spent_s: float
+    """Wall-clock time of the measurement."""
 
     @property
     def frames(self) -> int:
@@ -66,20 +70,20 @@ def figures(clients: int, each_s: float) -> dict[str, Any]:
     }
 
 
-def _per_frame_ms(one: Run, many: Run) -> float:
+def _per_frame_ms(one: ClientRun, many: ClientRun) -> float:
     """Cost of one more client. A frame is encoded once, however many clients there are."""
     made = one.cpu_s / one.spent_s
     sent_s = many.cpu_s - made * many.spent_s
     return 1e3 * max(sent_s, 1e-9) / max(1, many.frames - round(one.frames * many.spent_s / one.spent_s))
 
 
-def _rate_hz(run: Run) -> dict[str, float]:
+def _rate_hz(run: ClientRun) -> dict[str, float]:
     """Frames per second of the fastest and of the slowest client."""
     rates = [len(client.lags_s) / run.spent_s for client in run.clients]
     return {"least": round(min(rates), 1), "most": round(max(rates), 1), "of": RATE_HZ}
 
 
-def _lags(run: Run) -> dict[str, float]:
+def _lags(run: ClientRun) -> dict[str, float]:
     """Over all clients; ``growth`` is the change of the median from the first to the last third of the run, for the
     client whose median changed most."""
     every = np.concatenate([client.lags_s for client in run.clients]) * 1e3
@@ -117,7 +121,7 @@ def _server(*, deflate: bool) -> Iterator[_Server]:
         process.communicate()
 
 
-async def _measure(server: _Server, number: int, for_s: float, compression: str | None) -> Run:
+async def _measure(server: _Server, number: int, for_s: float, compression: str | None) -> ClientRun:
     """``number`` clients that read, plus, if there are several, one that does not."""
     url, lazy = f"ws://127.0.0.1:{server.port}/", int(number > 1)
     sockets = await asyncio.gather(*(_open(url, compression) for _ in range(number + lazy)))
@@ -132,7 +136,7 @@ async def _measure(server: _Server, number: int, for_s: float, compression: str 
     spent_s = time.monotonic() - start
     for reader in readers:
         reader.cancel()
-    run = Run([Client(list(client.lags_s)) for client in clients], cpu_s, spent_s)
+    run = ClientRun([Client(list(client.lags_s)) for client in clients], cpu_s, spent_s)
     for socket in sockets:
         socket.transport.abort()
     return run

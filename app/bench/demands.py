@@ -8,14 +8,17 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Demand:
+class Requirement:
     """A limit on one figure of a stage."""
 
     stage: str
+    """Name of its row in the bench's table."""
     figure: str
     """Key of the figure in the stage's row."""
     at_most: float | None = None
+    """None when there is no upper limit."""
     at_least: float | None = None
+    """None when there is no lower limit."""
     peer: str | None = None
     """The library that the figure compares with; None for a figure of the stage itself."""
     is_optional: bool = False
@@ -43,11 +46,11 @@ class Demand:
         return None
 
 
-def _faster(stage: str, peer: str, times: float) -> tuple[Demand, Demand]:
+def _faster(stage: str, peer: str, times: float) -> tuple[Requirement, Requirement]:
     """For both recordings that the LiDAR stages are measured on."""
     return (
-        Demand(stage, "ratio", at_least=times, peer=peer),
-        Demand(f"{stage}@kitti", "ratio", at_least=times, peer=peer, is_optional=True),
+        Requirement(stage, "ratio", at_least=times, peer=peer),
+        Requirement(f"{stage}@kitti", "ratio", at_least=times, peer=peer, is_optional=True),
     )
 
 
@@ -56,17 +59,17 @@ DEMANDS = (
     *_faster("cluster", "open3d cluster_dbscan", 80.0),
     *_faster("lidar_chain", "open3d, 0.2 m voxels", 6.0),
     *_faster("lidar_chain", "open3d", 50.0),
-    Demand("decode", "median_ms", at_most=2.0),
-    Demand("step", "median_ms", at_most=5.0),
-    Demand("step_beside_network", "p99_to_idle_median", at_most=4.0),
-    Demand("line", "rate_hz", at_least=10.0),
-    Demand("simulate_lidar", "ratio", at_least=5.0, peer="real time"),
-    Demand("simulate_camera", "ratio", at_least=1.0, peer="real time"),
+    Requirement("decode", "median_ms", at_most=2.0),
+    Requirement("step", "median_ms", at_most=5.0),
+    Requirement("step_beside_network", "p99_to_idle_median", at_most=4.0),
+    Requirement("line", "rate_hz", at_least=10.0),
+    Requirement("simulate_lidar", "ratio", at_least=5.0, peer="real time"),
+    Requirement("simulate_camera", "ratio", at_least=1.0, peer="real time"),
 )
 
 
 PAGE_DEMANDS = tuple(
-    Demand(f"{what}{when}", "median_ms", at_most=at_most)
+    Requirement(f"{what}{when}", "median_ms", at_most=at_most)
     for when in ("", " while computed")
     for what, at_most in (("seek", 150.0), ("first view", 2000.0))
 )
@@ -84,6 +87,6 @@ def page_rows(figures: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     }
 
 
-def broken(figures: Mapping[str, Mapping[str, Any]], demands: Sequence[Demand] = DEMANDS) -> Iterator[str]:
+def broken(figures: Mapping[str, Mapping[str, Any]], demands: Sequence[Requirement] = DEMANDS) -> Iterator[str]:
     """One sentence for each requirement that is missed."""
     return (sentence for demand in demands if (sentence := demand.broken(figures)) is not None)

@@ -5,14 +5,11 @@ bench`` compares the speed of the compiled version with it, and a test compares 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.lidar import ground_kernels, plane_kernels
 from pipeline.lidar.ground import Ground
 from pipeline.params import GroundParams
-from pipeline.types import F32, F64
-
-Mask = npt.NDArray[np.bool_]
+from pipeline.types import F32, F64, Mask
 
 
 def fit_ground_numpy(points: F32, keep: Mask, params: GroundParams) -> Ground:

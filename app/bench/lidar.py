@@ -31,11 +31,14 @@ SYSTEM_LIBRARIES = "on slim systems Open3D needs libegl1 libgl1 libx11-6 libusb-
 
 @dataclass(frozen=True)
 class Prepared:
-    """One sweep with the results of the stages before clustering. chosen: (N,) bool, the points to cluster."""
+    """One sweep with the results of the stages before clustering."""
 
     sweep: Sweep
+    """As recorded."""
     keep: npt.NDArray[np.bool_]
+    """(N,) points that downsampling leaves."""
     chosen: npt.NDArray[np.bool_]
+    """(N,) the points to cluster."""
 
 
 def stages(sweeps: list[Sweep], budget_s: float, params: Params) -> dict[str, dict[str, Any]]:

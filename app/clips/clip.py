@@ -27,12 +27,17 @@ class Clip:
     """Frames ``first`` to ``last`` of a recording, both included, run with one set of parameters."""
 
     recording: OpenRecording
+    """With its whole-drive runs, whose states the clip starts from."""
     params: Params
+    """Of the run whose results it shows."""
     first: int
+    """First frame."""
     last: int
+    """Last frame, included."""
     scheduler: ComputeScheduler
     """Asked before each frame is computed, so that interactive requests take priority."""
     title: str
+    """Shown in the exported file."""
     rate_hz: float
     """Nominal frame rate of the recording."""
     start: RerunStartOptions = RerunStartOptions()

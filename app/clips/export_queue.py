@@ -38,6 +38,7 @@ class ExportStatus:
     last: int
     """Last frame of the clip, included."""
     state: JobState = "waiting"
+    """``done``, ``failed`` and ``cancelled`` are final."""
     progress: float = 0.0
     """From 0 to 1."""
     note: str = ""

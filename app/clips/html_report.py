@@ -17,7 +17,7 @@ from app.drive.events.event import Event
 from app.drive.frame_rows import Objects, Row, objects_of, row_of
 from app.reports.html import page, section_html
 from pipeline.common.progress import Progress
-from pipeline.evaluation.report_sections import Chart, Section, Series, Table
+from pipeline.evaluation.report_sections import Chart, ReportSection, Series, Table
 from pipeline.params import Params, to_yaml
 from pipeline.types import F64, U8, Frame, Result
 
@@ -28,7 +28,7 @@ _CURVES = (
     ("Closing speed", "m/s", ("closing_speed_mps",)),
     ("Time to collision", "s", ("ttc_s",)),
     ("Path offset of the CIPV", "m", ("path_offset_m",)),
-    ("Own and desired speed", "m/s", ("speed_mps", "desired_speed_mps")),
+    ("Ego and desired speed", "m/s", ("speed_mps", "desired_speed_mps")),
     ("Brake", "fraction of the pedal", ("brake",)),
 )
 _LONGEST_TTC_S = 20.0
@@ -40,7 +40,9 @@ class ClipInfo:
     """Where a clip comes from."""
 
     title: str
+    """Of the recording."""
     uri: str
+    """As the recording was opened."""
     first: int
     """First frame of the clip."""
     last: int
@@ -76,7 +78,7 @@ def clip_page(run: Iterable[tuple[Frame, Result]], draw: Callable[[int], U8], pa
     sections = [
         _summary(rows, names, info),
         _events(events, names, times),
-        Section("curves", "Curves", charts=tuple(_charts(rows, times))),
+        ReportSection("curves", "Curves", charts=tuple(_charts(rows, times))),
     ]
     said = worth_a_picture(events)
     pictures = {place: (_jpeg(draw(info.first + place)), text) for place, text in said.items()}
@@ -98,7 +100,7 @@ def _jpeg(drawn: U8) -> bytes:
     return cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1].tobytes()
 
 
-def _summary(rows: Sequence[Row], names: Sequence[str], info: ClipInfo) -> Section:
+def _summary(rows: Sequence[Row], names: Sequence[str], info: ClipInfo) -> ReportSection:
     with_lead = sum(row.cipv_id is not None for row in rows)
     leads = {row.cipv_id for row in rows} - {None}
     text = (
@@ -106,13 +108,13 @@ def _summary(rows: Sequence[Row], names: Sequence[str], info: ClipInfo) -> Secti
         f"{with_lead} frames with a CIPV, {len(leads)} different vehicle{'s' if len(leads) != 1 else ''}. "
         f"Runs with the same input and parameters have the digest {info.digest}.",
     )
-    return Section("clip", "Clip", text)
+    return ReportSection("clip", "Clip", text)
 
 
-def _events(events: Sequence[Event], names: Sequence[str], times: Sequence[float]) -> Section:
+def _events(events: Sequence[Event], names: Sequence[str], times: Sequence[float]) -> ReportSection:
     rows = tuple((names[each.index], round(times[each.index], 2), each.kind, each.text) for each in events)
     table = Table("What happened", ("frame", "at s", "kind", "event"), rows)
-    return Section("events", "Events", tables=(table,) if rows else (), text=() if rows else ("No events.",))
+    return ReportSection("events", "Events", tables=(table,) if rows else (), text=() if rows else ("No events.",))
 
 
 def _charts(rows: Sequence[Row], times: Sequence[float]) -> Iterable[Chart]:

@@ -18,6 +18,7 @@ from app.bench.page import measure as page_bench
 from app.bench.suite import run_all
 from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions
+from app.fleet.extra import need_extra
 from pipeline.common.errors import BadInput
 
 CLIENTS_EACH_S, PAGE_S = 6.0, 12.0
@@ -39,9 +40,20 @@ class Bench:
     page: Annotated[str | None, option("SOURCE")] = None
     """Measure the latency of the dashboard in a browser instead, while it plays this source, e.g. sim:straight"""
 
+    drives: int = 0
+    """Measure questions to the tables of N made-up drives instead, e.g. 10000 (2 GB on the disk)"""
+
     def __call__(self) -> int:
         if self.clients < 0:
             raise BadInput(f"--clients {self.clients}: must not be negative")
+        if self.drives < 0:
+            raise BadInput(f"--drives {self.drives}: must not be negative")
+        if self.drives:
+            from app.bench import fleet_tables  # needs the extra `fleet`
+
+            need_extra()
+            print(json.dumps(fleet_tables.figures(self.drives), indent=1))
+            return 0
         if self.clients or self.page is not None:
             live: dict[str, Any] = {}
             if self.clients:

@@ -1,5 +1,6 @@
 """`cipv calibrate distance` fits the paper's regression from box height to distance for another camera, `cipv calibrate
-alignment` where LiDAR points are in the image."""
+alignment` where LiDAR points are in the image, `cipv calibrate mount` how the LiDAR sits in the car, `cipv
+calibrate time` when the sensors really measured."""
 
 from __future__ import annotations
 
@@ -21,26 +22,33 @@ from app.commands.support.progress_bars import frames_progress, task_progress
 from pipeline.calibration.alignment.drive import fit_drive
 from pipeline.calibration.alignment.fit import overlap_sentence
 from pipeline.calibration.distance import LawFit, as_law, as_overrides, collect_pairs, fit_laws
+from pipeline.calibration.mount.drive import fit_mount_drive
+from pipeline.calibration.mount.fit import mount_sentence, turned
+from pipeline.calibration.time_offset import watch
+from pipeline.calibration.times import times_of
 from pipeline.common.errors import BadInput
 from pipeline.detection import Detectors, detect, detector_for
+from pipeline.formats.calibration_files.rig import write_rig
 from pipeline.inference.distance_laws import keep_law
 from pipeline.inference.model_registry import EMBEDDED, find
 from pipeline.params import Params
 from pipeline.types import Frame
-from pipeline.types.source import Source
+from pipeline.types.source import Mounted, Source
 from pipeline.vision.detector import Detector
 
 
 @dataclass(frozen=True)
 class Calibrate:
-    """Fit to the detections in a recording, for another car or camera: the distance law d = a·h^b for each class, or
-    the alignment of LiDAR and camera, from ordinary traffic.
+    """Fit to a recording, for another car or camera: the distance law d = a·h^b for each class, the alignment of LiDAR
+    and camera from ordinary traffic, the mount of the LiDAR in the car from driving, or the time between the sensors.
 
     Example: cipv calibrate alignment kitti:PATH --model angular --out alignment.yaml
     """
 
-    what: tyro.conf.Positional[Literal["distance", "alignment"]]
-    """distance: the distance law, from box heights; alignment: the rotation between LiDAR and camera"""
+    what: tyro.conf.Positional[Literal["distance", "alignment", "mount", "time"]]
+    """distance: the distance law, from box heights; alignment: the rotation between LiDAR and camera; mount: yaw,
+    pitch, roll and height of the LiDAR against the direction of travel and the road, and its offset from the axle;
+    time: the time offset of the camera and the delay of ego speed"""
     source: SourceOptions
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     truth: Literal["labels", "lidar"] = "labels"
@@ -52,7 +60,7 @@ class Calibrate:
     offset: bool = False
     """alignment: also fit the pinhole camera's lateral and vertical position; the angles become less certain"""
     out: Annotated[Path | None, option("PATH")] = None
-    """Write a preset file for `cipv run --params`"""
+    """Write a preset file for `cipv run --params`; mount: a rig file"""
     keep: bool = False
     """Store the law with the detector; it is then used with that network unless a parameter overrides it"""
     json: bool = False
@@ -62,20 +70,44 @@ class Calibrate:
         self._check()
         params = self.pipeline.parameters()
         source = self.source.open()
+        if self.what in ("mount", "time"):
+            return (self._fit_mount if self.what == "mount" else self._fit_time)(params, source)
         detector = detector_for(source, self.pipeline.detector)
         return (self._fit_distance if self.what == "distance" else self._fit_alignment)(params, source, detector)
 
     def _check(self) -> None:
-        """BadInput for an option of the other fit."""
-        others = (
-            {"--model": self.model != "pinhole", "--offset": self.offset}
-            if self.what == "distance"
-            else {"--truth": self.truth != "labels", "--free-exponent": self.free_exponent, "--keep": self.keep}
-        )
-        for name in (name for name, given in others.items() if given):
-            raise BadInput(f"{name} does not belong to `cipv calibrate {self.what}`")
+        """BadInput for an option of another fit."""
+        belongs = {
+            "--model": (self.model != "pinhole", "alignment"),
+            "--offset": (self.offset, "alignment"),
+            "--truth": (self.truth != "labels", "distance"),
+            "--free-exponent": (self.free_exponent, "distance"),
+            "--keep": (self.keep, "distance"),
+        }
+        for name, (given, to) in belongs.items():
+            if given and to != self.what:
+                raise BadInput(f"{name} does not belong to `cipv calibrate {self.what}`")
         if self.offset and self.model == "angular":
             raise BadInput("--offset needs the pinhole model: the angular one has no position")
+
+    def _fit_mount(self, params: Params, source: Source) -> int:
+        mounted = source if isinstance(source, Mounted) else None
+        if self.out is not None and mounted is None:
+            raise BadInput("--out: this recording has its own mounts; a rig file is for pcap, pcd and rosbag")
+        with frames_progress() as bar:
+            fit = fit_mount_drive(source.frame, len(source), params, task_progress(bar, "driving"))
+        if self.json:
+            print(json.dumps(asdict(fit), indent=1))
+        else:
+            table = Table("LiDAR", "value", "± 1 σ", title=mount_sentence(fit))
+            for name, value in fit.values.items():
+                table.add_row(name, f"{value:.3f}", f"{fit.sigmas[name]:.2g}")
+            Console().print(table)
+        for warning in fit.warnings:
+            print(f"cipv: {warning}", file=sys.stderr)
+        if self.out is not None and mounted is not None:
+            write_rig(self.out, *turned(fit, mounted.T_ego_lidar, source.frame(0).camera))
+        return 0
 
     def _fit_alignment(self, params: Params, source: Source, detector: Detector) -> int:
         def frame_of(index: int) -> Frame:
@@ -97,6 +129,29 @@ class Calibrate:
         if self.out is not None:
             section = {"model": fit.model, **fit.values}
             self.out.write_text(yaml.safe_dump({"alignment": section}, sort_keys=False), encoding="utf-8")
+        return 0
+
+    def _fit_time(self, params: Params, source: Source) -> int:
+        with frames_progress() as bar:
+            scenes, speeds = watch(source.frame, len(source), params, task_progress(bar, "driving"))
+        camera, ego, untold = times_of(scenes, speeds)
+        found = {"camera": camera, "ego": ego}
+        if self.json:
+            told = {name: asdict(each) if each is not None else None for name, each in found.items()}
+            print(json.dumps(told, indent=1))
+        else:
+            table = Table("sync", "add to its times", "± 1 σ", title=f"{len(scenes)} images, {len(speeds)} speeds")
+            if camera is not None:
+                table.add_row("camera_offset_ms", f"{camera.camera_offset_ms:+.1f} ms", f"{camera.sigma_ms:.1f}")
+            if ego is not None:
+                table.add_row("ego_offset_ms", f"{ego.ego_offset_ms:+.1f} ms", f"{ego.sigma_ms:.1f}")
+            Console().print(table)
+        for warning in (*(camera.warnings if camera is not None else ()), *untold):
+            print(f"cipv: {warning}", file=sys.stderr)
+        if self.out is not None:
+            values = {"camera_offset_ms": camera.camera_offset_ms} if camera is not None else {}
+            values |= {"ego_offset_ms": ego.ego_offset_ms} if ego is not None else {}
+            self.out.write_text(yaml.safe_dump({"sync": values}, sort_keys=False), encoding="utf-8")
         return 0
 
     def _fit_distance(self, params: Params, source: Source, detector: Detector) -> int:

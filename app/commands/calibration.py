@@ -19,18 +19,20 @@ from pipeline.types import CameraCalibration
 
 @dataclass(frozen=True)
 class ConvertCalibration:
-    """Check the calibration of a recording or of a file, and write it for KITTI, ROS, OpenCV, or as a rig file.
+    """Check the calibration of a recording or of a file, and write it for KITTI, ROS, OpenCV, Kalibr, or
+    as a rig file.
 
     Example: cipv calibration astyx:PATH --params alignment.yaml --to ros --out front_camera
     """
 
     origin: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
-    """A recording, or with --format a file; for ROS, the folder with camera_info.yaml and static_transform.yaml"""
+    """A recording, or with --format a file; for ROS, the folder with camera_info.yaml and static_transform.yaml;
+    for Kalibr, the folder with camchain.yaml and transform.yaml"""
     out: Path
-    """File to write; for ROS, a folder"""
-    format: Annotated[Literal["kitti", "ros", "opencv"] | None, option("kitti|ros|opencv")] = None
+    """File to write; for ROS and Kalibr, a folder"""
+    format: Annotated[Literal["kitti", "ros", "opencv", "kalibr"] | None, option("kitti|ros|opencv|kalibr")] = None
     """Format of the file to read. Without it, SOURCE is a recording"""
-    to: Literal["kitti", "ros", "opencv", "rig"] = "rig"
+    to: Literal["kitti", "ros", "opencv", "kalibr", "rig"] = "rig"
     """Format to write"""
     size: Annotated[tuple[int, int] | None, option("WIDTH HEIGHT")] = None
     """Image size, for formats that do not store it: KITTI"""

@@ -16,6 +16,7 @@ import tyro
 from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
+from app.labels.project_classes import project_classes
 from app.reports.html import html
 from app.reports.terminal_tables import show
 from pipeline.common.errors import BadInput
@@ -25,6 +26,7 @@ from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive
 from pipeline.evaluation.scores.report import as_json, sections
 from pipeline.evaluation.scores.results_file import EMPTY, read_results
 from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels, of_source
+from pipeline.labels.classes import as_bases
 from pipeline.labels.formats import native
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.params import Params, from_yaml, preset
@@ -125,7 +127,8 @@ class Evaluate:
         if self.truth == ("native",) or self.truth[n] == "native":
             return of_source(source, rules.lead)
         file = Path(self.truth[n])
-        truth = of_labels(native.from_json(read_bytes(file), str(file)), rules.lead)
+        known = native.from_json(read_bytes(file), str(file))
+        truth = of_labels(as_bases(known, project_classes()), rules.lead)
         ticks = tuple(source.t_ns(index) for index in range(len(source)))
         frames = {tick: frame for tick, frame in truth.frames.items() if tick in set(ticks)}
         if not frames:

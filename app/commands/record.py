@@ -24,14 +24,12 @@ from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.save import about
-from pipeline.recording.segments import Rotation, Segments
+from pipeline.recording.segments import FileRotation, Segments
 from pipeline.recording.session.velodyne_scan import RawLidar
 from pipeline.run import run, run_live
 from pipeline.sources import is_live
 from pipeline.types import Frame, Result
 from pipeline.types.source import LiveSource, Source, is_live_source
-
-Ran = tuple[Frame, Result]
 
 
 @dataclass(frozen=True)
@@ -126,12 +124,12 @@ class Record:
         return Recorder(path, about(source, detectors), self._rotation, raw_lidar=RawLidar(*mount))
 
     @property
-    def _rotation(self) -> Rotation:
+    def _rotation(self) -> FileRotation:
         max_bytes = None if self.rotate_mb is None else self.rotate_mb * 1e6
         max_s = None if self.rotate_minutes is None else self.rotate_minutes * 60.0
-        return Rotation(max_bytes, max_s)
+        return FileRotation(max_bytes, max_s)
 
-    def _until_enough(self, ran: Iterator[Ran], asked: Event) -> Iterator[Ran]:
+    def _until_enough(self, ran: Iterator[tuple[Frame, Result]], asked: Event) -> Iterator[tuple[Frame, Result]]:
         """Until ``seconds`` have passed or a stop is requested; either way the file is finished properly."""
         first_ns = None
         with suppress(_Ended):

@@ -22,11 +22,9 @@ from pipeline.types import MOST_SENSORS_FIRST, Frame, Result
 from pipeline.types.result_json import write_line
 from pipeline.types.source import AnySource, Source, is_live_source
 
-Ran = tuple[Frame, Result]
-
 
 @dataclass(frozen=True)
-class Run:
+class RunPipeline:
     """Run the pipeline on a recording or on live sensors, and write one result per frame.
 
     Example: cipv run astyx:PATH --out results.jsonl --rrd drive.rrd
@@ -53,27 +51,27 @@ class Run:
             if self.out is not None:
                 to_stdout = str(self.out) == "-"
                 out = sys.stdout if to_stdout else stack.enter_context(self.out.open("w", encoding="utf-8"))
-            replay = None
+            rerun_sink = None
             if self.rrd is not None:
                 from app.views.rerun.view import RerunSink  # takes half a second to import
 
-                replay = stack.enter_context(RerunSink(self.rrd, source.title, params.alignment))
+                rerun_sink = stack.enter_context(RerunSink(self.rrd, source.title, params.alignment))
             bar = stack.enter_context(frames_progress())
             total = self.frames if is_live_source(source) else len(cast("Source", source))
             task = bar.add_task(source.title, total=total)
             for frame, result in _until_interrupted(self._results(source, params, detectors), is_live_source(source)):
                 if out is not None:
                     write_line(out, result)
-                elif replay is None:
+                elif rerun_sink is None:
                     print(_sentence(result))
-                if replay is not None:
-                    replay.show(frame, result)
+                if rerun_sink is not None:
+                    rerun_sink.show(frame, result)
                 tally.add(result)
                 bar.advance(task)
         print(tally.sentence(), file=sys.stderr)
         return 0
 
-    def _results(self, source: AnySource, params: Params, detectors: Detectors) -> Iterator[Ran]:
+    def _results(self, source: AnySource, params: Params, detectors: Detectors) -> Iterator[tuple[Frame, Result]]:
         """Frames with their results, as many as are wanted."""
         if is_live_source(source):
             every = run_live(source, params, detectors, self.sensors, Waiting(source))
@@ -82,7 +80,7 @@ class Run:
         return islice(every, self.frames)
 
 
-def _until_interrupted(results: Iterator[Ran], is_live: bool) -> Iterator[Ran]:
+def _until_interrupted(results: Iterator[tuple[Frame, Result]], is_live: bool) -> Iterator[tuple[Frame, Result]]:
     """All of them. Live sensors have no end of their own: there Ctrl-C is it, and all is well."""
     try:
         yield from results

@@ -19,6 +19,7 @@ from app.core.server_address import DEFAULT_PORT
 from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
 from app.labels import URL_VARIABLE
+from app.labels.project_classes import project_classes
 from app.labels.service.desk import LabelDesk
 from app.views.lazy_scene import LateScene
 from app.web.serve import serve
@@ -61,8 +62,8 @@ class ServerOptions:
         """DatabaseError when a database that was named cannot be opened. The local database is opened once the first
         image is shown; an error in it is shown in the dashboard."""
         if self.labels or os.environ.get(URL_VARIABLE):
-            return LabelDesk(_open_labels(self.labels))
-        return LabelDesk(open_later=lambda: _open_labels(None))
+            return LabelDesk(_open_labels(self.labels), classes=project_classes())
+        return LabelDesk(open_later=lambda: _open_labels(None), classes=project_classes())
 
     def serve(self, engine: Engine) -> int:
         """Until Ctrl-C."""

@@ -25,7 +25,7 @@ from pipeline.types.source import Source
 
 
 @dataclass(frozen=True)
-class Import:
+class ImportRecording:
     """Convert any recording to a session: one MCAP file that opens in CIPV Studio, Foxglove and rerun.
 
     Example: cipv import astyx:PATH --out drive.mcap

@@ -16,6 +16,7 @@ class Wish:
     """What clients want at one moment: standing values, and requests that are served once."""
 
     params: Params
+    """For the shown frame and for whole-drive runs."""
     preset: str = "default"
     """The preset that the parameters started from."""
     params_revision: int = 0
@@ -23,6 +24,7 @@ class Wish:
     settled: bool = True
     """The parameters are meant to stay; false while a slider is being dragged."""
     playing: bool = False
+    """False holds the shown frame."""
     speed: float = 1.0
     """Playback rate; 1 is real time."""
     loop: bool = True

@@ -32,9 +32,13 @@ class PlaybackClock:
     """Recording time runs from an anchor at ``speed`` times wall time."""
 
     timeline_s: F64
+    """(N,) place of each frame on the playback timeline."""
     anchor_wall_s: float
+    """Monotonic clock at the anchor."""
     anchor_media_s: float
+    """Recording time at the anchor."""
     speed: float
+    """1 is real time."""
 
     def due(self, now_s: float) -> int:
         """The newest frame whose time has come."""

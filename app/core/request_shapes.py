@@ -14,13 +14,16 @@ Meters = Annotated[float, Field(gt=0.0, le=LARGEST_SIDE_M, allow_inf_nan=False)]
 
 
 class CuboidShape(BaseModel):
-    """Ego frame, metres: centre x y z, length width height, turn of the length axis in radians."""
+    """A cuboid in the ego frame, metres."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 
     center: tuple[Finite, Finite, Finite]
+    """x y z of its middle."""
     size: tuple[Meters, Meters, Meters]
+    """Length, width, height."""
     yaw_rad: Annotated[float, Field(gt=-LARGEST_YAW_RAD, lt=LARGEST_YAW_RAD, allow_inf_nan=False)]
+    """Turn of the length axis from ego x, positive to the left."""
 
     def value(self) -> Cuboid:
         return Cuboid(self.center, self.size, self.yaw_rad)

@@ -13,13 +13,16 @@ from pipeline.common.geometry import Cuboid
 
 @dataclass(frozen=True)
 class HeldCuboid:
-    """A labelled cuboid that may be dragged in the 3D view. page: whose it is; track: its label; frame: that the page
-    shows it in."""
+    """A labelled cuboid that may be dragged in the 3D view."""
 
     page: object
+    """Whose it is."""
     track: int
+    """Its label."""
     frame: int
+    """That the page shows it in."""
     cuboid: Cuboid
+    """In the ego frame, as the page has it."""
 
     def is_of(self, other: HeldCuboid | None) -> bool:
         """The same label in the same frame at the same page, wherever it is."""
@@ -32,30 +35,40 @@ LabelRole = Literal["cipv", "path", "fused", "warning"]
 
 @dataclass(frozen=True)
 class LabelInView:
-    """A label as a page draws it. text: number, class and state. facing: its front is known."""
+    """A label as a page draws it."""
 
     track: int
+    """Its label."""
     cuboid: Cuboid
+    """In the ego frame."""
     text: str
+    """Number, class and state."""
     role: LabelRole
+    """Decides its colour."""
     facing: bool
+    """Whether its front is known."""
 
 
 @dataclass(frozen=True)
 class LabelsInView:
-    """What a labeling page draws. alone: without the pipeline's objects."""
+    """What a labeling page draws."""
 
     labels: tuple[LabelInView, ...]
+    """Of the shown frame."""
     alone: bool
+    """Without the pipeline's objects."""
 
 
 @dataclass(frozen=True)
 class PageView:
-    """What one page wants to see in its own 3D view. selected: an object's id. labels: None where it does not label."""
+    """What one page wants to see in its own 3D view."""
 
     selected: int | None = None
+    """An object's id; None for no selection."""
     held: HeldCuboid | None = None
+    """The cuboid that has handles; None without one."""
     labels: LabelsInView | None = None
+    """None where the page does not label."""
 
 
 NOTHING = PageView()

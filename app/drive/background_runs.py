@@ -49,6 +49,7 @@ class DriveState:
     total: int = 0
     """Frames of the drive."""
     running: bool = False
+    """False when done, failed or cancelled."""
     phase: Phase = "done"
     """``detect`` while networks run on images for the first time, ``run`` afterwards."""
     note: str = ""

@@ -22,25 +22,34 @@ SAME_PLACE_M = 0.5
 
 @dataclass(frozen=True)
 class Metric:
-    """One figure of both runs. better: which way is good; None where neither is."""
+    """One figure of both runs."""
 
     name: str
+    """Shown to people."""
     unit: str
+    """Empty for counts."""
     base: float | None
+    """Of the run compared with; None where it is undefined."""
     run: float | None
+    """Of the run itself; None where it is undefined."""
     better: Literal["higher", "lower"] | None = None
+    """Which direction is good; None where neither is."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """differing: first and last frame of each range. sentences: what differs at the first of each. judged: frames with
-    truth."""
+    """Two runs of one drive side by side."""
 
     frames: int
+    """That both have run."""
     differing: tuple[tuple[int, int], ...]
+    """First and last frame of each range in which they differ."""
     sentences: dict[int, str]
+    """What differs at the first frame of each range, by that frame."""
     metrics: tuple[Metric, ...]
+    """Those that need truth only where there is one."""
     judged: int
+    """Frames with truth."""
 
     @property
     def frames_differing(self) -> int:

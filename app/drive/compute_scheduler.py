@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from pipeline.inference.cancellation import Stop
+from pipeline.inference.cancellation import Cancellation
 
 HAND_RESTS_S = 0.3
 """So long after what a person asked for was served nobody is taken to wait for anything: the page has drawn it, and
@@ -41,7 +41,7 @@ class ComputeScheduler:
         self._ended = False
         self._has_asked = False
         self._rests_at_s = time.monotonic()
-        self._stops: set[Stop] = set()
+        self._stops: set[Cancellation] = set()
         self._credit_s, self._credited_at_s = _CREDIT_S, time.monotonic()
         self._overdue_at_s: float | None = None
 
@@ -89,7 +89,7 @@ class ComputeScheduler:
     @contextmanager
     def stoppable(self) -> Iterator[None]:
         """Networks asked in the block end with Stopped when a person asks for something."""
-        stop = Stop()
+        stop = Cancellation()
         with self._condition:
             self._stops.add(stop)
         with self._until_done(stop):
@@ -127,9 +127,9 @@ class ComputeScheduler:
                 if self._playing:
                     self._credit_s -= time.monotonic() - began_s
 
-    def _let_begin(self, to_the_end: bool) -> Stop:
+    def _let_begin(self, to_the_end: bool) -> Cancellation:
         """Wait for it. What is to stop the work is known to ``asked`` before anybody can ask."""
-        stop = Stop()
+        stop = Cancellation()
         with self._condition:
             overdue_at_s = time.monotonic() + _LONGEST_FRONT_S
             if not to_the_end:
@@ -157,7 +157,7 @@ class ComputeScheduler:
         return self._credit_s > 0
 
     @contextmanager
-    def _until_done(self, stop: Stop) -> Iterator[None]:
+    def _until_done(self, stop: Cancellation) -> Iterator[None]:
         try:
             with stop.here():
                 yield

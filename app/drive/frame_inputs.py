@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.types import Frame, Picture
+from pipeline.types import CameraImage, Frame
 
 _LIMIT_BYTES = 384e6
 """About 1200 frames of a real VLP-16. What does not fit is read from the source again, in every run."""
@@ -24,7 +24,7 @@ def without_pixels(frame: Frame) -> Frame:
     if frame.picture is None:
         return frame
     blank = np.broadcast_to(np.zeros((), np.uint8), frame.picture.bgr.shape)
-    return replace(frame, picture=Picture(frame.picture.t_ns, blank))
+    return replace(frame, picture=CameraImage(frame.picture.t_ns, blank))
 
 
 class InputStore:

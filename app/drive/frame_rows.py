@@ -63,21 +63,35 @@ class Row(NamedTuple):
     """One frame. What belongs to the CIPV is None without one."""
 
     t_ns: int
+    """The tick."""
     cipv_id: int | None
+    """Object number in this run."""
     source: str | None
+    """V, L or VL."""
     carried: bool | None
+    """Predicted, not seen in this frame."""
     distance_m: float | None
+    """To the CIPV."""
     closing_speed_mps: float | None
+    """Positive when the gap shrinks."""
     ttc_s: float | None
+    """None when the gap does not shrink."""
     path_offset_m: float | None
+    """Of the CIPV's nearest point from the centre of the path."""
     speed_mps: float | None
+    """Of the ego vehicle; None where unknown."""
     desired_speed_mps: float | None
+    """That ACC asks for."""
     accel_mps2: float | None
+    """That ACC and AEB ask for."""
     brake: float | None
+    """Pedal, 0–1."""
     acc_state: str | None
+    """Such as ``follow``; None without ego speed."""
     gaps: str
     """The sensors without data, joined by commas."""
     vl_disagreement_m: float | None
+    """How far the camera's and the LiDAR's distance of the CIPV are apart; None unless both have one."""
     judged: Judged | None
     """The verdict against truth; None where there is none."""
     extra: tuple[ColumnValue, ...] = ()

@@ -29,6 +29,7 @@ class KnownState(NamedTuple):
     at: int
     """Index of the frame."""
     state: State
+    """Before that frame was run."""
 
 
 class DriveRun:

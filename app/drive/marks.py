@@ -24,14 +24,18 @@ class MarkRefused(BadInput):
 
 @dataclass(frozen=True)
 class SavedMark:
-    """A marked frame of one recording; ``id`` is its number there. t_ns: the frame's stamp, which is what counts for
-    one of live sensors. in_session: it went into a session that was being recorded, too."""
+    """A marked frame of one recording."""
 
     id: int
+    """Its number in the recording."""
     index: int
+    """Of the frame."""
     text: str = ""
+    """What the person wrote; may be empty."""
     t_ns: int | None = None
+    """The frame's stamp, which is what counts for one of live sensors; None where it had none."""
     in_session: bool = False
+    """Whether it went into a session that was being recorded, too."""
 
 
 class Marks:

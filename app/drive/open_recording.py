@@ -40,6 +40,7 @@ class RunSetup:
     timeline_s: F64
     """(total,) place of each frame on the playback timeline, in seconds."""
     detectors: Detectors
+    """For vehicles and lanes; their names are part of a run's digest."""
     sensors: Sensors
     """The sensors whose data the pipeline may use."""
 

@@ -1,7 +1,7 @@
 """The engine's worker thread: it owns the open source, and publishes a ``Snapshot`` after each thing it does.
 
 Callers say what they want through ``control``; the newest wish wins. What a wish makes of a recording or of sensors is
-its player's: ``app/playing/``.
+its player's (``app/engine/player.py``).
 """
 
 from __future__ import annotations

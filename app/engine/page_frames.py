@@ -14,11 +14,14 @@ from pipeline.params import Params
 
 @dataclass(frozen=True, eq=False)
 class PageFrame:
-    """A frame as one page sees it. uri: of the recording. time_s: its place on the playback timeline."""
+    """A frame as one page sees it."""
 
     uri: str
+    """Of the recording."""
     time_s: float
+    """Its place on the playback timeline."""
     processed: ProcessedFrame
+    """Exact where the whole drive has been run up to it."""
 
 
 class PageFrames:

@@ -18,7 +18,9 @@ class ProcessedFrame:
     frame: Frame
     """The input, detections included."""
     after: State
+    """The state that the next frame is run from."""
     result: Result
+    """What the frame came to."""
     params: Params
     """What it was run with."""
     detect_ms: float

@@ -24,7 +24,9 @@ class Notice:
     """A sentence shown in the dashboard, with the remedy if there is one."""
 
     level: Literal["info", "warning", "error"]
+    """Decides the colour; only an ``error`` goes away by itself."""
     text: str
+    """One or two sentences."""
     until_s: float = 0.0
     """An error goes with the next frame, but not before this time of ``time.monotonic``."""
 
@@ -39,25 +41,39 @@ class Snapshot:
     """Source, playback and the shown frame at one moment."""
 
     params: Params
+    """In use."""
     preset: str = "default"
+    """The preset that the parameters started from."""
     params_revision: int = 0
+    """Grows with every change of parameters."""
     uri: str | None = None
+    """As the source was opened; None before."""
     title: str = ""
+    """Of the recording."""
     rate_hz: float = 0.0
+    """Nominal frame rate; 0 when unknown."""
     count: int = 0
     """Frames of the recording; 0 for live sensors."""
     index: int = 0
+    """Of the shown frame."""
     time_s: float = 0.0
     """Place of the shown frame on the playback timeline, in seconds."""
     duration_s: float = 0.0
+    """Of the whole timeline."""
     playing: bool = False
+    """False holds the shown frame."""
     speed: float = 1.0
+    """Playback rate; 1 is real time."""
     loop: bool = True
+    """Whether playback starts again at the end of the drive."""
     busy: str | None = None
     """What the engine is doing while it cannot serve requests."""
     detector: str | None = None
+    """Name of the network for vehicles; None without one."""
     lane_detector: str | None = None
+    """Name of the lane detector; None without one."""
     notices: tuple[Notice, ...] = ()
+    """What there is to tell the person now."""
     sequence: int = 0
     """Grows with every new result."""
     skipped: int = 0
@@ -67,12 +83,15 @@ class Snapshot:
     processed: ProcessedFrame | None = None
     """The shown frame; None before the first one."""
     drive: DriveState = DriveState()
+    """How far the whole-drive run is."""
     labels: LabelState = LabelState()
+    """Of what is open."""
     live: bool = False
     """Live sensors, not a recording."""
     streams: tuple[StreamHealth, ...] = ()
     """Health of each live sensor, updated also while no tick arrives."""
     recording: RecordingState | None = None
+    """None while nothing is recorded."""
 
     def opened(self, uri: str, player: Player, detectors: Detectors) -> Snapshot:
         """The next snapshot once something else was opened: of the parameters and of playback it is the same."""

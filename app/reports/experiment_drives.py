@@ -16,7 +16,7 @@ from urllib.parse import urlencode
 from app.core.server_address import DEFAULT_PORT
 from app.reports.html import page, section_html
 from app.reports.svg_charts import chart_svg
-from pipeline.evaluation.report_sections import Linked, Section, Table
+from pipeline.evaluation.report_sections import Linked, ReportSection, Table
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.params import Params, changes_of
 from pipeline.params import to_yaml as params_to_yaml
@@ -68,9 +68,9 @@ class ReplayFolder:
         return self._folder / f"{drive.name}{suffix}"
 
 
-def _listed(name: str, title: str, drives: list[ExperimentDrive]) -> Section:
+def _listed(name: str, title: str, drives: list[ExperimentDrive]) -> ReportSection:
     rows = tuple((Linked(each.title, url_quote(f"{each.name}.html")), " ".join(each.text)) for each in drives)
-    return Section(name, title, tables=(Table(f"{len(drives)} drives", ("drive", "outcome"), rows),))
+    return ReportSection(name, title, tables=(Table(f"{len(drives)} drives", ("drive", "outcome"), rows),))
 
 
 def _command(drive: ExperimentDrive) -> str:

@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from html import escape
 
-from app.reports.scene_pictures import scene_html
+from app.reports.scene_images import scene_html
 from app.reports.svg_charts import chart_svg
-from pipeline.evaluation.report_sections import AnyCell, Cell, Coloured, Driven, Linked, Scene, Section, Table
+from pipeline.evaluation.report_sections import AnyCell, Cell, Coloured, Driven, Linked, ReportSection, Scene, Table
 
 _STYLE = """
 :root { color-scheme: light dark; --ground: #fff; --ink: #1b2024; --soft: #5d6870; --edge: #d8dee2; --raised: #f4f6f7;
@@ -44,11 +44,11 @@ td a { color: inherit; text-decoration-style: dotted; } code { font-size: 13px; 
 """
 
 
-def html(sections: Iterable[Section], title: str, replays: str = "") -> str:
-    """The whole report. replays: relative address of the folder with the saved drives, empty without one."""
+def html(sections: Iterable[ReportSection], title: str, folder: str = "") -> str:
+    """The whole report. folder: relative address of the folder with the saved drives, empty without one."""
     sections = list(sections)
     links = "".join(f'<a href="#{escape(each.name)}">{escape(each.name)}</a>' for each in sections)
-    return page(title, f"<nav>{links}</nav>{''.join(section_html(each, replays) for each in sections)}")
+    return page(title, f"<nav>{links}</nav>{''.join(section_html(each, folder) for each in sections)}")
 
 
 def page(title: str, body: str) -> str:
@@ -60,14 +60,14 @@ def page(title: str, body: str) -> str:
     )
 
 
-def section_html(section: Section, replays: str = "") -> str:
+def section_html(section: ReportSection, folder: str = "") -> str:
     """One section, for a page of one's own."""
     return (
         f'<section id="{escape(section.name)}"><h2>{escape(section.title)}</h2>'
         + "".join(f"<p>{escape(paragraph)}</p>" for paragraph in section.text)
-        + (f'<p><a href="{escape(replays)}index.html#{escape(section.name)}">Every drive</a></p>' if replays else "")
+        + (f'<p><a href="{escape(folder)}index.html#{escape(section.name)}">Every drive</a></p>' if folder else "")
         + _scenes(section.scenes)
-        + "".join(_table(table, replays) for table in section.tables)
+        + "".join(_table(table, folder) for table in section.tables)
         + f'<div class="charts">{"".join(chart_svg(chart) for chart in section.charts)}</div></section>'
     )
 
@@ -77,18 +77,18 @@ def _scenes(scenes: Iterable[Scene]) -> str:
     return f'<div class="scenes">{drawn}</div>' if drawn else ""
 
 
-def _table(table: Table, replays: str) -> str:
+def _table(table: Table, folder: str) -> str:
     worded = [all(isinstance(row[n], str | Linked | None) for row in table.rows) for n in range(len(table.columns))]
     head = "".join(
         f'<th class="{"word" if words else ""}">{escape(name)}</th>'
         for name, words in zip(table.columns, worded, strict=True)
     )
-    rows = "".join(f"<tr>{''.join(_cell(cell, table.decimals, replays) for cell in row)}</tr>" for row in table.rows)
+    rows = "".join(f"<tr>{''.join(_cell(cell, table.decimals, folder) for cell in row)}</tr>" for row in table.rows)
     caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
     return f'<h3>{escape(table.title)}</h3><div class="wide"><table>{caption}<tr>{head}</tr>{rows}</table></div>'
 
 
-def _cell(cell: AnyCell, decimals: int, replays: str) -> str:
+def _cell(cell: AnyCell, decimals: int, folder: str) -> str:
     if isinstance(cell, Linked):
         return f'<td class="word"><a href="{escape(cell.href)}">{escape(in_words(cell.value, decimals))}</a></td>'
     value = cell.value if isinstance(cell, Coloured | Driven) else cell
@@ -96,8 +96,8 @@ def _cell(cell: AnyCell, decimals: int, replays: str) -> str:
     drive = cell.drive if isinstance(cell, Coloured | Driven) else ""
     kind = "word" if isinstance(value, str) and not tone else tone
     text = escape(in_words(value, decimals))
-    if drive and replays:
-        text = f'<a href="{escape(replays + drive)}.html" title="Open this drive">{text}</a>'
+    if drive and folder:
+        text = f'<a href="{escape(folder + drive)}.html" title="Open this drive">{text}</a>'
     return f'<td class="{kind}">{text}</td>'
 
 

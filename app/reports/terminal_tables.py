@@ -8,13 +8,13 @@ from rich.console import Console
 from rich.table import Table as RichTable
 
 from app.reports.html import in_words
-from pipeline.evaluation.report_sections import Coloured, Driven, Linked, Section
+from pipeline.evaluation.report_sections import Coloured, Driven, Linked, ReportSection
 
 _FILE_WIDTH = 160
 """Columns of a table that goes to a file or a pipe."""
 
 
-def show(sections: Iterable[Section]) -> None:
+def show(sections: Iterable[ReportSection]) -> None:
     """Print them. Charts are left to the HTML report."""
     console = Console(width=None if Console().is_terminal else _FILE_WIDTH)
     for section in sections:

@@ -26,13 +26,13 @@ import numpy as np
 
 from app.drive.frame_rows import row_json, row_of
 from app.engine.snapshot import Snapshot
-from app.streaming.picture import MAX_WIDTH_PX, SentPicture, encode_picture
 from app.streaming.points import point_arrays
 from app.streaming.ranking import ranking_json
+from app.streaming.sent_image import MAX_WIDTH_PX, SentImage, encode_picture
 from pipeline.alignment.projection import Alignment, resolve
 from pipeline.common.geometry import corners_of
-from pipeline.lanes.road_lines import in_picture, polylines
-from pipeline.types import F64, Box, Frame, Ground, Picture, Result
+from pipeline.lanes.drawn_lines import in_image, polylines
+from pipeline.types import F64, Box, CameraImage, Frame, Ground, Result
 from pipeline.types.lane import EgoLane
 from pipeline.types.result_json import to_json
 
@@ -41,7 +41,7 @@ class Encoder:
     """Keeps the last JPEG, so that moving a slider on a paused frame does not encode the image again."""
 
     def __init__(self) -> None:
-        self._last: tuple[Picture, int, SentPicture] | None = None
+        self._last: tuple[CameraImage, int, SentImage] | None = None
 
     def message(self, snapshot: Snapshot, width_px: int = MAX_WIDTH_PX) -> bytes | None:
         """The message for the snapshot's tick, its image at most ``width_px`` wide; None when there is no tick."""
@@ -64,7 +64,7 @@ class Encoder:
         }
         return pack(header, picture.jpeg if picture else b"", point_arrays(frame, result, aligned, scale))
 
-    def _picture(self, frame: Frame, width_px: int) -> SentPicture | None:
+    def _picture(self, frame: Frame, width_px: int) -> SentImage | None:
         if frame.picture is None:
             return None
         if self._last is None or self._last[0] is not frame.picture or self._last[1] != width_px:
@@ -130,7 +130,7 @@ def _lanes_json(lane: EgoLane | None, aligned: Alignment | None, scale: float) -
     """The ego lane's lines where the camera saw them, and seen from above."""
     if lane is None:
         return {"lanes": None, "plan_lanes": None}
-    seen = in_picture(lane, aligned) if aligned is not None else None
+    seen = in_image(lane, aligned) if aligned is not None else None
     return {
         "lanes": {side: _pixel_list(uv * scale) for side, uv in seen.items()} if seen is not None else None,
         "plan_lanes": {side: np.round(line, 3).tolist() for side, line in polylines(lane).items()},
@@ -161,7 +161,7 @@ def _boxes_json(boxes: dict[int, Box], scale: float) -> dict[str, list[float]]:
     return {str(number): [round(value * scale, 1) for value in box] for number, box in sorted(boxes.items())}
 
 
-def _picture_json(picture: SentPicture | None, frame: Frame) -> dict[str, Any] | None:
+def _picture_json(picture: SentImage | None, frame: Frame) -> dict[str, Any] | None:
     if picture is None or frame.picture is None:
         return None
     return {

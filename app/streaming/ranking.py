@@ -17,16 +17,22 @@ BEHIND = "behind"
 
 @dataclass(frozen=True)
 class Ranked:
-    """order starts at 1, the CIPV. stopped_by: the first gate that failed, with its value and limit, or ``BEHIND``;
-    None for the CIPV."""
+    """One object and its rank."""
 
     id: int
+    """Object number."""
     order: int
+    """Starts at 1, the CIPV."""
     distance_m: float | None
+    """None when unknown."""
     stopped_by: str | None
+    """Name of the first gate that failed, or ``BEHIND``; None for the CIPV."""
     value: float | None
+    """That the gate tested; None when there was nothing to test."""
     limit: float | None
+    """That it was held against."""
     reason: str
+    """In words."""
 
 
 def ranking(result: Result) -> list[Ranked]:

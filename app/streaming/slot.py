@@ -14,11 +14,13 @@ FRAMES_UNDER_WAY = 2
 
 
 @dataclass
-class Traffic:
-    """Frames of all clients since the start: sent, and dropped because a newer one replaced them."""
+class FrameCounts:
+    """Frames of all clients since the start."""
 
     sent: int = 0
+    """Handed to a connection."""
     dropped: int = 0
+    """Replaced by a newer one before they were sent."""
 
 
 class Slot:
@@ -27,12 +29,12 @@ class Slot:
     ``paced``: frames wait for ``painted``. ``traffic`` counts frames. picture_px: how wide it shows the image, None
     until it says so."""
 
-    def __init__(self, paced: bool = False, traffic: Traffic | None = None) -> None:
+    def __init__(self, paced: bool = False, traffic: FrameCounts | None = None) -> None:
         self.picture_px: int | None = None
         self.own: OwnPlayhead | None = None
         """None while the page follows the shared playhead."""
         self._paced = paced
-        self._traffic = traffic or Traffic()
+        self._traffic = traffic or FrameCounts()
         self._under_way = 0
         self._unsent: dict[str, str | bytes] = {}
         self._newest: dict[str, int] = {}

@@ -36,9 +36,9 @@ from app.engine.page_frames import PageFrames
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
 from app.streaming.own_playhead import OwnPlayhead
-from app.streaming.picture import MAX_WIDTH_PX, width_for
 from app.streaming.scene_requests import hear, is_id_or_null
-from app.streaming.slot import Slot, Traffic
+from app.streaming.sent_image import MAX_WIDTH_PX, width_for
+from app.streaming.slot import FrameCounts, Slot
 
 DISPLAY_MAY_SAY = frozenset({"ping", "picture_px", "painted"})
 """What changes nothing for others; of a display everything else is ignored, whatever is added."""
@@ -61,7 +61,7 @@ class Stream:
 
     def __init__(self, looks: SharedViewState | None = None, frames: PageFrames | None = None) -> None:
         """frames: for pages with a playhead of their own; without it every page follows."""
-        self.traffic = Traffic()
+        self.traffic = FrameCounts()
         self._page_frames = frames
         self._pages = ThreadPoolExecutor(1, "cipv-pages")
         self._looks = looks or SharedViewState()

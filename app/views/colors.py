@@ -11,7 +11,7 @@ from typing import Literal
 from pipeline.types import FusedObject
 
 Rgb = tuple[int, int, int]
-Role = Literal[
+ColorRole = Literal[
     "lidar",
     "vision",
     "fused",
@@ -33,10 +33,12 @@ class Shades:
     """One role's colour as ``#rrggbb`` on a dark and on a light background."""
 
     dark: str
+    """On a dark background."""
     light: str
+    """On a light background."""
 
 
-PALETTE: dict[Role, Shades] = {
+PALETTE: dict[ColorRole, Shades] = {
     "lidar": Shades("#ff4dd8", "#b8008f"),
     "vision": Shades("#22d3ee", "#0e7490"),
     "fused": Shades("#c4b5fd", "#6d28d9"),
@@ -54,13 +56,13 @@ PALETTE: dict[Role, Shades] = {
 """``cluster`` is a LiDAR cluster that belongs to no object (yet); ``dropped`` a point that down-sampling left out."""
 
 
-def rgb(role: Role, theme: Literal["dark", "light"] = "dark") -> Rgb:
+def rgb(role: ColorRole, theme: Literal["dark", "light"] = "dark") -> Rgb:
     """A role's colour as three numbers 0–255."""
     text = getattr(PALETTE[role], theme)
     return int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16)
 
 
-def role_of(each: FusedObject, cipv_id: int | None) -> Role:
+def role_of(each: FusedObject, cipv_id: int | None) -> ColorRole:
     """What an object's colour says: that it is the CIPV, else which sensors see it."""
     if each.id == cipv_id:
         return "cipv"

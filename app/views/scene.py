@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from app.views.colors import Rgb, rgb, role_of, shade_of
 from pipeline.common.geometry import Cuboid
-from pipeline.lanes.road_lines import polylines
+from pipeline.lanes.drawn_lines import polylines
 from pipeline.types import DROPPED, F64, GROUND, UNCLUSTERED, FusedObject, Path, Point3, Result
 
 U8 = npt.NDArray[np.uint8]

@@ -7,7 +7,7 @@ from typing import Any
 
 from fastapi import FastAPI
 
-from app.web.routes.shapes import Refusal
+from app.web.routes.shapes.common import Refusal
 
 REFUSALS: dict[int | str, dict[str, Any]] = {
     "4XX": {

@@ -23,7 +23,7 @@ INDEX = "README.md"
 _PAGE = ".md"
 
 
-class Heading(NamedTuple):
+class PageHeading(NamedTuple):
     """A heading of a page."""
 
     level: int
@@ -34,19 +34,24 @@ class Heading(NamedTuple):
     """What a link to it has after ``#``"""
 
 
-class Page(NamedTuple):
+class HelpPage(NamedTuple):
     """A rendered page, without the frame around it."""
 
     title: str
+    """Of its first heading."""
     body: str
-    headings: tuple[Heading, ...]
+    """HTML."""
+    headings: tuple[PageHeading, ...]
+    """For the page's own table of contents."""
 
 
 class NavGroup(NamedTuple):
     """A heading of the sidebar with its links: (file below ``docs/``, words)."""
 
     title: str
+    """Of the group."""
     links: tuple[tuple[str, str], ...]
+    """File below ``docs/`` and words."""
 
 
 def files() -> dict[str, Path]:
@@ -65,7 +70,7 @@ def address_of(file: str) -> str:
     return "" if file == INDEX else file.removesuffix(_PAGE)
 
 
-def render(text: str, file: str) -> Page:
+def render(text: str, file: str) -> HelpPage:
     """A page. ``file``: where the text is, below ``docs/``; links are relative to it."""
     tokens = _parser().parse(text)
     headings = tuple(_anchored(tokens))
@@ -77,7 +82,7 @@ def render(text: str, file: str) -> Page:
     body = _parser().renderer.render(tokens, _parser().options, {})
     title = next((each.text for each in headings if each.level == 1), file)
     body = str(body).replace("<table>", '<div class="wide"><table>').replace("</table>", "</table></div>")
-    return Page(title, body, headings)
+    return HelpPage(title, body, headings)
 
 
 def navigation(text: str) -> tuple[NavGroup, ...]:
@@ -93,7 +98,7 @@ def navigation(text: str) -> tuple[NavGroup, ...]:
     return tuple(group for group in groups if group.links)
 
 
-def html_page(page: Page, nav: Sequence[NavGroup], file: str) -> str:
+def html_page(page: HelpPage, nav: Sequence[NavGroup], file: str) -> str:
     """The whole document: the page beside its sidebar."""
     name = "CIPV Studio" if file == INDEX else f"{page.title} · CIPV Studio"
     items = "".join(_nav_group(group, page, file) for group in nav)
@@ -129,14 +134,14 @@ def html_page(page: Page, nav: Sequence[NavGroup], file: str) -> str:
 """
 
 
-def not_found(address: str) -> Page:
+def not_found(address: str) -> HelpPage:
     """What is shown for an address without a page."""
     said = escape(address)
     body = (
         f"<h1>Page not found</h1>\n<p>There is no help page named <code>{said}</code>.</p>\n"
         '<p>The list of pages is in the contents, and on the <a href="/help/">overview</a>.</p>'
     )
-    return Page("Page not found", body, ())
+    return HelpPage("Page not found", body, ())
 
 
 def slug(text: str) -> str:
@@ -151,7 +156,7 @@ def _parser() -> MarkdownIt:
     return MarkdownIt("commonmark", {"html": False}).enable("table")
 
 
-def _anchored(tokens: Sequence[Token]) -> Iterator[Heading]:
+def _anchored(tokens: Sequence[Token]) -> Iterator[PageHeading]:
     """The headings; each opening token is given its anchor, numbered where two have the same words."""
     taken: dict[str, int] = {}
     for index, token in enumerate(tokens):
@@ -163,7 +168,7 @@ def _anchored(tokens: Sequence[Token]) -> Iterator[Heading]:
         if taken[anchor]:
             anchor = f"{anchor}-{taken[anchor]}"
         token.attrSet("id", anchor)
-        yield Heading(int(token.tag[1:]), text, anchor)
+        yield PageHeading(int(token.tag[1:]), text, anchor)
 
 
 def _words(tokens: Sequence[Token]) -> str:
@@ -192,7 +197,7 @@ def _point(link: Token, end: Token, file: str) -> None:
         link.attrSet("href", f"/help/{address_of(path)}{anchor}")
 
 
-def _nav_group(group: NavGroup, page: Page, file: str) -> str:
+def _nav_group(group: NavGroup, page: HelpPage, file: str) -> str:
     rows = []
     for target, words in group.links:
         is_here = target == file

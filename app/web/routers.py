@@ -11,6 +11,9 @@ from dataclasses import dataclass
 from fastapi import APIRouter
 
 from app.clips.export_queue import ExportQueue
+from app.drive.alignment_fit import AlignmentFitting
+from app.drive.alignment_scenes import AlignmentScenes
+from app.drive.alignment_versions import AlignmentVersions
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.streaming.stream import Stream
@@ -18,6 +21,7 @@ from app.views.rerun.web import ViewerFiles
 from app.web.metrics import Metrics
 from app.web.routes.alignment import alignment_router
 from app.web.routes.alignment_fit import alignment_fit_router
+from app.web.routes.alignment_versions import alignment_versions_router
 from app.web.routes.clips import clips_router
 from app.web.routes.drive import drive_router
 from app.web.routes.health import health_router
@@ -39,12 +43,23 @@ class Services:
     """What the routes work with."""
 
     engine: Engine
+    """Plays, seeks and computes the shown frame."""
     stream: Stream
+    """The state and frames that pages follow."""
     marks: Marks
+    """Of all recordings of this machine."""
     exports: ExportQueue
+    """Clips in the making."""
     viewer: ViewerFiles
     """The files of rerun's web viewer."""
     metrics: Metrics
+    """For /metrics."""
+    alignments: AlignmentVersions
+    """Saved alignments."""
+    scenes: AlignmentScenes
+    """The frames by which an alignment is scored."""
+    fitting: AlignmentFitting
+    """The fit that runs."""
 
 
 ROUTERS: list[Callable[[Services], APIRouter]] = [
@@ -59,8 +74,9 @@ ROUTERS: list[Callable[[Services], APIRouter]] = [
     lambda on: label_acts_router(on.engine.labels),
     lambda on: label_files_router(on.engine.labels),
     lambda on: clips_router(on.engine, on.exports),
-    lambda on: alignment_router(on.engine),
-    lambda on: alignment_fit_router(on.engine),
+    lambda on: alignment_router(on.engine, on.scenes),
+    lambda on: alignment_fit_router(on.engine, on.fitting),
+    lambda on: alignment_versions_router(on.engine, on.alignments, on.scenes, on.fitting),
     lambda on: project_router(on.engine),
     lambda on: rerun_router(on.engine, on.viewer),
     lambda on: help_router(),

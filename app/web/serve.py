@@ -16,6 +16,7 @@ from app.core.server_address import DEFAULT_PORT, is_loopback, listen_socket, re
 from app.core.session_folder import SESSIONS
 from app.core.shared_view_state import SharedViewState
 from app.core.stop_signals import asked_to_stop
+from app.drive.alignment_versions import AlignmentVersions
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.web.tokens import Tokens
@@ -62,7 +63,8 @@ def serve(
             if files is not None:
                 files.check()
             marks, audit = Marks(SESSIONS / "marks"), SESSIONS / "audit.jsonl"
-            app = create_app(engine, viser_port, (*hosts, host), marks, looks, tokens, audit)
+            alignments = AlignmentVersions(SESSIONS / "alignments.json")
+            app = create_app(engine, viser_port, (*hosts, host), marks, looks, tokens, audit, alignments)
             freeze_loaded_objects()
             Server(app, address, on_ready, tokens, asked, files).run(sockets=[bound])
         finally:

@@ -22,6 +22,9 @@ from starlette.types import Scope
 
 from app.clips.export_queue import ExportQueue
 from app.core.shared_view_state import SharedViewState
+from app.drive.alignment_fit import AlignmentFitting
+from app.drive.alignment_scenes import AlignmentScenes
+from app.drive.alignment_versions import AlignmentVersions
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.streaming.stream import Stream
@@ -52,14 +55,26 @@ def create_app(
     looks: SharedViewState | None = None,
     tokens: Tokens | None = None,
     audit: Path | None = None,
+    alignments: AlignmentVersions | None = None,
 ) -> FastAPI:
     """The application over a running engine. ``hosts``: names other than loopback it may be called by. ``marks``: where
     marked moments are kept; None forgets them at the end. ``looks``: hears what people look at. ``tokens``: what who
-    comes must have; None where only this machine can come. ``audit``: the file of who did what; None keeps none."""
+    comes must have; None where only this machine can come. ``audit``: the file of who did what; None keeps none.
+    ``alignments``: the saved ones; None forgets them at the end."""
     access = Access(hosts)
     stream = Stream(looks, engine.page_frames)
     exports, viewer, metrics = ExportQueue(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
-    services = Services(engine, stream, marks or Marks(), exports, viewer, metrics)
+    services = Services(
+        engine,
+        stream,
+        marks or Marks(),
+        exports,
+        viewer,
+        metrics,
+        alignments or AlignmentVersions(),
+        AlignmentScenes(),
+        AlignmentFitting(engine.drives),
+    )
 
     @asynccontextmanager
     async def listening(_: FastAPI) -> AsyncIterator[None]:
@@ -97,6 +112,7 @@ class TlsFiles:
     certificate: Path
     """With those that lead to its root, if any."""
     key: Path
+    """Of the certificate, without a passphrase."""
 
     def check(self) -> None:
         """BadInput when they cannot be used."""

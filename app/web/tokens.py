@@ -31,7 +31,9 @@ class Tokens:
     """One secret a role."""
 
     person: str
+    """May do everything."""
     display: str
+    """May watch only."""
     chosen: frozenset[Role] = frozenset()
     """Whose come from the environment, where other programs' logs do not show them: they are never printed."""
 

@@ -78,8 +78,11 @@ class Pinhole:
     """A calibrated camera; takes the parallax between the two mounts into account."""
 
     K: F64
+    """(3, 3) intrinsics, pixels."""
     distortion: F64
+    """OpenCV's coefficients; empty for none."""
     T_camera_ego: F64
+    """(4, 4), takes ego points to the camera frame."""
 
     _NEAREST_M = 0.3
 

@@ -33,12 +33,14 @@ STRONGEST = 4.0
 
 @dataclass(frozen=True, eq=False)
 class EdgeScene:
-    """What of one frame no alignment changes. points: (E, 3) depth edges, ego. strength: (H, W) uint8, how near and how
-    strong an upright edge of the image is. usual: (H,) the mean strength of each row."""
+    """What of one frame no alignment changes."""
 
     points: F64
+    """(E, 3) depth edges, ego frame, metres."""
     strength: U8
+    """(H, W) uint8, how near and how strong an upright edge of the image is."""
     usual: F32
+    """(H,) the mean strength of each row."""
 
 
 def edge_scene(sweep: Sweep, bgr: U8) -> EdgeScene:

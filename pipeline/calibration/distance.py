@@ -34,26 +34,34 @@ class TooFewPairs(BadInput):
 
 @dataclass(frozen=True)
 class Pair:
-    """One box with its truth. height_px: as the reference camera would see it. depth_m: of the object's nearest point
-    along the optical axis. range_m: of the same point from the ego origin, on the ground plane."""
+    """One box with its truth."""
 
     frame: str
+    """The recording's own name of it."""
     label: str
+    """Class of the labelled object; each class has its own law."""
     height_px: float
+    """Of the box, as the reference camera would see it."""
     depth_m: float
+    """Of the object's nearest point, along the optical axis."""
     range_m: float
+    """Of the same point from the ego origin, on the ground plane."""
 
 
 @dataclass(frozen=True)
 class LawFit:
-    """A class's law and how well it fits its own pairs: mean and 90th-percentile share of the true depth, and the
-    robust standard deviation of the logarithm of estimate over truth."""
+    """A class's law and how well it fits its own pairs."""
 
     law: PowerLaw
+    """Distance as a function of box height."""
     pairs: int
+    """That the law was fitted to."""
     mean_relative_error: float
+    """Mean error as a share of the true depth."""
     p90_relative_error: float
+    """90th percentile of the same."""
     log_sigma: float
+    """Robust standard deviation of the logarithm of estimate over truth."""
 
 
 def collect_pairs(

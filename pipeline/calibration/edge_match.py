@@ -41,23 +41,28 @@ MOST = 8000
 
 @dataclass(frozen=True)
 class EdgeScore:
-    """score: 0–1, 1 where no alignment near is better, 0 where the usual one of them is as good. better: changes of
-    parameters (``AlignmentParams``; of h_res_deg and v_res_deg a factor) that lead to the best one near, if that is
-    clearly better. sigmas: how far the best stands out. borders: depth edges in the images. score is None where too
-    few borders are seen (sigmas None), or where no alignment near stands out."""
+    """How well one alignment puts depth edges on edges of the image."""
 
     score: float | None
+    """0–1: 1 where no alignment near is better, 0 where the usual one of them is as good. None where too few borders
+    are seen, or where no alignment near stands out."""
     sigmas: float | None
+    """How far the best alignment stands out from its neighbours. None where too few borders are seen."""
     borders: int
+    """Depth edges in the images."""
     better: Mapping[str, float] = field(default_factory=dict)
+    """Changes of parameters (``AlignmentParams``; of h_res_deg and v_res_deg a factor) that lead to the best alignment
+    near; empty unless that one is clearly better."""
 
 
 @dataclass(frozen=True)
 class Near:
-    """An alignment of the surroundings, and what of the parameters it changes."""
+    """An alignment near the present one."""
 
     change: Mapping[str, float]
+    """What it changes of the parameters, by name, as ``EdgeScore.better`` says it."""
     aligned: Alignment
+    """Projects ego points with these changes applied."""
 
 
 def edge_score(scenes: Iterable[Seen], params: AlignmentParams) -> EdgeScore:

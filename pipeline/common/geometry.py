@@ -13,12 +13,14 @@ F64 = npt.NDArray[np.float64]
 
 
 class Cuboid(NamedTuple):
-    """A box standing upright on the ground. center: x y z of its middle; size: length width height along its own
-    axes; yaw_rad: turn of its length axis from ego x, positive to the left."""
+    """A box standing upright on the ground."""
 
     center: tuple[float, float, float]
+    """x y z of its middle."""
     size: tuple[float, float, float]
+    """Length, width, height along its own axes."""
     yaw_rad: float
+    """Turn of its length axis from ego x, positive to the left."""
 
     def footprint(self) -> F64:
         """(4, 2) corners seen from above: front left, front right, rear right, rear left."""
@@ -73,6 +75,13 @@ def iou_matrix(a: npt.NDArray[np.floating], b: npt.NDArray[np.floating]) -> F64:
     """(n, m) intersection over union of (n, 4) and (m, 4) boxes ``x1 y1 x2 y2``. Boxes of no area overlap nothing."""
     a, b = np.asarray(a, dtype=np.float64).reshape(-1, 4), np.asarray(b, dtype=np.float64).reshape(-1, 4)
     return _iou(a, b)
+
+
+def covered_share(a: npt.NDArray[np.floating], b: npt.NDArray[np.floating]) -> F64:
+    """(n, m) share of each box of ``a`` that lies in each box of ``b``; (n, 4) and (m, 4) boxes ``x1 y1 x2 y2``."""
+    a, b = np.asarray(a, dtype=np.float64).reshape(-1, 1, 4), np.asarray(b, dtype=np.float64).reshape(1, -1, 4)
+    inter = np.clip(np.minimum(a[..., 2:], b[..., 2:]) - np.maximum(a[..., :2], b[..., :2]), 0.0, None).prod(axis=-1)
+    return inter / np.maximum((a[..., 2:] - a[..., :2]).prod(axis=-1), 1e-9)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -21,10 +21,12 @@ F64 = npt.NDArray[np.float64]
 
 
 class CvState(NamedTuple):
-    """mean: (…, 4) float64 ``x y vx vy`` in m and m/s. cov: (…, 4, 4) float64, symmetric, positive semi-definite."""
+    """State of a constant-velocity filter; leading axes are independent filters."""
 
     mean: F64
+    """(…, 4) float64 ``x y vx vy`` in m and m/s."""
     cov: F64
+    """(…, 4, 4) float64, symmetric, positive semi-definite."""
 
 
 def start(position: npt.ArrayLike, R: F64, speed_sigma: float) -> CvState:

@@ -12,9 +12,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from pipeline.decision.object_motion import closing_speed_mps
+from pipeline.decision.object_motion import closing_speed_mps, required_decel_mps2
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
-from pipeline.params import AccParams
+from pipeline.params import AccParams, AebParams
 from pipeline.types import AccCommand, Braking, Cipv, EgoState, FusedObject, Path, Situation
 
 STANDSTILL_MPS = 0.1
@@ -51,8 +51,11 @@ class Demand:
     """Do not accelerate, even if the PID's memory asks for it."""
 
 
-def control(state: AccState, situation: Situation, params: AccParams) -> tuple[AccState, AccCommand | None]:
-    """Pedals for this frame; None, with the memory cleared, where own speed is neither known nor was a moment ago."""
+def control(
+    state: AccState, situation: Situation, params: AccParams, emergency: AebParams
+) -> tuple[AccState, AccCommand | None]:
+    """Pedals for this frame; None, with the memory cleared, where own speed is neither known nor was a moment ago.
+    emergency: what a required deceleration is reckoned with."""
     ego = situation.now.ego
     if ego is None:
         return AccState(), None
@@ -69,10 +72,9 @@ def control(state: AccState, situation: Situation, params: AccParams) -> tuple[A
         key=lambda wish: wish.speed_mps,
     )
     # A PID turns the speed error into an acceleration, and that into pedals
-    state, accel = pid(state, demand.speed_mps - ego.speed_mps, situation.now.dt_s, params)
+    hardest = _hardest_mps2(demand.object_id, situation, params, emergency)
+    state, accel = pid(state, demand.speed_mps - ego.speed_mps, situation.now.dt_s, params, hardest)
     accel = min(accel, 0.0) if demand.no_faster else accel
-    if demand.object_id is not None and _justified(demand.object_id, situation) is not Braking.FULL:
-        accel = max(accel, -params.comfort_decel_mps2)
     return replace(state, on_course=on_course), AccCommand(
         state=demand.state,
         desired_speed_mps=demand.speed_mps,
@@ -84,9 +86,31 @@ def control(state: AccState, situation: Situation, params: AccParams) -> tuple[A
     )
 
 
-def _justified(object_id: int, situation: Situation) -> Braking:
-    """The hardest braking that the object which is slowed down for can justify."""
-    return next((item.justifies for item in situation.objects if item.id == object_id), Braking.FULL)
+def _hardest_mps2(object_id: int | None, situation: Situation, params: AccParams, emergency: AebParams) -> float:
+    """The hardest braking that the object slowed down for calls for: comfortable, unless avoiding a collision takes
+    more and what is known of the object justifies it. A gap that is too short but does not shrink, as after a cut-in,
+    is opened gently: the paper's law alone would brake fully for it."""
+    if object_id is None or situation.now.ego is None:
+        return math.inf
+    item = next((each for each in situation.objects if each.id == object_id), None)
+    if item is not None and item.justifies is not Braking.FULL:
+        return params.comfort_decel_mps2
+    return max(params.comfort_decel_mps2, _required_mps2(object_id, item, situation, emergency))
+
+
+def _required_mps2(object_id: int, item: FusedObject | None, situation: Situation, emergency: AebParams) -> float:
+    """The deceleration that avoids it. What has no known speed may be standing."""
+    lead, ego = situation.lead, situation.now.ego
+    assert ego is not None
+    distance: float | None = None
+    closing: float | None = None
+    if lead is not None and lead.id == object_id:
+        distance, closing = lead.distance_m, lead.closing_speed_mps
+    elif item is not None:
+        distance, closing = item.distance_m, closing_speed_mps(item)
+    if distance is None:
+        return math.inf
+    return required_decel_mps2(distance, ego.speed_mps if closing is None else closing, emergency)
 
 
 def cruise(params: AccParams) -> Demand:
@@ -171,12 +195,14 @@ def hold(ego: EgoState, path: Path, params: AccParams) -> list[Demand]:
     return [Demand(allowed, "cruise", f"{why}: {limit}", no_faster=holds)]
 
 
-def pid(state: AccState, error_mps: float, dt_s: float | None, params: AccParams) -> tuple[AccState, float]:
-    """Acceleration in m/s² from a speed error, with anti-windup: while the output is clipped, the integral only
-    unwinds. Without dt (first frame) only the proportional part acts."""
+def pid(
+    state: AccState, error_mps: float, dt_s: float | None, params: AccParams, hardest_mps2: float = math.inf
+) -> tuple[AccState, float]:
+    """Acceleration in m/s² from a speed error, no lower than -hardest_mps2, with anti-windup: while the output is
+    clipped, the integral only unwinds. Without dt (first frame) only the proportional part acts."""
     slope = (error_mps - state.error_mps) / dt_s if dt_s and state.error_mps is not None else 0.0
     integral = state.integral_m + (error_mps * dt_s if dt_s else 0.0)
     wanted = params.kp * error_mps + params.ki * integral + params.kd * slope
-    accel = min(max(wanted, -min(params.brake_limit_mps2, params.max_decel_mps2)), params.max_accel_mps2)
+    accel = min(max(wanted, -min(hardest_mps2, params.brake_limit_mps2, params.max_decel_mps2)), params.max_accel_mps2)
     winds_up = (wanted != accel) and (error_mps > 0) == (wanted > 0)
     return AccState(state.integral_m if winds_up else integral, error_mps), accel

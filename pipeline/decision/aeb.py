@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 from pipeline.common.fast_replace import evolve
 from pipeline.decision.acc import STANDSTILL_MPS
 from pipeline.decision.braking_evidence import FRICTION_MPS2
-from pipeline.decision.object_motion import closing_speed_mps
+from pipeline.decision.object_motion import closing_speed_mps, required_decel_mps2
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
 from pipeline.params import AccParams, AebParams
 from pipeline.types import AccCommand, Braking, EgoState, FusedObject, Situation
@@ -23,7 +23,6 @@ from pipeline.types import AccCommand, Braking, EgoState, FusedObject, Situation
 Stage = Literal["warn", "partial_brake", "full_brake"]
 STAGES: tuple[Stage, ...] = ("warn", "partial_brake", "full_brake")
 _NONE, _WARN, _PARTIAL, _FULL = range(4)
-_SMALLEST_GAP_M = 0.1
 
 
 @dataclass(frozen=True)
@@ -72,16 +71,6 @@ def guard(
     worst = max(threats, key=lambda threat: (_level(threat, params), threat.required_mps2), default=None)
     state = _next(state, worst, ego, situation.now.dt_s or 0.0, params)
     return state, _stronger(command, state, params, pedals)
-
-
-def required_decel_mps2(distance_m: float, closing_mps: float, params: AebParams) -> float:
-    """The constant deceleration that ends the approach ``margin_m`` before contact: Δv² / (2·d), where d is the
-    distance left after brake build-up. Δv is the *relative* speed: a moving lead needs less than a standing one.
-    Infinite when no distance is left."""
-    if closing_mps <= 0.0:
-        return 0.0
-    left_m = distance_m - params.margin_m - closing_mps * params.build_up_s
-    return closing_mps**2 / (2.0 * left_m) if left_m > _SMALLEST_GAP_M else inf
 
 
 def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:

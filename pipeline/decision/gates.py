@@ -13,6 +13,10 @@ from pipeline.decision.path_position import Place
 from pipeline.params import CipvParams
 from pipeline.types import VEHICLES, Conditions, Eligibility, FusedObject, Gate, Path
 
+ABREAST_M = 1.0
+"""From the bumper: what begins nearer and aside is beside the car."""
+OWN_HALF_WIDTH_M = 1.0
+"""Of a passenger car; with mirrors it is a little wider, and in height of bumpers a little narrower."""
 _KNOWN_M = 0.5
 """A tracked distance that is as sure as this is as good as a measured one."""
 ON_A_VAGUE_PATH = 0.25
@@ -66,7 +70,7 @@ class Condition(NamedTuple):
     """The sentence that says why it failed. Only the first failure of an object is put in words."""
 
 
-class Verdict(NamedTuple):
+class GateVerdict(NamedTuple):
     """What was found about one candidate."""
 
     eligibility: Eligibility
@@ -77,7 +81,7 @@ class Verdict(NamedTuple):
     """Why it cannot be the lead; None if it can."""
 
 
-def judge(who: Candidate) -> Verdict:
+def judge(who: Candidate) -> GateVerdict:
     """Hold one object against every condition of a lead."""
     answers = [condition.check(who) for condition in CONDITIONS]
     eligibility = Conditions(*[met for met, _, _ in answers])
@@ -85,7 +89,7 @@ def judge(who: Candidate) -> Verdict:
         [Gate(each.shown_as, value, limit, met) for each, (met, value, limit) in zip(CONDITIONS, answers, strict=True)]
     )
     why_not = None if all(eligibility) else CONDITIONS[eligibility.index(False)].why_not(who)
-    return Verdict(eligibility, gates, why_not)
+    return GateVerdict(eligibility, gates, why_not)
 
 
 def may_cut_in(item: FusedObject) -> bool:
@@ -164,9 +168,12 @@ def _wrong_size(who: Candidate) -> str:
 
 
 def _ahead(who: Candidate) -> Answer:
-    """By the way along the path to it, from the bumper."""
-    ahead_m = who.place.ahead_m if who.place is not None else None
-    return ahead_m is not None and ahead_m > 0.0, ahead_m, 0.0
+    """By the way along the path to it, from the bumper. What is wider aside than the car reaches is still beside it
+    until it is a little farther: no steering moves the car onto it within that way."""
+    if who.place is None:
+        return False, None, 0.0
+    limit_m = 0.0 if abs(who.place.offset_m) <= OWN_HALF_WIDTH_M else ABREAST_M
+    return who.place.ahead_m > limit_m, who.place.ahead_m, limit_m
 
 
 def _in_path(who: Candidate) -> Answer:
@@ -197,26 +204,35 @@ def _uncertain(who: Candidate) -> str:
 
 
 def _probable(who: Candidate) -> Answer:
-    """That it exists and that it is in the path: the less probable of the two decides. A weak box that nothing supports
-    exists by less than a half; a car 60 m away on a road that may bend either way is in the path by less than a half,
-    though it be straight ahead. The lead was seen in the path when that was known well enough: it is asked only on
-    which side of the edge it is now.
+    """That it exists, and that it exists in the path. A weak box that nothing supports exists by less than a half; a
+    car 60 m away on a road that may bend either way is in the path by less than a half, though it be straight ahead;
+    and what does both just so does not do both at once. The lead was seen in the path when that was known well enough:
+    it is asked only on which side of the edge it is now.
 
     A new lead must exist more surely than it must be in the path: braking for what is not there at all is worse than
-    for a car that is beside the path, and far away no place is sure."""
-    params = who.params
-    there = who.item.existence if who.item.existence is not None else 1.0
-    in_path = _in_path_probability(who) if who.odds > 0.0 else 1.0  # what is out of the path has a gate for that
-    asked = (
-        (there, _needed_existence(who)),
-        (in_path, params.stay_probability if who.leads else params.become_probability),
-    )
+    for a car that is beside the path, and far away no place is sure. What stands must be in the path more surely: of 43
+    standing vehicles within 40 m on two KITTI drives, 2 were."""
+    there, in_path = _existence(who), _in_path_probability(who) if who.odds > 0.0 else 1.0
+    # what is out of the path has a gate for that
+    asked = ((there, _needed_existence(who)), (in_path, who.params.stay_probability))
+    if not who.leads:
+        asked = (asked[0], (there * in_path, _needed_probability(who)))
     probability, limit = min(asked, key=lambda pair: pair[0] - pair[1])
     return probability >= limit, probability, limit
 
 
+def _existence(who: Candidate) -> float:
+    return who.item.existence if who.item.existence is not None else 1.0
+
+
 def _needed_existence(who: Candidate) -> float:
     return who.params.stay_probability if who.leads else who.params.become_existence
+
+
+def _needed_probability(who: Candidate) -> float:
+    """Of a new lead."""
+    usual, standing = who.params.become_probability, who.params.become_standing
+    return max(usual, standing) if who.item.moving is False else usual
 
 
 def _in_path_probability(who: Candidate) -> float:
@@ -226,10 +242,14 @@ def _in_path_probability(who: Candidate) -> float:
 
 
 def _improbable(who: Candidate) -> str:
-    there = who.item.existence
-    if there is not None and there < _needed_existence(who):
+    there = _existence(who)
+    if there < _needed_existence(who):
         return f"only {100 * there:.0f} % likely to exist"
-    return f"only {100 * _in_path_probability(who):.0f} % likely to be in path"
+    in_path = _in_path_probability(who)
+    needed = who.params.stay_probability if who.leads else _needed_probability(who)
+    if in_path < needed:
+        return f"only {100 * in_path:.0f} % likely to be in path"
+    return f"only {100 * there * in_path:.0f} % likely to exist and be in path"
 
 
 CONDITIONS = Conditions(

@@ -1,4 +1,5 @@
-"""How objects move relative to the car and over the ground: closing speed, time to collision, moving or not.
+"""How objects move relative to the car and over the ground: closing speed, time to collision, required deceleration,
+moving or not.
 
 Signs, in words: a lead that is slower than ego closes the gap, its closing speed is positive and its TTC finite; a lead
 that pulls away has a negative closing speed and no TTC.
@@ -7,15 +8,16 @@ that pulls away has a negative closing speed and no TTC.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import hypot
+from math import hypot, inf
 
 from pipeline.common.fast_replace import evolve
-from pipeline.params import MotionParams
+from pipeline.params import AebParams, MotionParams
 from pipeline.path.yaw_rate import usable_rate
 from pipeline.types import EgoState, FusedObject
 
 SMALLEST_CLOSING_MPS = 0.1
 """A gap that shrinks more slowly than this does not shrink measurably, and has no TTC."""
+_SMALLEST_GAP_M = 0.1
 
 
 def closing_speed_mps(item: FusedObject) -> float | None:
@@ -24,6 +26,16 @@ def closing_speed_mps(item: FusedObject) -> float | None:
         return None
     x, y, _ = item.closest_point
     return -(x * item.velocity_mps[0] + y * item.velocity_mps[1]) / item.distance_m
+
+
+def required_decel_mps2(distance_m: float, closing_mps: float, params: AebParams) -> float:
+    """The constant deceleration that ends the approach ``margin_m`` before contact: Δv² / (2·d), where d is the
+    distance left after brake build-up. Δv is the *relative* speed: a moving lead needs less than a standing one.
+    Infinite when no distance is left."""
+    if closing_mps <= 0.0:
+        return 0.0
+    left_m = distance_m - params.margin_m - closing_mps * params.build_up_s
+    return closing_mps**2 / (2.0 * left_m) if left_m > _SMALLEST_GAP_M else inf
 
 
 def describe(objects: Iterable[FusedObject], ego: EgoState | None, params: MotionParams) -> tuple[FusedObject, ...]:

@@ -6,11 +6,10 @@ post), and its course must lead into the corridor.
 
 from __future__ import annotations
 
-from pipeline.decision.gates import is_solid
+from pipeline.decision.gates import ABREAST_M, is_solid
 from pipeline.decision.path_position import believed_mps
 from pipeline.types import FusedObject, Path
 
-ABREAST_M = 1.0
 _VELOCITY_HITS = 3
 """After two sightings the LiDAR's velocity is the difference of two noisy positions, which may point across the road.
 That the camera has followed the object for longer does not help."""

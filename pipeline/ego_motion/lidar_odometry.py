@@ -78,7 +78,7 @@ class LidarMotion(NamedTuple):
     """x, y in metres and heading in radians since odometry began, in the ego frame of then."""
 
 
-class Followed(NamedTuple):
+class OdometryStep(NamedTuple):
     """Odometry after a sweep."""
 
     state: OdometryState
@@ -96,7 +96,7 @@ def follow(
     tracks: tuple[LidarTrack, ...],
     dt_s: float | None,
     prior: EgoState | None,
-) -> Followed:
+) -> OdometryStep:
     """Own motion after one more sweep.
 
     Args:
@@ -108,21 +108,21 @@ def follow(
         prior: own motion as another sensor has it, to begin with.
     """
     if dt_s is None:
-        return Followed(OdometryState(), None)
+        return OdometryStep(OdometryState(), None)
     if before.unplaced_s + dt_s > _LONGEST_GAP_S:
         before = OdometryState()
     since_s = before.unplaced_s + dt_s
     if sweep is None or ground is None:
-        return Followed(evolve(before, unplaced_s=since_s, agreeing=0), None)
+        return OdometryStep(evolve(before, unplaced_s=since_s, agreeing=0), None)
     speed, turning = _foreseen(before, since_s, prior)
     expected = EgoState(sweep.t_ns, speed.rate, turning.rate) if speed is not None and turning is not None else None
     points = structure.standing(deskew.deskew(sweep, expected, _DESKEW) or sweep, ground, tracks, dt_s)
     fixed = structure.support(points)
     if len(points) < _FEWEST_POINTS or min(fixed.along_x, fixed.along_y) < _FEWEST_CELLS:
-        return Followed(OdometryState(), None, _too_little(len(points), fixed))
+        return OdometryStep(OdometryState(), None, _too_little(len(points), fixed))
     cloud = registration.thinned(points)
     if not before.clouds:
-        return Followed(OdometryState((cloud,), (np.eye(4),)), None)
+        return OdometryStep(OdometryState((cloud,), (np.eye(4),)), None)
 
     last = before.poses[-1]
     starts = [speed.rate] if speed is not None else _starts(since_s)
@@ -147,16 +147,16 @@ def follow(
         )
         if surprise > _GATE_SIGMAS or fit < _LEAST_FIT:
             if refused + 1 > _MOST_REFUSED or agreeing < _AGREEING:
-                return Followed(OdometryState((cloud,), (np.eye(4),)), None, _CONTRADICTS)
+                return OdometryStep(OdometryState((cloud,), (np.eye(4),)), None, _CONTRADICTS)
             kept = evolve(before, refused=refused + 1, unplaced_s=since_s)
-            return Followed(kept, _motion(foreseen, foreseen_turn, last @ _moved_by(moved, turned)), _CONTRADICTS)
+            return OdometryStep(kept, _motion(foreseen, foreseen_turn, last @ _moved_by(moved, turned)), _CONTRADICTS)
         new_speed = rate_filter.update(foreseen, moved, since_s, moved_sigma)
         new_turning = rate_filter.update(foreseen_turn, turned, since_s, turned_sigma)
         agreeing, refused = agreeing + 1, 0
     after = OdometryState(
         (*before.clouds, cloud)[-_KEPT:], (*before.poses, pose)[-_KEPT:], new_speed, new_turning, agreeing, refused
     )
-    return Followed(after, _motion(new_speed, new_turning, pose) if agreeing >= _AGREEING else None)
+    return OdometryStep(after, _motion(new_speed, new_turning, pose) if agreeing >= _AGREEING else None)
 
 
 _CONTRADICTS = "LiDAR odometry: sweeps contradict each other"

@@ -46,7 +46,7 @@ class OwnMotionState:
     """Of the last GNSS fixes."""
 
 
-class Seen(NamedTuple):
+class OdometryContext(NamedTuple):
     """What the frame before left that odometry needs."""
 
     ground: Ground | None
@@ -74,7 +74,7 @@ def measure(
     before: OwnMotionState,
     frame: Frame,
     recorded: EgoState | None,
-    seen: Seen,
+    seen: OdometryContext,
     dt_s: float | None,
     params: MotionParams,
 ) -> Measured:

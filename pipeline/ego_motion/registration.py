@@ -29,7 +29,7 @@ _FITS_M = 0.5
 _JUDGED_BY = 2
 
 
-class Placed(NamedTuple):
+class Registration(NamedTuple):
     """Where a cloud lies among earlier ones."""
 
     pose: F64
@@ -48,7 +48,7 @@ def thinned(points: F32) -> F32:
     return _voxels(points, _MAP_VOXEL_M).astype(np.float32)
 
 
-def align(cloud: F32, clouds: Sequence[F32], poses: Sequence[F64], guesses: Sequence[F64]) -> Placed:
+def align(cloud: F32, clouds: Sequence[F32], poses: Sequence[F64], guesses: Sequence[F64]) -> Registration:
     """The place of a thinned cloud among earlier ones, from the best of the guesses.
 
     Args:
@@ -80,10 +80,10 @@ def align(cloud: F32, clouds: Sequence[F32], poses: Sequence[F64], guesses: Sequ
     found = [registered(guess) for guess in guesses]
     pairs = zip(clouds[-_JUDGED_BY:], poses[-_JUDGED_BY:], strict=True)
     tree = cKDTree(np.vstack([_moved(points, pose) for points, pose in pairs]))
-    placed = [Placed(pose, _fit(tree, _moved(matched, pose))) for pose in found]
+    placed = [Registration(pose, _fit(tree, _moved(matched, pose))) for pose in found]
     best = max(placed, key=lambda each: each.fit)
     # a far guess takes more than one round to arrive
-    return best if len(guesses) == 1 else Placed(registered(registered(best.pose)), best.fit)
+    return best if len(guesses) == 1 else Registration(registered(registered(best.pose)), best.fit)
 
 
 def _fit(tree: cKDTree, points: F64) -> float:

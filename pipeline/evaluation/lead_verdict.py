@@ -29,30 +29,34 @@ SAME_BOX_IOU = 0.5
 
 @dataclass(frozen=True)
 class LeadRule:
-    """Which labelled vehicle is the lead, and when a CIPV is on it.
-
-    half_lane_m: a vehicle whose centre is nearer to the car's axis is in the lane. max_range_m: leads beyond this are
-    ignored. lateral_slack_m: how far to the side of the label a CIPV may lie. range_slack: how far in front of it or
-    behind it, as a share of its range, but at least ``range_slack_m``.
-    """
+    """Which labelled vehicle is the lead, and when a CIPV is on it."""
 
     half_lane_m: float = 1.5
+    """A vehicle whose centre is nearer to the car's axis than this is in the lane."""
     max_range_m: float = FARTHEST_LEAD_M
+    """Leads beyond this are ignored."""
     lateral_slack_m: float = 0.3
+    """How far to the side of the label a CIPV may lie."""
     range_slack: float = 0.15
+    """How far in front of the label or behind it, as a share of its range."""
     range_slack_m: float = 2.0
+    """The least that ``range_slack`` comes to."""
 
 
 @dataclass(frozen=True)
 class Judged:
-    """One frame's verdict. Distances are horizontal ranges to the nearest face, lateral_error_m how far the CIPV lies
-    beside the lead (0: on it), metres; None where there is none."""
+    """One frame's verdict. Distances are horizontal ranges to the nearest face."""
 
     frame: str
+    """The recording's own name of it."""
     verdict: Verdict
+    """Of the CIPV against the labelled lead."""
     truth_m: float | None
+    """Of the labelled lead; None where nobody leads."""
     distance_m: float | None
+    """Of the CIPV; None where none was chosen."""
     lateral_error_m: float | None
+    """How far the CIPV lies beside the lead, 0 on it; None where one of them is missing."""
 
     @property
     def error_m(self) -> float | None:
@@ -131,16 +135,24 @@ def switches(pairs: Iterable[tuple[int | None, int | None]]) -> int:
 
 @dataclass(frozen=True)
 class LeadScore:
-    """A drive's figures. Errors are in metres, and as a share of the true distance, over the frames that have one."""
+    """A drive's figures. Errors are over the frames that have one."""
 
     frames: int
+    """That were judged."""
     correct: int
+    """The CIPV is the lead, or both are none."""
     missed: int
+    """There is a lead and no CIPV."""
     false: int
+    """There is a CIPV and no lead."""
     wrong: int
+    """The CIPV is another vehicle than the lead."""
     mean_error_m: float | None
+    """Of the CIPV's distance; None where no frame has both distances."""
     max_error_m: float | None
+    """The same, at worst."""
     mean_relative_error: float | None
+    """Mean of the errors as shares of the true distance."""
 
 
 def score(judged: Iterable[Judged]) -> LeadScore:

@@ -14,12 +14,14 @@ Cell = str | float | int | None
 
 @dataclass(frozen=True)
 class Coloured:
-    """A cell whose colour has the meaning that the table's caption gives. drive: name of the drive it comes from, where
-    one is kept."""
+    """A cell whose colour has the meaning that the table's caption gives."""
 
     value: Cell
+    """As without colour."""
     tone: Tone
+    """One of the report's colours."""
     drive: str = ""
+    """Name of the drive it comes from, where one is saved; else empty."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,9 @@ class Driven:
     """A cell with the name of the drive it comes from."""
 
     value: Cell
+    """As without a drive."""
     drive: str
+    """Name under which the drive is saved."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,9 @@ class Linked:
     """A cell with a link; href is an absolute address."""
 
     value: Cell
+    """Text of the link."""
     href: str
+    """An absolute address."""
 
 
 AnyCell = Cell | Coloured | Driven | Linked
@@ -46,10 +52,15 @@ class Table:
     """Numbers keep their full precision here; None is shown as a dash. decimals: for people."""
 
     title: str
+    """Above the table."""
     columns: tuple[str, ...]
+    """Headings; every row has as many cells."""
     rows: tuple[tuple[AnyCell, ...], ...]
+    """Numbers with their full precision; None is shown as a dash."""
     caption: str = ""
+    """What the table shows and how; empty for none."""
     decimals: int = 2
+    """That are shown."""
 
 
 @dataclass(frozen=True)
@@ -57,9 +68,13 @@ class Series:
     """One line (or its points) of a chart."""
 
     name: str
+    """In the legend."""
     x: tuple[float, ...]
+    """Values along the chart's x axis."""
     y: tuple[float, ...]
+    """As long as ``x``."""
     points_only: bool = False
+    """Dots without a line."""
 
     @staticmethod
     def of_points(name: str, points: Iterable[tuple[float, float]]) -> Series:
@@ -70,10 +85,16 @@ class Series:
 
 @dataclass(frozen=True)
 class Chart:
+    """Lines over one pair of axes."""
+
     title: str
+    """Above the chart."""
     x_label: str
+    """With its unit."""
     y_label: str
+    """With its unit."""
     series: tuple[Series, ...]
+    """In the order of the legend."""
 
 
 @dataclass(frozen=True)
@@ -81,25 +102,34 @@ class Scene:
     """A moment of a scenario, to be drawn."""
 
     title: str
+    """Below the drawing."""
     scenario: Scenario
+    """What is drawn."""
     t_s: float
+    """Time in the scenario."""
 
 
 @dataclass(frozen=True)
-class Section:
-    """One experiment's report. text: paragraphs on what was done and what it shows. failures: a sentence for each
-    requirement that is not met. scenes: the scenes that were driven."""
+class ReportSection:
+    """One experiment's report."""
 
     name: str
+    """For scripts and links."""
     title: str
+    """For people."""
     text: tuple[str, ...] = ()
+    """Paragraphs on what was done and what it shows."""
     tables: tuple[Table, ...] = ()
+    """In order, below the text."""
     charts: tuple[Chart, ...] = ()
+    """In order, below the tables."""
     failures: tuple[str, ...] = ()
+    """A sentence for each requirement that is not met."""
     scenes: tuple[Scene, ...] = ()
+    """The scenes that were driven."""
 
 
-def as_json(section: Section) -> dict[str, Any]:
+def as_json(section: ReportSection) -> dict[str, Any]:
     """The section as plain dicts, lists, strings and numbers."""
     return {
         "name": section.name,

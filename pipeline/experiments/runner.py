@@ -10,7 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 from pipeline.common.errors import BadInput
-from pipeline.evaluation.report_sections import Section
+from pipeline.evaluation.report_sections import ReportSection
 from pipeline.experiments.curves.experiment import CURVES
 from pipeline.experiments.euro_ncap.experiment import NCAP
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
@@ -61,7 +61,7 @@ def run_all(
     jobs: int = 0,
     done: Callable[[], None] = lambda: None,
     keep: Keep | None = None,
-) -> list[Section]:
+) -> list[ReportSection]:
     """Each experiment's report. jobs: processes; 0 means one per core, 1 only this one. ``done`` is called after every
     case, ``keep`` with every drive."""
     jobs = jobs or os.cpu_count() or 1
@@ -81,7 +81,7 @@ def _reported(
     outcomes: Iterable[Any],
     done: Callable[[], None],
     keep: Keep | None,
-) -> Section:
+) -> ReportSection:
     """The report of outcomes that arrive one by one, in the order of the cases."""
     cases, got = experiment.cases(short), []
     for case, outcome in zip(cases, outcomes, strict=True):

@@ -58,21 +58,30 @@ def parameters(controller: str, set_speed_mps: float, changes: Mapping[str, Any]
 
 @dataclass(frozen=True)
 class DriveRecord:
-    """A drive towards the target, one value per tick. gap_m: from the bumper to the target's rear. acquired_m: the gap
-    when the target first was the CIPV; brakes_m: when any braking was first asked for. impact_mps: relative speed at
-    contact, None without. motions: the ego vehicle's. All None or empty where it did not happen."""
+    """A drive towards the target, one value per tick."""
 
     t_s: tuple[float, ...]
+    """Since the scenario's start."""
     speed_mps: tuple[float, ...]
+    """Of the ego car."""
     accel_mps2: tuple[float, ...]
+    """Of the ego car."""
     gap_m: tuple[float, ...]
+    """From the bumper to the target's rear."""
     target_mps: tuple[float, ...]
+    """Speed of the target."""
     measured_m: tuple[float | None, ...]
+    """Distance of the CIPV as the pipeline has it; None without one."""
     states: tuple[str, ...]
+    """Of the controller."""
     acquired_m: float | None
+    """The gap when the target first was the CIPV; None if never."""
     brakes_m: float | None
+    """The gap when any braking was first asked for; None if never."""
     impact_mps: float | None
+    """Relative speed at contact; None without contact."""
     motions: tuple[Motion, ...] = ()
+    """Of the ego vehicle; empty when not kept."""
 
     @property
     def smallest_gap_m(self) -> float:

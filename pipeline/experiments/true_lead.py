@@ -28,18 +28,20 @@ _SAME_PLACE_M, _SAME_SHARE = 2.5, 0.2
 
 
 @dataclass(frozen=True)
-class Way:
-    """Where the ego vehicle's script takes it. t_s: (M,). places: (M, 2) world x, y."""
+class ScriptedWay:
+    """Where the ego vehicle's script takes it."""
 
     t_s: F64
+    """(M,) since the scenario's start."""
     places: F64
+    """(M, 2) world x, y."""
 
     @staticmethod
-    def of(scene: Scenario) -> Way:
+    def of(scene: Scenario) -> ScriptedWay:
         """The whole drive and 15 s more."""
         alone = scene.model_copy(update={"actors": (), "crossing_actors": ()})
         t_s = np.arange(0.0, scene.duration_s + _LONGEST_S, _STEP_S)
-        return Way(t_s, np.array([world_state.at(alone, float(t)).pose[:2] for t in t_s]))
+        return ScriptedWay(t_s, np.array([world_state.at(alone, float(t)).pose[:2] for t in t_s]))
 
     def ahead(self, now: World, at_most_m: float = _AHEAD_M) -> Path | None:
         """The rest of it, 90 m at most, in the current ego frame; None while the car stands."""
@@ -80,9 +82,10 @@ def overlap(state: ActorState, path: Path) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class InSight:
-    """For how many consecutive frames each vehicle has been visible, by id. Hidden ones are left out."""
+    """How long vehicles have been visible."""
 
     frames: Mapping[int, int] = field(default_factory=dict)
+    """Consecutive ones, by id; hidden vehicles are left out."""
 
     def then(self, now: World, camera: CameraCalibration) -> InSight:
         """One frame later."""

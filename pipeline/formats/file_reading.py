@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.common.picture_decoding import TooMuch, decode_within_budget
+from pipeline.common.image_decoding import TooMuch, decode_within_budget
 from pipeline.common.user_file_errors import reason_of
 from pipeline.common.user_files import check_allowed, read_regular
 from pipeline.formats.extrinsic_mistakes import likely_mistake, looks_ahead
-from pipeline.types import F64, U8, CameraCalibration, Picture
+from pipeline.types import F64, U8, CameraCalibration, CameraImage
 from pipeline.types.source import SourceError
 
 _JPEG_START = b"\xff\xd8"
@@ -116,7 +116,7 @@ def decode_image(data: bytes, name: str) -> tuple[U8, bytes | None]:
     return picture, data if is_jpeg else None
 
 
-def picture_of(path: Path | None, t_ns: int | None, size: tuple[int, int], notes: list[str]) -> Picture | None:
+def picture_of(path: Path | None, t_ns: int | None, size: tuple[int, int], notes: list[str]) -> CameraImage | None:
     """The image of a frame; None, and ``notes`` says why, when there is no file, when it is damaged or when it is not
     of the size (width, height) of the recording's others."""
     if path is None:
@@ -130,7 +130,7 @@ def picture_of(path: Path | None, t_ns: int | None, size: tuple[int, int], notes
     if (bgr.shape[1], bgr.shape[0]) != size:
         notes.append(f"{path.name}: {bgr.shape[1]}×{bgr.shape[0]}, the others are {size[0]}×{size[1]}")
         return None
-    return Picture(t_ns, bgr, encoded)
+    return CameraImage(t_ns, bgr, encoded)
 
 
 def rigid_transform(values: npt.ArrayLike, what: str) -> F64:

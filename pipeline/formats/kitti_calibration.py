@@ -21,10 +21,12 @@ _VELODYNE_HEIGHT_M = 1.73
 
 @dataclass(frozen=True)
 class KittiCalibration:
-    """T_rect_ego: (4, 4) takes Velodyne points to the rectified camera 0, where labels are. camera: camera 2."""
+    """What the product needs of KITTI's many transforms."""
 
     T_rect_ego: F64
+    """(4, 4), takes Velodyne points to the rectified camera 0, where labels are."""
     camera: CameraCalibration
+    """Camera 2, the left colour camera."""
 
 
 def parse_object_calibration(data: bytes, file: str, size: tuple[int, int]) -> KittiCalibration:

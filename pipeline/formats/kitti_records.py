@@ -49,15 +49,20 @@ _METRES_A_DEGREE = 111_320.0
 
 
 class LabelRow(NamedTuple):
-    """One line of a label file, ego frame. kind: as KITTI calls it. bbox: pixels of the rectified image. cuboid and
-    bbox are None where the line says that it knows none; so are truncation (0–1) and occlusion (0–2)."""
+    """One line of a label file, ego frame."""
 
     kind: str
+    """As KITTI calls it."""
     label: str
+    """The same as one of our classes."""
     cuboid: Cuboid | None
+    """None where the line says that it knows none."""
     bbox: Box | None
+    """Pixels of the rectified image; None where the line knows none."""
     truncation: float | None = None
+    """0–1 of the object outside the image; None where unknown."""
     occlusion: int | None = None
+    """0 visible, 1 partly, 2 largely hidden; None where unknown."""
 
 
 def parse_labels(data: bytes, T_rect_ego: F64) -> tuple[TruthObject, ...]:
@@ -97,7 +102,9 @@ def parse_row(fields: Sequence[str], T_ego_rect: F64) -> LabelRow:
     box: Box = (x1, y1, x2, y2)
     if not all(math.isfinite(value) and abs(value) < _LARGEST_PX for value in (truncated, occluded, *box)):
         raise SourceError("a KITTI label with invalid numbers")
-    cuboid = cuboid_from_label(place, T_ego_rect) if tuple(place) != NO_CUBOID else None
+    # the tracking benchmark writes its regions' missing numbers in another order than the object benchmark
+    is_region = fields[0] == DONT_CARE and min(place[:3]) <= 0.0
+    cuboid = cuboid_from_label(place, T_ego_rect) if tuple(place) != NO_CUBOID and not is_region else None
     seen = box if box != NO_BOX else None
     cut = truncated if 0.0 <= truncated <= 1.0 and cuboid is not None else None
     hidden = int(occluded) if occluded in (0.0, 1.0, 2.0) and cuboid is not None else None
@@ -148,17 +155,24 @@ def cuboid_to_label(cuboid: Cuboid, T_rect_ego: F64) -> tuple[float, ...]:
 
 
 class Oxts(NamedTuple):
-    """One record of the inertial unit. yaw_rate_radps: positive to the left. quality: None without a satellite fix. The
-    place is the Velodyne's, WGS 84; course clockwise from north, None when the car stands."""
+    """One record of the inertial unit."""
 
     speed_mps: float
+    """Forwards."""
     yaw_rate_radps: float
+    """Positive to the left."""
     lat_deg: float
+    """Of the Velodyne, WGS 84."""
     lon_deg: float
+    """Of the Velodyne, WGS 84."""
     alt_m: float
+    """Of the Velodyne."""
     course_rad: float | None
+    """Clockwise from north; None when the car stands."""
     sigma_m: float
+    """The unit's own accuracy of the place."""
     quality: GnssQuality | None
+    """None without a satellite fix."""
 
 
 def parse_oxts(data: bytes, file: str) -> Oxts:

@@ -101,7 +101,7 @@ class NmeaReader:
         is_moving = course is not None and speed_mps >= _SLOWEST_COURSE_MPS
         lat_deg, lon_deg = float(place.latitude), float(place.longitude)
         if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
-            raise ValueError("a position off the Earth")
+            raise ValueError("an impossible position")
         course_rad, sigma_m = math.radians(float(course)) if is_moving else None, _sigma_m(gga, gst, quality)
         if not all(map(math.isfinite, (speed_mps, course_rad or 0.0, sigma_m))):
             raise ValueError("a number that is not finite")

@@ -24,7 +24,7 @@ _MAX_POINTS = 4_000_000
 _MAX_HEADER = 8192
 _LINES = ("VERSION", "FIELDS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
 
-Rows = npt.NDArray[np.void]
+PointRows = npt.NDArray[np.void]
 
 
 class _Header(NamedTuple):
@@ -34,7 +34,7 @@ class _Header(NamedTuple):
     begins: int
 
 
-def parse_pcd(data: bytes, name: str, notes: list[str]) -> Rows:
+def parse_pcd(data: bytes, name: str, notes: list[str]) -> PointRows:
     """The points as a structured array. A file that is cut off gives the points before the cut, and ``notes`` says so.
     SourceError, naming the file, when it is no PCD file or holds no point."""
     header = _header(data, name)
@@ -102,7 +102,7 @@ def _encoding(lines: dict[str, list[str]]) -> str:
     return data
 
 
-def _ascii(body: bytes, header: _Header, name: str) -> Rows:
+def _ascii(body: bytes, header: _Header, name: str) -> PointRows:
     """Rows of numbers; the first that is none ends it."""
     columns = sum(int(np.prod(header.dtype[field].shape, dtype=int)) for field in header.dtype.names or ())
     good: list[list[float]] = []
@@ -132,7 +132,7 @@ def _ascii(body: bytes, header: _Header, name: str) -> Rows:
     return rows
 
 
-def _compressed(body: bytes, header: _Header, name: str) -> Rows:
+def _compressed(body: bytes, header: _Header, name: str) -> PointRows:
     """LZF, field after field (all x, then all y, …)."""
     expected = header.points * header.dtype.itemsize
     if len(body) < 8:

@@ -21,14 +21,18 @@ _VLP16 = len(VLP16_ELEVATIONS_DEG)
 
 
 class Cloud(NamedTuple):
-    """xyz: (N, 3) float32, the sensor's axes. intensity: (N,) float32, 0–255. time_s: after the cloud's stamp, or
-    None."""
+    """A point cloud in the sensor's own axes."""
 
     xyz: F32
+    """(N, 3) float32, metres."""
     intensity: F32
+    """(N,) float32, 0–255."""
     ring: U8
+    """(N,) from 0, the lowest, upwards."""
     channels: int
+    """Number of rings that the sensor has."""
     time_s: F32 | None
+    """(N,) after the cloud's stamp; None where points carry no time."""
 
     def sweep(self, t_ns: int, T_ego_lidar: F64) -> Sweep:
         """In the ego frame."""

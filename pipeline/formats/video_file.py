@@ -9,8 +9,8 @@ from threading import Lock
 import av
 import numpy as np
 
+from pipeline.common.image_decoding import MOST_PIXELS, check_pixels
 from pipeline.common.nearest_in_time import Times
-from pipeline.common.picture_decoding import MOST_PIXELS, check_pixels
 from pipeline.common.progress import Progress, silent
 from pipeline.common.user_file_errors import reason_of
 from pipeline.common.user_files import check_regular, overload_told_apart

@@ -23,9 +23,10 @@ _SAME_RANGE_SIGMAS, _APART_RAD = 1.5, radians(8.0)
 
 @dataclass(frozen=True)
 class AgreementState:
-    """share: of the vehicles that both sensors should see, how many come apart; a running mean, 0–1."""
+    """How camera and LiDAR have agreed lately."""
 
     share: float = 0.0
+    """Of the vehicles that both sensors should see, how many come apart: a running mean, 0–1."""
 
 
 def follow(

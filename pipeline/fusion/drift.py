@@ -6,7 +6,7 @@ car too wide goes on doing so. So each vehicle counts once, by the mean over its
 means have; and angles are told only when the vehicles of the last seconds together leave little doubt.
 
 Not told by it: a wrong distance law, which moves no box, and a road that bends, which moves both. A wrong time between
-the sensors turns vehicles that cross one way and those that come from the other side the other way.
+the sensors moves each vehicle by how fast its bearing changes, which is fitted beside the angle and held near zero.
 """
 
 from __future__ import annotations
@@ -24,8 +24,11 @@ from pipeline.types import F64, VEHICLES, Box, FusedObject
 
 BORDER_PX = 3.0
 """A box that ends this close to the image's border is cut."""
-LIKE_WIDTH = 0.35
-"""A cluster whose width differs from its box's by a larger share is a part of the vehicle, or more than it."""
+LIKE_WIDTH, NARROWEST = 0.35, 0.4
+"""A cluster whose width differs from its box's by a larger share is a part of the vehicle, or more than it; beside the
+axis, where its side may be missing, a narrower one counts too."""
+NARROWEST_M = 1.3
+"""Narrower clusters are the visible part of a vehicle behind others, whose box a detector draws whole."""
 NEAREST_M, FARTHEST_M = 5.0, 40.0
 """Nearer, the two mounts see different sides of a car; farther, one or two rings are on it."""
 LASTING_SHARE = 0.06
@@ -36,25 +39,40 @@ FRAME_SHARE = 0.08
 """By how much more in one frame."""
 SMALLEST_DEG = 0.4
 """Smaller angles move a car 30 m away by about a tenth of its width: fusion does without them."""
-FEWEST_FRAMES, FEWEST_VEHICLES = 5, 4
-"""A vehicle counts once it has been seen for half a second at 10 Hz; of three vehicles two may be wrong pairs."""
-MEDIAN_LOSS = 1.25
-"""Standard deviation of a median against that of a mean."""
+FEWEST_FRAMES, FEWEST_VEHICLES = 5, 3
+"""A vehicle counts once it has been seen for half a second at 10 Hz; of two vehicles both may be wrong pairs."""
+REMEMBERED = 20
+"""Frames after which a vehicle's mean forgets: a lead that stays for minutes is judged by the last seconds."""
+FASTEST_DEGPS = 6.0
+"""Bearings that change faster are those of vehicles that are passed, seen from a new side in every frame."""
+RECENT_SHARE = 0.4
+"""Of the time that is looked at: vehicles from before the knock must not outvote those after it."""
+TIME_SIGMA_S = 0.04
+"""Standard deviation of the time between the sensors. Vehicles whose bearing changes fast, as oncoming ones', are off
+by as much as an angle would be; where all of them are, they tell no angle."""
+HUBER, ROUNDS = 1.5, 10
+"""Deviations beyond which a vehicle counts less; how often that is weighed anew."""
+AGREEING_SHARE = 0.7
+"""Of the vehicles that must say at least half of the angle, each by itself."""
 
 
-class Sighting(NamedTuple):
+class CuboidOffset(NamedTuple):
     """How far one vehicle's cuboid has lain from its box."""
 
     id: int
+    """Of the fused object."""
     t_ns: int
     """The last frame of both."""
     frames: int
+    """In which both sensors have seen it so far."""
     yaw_deg: float
     """Mean over the frames; the turn of the camera to the left that puts one on the other."""
     pitch_deg: float
     """The same downwards."""
     height_deg: float
     """Of the box, mean over the frames."""
+    rate_degps: float = 0.0
+    """How fast its bearing changes, to the left, mean over the frames."""
 
 
 class Drift(NamedTuple):
@@ -83,7 +101,8 @@ class Drift(NamedTuple):
 class DriftState(NamedTuple):
     """The vehicles of the last seconds."""
 
-    sightings: tuple[Sighting, ...] = ()
+    sightings: tuple[CuboidOffset, ...] = ()
+    """One per vehicle; one not seen for ``fusion.drift_s`` is dropped."""
 
 
 def follow(
@@ -104,22 +123,33 @@ def follow(
         if box is not None and _tells(item, box, picture_size):
             assert item.cuboid is not None
             found = _angles(item.cuboid, box, aligned)
-            if found is not None:
-                known[item.id] = _with(known.get(item.id), item.id, t_ns, found)
+            rate_degps = _rate_degps(item)
+            if found is not None and abs(rate_degps) < FASTEST_DEGPS:
+                known[item.id] = _with(known.get(item.id), item.id, t_ns, (*found, rate_degps))
     sightings = tuple(known.values())
     return DriftState(sightings), judge(sightings, params)
 
 
-def judge(sightings: tuple[Sighting, ...], params: FusionParams) -> Drift | None:
-    """The angles of all sightings together, if they are surely not zero."""
+def judge(sightings: tuple[CuboidOffset, ...], params: FusionParams) -> Drift | None:
+    """The angles of all sightings together, or of the newest ones, if they are surely not zero."""
+    newest_ns = max((each.t_ns for each in sightings), default=0)
+    recent = tuple(each for each in sightings if newest_ns - each.t_ns <= RECENT_SHARE * params.drift_s * 1e9)
+    return _judged(sightings, params) or _judged(recent, params)
+
+
+def _judged(sightings: tuple[CuboidOffset, ...], params: FusionParams) -> Drift | None:
     steady = [each for each in sightings if each.frames >= FEWEST_FRAMES]
     if len(steady) < FEWEST_VEHICLES:
         return None
     sigmas_deg = np.array([_sigma_deg(each) for each in steady])
-    yaw_deg, yaw_sigma_deg = _middle(np.array([each.yaw_deg for each in steady]), sigmas_deg)
-    pitch_deg, pitch_sigma_deg = _middle(np.array([each.pitch_deg for each in steady]), sigmas_deg)
-    both = ((yaw_deg, yaw_sigma_deg), (pitch_deg, pitch_sigma_deg))
-    if not any(abs(angle) > max(SMALLEST_DEG, params.drift_sigmas * sigma) for angle, sigma in both):
+    rates = np.array([each.rate_degps for each in steady])
+    yaws, pitches = (np.array([getattr(each, name) for each in steady]) for name in ("yaw_deg", "pitch_deg"))
+    yaw_deg, yaw_sigma_deg, yaw_clear = _common(yaws, sigmas_deg, rates)
+    pitch_deg, pitch_sigma_deg, pitch_clear = _common(pitches, sigmas_deg, np.zeros(len(steady)))
+    found = ((yaw_deg, yaw_sigma_deg, yaw_clear), (pitch_deg, pitch_sigma_deg, pitch_clear))
+    if not any(
+        is_clear and abs(angle) > max(SMALLEST_DEG, params.drift_sigmas * sigma) for angle, sigma, is_clear in found
+    ):
         return None
     return Drift(yaw_deg, pitch_deg, yaw_sigma_deg, pitch_sigma_deg, len(steady))
 
@@ -128,45 +158,79 @@ def _tells(item: FusedObject, box: Box, size: tuple[int, int]) -> bool:
     """Whether both sensors see all of the vehicle now."""
     if item.cuboid is None or not item.seen_by_two_sensors or item.label not in VEHICLES:
         return False
+    if item.cuboid.size[1] < NARROWEST_M:
+        return False
     is_whole = min(box[0], box[1], size[0] - box[2], size[1] - box[3]) > BORDER_PX
     return is_whole and item.distance_m is not None and NEAREST_M <= item.distance_m <= FARTHEST_M
 
 
 def _angles(cuboid: Cuboid, box: Box, aligned: Alignment) -> tuple[float, float, float] | None:
-    """Yaw and pitch between a cuboid and its box, and the box's height, degrees; None where their widths differ."""
+    """Yaw and pitch between a cuboid and its box, and the box's height, degrees; None where their widths differ.
+
+    Of a vehicle beside the camera's axis the box ends inwards at the far end of its side, which the LiDAR seldom
+    meets; outwards both end at the corner of its near face. So such a vehicle tells by its outer edge alone."""
     uv = aligned.project(cuboid.corners())
     if np.isnan(uv).any():
         return None
     left, right, foot = uv[:, 0].min(), uv[:, 0].max(), uv[:4, 1].max()
-    if abs((right - left) - (box[2] - box[0])) > LIKE_WIDTH * (box[2] - box[0]):
+    share = (right - left) / (box[2] - box[0])
+    if not NARROWEST < share < 1.0 + LIKE_WIDTH:
         return None
-    middle, middle_seen = (left + right) / 2, (box[0] + box[2]) / 2
-    _, rays = aligned.rays(np.array([[middle, foot], [middle_seen, box[3]], [middle_seen, box[1]]]))
+    sides = cuboid.corners()[:, 1]
+    low, high = float(sides.min()), float(sides.max())
+    if high < 0.0:
+        edge, edge_seen = right, box[2]
+    elif low > 0.0:
+        edge, edge_seen = left, box[0]
+    elif share > 1.0 - LIKE_WIDTH:
+        edge, edge_seen = (left + right) / 2, (box[0] + box[2]) / 2
+    else:
+        return None
+    _, rays = aligned.rays(np.array([[edge, foot], [edge_seen, box[3]], [edge_seen, box[1]]]))
     azimuth = [atan2(y, x) for x, y, _ in rays]
     elevation = [atan2(z, hypot(x, y)) for x, y, z in rays]
     yaw, pitch, height = azimuth[0] - azimuth[1], elevation[1] - elevation[0], elevation[2] - elevation[1]
     return degrees(yaw), degrees(pitch), degrees(height)
 
 
-def _with(before: Sighting | None, number: int, t_ns: int, found: tuple[float, float, float]) -> Sighting:
-    """The sighting with one frame more."""
+def _rate_degps(item: FusedObject) -> float:
+    """How fast its bearing changes, as far as its speed is known."""
+    if item.velocity_mps is None or item.cuboid is None:
+        return 0.0
+    (x, y, _), (vx, vy) = item.cuboid.center, item.velocity_mps
+    return degrees((x * vy - y * vx) / max(x * x + y * y, 1.0))
+
+
+def _with(before: CuboidOffset | None, number: int, t_ns: int, found: tuple[float, ...]) -> CuboidOffset:
+    """The sighting with one frame more. found: as the fields after ``frames``."""
     if before is None:
-        return Sighting(number, t_ns, 1, *found)
-    frames = before.frames + 1
-    yaw, pitch, height = (old + (new - old) / frames for old, new in zip(before[3:], found, strict=True))
-    return Sighting(number, t_ns, frames, yaw, pitch, height)
+        return CuboidOffset(number, t_ns, 1, *found)
+    frames = min(before.frames + 1, REMEMBERED)
+    means = (old + (new - old) / frames for old, new in zip(before[3:], found, strict=True))
+    return CuboidOffset(number, t_ns, frames, *means)
 
 
-def _sigma_deg(each: Sighting) -> float:
+def _sigma_deg(each: CuboidOffset) -> float:
     """Standard deviation of a vehicle's mean."""
     return hypot(LASTING_DEG, LASTING_SHARE * each.height_deg, FRAME_SHARE * each.height_deg / each.frames**0.5)
 
 
-def _middle(values: F64, sigmas: F64) -> tuple[float, float]:
-    """Weighted median, which a wrong pair or two do not move, and its standard deviation: by the values' own deviations
-    or by how far they lie apart, whichever is more."""
-    order = np.argsort(values)
-    weight = np.cumsum(sigmas[order] ** -2)
-    middle = float(values[order][np.searchsorted(weight, weight[-1] / 2)])
-    apart = 1.25 * float(np.mean(np.abs(values - middle))) / len(values) ** 0.5  # 1.25: of a normal distribution
-    return middle, MEDIAN_LOSS * max(float(weight[-1]) ** -0.5, apart)
+def _common(values: F64, sigmas: F64, rates: F64) -> tuple[float, float, bool]:
+    """The angle that all vehicles share beside a common time offset, its standard deviation, and whether most of them
+    say so one by one. Robust (Huber): a wrong pair or two do not move it."""
+    design = np.column_stack([np.ones(len(values)), rates])
+    held = np.diag([0.0, TIME_SIGMA_S**-2])
+    weight = sigmas**-2
+    solved: F64 = np.zeros(2)
+    inverse: F64 = np.eye(2)
+    for _ in range(ROUNDS):
+        inverse = np.asarray(np.linalg.inv(design.T @ (design * weight[:, None]) + held), dtype=np.float64)
+        solved = np.asarray(inverse @ (design.T @ (values * weight)), dtype=np.float64)
+        off = np.abs(values - design @ solved) / sigmas
+        weight = sigmas**-2 * HUBER / np.maximum(off, HUBER)
+    off = np.minimum(np.abs(values - design @ solved) / sigmas, 2.0 * HUBER)
+    scatter = float(np.sqrt(np.sum(off**2) / max(len(values) - 1, 1)))
+    angle, sigma = float(solved[0]), float(inverse[0, 0] ** 0.5) * max(scatter, 1.0)
+    alone = values - rates * solved[1]
+    is_clear = np.count_nonzero(alone * np.sign(angle) > abs(angle) / 2) >= AGREEING_SHARE * len(values)
+    return angle, sigma, bool(is_clear)

@@ -27,7 +27,7 @@ _BODY_LOW_M, _BODY_HIGH_M = 0.3, 1.2
 """Heights over the road between which every vehicle is solid: under it is air, over it is glass."""
 _BODY_SHARE = 0.7
 """Of its width; the sides may be off by the box's error."""
-_MIN_RAYS = 3
+MIN_RAYS = 3
 """Fewer may be one speck of dirt or one mixed pixel."""
 CLEAR_SHARE = 0.8
 """Of the rays that reached the place, so many passed through where it is free."""
@@ -97,27 +97,27 @@ class Rays(NamedTuple):
     @property
     def is_free(self) -> bool:
         """Whether they show that nothing stands there."""
-        return self.through >= _MIN_RAYS and self.clear >= CLEAR_SHARE
+        return self.through >= MIN_RAYS and self.clear >= CLEAR_SHARE
 
     @property
     def is_silent(self) -> bool:
         """Whether a vehicle there would have to swallow nearly all rays."""
-        return self.silent >= _SILENT_RAYS and self.stopped + self.taken < _MIN_RAYS
+        return self.silent >= _SILENT_RAYS and self.stopped + self.taken < MIN_RAYS
 
     @property
     def is_stopped(self) -> bool:
         """Whether rays ended there that may be its own."""
-        return self.stopped >= _MIN_RAYS
+        return self.stopped >= MIN_RAYS
 
     @property
     def is_taken(self) -> bool:
         """Whether all rays that ended there are known to be of something else."""
-        return self.taken >= _MIN_RAYS and not self.is_stopped
+        return self.taken >= MIN_RAYS and not self.is_stopped
 
     @property
     def free_share(self) -> float | None:
         """Of those that reached the place, how many went on; None if too few did."""
-        if self.through + self.stopped + self.taken >= _MIN_RAYS:
+        if self.through + self.stopped + self.taken >= MIN_RAYS:
             return self.clear
         return self.silent_share if self.silent >= _SILENT_RAYS else None
 
@@ -221,7 +221,7 @@ def _count(points, ring, kind, origin, places, slope, step_rad, silent_m):  # ty
         near, deep = places[k, 2], places[k, 3] - places[k, 2]
         slices = min(max(int(np.ceil(deep / _SLICE_M)), 1), _MOST_SLICES)
         half = 0.5 * deep / slices
-        rays, live = 2.0 * places[k, 4] / step_rad, seen[k].sum() >= _MIN_RAYS and hidden[k] < _MIN_RAYS
+        rays, live = 2.0 * places[k, 4] / step_rad, seen[k].sum() >= MIN_RAYS and hidden[k] < MIN_RAYS
         out[k, 0] = out[k, 3] = out[k, 4] = out[k, 5] = np.inf
         for b in range(slices):
             at = near + (2 * b + 1) * half

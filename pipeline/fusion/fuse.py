@@ -29,17 +29,23 @@ class FusionState:
     """Which fused identity each sensor's track carries, so that an object keeps its number from V to VL to L."""
 
     next_id: int = 1
+    """The number that the next new object gets; numbers are never given twice."""
     by_lidar: dict[int, int] = field(default_factory=dict)
+    """Object id of each LiDAR track id, of the last frame."""
     by_vision: dict[int, int] = field(default_factory=dict)
+    """Object id of each camera track id, of the last frame."""
 
 
 @dataclass(frozen=True)
 class Fusion:
-    """objects in order of distance; lidar_boxes and vision_boxes: the image boxes that were compared, by object id."""
+    """The objects of one frame, and the boxes that fusion compared."""
 
     objects: tuple[FusedObject, ...]
+    """In order of distance."""
     lidar_boxes: dict[int, Box]
+    """Projected clusters in image pixels, by object id."""
     vision_boxes: dict[int, Box]
+    """Boxes of the camera tracks in image pixels, by object id."""
 
     def ranged_boxes(self) -> dict[int, tuple[float, float]]:
         """Distance and its standard deviation by the LiDAR, by id of the vision track, of what both surely see now:

@@ -46,7 +46,7 @@ _CLEARLY = 1.0
 """By how much, in log-likelihood, the best group beats the second."""
 
 
-class Sweep(SweepRays, Protocol):
+class SweepReturns(SweepRays, Protocol):
     """A segmented sweep, as far as single points matter."""
 
     @property
@@ -75,7 +75,10 @@ class _Group(NamedTuple):
 
 
 def range_boxes(
-    boxes: tuple[VisionMeasurement, ...] | None, sweep: Sweep, alignment: Alignment | None, params: FusionParams
+    boxes: tuple[VisionMeasurement, ...] | None,
+    sweep: SweepReturns,
+    alignment: Alignment | None,
+    params: FusionParams,
 ) -> tuple[VisionMeasurement, ...] | None:
     """The boxes, those of far vehicles with ``ranged_m`` and ``returns`` where the sweep holds returns of them."""
     if not params.single_returns or not boxes or alignment is None or sweep.ground is None:
@@ -87,7 +90,7 @@ def range_boxes(
     return tuple(_ranged(each, points) if ask else each for each, ask in zip(boxes, asked, strict=True))
 
 
-def _above_the_road(sweep: Sweep, ground: Ground, alignment: Alignment) -> _Points:
+def _above_the_road(sweep: SweepReturns, ground: Ground, alignment: Alignment) -> _Points:
     xyz = sweep.points[:, :3].astype(np.float64)
     range_m = np.hypot(xyz[:, 0], xyz[:, 1])
     rows = np.flatnonzero((sweep.kind != -1) & (xyz[:, 0] > 0.0) & (range_m > NEAREST_M / 2))

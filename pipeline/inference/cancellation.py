@@ -22,7 +22,7 @@ class Terminates(Protocol):
     terminate: bool
 
 
-class Stop:
+class Cancellation:
     """Cancels what another thread runs: ``set`` ends the run under way in that thread's ``here`` block, and refuses
     further ones."""
 
@@ -65,12 +65,12 @@ class Stop:
 
 
 class _OfThread(threading.local):
-    stop: Stop | None = None
+    stop: Cancellation | None = None
 
 
 _of_thread = _OfThread()
 
 
-def of_this_thread() -> Stop:
+def of_this_thread() -> Cancellation:
     """What cancels the networks that this thread runs; outside of a ``here`` block nothing does."""
-    return _of_thread.stop or Stop()
+    return _of_thread.stop or Cancellation()

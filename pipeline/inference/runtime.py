@@ -21,7 +21,7 @@ from pipeline.inference.cancellation import Stopped, of_this_thread
 from pipeline.inference.denormals import flush_to_zero, flush_weights
 from pipeline.inference.graph import Size, input_size, with_empty_masks, with_input_size, with_unit_picture
 from pipeline.inference.known_networks import Task
-from pipeline.inference.tuning import Way, kept_way
+from pipeline.inference.tuning import RunSettings, kept_way
 from pipeline.types import F32, U8
 
 _GIVES_WAY = 5
@@ -82,7 +82,7 @@ def _give_way() -> None:
             os.setpriority(os.PRIO_PROCESS, this, os.getpriority(os.PRIO_PROCESS, this) + _GIVES_WAY)
 
 
-def open_as(graph: bytes, way: Way) -> ort.InferenceSession:
+def open_as(graph: bytes, way: RunSettings) -> ort.InferenceSession:
     """The graph on the providers, threads and options of a way. Raises onnxruntime's own errors."""
     options = ort.SessionOptions()
     options.intra_op_num_threads = way.threads
@@ -127,7 +127,7 @@ def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
     return [np.asarray(output) for output in outputs]
 
 
-def ways_of(path: Path) -> Callable[[Way], Callable[[], Sequence[F32]]]:
+def ways_of(path: Path) -> Callable[[RunSettings], Callable[[], Sequence[F32]]]:
     """For ``pipeline.inference.tuning``: the network in a file on the same noisy image, one way after the other.
     DetectorError when it takes no image."""
     model = with_empty_masks(with_unit_picture(read_graph(path)))  # each leaves the other's graphs as they are
@@ -138,7 +138,7 @@ def ways_of(path: Path) -> Callable[[Way], Callable[[], Sequence[F32]]]:
     graph = (model if own else with_input_size(model, _TUNED_SIZE)).SerializeToString()
     noise = np.random.default_rng(0).random((1, 3, *(own or _TUNED_SIZE)), np.float32)
 
-    def run(way: Way) -> Callable[[], Sequence[F32]]:
+    def run(way: RunSettings) -> Callable[[], Sequence[F32]]:
         session = open_as(graph, way)
         return lambda: run_session(session, noise)
 

@@ -35,7 +35,7 @@ _ROUNDS = 7
 
 
 @dataclass(frozen=True)
-class Way:
+class RunSettings:
     """One way of running a network."""
 
     providers: tuple[str, ...]
@@ -56,7 +56,8 @@ class Way:
 class Trial:
     """What one way took."""
 
-    way: Way
+    way: RunSettings
+    """Providers, threads and options that were tried."""
     best_ms: float | None
     """The shortest of its runs: other work on the machine only ever adds. None when it could not run or its outputs
     differ."""
@@ -64,27 +65,27 @@ class Trial:
     """Why."""
 
 
-def untuned(threads: int) -> Way:
+def untuned(threads: int) -> RunSettings:
     """How a network runs that nobody tuned: on the best provider that is installed."""
     there = ort.get_available_providers()
-    return Way(tuple(name for name in _UNTUNED if name in there), threads)
+    return RunSettings(tuple(name for name in _UNTUNED if name in there), threads)
 
 
-def kept_way(path: Path, threads: int) -> Way:
+def kept_way(path: Path, threads: int) -> RunSettings:
     """The tuned way of a network's file on this machine, or the untuned one."""
     rows, usual = _read(_file()), untuned(threads)
     row = rows.get(_key(path)) if rows else None
     if row is None:
         return usual
     try:
-        way = Way(tuple(row["providers"]), int(row["threads"]), str(row["optimisation"]), bool(row["arena"]))
+        way = RunSettings(tuple(row["providers"]), int(row["threads"]), str(row["optimisation"]), bool(row["arena"]))
     except (KeyError, TypeError, ValueError):
         return usual
     known = hasattr(ort.GraphOptimizationLevel, way.optimisation) and 1 <= way.threads <= 64
     return way if known and set(way.providers) <= set(ort.get_available_providers()) else usual
 
 
-def keep(path: Path, way: Way) -> None:
+def keep(path: Path, way: RunSettings) -> None:
     """Run this file's network this way from now on. OSError when the store cannot be written."""
     file = _file()
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -95,7 +96,7 @@ def keep(path: Path, way: Way) -> None:
     part.replace(file)
 
 
-def tune(run: Callable[[Way], Callable[[], Sequence[F32]]], threads: int) -> Iterator[Trial]:
+def tune(run: Callable[[RunSettings], Callable[[], Sequence[F32]]], threads: int) -> Iterator[Trial]:
     """Try each way, the untuned one first; the best of those before is varied in one thing at a time.
 
     run: gives for a way a function that runs the network once on a fixed input; either may raise.
@@ -120,7 +121,7 @@ def fastest(trials: Sequence[Trial]) -> Trial:
 
 
 def _timed(
-    run: Callable[[Way], Callable[[], Sequence[F32]]], way: Way, expected: Sequence[F32] | None
+    run: Callable[[RunSettings], Callable[[], Sequence[F32]]], way: RunSettings, expected: Sequence[F32] | None
 ) -> tuple[Trial, Sequence[F32]]:
     try:
         once = run(way)
@@ -148,23 +149,23 @@ def _agree(ours: Sequence[F32], theirs: Sequence[F32]) -> bool:
     )
 
 
-def _other_providers(way: Way) -> Iterator[Way]:
+def _other_providers(way: RunSettings) -> Iterator[RunSettings]:
     there = [name for name in PROVIDERS if name in ort.get_available_providers()]
     for place, name in enumerate(there):
         if name != way.providers[0]:
             yield evolve(way, providers=tuple(there[place:]))
 
 
-def _other_threads(way: Way) -> Iterator[Way]:
+def _other_threads(way: RunSettings) -> Iterator[RunSettings]:
     cores = os.cpu_count() or 1
     yield from (evolve(way, threads=n) for n in (1, 2, 4, cores) if n <= cores and n != way.threads)
 
 
-def _other_levels(way: Way) -> Iterator[Way]:
+def _other_levels(way: RunSettings) -> Iterator[RunSettings]:
     yield from (evolve(way, optimisation=level) for level in ("ORT_ENABLE_EXTENDED", "ORT_ENABLE_BASIC"))
 
 
-def _no_arena(way: Way) -> Iterator[Way]:
+def _no_arena(way: RunSettings) -> Iterator[RunSettings]:
     yield evolve(way, arena=False)
 
 

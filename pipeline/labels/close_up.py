@@ -31,10 +31,12 @@ _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4)
 
 @dataclass(frozen=True)
 class Fit:
-    """Points in a cuboid, and right beside it, without those of the road."""
+    """How a cuboid lies on the points around it. Points of the road do not count."""
 
     inside: int
+    """Points in the cuboid."""
     beside: int
+    """Points right outside it: many mean that it is too small or misplaced."""
 
     @property
     def share_beside(self) -> float | None:

@@ -13,7 +13,8 @@ from pipeline.alignment.projection import Alignment, resolve
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
 from pipeline.fusion.vehicle_sizes import usual_size_m
-from pipeline.labels.snap import FEWEST_POINTS, onto_points
+from pipeline.labels.cuboids.points_of import FEWEST_POINTS
+from pipeline.labels.cuboids.snap import onto_points
 from pipeline.lidar.boxes import fit_obstacles
 from pipeline.lidar.cluster import candidates, cluster
 from pipeline.lidar.ground import Ground, fit_ground
@@ -34,13 +35,16 @@ class NothingThere(BadInput):
 
 @dataclass(frozen=True)
 class Lifted:
-    """how: one sentence. points: that it was laid on, 0 when its distance comes from the image. bbox: None when
-    nobody drew one and none was detected there."""
+    """A cuboid made from a place in the image."""
 
     cuboid: Cuboid
+    """In the ego frame."""
     bbox: Box | None
+    """In image pixels; None when nobody drew one and none was detected there."""
     points: int
+    """That the cuboid was laid on; 0 when its distance comes from the image."""
     how: str
+    """What the distance was measured by: one sentence."""
 
 
 def lift(

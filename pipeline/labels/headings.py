@@ -72,11 +72,12 @@ class Pose:
 
 @dataclass(frozen=True)
 class Travelled:
-    """How a track moved over the ground. along_m: forwards along its own axis, negative for backwards. proven: by more
-    than boxes and own motion can be wrong, and steadily."""
+    """How a track moved over the ground."""
 
     along_m: float
+    """Forwards along its own axis; negative for backwards."""
     proven: bool
+    """Whether it moved farther than errors of boxes and ego motion explain, and steadily."""
 
 
 def own_poses(moments: Mapping[int, Moment]) -> dict[int, Pose]:

@@ -65,6 +65,20 @@ class Sighting:
 
 
 @dataclass(frozen=True)
+class Attribute:
+    """What is said of a track in some frames, by the project's class list."""
+
+    first: int
+    """First frame."""
+    last: int
+    """Last frame, included."""
+    name: str
+    """``motion``, ``brake lights``, …"""
+    value: str
+    """One of those that the list has for it."""
+
+
+@dataclass(frozen=True)
 class LabelTrack:
     """One vehicle or person over time."""
 
@@ -86,6 +100,8 @@ class LabelTrack:
     """Of a proposal, 0–1: how sure it is a road user at all; None where that was not asked."""
     heading: Heading = ""
     """What told its front from its rear."""
+    attributes: tuple[Attribute, ...] = ()
+    """By name and first frame; those of one name do not overlap."""
 
     def at(self, frame: int) -> Sighting | None:
         return next((each for each in self.sightings if each.frame == frame), None)

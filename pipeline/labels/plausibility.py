@@ -33,11 +33,14 @@ _LEAST_BOX_IOU = 0.3
 
 @dataclass(frozen=True)
 class Problem:
-    """frame: where to look. track: what to select; None where it is about the lead alone. words: one sentence."""
+    """Something in labels that can hardly be so."""
 
     frame: int
+    """Where to look."""
     track: int | None
+    """What to select; None where it is about the lead alone."""
     words: str
+    """One sentence for the person who labels."""
 
 
 def problems(labels: LabelSet, drive: LabeledDrive) -> list[Problem]:

@@ -59,11 +59,17 @@ class Seen:
     """An object of one frame's result."""
 
     id: int
+    """Of the object in the run."""
     label: str | None
+    """The camera's class; None when only the LiDAR has seen it."""
     cuboid: Cuboid | None
+    """In the ego frame; None without a LiDAR cluster."""
     bbox: Box | None
+    """In image pixels; None without a camera track."""
     in_path: bool
+    """Whether the run took it to be in the ego path."""
     carried: bool
+    """Predicted, not seen in this frame."""
     score: float | None = None
     """The detector's score of its class, 0–1; None for what the camera does not see."""
 
@@ -73,7 +79,9 @@ class Proposals:
     """Tracks under the run's own numbers, and who leads."""
 
     tracks: tuple[LabelTrack, ...]
+    """Vehicles, one per object that was seen often enough."""
     leads: tuple[LeadRange, ...]
+    """Who the run followed; ranges do not overlap."""
 
 
 def propose(

@@ -64,6 +64,10 @@ def _check_track(track: LabelTrack, count: int) -> None:
     frames = [each.frame for each in track.sightings]
     _require(all(0 <= frame < count for frame in frames), f"track {track.id} is in a frame that does not exist")
     _require(frames == sorted(set(frames)), f"track {track.id}: sightings are not in frame order")
+    for said in track.attributes:
+        _require(
+            0 <= said.first <= said.last < count, f"track {track.id}: {said.name!r} is of frames that do not exist"
+        )
     sure = track.confidence
     _require(sure is None or 0.0 <= sure <= 1.0, f"track {track.id}: a confidence is between 0 and 1")
     for sighting in track.sightings:

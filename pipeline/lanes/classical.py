@@ -30,11 +30,14 @@ _PER_ROW = 12
 
 @dataclass(frozen=True)
 class ClassicalLanes:
-    """The detector for images of one camera. horizon: row of the horizon as a share of the image's height."""
+    """The detector for images of one camera."""
 
     name: str
+    """Key of caches; equal names give equal points."""
     horizon: float
+    """Row of the horizon as a share of the image's height; nothing above it is searched."""
     notes: tuple[str, ...] = (_NOTE,)
+    """Shown with every result."""
 
     def detect(self, bgr: U8) -> RawLanes:
         """Centres of what may be paint, in some ninety rows of an image (H, W, 3) uint8; not grouped to lines."""

@@ -44,38 +44,51 @@ _ENOUGH_COVER = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
-    """What the lines of a road share: heading and curvature against the car, and the camera's pitch (positive
-    downwards) against its calibration; with how far each is searched around its value."""
+class RoadCurve:
+    """What the lines of a road share, and how far each value is searched around its start."""
 
     heading_rad: float = 0.0
+    """Of the road against the car, positive to the left."""
     curvature_per_m: float = 0.0
+    """1/radius, positive to the left."""
     pitch_rad: float = 0.0
+    """Of the camera against its calibration, positive downwards."""
     heading_reach_rad: float = 0.12
+    """Search range to either side."""
     curvature_reach_per_m: float = 1.0 / 120.0
+    """Search range to either side: radii down to 120 m at first."""
     pitch_reach_rad: float = 0.03
+    """Search range to either side."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedLine:
-    """coefficients (4,) and covariance (4, 4) of y(x) from the foot of the camera. quality: 0–1."""
+    """y(x) of one line, from the foot of the camera."""
 
     coefficients: F64
+    """(4,) of y = c0 + c1 x + c2 x² + c3 x³, metres."""
     covariance: F64
+    """(4, 4) of the coefficients."""
     x_min_m: float
+    """Nearest point that the fit rests on."""
     x_max_m: float
+    """Farthest such point."""
     quality: float
+    """0–1."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """Points of an image on the road. slope, inverse: (M,) float64 as in this module's first lines. weight: (M,)
-    float64, 0–1. height_m: the camera's over the road."""
+    """Points of an image on the road."""
 
     slope: F64
+    """(M,) float64 y/x; see this module's docstring."""
     inverse: F64
+    """(M,) float64 1/x, per metre."""
     weight: F64
+    """(M,) float64, 0–1."""
     height_m: float
+    """Of the camera over the road."""
 
     def only(self, picked: Picked) -> Sightings:
         return Sightings(self.slope[picked], self.inverse[picked], self.weight[picked], self.height_m)
@@ -85,7 +98,7 @@ class Sightings:
         return 1.0 / (self.inverse + pitch_rad / self.height_m)
 
 
-def shared_shape(seen: Sightings, around: Shape) -> tuple[Shape, F64]:
+def shared_shape(seen: Sightings, around: RoadCurve) -> tuple[RoadCurve, F64]:
     """The shape under which the points gather most sharply into lines, and their lateral histogram (90,) there."""
     if len(seen.slope) > _VOTED_POINTS:
         seen = seen.only(np.linspace(0, len(seen.slope) - 1, _VOTED_POINTS).astype(np.int64))
@@ -93,7 +106,7 @@ def shared_shape(seen: Sightings, around: Shape) -> tuple[Shape, F64]:
     bends = _grid(around.curvature_per_m, around.curvature_reach_per_m, 0.0014)
     pitches = _grid(around.pitch_rad, around.pitch_reach_rad, 0.006)
     best, histogram = _vote(seen.slope, seen.inverse, seen.weight, seen.height_m, headings, bends, pitches)
-    return Shape(*best.tolist()), histogram
+    return RoadCurve(*best.tolist()), histogram
 
 
 def peaks(histogram: F64) -> list[float]:
@@ -110,7 +123,7 @@ def peaks(histogram: F64) -> list[float]:
 
 
 def fit_line(
-    seen: Sightings, y0_m: float, shape: Shape, bearing_sigma_rad: float, rounds: int = 3
+    seen: Sightings, y0_m: float, shape: RoadCurve, bearing_sigma_rad: float, rounds: int = 3
 ) -> FittedLine | None:
     """The line near ``y0_m``, of about the shared shape, through the points around it; None with too few. rounds: of
     weighing the points anew."""

@@ -23,7 +23,7 @@ from pipeline.inference.runtime import (
     read_graph,
     run_session,
 )
-from pipeline.lanes.heads import Head, UnknownLaneHead, pick_head
+from pipeline.lanes.heads import LaneHead, UnknownLaneHead, pick_head
 from pipeline.lanes.horizon import horizon_share
 from pipeline.types import F32, U8, CameraCalibration, RawLanes
 
@@ -37,20 +37,24 @@ _MOST_SKY = 0.6
 
 @dataclass(frozen=True)
 class LaneNetwork:
-    """A loaded lane network.
-
-    name: file and digest, so that equal names give equal points: the key of caches. input_size: (height, width).
-    """
+    """A loaded lane network."""
 
     name: str
+    """File and digest, so that equal names give equal points: the key of caches."""
     providers: tuple[str, ...]
+    """ONNX Runtime's execution providers in use."""
     input_size: Size
-    head: Head
+    """Height, width in pixels."""
+    head: LaneHead
+    """How its outputs are read."""
     notes: tuple[str, ...]
+    """What there is to say about it with every result."""
     threads: int
+    """Threads that one image is computed with."""
     horizon: float
     """Where the camera sees the horizon, as a share of its image's height."""
     sha256: str
+    """Of the file."""
     _session: ort.InferenceSession = field(repr=False, compare=False)
 
     def detect(self, bgr: U8) -> RawLanes:
@@ -134,7 +138,7 @@ def _loaded(path: Path, threads: int, horizon: float) -> LaneNetwork:
     return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, count, horizon, sha256, session)
 
 
-def _placed(picture: Size, size: Size, head: Head, horizon: float) -> _Placed:
+def _placed(picture: Size, size: Size, head: LaneHead, horizon: float) -> _Placed:
     (height, width), (rows, columns) = picture, size
     if head.fit == "letterbox":
         scale = min(rows / height, columns / width)

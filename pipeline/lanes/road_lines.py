@@ -1,8 +1,7 @@
 """What a lane detector saw in the image, as lines on the road in metres.
 
-``measure``    points of one image → ground → lines, with the pitch that makes them parallel
-``follow``     the same, and the lines tracked from frame to frame: the stage that ``step`` runs
-``polylines``  an ``EgoLane`` as points on the road, and ``in_picture`` as pixels, for views
+``measure``  points of one image → ground → lines, with the pitch that makes them parallel
+``follow``   the same, and the lines tracked from frame to frame: the stage that ``step`` runs
 
 The road is a plane: the one that the LiDAR's ground points show, else as far below the ego origin as the calibration
 or the parameter says. Lines of a road are parallel, so the pitch of the camera against its calibration shows in how
@@ -22,11 +21,11 @@ from pipeline.alignment.projection import Alignment
 from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64
 from pipeline.lanes import line_fit, tracking
-from pipeline.lanes.line_fit import FittedLine, Shape, Sightings
+from pipeline.lanes.line_fit import FittedLine, RoadCurve, Sightings
 from pipeline.lidar.ground import Ground
 from pipeline.params import LaneParams
 from pipeline.types import I32, Box, Moment, RawLanes
-from pipeline.types.lane import EgoLane, LaneLine, powers
+from pipeline.types.lane import EgoLane, powers
 
 Seed = tuple[float, Sightings]
 
@@ -49,16 +48,16 @@ _BEYOND = 0.6
 """Points that seem farther than ``max_range_m`` may be nearer under another pitch: this much of the inverse."""
 _COMPARED = powers(10.0)
 _APART_M = 0.6
-_POLYLINE_STEP_M = 1.0
-_DRAWN_FROM_M = 1.0
 
 
 @dataclass(frozen=True)
 class Pitch:
-    """The camera's pitch against its calibration, positive downwards, radians."""
+    """The camera's pitch against its calibration."""
 
     rad: float
+    """Positive downwards."""
     sigma_rad: float
+    """Standard deviation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +65,11 @@ class LaneMeasurement:
     """The lines of one image in the ego frame, strongest first, and the pitch under which they were mapped."""
 
     source: str
+    """Name of the detector."""
     lines: tuple[FittedLine, ...]
+    """Strongest first."""
     pitch: Pitch
+    """Under which the lines were mapped to the ground."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +126,7 @@ def follow(
 
 
 def measure(
-    raw: RawLanes, aligned: Alignment, plane: F64, pitch: Pitch, params: LaneParams, expected: Shape | None = None
+    raw: RawLanes, aligned: Alignment, plane: F64, pitch: Pitch, params: LaneParams, expected: RoadCurve | None = None
 ) -> LaneMeasurement:
     """Lines on the road from points in the image; none where too few points lie on it.
 
@@ -140,7 +142,7 @@ def measure(
     if len(line) < _MIN_POINTS:
         return nothing
     reach = float(min(2.5 * pitch.sigma_rad, 0.045))
-    around = evolve(expected or Shape(), pitch_rad=pitch.rad, pitch_reach_rad=reach)
+    around = evolve(expected or RoadCurve(), pitch_rad=pitch.rad, pitch_reach_rad=reach)
     shape, histogram = line_fit.shared_shape(seen, around)
     sigma = float(np.radians(params.bearing_sigma_deg))
     first = _fitted(_seeds(line, seen, shape, histogram), shape, sigma)
@@ -182,36 +184,10 @@ def _settled(state: LaneState, seen: F64 | None) -> tuple[F64 | None, int]:
     return state.plane + gain * (seen - state.plane), state.sweeps + 1
 
 
-def polylines(lane: EgoLane) -> dict[str, F64]:
-    """``left`` and ``right`` as (K, 2) ego x, y every metre as far as paint supports them; (0, 2) without a line."""
-    return {"left": _polyline(lane.left), "right": _polyline(lane.right)}
-
-
-def in_picture(lane: EgoLane, aligned: Alignment) -> dict[str, F64]:
-    """``left`` and ``right`` as (K, 2) pixels u, v where the lines were seen, NaN behind the camera. The alignment does
-    not know of the pitch, so each point is put where the pitch made it seem to be."""
-    plane = lane.plane
-    eye, _ = aligned.rays(np.zeros((0, 2)))
-    height_m = float(eye[2] - (plane[0] * eye[0] + plane[1] * eye[1] + plane[2]))
-    drawn = {}
-    for side, line in polylines(lane).items():
-        ahead = line[line[:, 0] > eye[0] + _DRAWN_FROM_M] - eye[:2]
-        seemed = ahead / (1.0 - ahead[:, :1] * lane.pitch_rad / height_m) + eye[:2]
-        drawn[side] = aligned.project(np.column_stack([seemed, seemed @ plane[:2] + plane[2]]))
-    return drawn
-
-
-def _polyline(line: LaneLine | None) -> F64:
-    if line is None:
-        return np.zeros((0, 2))
-    x = np.append(np.arange(line.x_min_m, line.x_max_m, _POLYLINE_STEP_M), line.x_max_m)
-    return np.column_stack([x, line.y_m(x)])
-
-
 def warm_up() -> None:
     """Compile the kernels before the first image."""
     seen = Sightings(np.zeros(20), np.linspace(0.05, 0.2, 20), np.ones(20), 1.0)
-    shape, _ = line_fit.shared_shape(seen, Shape())
+    shape, _ = line_fit.shared_shape(seen, RoadCurve())
     line_fit.fit_line(seen, 0.0, shape, 1e-3)
 
 
@@ -234,7 +210,7 @@ def _on_road(raw: RawLanes, rays: F64, plane: F64, height_m: float, max_range_m:
     return Sightings(slope[ahead], inverse[ahead], raw.scores[ahead].astype(np.float64), height_m), raw.line[ahead]
 
 
-def _seeds(line: I32, seen: Sightings, shape: Shape, histogram: F64) -> list[Seed]:
+def _seeds(line: I32, seen: Sightings, shape: RoadCurve, histogram: F64) -> list[Seed]:
     """Where each line lies at x = 0, and which points it may be made of: those that the detector says are one line, or,
     where it does not say, any that are near a peak of the histogram."""
     groups = sorted(set(line[line >= 0].tolist()))
@@ -245,7 +221,7 @@ def _seeds(line: I32, seen: Sightings, shape: Shape, histogram: F64) -> list[See
     return [(float(np.median(y0[line == group])), seen.only(line == group)) for group in groups]
 
 
-def _fitted(seeds: list[Seed], shape: Shape, bearing_sigma_rad: float) -> list[tuple[FittedLine, Sightings]]:
+def _fitted(seeds: list[Seed], shape: RoadCurve, bearing_sigma_rad: float) -> list[tuple[FittedLine, Sightings]]:
     """The line through each seed's points, with those points; without the hopeless ones."""
     fits = [(line_fit.fit_line(points, y0, shape, bearing_sigma_rad), points) for y0, points in seeds]
     return [(found, points) for found, points in fits if found is not None and found.quality > _HOPELESS]

@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64
-from pipeline.lanes.line_fit import FittedLine, Shape
+from pipeline.lanes.line_fit import FittedLine, RoadCurve
 from pipeline.params import LaneParams
 from pipeline.types import EgoState
 from pipeline.types.lane import EgoLane, LaneLine, Side, powers
@@ -50,26 +50,34 @@ _CLOTHOID_PER_M2 = 1.0 / 150.0**2
 
 @dataclass(frozen=True, eq=False)
 class LineTrack:
-    """One tracked line. coefficients (4,), covariance (4, 4); seen: how often; unseen_s: time since it was last
-    seen."""
+    """One tracked line."""
 
     coefficients: F64
+    """(4,) of the cubic y(x) in the ego frame, metres."""
     covariance: F64
+    """(4, 4) of the coefficients."""
     x_min_m: float
+    """Nearest x that the line was seen at."""
     x_max_m: float
+    """Farthest x that the line was seen at."""
     quality: float
+    """0–1; fades while the line is not seen."""
     seen: int = 1
+    """In how many images."""
     unseen_s: float = 0.0
+    """Time since it was last seen."""
 
 
 @dataclass(frozen=True, eq=False)
 class LaneTracks:
-    """Every tracked line. source: the detector's name, None before it first delivered; age_s: time since it last
-    did."""
+    """Every tracked line."""
 
     lines: tuple[LineTrack, ...] = ()
+    """In no particular order."""
     source: str | None = None
+    """The detector's name; None before it first delivered."""
     age_s: float = 0.0
+    """Time since it last did."""
 
 
 def predict(tracks: LaneTracks, ego: EgoState | None, dt_s: float | None, params: LaneParams) -> LaneTracks:
@@ -122,12 +130,12 @@ def ego_lane(tracks: LaneTracks, pitch_rad: float, plane: F64, params: LaneParam
     return EgoLane(_as_line("left", a), _as_line("right", b), tracks.source, tracks.age_s, pitch_rad, width, plane)
 
 
-def expected_shape(tracks: LaneTracks) -> Shape | None:
+def expected_shape(tracks: LaneTracks) -> RoadCurve | None:
     """Heading and curvature of the best line, to search around; None when none is sure."""
     best = max(tracks.lines, key=lambda line: line.quality, default=None)
     if best is None or best.quality < 0.5 or best.seen < 3:
         return None
-    return Shape(
+    return RoadCurve(
         float(best.coefficients[1]),
         float(2.0 * best.coefficients[2]),
         heading_reach_rad=0.045,

@@ -19,9 +19,7 @@ import numpy.typing as npt
 
 from pipeline.lidar.ground import Ground, no_higher_than
 from pipeline.params import ClusterParams
-from pipeline.types import DROPPED, F32, F64, GROUND, I32, UNCLUSTERED
-
-Mask = npt.NDArray[np.bool_]
+from pipeline.types import DROPPED, F32, F64, GROUND, I32, UNCLUSTERED, Mask
 
 UNLABELLED = -1
 _WIDEST_M = 2.6

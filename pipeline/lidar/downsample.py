@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.params import DownsampleParams
-from pipeline.types import Sweep
-
-Mask = npt.NDArray[np.bool_]
+from pipeline.types import Mask, Sweep
 
 
 def keep_mask(sweep: Sweep, params: DownsampleParams) -> Mask:

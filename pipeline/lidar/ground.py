@@ -19,14 +19,11 @@ Choices that the two papers leave open, made on real 16-channel sweeps:
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.lidar import ground_kernels as kernels
 from pipeline.params import GroundParams
-from pipeline.types import F32
+from pipeline.types import F32, Mask
 from pipeline.types import Ground as Ground
-
-Mask = npt.NDArray[np.bool_]
 
 
 def no_higher_than(ground: Ground, points: F32, of: Mask, height_m: float) -> Mask:

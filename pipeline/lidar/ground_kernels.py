@@ -7,9 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.lidar.plane_kernels import refine
-from pipeline.types import F32, F64
+from pipeline.types import F32, F64, Mask
 
-Mask = npt.NDArray[np.bool_]
 U32 = npt.NDArray[np.uint32]
 
 MIN_COS_BEND = float(np.cos(np.radians(3.0)))

@@ -22,6 +22,7 @@ from scipy.optimize import linear_sum_assignment
 
 from pipeline.common import kalman
 from pipeline.common.geometry import Cuboid
+from pipeline.lidar.track_history import first_sightings, recorded, rigid_sideways, slopes
 from pipeline.params import LidarTrackingParams
 from pipeline.types import F64, I64, LidarTrack, Obstacle, Point3
 
@@ -31,10 +32,6 @@ MIN_GATE_POINTS = 10
 """Counts and densities below this many points are noise: one ring more or less doubles them."""
 _SIDES_FRAMES = 10
 """Sightings over which the sides of a footprint are compared: a second at 10 Hz."""
-_SIDE_NOISE_M = 0.15
-"""Least noise of a side: neighbouring rays of a VLP-16 are 0.1 m apart at 28 m, and a rounded corner
-adds as much."""
-_SURE_SIGMAS = 2.0
 THINNEST_M = 0.5
 """Thinnest footprint for comparing densities. A rear alone is as thin as the LiDAR's noise; with some flank the same
 car has twenty times the area."""
@@ -56,18 +53,21 @@ _NO_FILTERS = kalman.CvState(np.zeros((0, 4)), np.zeros((0, 4, 4)))
 
 @dataclass(frozen=True)
 class LidarTrackerState:
-    """What one frame leaves to the next; arrays have one row per track, in the order of ``tracks``.
-
-    filters: mean (T, 4), cov (T, 4, 4). shape: (T, 5) of the last sighting, as in ``Looks``. history: (T, H, 5)
-    ``t_s x y low high`` of the last sightings' reference points and sides, newest last, NaN before the first.
-    ``clock_s`` runs from the first frame."""
+    """What one frame leaves to the next; arrays have one row per track, in the order of ``tracks``."""
 
     tracks: tuple[LidarTrack, ...] = ()
+    """As they were given to fusion."""
     filters: kalman.CvState = _NO_FILTERS
+    """mean (T, 4), cov (T, 4, 4)."""
     shape: F64 = field(default_factory=lambda: np.zeros((0, 5)))
+    """(T, 5) of the last sighting, as in ``Looks``."""
     history: F64 = field(default_factory=lambda: np.zeros((0, 1, 5)))
+    """(T, H, 5) ``t_s x y low high`` of the last sightings' reference points and sides, newest last, NaN before the
+    first."""
     next_id: int = 1
+    """Number of the next new track; numbers are never given twice."""
     clock_s: float = 0.0
+    """Runs from the first frame; the time of ``history``."""
 
 
 def track(
@@ -91,7 +91,7 @@ def track(
     partner = associate(state, filters, seen, dt_s, params)
     filters = _correct(filters, seen.place, partner, params)
     where = np.concatenate([seen.place, seen.sides], axis=1)
-    history = _recorded(state.history, partner, where, clock_s, max(params.trajectory_frames, _SIDES_FRAMES))
+    history = recorded(state.history, partner, where, clock_s, max(params.trajectory_frames, _SIDES_FRAMES))
     velocity = filters.mean[:, 2:]
     if params.filter == "trajectory":
         velocity = slopes(history[:, -params.trajectory_frames :, :3])
@@ -126,7 +126,7 @@ def track(
             np.concatenate([filters.mean[rows], begun.mean]), np.concatenate([filters.cov[rows], begun.cov])
         ),
         shape=np.concatenate([shape[rows], seen.shape[fresh]]),
-        history=np.concatenate([history[rows], _first(where[fresh], clock_s, history.shape[1])]),
+        history=np.concatenate([history[rows], first_sightings(where[fresh], clock_s, history.shape[1])]),
         next_id=state.next_id + len(fresh),
         clock_s=clock_s,
     )
@@ -238,65 +238,6 @@ def _correct(filters: kalman.CvState, place: F64, partner: I64, params: LidarTra
 
 def _noise(params: LidarTrackingParams) -> F64:
     return np.eye(2) * params.position_sigma_m**2
-
-
-def _recorded(history: F64, partner: I64, place: F64, clock_s: float, frames: int) -> F64:
-    """(T, frames, 5) the history with this tick's sightings at its end."""
-    kept: F64 = np.full((len(history), frames, 5), np.nan)
-    common = min(frames, history.shape[1])
-    kept[:, frames - common :] = history[:, history.shape[1] - common :]
-    rows = np.flatnonzero(partner >= 0)
-    kept[rows, :-1] = kept[rows, 1:]
-    kept[rows, -1, 0] = clock_s
-    kept[rows, -1, 1:] = place[partner[rows]]
-    return kept
-
-
-def _first(place: F64, clock_s: float, frames: int) -> F64:
-    """(N, frames, 5) the histories of tracks seen once, now."""
-    history: F64 = np.full((len(place), frames, 5), np.nan)
-    history[:, -1, 0], history[:, -1, 1:] = clock_s, place
-    return history
-
-
-def slopes(history: F64) -> F64:
-    """(T, C) speed in m/s of the least-squares line through each column of (T, H, 1 + C) ``t_s …``; NaN where all are
-    of one time."""
-    known = ~np.isnan(history[:, :, :1])
-    table = np.where(known, history, 0.0)
-    mean = table.sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1)
-    t, xy = (table - mean)[:, :, :1] * known, (table - mean)[:, :, 1:]
-    spread = np.sum(t * t, axis=1)
-    return np.asarray(
-        np.divide(
-            np.sum(t * xy, axis=1), spread, out=np.full((len(history), table.shape[2] - 1), np.nan), where=spread > 0.0
-        )
-    )
-
-
-def rigid_sideways(history: F64) -> F64:
-    """(T,) how fast each track surely moves along ego y as a whole, m/s, of its (H, 5) history: the speed that both of
-    its sides share, less what their scatter explains; 0 where they part.
-
-    A parked car's footprint grows while we pass, as more of its flank comes into view: its reference point moves by
-    metres, one of its sides does not. A car that pulls out takes both sides along."""
-    if not len(history):
-        return np.zeros(0)
-    sides = history[:, :, [0, 3, 4]]
-    speed = slopes(sides)
-    known = ~np.isnan(sides[:, :, :1])
-    count = np.maximum(known.sum(axis=1), 1)
-    t = np.where(known, sides[:, :, :1], 0.0)
-    t = (t - t.sum(axis=1, keepdims=True) / count[:, None]) * known
-    y = np.where(known, sides[:, :, 1:], 0.0)
-    y = (y - y.sum(axis=1, keepdims=True) / count[:, None]) * known
-    residual = np.sum((y - t * np.nan_to_num(speed)[:, None, :]) ** 2, axis=1) / np.maximum(count - 2, 1)
-    noise_m = np.sqrt(np.maximum(residual, _SIDE_NOISE_M**2))
-    span = np.sqrt(np.sum(t * t, axis=1))
-    sure = np.abs(speed) - _SURE_SIGMAS * np.divide(noise_m, span, out=np.full_like(noise_m, np.inf), where=span > 0.0)
-    least = np.clip(np.nan_to_num(sure, nan=0.0, neginf=0.0).min(axis=1), 0.0, None)
-    together = np.sign(speed[:, 0]) == np.sign(speed[:, 1])
-    return np.asarray(np.where(together, np.sign(np.nan_to_num(speed[:, 0])) * least, 0.0))
 
 
 def _lives_on(last: LidarTrack, unseen_s: float, has_sweep: bool, params: LidarTrackingParams) -> bool:

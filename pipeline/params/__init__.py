@@ -83,25 +83,45 @@ class Params(Section):
     """All parameters of the pipeline, by stage."""
 
     deskew: DeskewParams = DeskewParams()
+    """LiDAR, before all else: ego motion taken out of a sweep."""
     downsample: DownsampleParams = DownsampleParams()
+    """LiDAR: fewer points, the same for each channel."""
     ground: GroundParams = GroundParams()
+    """LiDAR: what is road and what stands on it."""
     cluster: ClusterParams = ClusterParams()
+    """LiDAR: which points belong together."""
     box: BoxParams = BoxParams()
+    """LiDAR: the cuboid around a cluster."""
     lidar_tracking: LidarTrackingParams = LidarTrackingParams()
+    """LiDAR: clusters from sweep to sweep."""
     detection: DetectionParams = DetectionParams()
+    """Camera: which boxes of the detector count."""
     distance: DistanceParams = DistanceParams()
+    """Camera: how far a box is by its height."""
     vision_tracking: VisionTrackingParams = VisionTrackingParams()
+    """Camera: boxes from image to image."""
     alignment: AlignmentParams = AlignmentParams()
+    """How points are projected into the image."""
     fusion: FusionParams = FusionParams()
+    """Which LiDAR track and which camera track are one object."""
     existence: ExistenceParams = ExistenceParams()
+    """What each sensor says for and against an object."""
     motion: MotionParams = MotionParams()
+    """Where ego motion comes from, and what counts as moving."""
     lanes: LaneParams = LaneParams()
+    """Lane lines, found and tracked."""
     path: PathParams = PathParams()
+    """Where the car is going."""
     cipv: CipvParams = CipvParams()
+    """Who can be the lead, and who is."""
     acc: AccParams = AccParams()
+    """Following the lead."""
     aeb: AebParams = AebParams()
+    """Warning and emergency braking."""
     time: TimeParams = TimeParams()
+    """Where one clip of a recording ends and the next begins."""
     sync: SyncParams = SyncParams()
+    """Live sensors: which messages make one tick."""
 
 
 PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
@@ -138,6 +158,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "decide_s": 0.0,
             "become_existence": 0.0,
             "become_probability": 0.0,
+            "become_standing": 0.0,
             "stay_probability": 0.0,
         },
         "acc": {"comfort_decel_mps2": 8.0, "approach_decel_mps2": 0.0, "confirm_frames": 1},

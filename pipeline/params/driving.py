@@ -120,7 +120,20 @@ class CipvParams(Section):
         0.7, 0.0, 0.95, 0.01, "", "To become the lead, an object must exist with at least this probability"
     )
     become_probability: float = slider(
-        0.5, 0.0, 0.95, 0.01, "", "To become the lead, an object must be in the path with at least this probability"
+        0.5,
+        0.0,
+        0.95,
+        0.01,
+        "",
+        "To become the lead, an object must exist and be in the path with at least this probability",
+    )
+    become_standing: float = slider(
+        0.67,
+        0.0,
+        0.95,
+        0.01,
+        "",
+        "The same for a vehicle that stands: far more of them are parked beside the path than stopped in it",
     )
     stay_probability: float = slider(
         0.4, 0.0, 0.95, 0.05, "", "The lead is kept while both probabilities are at least this"
@@ -143,7 +156,12 @@ class AccParams(Section):
     max_accel_mps2: float = slider(2.0, 0.5, 5.0, 0.1, "m/s²", "Acceleration at full accelerator")
     max_decel_mps2: float = slider(8.0, 1.0, 10.0, 0.1, "m/s²", "Deceleration at full brake")
     comfort_decel_mps2: float = slider(
-        3.5, 0.5, 10.0, 0.1, "m/s²", "Hardest ACC braking on weak evidence (ISO 15622 permits 3.5 at speed)"
+        3.5,
+        0.5,
+        10.0,
+        0.1,
+        "m/s²",
+        "Hardest ACC braking unless a collision takes more to avoid, and evidence is strong (ISO 15622: 3.5 at speed)",
     )
     approach_decel_mps2: float = slider(
         2.5,

@@ -28,15 +28,20 @@ EDGE_SIGMA_M = 0.5
 
 @dataclass(frozen=True, eq=False)
 class FusedPath:
-    """The path of all sources together. center: (K, 2). sigma_m: (K,). left_m, right_m: (K,) distances to the edges.
-    shares: (K, S) of ``SOURCES``. behind_m: (K,) how far it still lags behind its sources."""
+    """The path of all sources together, at s = 0, 1, … m."""
 
     center: F64
+    """(K, 2) ego x, y."""
     sigma_m: F64
+    """(K,) standard deviation of the lateral position."""
     left_m: F64
+    """(K,) distance from the centre to the left edge."""
     right_m: F64
+    """(K,) distance from the centre to the right edge."""
     shares: F64
+    """(K, S) weight of each of ``SOURCES`` in the mean."""
     behind_m: F64
+    """(K,) how far it still lags behind its sources."""
 
 
 def normals(center: F64) -> F64:

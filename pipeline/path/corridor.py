@@ -44,11 +44,14 @@ _USABLE_WITHOUT_SPEED_M, _USABLE_AT_STANDSTILL_M = 20.0, 5.0
 
 @dataclass(frozen=True, eq=False)
 class PathState:
-    """What one frame leaves to the next. last: the fused path; None where nothing can be carried over."""
+    """What one frame leaves to the next."""
 
     yaw: YawRate | None = None
+    """Smoothed yaw rate; None before the first."""
     gnss: GnssState = GnssState()
+    """Where on the route the car is."""
     last: FusedPath | None = None
+    """The fused path; None where nothing can be carried over."""
 
 
 class Evidence(NamedTuple):

@@ -18,8 +18,8 @@ from pipeline.params import PathParams
 from pipeline.types import EgoState
 from pipeline.types.lane import EgoLane, LaneLine
 
-SourceName = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "traffic"]
-SOURCES: tuple[SourceName, ...] = ("lane", "gnss", "yaw_rate", "straight", "edges", "traffic")
+PathSourceName = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "traffic"]
+SOURCES: tuple[PathSourceName, ...] = ("lane", "gnss", "yaw_rate", "straight", "edges", "traffic")
 STEP_M = 1.0
 UNKNOWN_SIGMA_M = 1e3
 """Sigma of a position about which a source says nothing."""
@@ -42,16 +42,18 @@ point on the road may be taken to be."""
 
 @dataclass(frozen=True, eq=False)
 class PathEstimate:
-    """The path as one source has it, at s = 0, 1, … m. left_m, right_m: (K,) float64 distances from the centre to the
-    lane's edges; None where the source does not see edges."""
+    """The path as one source has it, at s = 0, 1, … m."""
 
-    source: SourceName
+    source: PathSourceName
+    """Whose estimate it is."""
     center: F64
     """(K, 2) float64 ego x, y."""
     sigma_m: F64
     """(K,) float64, standard deviation of the lateral position."""
     left_m: F64 | None = None
+    """(K,) float64, distance from the centre to the lane's left edge; None where the source does not see edges."""
     right_m: F64 | None = None
+    """The same of the right edge."""
 
 
 @lru_cache(maxsize=8)

@@ -44,16 +44,18 @@ GROWTH = _Growth()
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
-    """mean: (3,) float64 ``x y heading``. cov: (3, 3) float64."""
+class MapPose:
+    """A Gaussian over place and heading on the map."""
 
     mean: F64
+    """(3,) float64 east and north in metres, heading in radians counter-clockwise from east."""
     cov: F64
+    """(3, 3) float64 covariance of the same."""
 
 
-def start(x: float, y: float, heading_rad: float, place_sigma_m: float) -> Pose:
+def start(x: float, y: float, heading_rad: float, place_sigma_m: float) -> MapPose:
     """At the first fix that comes with a course."""
-    return Pose(np.array([x, y, heading_rad]), np.diag([place_sigma_m**2] * 2 + [_START_HEADING_SIGMA_RAD**2]))
+    return MapPose(np.array([x, y, heading_rad]), np.diag([place_sigma_m**2] * 2 + [_START_HEADING_SIGMA_RAD**2]))
 
 
 def white_sigma_m(sigma_m: float) -> float:
@@ -62,8 +64,8 @@ def white_sigma_m(sigma_m: float) -> float:
 
 
 def predict(
-    pose: Pose, speed_mps: float, yaw_rate_radps: float | None, dt_s: float, coasting: Coasting | None = None
-) -> Pose:
+    pose: MapPose, speed_mps: float, yaw_rate_radps: float | None, dt_s: float, coasting: Coasting | None = None
+) -> MapPose:
     """The pose ``dt_s`` later by dead reckoning; a yaw rate that nobody ever measured is 0 ± 0.05 rad/s. coasting: what
     comes on top where speed and yaw rate are those of a while ago."""
     turn = GROWTH.heading_rad_per_root_s if yaw_rate_radps is not None else GROWTH.heading_without_yaw_rate
@@ -72,10 +74,10 @@ def predict(
     if coasting is not None:
         along_var, turn_var = along_var + coasting.travelled_var_m2, turn_var + coasting.turned_var_rad2
     mean, cov = _predict(pose.mean, pose.cov, speed_mps, yaw_rate_radps or 0.0, dt_s, along_var, turn_var)
-    return Pose(mean, cov)
+    return MapPose(mean, cov)
 
 
-def jump_m(pose: Pose, x: float, y: float, sigma_m: float, sigmas: float) -> float | None:
+def jump_m(pose: MapPose, x: float, y: float, sigma_m: float, sigmas: float) -> float | None:
     """How far a fix lies from where it was expected, when that is farther than the noise explains (the innovation's
     Mahalanobis distance against ``sigmas``); None when it is where it should be."""
     dx, dy = x - float(pose.mean[0]), y - float(pose.mean[1])
@@ -85,19 +87,19 @@ def jump_m(pose: Pose, x: float, y: float, sigma_m: float, sigmas: float) -> flo
     return away if distance2 > sigmas**2 and away > _SMALLEST_JUMP_M else None
 
 
-def with_fix(pose: Pose, x: float, y: float, sigma_m: float) -> Pose:
+def with_fix(pose: MapPose, x: float, y: float, sigma_m: float) -> MapPose:
     """The pose after a fix that scatters by ``sigma_m`` each way."""
     mean, cov = _measure(pose.mean, pose.cov, 0, x, sigma_m**2)
-    return Pose(*_measure(mean, cov, 1, y, sigma_m**2))
+    return MapPose(*_measure(mean, cov, 1, y, sigma_m**2))
 
 
-def with_course(pose: Pose, heading_rad: float, speed_mps: float) -> Pose:
+def with_course(pose: MapPose, heading_rad: float, speed_mps: float) -> MapPose:
     """The pose after a course; one that lies more than 90° off is a car that reverses, and says nothing."""
     off = (heading_rad - float(pose.mean[2]) + pi) % (2 * pi) - pi
     if not isfinite(off) or abs(off) > pi / 2:
         return pose
     sigma = COURSE_SIGMA_MPS / max(speed_mps, COURSE_SIGMA_MPS)
-    return Pose(*_measure(pose.mean, pose.cov, 2, float(pose.mean[2]) + off, sigma * sigma))
+    return MapPose(*_measure(pose.mean, pose.cov, 2, float(pose.mean[2]) + off, sigma * sigma))
 
 
 @numba.njit(cache=True, nogil=True)

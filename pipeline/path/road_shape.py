@@ -44,9 +44,13 @@ class Grid(NamedTuple):
     """Which shapes are tried: how far aside at the two nodes (m) and the heading (rad), each from −most to most."""
 
     first_m: tuple[float, float]
+    """At the near node: most, step."""
     second_m: tuple[float, float]
+    """At the far node: most, step."""
     heading: tuple[float, float]
+    """Most, step."""
     bin_m: float
+    """Width of the lateral bins in which points vote."""
 
 
 _WIDE = Grid((8.0, 1.0), (24.0, 2.0), (0.0, 1.0), 1.5)

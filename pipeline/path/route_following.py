@@ -17,7 +17,7 @@ from pipeline.common.geometry import F64
 from pipeline.params import PathParams
 from pipeline.path import map_pose as poses
 from pipeline.path.estimates import UNKNOWN_SIGMA_M, PathEstimate, samples
-from pipeline.path.map_pose import Pose
+from pipeline.path.map_pose import MapPose
 from pipeline.path.route_line import SPACING_M, RouteLine, lay_out, to_grid
 from pipeline.path.yaw_rate import usable_rate
 from pipeline.types import EgoState, GnssFix, Route
@@ -40,19 +40,24 @@ _SEARCH_M = 60.0
 
 @dataclass(frozen=True, eq=False)
 class GnssState:
-    """line: the route laid out. pose: of the car; None before the first fix with a course. fix_t_ns: of the last fix
-    looked at. fix_sigma_m: of the last one believed. doubt_m: what the last jump left, fading. refused_s: for how long
-    every fix has been refused. at_m: place along the route; None while not on it. placed_anew: after a jump that
-    stayed, until the doubt has faded."""
+    """Where the car is on the route, from frame to frame."""
 
     line: RouteLine | None = None
-    pose: Pose | None = None
+    """The route laid out; None without a route."""
+    pose: MapPose | None = None
+    """Of the car on the map; None before the first fix with a course."""
     fix_t_ns: int | None = None
+    """Of the last fix looked at: a fix that is repeated counts once."""
     fix_sigma_m: float = 0.0
+    """Standard deviation of the last fix believed."""
     doubt_m: float = 0.0
+    """What the last jump left, fading."""
     refused_s: float = 0.0
+    """For how long every fix has been refused."""
     at_m: float | None = None
+    """Distance along the route; None while not on it."""
     placed_anew: bool = False
+    """After a jump that stayed, until the doubt has faded."""
 
 
 def follow(
@@ -194,7 +199,7 @@ def _at(state: GnssState, at_m: float | None) -> GnssState:
     return evolve(state, at_m=at_m)
 
 
-def _match(line: RouteLine, pose: Pose, last_m: float | None, reach_m: float) -> float | None:
+def _match(line: RouteLine, pose: MapPose, last_m: float | None, reach_m: float) -> float | None:
     """Place along the route of the point nearest to the car, driven the same way as the car goes: a route may cross
     itself, or come back on the other side of the road. Near the last match where there is one."""
     x, y, heading = pose.mean.tolist()
@@ -212,7 +217,7 @@ def _match(line: RouteLine, pose: Pose, last_m: float | None, reach_m: float) ->
     return float(np.clip(k * SPACING_M + along, 0.0, (len(line.places) - 1) * SPACING_M))
 
 
-def _sideways_variance(pose: Pose) -> float:
+def _sideways_variance(pose: MapPose) -> float:
     """Variance of the position across the car's heading."""
     n = np.array([-np.sin(pose.mean[2]), np.cos(pose.mean[2])])
     return float(n @ pose.cov[:2, :2] @ n)

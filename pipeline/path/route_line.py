@@ -22,13 +22,16 @@ _NORTH, _SOUTH = 32600, 32700
 
 @dataclass(frozen=True, eq=False)
 class RouteLine:
-    """A route as a line on the UTM grid. places: (K, 2) float64 east, north, one a metre. headings: (K,) float64
-    radians counter-clockwise from grid east. epsg: of the UTM zone its first point lies in."""
+    """A route as a line on the UTM grid."""
 
     route: Route
+    """What it was made from, to tell whether it is still the same."""
     epsg: int
+    """Code of the UTM zone that its first point lies in."""
     places: F64
+    """(K, 2) float64 east, north; one a metre."""
     headings: F64
+    """(K,) float64 radians counter-clockwise from grid east."""
 
 
 def lay_out(route: Route) -> RouteLine | None:

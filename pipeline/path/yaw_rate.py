@@ -34,10 +34,12 @@ _LASTING = 0.5
 
 @dataclass(frozen=True)
 class YawRate:
-    """A smoothed yaw rate, rad/s, and its variance, which grows while none is measured."""
+    """A smoothed yaw rate."""
 
     rate_radps: float
+    """Positive to the left."""
     variance: float
+    """(rad/s)²; grows while none is measured."""
 
 
 def follow(before: YawRate | None, ego: EgoState | None, dt_s: float | None, params: PathParams) -> YawRate | None:

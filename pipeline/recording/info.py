@@ -21,47 +21,68 @@ _GAP_STEPS = 1.5
 
 @dataclass(frozen=True)
 class Rhythm:
-    """How something came over time. rate_hz: over the whole of it, None for fewer than two or all at once;
-    usual_step_s: the median step, which is shorter where there are gaps. gaps: steps of more than 1.5 usual ones;
-    longest_gap_s: the longest step of all. duration_s: all steps together, but those back in time."""
+    """How something came over time."""
 
     count: int
+    """Number of messages."""
     first_ns: int | None
+    """None for none."""
     last_ns: int | None
+    """None for none."""
     duration_s: float
+    """All steps together, but those back in time."""
     rate_hz: float | None
+    """Over the whole of it; None for fewer than two or all at once."""
     usual_step_s: float | None
+    """The median step, which is shorter than the mean where there are gaps."""
     gaps: int
+    """Steps of more than 1.5 usual ones."""
     longest_gap_s: float | None
+    """The longest step of all."""
 
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """rhythm: by log time, that is when its messages were received."""
+    """One topic of a file."""
 
     topic: str
+    """With its slashes."""
     schema: str
+    """Name of its messages' type."""
     encoding: str
+    """Of its messages, such as ``json`` or ``protobuf``."""
     rhythm: Rhythm
+    """By log time, that is when its messages were received."""
 
 
 @dataclass(frozen=True)
 class Info:
-    """about: None for a file that is no session of ours. frames: by header time, where there are frames. problem: None
-    for a whole file. chain: whether it is as it was written, None when nobody looked."""
+    """One MCAP file, ours or not."""
 
     path: str
+    """As it was given."""
     bytes: int
+    """Of the file."""
     profile: str
+    """As the file's header names it; empty for none."""
     duration_s: float
+    """From the first message to the last."""
     about: About | None
+    """None for a file that is no session of ours."""
     frames: Rhythm | None
+    """By header time, where there are frames."""
     topics: tuple[TopicInfo, ...]
+    """One for each channel of the file."""
     chunks: int
+    """In all."""
     damaged_chunks: int
+    """Whose content cannot be read."""
     marks: tuple[str, ...]
+    """Put by a person while recording."""
     problem: str | None
+    """What the file lacks; None for a whole one."""
     chain: Chain | None
+    """Whether it is as it was written; None when nobody looked."""
 
 
 def info(path: Path, *, is_quick: bool = False) -> Info:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from pipeline.params import Params
-from pipeline.recording.segments import NEVER, Rotation, Segments
+from pipeline.recording.segments import NEVER, FileRotation, Segments
 from pipeline.recording.session.provenance import About
 from pipeline.recording.session.velodyne_scan import RawLidar
 from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep
@@ -55,16 +55,22 @@ class _Job(NamedTuple):
 
 @dataclass(frozen=True)
 class RecordingState:
-    """How a recording does. file: the newest of ``files``. seconds, bytes: over all of them. dropped: frames, batches
-    of packets, sweeps, images and samples that did not fit. error: why it ended by itself, None while all is well."""
+    """How a recording does."""
 
     file: Path
+    """The newest of ``files``."""
     files: tuple[Path, ...]
+    """In order of time."""
     frames: int
+    """Written so far, over all files."""
     seconds: float
+    """Over all files."""
     bytes: int
+    """Over all files."""
     dropped: int
+    """Frames, batches of packets, sweeps, images and samples that did not fit."""
     error: str | None
+    """Why it ended by itself; None while all is well."""
 
     def to_json(self) -> dict[str, Any]:
         """As the page and ``/api/recording`` read it."""
@@ -87,7 +93,7 @@ class Recorder:
         self,
         path: Path,
         about: About,
-        rotation: Rotation = NEVER,
+        rotation: FileRotation = NEVER,
         *,
         queued: int = _QUEUED,
         raw_lidar: RawLidar | None = None,

@@ -7,7 +7,6 @@ import os
 import zlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO
 
@@ -47,13 +46,21 @@ class _Chained:
         self.file.flush()
 
 
-def relabel(file: McapFile, out: Path, labels: bytes, t_ns: int, progress: Progress = silent) -> bool:
+def relabel(
+    file: McapFile,
+    out: Path,
+    labels: bytes,
+    t_ns: int,
+    progress: Progress = silent,
+    drawn: Sequence[Stored] = (),
+) -> bool:
     """Write a new file ``out`` with these labels, of header time ``t_ns``, in place of any that were in it. progress:
-    of bytes. False, and nothing written, where the file's end does not tell enough for that.
+    of bytes. drawn: what viewers show of the labels, at the times of its frames. False, and nothing written, where the
+    file's end does not tell enough for that.
 
     BadInput when ``out`` exists; whatever ends this early leaves no file behind.
     """
-    with file.path.open("rb") as source:
+    with file.open_again() as source:
         summary = read_summary(source, file.size)
         place = _first_with_labels(file)
         if summary is None or place == 0 or not _is_in_order(file, summary):
@@ -70,7 +77,7 @@ def relabel(file: McapFile, out: Path, labels: bytes, t_ns: int, progress: Progr
                 end += link[1] if link is not None else 0
                 _copy(source, target, end, progress)
                 stream = _Chained(target, link[0].sha256) if link is not None else target
-                _write_rest(file, summary, place, end, stream, labels, t_ns)
+                _write_rest(file, summary, place, end, stream, labels, t_ns, drawn)
                 os.fsync(target.fileno())
         except BaseException:
             out.unlink(missing_ok=True)
@@ -80,7 +87,7 @@ def relabel(file: McapFile, out: Path, labels: bytes, t_ns: int, progress: Progr
 
 def _first_with_labels(file: McapFile) -> int:
     """The place of the first chunk that may hold labels; the number of chunks when none does."""
-    numbers = {number for number, channel in file.directory.channels.items() if channel.topic == topics.LABELS}
+    numbers = {number for number, channel in file.directory.channels.items() if channel.topic in topics.OF_LABELS}
     chunks = file.directory.chunks
     return next((i for i, each in enumerate(chunks) if each.channels is None or each.channels & numbers), len(chunks))
 
@@ -92,33 +99,41 @@ def _is_in_order(file: McapFile, summary: Summary) -> bool:
     return known and all(sorted(each) == [*range(1, len(each) + 1)] for each in (summary.schemas, summary.channels))
 
 
-def _copy(source: BufferedReader, target: BinaryIO, end: int, progress: Progress) -> None:
-    piece, done = memoryview(bytearray(_PIECE_BYTES)), 0
+def _copy(source: BinaryIO, target: BinaryIO, end: int, progress: Progress) -> None:
+    done = 0
     source.seek(0)
     while done < end:
         progress(done, end)
-        count = source.readinto(piece[: end - done])
-        if not count:
-            raise OSError(f"{source.name}: it shrank while being read")
-        target.write(piece[:count])
-        done += count
+        piece = source.read(min(_PIECE_BYTES, end - done))
+        if not piece:
+            raise OSError("the session shrank while being read")
+        target.write(piece)
+        done += len(piece)
 
 
 def _write_rest(
-    file: McapFile, before: Summary, place: int, end: int, target: BinaryIO | _Chained, labels: bytes, t_ns: int
+    file: McapFile,
+    before: Summary,
+    place: int,
+    end: int,
+    target: BinaryIO | _Chained,
+    labels: bytes,
+    t_ns: int,
+    drawn: Sequence[Stored],
 ) -> None:
     """What comes after byte ``end``: the messages from chunk ``place`` on, the labels, what was attached, the summary.
     The library writes it as the end of a file that began with it; what lies before it is told of afterwards."""
     chunks = file.directory.chunks
     passed = [stored for at in range(place, len(chunks)) for stored in file.chunk(at)]
-    kept = [stored for stored in passed if stored.channel.topic != topics.LABELS]
+    kept = [stored for stored in passed if stored.channel.topic not in topics.OF_LABELS]
     log_time_ns = kept[-1].log_time_ns if kept else chunks[place - 1].end_ns
     writer = Writer(target, CHUNK_BYTES)  # type: ignore[arg-type]  # of a file it wants these three methods
-    numbers = _register(writer, file, before)
+    said = [*drawn, Stored(_LABELS, log_time_ns, t_ns, labels)]
+    numbers = _register(writer, file, before, [each.channel for each in said])
     copied = Counter(before.statistics.channel_message_counts if before.statistics is not None else {})
     copied -= Counter(numbers[stored.channel] for stored in passed)
     sequences = Counter(copied)
-    for channel, at_ns, published_ns, data in (*kept, Stored(_LABELS, log_time_ns, t_ns, labels)):
+    for channel, at_ns, published_ns, data in (*kept, *said):
         sequences[numbers[channel]] += 1
         writer.add_message(numbers[channel], at_ns, data, max(published_ns, 0), sequences[numbers[channel]])
     for attached in before.attachment_indexes:
@@ -135,17 +150,20 @@ def _write_rest(
     _tell_of_all(target.file if isinstance(target, _Chained) else target, before, end, copied)
 
 
-def _register(writer: Writer, file: McapFile, before: Summary) -> dict[topics.Channel, int]:
-    """Schemas and channels under the numbers that they have, and labels' where there were none."""
+def _register(
+    writer: Writer, file: McapFile, before: Summary, said: Sequence[topics.Channel]
+) -> dict[topics.Channel, int]:
+    """Schemas and channels under the numbers that they have, and those of labels where there were none."""
     for schema in (before.schemas[number] for number in sorted(before.schemas)):
         writer.register_schema(schema.name, schema.encoding, schema.data)
     numbers: dict[topics.Channel, int] = {}
     for channel in (before.channels[number] for number in sorted(before.channels)):
         number = writer.register_channel(channel.topic, channel.message_encoding, channel.schema_id, channel.metadata)
         numbers[file.directory.channels[channel.id]] = number
-    if _LABELS not in numbers:
-        schema_id = writer.register_schema(_LABELS.schema_name, _LABELS.schema_encoding, _LABELS.schema_data)
-        numbers[_LABELS] = writer.register_channel(_LABELS.topic, _LABELS.message_encoding, schema_id)
+    for new in dict.fromkeys(said):
+        if new not in numbers:
+            schema_id = writer.register_schema(new.schema_name, new.schema_encoding, new.schema_data)
+            numbers[new] = writer.register_channel(new.topic, new.message_encoding, schema_id)
     return numbers
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.common.progress import Progress, silent
 from pipeline.recording import topics
+from pipeline.recording.drawn_labels import NOTHING_DRAWN, Drawn
 from pipeline.recording.errors import Damaged
 from pipeline.recording.mcap import chain
 from pipeline.recording.mcap.output import Output
@@ -20,16 +21,22 @@ from pipeline.recording.session.velodyne_scan import PACKETS_BEFORE_NS
 
 @dataclass(frozen=True)
 class Recovered:
-    """What was saved. is_cut: the file's end was missing. sound_bytes: up to where its records were whole, of
-    size_bytes. lost_chunks: whole in length, damaged in content."""
+    """What was saved."""
 
     messages: int
+    """Copied."""
     frames: int
+    """Of these, whole frames."""
     chunks: int
+    """That were read."""
     lost_chunks: int
+    """Whole in length, damaged in content."""
     sound_bytes: int
+    """Up to where the file's records were whole."""
     size_bytes: int
+    """Of the damaged file."""
     is_cut: bool
+    """Whether the file's end was missing."""
 
 
 def recover(path: Path, out: Path, progress: Progress = silent) -> Recovered:
@@ -66,11 +73,13 @@ def clip(
     out: Path,
     labels: bytes | None = None,
     progress: Progress = silent,
+    drawn: Mapping[int, Sequence[Drawn]] = NOTHING_DRAWN,
 ) -> int:
     """Frames ``first`` to ``last``, both included, as a session of their own, with results, marks and all else that
     was recorded meanwhile. What these frames refer to from before (calibration, parameters) is moved to right before
     the first, so that the clip begins where it begins. Labels name the frames that they are of, so they are kept whole;
-    ``labels`` are put in their place. ``progress`` counts frames. Returns the number of messages."""
+    ``labels`` are put in their place, with what viewers show of them (``drawn``, by frame). ``progress`` counts frames.
+    Returns the number of messages."""
     first_ns = source.log_time_ns(first)
     # a frame's companions (marks, notes) come after it, so the clip goes on to the next frame
     last_ns = source.log_time_ns(last + 1) - 1 if last + 1 < len(source) else 2**63 - 1
@@ -85,10 +94,12 @@ def clip(
                 yield stored._replace(log_time_ns=to_ns[at_ns])
         at_ns, done = first_ns, 0
         for stored in source.file.messages(None, first_ns, last_ns):
-            if stored.channel.topic != topics.LABELS:
+            if stored.channel.topic not in (topics.OF_LABELS if labels is not None else (topics.LABELS,)):
                 at_ns, is_frame = stored.log_time_ns, stored.channel.topic == topics.FRAMES
                 yield _with_references_moved(stored, to_ns) if is_frame else stored
                 if is_frame:
+                    for each in drawn.get(first + done, ()):
+                        yield Stored(topics.channel(each.topic), at_ns, stored.publish_time_ns, each.data)
                     done += 1
                     progress(done, last + 1 - first)
         said = labels if labels is not None else source.labels()

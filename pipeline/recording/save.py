@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.common.progress import Progress, silent
+from pipeline.recording.drawn_labels import NOTHING_DRAWN, Drawn, stored_of
 from pipeline.recording.relabel import relabel
 from pipeline.recording.rewrite import clip
 from pipeline.recording.session.provenance import About
@@ -24,25 +26,33 @@ def save(
     last: int | None = None,
     progress: Progress = silent,
     labels: bytes | None = None,
+    drawn: Mapping[int, Sequence[Drawn]] = NOTHING_DRAWN,
 ) -> None:
     """Write frames ``first`` to ``last`` (both included; None: to the end) to a new file, inputs and labels.
 
     A part of a session keeps all that is in it: results, marks, parameters, labels. The pipeline gives the same results
-    on either. labels: a file of labels to put in, in place of any that are there.
+    on either. labels: a file of labels to put in, in place of any that are there. drawn: what viewers
+    show of them, by frame.
 
     BadInput when ``out`` exists; whatever ends this early leaves no file behind.
     """
     last = len(source) - 1 if last is None else last
     if isinstance(source, SessionSource):
         is_whole = (first, last) == (0, len(source) - 1)
-        if labels is not None and is_whole and relabel(source.file, out, labels, source.t_ns(last), progress):
+        if (
+            labels is not None
+            and is_whole
+            and relabel(source.file, out, labels, source.t_ns(last), progress, stored_of(source, drawn))
+        ):
             return
-        clip(source, first, last, out, labels, progress)
+        clip(source, first, last, out, labels, progress, drawn)
         return
     writer = SessionWriter(out, about(source))
     try:
         for index in range(first, last + 1):
             writer.write(source.frame(index), truth=source.truth(index))
+            for each in drawn.get(index, ()):
+                writer.write_drawn(each.topic, each.data)
             progress(index + 1 - first, last + 1 - first)
         if labels is not None:
             writer.write_labels(labels)

@@ -18,14 +18,16 @@ from pipeline.types.source import TruthObject
 
 
 @dataclass(frozen=True)
-class Rotation:
-    """When a recording goes on in a new file; None is never. max_s: of recorded time."""
+class FileRotation:
+    """When a recording goes on in a new file."""
 
     max_bytes: float | None = None
+    """Of one file; None for no limit."""
     max_s: float | None = None
+    """Of recorded time; None for no limit."""
 
 
-NEVER = Rotation()
+NEVER = FileRotation()
 _PACKETS_CARRIED = 6
 """Batches, of about a sweep each."""
 
@@ -41,7 +43,7 @@ class Segments:
         self,
         path: Path,
         about: About,
-        rotation: Rotation = NEVER,
+        rotation: FileRotation = NEVER,
         compression: Compression = "zstd",
         raw_lidar: RawLidar | None = None,
     ) -> None:

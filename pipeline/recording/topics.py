@@ -33,6 +33,10 @@ MARKS = "/marks"
 NOTES = "/notes"
 HEALTH = "/health"
 LABELS = "/labels"
+LABEL_SCENE, LABEL_IMAGE = "/labels/scene", "/labels/image"
+"""The labels of each frame as viewers draw them, made of ``LABELS`` and read by nobody here."""
+OF_LABELS = frozenset((LABELS, LABEL_SCENE, LABEL_IMAGE))
+"""What other labels take the place of."""
 
 EGO_FRAME, CAMERA_FRAME = "ego", "camera"
 """Names of the frames of reference: points are in ``ego``; ``camera`` is the optical frame (z ahead, x right)."""
@@ -53,14 +57,20 @@ frame each, in gzip."""
 
 @dataclass(frozen=True)
 class Channel:
-    """What MCAP wants to know of a topic. ``metadata``: (key, value) pairs."""
+    """What MCAP wants to know of a topic."""
 
     topic: str
+    """With its slashes."""
     message_encoding: str
+    """``protobuf``, ``json`` or ``ros1``."""
     schema_name: str
+    """Of the messages' type."""
     schema_encoding: str
+    """How ``schema_data`` is written."""
     schema_data: bytes
+    """The schema itself; empty for none."""
     metadata: tuple[tuple[str, str], ...] = ()
+    """(key, value) pairs."""
 
 
 _WELL_KNOWN: dict[str, Any] = {
@@ -70,6 +80,8 @@ _WELL_KNOWN: dict[str, Any] = {
     GNSS: foxglove.LocationFix,
     TF: foxglove.FrameTransform,
     OBJECTS: foxglove.SceneUpdate,
+    LABEL_SCENE: foxglove.SceneUpdate,
+    LABEL_IMAGE: foxglove.ImageAnnotations,
     MARKS: foxglove.Log,
     NOTES: foxglove.Log,
 }

@@ -11,24 +11,29 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 
 from pipeline.common.errors import BadInput
 from pipeline.common.user_file_errors import first_complaint, read_yaml
-from pipeline.replay.messages import Sensor
 from pipeline.replay.wire import WireEvent
+from pipeline.sources.live.health import Sensor
 
 FaultKind = Literal["silence", "garbage", "duplicate", "out_of_order", "clock_jump", "disconnect"]
 
 
 class Fault(BaseModel):
-    """One trouble of one sensor, seconds after the start. disconnect: nothing is sent, and a connection is closed and
-    not taken. clock_jump: the sensor's own clock is off by ``by_s`` while it lasts. garbage: random bytes come between.
-    out_of_order, duplicate: every fifth message."""
+    """One fault of one sensor. disconnect: nothing is sent, and a connection is closed and not taken. clock_jump: the
+    sensor's own clock is off by ``by_s``. garbage: random bytes come between. out_of_order, duplicate: every fifth
+    message."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     sensor: Sensor
+    """Which stream it befalls."""
     kind: FaultKind
+    """What goes wrong; see the class."""
     from_s: float = Field(ge=0.0)
+    """Seconds after the start."""
     to_s: float = Field(gt=0.0)
+    """Seconds after the start, when all is well again."""
     by_s: float = 7.0
+    """clock_jump only: how far the clock jumps, seconds."""
 
     @model_validator(mode="after")
     def _check(self) -> Fault:

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import cv2
 
-from pipeline.types import EgoState, Frame, GnssFix, Picture, Sweep
+from pipeline.sources.live.health import Sensor
+from pipeline.types import CameraImage, EgoState, Frame, GnssFix, Sweep
 from pipeline.types.source import RawPackets, Source
 
-Sensor = Literal["lidar", "camera", "gnss", "ego"]
 _JPEG_QUALITY = 95
 
 
 class Message(NamedTuple):
-    """value: a ``Sweep`` or a LiDAR's packet as it was captured, a JPEG, a ``GnssFix`` or an ``EgoState``, measured at
-    ``t_ns`` of the recording."""
+    """What one sensor measured at one time."""
 
     t_ns: int
+    """When it was measured, in the recording's time."""
     sensor: Sensor
+    """Decides what ``value`` is."""
     value: Sweep | bytes | GnssFix | EgoState
+    """A sweep, or a LiDAR's packet as it was captured; a JPEG; a fix; ego motion."""
 
 
 def of_recording(source: Source, first: int = 0, last: int | None = None) -> Iterator[Message]:
@@ -54,7 +56,7 @@ def of_frame(frame: Frame) -> Iterator[Message]:
     return iter(sorted(found, key=lambda message: message.t_ns))
 
 
-def jpeg_of(picture: Picture) -> bytes:
+def jpeg_of(picture: CameraImage) -> bytes:
     """As the camera gave it where that is a JPEG, else encoded."""
     if picture.encoded is not None and picture.encoded.startswith(b"\xff\xd8"):
         return picture.encoded

@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 from itertools import chain
 
 from pipeline.replay.faults import Fault, disconnected, disturb
-from pipeline.replay.messages import Message, Sensor
+from pipeline.replay.messages import Message
 from pipeline.replay.senders import Sender
 from pipeline.replay.wire import WireEvent, to_wire
+from pipeline.sources.live.health import Sensor
 from pipeline.types import F64
 
 _AHEAD = 400
@@ -23,14 +24,16 @@ _LATE_NS, _TOO_LATE_NS = 20_000_000, 200_000_000
 
 
 @dataclass
-class Sent:
-    """What was sent, by sensor. late: events sent over 20 ms late. slips: how often something was over 200 ms late, and
-    everything from it on was put off: a sensor may fall silent, but it does not lag behind its own clock. Either says
-    that this machine is too slow."""
+class ReplayCounts:
+    """What was sent, and whether this machine kept up."""
 
     events: dict[Sensor, int] = field(default_factory=dict)
+    """Number by sensor."""
     late: int = 0
+    """Events sent over 20 ms late."""
     slips: int = 0
+    """How often something was over 200 ms late and everything from it on was put off: a sensor may fall silent, but it
+    does not lag behind its own clock."""
 
 
 def replay(
@@ -42,16 +45,16 @@ def replay(
     faults: Sequence[Fault] = (),
     start_ns: int | None = None,
     stopped: Callable[[], bool] = lambda: False,
-) -> Sent:
+) -> ReplayCounts:
     """Play to the end, or until ``stopped``. A sensor that nobody listens to is left out. start_ns: when to begin,
     unix, by default soon; faults are counted from it."""
     wanted = (message for message in messages if message.sensor in senders)
     first = next(iter(wanted), None)
     if first is None:
-        return Sent()
+        return ReplayCounts()
     start_ns = time.time_ns() + _START_IN_NS if start_ns is None else start_ns
     events = to_wire(chain([first], wanted), start_ns, speed, T_ego_lidar)
-    sent = Sent()
+    sent = ReplayCounts()
     plugged = dict.fromkeys(senders, True)
     slipped_ns = 0
     for planned in _made_ahead(disturb(events, faults, start_ns), stopped):

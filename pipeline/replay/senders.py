@@ -14,10 +14,10 @@ import can
 from pipeline.common.errors import BadInput
 from pipeline.formats.velodyne import PACKET_BYTES, POSITION_BYTES
 from pipeline.replay.camera_server import CameraServer
-from pipeline.replay.messages import Sensor
 from pipeline.replay.nmea_writer import sentences
 from pipeline.sources.live.config import CanConfig, GnssConfig, LidarConfig, LiveConfig, SignalConfig
 from pipeline.sources.live.devices.can import load_dbc
+from pipeline.sources.live.health import Sensor
 from pipeline.types import EgoState, GnssFix
 
 _LOOPBACK = "127.0.0.1"

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 from pipeline.formats.velodyne.encode import PACKETS_A_ROTATION, packets_of
 from pipeline.formats.velodyne.packet import BLOCK_US, PACKET_BYTES
-from pipeline.replay.messages import Message, Sensor
+from pipeline.replay.messages import Message
+from pipeline.sources.live.health import Sensor
 from pipeline.types import F64, Sweep
 
 _PACKET_NS = round(12 * BLOCK_US * 1000)
@@ -19,13 +20,17 @@ _AHEAD_NS = ROTATION_NS // 2 + 20_000_000
 
 
 class WireEvent(NamedTuple):
-    """send_ns: when to send it, unix. stamp_ns: the sensor's own time that goes with it. payload: a packet without its
-    stamp, a JPEG, a ``GnssFix`` or an ``EgoState``; bytes of any other kind are garbage and sent as they are."""
+    """One thing to send."""
 
     send_ns: int
+    """When to send it, Unix time."""
     sensor: Sensor
+    """Decides address and protocol."""
     stamp_ns: int
+    """The sensor's own time that goes with it."""
     payload: Any
+    """A packet without its stamp, a JPEG, a ``GnssFix`` or an ``EgoState``; bytes of any other kind are garbage and
+    sent as they are."""
 
 
 def to_wire(

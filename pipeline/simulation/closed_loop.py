@@ -1,7 +1,7 @@
 """The closed loop: the world as the sensors see it → the pipeline → pedals → the vehicle → the next world.
 
-    world_state.at ─► Sensors ─► boxes (truth or network) ─► step ─► AccCommand ─► vehicle, in 5 ms steps ─┐
-       └──────────────────────────────────────────────────────────────────────────────────────────◄┘
+    world_state.at ─► SensorRig ─► boxes (truth or network) ─► step ─► AccCommand ─► vehicle, in 5 ms steps ─┐
+       └────────────────────────────────────────────────────────────────────────────────────────────────────◄┘
 
 Deterministic: the same scenario, parameters and seed give the same drive.
 """
@@ -20,7 +20,7 @@ from pipeline.run import only
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import truth_boxes
 from pipeline.simulation.sensors.detection_model import BoxNoise
-from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.sensors.rig import SensorRig
 from pipeline.simulation.world import actors, world_state
 from pipeline.simulation.world import ego_vehicle as vehicle
 from pipeline.simulation.world.ego_vehicle import Pedals, VehicleModel, VehicleState
@@ -50,7 +50,9 @@ class TruthEyes:
     """Projected truth with a detector's errors: no image, no network."""
 
     noise: BoxNoise = BoxNoise()
+    """The detector's errors."""
     needs_picture: bool = False
+    """No image is drawn."""
 
     def look(self, frame: Frame, now: World, seed: int) -> Frame:
         assert frame.camera is not None
@@ -62,8 +64,11 @@ class NetworkEyes:
     """A real network on the rendered image."""
 
     detector: Detector
+    """On the whole image."""
     far: FarView | None = None
+    """On its far part too; None for the whole image alone."""
     needs_picture: bool = True
+    """The image is drawn for it."""
 
     def look(self, frame: Frame, now: World, seed: int) -> Frame:
         return detect(frame, Detectors(self.detector, far=self.far))
@@ -71,25 +76,34 @@ class NetworkEyes:
 
 @dataclass(frozen=True)
 class Setup:
-    """The setup of a drive: parameters, sensors, detector and car. closed: the pipeline's pedals move the car;
-    otherwise the car follows its script, and the pipeline's commands are only recorded."""
+    """The setup of a drive."""
 
     params: Params = field(default_factory=Params)
+    """Of the pipeline."""
     sensors: Sensed = "both"
+    """Those that the pipeline is given."""
     eyes: Eyes = TruthEyes()
+    """How vehicles in the image are found."""
     model: VehicleModel = VehicleModel()
+    """How the car responds to pedals."""
     closed: bool = True
+    """The pipeline's pedals move the car; otherwise it follows its script, and commands are only recorded."""
 
 
 @dataclass(frozen=True)
 class LoopStep:
-    """One tick of a drive. vehicle: its state when the sensors measured; ``result`` is the pipeline's."""
+    """One tick of a drive."""
 
     index: int
+    """From 0."""
     world: World
+    """The truth when the sensors measured."""
     frame: Frame
+    """What the sensors measured."""
     result: Result
+    """The pipeline's."""
     vehicle: VehicleState
+    """Its state when the sensors measured."""
 
     @property
     def t_s(self) -> float:
@@ -100,7 +114,7 @@ def drive(scenario: Scenario, setup: Setup) -> Iterator[LoopStep]:
     """Every tick of the scenario, until its end or until the caller stops."""
     warm_up()
     period_s = 1.0 / scenario.rate_hz
-    sensors = Sensors(scenario, _furthest_m(scenario))
+    sensors = SensorRig(scenario, _furthest_m(scenario))
     car = _at_start(scenario)
     state = State()
     for index in range(scenario.frame_count()):
@@ -115,7 +129,7 @@ def drive(scenario: Scenario, setup: Setup) -> Iterator[LoopStep]:
             car = _drive_on(vehicle.command(car, _pedals(result.acc), setup.model), scenario, period_s, setup.model)
 
 
-def _look(sensors: Sensors, setup: Setup, scenario: Scenario, now: World, index: int) -> Frame:
+def _look(sensors: SensorRig, setup: Setup, scenario: Scenario, now: World, index: int) -> Frame:
     wants_boxes = setup.sensors != "lidar"
     frame = sensors.frame(now, index, round(now.t_s * 1e9), picture=wants_boxes and setup.eyes.needs_picture)
     if wants_boxes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from math import ceil, pi
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -19,8 +20,8 @@ from pipeline.simulation.sensors.faults import NONE, Faults
 from pipeline.simulation.sensors.gnss_model import MEASURED, RTK, GnssModel, OdometryModel
 from pipeline.simulation.sensors.lidar_model import VLP16, LidarModel
 from pipeline.simulation.world.actors import Actor, Motion, Script, motion
-from pipeline.simulation.world.intersection_ways import CrossingActor, Route, route
-from pipeline.simulation.world.roads import Road, Strict
+from pipeline.simulation.world.intersection_ways import CrossingActor, CrossingWay, route
+from pipeline.simulation.world.roads import Road, ScenarioPart
 from pipeline.types import F64
 
 _GAP_STEP_S, _GAP_HALVINGS = 0.25, 10
@@ -31,36 +32,51 @@ class ScenarioError(BadInput):
 
 
 class Ego(Script):
-    """The ego vehicle's own script. start_m: where on the road its LiDAR is at time 0."""
+    """The ego vehicle's own script."""
 
     start_m: float = 100.0
+    """Where on the road its LiDAR is at time 0."""
 
 
-Moment = tuple[float, float, float, float, float, float]
+DrivenMoment = tuple[float, float, float, float, float, float]
 """A ``Motion``: travelled_m, d_m, speed_mps, accel_mps2, d_rate_mps, d_accel_mps2."""
 
 
-class Scenario(Strict):
-    """driven: the ego vehicle's motion as a closed loop drove it, a moment a tick; where it is given, the ego
-    vehicle moves so and not by its script. sensors: those that the pipeline is given. detections: what is found in the
-    images; None: what detectors find that look at them. faults: what is wrong with the sensors."""
+class Scenario(ScenarioPart):
+    """One scenario file."""
 
     title: str
+    """Shown to people."""
     seed: int = Field(default=0, ge=0)
+    """Of everything random: equal seeds give equal bytes."""
     duration_s: float = Field(gt=0.0, le=3600.0)
+    """After which the drive ends."""
     rate_hz: float = Field(default=10.0, ge=1.0, le=20.0)
+    """Of the LiDAR's rotation, and so of ticks."""
     road: Road
+    """What everybody drives on."""
     lidar: LidarModel = VLP16
+    """Mount and noise."""
     camera: CameraModel = ORDINARY
+    """Lens and noise."""
     gnss: GnssModel = RTK
+    """Place on the Earth and noise of the receiver."""
     odometry: OdometryModel = MEASURED
+    """Noise of ego speed and yaw rate."""
     ego: Ego
+    """The ego vehicle's script."""
     actors: tuple[Actor, ...] = ()
+    """Vehicles along the road."""
     crossing_actors: tuple[CrossingActor, ...] = ()
+    """Vehicles that come from a crossing's other arms."""
     sensors: Literal["lidar", "camera", "both"] = "both"
+    """Those that the pipeline is given."""
     detections: Detections | None = None
+    """What is found in the images; None leaves that to the detectors."""
     faults: Faults = NONE
-    driven: tuple[Moment, ...] = ()
+    """What is wrong with the sensors."""
+    driven: tuple[DrivenMoment, ...] = ()
+    """The ego vehicle's motion as a closed loop drove it, one moment a tick; where given, it replaces the script."""
 
     @model_validator(mode="after")
     def _lanes_and_ids(self) -> Scenario:
@@ -113,7 +129,7 @@ class Scenario(Strict):
         return tuple(each for each in self.cast if each.id not in still)
 
     @cached_property
-    def routes(self) -> tuple[Route, ...]:
+    def routes(self) -> tuple[CrossingWay, ...]:
         """The ways of ``crossing_actors``."""
         return tuple(route(actor, self.road) for actor in self.crossing_actors)
 
@@ -144,6 +160,8 @@ def load(name_or_path: str) -> Scenario:
     """A built-in scenario by its name, or any file that ends in .yaml. ScenarioError says what is wrong."""
     path = given_path(name_or_path, ScenarioError) if name_or_path.endswith((".yaml", ".yml")) else None
     if path is None:
+        if Path(name_or_path).suffix or Path(name_or_path).name != name_or_path:
+            raise ScenarioError(f"{name_or_path}: not a scenario file: its name has to end in .yaml")
         if name_or_path not in names():
             raise ScenarioError(f"no scenario named {name_or_path!r}; there are {', '.join(names())}")
         path = FOLDER / f"{name_or_path}.yaml"

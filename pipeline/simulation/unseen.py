@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.sensors.rig import SensorRig
 from pipeline.simulation.sensors.senses import Senses
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.world_state import World
@@ -15,7 +15,7 @@ from pipeline.types import Frame
 def frames(scenario: Scenario) -> Iterator[tuple[World, Frame]]:
     """The truth and what is sensed of it, tick by tick: all but the images is as ``sim:`` gives it."""
     end_m = world_state.at(scenario, scenario.duration_s).s_m
-    sensors, senses = Sensors(scenario, end_m), Senses(scenario)
+    sensors, senses = SensorRig(scenario, end_m), Senses(scenario)
     step_ns = round(1e9 / scenario.rate_hz)
     for index in range(scenario.frame_count()):
         now = world_state.at(scenario, index * step_ns / 1e9)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import cast
 
 from pipeline.common.progress import Progress, silent
+from pipeline.common.remote_files import is_remote
 from pipeline.source_kinds import SourceKind, is_live, kind_named, kind_of_bare, looks_like, usages
 from pipeline.types.source import AnySource, LiveSource, Opening, Source, SourceError, TruthObject
 
@@ -25,6 +26,8 @@ __all__ = [
     "open_source",
     "usages",
 ]
+
+_IN_STORE = "files ending in .mcap; `cipv import` makes one of any recording"
 
 
 def open_source(uri: str, *, rings: int = 16, progress: Progress = silent) -> Source:
@@ -60,6 +63,11 @@ def open_any(uri: str, *, rings: int = 16, progress: Progress = silent) -> AnySo
 
 def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
     """What opens a URI, and the part after its scheme. live: whether error texts offer live sensors, too."""
+    if is_remote(uri):
+        in_store = kind_of_bare(uri)
+        if in_store is None:
+            raise SourceError(f"{uri}: of a store only sessions are read in place, {_IN_STORE}")
+        return in_store, uri
     scheme, colon, rest = uri.partition(":")
     is_drive_letter = len(scheme) == 1
     if not colon or is_drive_letter or not scheme.isalnum():

@@ -23,7 +23,7 @@ from pipeline.sources import rig as rig_files
 from pipeline.sources.live.config import CalibrationConfig
 from pipeline.sources.sidecar_files import FIX_WITHIN_NS, NMEA_SUFFIXES, fixes_of, named
 from pipeline.sources.uri_options import number_option, split_options
-from pipeline.types import U8, CameraCalibration, Frame, GnssFix, Picture, Sweep
+from pipeline.types import U8, CameraCalibration, CameraImage, Frame, GnssFix, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
 PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png")
@@ -135,13 +135,13 @@ class CameraAlone:
         ego, gnss = self._own.latest(t_ns, FIX_WITHIN_NS), self._fixes.latest(t_ns, FIX_WITHIN_NS)
         return Frame(index, name, t_ns, camera=self._camera, ego=ego, gnss=gnss)
 
-    def _picture(self, index: int, t_ns: int, notes: list[str]) -> Picture | None:
+    def _picture(self, index: int, t_ns: int, notes: list[str]) -> CameraImage | None:
         try:
             bgr, encoded = self._read(index)
         except SourceError as error:
             notes.append(str(error))
             return None
-        return Picture(t_ns, bgr, encoded)
+        return CameraImage(t_ns, bgr, encoded)
 
     def _assumed(self, options: dict[str, str], notes: list[str]) -> CameraCalibration | None:
         """A dash cam's calibration for the first readable image."""

@@ -10,15 +10,20 @@ from urllib.parse import parse_qsl
 
 import numpy as np
 
+from pipeline.common.remote_files import facts, is_remote, version_of
 from pipeline.types import Frame
 
 
 def fingerprint(uri: str) -> str:
     """Sixteen characters that are another when a file of the recording was edited or replaced: by the name, size and
     time of change of the file and of what shares its stem (a video, sentences), of all files of a folder, and of files
-    named in options. A URI that names no file, as of a built-in scenario, stays as it is."""
+    named in options; of a file in a store by its size and what the store says of its version. A URI that names no file,
+    as of a built-in scenario, stays as it is."""
     _, _, rest = uri.partition(":")
     digest = hashlib.sha256(uri.encode(errors="replace"))
+    if is_remote(uri):
+        digest.update(version_of(facts(uri)).encode())
+        return digest.hexdigest()[:16]
     for file in _files(rest) if rest else _files(uri):
         try:
             stat = file.stat()

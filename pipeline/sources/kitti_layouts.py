@@ -30,12 +30,19 @@ class Files:
     """Where a recording keeps what; files by frame name, stamps by frame number."""
 
     pictures: dict[str, Path]
+    """Images by frame name."""
     sweeps: dict[str, Path]
+    """Point clouds by frame name."""
     lidar_stamps: tuple[int, ...] = ()
+    """Nanoseconds; empty where the layout has none."""
     camera_stamps: tuple[int, ...] = ()
+    """Nanoseconds; empty where the layout has none."""
     oxts: dict[str, Path] = field(default_factory=dict)
+    """Records of the inertial unit, by frame name."""
     labels: dict[str, Path] = field(default_factory=dict)
+    """Object benchmark: by frame name."""
     calibrations: dict[str, Path] = field(default_factory=dict)
+    """Object benchmark: by frame name."""
     raw_calibration: tuple[Path, Path] | None = None
     """Raw drives: of the cameras, and of the Velodyne."""
     sequence_calibration: Path | None = None

@@ -50,7 +50,7 @@ class PcdSource:
         )
         self._size = picture_size(self._pictures.values()) or (0, 0)
         rig = _rig(folder, options)
-        self._T_ego_lidar, self._camera = rig.lidar.mount.T_ego_sensor(), rig.camera_calibration()
+        self.T_ego_lidar, self._camera = rig.lidar.mount.T_ego_sensor(), rig.camera_calibration()
         stamps = [_stamp_ns(name) for name in self._names]
         known = [stamp for stamp in stamps if stamp is not None]
         self._has_times = len(known) == len(stamps) and bool(np.all(np.diff(known) > 0))
@@ -94,7 +94,7 @@ class PcdSource:
         except SourceError as error:
             notes.append(str(error) if path.name in str(error) else f"{path.name}: {error}")
             return None
-        return cloud.sweep(t_ns, self._T_ego_lidar)
+        return cloud.sweep(t_ns, self.T_ego_lidar)
 
     def _about(self) -> tuple[str, ...]:
         notes = [] if self._has_times else ["no time stamps in the file names: 10 Hz assumed"]

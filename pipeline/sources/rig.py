@@ -9,32 +9,45 @@ from pydantic import ValidationError
 
 from pipeline.common.user_file_errors import first_complaint, read_yaml
 from pipeline.formats.file_reading import check_looks_ahead
-from pipeline.sources.live.config import CalibrationConfig, Mount, OffsetMs, Strict
-from pipeline.types import CameraCalibration, Picture
+from pipeline.sources.live.config import CalibrationConfig, ConfigPart, Mount, OffsetMs
+from pipeline.types import CameraCalibration, CameraImage
 from pipeline.types.source import SourceError
 
 SUFFIXES = (".yaml", ".yml")
 
 
-class RigLidar(Strict):
+class RigLidar(ConfigPart):
+    """The LiDAR of a recording."""
+
     mount: Mount = Mount()
+    """In the ego frame."""
 
 
-class RigCamera(Strict):
+class RigCamera(ConfigPart):
+    """The camera of a recording."""
+
     calibration: CalibrationConfig | None = None
+    """None where it is not known."""
     time_offset_ms: OffsetMs = 0.0
+    """Added to the times of images."""
 
 
-class RigGnss(Strict):
+class RigGnss(ConfigPart):
+    """The receiver of a recording."""
+
     time_offset_ms: OffsetMs = 0.0
+    """Added to the times of fixes."""
 
 
-class Rig(Strict):
+class Rig(ConfigPart):
     """Offsets are added to the sensor's own times, as in the live configuration."""
 
     lidar: RigLidar = RigLidar()
+    """Where it sits."""
     camera: RigCamera = RigCamera()
+    """Calibration and clock."""
     gnss: RigGnss = RigGnss()
+    """Clock."""
 
     def camera_calibration(self) -> CameraCalibration | None:
         calibration = self.camera.calibration
@@ -54,7 +67,7 @@ def load_rig(path: Path) -> Rig:
 
 
 def calibration_for(
-    camera: CameraCalibration | None, picture: Picture | None, notes: list[str]
+    camera: CameraCalibration | None, picture: CameraImage | None, notes: list[str]
 ) -> CameraCalibration | None:
     """The calibration, if it is of the image's size; else None, and ``notes`` says so."""
     if camera is None or picture is None:

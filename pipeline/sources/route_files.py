@@ -39,7 +39,7 @@ _UNKNOWN_SIGMA_M = 0.5
 """Of a file that does not say how good it is: a drawn or surveyed route."""
 _LARGEST_FILE_BYTES = 200_000_000
 
-Rows = list[tuple[float, float]]
+PositionRows = list[tuple[float, float]]
 
 
 class RouteError(BadInput):
@@ -71,15 +71,15 @@ def from_fixes(name: str, fixes: Iterable[GnssFix]) -> Route:
     return _route(name, [(fix.lat_deg, fix.lon_deg) for fix in known], sigma_m, name)
 
 
-def _route(name: str, rows: Rows, sigma_m: float, path: str) -> Route:
+def _route(name: str, rows: PositionRows, sigma_m: float, path: str) -> Route:
     good = [(lat, lon) for lat, lon in rows if abs(lat) <= 84.0 and abs(lon) <= 180.0 and (lat, lon) != (0.0, 0.0)]
     if len(set(good)) < 2:
-        raise RouteError(f"{path}: no route: {len(set(good))} distinct positions on the Earth, at least 2 are needed")
+        raise RouteError(f"{path}: no route: {len(set(good))} distinct valid positions; at least 2 are needed")
     lat, lon = np.array(good).T
     return Route(name, lat.copy(), lon.copy(), sigma_m)
 
 
-def _reader(suffix: str, text: str) -> Callable[[str, str], tuple[Rows, float]]:
+def _reader(suffix: str, text: str) -> Callable[[str, str], tuple[PositionRows, float]]:
     """By the file's name, else by how it begins."""
     start = text.lstrip("\ufeff \r\n\t")[:200]
     if suffix == ".gpx" or start.startswith("<"):
@@ -87,7 +87,7 @@ def _reader(suffix: str, text: str) -> Callable[[str, str], tuple[Rows, float]]:
     return _nmea if suffix == ".nmea" or start.startswith(("$", "!")) else _csv
 
 
-def _csv(text: str, path: str, zone: str = "") -> tuple[Rows, float]:
+def _csv(text: str, path: str, zone: str = "") -> tuple[PositionRows, float]:
     sample = text[:4096]
     delimiter = max(",;\t ", key=sample.count)
     try:
@@ -119,7 +119,7 @@ def _column(names: list[str], known: tuple[str, ...]) -> int | None:
     return next((names.index(name) for name in known if name in names), None)
 
 
-def _from_utm(lines: list[list[str]], east: int, north: int, zone_at: int | None, zone: str, path: str) -> Rows:
+def _from_utm(lines: list[list[str]], east: int, north: int, zone_at: int | None, zone: str, path: str) -> PositionRows:
     """Latitudes and longitudes of places in metres of one UTM zone: the one asked for, else the file's own."""
     rows = [row for row in lines if len(row) > max(east, north)]
     named = {row[zone_at].strip() for row in rows if len(row) > zone_at} if zone_at is not None and not zone else {zone}
@@ -145,7 +145,7 @@ def utm_epsg(zone: str) -> int | None:
     return base + number if 1 <= number <= 60 else None
 
 
-def _gpx(text: str, path: str) -> tuple[Rows, float]:
+def _gpx(text: str, path: str) -> tuple[PositionRows, float]:
     root = parse_xml(text, path, RouteError)
     for kind, point in (("trk", "trkpt"), ("rte", "rtept")):
         line = root.find(f"{{*}}{kind}")
@@ -155,8 +155,8 @@ def _gpx(text: str, path: str) -> tuple[Rows, float]:
     return [], _UNKNOWN_SIGMA_M
 
 
-def _nmea(text: str, path: str) -> tuple[Rows, float]:
-    places: dict[str, Rows] = {"GGA": [], "RMC": []}
+def _nmea(text: str, path: str) -> tuple[PositionRows, float]:
+    places: dict[str, PositionRows] = {"GGA": [], "RMC": []}
     sigmas: dict[str, list[float]] = {"GGA": [], "RMC": []}
     for line in text.splitlines():
         found = _nmea_place(line)

@@ -17,7 +17,7 @@ from pipeline.formats.file_reading import files_by_name
 from pipeline.formats.nmea import NmeaReader
 from pipeline.sources import rig as rig_files
 from pipeline.sources.uri_options import number_option
-from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Sweep
+from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, GnssFix, Sweep
 from pipeline.types.source import SourceError
 
 OPTIONS = ("video", "video_offset_s", "nmea", "rig")
@@ -84,7 +84,7 @@ class Beside:
     def _ego(self, t_ns: int) -> EgoState | None:
         return self._own.latest(t_ns, FIX_WITHIN_NS)
 
-    def _picture(self, t_ns: int, notes: list[str]) -> Picture | None:
+    def _picture(self, t_ns: int, notes: list[str]) -> CameraImage | None:
         if self._video is None:
             return None
         index = nearest(self._video.times_ns, t_ns - self._video_begins_ns, _PICTURE_WITHIN_NS)
@@ -96,7 +96,7 @@ class Beside:
         except SourceError as error:
             notes.append(str(error))
             return None
-        return Picture(self._video_begins_ns + int(self._video.times_ns[index]), bgr)
+        return CameraImage(self._video_begins_ns + int(self._video.times_ns[index]), bgr)
 
     def _open_video(self, path: Path | None, progress: Progress) -> video_files.VideoFile | None:
         if path is None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.simulation import scenario
 from pipeline.simulation.sensors.faults import NONE
-from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.sensors.rig import SensorRig
 from pipeline.simulation.sensors.senses import Senses
 from pipeline.simulation.world import world_state
 from pipeline.types import Frame, Sweep
@@ -40,7 +40,7 @@ class SimulatedSource:
         self.notes = tuple(_notes(self._scenario))
         self._step_ns = round(1e9 / self.rate_hz)
         last = world_state.at(self._scenario, self._scenario.duration_s)
-        self._sensors = Sensors(self._scenario, last.s_m)
+        self._sensors = SensorRig(self._scenario, last.s_m)
         self._senses = Senses(self._scenario)
 
     def __len__(self) -> int:

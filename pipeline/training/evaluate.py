@@ -20,7 +20,7 @@ from pipeline.params import DetectionParams
 from pipeline.simulation.built_in import names
 from pipeline.simulation.sensors.camera import HEIGHT, WIDTH, calibration
 from pipeline.training.labels import CLASSES, Label, labels
-from pipeline.training.scenes import Moment, drive, moments
+from pipeline.training.scenes import DrawnScene, drive, moments
 from pipeline.types import Detection
 from pipeline.vision.detector import Detector, open_detector
 from pipeline.vision.nms import select
@@ -38,16 +38,22 @@ _HEIGHT_M = 1.6
 
 @dataclass
 class Bin:
-    """Counts of one range of distances. height_errors: found height over true height − 1, for whole, unoccluded
-    boxes."""
+    """Counts of one range of distances."""
 
     vehicles: int = 0
+    """In the images."""
     found: int = 0
+    """Of these, with a box."""
     named: int = 0
+    """Of the found, with the right class."""
     leads: int = 0
+    """Vehicles straight ahead."""
     leads_found: int = 0
+    """Of these, with a box."""
     wrong: int = 0
+    """Boxes that are no vehicle's."""
     height_errors: list[float] = field(default_factory=list)
+    """Found height over true height − 1, for whole, unoccluded boxes."""
 
     def recall(self) -> float:
         return self.found / max(self.vehicles, 1)
@@ -71,7 +77,7 @@ class Bin:
         return float(np.mean(np.abs(self.height_errors))) if self.height_errors else 0.0
 
 
-def evaluate(detector: Detector, pictures: Iterable[Moment], params: DetectionParams | None = None) -> list[Bin]:
+def evaluate(detector: Detector, pictures: Iterable[DrawnScene], params: DetectionParams | None = None) -> list[Bin]:
     """One bin for each pair of ``EDGES_M``. A lead is the nearest vehicle straight ahead. A false positive has no
     distance; it counts at the distance of a car with its box height."""
     camera = calibration()

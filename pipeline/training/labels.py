@@ -24,21 +24,22 @@ _WIDEST_TAN = 1.1
 
 @dataclass(frozen=True)
 class Label:
-    """One vehicle in an image.
-
-    box: around its whole outline including hidden parts, clipped to the image, since the height gives the distance.
-    visible: share of the outline inside the image that nearer vehicles do not cover. distance_m: range from the ego
-    origin to the nearest corner of its footprint. ahead: its centre is straight ahead, no more than 1.5 m to either
-    side. cut: the outline leaves the image.
-    """
+    """One vehicle in an image."""
 
     actor_id: int
+    """Of the scenario."""
     label: int
+    """Index of its class."""
     box: Box
+    """Around its whole outline including hidden parts, clipped to the image, since the height gives the distance."""
     visible: float
+    """Share of the outline inside the image that nearer vehicles do not cover."""
     distance_m: float
+    """From the ego origin to the nearest corner of its footprint."""
     ahead: bool
+    """Its centre is straight ahead, no more than 1.5 m to either side."""
     cut: bool
+    """The outline leaves the image."""
 
 
 def labels(world: World, camera: CameraCalibration) -> tuple[Label, ...]:

@@ -21,7 +21,7 @@ from pipeline.simulation.built_in import names
 from pipeline.simulation.sensors.camera import HEIGHT, WIDTH, calibration
 from pipeline.training.evaluate import EDGES_M, JUDGE_SEEDS, MATCH_IOU
 from pipeline.training.labels import labels
-from pipeline.training.scenes import Moment, drive, moments
+from pipeline.training.scenes import DrawnScene, drive, moments
 from pipeline.types import DistanceLaw
 from pipeline.vision.detector import Detector, open_detector
 from pipeline.vision.distance import height_at_reference, is_cut
@@ -41,9 +41,10 @@ class SeenPair(Pair):
     """kind: the kind of vehicle, which may differ from the label: a van is a "car"."""
 
     kind: str
+    """The kind of vehicle, which may differ from the label: a van is a "car"."""
 
 
-def pairs(detector: Detector, pictures: Iterable[Moment]) -> Iterator[SeenPair]:
+def pairs(detector: Detector, pictures: Iterable[DrawnScene]) -> Iterator[SeenPair]:
     """Every box of a whole, unoccluded vehicle, with the true depth of its nearest point."""
     camera = calibration()
     for number, moment in enumerate(pictures):
@@ -91,7 +92,7 @@ def errors(found: Iterable[SeenPair], law: DistanceLaw) -> list[tuple[int, float
     return rows
 
 
-def _scenario_pictures() -> Iterator[Moment]:
+def _scenario_pictures() -> Iterator[DrawnScene]:
     return itertools.chain.from_iterable(drive(name, 1.0) for name in names())
 
 

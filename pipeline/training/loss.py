@@ -18,12 +18,16 @@ _MOST_LOG_SIZE = 6.0
 
 @dataclass(frozen=True)
 class Losses:
-    """Means over the cells assigned to a vehicle; iou: of their boxes."""
+    """Means over the cells assigned to a vehicle."""
 
     total: Tensor
+    """What is minimised; the only one with a gradient."""
     objectness: float
+    """How badly scores tell the boxes' IoU."""
     classes: float
+    """Cross-entropy of the class scores."""
     iou: float
+    """Of the boxes."""
 
 
 def losses(logits: Tensor, labels: Tensor, boxes: Tensor, size: Size) -> Losses:

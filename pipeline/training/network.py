@@ -53,7 +53,7 @@ class Residual(nn.Module):
         return torch.add(x, self.body(x))
 
 
-class Head(nn.Module):
+class DecoupledHead(nn.Module):
     """Boxes and objectness on one branch, classes on another (Ge 2021, decoupled head), depthwise for speed."""
 
     def __init__(self, channels: int, classes: int) -> None:
@@ -69,7 +69,7 @@ class Head(nn.Module):
         return torch.cat([self.box(self.box_branch(x)), self.classes(self.class_branch(x))], dim=1)
 
 
-class Network(nn.Module):
+class DetectorNetwork(nn.Module):
     """Residual backbone, top-down feature pyramid (Lin 2017), three heads."""
 
     def __init__(self) -> None:
@@ -80,7 +80,7 @@ class Network(nn.Module):
         self.to_32 = nn.Sequential(conv(w16, w32, 3, 2), Residual(w32), Residual(w32))
         self.lateral = nn.ModuleList(conv(width, NECK, 1) for width in (w8, w16, w32))
         self.fuse = nn.ModuleList(Residual(NECK) for _ in STRIDES)
-        self.heads = nn.ModuleList(Head(NECK, len(CLASSES)) for _ in STRIDES)
+        self.heads = nn.ModuleList(DecoupledHead(NECK, len(CLASSES)) for _ in STRIDES)
 
     def forward(self, bgr: Tensor) -> Tensor:
         """(B, N, 5 + C) logits."""
@@ -94,10 +94,10 @@ class Network(nn.Module):
         return torch.cat(levels, dim=2).transpose(1, 2)
 
 
-class Exported(nn.Module):
+class ExportedNetwork(nn.Module):
     """The network with probabilities in place of logits: what is written to ONNX."""
 
-    def __init__(self, network: Network) -> None:
+    def __init__(self, network: DetectorNetwork) -> None:
         super().__init__()
         self.network = network
 
@@ -111,11 +111,11 @@ class Exported(nn.Module):
         return torch.cat([logits[..., :4], objectness**common, torch.sigmoid(logits[..., 5:]) * own], dim=2)
 
 
-def export(network: Network, path: Path, size: tuple[int, int]) -> None:
+def export(network: DetectorNetwork, path: Path, size: tuple[int, int]) -> None:
     """Write the ONNX file for an input (height, width), class names in its properties."""
     import onnx
 
-    model = Exported(network).eval()
+    model = ExportedNetwork(network).eval()
     torch.onnx.export(
         model,
         (torch.zeros(1, 3, *size),),
@@ -132,7 +132,7 @@ def export(network: Network, path: Path, size: tuple[int, int]) -> None:
 
 def main() -> None:
     weights, out = map(Path, sys.argv[1:])
-    network = Network()
+    network = DetectorNetwork()
     network.load_state_dict(torch.load(weights))
     export(network, out, INPUT_SIZE)
 

@@ -28,20 +28,24 @@ _LONGEST_CHANGE_S = 5.0
 _BEYOND_M = 600.0
 _SOME_TURNED, _TURNED, _SHORT_M = 0.35, 0.4, 7.0
 
-Size = tuple[float, float, float]
-Models = dict[str, list[Size]]
+BodySize = tuple[float, float, float]
+BodyModels = dict[str, list[BodySize]]
 """Lengths, widths and heights of vehicles, by kind."""
 
 
 @dataclass(frozen=True)
-class Moment:
-    """An image (720, 1280, 3) uint8 blue green red and the world it shows."""
+class DrawnScene:
+    """A drawn image and its truth."""
 
     picture: U8
+    """(720, 1280, 3) uint8 blue green red."""
     world: world_state.World
+    """What it shows."""
 
 
-def moments(seed: int, count: int, wanted: Callable[[world_state.World], bool] = lambda _: True) -> Iterator[Moment]:
+def moments(
+    seed: int, count: int, wanted: Callable[[world_state.World], bool] = lambda _: True
+) -> Iterator[DrawnScene]:
     """The images out of ``count`` whose world is ``wanted``; the others are not rendered. Equal seeds give equal
     images; different seeds share no road, traffic or backdrop."""
     rng = np.random.default_rng([seed, 11])
@@ -56,7 +60,7 @@ def moments(seed: int, count: int, wanted: Callable[[world_state.World], bool] =
             now = _turned(rng, now)
         now = without_collisions(now)
         if wanted(now):
-            yield Moment(camera.picture(now), now)
+            yield DrawnScene(camera.picture(now), now)
 
 
 def without_collisions(now: world_state.World) -> world_state.World:
@@ -106,7 +110,7 @@ def _crossing_places(rng: np.random.Generator) -> list[float]:
     return [] if rng.random() < 0.6 else (np.arange(100.0, 2000.0, 150.0) + rng.uniform(0.0, 50.0)).tolist()
 
 
-def random_traffic(rng: np.random.Generator, road: Road, models: Models) -> Scenario:
+def random_traffic(rng: np.random.Generator, road: Road, models: BodyModels) -> Scenario:
     """Vehicles in every lane at about the ego vehicle's speed, some of them braking or changing lanes."""
     speed = float(rng.uniform(8.0, 30.0))
     ego_lane = -int(rng.integers(1, road.lanes_forward + 1))
@@ -135,12 +139,12 @@ def random_traffic(rng: np.random.Generator, road: Road, models: Models) -> Scen
     )
 
 
-def size_models(rng: np.random.Generator) -> Models:
+def size_models(rng: np.random.Generator) -> BodyModels:
     """A dozen sizes of each kind. More sizes would give more variety, but meshes are cached."""
     return {kind: [_grown(rng, SIZES_M[kind]) for _ in range(_MODELS_A_KIND)] for kind in _KINDS}
 
 
-def _grown(rng: np.random.Generator, size_m: Size) -> Size:
+def _grown(rng: np.random.Generator, size_m: BodySize) -> BodySize:
     length, width, height = (
         float(side * factor) for side, factor in zip(size_m, rng.uniform(0.88, 1.14, 3), strict=True)
     )
@@ -148,7 +152,7 @@ def _grown(rng: np.random.Generator, size_m: Size) -> Size:
 
 
 def _vehicle(
-    rng: np.random.Generator, models: Models, number: int, lane: int, ahead_m: float, speed_mps: float
+    rng: np.random.Generator, models: BodyModels, number: int, lane: int, ahead_m: float, speed_mps: float
 ) -> dict[str, Any]:
     kind = str(rng.choice(_KINDS, p=_SHARES))
     braking = speed_mps > 0.0 and rng.random() < 0.3
@@ -178,11 +182,11 @@ def _lane_change(rng: np.random.Generator, road: Road, lane: int) -> list[dict[s
     return [{"start_s": 0.0, "duration_s": float(rng.uniform(3.0, _LONGEST_CHANGE_S)), "lane": int(rng.choice(beside))}]
 
 
-def drive(name: str, step_s: float) -> Iterator[Moment]:
+def drive(name: str, step_s: float) -> Iterator[DrawnScene]:
     """A built-in scenario, or any scenario file, as moments ``step_s`` apart."""
     scenario = load(name)
     end_m = world_state.at(scenario, scenario.duration_s).s_m + _BEYOND_M
     camera = DrawnCamera(scenario.road, Roadside.build(scenario.road, scenario.seed, 0.0, end_m), scenario.seed)
     for t_s in np.arange(0.0, scenario.duration_s, step_s).tolist():
         now = world_state.at(scenario, t_s)
-        yield Moment(camera.picture(now), now)
+        yield DrawnScene(camera.picture(now), now)

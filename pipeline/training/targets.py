@@ -23,11 +23,12 @@ BACKGROUND, IGNORED = -1, -2
 
 @dataclass(frozen=True)
 class Targets:
-    """For the N cells of an image: labels (N,) int64 a class, ``BACKGROUND`` or ``IGNORED``; boxes (N, 4) float32
-    x1 y1 x2 y2 in network pixels, zero where there is no class."""
+    """For the N cells of an image."""
 
     labels: npt.NDArray[np.int64]
+    """(N,) int64 a class, ``BACKGROUND`` or ``IGNORED``."""
     boxes: F32
+    """(N, 4) float32 x1 y1 x2 y2 in network pixels, zero where there is no class."""
 
 
 def assign(boxes: F32, labels: npt.NDArray[np.int64], visible: F32, size: Size) -> Targets:

@@ -19,7 +19,7 @@ from pipeline.inference.graph import Size
 from pipeline.training.augment import view
 from pipeline.training.dataset import read_labels
 from pipeline.training.loss import losses
-from pipeline.training.network import INPUT_SIZE, Network, export
+from pipeline.training.network import INPUT_SIZE, DetectorNetwork, export
 from pipeline.training.targets import assign
 from pipeline.types import F32
 
@@ -80,7 +80,7 @@ def train(
     torch.manual_seed(seed)
     torch.set_num_threads(threads)
     examples = Examples(folders, seed)
-    network = Network()
+    network = DetectorNetwork()
     if start_from is not None:
         network.load_state_dict(torch.load(start_from))
     average = copy.deepcopy(network)
@@ -122,7 +122,7 @@ def _blend(average: torch.nn.Module, network: torch.nn.Module, keep: float) -> N
                 mean.lerp_(now, 1.0 - keep)
 
 
-def _save(average: Network, out: Path) -> None:
+def _save(average: DetectorNetwork, out: Path) -> None:
     network = copy.deepcopy(average).eval()
     torch.save(network.state_dict(), out.with_suffix(".pt"))
     export(network, out, INPUT_SIZE)

@@ -15,7 +15,7 @@ Point2 = tuple[float, float]
 Point3 = tuple[float, float, float]
 Box = tuple[float, float, float, float]
 """Axis-aligned image box ``x1 y1 x2 y2`` in pixels."""
-Window = tuple[int, int, int, int]
+PixelWindow = tuple[int, int, int, int]
 """A part of an image, ``x1 y1 x2 y2`` in whole pixels, the last ones not in it."""
 VEHICLES = frozenset({"car", "truck", "bus", "motorcycle"})
 """Class names that may be a lead vehicle. Detector labels are mapped to the COCO names by the detector."""

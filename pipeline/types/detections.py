@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.types.arrays import F32, I32, Window
+from pipeline.types.arrays import F32, I32, PixelWindow
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class RawBoxes:
     """M class names in COCO's spelling."""
     law: DistanceLaw = REAL_VEHICLES
     """Distance from box heights, where no parameter says otherwise."""
-    far: Window | None = None
+    far: PixelWindow | None = None
     """The part of the image that was looked at a second time, at native resolution; None: none."""
     far_count: int = 0
     """How many of the candidates, the last ones, come from that look."""

@@ -29,7 +29,7 @@ class Sweep:
 
 
 @dataclass(frozen=True)
-class Picture:
+class CameraImage:
     """One camera image."""
 
     t_ns: int | None
@@ -196,7 +196,7 @@ class Frame:
     """The tick."""
     sweep: Sweep | None = None
     """The LiDAR's rotation."""
-    picture: Picture | None = None
+    picture: CameraImage | None = None
     """The camera's image."""
     camera: CameraCalibration | None = None
     """The camera's calibration; known without an image too."""

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.types.arrays import F32, F64, I32, Box, Window
+from pipeline.types.arrays import F32, F64, I32, Box, PixelWindow
 from pipeline.types.frame import EgoState, Frame, OwnMotion, StreamHealth
 from pipeline.types.lane import EgoLane
 from pipeline.types.objects import FusedObject, Ground, LidarTrack, Obstacle, VisionTrack
@@ -109,7 +109,7 @@ class SensorHealth:
     """How much later than the sweep the image was taken."""
     ego_age_ms: float | None
     """Age of own motion."""
-    far_view: Window | None = None
+    far_view: PixelWindow | None = None
     """The part of the image that the detector saw a second time, in native pixels; None when it did not."""
 
     @staticmethod

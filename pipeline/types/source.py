@@ -192,6 +192,16 @@ class RawPackets(Protocol):
 
 
 @runtime_checkable
+class Mounted(Protocol):
+    """A source whose LiDAR's mount a rig file says."""
+
+    @property
+    def T_ego_lidar(self) -> F64:
+        """(4, 4), takes the LiDAR's own points to the ego frame."""
+        ...
+
+
+@runtime_checkable
 class Simulated(Protocol):
     """A source that knows whether the simulator drew its images, which detectors of real images do worse on."""
 

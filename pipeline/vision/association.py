@@ -9,13 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from pipeline.common.geometry import F64
+from pipeline.common.geometry import F64, iou_matrix
 from pipeline.params import VisionTrackingParams
 from pipeline.types import VEHICLES, VisionMeasurement, VisionTrack
 
 _NOMINAL_DT_S = 0.1
 _MAX_GROWTH = 3.0
 """The outer gate is meant for images 0.1 s apart; it widens with the time since the last sighting, thrice at most."""
+_ESTABLISHED_HITS = 3
+"""Sightings after which an object's motion is measured rather than assumed."""
 
 
 class Expected(NamedTuple):
@@ -25,6 +27,8 @@ class Expected(NamedTuple):
     """With the predicted box."""
     centre_sigma_px: float
     """Standard deviation of a sighting's centre from the predicted one, along each axis of the image."""
+    noise_px: float
+    """What of it is the box's own noise: all that remains once the prediction is perfect."""
     unseen_s: float
     """Since its last sighting."""
 
@@ -34,15 +38,43 @@ def match(
     measurements: Sequence[VisionMeasurement],
     params: VisionTrackingParams,
 ) -> dict[int, int]:
-    """Index of followed object → index of measurement: the one-to-one choice of least total cost, where leaving a pair
-    apart costs as much as a pair at its gate. (Making as many pairs as possible would shift a whole row of cars by one
-    when the first leaves the image.)"""
-    if not expected or not measurements:
+    """Index of followed object → index of measurement. A network that draws a second box on a vehicle for a moment
+    starts a track that would take over its number, so doubles choose among what is left."""
+    if params.filter == "queue":
+        return _assign(range(len(expected)), range(len(measurements)), expected, measurements, params)
+    doubles = _doubles(expected, params)
+    first = [row for row in range(len(expected)) if row not in doubles]
+    found = _assign(first, range(len(measurements)), expected, measurements, params)
+    taken = set(found.values())
+    left = [column for column in range(len(measurements)) if column not in taken]
+    return found | _assign(sorted(doubles), left, expected, measurements, params)
+
+
+def _doubles(expected: Sequence[Expected], params: VisionTrackingParams) -> set[int]:
+    """The objects seen once or twice whose box lies on that of an established one."""
+    young = [row for row, each in enumerate(expected) if each.track.hits < _ESTABLISHED_HITS]
+    old = [row for row, each in enumerate(expected) if each.track.hits >= _ESTABLISHED_HITS]
+    if not young or not old:
+        return set()
+    boxes = np.array([each.track.bbox for each in expected])
+    on_another = iou_matrix(boxes[young], boxes[old]).max(axis=1) > params.ghost_iou
+    return {young[index] for index in np.flatnonzero(on_another).tolist()}
+
+
+def _assign(
+    rows: Sequence[int],
+    columns: Sequence[int],
+    expected: Sequence[Expected],
+    measurements: Sequence[VisionMeasurement],
+    params: VisionTrackingParams,
+) -> dict[int, int]:
+    """The one-to-one choice of least total cost, where leaving a pair apart costs as much as a pair at its gate.
+    (Making as many pairs as possible would shift a whole row of cars by one when the first leaves the image.)"""
+    if not rows or not columns:
         return {}
-    cost = _costs(expected, measurements, params)
-    rows, columns = linear_sum_assignment(np.minimum(cost, 1.0))
-    near = cost[rows, columns] < 1.0
-    return dict(zip(rows[near].tolist(), columns[near].tolist(), strict=True))
+    cost = _costs([expected[row] for row in rows], [measurements[column] for column in columns], params)
+    chosen = zip(*(each.tolist() for each in linear_sum_assignment(np.minimum(cost, 1.0))), strict=True)
+    return {rows[i]: columns[j] for i, j in chosen if cost[i, j] < 1.0}
 
 
 def same_kind(a: str, b: str) -> bool:
@@ -61,7 +93,8 @@ def _costs(
     and height changed. The gate is as wide as the prediction is uncertain, so a small box far away, which moves by two
     or three pixels, cannot become its neighbour 20 pixels aside: a new number is better than a wrong one. A detector
     that draws half of a vehicle for a moment keeps its number; what its height then says is the place filter's to
-    refuse."""
+    refuse. A vague prediction makes any box near it unsurprising, its neighbour's too, but none of them likely: it pays
+    the logarithm of its spread, as in a likelihood, which also narrows its gate."""
     old = np.array([each.track.bbox for each in expected])
     new = np.array([seen.detection.bbox for seen in measurements])
     apart = (old[:, None, :2] + old[:, None, 2:] - new[:, :2] - new[:, 2:]) / 2
@@ -72,8 +105,10 @@ def _costs(
         sigma_px = np.array([each.centre_sigma_px for each in expected])[:, None]
         old_size, new_size = old[:, 2:] - old[:, :2], new[:, 2:] - new[:, :2]
         change = np.abs(np.log(np.maximum(new_size, 1.0) / np.maximum(old_size, 1.0)[:, None]))
-        cost = np.hypot(
-            moved_px / (params.gate_sigmas * sigma_px), change.max(axis=-1) / math.log(params.max_size_ratio)
+        vague = np.array([math.log(each.centre_sigma_px / each.noise_px) for each in expected])[:, None]
+        cost = np.sqrt(
+            ((moved_px / sigma_px) ** 2 + 4.0 * vague) / params.gate_sigmas**2
+            + (change.max(axis=-1) / math.log(params.max_size_ratio)) ** 2
         )
         growth = np.clip([each.unseen_s / _NOMINAL_DT_S for each in expected], 1.0, _MAX_GROWTH)
         farthest_px = np.maximum(params.gate_px, params.gate_sizes * old_size[:, 0]) * growth

@@ -40,7 +40,9 @@ class PowerLaw:
     """Depth in metres = coefficient · (box height in pixels) ^ exponent."""
 
     coefficient: float
+    """Metres times pixels^-exponent."""
     exponent: float
+    """-1 for an ideal pinhole camera."""
 
     def __call__(self, height_px: float) -> float:
         return self.coefficient * height_px**self.exponent

@@ -16,7 +16,7 @@ import numpy as np
 
 from pipeline.inference.graph import MULTIPLE
 from pipeline.inference.runtime import DetectorError
-from pipeline.types import F32, U8, Frame, Mask, RawBoxes, Window
+from pipeline.types import F32, U8, Frame, Mask, PixelWindow, RawBoxes
 from pipeline.vision.detector import Detector, open_detector
 
 WINDOW_PX = 416
@@ -33,7 +33,7 @@ _CUT_PX = 3.0
 """A box that ends this near to an inner edge of the window goes on beyond it."""
 
 
-class Network(Protocol):
+class WindowDetector(Protocol):
     """What looks at the window."""
 
     @property
@@ -50,7 +50,7 @@ class Network(Protocol):
 class FarView:
     """A detector and the size of its window."""
 
-    detector: Network
+    detector: WindowDetector
     """At the window's input size."""
     size_px: int = WINDOW_PX
     """Side of the window, in pixels of the image."""
@@ -70,7 +70,9 @@ class FarLook:
     """The far view of one frame. Its name is the far view's: which window it is follows from the frame."""
 
     view: FarView
+    """Which part of the image, and the network that looks at it."""
     frame: Frame | None
+    """Its lanes and calibration place the window; None puts it in the middle of the image."""
 
     @property
     def name(self) -> str:
@@ -116,7 +118,7 @@ def open_far_view(detector: Detector, picture_size: tuple[int, int], size_px: in
     return FarView(native, size_px)
 
 
-def window_of(frame: Frame | None, picture_size: tuple[int, int], size_px: int = WINDOW_PX) -> Window:
+def window_of(frame: Frame | None, picture_size: tuple[int, int], size_px: int = WINDOW_PX) -> PixelWindow:
     """The window in an image of (width, height): around the vanishing point of the way ahead, inside the image. The
     image's middle where the camera is not known."""
     width, height = picture_size
@@ -141,7 +143,7 @@ def _bend_bearing(frame: Frame | None) -> float:
     return float(np.clip(ego.yaw_rate_radps / ego.speed_mps * LOOK_AHEAD_M / 2, -0.5, 0.5))
 
 
-def _is_whole(boxes: F32, window: Window, picture_size: tuple[int, int]) -> Mask:
+def _is_whole(boxes: F32, window: PixelWindow, picture_size: tuple[int, int]) -> Mask:
     """(M,) whether the window shows all of each box that the image shows."""
     x1, y1, x2, y2 = window
     width, height = picture_size

@@ -13,7 +13,7 @@ from pipeline.common.kalman import CvState
 from pipeline.params import VisionTrackingParams
 from pipeline.types import VisionMeasurement, VisionTrack
 from pipeline.vision import place_filter
-from pipeline.vision.place_filter import Sighting
+from pipeline.vision.place_filter import PlaceMeasurement
 from pipeline.vision.vehicle_height import Height, learn
 
 FASTEST_OVER_GROUND_MPS = 70.0
@@ -29,6 +29,7 @@ class Followed:
     """One object between two images."""
 
     track: VisionTrack
+    """What the rest of the pipeline is told."""
     unseen_s: float
     """Since its last sighting."""
     unplaced_s: float
@@ -53,7 +54,9 @@ class SpeedGuess(NamedTuple):
     """What a new object's relative speed along ego x is taken for, and its standard deviation along each axis."""
 
     along_mps: float
+    """Relative speed along ego x."""
     sigma_mps: float
+    """The same along x and y."""
 
 
 def predict_place(followed: Followed, dt_s: float, params: VisionTrackingParams) -> tuple[CvState | None, float]:
@@ -75,9 +78,12 @@ def take_place(
     guess: SpeedGuess,
     ego_speed_mps: float | None,
     params: VisionTrackingParams,
+    slip_m: float = 0.0,
 ) -> Followed:
     """The measured place taken in, or refused when it cannot be that object's. When it is refused for long, the
-    distances are right and the filter is wrong: it starts anew from them, and its speed has to be measured again."""
+    distances are right and the filter is wrong: it starts anew from them, and its speed has to be measured again.
+
+    slip_m: how far the box may lie off sideways, beyond its usual noise."""
     if seen.position is None or seen.sigma_m is None or seen.distance_m is None:
         if followed.place_filter is not None:
             return evolve(followed, track=with_place(followed.track, followed.place_filter, followed.placed))
@@ -95,11 +101,11 @@ def take_place(
         followed = learned(followed, seen.ranged_m, seen.ranged_sigma_m, params)
         own_m, share = seen.ranged_m, seen.ranged_sigma_m / seen.ranged_m
         noise_share = share
-    sighting = Sighting(
+    sighting = PlaceMeasurement(
         own_m,
         math.atan2(seen.position[1], seen.position[0]),
         noise_share,
-        math.radians(params.bearing_sigma_deg),
+        math.hypot(math.radians(params.bearing_sigma_deg), slip_m / own_m),
     )
     filtered, placed = followed.place_filter, followed.placed + 1
     if filtered is not None and place_filter.surprise(filtered, sighting) > params.max_nis:
@@ -119,7 +125,8 @@ def take_place(
 
 
 def learned(followed: Followed, range_m: float, sigma_m: float, params: VisionTrackingParams) -> Followed:
-    """The object with what a measured range says of its height; its place moves with that, so that it is no motion."""
+    """The object with what a measured range says of its height. Its place moves with that, so that it is no motion, but
+    no farther than the range: one that rests on earlier ranges is right already."""
     seen = followed.seen
     if (
         not params.learn_height
@@ -133,7 +140,9 @@ def learned(followed: Followed, range_m: float, sigma_m: float, params: VisionTr
     height = learn(followed.height, by_class_m, seen.noise_share, seen.size_share, range_m, sigma_m)
     place = followed.place_filter
     if place is not None and height != followed.height:
-        place = place_filter.scaled(place, height.factor / followed.height.factor)
+        due = range_m / math.hypot(*place_filter.position(place))
+        step = height.factor / followed.height.factor
+        place = place_filter.scaled(place, min(max(step, min(due, 1.0)), max(due, 1.0)))
     return evolve(followed, height=height, place_filter=place)
 
 

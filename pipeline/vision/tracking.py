@@ -41,7 +41,9 @@ class VisionTrackerState:
     """All that one image leaves to the next."""
 
     next_id: int = 1
+    """Number of the next new track; numbers are never given twice."""
     followed: tuple[Followed, ...] = field(default=())
+    """Every track that is still alive."""
 
 
 def track(
@@ -103,8 +105,10 @@ def learn_heights(
 
 def _expected(followed: Followed, params: VisionTrackingParams) -> Expected:
     """What the next box of an object is compared with."""
-    predicted = followed.box_filter.cov[0, 0] + _box_noise(followed.track.bbox, params)[0, 0]
-    return Expected(followed.track, math.sqrt(predicted), followed.unseen_s)
+    noise = _box_noise(followed.track.bbox, params)[0, 0]
+    return Expected(
+        followed.track, math.sqrt(followed.box_filter.cov[0, 0] + noise), math.sqrt(noise), followed.unseen_s
+    )
 
 
 def _without_ghosts(alive: tuple[Followed, ...], params: VisionTrackingParams) -> tuple[Followed, ...]:
@@ -177,12 +181,14 @@ def _seen(
 ) -> Followed:
     """The object with this image's box and distance taken in."""
     detection = seen.detection
-    label, votes, box_filter = detection.label, followed.votes, followed.box_filter
+    label, votes, box_filter, slip = detection.label, followed.votes, followed.box_filter, 0.0
     if params.filter == "kalman":
         tally = dict(votes)
         tally[label] = tally.get(label, 0.0) + detection.score
         label, votes = max(tally, key=lambda name: tally[name]), tuple(tally.items())
-        box_filter = kalman.update(box_filter, _centre(detection.bbox), _box_noise(detection.bbox, params))
+        slip = _slip_px(detection.bbox, followed.track.bbox, 0) / _width(detection.bbox)
+        noise = _box_noise(detection.bbox, params, followed.track.bbox)
+        box_filter = kalman.update(box_filter, _centre(detection.bbox), noise)
     track = evolve(
         followed.track,
         bbox=detection.bbox,
@@ -198,16 +204,25 @@ def _seen(
         track = evolve(track, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position, ranges=ranges)
     height = renamed(followed, label, seen)
     current = evolve(followed, track=track, unseen_s=0.0, votes=votes, box_filter=box_filter, height=height)
-    return take_place(current, seen, guess, ego_speed_mps, params) if params.filter == "kalman" else current
+    slip_m = slip * _CAR_WIDTH_M
+    return take_place(current, seen, guess, ego_speed_mps, params, slip_m) if params.filter == "kalman" else current
 
 
 def _missed(followed: Followed) -> Followed:
     return evolve(followed, track=evolve(followed.track, missed=followed.track.missed + 1))
 
 
-def _box_noise(box: Box, params: VisionTrackingParams) -> F64:
+def _box_noise(box: Box, params: VisionTrackingParams, expected: Box | None = None) -> F64:
+    """Covariance (2, 2) of a box's centre; with what the size is off the expected one, where that is known."""
     variance = max(_CENTRE_NOISE * _width(box), _EDGE_PX) ** 2 + params.shift_px**2
-    return np.array([[variance, 0.0], [0.0, variance]])
+    slips = [_slip_px(box, expected, axis) if expected is not None else 0.0 for axis in (0, 1)]
+    return np.diag([variance + slip**2 for slip in slips])
+
+
+def _slip_px(box: Box, expected: Box, axis: int) -> float:
+    """How far the centre may be off because only a part of the object was drawn, or more than it: one edge is right
+    then, and the centre off by half of what the size (axis 0: width, 1: height) is."""
+    return abs((box[axis + 2] - box[axis]) - (expected[axis + 2] - expected[axis])) / 2
 
 
 def _box_speed_sigma(box: Box) -> float:

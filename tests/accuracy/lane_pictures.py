@@ -14,7 +14,8 @@ import numpy as np
 
 from pipeline.alignment.projection import Alignment, Pinhole
 from pipeline.common.geometry import F64
-from pipeline.lanes.road_lines import LaneState, RoadView, follow, in_picture
+from pipeline.lanes.drawn_lines import in_image
+from pipeline.lanes.road_lines import LaneState, RoadView, follow
 from pipeline.params import LaneParams
 from pipeline.types import U8, CameraCalibration, Moment, RawLanes
 from pipeline.types.lane import EgoLane
@@ -58,7 +59,7 @@ def alone(raw: RawLanes, width: int, height: int) -> tuple[EgoLane | None, Align
 
 def misses(name: str, lane: EgoLane | None, aligned: Alignment, marks: Marks) -> list[Miss]:
     """Every mark of one image compared with the line detected there."""
-    lines = in_picture(lane, aligned) if lane is not None else {}
+    lines = in_image(lane, aligned) if lane is not None else {}
     found = []
     for row, sides in marks[name].items():
         for side, marked in zip(("left", "right"), sides, strict=True):
@@ -73,7 +74,7 @@ def draw(bgr: U8, raw: RawLanes, lane: EgoLane | None, aligned: Alignment, text:
     drawn = bgr.copy()
     for (u, v), score in zip(raw.points.tolist(), raw.scores.tolist(), strict=True):
         cv2.circle(drawn, (round(u), round(v)), 2, (255, round(255 * score), 0), cv2.FILLED)
-    for side, uv in (in_picture(lane, aligned) if lane is not None else {}).items():
+    for side, uv in (in_image(lane, aligned) if lane is not None else {}).items():
         seen = np.round(uv[~np.isnan(uv[:, 0])]).astype(np.int32)
         cv2.polylines(drawn, [seen], False, _COLOURS[side], 2, cv2.LINE_AA)
     cv2.putText(drawn, text or summary(lane), (12, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (255, 255, 255), 2, cv2.LINE_AA)

@@ -17,7 +17,7 @@ from pipeline.run import advance
 from pipeline.simulation import scenario
 from pipeline.simulation.drawing.road_markings import edge_paint_m
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.sensors.rig import SensorRig
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.roads import Road
 from pipeline.simulation.world.world_state import World
@@ -47,7 +47,7 @@ def errors(
 ) -> Iterator[LaneError]:
     """Drive a built-in scenario's ``frames`` (consecutive); the lane detector looks at every ``every``-th one."""
     played = scenario.load(name)
-    sensors = Sensors(played, world_state.at(played, played.duration_s).s_m)
+    sensors = SensorRig(played, world_state.at(played, played.duration_s).s_m)
     detectors, state = Detectors(None, detector, every), State()
     for index in frames:
         now = world_state.at(played, index / played.rate_hz)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from app.streaming.picture import WIDTH_STEP_PX
+from app.streaming.sent_image import WIDTH_STEP_PX
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.looks import box_of, pixels, repainted, wait_for_frame
 

@@ -18,6 +18,7 @@ import tyro
 from app.cli import _CONFIG, COMMANDS, _command
 from app.core.session_folder import SESSIONS
 from pipeline.params import PRESETS, Params
+from tests.docs.fleet_tables_page import tables_page
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -35,6 +36,7 @@ def pages() -> dict[str, str]:
     return {
         "reference/parameters.md": parameters_page(),
         "reference/cli.md": cli_page(),
+        "reference/fleet-tables.md": tables_page(_MADE),
         "architecture.md": with_layers((DOCS / "architecture.md").read_text(encoding="utf-8")),
     }
 
@@ -146,6 +148,8 @@ def _cli_lines() -> Iterator[str]:
         "| `CIPV_DATA` | folder with this machine's data sets and networks (`models/`) |",
         "| `CIPV_HOME` | folder for downloaded and registered networks and caches; default: `~/.cache/cipv` |",
         "| `CIPV_FOLDERS` | folders that the page and the API may open files from, separated by `:` |",
+        "| `CIPV_ADDRESSES` | beginnings of addresses in stores that may be opened too where `CIPV_FOLDERS` is set, "
+        "separated by spaces |",
         "| `CIPV_LABELS_URL` | label database; `--labels` and `--database` override it |",
         "| `CIPV_TOKEN`, `CIPV_DISPLAY_TOKEN` | tokens for the links that other machines use, at least 16 characters |",
         "| `CIPV_DEBUG` | when set, an unexpected error shows its traceback |",

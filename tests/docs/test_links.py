@@ -15,8 +15,10 @@ MOST_README_LINES = 150
 LARGEST_IMAGE_BYTES = 300_000
 PACKAGES = ("app", "pipeline", "static", "tests")
 IN_THIS_REPOSITORY = re.compile(r"(app|pipeline|static|tests|docs|\.ci)/[\w./-]*|(app|pipeline)(\.[a-z_0-9]+)+")
+A_FILE = re.compile(r"[\w-]+\.(py|js|html|css|svg|toml|lock|ini)")
 TO_BE_WRITTEN = {"pipeline/radar"}
 """What a guide tells its reader to make."""
+CITED_CODE = re.compile(r"(?<![\w/.-])(?:app|pipeline|static|tests)/[\w/-]+(?:\.(?:py|js|css|html))?(?![\w-])")
 CITED_PAGE = re.compile(r"(?<![\w/])docs/[\w/-]+\.md\b")
 
 
@@ -51,11 +53,33 @@ def test_every_file_and_module_it_names_exists(file: str) -> None:
     assert sorted(path for path in paths if not ((ROOT / path).exists() or (ROOT / f"{path}.py").exists())) == []
 
 
+@pytest.mark.parametrize("file", FILES)
+def test_every_file_that_it_names_without_a_folder_exists(file: str) -> None:
+    named = {span for span in code_spans(file) if A_FILE.fullmatch(span)}
+    present = {path.name for package in PACKAGES for path in (ROOT / package).rglob("*")}
+    present |= {path.name for path in ROOT.iterdir()}
+    assert sorted(named - present) == []
+
+
 def test_every_page_that_code_cites_exists() -> None:
     sources = [path for package in PACKAGES for path in (ROOT / package).rglob("*") if path.suffix in (".py", ".js")]
     cited = {page for path in sources for page in CITED_PAGE.findall(path.read_text(encoding="utf-8"))}
     assert "docs/reference/results.md" in cited
     assert sorted(page for page in cited if not (ROOT / page).exists()) == []
+
+
+def test_every_file_that_code_cites_exists() -> None:
+    sources = [
+        path for package in PACKAGES[:3] for path in (ROOT / package).rglob("*") if path.suffix in (".py", ".js")
+    ]
+    cited = {
+        (name, path.relative_to(ROOT).as_posix())
+        for path in sources
+        for name in CITED_CODE.findall(path.read_text(encoding="utf-8"))
+    }
+    assert ("app/engine/player.py", "app/engine/engine.py") in cited
+    missing = {(name, path) for name, path in cited if not ((ROOT / name).exists() or (ROOT / f"{name}.py").exists())}
+    assert missing == set()
 
 
 def test_the_index_lists_every_page_once() -> None:

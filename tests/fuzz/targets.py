@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from pipeline.common.errors import BadInput
-from pipeline.common.picture_decoding import TooMuch, decode_within_budget
+from pipeline.common.image_decoding import TooMuch, decode_within_budget
 from pipeline.common.user_file_errors import parse_yaml
 from pipeline.formats.kitti_records import parse_timestamps
 from pipeline.formats.nmea import NmeaReader

@@ -16,7 +16,7 @@ from pipeline.params import Params, SyncParams
 from pipeline.run import advance, run_live
 from pipeline.sources import open_source
 from pipeline.step import State
-from pipeline.types import U8, Frame, Picture, RawBoxes, RawLanes
+from pipeline.types import U8, CameraImage, Frame, RawBoxes, RawLanes
 from tests.pipeline.vision import networks
 
 
@@ -75,7 +75,7 @@ _NO_LANES = RawLanes("lanes", np.zeros((0, 2), np.float32), np.zeros(0, np.float
 
 
 def _frames(count: int) -> list[Frame]:
-    picture = Picture(0, np.zeros((36, 64, 3), np.uint8))
+    picture = CameraImage(0, np.zeros((36, 64, 3), np.uint8))
     return [Frame(i, f"{i}", i * 100_000_000, picture=picture) for i in range(count)]
 
 

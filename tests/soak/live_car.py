@@ -20,7 +20,7 @@ from pipeline.replay.messages import Message
 from pipeline.replay.replayer import replay
 from pipeline.replay.senders import open_senders
 from pipeline.simulation import scenario
-from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.sensors.rig import SensorRig
 from pipeline.simulation.world import world_state
 from pipeline.sources.live.config import load
 from pipeline.types import CameraCalibration, Frame
@@ -34,7 +34,7 @@ LEAD_M = (22.0, 25.5)
 def clip() -> tuple[list[Frame], list[bytes]]:
     """``SPAN`` frames of the LiDAR, and three images to each."""
     drive = scenario.load(SCENARIO)
-    sensors = Sensors(drive, world_state.at(drive, drive.duration_s).s_m)
+    sensors = SensorRig(drive, world_state.at(drive, drive.duration_s).s_m)
     frames, jpegs = [], []
     for number in range(3 * SPAN):
         frame = sensors.frame(world_state.at(drive, FROM_S + number / 30.0), number, 0)
@@ -47,7 +47,7 @@ def clip() -> tuple[list[Frame], list[bytes]]:
 
 def camera() -> CameraCalibration:
     drive = scenario.load(SCENARIO)
-    return Sensors(drive, 0.0).camera
+    return SensorRig(drive, 0.0).camera
 
 
 def messages(frames: list[Frame], jpegs: list[bytes], seconds: float) -> Iterator[Message]:

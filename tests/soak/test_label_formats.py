@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.common.geometry import Cuboid
-from pipeline.labels.formats.base import LabeledDrive, Shot
+from pipeline.labels.formats.base import FrameInfo, LabeledDrive
 from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Sighting
 from tests.pipeline.labels.formats.sets import IMPORT, camera
@@ -22,7 +22,7 @@ LIMIT_S = 10.0
 @pytest.fixture(scope="module")
 def drive() -> LabeledDrive:
     eye = camera()
-    shots = (Shot(f"{i:06d}", i * 10**8, eye, (1280, 720), eye.T_camera_ego) for i in range(FRAMES))
+    shots = (FrameInfo(f"{i:06d}", i * 10**8, eye, (1280, 720), eye.T_camera_ego) for i in range(FRAMES))
     return LabeledDrive("sim:long", tuple(shots))
 
 

@@ -25,7 +25,7 @@ from app.labels.store.drive_labels import DriveLabels
 from pipeline.common.geometry import Cuboid
 from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.evaluation.scores.truth import of_labels
-from pipeline.labels.formats.base import LabeledDrive, Shot, drive_of
+from pipeline.labels.formats.base import FrameInfo, LabeledDrive, drive_of
 from pipeline.labels.formats.registry import FORMATS, export_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
 from pipeline.recording.session.provenance import About
@@ -105,7 +105,7 @@ def test_a_hundred_thousand_labels_in_one_drive(kind: str, request: pytest.Fixtu
     back = timed("label set", labels.label_set)
     assert back == whole.__class__(**(vars(whole) | {"source": labels.info.uri}))
     timed("truth for scores", lambda: of_labels(back, LeadRule()))
-    drive = LabeledDrive(back.source, tuple(Shot(name, t) for name, t in zip(back.frames, back.t_ns, strict=True)))
+    drive = LabeledDrive(back.source, tuple(FrameInfo(name, t) for name, t in zip(back.frames, back.t_ns, strict=True)))
     for name in FORMATS:
         if name in ("native", "openlabel", "nuscenes", "csv"):
             timed(f"export {name}", lambda name=name: export_labels(back, drive, name, tmp_path / f"{kind}-{name}"))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from typing import NamedTuple
 
-from app.bench.page.devtools import Browser, Page
+from app.bench.page.devtools import Browser, BrowserPage
 
 _SETTLE_S = 4.0
 _FIRST_VIEWS = 5
@@ -84,7 +84,9 @@ class Waits(NamedTuple):
     cursor show the outcome; and until the table, the reasons and the parameters do, one screen refresh later."""
 
     painted_ms: float
+    """Until image, bird's-eye view, figures and cursor."""
     whole_ms: float
+    """Until table, reasons and parameters too."""
 
 
 def first_views_ms(running: Browser, address: str) -> list[float]:
@@ -97,7 +99,7 @@ def first_views_ms(running: Browser, address: str) -> list[float]:
     return found
 
 
-def opened(running: Browser, address: str) -> Page:
+def opened(running: Browser, address: str) -> BrowserPage:
     """The dashboard in a fresh profile, after its first painted frame."""
     page = running.open(address, f"(async () => {{ {_WATCH} }})()")
     page.call(_ONE_PAINTED, _PATIENCE_MS)

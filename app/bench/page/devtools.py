@@ -96,7 +96,7 @@ class Browser:
             self._told.add((said["method"], said.get("sessionId", "")))
         return said
 
-    def open(self, address: str, first: str = "") -> Page:
+    def open(self, address: str, first: str = "") -> BrowserPage:
         """A loaded page with an empty cache. first: a script that runs before the page's own."""
         context = self.ask("Target.createBrowserContext")["browserContextId"]
         width, height = SIZE_PX
@@ -108,7 +108,7 @@ class Browser:
         self.ask("Page.addScriptToEvaluateOnNewDocument", session, source=first)
         self.ask("Page.navigate", session, url=address)
         self.wait_for("Page.loadEventFired", session)
-        return Page(self, context, session)
+        return BrowserPage(self, context, session)
 
     def cpu_s(self) -> dict[str, float]:
         """CPU time so far, by kind of process."""
@@ -118,7 +118,7 @@ class Browser:
         return spent
 
 
-class Page:
+class BrowserPage:
     """An open page."""
 
     def __init__(self, browser: Browser, context: str, session: str) -> None:

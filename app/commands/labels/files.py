@@ -16,6 +16,7 @@ from app.commands.support.arguments import option
 from app.commands.support.open_with_progress import opened_recording
 from app.commands.support.options import RecordingName
 from app.commands.support.progress_bars import frames_progress, task_progress
+from app.labels.project_classes import project_classes
 from app.labels.wording import WORKING
 from pipeline.common.garbage_collection import gc_paused
 from pipeline.common.user_file_errors import given_path
@@ -65,7 +66,7 @@ class ExportLabels:
         drive = _drive(source)
         labels, notes = self._labels(source, drive)
         labels = selected(labels, self.only)
-        lost = export_labels(labels, drive, self.format, self.out)
+        lost = export_labels(labels, drive, self.format, self.out, project_classes())
         say(*notes, *lost, f"{self.out}: {_amount(labels)}")
         return 0
 

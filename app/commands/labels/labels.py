@@ -6,14 +6,22 @@ from __future__ import annotations
 import getpass
 import json
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 from app.commands.labels.files import Database, ExportLabels, ImportLabels, Person, say
+from app.commands.labels.people import LabelAgreement, LabelEffort, LabelQueue
+from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
-from app.commands.support.progress_bars import frames_progress
+from app.commands.support.progress_bars import frames_progress, task_progress
+from app.labels.project_classes import FILE as PROJECT_FILE
+from app.labels.project_classes import VARIABLE, project_classes
+from pipeline.labels.classes import FILE
+from pipeline.labels.formats.base import write_file
 
 
 @dataclass(frozen=True)
@@ -37,7 +45,9 @@ class ProposeLabels:
         from app.labels.acts.bulk import put_proposals
         from app.labels.store.database import open_database
         from app.labels.store.drive_labels import DriveLabels, info_of
-        from pipeline.labels.headings import Moment
+        from pipeline.labels.cuboids.points_of import Clustered, clustered
+        from pipeline.labels.cuboids.refine import refined
+        from pipeline.labels.headings import Moment, own_poses
         from pipeline.labels.model import Origin
         from pipeline.labels.propose import Seen, propose
         from pipeline.path.yaw_rate import usable_rate
@@ -65,6 +75,15 @@ class ProposeLabels:
         made_from = digest(source.uri, detectors.names, "both", params)
         origin = Origin("pipeline", "cipv labels propose", int(time.time() * 1000), made_from, calibration)
         found = propose(frames, leads, origin, moments)
+
+        @lru_cache(64)
+        def sweeps(index: int) -> Clustered | None:
+            sweep = source.frame(index).sweep
+            return clustered(sweep.points) if sweep is not None else None
+
+        with frames_progress() as bar:
+            progress = task_progress(bar, "laying proposals on points", len(found.tracks))
+            found = replace(found, tracks=refined(found.tracks, sweeps, own_poses(moments), progress))
         database = open_database(self.database)
         try:
             kept = DriveLabels(database, info_of(source, lambda: tuple(names)))
@@ -109,12 +128,47 @@ class ListLabels:
 
 
 @dataclass(frozen=True)
+class ListClasses:
+    """List the classes, sub-classes, their names in exports, and the attributes that people choose from. With --out:
+    write them as a YAML file to edit; sessions/labels.yaml, or the file named by $CIPV_LABEL_CLASSES, is used.
+
+    Example: cipv labels classes --out sessions/labels.yaml
+    """
+
+    out: Annotated[Path | None, option("FILE")] = None
+    """The file to write; must not exist"""
+    json: bool = False
+    """Print the list as JSON"""
+
+    def __call__(self) -> int:
+        if self.out is not None:
+            write_file(self.out, FILE.read_bytes())
+            say(f"{self.out}: edit it; {PROJECT_FILE} and the file named by ${VARIABLE} are read at start")
+            return 0
+        known = project_classes()
+        if self.json:
+            classes = [vars(each) for each in known.classes.values()]
+            print(json.dumps({"classes": classes, "attributes": known.attributes}, indent=2))
+            return 0
+        for each in known.classes.values():
+            names = ", ".join(f"{export}: {called}" for export, called in each.exports.items())
+            print(f"{each.name}{f', a kind of {each.of}' if each.of else ''}{f' ({names})' if names else ''}")
+        for name, values in known.attributes.items():
+            print(f"{name}: {', '.join(values)}")
+        return 0
+
+
+@dataclass(frozen=True)
 class Labels:
-    """Labels of recordings: propose, list, export and import."""
+    """Labels of recordings: propose, list, classes, queue, agreement, effort, export and import."""
 
     action: (
         Annotated[ProposeLabels, tyro.conf.subcommand("propose")]
         | Annotated[ListLabels, tyro.conf.subcommand("list")]
+        | Annotated[ListClasses, tyro.conf.subcommand("classes")]
+        | Annotated[LabelQueue, tyro.conf.subcommand("queue")]
+        | Annotated[LabelAgreement, tyro.conf.subcommand("agreement")]
+        | Annotated[LabelEffort, tyro.conf.subcommand("effort")]
         | Annotated[ExportLabels, tyro.conf.subcommand("export")]
         | Annotated[ImportLabels, tyro.conf.subcommand("import")]
     )

@@ -17,7 +17,7 @@ from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
 from pipeline.source_kinds import usages
 
 if TYPE_CHECKING:
-    from pipeline.detection import Detectors
+    from pipeline.detection import DetectorChoice, Detectors
     from pipeline.run import Sensors
     from pipeline.types import Route
     from pipeline.types.source import AnySource, Source
@@ -131,36 +131,26 @@ class PipelineOptions:
             raise BadInput(f"--far-view-px {self.far_view_px}: expected 0, or 64 to 2048")
         return self.far_view_px or None
 
+    def choice(self) -> DetectorChoice:
+        """The networks that are asked for."""
+        from pipeline.detection import DetectorChoice
+
+        return DetectorChoice(self.detector, self.lanes, self.every(), self.far_px())
+
     def open_detectors(self, source: AnySource, sensors: Sensors = "both") -> Detectors:
         """All detectors for the source's images; their notes are printed. None of them for LiDAR alone, and for
         recordings that contain detections."""
-        from pipeline.detection import Detectors, brings_detections, far_view_for, lanes_for
-        from pipeline.lanes.open_detector import usual_every
+        from pipeline.detection import open_detectors
 
-        every = self.every()
-        if sensors == "lidar" or brings_detections(source):
-            return Detectors()
-        lanes = lanes_for(source, self.lanes)
-        for note in lanes.notes if lanes is not None else ():
-            print(f"cipv: {note}", file=sys.stderr)
-        boxes = self.open_detector(source, sensors)
-        px = self.far_px()
-        far = far_view_for(source, boxes, px) if px is not None else None
-        return Detectors(boxes, lanes, every or usual_every(lanes, source.rate_hz), far)
+        return open_detectors(source, self.choice(), sensors, _say)
 
     def open_detector(self, source: AnySource, sensors: Sensors = "both") -> Detector | None:
-        """The detector for the source's images; its notes are printed. DetectorMissing when a named one is missing,
-        or any with ``sensors="camera"``; otherwise a message says so and LiDAR runs alone."""
-        from pipeline.detection import detector_for
-        from pipeline.inference.runtime import DetectorMissing
+        """The detector for the source's images; its notes are printed. DetectorMissing when a named one is missing, or
+        any with ``sensors="camera"``; otherwise a message says so and LiDAR runs alone."""
+        from pipeline.detection import open_boxes
 
-        try:
-            detector = detector_for(source, self.detector)
-        except DetectorMissing as missing:
-            if self.detector is not None or sensors == "camera":
-                raise
-            print(f"cipv: {missing}", file=sys.stderr)
-            return None
-        for note in detector.notes:
-            print(f"cipv: {note}", file=sys.stderr)
-        return detector
+        return open_boxes(source, self.detector, sensors, _say)
+
+
+def _say(note: str) -> None:
+    print(f"cipv: {note}", file=sys.stderr)

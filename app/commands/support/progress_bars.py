@@ -32,14 +32,19 @@ def share_progress() -> Progress:
     return _bar(TaskProgressColumn())
 
 
+def drives_progress() -> Progress:
+    """A bar that counts drives and shows the field ``rate`` of its task."""
+    return _bar(MofNCompleteColumn(), TextColumn("{task.fields[rate]}"))
+
+
 def task_progress(bar: Progress, name: str, total: int | None = None) -> Told:
     """Add a task to the bar, and return the callback that reports its progress."""
     task = bar.add_task(name, total=total)
     return lambda done, of: bar.update(task, completed=done, total=of)
 
 
-def _bar(count: ProgressColumn) -> Progress:
+def _bar(*counts: ProgressColumn) -> Progress:
     """Disappears when done, and is not shown when standard error is not a terminal."""
-    columns = (TextColumn("{task.description}"), BarColumn(), count, TimeRemainingColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), *counts, TimeRemainingColumn())
     console = Console(stderr=True)
     return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)

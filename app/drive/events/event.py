@@ -26,6 +26,7 @@ class Event:
     ids: tuple[int, ...] = ()
     """The objects it is about, the most important first."""
     severity: Severity = "info"
+    """Decides colour and order in the list."""
     mark: int | None = None
     """Number of a person's mark; None for other events and for marks that are part of the recording, which cannot be
     removed."""
@@ -46,8 +47,11 @@ class RunRows(NamedTuple):
     """Frames 0 … N−1 of one run, and its parameters."""
 
     rows: Sequence[Row]
+    """One per frame."""
     objects: Sequence[Objects]
+    """Of each frame, by object id."""
     params: Params
+    """Whose limits the events are about."""
 
     def starts_anew(self, index: int) -> bool:
         """Whether all trackers were reset at a frame, as after a gap in the recording."""
@@ -61,6 +65,7 @@ class EventFinder(NamedTuple):
     kinds: tuple[str, ...]
     """The kinds of event that it can find."""
     find: Callable[[RunRows], Iterable[Event]]
+    """Goes through a run once."""
 
 
 def ids(*numbers: int | None) -> tuple[int, ...]:

@@ -10,6 +10,7 @@ from typing import cast
 from app.drive.full_run import DriveRun
 from app.drive.open_recording import OpenRecording
 from app.drive.run_results import moments_of, seen_of
+from app.labels.acts.around import sweeps_of
 from app.labels.acts.leads import clear
 from app.labels.acts.tags import put_tag
 from app.labels.errors import ActRefused
@@ -19,9 +20,14 @@ from app.labels.store.drive_labels import DriveLabels
 from app.labels.store.frame_ranges import free_spans
 from app.labels.wording import frames_text, outside_text
 from pipeline.common.progress import Progress, silent
+from pipeline.labels.cuboids.refine import refined
+from pipeline.labels.headings import own_poses
 from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.labels.propose import Proposals, known_as, propose
 from pipeline.labels.recorded_truth import truth_labels
+
+_ALL = 100
+"""Percent."""
 
 
 def proposing(labels: DriveLabels, recording: OpenRecording, person: str, first: int, last: int) -> TaskWork:
@@ -35,11 +41,10 @@ def proposing(labels: DriveLabels, recording: OpenRecording, person: str, first:
         raise ActRefused(outside_text(first, last, recording.setup.total))
 
     def work(progress: Progress) -> str:
-        progress(0, 2)
-        found = _proposals(recording, run, first, last)
-        progress(1, 2)
-        said = put_proposals(labels, found, person, first, last, progress)
-        progress(2, 2)
+        progress(0, _ALL)
+        found = _proposals(recording, run, first, last, lambda done, total: progress(_ALL * done // (total + 1), _ALL))
+        said = put_proposals(labels, found, person, first, last, lambda *_: progress(_ALL - 1, _ALL))
+        progress(_ALL, _ALL)
         return said
 
     return work
@@ -155,13 +160,13 @@ def importing_truth(labels: DriveLabels, recording: OpenRecording, person: str) 
         origin = Origin("import", source.title, int(time.time() * 1000))
         found, notes = truth_labels(source, recording.names(), origin, progress)
         if not found.tracks:
-            raise ActRefused("this recording comes with no ground truth")
+            raise ActRefused("this recording has no ground truth")
         return importing(labels, found, person, notes, progress)
 
     return work
 
 
-def _proposals(recording: OpenRecording, run: DriveRun, first: int, last: int) -> Proposals:
+def _proposals(recording: OpenRecording, run: DriveRun, first: int, last: int, progress: Progress) -> Proposals:
     rows = run.rows()[: last + 1]
     frames = {index: seen_of(records) for index, records in run.objects() if first <= index <= last}
     leads = {index: rows[index].cipv_id for index in range(first, last + 1)}
@@ -172,7 +177,10 @@ def _proposals(recording: OpenRecording, run: DriveRun, first: int, last: int) -
         recording.digest(run.params),
         recording.calibration_digest(run.params),
     )
-    return propose(frames, leads, origin, moments_of(rows))
+    moments = moments_of(rows)
+    found = propose(frames, leads, origin, moments)
+    tracks = refined(found.tracks, sweeps_of(recording), own_poses(moments), progress)
+    return replace(found, tracks=tracks)
 
 
 def _put_proposals(draft: Draft, found: Proposals, first: int, last: int) -> int:

@@ -23,16 +23,16 @@ def set_path(draft: Draft, scope: Scope, act: SetPath) -> str:
         draft.add("path", path)
     else:
         draft.put("path", number, path)
-    return f"drew the path of {frames_text(act.frame)}"
+    return f"drew the path in {frames_text(act.frame)}"
 
 
 def remove_path(draft: Draft, scope: Scope, act: RemovePath) -> str:
     check_seen(draft, "path", act.frame, act.frame, act)
     number = _path_at(draft, act.frame)
     if number is None:
-        raise NoSuchLabel(f"there is no path in {frames_text(act.frame)}")
+        raise NoSuchLabel(f"no path in {frames_text(act.frame)}")
     draft.put("path", number, None)
-    return f"removed the path of {frames_text(act.frame)}"
+    return f"removed the path in {frames_text(act.frame)}"
 
 
 def add_event(draft: Draft, scope: Scope, act: AddEvent) -> str:

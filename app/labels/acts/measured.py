@@ -6,15 +6,19 @@ from pydantic import ValidationError
 
 from app.core.request_shapes import CuboidShape
 from app.drive.open_recording import OpenRecording
-from app.labels.acts.requests import AddMeasured, Lift, Refit, SetSighting
+from app.labels.acts.around import around, poses_around, sweeps_of
+from app.labels.acts.found import AddMeasured, AddSightings
+from app.labels.acts.request_fields import Placed
+from app.labels.acts.requests import Lift, Propagate, Refit, SetSighting
 from app.labels.acts.scope import Scope
 from app.labels.errors import ActRefused, BadAct
 from app.labels.store.drive_labels import DriveLabels
 from app.labels.wording import frames_text
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.cuboid_from_pixel import lift
-from pipeline.labels.model import LabelTrack
-from pipeline.labels.snap import refit
+from pipeline.labels.cuboids.propagate import MOST_FRAMES, propagated
+from pipeline.labels.cuboids.snap import refit
+from pipeline.labels.model import LabelTrack, Sighting
 from pipeline.params import Params
 from pipeline.types import Frame
 from pipeline.vision.classes import canonical
@@ -23,19 +27,25 @@ _DECIMALS = 4
 
 
 def measured(
-    labels: DriveLabels, recording: OpenRecording, params: Params, act: Refit | Lift
-) -> tuple[SetSighting | AddMeasured, str]:
+    labels: DriveLabels, recording: OpenRecording, params: Params, act: Refit | Lift | Propagate
+) -> tuple[SetSighting | AddMeasured | AddSightings, str]:
     """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found. BadInput
     where there is nothing to measure."""
+    if isinstance(act, Propagate):
+        return carried_on(labels, recording, act), ""
     Scope(labels.info.t_ns).check(act.frame)
     frame = recording.input(act.frame)
-    return refitted(labels, frame, params, act) if isinstance(act, Refit) else lifted(frame, params, act)
+    if isinstance(act, Refit):
+        return refitted(labels, frame, params, act, recording)
+    return lifted(frame, params, act)
 
 
-def refitted(labels: DriveLabels, frame: Frame, params: Params, act: Refit) -> tuple[SetSighting, str]:
-    """The track's cuboid in a frame laid on the points in and near it; where only the image shows it, on those seen
-    in its box. ActRefused where it is not, or the image alone would tell how far it is; BadInput where there are too
-    few points."""
+def refitted(
+    labels: DriveLabels, frame: Frame, params: Params, act: Refit, recording: OpenRecording | None = None
+) -> tuple[SetSighting, str]:
+    """The track's cuboid in a frame laid on the points in and near it, of this sweep and, with a recording, of those
+    around; where only the image shows it, on those seen in its box. ActRefused where it is not, where nothing fits
+    better than what is there, or the image alone would tell how far it is; BadInput where there are too few points."""
     track = labels.track(act.track).value
     assert isinstance(track, LabelTrack)
     sighting = track.at(act.frame)
@@ -44,9 +54,14 @@ def refitted(labels: DriveLabels, frame: Frame, params: Params, act: Refit) -> t
     if frame.sweep is None:
         raise ActRefused(f"{frames_text(act.frame)} has no points")
     if sighting.cuboid is not None:
-        found = refit(frame.sweep.points, sighting.cuboid)
+        sweeps = sweeps_of(recording) if recording is not None else None
+        seen_around = around(recording, track, sighting, sweeps) if recording is not None and sweeps else None
+        found = refit(frame.sweep.points, sighting.cuboid, seen_around)
+        if not found.is_better:
+            raise ActRefused(f"left as it is: {found.points} points show no place of #{act.track} that fits better")
         cuboid = found.cuboid
-        note = f"fitted to {found.points} points" + ("" if found.turned else "; they do not show its heading")
+        of = f" and those of {found.sweeps} sweeps" if found.sweeps > 1 else ""
+        note = f"fitted to {found.points} points{of}" + ("" if found.turned else "; its heading stays")
     else:
         seen = lift(frame, params, track.label, sighting.bbox)
         if not seen.points:
@@ -62,6 +77,25 @@ def refitted(labels: DriveLabels, frame: Frame, params: Params, act: Refit) -> t
         box_set=sighting.box_set,
     )
     return placed, note
+
+
+def carried_on(labels: DriveLabels, recording: OpenRecording, act: Propagate) -> AddSightings:
+    """The frames beyond a track's ends in which it is found. ActRefused where there are none."""
+    track = labels.track(act.track).value
+    assert isinstance(track, LabelTrack)
+    placed = [each.frame for each in track.sightings if each.cuboid is not None]
+    if not placed:
+        raise ActRefused(f"#{act.track} has no cuboid to carry on: fit (S) or draw one first")
+    sweeps = sweeps_of(recording)
+    found: list[Sighting] = []
+    for way, end, forward in (("forward", placed[-1], True), ("backward", placed[0], False)):
+        if act.way in ("both", way):
+            poses = poses_around(recording, end, MOST_FRAMES)
+            found += propagated(track.sightings, labels.info.t_ns, sweeps, poses, forward=forward)
+    if not found:
+        raise ActRefused(f"#{act.track} was not found beyond its ends")
+    shapes = tuple(Placed(frame=each.frame, cuboid=_given(each.cuboid)) for each in found if each.cuboid is not None)
+    return AddSightings(kind="propagate", track=act.track, revision=act.revision, sightings=shapes)
 
 
 def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddMeasured, str]:

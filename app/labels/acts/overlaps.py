@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import cast
 
-from app.labels.acts.requests import OverFrames
+from app.labels.acts.request_fields import OverFrames
 from app.labels.errors import Stale
 from app.labels.store.draft import Draft
 from app.labels.store.values import Item, ItemKind, Value, value_to_json

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from app.labels.acts import frames, leads, review, shape, tags, tracks
+from app.labels.acts import attributes, frames, leads, review, shape, tags, tracks
+from app.labels.acts.found import AddMeasured, AddSightings
 from app.labels.acts.requests import (
     Accept,
     AddEvent,
-    AddMeasured,
     AddTrack,
     ClearLead,
     DropKeyframe,
@@ -22,6 +22,7 @@ from app.labels.acts.requests import (
     RemovePath,
     ReviewOk,
     SendBack,
+    SetAttribute,
     SetLead,
     SetPath,
     SetSighting,
@@ -43,10 +44,12 @@ _ACTS: dict[type, Callable[[Draft, Scope, Any], str]] = {
     DropKeyframe: shape.drop_keyframe,
     DropSightings: shape.drop_sightings,
     SizeAlong: shape.size_along,
+    AddSightings: shape.add_sightings,
     Flip: shape.flip,
     AddTrack: tracks.add_track,
     AddMeasured: tracks.add_measured,
     Relabel: tracks.relabel,
+    SetAttribute: attributes.set_attribute,
     Split: tracks.split,
     Merge: tracks.merge,
     SetLead: leads.set_lead,

@@ -6,12 +6,18 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from app.core.request_shapes import Finite
-from app.labels.store.values import LONGEST_NAME
+from app.core.request_shapes import CuboidShape, Finite
+from app.labels.errors import BadAct
+from app.labels.store.values import LONGEST_NAME, ItemKind
+from app.labels.wording import frames_text
+from pipeline.common.errors import BadInput
+from pipeline.labels.model import Sighting
+from pipeline.labels.validate import check_sighting
 
 _LARGEST_ID = 2**63 - 1
 MOST_FRAMES = 2**31 - 1
 _MOST_POINTS = 1000
+_MOST_ITEMS = 10_000
 
 
 def _clean(text: str) -> str:
@@ -46,4 +52,74 @@ Line = Annotated[list[tuple[Finite, Finite]], Field(min_length=2, max_length=_MO
 class Strict(BaseModel):
     """No key more than is said."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
+
+
+class Placed(Strict):
+    """A position in one frame."""
+
+    frame: Index
+    """Of the drive, from 0."""
+    cuboid: CuboidShape | None = None
+    """In the ego frame; None where it is only seen in the image."""
+    bbox: tuple[Finite, Finite, Finite, Finite] | None = None
+    """x1 y1 x2 y2 in pixels of the raw image; None where it is outside."""
+    box_set: bool = False
+    """Whether the person set the box; else it follows the cuboid."""
+
+    def sighting(self) -> Sighting:
+        """As a keyframe. BadAct for a box that is none, or when nothing is there."""
+        if self.cuboid is None and self.bbox is None:
+            raise BadAct("provide a cuboid or a box")
+        cuboid = self.cuboid.value() if self.cuboid else None
+        sighting = Sighting(self.frame, cuboid, self.bbox, box_set=self.box_set and self.bbox is not None)
+        try:
+            return check_sighting(sighting, frames_text(self.frame))
+        except BadInput as error:
+            raise BadAct(str(error)) from None
+
+
+class Ref(Strict):
+    """An item, in the revision that the person saw."""
+
+    kind: ItemKind
+    """Numbers are unique within a kind only."""
+    id: Id
+    """Of the item among those of its kind."""
+    revision: Id
+    """As the person saw it; a newer one in the database is a conflict."""
+
+
+class TrackRef(Strict):
+    """A track, in the revision that the person saw."""
+
+    id: Id
+    """Of the track in this drive."""
+    revision: Id
+    """As the person saw it; a newer one in the database is a conflict."""
+
+
+class OfItems(Strict):
+    """An act on items of any kind."""
+
+    items: list[Ref] = Field(min_length=1, max_length=_MOST_ITEMS)
+    """Each as the person saw it: one newer item refuses the whole act."""
+
+
+class OfTrack(Strict):
+    """An act on one track."""
+
+    track: Id
+    """Its number in this drive."""
+    revision: Id
+    """As the person saw the track; a newer one in the database is a conflict."""
+
+
+class OverFrames(Strict):
+    """An act on a range of frames."""
+
+    seen: Id | None = None
+    """The revision of the labels that the person saw; what others have said in these frames since is a conflict. None
+    says it whatever was said."""
+    over_reviewed: bool = False
+    """Whether what a second person has reviewed there may be cut."""

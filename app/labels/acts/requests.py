@@ -6,225 +6,219 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.core.request_shapes import CuboidShape, Finite, Meters
-from app.labels.acts.request_fields import MOST_FRAMES, Comment, Id, Index, Line, Strict, Word
+from app.core.request_shapes import Finite, Meters
+from app.labels.acts.request_fields import (
+    MOST_FRAMES,
+    Comment,
+    Id,
+    Index,
+    Line,
+    OfItems,
+    OfTrack,
+    OverFrames,
+    Placed,
+    Strict,
+    TrackRef,
+    Word,
+)
 from app.labels.errors import BadAct
-from app.labels.store.values import ItemKind
-from app.labels.wording import frames_text
-from pipeline.common.errors import BadInput
-from pipeline.labels.model import Sighting
-from pipeline.labels.validate import check_sighting
 from pipeline.types import Point2
 
-_MOST_ITEMS = 10_000
 
-
-class Placed(Strict):
-    """Where something is in one frame. bbox: x1 y1 x2 y2 in pixels of the raw image. box_set: the person set it;
-    else it follows the cuboid."""
-
-    frame: Index
-    cuboid: CuboidShape | None = None
-    bbox: tuple[Finite, Finite, Finite, Finite] | None = None
-    box_set: bool = False
-
-    def sighting(self) -> Sighting:
-        """As a keyframe. BadAct for a box that is none, or when nothing is there."""
-        if self.cuboid is None and self.bbox is None:
-            raise BadAct("provide a cuboid or a box")
-        cuboid = self.cuboid.value() if self.cuboid else None
-        sighting = Sighting(self.frame, cuboid, self.bbox, box_set=self.box_set and self.bbox is not None)
-        try:
-            return check_sighting(sighting, frames_text(self.frame))
-        except BadInput as error:
-            raise BadAct(str(error)) from None
-
-
-class Ref(Strict):
-    """An item as the person sees it."""
-
-    kind: ItemKind
-    id: Id
-    revision: Id
-
-
-class TrackRef(Strict):
-    """A track as the person sees it."""
-
-    id: Id
-    revision: Id
-
-
-class _OfItems(Strict):
-    items: list[Ref] = Field(min_length=1, max_length=_MOST_ITEMS)
-
-
-class _OfTrack(Strict):
-    track: Id
-    revision: Id
-
-
-class OverFrames(Strict):
-    """seen: the revision of the labels that the person saw; what others have said in these frames since is a conflict.
-    None says it whatever was said. over_reviewed: what a second person has reviewed there may be cut."""
-
-    seen: Id | None = None
-    over_reviewed: bool = False
-
-
-class Accept(_OfItems):
-    """It is so."""
+class Accept(OfItems):
+    """Accept labels."""
 
     kind: Literal["accept"]
 
 
-class Reject(_OfItems):
-    """It is not so. It stays known, so that it is not proposed again."""
+class Reject(OfItems):
+    """Reject labels. They stay in the database, so that they are not proposed again."""
 
     kind: Literal["reject"]
 
 
-class SendBack(_OfItems):
-    """Review: tracks are to be looked at again; they carry the comment."""
+class SendBack(OfItems):
+    """Review: send labels back to be corrected, with a comment."""
 
     kind: Literal["send_back"]
     comment: Comment
+    """What is wrong, for whoever corrects it."""
 
 
-class ReviewOk(_OfItems):
-    """Review: a second person says that it is so."""
+class ReviewOk(OfItems):
+    """Review: approve labels as a second person."""
 
     kind: Literal["review_ok"]
 
 
-class Remove(_OfItems):
-    """Labels that should never have been."""
+class Remove(OfItems):
+    """Delete labels."""
 
     kind: Literal["remove"]
 
 
-class SetSighting(_OfTrack, Placed):
-    """A keyframe; with ``interpolate`` the frames around follow."""
+class SetSighting(OfTrack, Placed):
+    """Set a keyframe; with ``interpolate`` the frames around it follow."""
 
     kind: Literal["set_sighting"]
     interpolate: bool = True
+    """Whether the frames up to the neighbouring keyframes follow."""
 
 
-class DropKeyframe(_OfTrack):
-    """The frame follows its neighbours again."""
+class DropKeyframe(OfTrack):
+    """Remove a keyframe; the frame is interpolated again."""
 
     kind: Literal["drop_keyframe"]
     frame: Index
+    """Whose keyframe goes."""
 
 
-class DropSightings(_OfTrack):
-    """The vehicle is not there from first to last."""
+class DropSightings(OfTrack):
+    """Remove a track from a range of frames."""
 
     kind: Literal["drop_sightings"]
     first: Index
+    """First frame that loses its sighting."""
     last: Index
+    """Last such frame, inclusive."""
 
 
-class SizeAlong(_OfTrack):
-    """The same size in every frame, the near side held."""
+class SizeAlong(OfTrack):
+    """Give a track the same size in every frame; its near side stays in place."""
 
     kind: Literal["size_along"]
     size: tuple[Meters, Meters, Meters]
+    """Length, width, height."""
 
 
-class Flip(_OfTrack):
-    """It faces the other way, in every frame."""
+class Flip(OfTrack):
+    """Reverse a track's heading in every frame."""
 
     kind: Literal["flip"]
 
 
-class Refit(_OfTrack):
-    """The cuboid onto the points in and near it."""
+class Refit(OfTrack):
+    """Fit a cuboid to the points in and near it."""
 
     kind: Literal["refit"]
     frame: Index
+    """Whose points decide."""
+
+
+class Propagate(OfTrack):
+    """Carry a track on beyond its ends, as far as its points are found."""
+
+    kind: Literal["propagate"]
+    way: Literal["both", "forward", "backward"] = "both"
+    """In time."""
 
 
 class AddTrack(Placed):
-    """A vehicle that nobody saw."""
+    """Add a vehicle that was not proposed."""
 
     kind: Literal["add_track"]
     label: Word
+    """Class of the vehicle."""
 
 
 class Lift(Strict):
-    """A vehicle from where it is in the image: a box around it, or a pixel on it."""
+    """Add a vehicle by its place in the image: a box around it, or a pixel on it."""
 
     kind: Literal["lift"]
     frame: Index
+    """Whose image was clicked."""
     label: Word = "car"
+    """Class of the vehicle; decides how large it is taken to be."""
     bbox: tuple[Finite, Finite, Finite, Finite] | None = None
+    """x1 y1 x2 y2 in pixels of the raw image; None when ``pixel`` is given."""
     pixel: tuple[Finite, Finite] | None = None
+    """x, y in the raw image; None when ``bbox`` is given."""
 
 
-class AddMeasured(Placed):
-    """What a lift comes to: nobody sends it. how: what it was measured by, in words."""
-
-    kind: Literal["lift"]
-    label: Word
-    how: str
-
-
-class Relabel(_OfTrack):
-    """It is of another class."""
+class Relabel(OfTrack):
+    """Change a track's class."""
 
     kind: Literal["relabel"]
     label: Word
+    """The new class."""
 
 
-class Split(_OfTrack):
-    """From a frame on it is another one."""
+class SetAttribute(OfTrack):
+    """Set or clear an attribute of a track over a range of frames."""
+
+    kind: Literal["set_attribute"]
+    name: Word
+    """Of the attribute, as in the class list."""
+    value: Word | None
+    """One of the attribute's values; None clears it."""
+    first: Index
+    """First frame of the range."""
+    last: Index
+    """Last frame of the range, inclusive."""
+
+
+class Split(OfTrack):
+    """Split a track in two at a frame."""
 
     kind: Literal["split"]
     frame: Index
+    """First frame of the second track."""
 
 
 class Merge(Strict):
-    """Two are one: the first goes on, where both are it is as the first says."""
+    """Merge two tracks. In frames that have both, the first one's sighting is kept."""
 
     kind: Literal["merge"]
     tracks: tuple[TrackRef, TrackRef]
+    """The one that goes on, then the one that becomes part of it."""
 
 
 class SetLead(OverFrames):
-    """Who leads from first to last, whatever was said there before."""
+    """Set the lead in a range of frames, replacing what was labelled there."""
 
     kind: Literal["set_lead"]
     first: Index
+    """First frame of the range."""
     last: Index
+    """Last frame, inclusive."""
     lead: Id | Literal["none", "unknown"]
+    """Track that leads; ``none`` when nobody does, ``unknown`` when it cannot be told."""
 
 
 class ClearLead(OverFrames):
-    """Nobody has said who leads from first to last."""
+    """Clear the lead in a range of frames."""
 
     kind: Literal["clear_lead"]
     first: Index
+    """First frame of the range."""
     last: Index
+    """Last frame, inclusive."""
 
 
 class TrimLead(OverFrames):
-    """A range begins or ends elsewhere: it is from first to last now, whatever was said where it was not before."""
+    """Move the ends of a lead range; frames that it gains are overwritten."""
 
     kind: Literal["trim_lead"]
     range: Id
+    """Number of the lead range that changes."""
     revision: Id
+    """As the person saw it; a newer one in the database is a conflict."""
     first: Index
+    """Its new first frame."""
     last: Index
+    """Its new last frame, inclusive."""
 
 
 class SetPath(OverFrames):
-    """The ego lane's lines in a frame: ego x, y from the bumper on."""
+    """Draw the borders of the ego lane in a frame: ego x, y from the bumper outwards."""
 
     kind: Literal["set_path"]
     frame: Index
+    """The only frame that the lines hold in."""
     left: Line | None
+    """From near to far; None where the lane has no left line."""
     right: Line | None
+    """From near to far; None where the lane has no right line."""
 
     def lines(self) -> tuple[tuple[Point2, ...] | None, tuple[Point2, ...] | None]:
         """BadAct when there is neither."""
@@ -237,50 +231,62 @@ class SetPath(OverFrames):
 
 
 class RemovePath(OverFrames):
-    """The pipeline's path is right after all."""
+    """Remove a drawn path; the pipeline's applies again."""
 
     kind: Literal["remove_path"]
     frame: Index
+    """Whose labelled path goes."""
 
 
 class AddEvent(OverFrames):
-    """Something happens: ``cut_in``, ``cut_out``, or another word."""
+    """Add an event: ``cut_in``, ``cut_out``, or another word."""
 
     kind: Literal["add_event"]
     frame: Index
+    """When it happens; a range of frames is two events."""
     event: Word
+    """Free text besides the two known kinds."""
     tracks: list[Id] = Field(default_factory=list, max_length=100)
+    """Who takes part; may be empty."""
 
 
 class Tag(OverFrames):
-    """A word about the frames from first to last, or no more."""
+    """Add a tag to a range of frames, or remove it from them."""
 
     kind: Literal["tag"]
     first: Index
+    """First frame of the range."""
     last: Index
+    """Last frame, inclusive."""
     tag: Word
+    """Free text, such as ``night``."""
     on: bool = True
+    """False takes the word away from these frames."""
 
 
 class Propose(Strict):
-    """The present run's objects as proposals."""
+    """Propose the current run's objects as labels."""
 
     kind: Literal["propose"]
     first: Index = 0
+    """First frame to propose for."""
     last: Index = MOST_FRAMES
+    """Last frame, inclusive; beyond the drive means to its end."""
     source: Literal["run"] = Field("run", alias="from")
+    """Only the present run proposes so far."""
 
 
 class Import(Strict):
-    """The truth that comes with the recording."""
+    """Import the ground truth that comes with the recording."""
 
     kind: Literal["import"]
     what: Literal["truth"] = "truth"
+    """Only the recording's own truth so far; files are uploaded."""
 
 
 Act = Annotated[
     Accept | Reject | SendBack | ReviewOk | Remove | SetSighting | DropKeyframe | DropSightings | SizeAlong | Flip
-    | Refit | AddTrack | Lift | Relabel | Split | Merge | SetLead | ClearLead | TrimLead | SetPath | RemovePath
-    | AddEvent | Tag | Propose | Import,
+    | Refit | Propagate | AddTrack | Lift | Relabel | SetAttribute | Split | Merge | SetLead | ClearLead | TrimLead
+    | SetPath | RemovePath | AddEvent | Tag | Propose | Import,
     Field(discriminator="kind"),
 ]  # fmt: skip

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeVar, cast
 
 from app.labels.errors import BadAct
 from app.labels.store.draft import Draft
 from app.labels.store.values import Item
 from app.labels.wording import outside_text
+from pipeline.labels.classes import ClassList, default_classes
 from pipeline.labels.model import EventLabel, LabelTrack, LeadRange, Origin, PathLabel
 
 Stated = LabelTrack | LeadRange | PathLabel | EventLabel
@@ -17,9 +18,12 @@ S = TypeVar("S", LabelTrack, LeadRange, PathLabel, EventLabel)
 
 @dataclass(frozen=True)
 class Scope:
-    """t_ns: the ticks of all frames."""
+    """The drive that an act is on."""
 
     t_ns: tuple[int, ...]
+    """Ticks of all its frames: acts interpolate over time."""
+    classes: ClassList = field(default_factory=default_classes)
+    """Classes that people choose from."""
 
     def check(self, first: int, last: int | None = None) -> None:
         """BadAct for frames that the recording does not have."""

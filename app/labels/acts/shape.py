@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from app.labels.acts.found import AddSightings
 from app.labels.acts.requests import DropKeyframe, DropSightings, Flip, SetSighting, SizeAlong
 from app.labels.acts.scope import Scope, corrected, track_of
 from app.labels.errors import ActRefused
@@ -63,6 +64,19 @@ def size_along(draft: Draft, scope: Scope, act: SizeAlong) -> str:
     return "resized #{} to {} m in every frame".format(track.id, " × ".join(f"{side:.2f}" for side in act.size))
 
 
+def add_sightings(draft: Draft, scope: Scope, act: AddSightings) -> str:
+    """Where the track was not before; none of them is a keyframe."""
+    track = track_of(draft, act.track, act.revision)
+    old = draft.sightings(track.id)
+    new = {each.frame: replace(each.sighting(), keyframe=False) for each in act.sightings if each.frame not in old}
+    if not new:
+        raise ActRefused(f"#{track.id} was not found beyond its ends")
+    scope.check(min(new), max(new))
+    draft.put_sightings(track.id, dict(new))
+    corrected(draft, track)
+    return f"carried #{track.id} on over {len(new)} frames, to {frames_text(min(*new, *old), max(*new, *old))}"
+
+
 def flip(draft: Draft, scope: Scope, act: Flip) -> str:
     track = track_of(draft, act.track, act.revision)
     old = draft.sightings(track.id)
@@ -73,7 +87,7 @@ def flip(draft: Draft, scope: Scope, act: Flip) -> str:
         raise ActRefused(f"#{track.id} has no cuboid in any frame")
     _put(draft, track.id, old, {**old, **after})
     corrected(draft, replace(track, heading=""))
-    return f"turned #{track.id} round in every frame"
+    return f"reversed #{track.id} in every frame"
 
 
 def _put(draft: Draft, track: int, old: Mapping[int, Sighting], new: Mapping[int, Sighting]) -> None:

@@ -5,35 +5,35 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
-from app.labels.acts.requests import AddMeasured, AddTrack, Merge, Relabel, Split
+from app.labels.acts.found import AddMeasured
+from app.labels.acts.requests import AddTrack, Merge, Relabel, Split
 from app.labels.acts.scope import Scope, by_person, corrected, track_of
 from app.labels.errors import ActRefused
 from app.labels.store.draft import Draft
 from app.labels.store.values import Frames
 from app.labels.wording import frames_text
-from pipeline.labels.model import EventLabel, LabelTrack, LeadRange
-from pipeline.vision.classes import canonical
+from pipeline.labels.model import Attribute, EventLabel, LabelTrack, LeadRange
 
 
 def add_track(draft: Draft, scope: Scope, act: AddTrack) -> str:
     scope.check(act.frame)
     number = draft.next_number("track")
-    draft.add("track", LabelTrack(number, canonical(act.label), (), "corrected", by_person(draft)))
+    draft.add("track", LabelTrack(number, scope.classes.named(act.label), (), "corrected", by_person(draft)))
     draft.put_sightings(number, {act.frame: act.sighting()})
-    return f"added #{number}, a {canonical(act.label)}, in {frames_text(act.frame)}"
+    return f"added #{number}, a {scope.classes.named(act.label)}, in {frames_text(act.frame)}"
 
 
 def add_measured(draft: Draft, scope: Scope, act: AddMeasured) -> str:
     """Where a person pointed is a vehicle; what was measured there is a proposal until somebody says that it is so."""
     scope.check(act.frame)
     number = draft.next_number("track")
-    draft.add("track", LabelTrack(number, canonical(act.label), (), "proposed", by_person(draft, act.how)))
+    draft.add("track", LabelTrack(number, scope.classes.named(act.label), (), "proposed", by_person(draft, act.how)))
     draft.put_sightings(number, {act.frame: act.sighting()})
-    return f"proposed #{number}, a {canonical(act.label)}, in {frames_text(act.frame)}"
+    return f"proposed #{number}, a {scope.classes.named(act.label)}, in {frames_text(act.frame)}"
 
 
 def relabel(draft: Draft, scope: Scope, act: Relabel) -> str:
-    track, label = track_of(draft, act.track, act.revision), canonical(act.label)
+    track, label = track_of(draft, act.track, act.revision), scope.classes.named(act.label)
     corrected(draft, replace(track, label=label))
     return f"changed #{track.id} to {label}"
 
@@ -53,6 +53,7 @@ def split(draft: Draft, scope: Scope, act: Split) -> str:
     draft.add("track", replace(track_of(draft, track.id), id=number, comment=""))
     draft.put_sightings(track.id, dict.fromkeys(later))
     draft.put_sightings(number, later)
+    _share_attributes(draft, track, number, act.frame)
     _rename_from(draft, track.id, number, act.frame)
     return f"split #{track.id} at {frames_text(act.frame)}: from there it is #{number}"
 
@@ -63,10 +64,28 @@ def merge(draft: Draft, scope: Scope, act: Merge) -> str:
         raise ActRefused("a track cannot be merged with itself")
     ours, theirs = draft.sightings(first.id), draft.sightings(second.id)
     draft.put_sightings(first.id, {frame: each for frame, each in theirs.items() if frame not in ours})
-    corrected(draft, first)
+    corrected(draft, replace(first, attributes=_together(first.attributes, second.attributes)))
     _rename_from(draft, second.id, first.id, 0)
     draft.put("track", second.id, None)
     return f"merged #{second.id} into #{first.id}"
+
+
+def _together(first: tuple[Attribute, ...], second: tuple[Attribute, ...]) -> tuple[Attribute, ...]:
+    """The second's where the first says nothing by that name."""
+    more = [
+        each
+        for each in second
+        if not any(one.name == each.name and one.first <= each.last and each.first <= one.last for one in first)
+    ]
+    return tuple(sorted((*first, *more), key=lambda each: (each.name, each.first)))
+
+
+def _share_attributes(draft: Draft, track: LabelTrack, new: int, frame: int) -> None:
+    """What is said of the frames from one on is said of the new track."""
+    before = (replace(each, last=min(each.last, frame - 1)) for each in track.attributes if each.first < frame)
+    after = (replace(each, first=max(each.first, frame)) for each in track.attributes if each.last >= frame)
+    for number, said in ((track.id, tuple(before)), (new, tuple(after))):
+        draft.put("track", number, replace(track_of(draft, number), attributes=said))
 
 
 def _rename_from(draft: Draft, old: int, new: int, frame: int) -> None:

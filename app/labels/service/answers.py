@@ -8,12 +8,12 @@ from app.labels.store.values import HistoryEntry, Item, ItemKind, value_to_json
 from pipeline.labels.model import LabelTrack, Sighting
 
 if TYPE_CHECKING:
-    from app.labels.store.drive_labels import Changes, DriveInfo, DriveLabels
+    from app.labels.store.drive_labels import DriveInfo, DriveLabels, LabelSetChanges
 
 _LISTS: dict[ItemKind, str] = {"track": "tracks", "lead": "leads", "path": "paths", "event": "events", "tag": "tags"}
 
 
-def changes_json(info: DriveInfo, changes: Changes) -> dict[str, Any]:
+def changes_json(info: DriveInfo, changes: LabelSetChanges) -> dict[str, Any]:
     """What changed, by kind; tracks are without their sightings."""
     lists: dict[str, list[dict[str, Any]]] = {name: [] for name in _LISTS.values()}
     for item in changes.items:
@@ -60,6 +60,8 @@ def placed_json(sighting: Sighting) -> dict[str, Any]:
         "bbox": sighting.bbox,
         "keyframe": sighting.keyframe,
         "box_set": sighting.box_set,
+        "truncation": sighting.truncation,
+        "occlusion": sighting.occlusion,
     }
 
 

@@ -2,27 +2,38 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from dataclasses import dataclass
+
+import numpy as np
 
 from app.drive.open_recording import OpenRecording
 from app.labels.store.drive_labels import DriveLabels
 from app.labels.transfer.files import drive_for
+from pipeline.common.geometry import Cuboid
 from pipeline.labels.close_up import fit_of
 from pipeline.labels.model import LabelSet, LabelTrack
 from pipeline.labels.plausibility import Problem, problems
+from pipeline.lidar.ground import fit_ground
+from pipeline.params import GroundParams
+from pipeline.types import F32
 
 _NEAR_M = 30.0
 """Nearer than this a vehicle has points, where there is a sweep."""
 _MOST_READ = 200
+_OFF_ROAD_M = 0.5
+"""Planes fitted to a road that bends up or down are off by 0.3 m at 30 m."""
 
 
 @dataclass(frozen=True)
 class Checked:
-    """revision: of the labels that were looked at."""
+    """What the checks found at one revision."""
 
     revision: int
+    """Of the labels that were looked at; newer labels are checked again."""
     problems: tuple[Problem, ...]
+    """In order of frames."""
 
 
 class LabelChecks:
@@ -46,7 +57,8 @@ class LabelChecks:
 
 
 def _empty(labels: LabelSet, recording: OpenRecording) -> list[Problem]:
-    """Near cuboids without a single point, one frame of each track, and only of what people stand behind."""
+    """Near cuboids without a single point, or in or over the road: one frame of each track, and only of what people
+    stand behind."""
     found: list[Problem] = []
     for track in [each for each in labels.tracks if each.state in ("accepted", "corrected")][:_MOST_READ]:
         frame = _nearest(track)
@@ -56,8 +68,20 @@ def _empty(labels: LabelSet, recording: OpenRecording) -> list[Problem]:
         if sighting is None or sighting.cuboid is None or sweep is None:
             continue
         if not fit_of(sweep.points, sighting.cuboid).inside:
-            found.append(Problem(frame, track.id, f"#{track.id} {track.label}: there are no points in its cuboid"))
+            found.append(Problem(frame, track.id, f"#{track.id} {track.label}: no points in its cuboid"))
+        off_m = _above_road_m(sweep.points, sighting.cuboid)
+        if abs(off_m) > _OFF_ROAD_M:
+            where = "above" if off_m > 0 else "below"
+            words = f"#{track.id} {track.label}: its bottom is {abs(off_m):.1f} m {where} the road"
+            found.append(Problem(frame, track.id, words))
     return found
+
+
+def _above_road_m(points: F32, cuboid: Cuboid) -> float:
+    """How far its bottom is above the ground there; 0 where no ground was found."""
+    ground = fit_ground(points, np.ones(len(points), dtype=bool), GroundParams())
+    height_m = float(ground.height(np.array([cuboid.center[:2]]))[0])
+    return cuboid.center[2] - cuboid.size[2] / 2 - height_m if math.isfinite(height_m) else 0.0
 
 
 def _nearest(track: LabelTrack) -> int | None:

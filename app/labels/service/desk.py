@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 from app.core.control import Control, Wish
 from app.drive.open_recording import OpenRecording
-from app.labels.acts.requests import Import, Lift, Propose, Refit
+from app.labels.acts.requests import Import, Lift, Propagate, Propose, Refit
 from app.labels.service.opened import KeptLabels, Opened
 from app.labels.service.param_write_queue import SettlingQueue
 from app.labels.service.state import LabelState
 from app.labels.service.tasks import Tasks
 from pipeline.common.errors import BadInput
+from pipeline.labels.classes import ClassList, default_classes
 from pipeline.labels.formats.registry import FormatName
 from pipeline.params import Params
 
@@ -46,7 +47,9 @@ class ActDone:
     something else is opened meanwhile."""
 
     acted: Acted
+    """What it changed, with its number in the log."""
     labels: DriveLabels
+    """Of the drive that the act was on."""
 
 
 class LabelDesk:
@@ -54,7 +57,15 @@ class LabelDesk:
     hears of parameters that are settled from ``Control`` and gives them back when they are undone, and wakes it
     whenever ``state`` is another."""
 
-    def __init__(self, database: Database | None = None, *, open_later: Callable[[], Database] | None = None) -> None:
+    def __init__(
+        self,
+        database: Database | None = None,
+        *,
+        open_later: Callable[[], Database] | None = None,
+        classes: ClassList | None = None,
+    ) -> None:
+        """classes: the project's; the program's otherwise."""
+        self.classes = classes or default_classes()
         self.kept = KeptLabels(database, open_later)
         self._control = Control(Wish(Params()))
         self._is_shown = False
@@ -138,7 +149,7 @@ class LabelDesk:
         """Runs against labels."""
         from app.labels.service.scoring import LabelScores
 
-        return LabelScores()
+        return LabelScores(self.classes)
 
     # ------------------------------------------------------------ acts
 
@@ -152,11 +163,11 @@ class LabelDesk:
             from app.labels.acts.scope import Scope
 
             doing, note = act, ""
-            if isinstance(act, Refit | Lift):
+            if isinstance(act, Refit | Lift | Propagate):
                 from app.labels.acts.measured import measured
 
                 doing, note = measured(labels, recording, self._control.peek().params, act)
-            scope = Scope(labels.info.t_ns)
+            scope = Scope(labels.info.t_ns, self.classes)
             self._settling.finish()
             done = labels.log.act(doing.kind, person, lambda draft: do(draft, scope, doing), act_id=act_id, note=note)
             self.refresh()

@@ -25,11 +25,14 @@ Why = Literal["keyframe", "end", "fits worst"]
 
 @dataclass(frozen=True)
 class Still:
-    """One frame of a track's filmstrip. fit: None where it has no cuboid, or the frame no points."""
+    """One frame of a track's filmstrip."""
 
     frame: int
+    """Of the drive, from 0."""
     why: Why
+    """Why this frame was chosen."""
     fit: Fit | None
+    """How its cuboid lies on the points; None where it has no cuboid, or the frame no points."""
 
 
 def filmstrip(track: LabelTrack, recording: OpenRecording) -> list[Still]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from app.labels.store.drive_labels import DriveLabels
 
 What = Literal["unlabelled", "disagreement", "proposed", "sent_back", "unreviewed"]
-Key = tuple[ItemKind, int]
+LabelKey = tuple[ItemKind, int]
 """TaskKind and number of a label."""
 _NOTHING: dict[What, str] = {
     "unlabelled": "the lead is labelled in every frame there",
@@ -30,32 +30,39 @@ _NOTHING: dict[What, str] = {
 
 
 @dataclass(frozen=True)
-class Place:
-    """item: what it is about, where that is one label."""
+class WorkPlace:
+    """A frame with something to do."""
 
     frame: int
+    """Of the drive, from 0."""
     why: str
-    item: Key | None = None
+    """What is to be done there, in words."""
+    item: LabelKey | None = None
+    """What it is about, where that is one label."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What is looked for, beyond which frame, which way. after: of several labels in that frame, the one that was
-    looked at; None to go beyond the frame. person: who asks."""
+    """A request for the next piece of work."""
 
     what: What
+    """Kind of work looked for."""
     frame: int
+    """Where the person is now."""
     direction: int
+    """1 forwards, -1 backwards."""
     person: str = ""
-    after: Key | None = None
+    """Who asks: nobody reviews their own labels."""
+    after: LabelKey | None = None
+    """Of several labels in that frame, the one that was looked at; None to go beyond the frame."""
 
 
 def where_next(
     labels: DriveLabels, scores: LabelScores, run: DriveRun | None, asked: Asked
-) -> tuple[Place | None, str, int]:
+) -> tuple[WorkPlace | None, str, int]:
     """(the nearest such place, why it is one or why there is none, how many there are in the drive)."""
     places = _places(labels, scores, run, asked)
-    here, way = _order(Place(asked.frame, "", asked.after)), 1 if asked.direction > 0 else -1
+    here, way = _order(WorkPlace(asked.frame, "", asked.after)), 1 if asked.direction > 0 else -1
     ahead = [
         each
         for each in places
@@ -69,12 +76,12 @@ def where_next(
     return found, found.why, len(places)
 
 
-def _order(place: Place) -> tuple[int, int, int]:
+def _order(place: WorkPlace) -> tuple[int, int, int]:
     kind, number = place.item if place.item is not None else (None, 0)
     return place.frame, KINDS.index(kind) if kind is not None else 0, number
 
 
-def _places(labels: DriveLabels, scores: LabelScores, run: DriveRun | None, asked: Asked) -> Sequence[Place]:
+def _places(labels: DriveLabels, scores: LabelScores, run: DriveRun | None, asked: Asked) -> Sequence[WorkPlace]:
     if asked.what == "unlabelled":
         return _unlabelled(labels)
     if asked.what == "disagreement":
@@ -84,7 +91,7 @@ def _places(labels: DriveLabels, scores: LabelScores, run: DriveRun | None, aske
     return _waiting(labels, sent_back=asked.what == "sent_back")
 
 
-def _unlabelled(labels: DriveLabels) -> list[Place]:
+def _unlabelled(labels: DriveLabels) -> list[WorkPlace]:
     """A proposal is nobody's word."""
     said: set[int] = set()
     proposed: set[int] = set()
@@ -92,13 +99,13 @@ def _unlabelled(labels: DriveLabels) -> list[Place]:
         if lead.state != "rejected":
             (proposed if lead.state == "proposed" else said).update(range(lead.first, lead.last + 1))
     return [
-        Place(index, "lead only proposed" if index in proposed else "lead not labelled")
+        WorkPlace(index, "lead only proposed" if index in proposed else "lead not labelled")
         for index in range(len(labels.info.t_ns))
         if index not in said
     ]
 
 
-def _waiting(labels: DriveLabels, *, sent_back: bool) -> list[Place]:
+def _waiting(labels: DriveLabels, *, sent_back: bool) -> list[WorkPlace]:
     """Where what is proposed, or was sent back, begins."""
     places = []
     for frame, item in _begun(labels):
@@ -106,11 +113,11 @@ def _waiting(labels: DriveLabels, *, sent_back: bool) -> list[Place]:
         if isinstance(value, FrameTag) or value.state != "proposed" or (sent_back and not value.comment):
             continue
         why = f"{_name(item)}: {value.comment}" if value.comment else f"{_name(item)} is proposed"
-        places.append(Place(frame, why, (item.kind, item.id)))
+        places.append(WorkPlace(frame, why, (item.kind, item.id)))
     return places
 
 
-def _unreviewed(labels: DriveLabels, person: str) -> list[Place]:
+def _unreviewed(labels: DriveLabels, person: str) -> list[WorkPlace]:
     """Where what somebody else stands behind begins, and no second person has looked at it. What this person made or
     changed last is for another."""
     changed_by = labels.changed_by()
@@ -122,7 +129,7 @@ def _unreviewed(labels: DriveLabels, person: str) -> list[Place]:
         made = value.origin.name if value.origin.maker == "person" else ""
         last = changed_by.get((item.kind, item.id), made)
         if person not in (made, last):
-            places.append(Place(frame, f"{_name(item)} by {last or value.origin.name}", (item.kind, item.id)))
+            places.append(WorkPlace(frame, f"{_name(item)} by {last or value.origin.name}", (item.kind, item.id)))
     return places
 
 
@@ -149,14 +156,16 @@ def _name(item: Item) -> str:
     return value.kind if isinstance(value, EventLabel) else f"#{item.id}"
 
 
-def _disagreements(labels: DriveLabels, scores: LabelScores, run: DriveRun | None) -> list[Place]:
+def _disagreements(labels: DriveLabels, scores: LabelScores, run: DriveRun | None) -> list[WorkPlace]:
     from app.labels.service.scoring import disagreements  # what scores is imported with the first question
 
     score = scores.score(labels, run) if run is not None else None
     if run is None or score is None:
         return []
     rows, leads = run.rows(), list(_leads(labels))
-    return [Place(index, _otherwise(each, rows[index].cipv_id, leads, index)) for index, each in disagreements(score)]
+    return [
+        WorkPlace(index, _otherwise(each, rows[index].cipv_id, leads, index)) for index, each in disagreements(score)
+    ]
 
 
 def _unjudged(labels: DriveLabels, scores: LabelScores, run: DriveRun | None) -> str:

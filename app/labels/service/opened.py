@@ -58,11 +58,14 @@ class KeptLabels:
 
 @dataclass(eq=False)
 class Opened:
-    """What is open. recording: None for what has no frames to label. kept: where its labels are."""
+    """What is open."""
 
     uri: str
+    """As it was opened."""
     recording: OpenRecording | None
+    """None for what has no frames to label."""
     kept: KeptLabels
+    """Where its labels are."""
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _labels: DriveLabels | None = None
 

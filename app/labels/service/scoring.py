@@ -21,6 +21,7 @@ from pipeline.evaluation.scores.figures import FIGURES
 from pipeline.evaluation.scores.report import MOST
 from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels
 from pipeline.evaluation.scores.worst import Bad, worst
+from pipeline.labels.classes import ClassList, as_bases, default_classes
 
 if TYPE_CHECKING:
     from app.labels.store.drive_labels import DriveLabels
@@ -30,20 +31,26 @@ _MOST_HELD = 8
 
 @dataclass(frozen=True)
 class Standing:
-    """A run against the labels. judged: frames in which they say who leads. metrics: every figure that it or the other
-    run has. notes: what does not count, and why. errors: rows of ``error_rows``. worst: frames to look at first."""
+    """A run against the labels."""
 
     judged: int
+    """Frames in which the labels say who leads."""
     metrics: tuple[Metric, ...]
+    """Every figure that this or the other run has."""
     notes: tuple[str, ...]
+    """What does not count, and why."""
     errors: tuple[tuple[Cell, ...], ...]
+    """Rows of ``error_rows``."""
     worst: tuple[Bad, ...]
+    """Frames to look at first."""
 
 
 class LabelScores:
     """Any thread. What was judged is kept until labels or runs are others."""
 
-    def __init__(self) -> None:
+    def __init__(self, classes: ClassList | None = None) -> None:
+        """classes: sub-classes are scored as the class that they are of."""
+        self._classes = classes or default_classes()
         self._lock = threading.Lock()
         self._of: tuple[DriveLabels, int] | None = None
         self._truth: DriveTruth | None = None
@@ -55,7 +62,7 @@ class LabelScores:
             revision = labels.revision
             if self._of is None or self._of[0] is not labels or self._of[1] != revision:
                 try:
-                    self._truth = of_labels(labels.unnamed_set(), RULE)
+                    self._truth = of_labels(as_bases(labels.unnamed_set(), self._classes), RULE)
                 except NoTruth:
                     self._truth = None
                 self._of, self._scores = (labels, revision), {}

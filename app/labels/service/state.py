@@ -10,16 +10,20 @@ from app.labels.service.tasks import TaskState
 
 @dataclass(frozen=True)
 class LabelState:
-    """revision: the number of the newest act. can_undo, can_redo: of changes of parameters that nobody put a name to;
-    what a person can take back is for that person to ask. labelled: it is a recording; else only parameters are
-    changed. trouble: what is wrong with the database, or went wrong with changes of parameters; empty for nothing."""
+    """What everybody is told of the labels of what is open."""
 
     revision: int = 0
+    """Number of the newest act."""
     can_undo: bool = False
+    """Of changes of parameters that nobody put a name to; what a person can take back is for that person to ask."""
     can_redo: bool = False
+    """The same, for what was taken back."""
     labelled: bool = False
+    """Whether it is a recording; else only parameters are changed."""
     task: TaskState | None = None
+    """Work in progress, or how the last one ended; None before the first."""
     trouble: str = ""
+    """What is wrong with the database, or went wrong with changes of parameters; empty for nothing."""
 
     def to_json(self) -> dict[str, Any] | None:
         """None for what cannot be labelled."""

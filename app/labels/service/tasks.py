@@ -26,6 +26,7 @@ class TaskState:
     id: int
     """Its number, as whoever began it was told."""
     what: TaskKind
+    """Kind of work."""
     done: int = 0
     """Units of work finished."""
     total: int = 0
@@ -35,6 +36,7 @@ class TaskState:
     error: str | None = None
     """Why it failed."""
     running: bool = True
+    """False once it has ended, either way."""
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)

@@ -29,14 +29,18 @@ _LONGEST_HISTORY = 200
 
 @dataclass(frozen=True)
 class Acted:
-    """What was done. revision: the drive's; act: its number, None when nothing changed. note: what there is to say
-    of it besides. params: what parameters of this program are to be now, by name."""
+    """What was done."""
 
     revision: int
+    """Of the drive, after the act."""
     act: int | None
+    """Its number; None when nothing changed."""
     what: str
+    """The act in words, for undo and history."""
     note: str = ""
+    """What else there is to say about it."""
     params: Mapping[str, Any] = field(default_factory=dict)
+    """What parameters of this program are to be now, by name."""
 
 
 @dataclass

@@ -50,7 +50,7 @@ class Database:
             self.url = make_url(url)
             self._engine = _engine(self.url)
         except ImportError as error:
-            brought = ", which `make install` brings" if error.name == "psycopg" else ""
+            brought = ", which `make install` installs" if error.name == "psycopg" else ""
             raise DatabaseError(f"labels: {error.name or error} is not installed{brought}") from None
         except (ArgumentError, NoSuchModuleError) as error:
             raise DatabaseError(f"labels: invalid database address: {first_line(error)}") from None

@@ -36,14 +36,18 @@ from pipeline.types.source import Source
 
 @dataclass(frozen=True)
 class DriveInfo:
-    """A recording that labels belong to. key: of its content. t_ns: the ticks of its frames. names: gives their names,
-    which may mean to read them all."""
+    """A recording that labels belong to."""
 
     key: str
+    """Made from its content, so that a moved file keeps its labels."""
     uri: str
+    """As it was opened."""
     title: str
+    """Shown to people."""
     t_ns: tuple[int, ...]
+    """Ticks of its frames."""
     names: Callable[[], tuple[str, ...]]
+    """Gives the names of its frames, which may mean to read them all."""
 
 
 def info_of(source: Source, names: Callable[[], tuple[str, ...]]) -> DriveInfo:
@@ -62,23 +66,32 @@ def info_of_uri(uri: str) -> DriveInfo:
 
 @dataclass(frozen=True)
 class Version:
-    """A frozen label set. frames: that have a label."""
+    """A frozen label set."""
 
     name: str
+    """Unique within the drive."""
     person: str
+    """Who froze it."""
     t_unix_ms: int
+    """When, in Unix milliseconds, by the clock of the program that wrote it."""
     tracks: int
+    """Number of labelled vehicles."""
     frames: int
+    """Number of frames that have a label."""
 
 
 @dataclass(frozen=True)
-class Changes:
-    """What acts after ``since`` changed. extents: of tracks, first and last frame, sightings, keyframes."""
+class LabelSetChanges:
+    """What acts after a revision changed."""
 
     revision: int
+    """The newest, which to ask from next time."""
     items: list[Item]
+    """Added or changed, as they are now."""
     removed: list[tuple[ItemKind, int]]
+    """Kind and number of each."""
     extents: dict[int, tuple[int, int, int, list[int]]]
+    """By track: first and last frame, number of sightings, keyframes."""
 
 
 class DriveLabels:
@@ -96,13 +109,13 @@ class DriveLabels:
         with self._database.reading() as connection:
             return connection.scalars(select(DriveRow.revision).where(DriveRow.id == self._id)).one()
 
-    def changes(self, since: int = 0) -> Changes:
+    def changes(self, since: int = 0) -> LabelSetChanges:
         with self._database.reading() as connection:
             revision = connection.scalars(select(DriveRow.revision).where(DriveRow.id == self._id)).one()
             items, removed = read_changed(connection, self._id, since)
             tracks = [item.id for item in items if item.kind == "track"]
             extents = read_extents(connection, self._id, tracks) if tracks else {}
-        return Changes(revision, items, removed if since else [], extents)
+        return LabelSetChanges(revision, items, removed if since else [], extents)
 
     def window(self, first: int, last: int) -> tuple[int, dict[int, list[tuple[int, Sighting]]]]:
         """(revision, by frame the tracks in it and where they are)."""

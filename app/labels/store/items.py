@@ -119,11 +119,14 @@ def read_changers(connection: Connection, drive_id: int) -> dict[tuple[ItemKind,
 
 @dataclass(frozen=True)
 class Change:
-    """What an act did to items of one kind: those that it changed or removed, before, and those it left, after."""
+    """What an act did to items of one kind."""
 
     person: str
+    """Who did it."""
     before: list[Value]
+    """Those that it changed or removed, as they were."""
     after: list[Value]
+    """Those it left, as they are."""
 
 
 def read_changes_of_others(

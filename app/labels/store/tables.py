@@ -122,3 +122,14 @@ class VersionRow(Base):
     labels: Mapped[bytes] = mapped_column(LargeBinary)
     previous: Mapped[str] = mapped_column(String(64), server_default="")
     sha256: Mapped[str] = mapped_column(String(64), server_default="")
+
+
+class WorkRow(Base):
+    """Who labels a recording (empty for nobody yet), and how far that is; see ``work.State``. t_unix_ms: when that was
+    said last."""
+
+    __tablename__ = "work"
+    drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
+    person: Mapped[str] = mapped_column(String(LONGEST_NAME))
+    state: Mapped[str] = mapped_column(String(16))
+    t_unix_ms: Mapped[int] = mapped_column(BigInteger)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
-from pydantic import TypeAdapter
+from pydantic import ConfigDict, TypeAdapter
 
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel, Sighting
@@ -37,36 +37,50 @@ _QUICK = 1
 
 @dataclass(frozen=True)
 class Item:
-    """One label as it stands. value: a track is without its sightings. revision: the act that changed it last."""
+    """One label as it stands."""
 
     kind: ItemKind
+    """Numbers are unique within a kind only."""
     id: int
+    """Among those of its kind."""
     revision: int
+    """Number of the act that changed it last."""
     value: Value
+    """Its content; a track is without its sightings, which are rows of their own."""
 
 
 @dataclass(frozen=True)
 class Content:
-    """What an act found or left of an item. value: null where it was not there. frames: of a track, those that the act
-    changed."""
+    """What an act found or left of an item."""
 
     value: Value | None
+    """None where it was not there."""
     frames: Frames
+    """Of a track: sightings in the frames that the act changed."""
 
 
 @dataclass(frozen=True)
 class HistoryEntry:
-    """One act in an item's life. before, after: the item, null where it was not there; of a track, with the sightings
-    that the act changed. note: what there was to say about it."""
+    """One act in an item's life."""
+
+    __pydantic_config__ = ConfigDict(use_attribute_docstrings=True)  # the API answers it as it is
 
     act: int
+    """Number of the act in the log."""
     what: str
+    """The act in words."""
     note: str
+    """What there was to say about it; empty for nothing."""
     person: str
+    """Who did it."""
     t_unix_ms: int
+    """When, in Unix milliseconds."""
     before: dict[str, Any] | None
+    """The item as JSON, None where it was not there; of a track, with the sightings that the act changed."""
     after: dict[str, Any] | None
+    """The same, as the act left it."""
     undone: bool
+    """Whether it has been taken back since."""
 
 
 def value_to_json(kind: ItemKind, value: Value) -> dict[str, Any]:

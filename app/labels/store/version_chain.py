@@ -37,7 +37,7 @@ def check(connection: Connection, row: VersionRow | Any) -> None:
         raise ActRefused(f"version {row.name!r} was changed in the database since it was frozen")
     before = select(VersionRow.name).where(VersionRow.drive_id == row.drive_id, VersionRow.sha256 == row.previous)
     if row.previous and connection.execute(before).first() is None:
-        raise ActRefused(f"the version before {row.name!r} was changed or taken out of the database")
+        raise ActRefused(f"the version before {row.name!r} was changed or removed from the database")
 
 
 def _sha256(values: Mapping[str, Any], previous: str) -> str:

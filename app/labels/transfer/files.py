@@ -19,6 +19,7 @@ from app.labels.service.tasks import TaskWork
 from app.labels.store.drive_labels import DriveLabels
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
+from pipeline.labels.classes import ClassList
 from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelSet, Origin
@@ -33,26 +34,35 @@ _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 @dataclass(frozen=True)
-class Exported:
-    """file: to be handed out; it lies in ``folder``, which goes with it. lost: what the format has no place for."""
+class ExportedLabels:
+    """A file ready for download."""
 
     file: Path
+    """To be handed out; it lies in ``folder``."""
     folder: Path
+    """Temporary: to be removed with the file once it is sent."""
     lost: tuple[str, ...]
+    """What the format has no place for, one sentence each."""
 
 
-def exported(recording: OpenRecording, labels: LabelSet, name: FormatName, only: Selection = "all") -> Exported:
+def exported(
+    recording: OpenRecording,
+    labels: LabelSet,
+    name: FormatName,
+    only: Selection = "all",
+    classes: ClassList | None = None,
+) -> ExportedLabels:
     """A file, of a format that makes a folder a .zip of it. BadInput when it cannot be."""
     folder = Path(tempfile.mkdtemp(prefix="cipv-export-"))
     try:
         which = "" if only == "all" else f"-{only}"
         out = folder / f"labels-{name}{which}{FORMATS[name].suffix}"
-        lost = export_labels(selected(labels, only), drive_for(recording), name, out)
+        lost = export_labels(selected(labels, only), drive_for(recording), name, out, classes)
         file = _zipped(out) if out.is_dir() else out
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
-    return Exported(file, folder, lost)
+    return ExportedLabels(file, folder, lost)
 
 
 def importing_file(

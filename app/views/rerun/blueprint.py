@@ -1,4 +1,4 @@
-"""How a replay opens: camera top left, the world beside it, bird's-eye view and reasons below, curves at the bottom."""
+"""How a rerun recording opens: camera top left, the world beside it, plan and reasons below, curves at the bottom."""
 
 from __future__ import annotations
 

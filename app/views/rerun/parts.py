@@ -1,4 +1,4 @@
-"""What a replay is made of: objects, boxes, lines and images as rerun's own types, None when there are none."""
+"""What a rerun recording holds: objects, boxes, lines and images as rerun's own types, None when there are none."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import rerun as rr
 
 from app.views import scene
 from pipeline.common.geometry import F64
-from pipeline.types import Box, FusedObject, Path, Picture, Result
+from pipeline.types import Box, CameraImage, FusedObject, Path, Result
 
 FAINT, THIN, THICK, POINT = (rr.Radius.ui_points(size) for size in (0.5, 1.0, 2.5, 1.4))
 """Radii in screen points, independent of the zoom."""
@@ -95,7 +95,7 @@ def boxes(
     )
 
 
-def encoded(picture: Picture) -> rr.EncodedImage:
+def encoded(picture: CameraImage) -> rr.EncodedImage:
     """The camera's own JPEG unchanged; a raw image is encoded once."""
     if picture.encoded is not None and picture.encoded.startswith(b"\xff\xd8"):
         return rr.EncodedImage(contents=picture.encoded, media_type="image/jpeg")

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class RerunStartOptions:
-    """paused: it starts paused at the first frame. compact: for a narrow pane, the camera above and one other view at a
-    time below."""
+    """How rerun opens a recording."""
 
     paused: bool = False
+    """At the first frame."""
     compact: bool = False
+    """For a narrow pane: the camera above, and one other view at a time below."""
 
 
 PLAYING = RerunStartOptions()

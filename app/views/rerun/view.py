@@ -40,15 +40,16 @@ class ViewerAddress:
     """A running viewer, by the address it prints: ``rerun+http://127.0.0.1:9876/proxy``."""
 
     url: str
+    """As the viewer prints it."""
 
 
 class RerunSink:
     """Writes each frame and its result to ``target``: a file's path, an open binary stream, which stays open and
-    gets the whole replay on closing, or a running viewer.
+    gets the whole recording on closing, or a running viewer.
 
     ``title`` names the recording in the viewer; ``params`` says which model projects the points into the image.
     Timelines: ``frame`` (index) and ``sensor_time`` (the frame's tick), never the time of writing. ReplayError when the
-    file cannot be made. Use it in a ``with`` block: a replay is complete once closed. One thread at a time.
+    file cannot be made. Use it in a ``with`` block: a recording is complete once closed. One thread at a time.
     """
 
     def __init__(

@@ -29,7 +29,7 @@ PAGE_HEADER = "x-cipv-page"
 PAGE: ContextVar[str] = ContextVar("page", default="")
 """That page's name, in whatever viser runs on its event loop for this browser; empty where nobody said."""
 _starting = threading.Lock()
-Answer = Callable[[ServerConnection, Request], Response | None]
+Respond = Callable[[ServerConnection, Request], Response | None]
 
 
 @contextmanager
@@ -39,7 +39,7 @@ def demanding_the_secret() -> Iterator[None]:
     with _starting:
         usual, guarded = websockets.asyncio.server.serve, False
 
-        def serve(handler: Any, *arguments: Any, process_request: Answer, **options: Any) -> Any:
+        def serve(handler: Any, *arguments: Any, process_request: Respond, **options: Any) -> Any:
             nonlocal guarded
             guarded = True
             return usual(handler, *arguments, process_request=_checked(process_request), **options)
@@ -53,7 +53,7 @@ def demanding_the_secret() -> Iterator[None]:
         raise RuntimeError("viser's server was started without the check of its internal secret")
 
 
-def _checked(answer: Answer) -> Answer:
+def _checked(answer: Respond) -> Respond:
     def process_request(connection: ServerConnection, request: Request) -> Response | None:
         given = request.headers.get_all(_NAME)
         if len(given) != 1 or not hmac.compare_digest(given[0].encode(), HEADERS[_NAME].encode()):

@@ -42,7 +42,9 @@ class Strokes:
     """The parts of one node, each with its colour."""
 
     parts: list[F64] = field(default_factory=list)
+    """(K, 2, 3) line segments each, ego frame."""
     colors: list[Rgb] = field(default_factory=list)
+    """One per part."""
 
     def add(self, part: F64, color: Rgb) -> None:
         self.parts.append(part)

@@ -18,7 +18,7 @@ import viser
 
 from app.core.shared_view_state import NOTHING, OnDrag, PageView
 from app.views import scene
-from app.views.colors import Role, rgb
+from app.views.colors import ColorRole, rgb
 from app.views.ray_picking import object_on_ray
 from app.views.viser import nodes as viser_nodes
 from app.views.viser.browser_scene import BrowserScene
@@ -36,18 +36,21 @@ _LABELS = ("vehicles and in path", "all", "none")
 _ARROW_S = 1.0
 
 
-class Pose(NamedTuple):
+class ViewPose(NamedTuple):
     """Position, look-at point and up direction of a view. Ego frame, metres."""
 
     eye: Point3
+    """Where the camera is."""
     target: Point3
+    """Where it looks."""
     up: Point3
+    """Which way is up in the view."""
 
 
 POSES = {
-    "Follow": Pose((-16.0, 0.0, 9.0), (20.0, 0.0, -1.0), (0.0, 0.0, 1.0)),
-    "Top": Pose((28.0, 0.0, 75.0), (28.01, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    "Driver": Pose((-1.9, 0.36, 0.75), (30.0, 0.36, -0.2), (0.0, 0.0, 1.0)),
+    "Follow": ViewPose((-16.0, 0.0, 9.0), (20.0, 0.0, -1.0), (0.0, 0.0, 1.0)),
+    "Top": ViewPose((28.0, 0.0, 75.0), (28.01, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    "Driver": ViewPose((-1.9, 0.36, 0.75), (30.0, 0.36, -0.2), (0.0, 0.0, 1.0)),
 }
 """Behind and above the car, from above with the road upwards, and from the driver's seat."""
 
@@ -249,7 +252,7 @@ class ViserView:
         viser_nodes.arrows(self._scene, velocities)
         by_id = {each.id: each for each in result.objects}
         following = None if result.next_cipv is None else result.next_cipv.id
-        marked: tuple[tuple[str, int | None, Role, float], ...] = (
+        marked: tuple[tuple[str, int | None, ColorRole, float], ...] = (
             ("/cipv", scene.cipv_id(result), "cipv", 0.25),
             ("/next_cipv", following, "cipv", 0.08),
         )

@@ -2,108 +2,109 @@
 
 from __future__ import annotations
 
-import threading
-from collections import deque
 from collections.abc import Mapping
+from dataclasses import asdict
+from math import isfinite
 
-import numpy as np
 from fastapi import APIRouter, HTTPException
-from pydantic import BaseModel
 
-from app.drive.open_recording import OpenRecording
+from app.drive.alignment_scenes import AlignmentScenes
 from app.engine.engine import Engine
-from app.engine.snapshot import Snapshot
-from pipeline.calibration.depth_edges import edge_scene
+from app.web.routes.shapes.common import ApiModel
 from pipeline.calibration.edge_match import FEWEST, REACH_DEG, EdgeScore, Seen, edge_score
-from pipeline.types import Frame
+from pipeline.calibration.local_match import BANDS_M, LocalMatch, local_match
 
-FRAMES = 20
-"""Frames that are looked at, over the whole drive or the last shown ones: one sweep of 16 rings has few borders."""
 _NOTHING = "No frame has both an image and LiDAR points in it"
-APART_NS = 500_000_000
-"""Of live sensors, frames nearer to each other than this show the same once more."""
 
 
-class Score(BaseModel):
-    """score: 1 when nothing near is better, 0 when the usual mount near is as good; null where nothing can be said.
-    better: changes of alignment parameters towards the best near; a factor for h_res_deg and v_res_deg. sigmas: how far
-    the best near stands out. text: all of it in a sentence; brief: in a word or two."""
+class RegionJson(ApiModel):
+    """How well LiDAR and images agree in a part of the image."""
+
+    borders: int
+    """Depth edges that were compared."""
+    score: float | None
+    """1 when no shift of the points is better there, 0 when the usual shift is as good; null where it cannot tell."""
+    shift_px: tuple[float, float] | None
+    """By how many pixels of the image the points should move right and down; null where it cannot tell."""
+
+
+class RangeJson(RegionJson):
+    """The same by distance."""
+
+    from_m: float
+    """Nearest horizontal distance."""
+    to_m: float | None
+    """Farthest; null for the last one."""
+
+
+class Score(ApiModel):
+    """How well LiDAR and images agree."""
 
     score: float | None
+    """1 when nothing near is better, 0 when the usual mount near is as good; null where nothing can be said."""
     sigmas: float | None
+    """How far the best near stands out; null where too little is seen."""
     borders: int
+    """Depth edges that were compared."""
     better: dict[str, float]
+    """Changes of alignment parameters towards the best near; a factor for h_res_deg and v_res_deg."""
     brief: str
+    """All of it in a word or two."""
     text: str
+    """All of it in a sentence."""
+    columns: int
+    """Of the image's regions."""
+    rows: int
+    """Of the image's regions."""
+    regions: list[RegionJson]
+    """Parts of the image, row by row from the upper left."""
+    ranges: list[RangeJson]
+    """The same by distance."""
 
 
-def alignment_router(engine: Engine) -> APIRouter:
+def alignment_router(engine: Engine, scenes: AlignmentScenes) -> APIRouter:
     """The score's route; what it looks at is found once a recording."""
     router = APIRouter(prefix="/api/alignment", tags=["alignment"])
-    scenes = _Scenes()
 
     @router.get("/score")
     def score() -> Score:
         """Score the alignment of LiDAR and camera. Compares how well depth borders match image edges with the same
         for the mount rotated by up to 3°. Uses frames of the whole recording, which takes a second the first time; for
         live sensors, the frames shown at each request. 404 when nothing is shown."""
-        recording, shown = engine.drives.recording, engine.snapshot
-        seen = scenes.of_shown(shown) if recording is None else scenes.of_recording(recording)
-        return _json(edge_score(seen, engine.control.peek().params.alignment), len(seen))
+        seen = seen_now(engine, scenes)
+        params = engine.control.peek().params.alignment
+        return _json(edge_score(seen, params), local_match(seen, params), len(seen))
 
     return router
 
 
-class _Scenes:
-    """The looked-at frames of what was asked about last."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._of: OpenRecording | str | None = None
-        self._newest_ns = 0
-        self._seen: deque[Seen] = deque(maxlen=FRAMES)
-
-    def of_recording(self, recording: OpenRecording) -> list[Seen]:
-        with self._lock:
-            if self._of is not recording:
-                self._begin(recording)
-                for index in np.unique(np.linspace(0, recording.setup.total - 1, FRAMES).round().astype(int)).tolist():
-                    self._look(recording.as_read(index))
-            return list(self._seen)
-
-    def of_shown(self, shown: Snapshot) -> list[Seen]:
-        """404 when nothing is."""
-        if shown.processed is None or shown.uri is None:
-            raise HTTPException(404, "nothing is shown yet")
-        frame = shown.processed.frame
-        with self._lock:
-            if self._of != shown.uri:
-                self._begin(shown.uri)
-            if not self._seen or abs(frame.t_ns - self._newest_ns) >= APART_NS:
-                self._look(frame)
-            return list(self._seen)
-
-    def _begin(self, of: OpenRecording | str) -> None:
-        self._of = of
-        self._seen.clear()
-
-    def _look(self, frame: Frame) -> None:
-        if frame.sweep is not None and frame.picture is not None:
-            self._newest_ns = frame.t_ns
-            self._seen.append((edge_scene(frame.sweep, frame.picture.bgr), frame.camera))
+def seen_now(engine: Engine, scenes: AlignmentScenes) -> list[Seen]:
+    """The frames to score the present alignment by; 404 when nothing is shown."""
+    recording, shown = engine.drives.recording, engine.snapshot
+    if recording is not None:
+        return scenes.of_recording(recording)
+    if shown.processed is None or shown.uri is None:
+        raise HTTPException(404, "nothing is shown yet")
+    return scenes.of_shown(shown.uri, shown.processed.frame)
 
 
-def _json(found: EdgeScore, frames: int) -> Score:
+def _json(found: EdgeScore, local: LocalMatch, frames: int) -> Score:
     """frames: how many were looked at."""
-    if not frames:
-        return Score(score=None, sigmas=None, borders=0, better={}, brief="nothing to match", text=_NOTHING)
+    text = f"{_sentence(found)} ({found.borders} borders in {frames} frame{'' if frames == 1 else 's'})"
     return Score(
         score=found.score,
         sigmas=found.sigmas,
         borders=found.borders,
         better=dict(found.better),
-        brief=_brief(found),
-        text=f"{_sentence(found)} ({found.borders} borders in {frames} frame{'' if frames == 1 else 's'})",
+        brief=_brief(found) if frames else "nothing to match",
+        text=text if frames else _NOTHING,
+        columns=local.columns,
+        rows=local.rows,
+        regions=[RegionJson(**asdict(each)) for each in local.grid],
+        ranges=[
+            RangeJson(from_m=low, to_m=high if isfinite(high) else None, **asdict(each))
+            for low, high, each in zip(BANDS_M[:-1], BANDS_M[1:], local.bands, strict=True)
+        ],
     )
 
 

@@ -6,18 +6,18 @@ from typing import Annotated, Literal
 
 import yaml
 from fastapi import APIRouter, HTTPException, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from app.core.jobs import JobState
 from app.drive.alignment_fit import AlignmentFitting, FitJob
 from app.engine.engine import Engine
 from app.web.routes.refusals import open_recording, refusing
-from app.web.routes.shapes import StatusJson, file_of
+from app.web.routes.shapes.common import ApiModel, StatusJson, file_of
 from pipeline.calibration.alignment.fit import AlignmentFit, overlap_sentence
 from pipeline.calibration.alignment.models import ModelName
 
 
-class FitChoice(BaseModel):
+class FitChoice(ApiModel):
     """What to fit."""
 
     model_config = ConfigDict(extra="forbid")
@@ -26,34 +26,43 @@ class FitChoice(BaseModel):
     offset: bool = Field(False, description="pinhole: also fit the camera's lateral and vertical position")
 
 
-class FitResult(BaseModel):
-    """changes: parameters by dotted name, as PATCH /api/params takes them. sigmas: standard deviation of each value.
-    iou_before, iou_after: mean overlap of boxes and projected clusters, of held-out frames if the drive is long enough;
-    null without an alignment before. text: that in a sentence. warnings: what the drive cannot tell."""
+class FitResult(ApiModel):
+    """The outcome of a fit."""
 
     changes: dict[str, float | str]
+    """Parameters by dotted name, as PATCH /api/params takes them."""
     sigmas: dict[str, float]
+    """Standard deviation of each value."""
     frames: int
+    """That were fitted to."""
     pairs: int
+    """Boxes paired with a cluster."""
     iou_before: float | None
+    """Mean overlap of boxes and projected clusters with the present alignment; null without one."""
     iou_after: float
+    """The same with the fit, of held-out frames if the drive is long enough."""
     text: str
+    """The outcome in a sentence."""
     warnings: list[str]
+    """What the drive cannot tell."""
 
 
-class FitJson(BaseModel):
-    """state none: no fit was begun for this recording. progress is 0–1."""
+class FitJson(ApiModel):
+    """The newest fit."""
 
     state: JobState | Literal["none"]
+    """``none``: no fit was begun for this recording."""
     progress: float
+    """0–1."""
     note: str
+    """Why it failed; empty otherwise."""
     result: FitResult | None
+    """Null until it is done."""
 
 
-def alignment_fit_router(engine: Engine) -> APIRouter:
+def alignment_fit_router(engine: Engine, fitting: AlignmentFitting) -> APIRouter:
     """Routes over the one fit."""
     router = APIRouter(prefix="/api/alignment", tags=["alignment"])
-    fitting = AlignmentFitting(engine.drives)
 
     @router.post("/fit", status_code=202)
     def begin(body: FitChoice) -> FitJson:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, HTTPException
 from fastapi.responses import FileResponse
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from app.clips.clip import Clip
 from app.clips.export_queue import ExportQueue, ExportStatus
@@ -15,37 +15,50 @@ from app.core.jobs import JobState
 from app.engine.engine import Engine
 from app.web.routes.names import one_of
 from app.web.routes.refusals import open_recording, refusing
-from app.web.routes.shapes import StatusJson, file_of
+from app.web.routes.shapes.common import ApiModel, StatusJson, file_of
 
 ClipKind = Annotated[str, *one_of(EXPORTERS)]
 
 
-class ClipChoice(BaseModel):
-    """Frames ``first`` to ``last``, both included."""
+class ClipChoice(ApiModel):
+    """What to export."""
 
     first: int = Field(ge=0)
+    """First frame."""
     last: int = Field(ge=0)
+    """Last frame, included."""
     kind: ClipKind
+    """Of file."""
 
 
-class JobJson(BaseModel):
-    """progress is 0–1. file and bytes: the download's name and size, null until it is done."""
+class JobJson(ApiModel):
+    """An export."""
 
     id: str
+    """As its URL has it."""
     kind: str
+    """Of file."""
     first: int
+    """First frame of the clip."""
     last: int
+    """Last frame, included."""
     state: JobState
+    """``done``, ``failed`` and ``cancelled`` are final."""
     progress: float
+    """0–1."""
     note: str
+    """Why it failed; empty otherwise."""
     file: str | None
+    """The download's name; null until it is done."""
     bytes: int | None
+    """The download's size; null until it is done."""
 
 
-class JobList(BaseModel):
+class JobList(ApiModel):
     """Exports, the oldest first."""
 
     jobs: list[JobJson]
+    """Those that ended are listed too."""
 
 
 def clips_router(engine: Engine, jobs: ExportQueue) -> APIRouter:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fastapi import APIRouter, HTTPException, Query
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from app.drive.background_runs import BackgroundRuns
 from app.drive.events import event_kinds, find_events
@@ -19,78 +19,112 @@ from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
 from app.web.routes.names import one_of
 from app.web.routes.refusals import open_recording, refusing
-from app.web.routes.shapes import StatusJson
+from app.web.routes.shapes.common import ApiModel, StatusJson
 from pipeline.common.clips import first_frames
 from pipeline.types import ObjectSource
 
 
-class Columns(BaseModel):
-    """Each column is a list for frames ``from`` … done−1; t_s has every frame of the recording, and
-    clips the index at which each clip of it begins, when ``from`` is 0."""
+class Columns(ApiModel):
+    """Columns of the timeline: each is a list for frames ``from`` … done−1."""
 
     run: int
+    """Number of the run."""
     uri: str
+    """Of the recording."""
     count: int
+    """Frames of the recording."""
     first: int = Field(serialization_alias="from")
+    """The first frame that is answered."""
     done: int
+    """Frames that have been run."""
     t_s: list[float]
+    """Place on the timeline of every frame of the recording, when ``from`` is 0."""
     clips: list[int]
+    """Index at which each clip of the recording begins, when ``from`` is 0."""
     columns: dict[str, list[Any]]
+    """By name."""
 
 
-class Curve(BaseModel):
-    """One object's values at the frames in which it was, whose numbers are in ``index``."""
+class Curve(ApiModel):
+    """One object's values at the frames in which it was."""
 
     id: int
+    """Object number in the run."""
     run: int
+    """Number of the run."""
     index: list[int]
+    """Numbers of the frames; all lists have this length."""
     source: list[ObjectSource]
+    """V, L or VL."""
     carried: list[bool]
+    """Predicted, not seen in that frame."""
     in_path: list[bool]
+    """Whether it was taken to be in the ego path."""
     distance_m: list[float | None]
+    """Null when unknown."""
     closing_speed_mps: list[float | None]
+    """Positive when the gap shrinks."""
     ttc_s: list[float | None]
+    """Null when the gap does not shrink."""
     path_offset_m: list[float | None]
+    """From the path's centre, positive to the left."""
     vl_gap_m: list[float | None]
+    """The camera's distance less the LiDAR's; null unless both saw it."""
 
 
 EventKind = Annotated[str, *one_of(event_kinds())]
 
 
-class EventJson(BaseModel):
-    """Something that happened. ids: of the objects it is about. mark: its number, when a person made it."""
+class EventJson(ApiModel):
+    """Something that happened."""
 
     kind: EventKind
+    """For filters and colours."""
     index: int
+    """Of the frame."""
     t_s: float
+    """Place on the timeline."""
     text: str
+    """One sentence."""
     ids: list[int]
+    """Of the objects it is about, the most important first."""
     severity: Severity
+    """Decides its colour."""
     mark: int | None
+    """Its number, when a person made it; null for others."""
 
 
-class Events(BaseModel):
+class Events(ApiModel):
     """Events of a run, by frame."""
 
     run: int | None
+    """Number of the run; null before one has begun."""
     events: list[EventJson]
+    """By frame."""
 
 
-class NewMark(BaseModel):
-    """``index`` absent: the shown frame."""
+class NewMark(ApiModel):
+    """A moment to be marked."""
 
     index: int | None = Field(None, ge=0)
+    """Of the frame; absent or null: the shown frame."""
     text: str = Field("", max_length=LONGEST_TEXT)
+    """What there is to see; may be empty."""
 
 
-class MarkJson(BaseModel):
-    """A marked moment. t_s: its place on the timeline. in_session: whether a session that is being recorded has it."""
+class MarkJson(ApiModel):
+    """A marked moment."""
 
     id: int
+    """Its number in the recording."""
     index: int
+    """Of the frame."""
     t_s: float
+    """Its place on the timeline."""
     text: str
+    """What the person wrote."""
     in_session: bool
+    """Whether a session that is being recorded has it."""
 
 
 def drive_router(engine: Engine, drives: BackgroundRuns, marks: Marks) -> APIRouter:

@@ -6,17 +6,19 @@ from typing import Literal
 
 from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST
-from pydantic import BaseModel
 
 from app.engine.engine import Engine
 from app.web.metrics import Metrics
+from app.web.routes.shapes.common import ApiModel
 
 
-class Health(BaseModel):
-    """engine: false when the worker thread has ended; only a restart of the server helps."""
+class Health(ApiModel):
+    """Whether the server and its worker run."""
 
     status: Literal["ok", "failed"]
+    """``failed`` is sent with status 503."""
     engine: bool
+    """False when the worker thread has ended; only a restart of the server helps."""
 
 
 def health_router(engine: Engine, metrics: Metrics) -> APIRouter:

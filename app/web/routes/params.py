@@ -14,7 +14,8 @@ from pydantic.fields import FieldInfo
 from app.engine.engine import Engine
 from app.labels.acts.request_fields import PersonOrNobody
 from app.web.routes.refusals import refusing
-from app.web.routes.shapes import ParamsJson, file_of
+from app.web.routes.shapes.common import ApiModel, file_of
+from app.web.routes.shapes.parameters import ParamsJson
 from pipeline.alignment.projection import angular_from_calibration
 from pipeline.params import PRESETS, Params, ParamsError, flat, preset, to_yaml, with_changes
 from pipeline.types import REAL_VEHICLES, Frame
@@ -22,7 +23,7 @@ from pipeline.types import REAL_VEHICLES, Frame
 _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": ParamsJson}}
 
 
-class Step(BaseModel):
+class Step(ApiModel):
     """A change of parameters that can be undone."""
 
     person: PersonOrNobody = Field("", description="Who can undo the change; anyone without a name")
@@ -32,6 +33,7 @@ class Changes(Step):
     """New values by dotted name; null, where permitted, means the value of the calibration or the detector."""
 
     changes: dict[str, Any] = Field(min_length=1, examples=[{"cluster.z_weight": 0.4}])
+    """At least one."""
     final: bool = Field(
         True, description="False while a slider is dragged: no undo step, and no run over the whole drive"
     )
@@ -41,13 +43,16 @@ class Replacement(Step):
     """A preset, and the values that differ from it."""
 
     preset: str = Field("default", examples=list(PRESETS))
+    """Which values to start from."""
     values: dict[str, Any] = Field(default_factory=dict, examples=[{"cluster.z_weight": 0.4}])
+    """Those that differ from the preset."""
 
 
 class PresetChoice(Step):
     """A preset's name."""
 
     name: str = Field(examples=list(PRESETS))
+    """One of ``presets``."""
 
 
 def params_router(engine: Engine) -> APIRouter:

@@ -4,31 +4,37 @@ from __future__ import annotations
 
 from fastapi import APIRouter, HTTPException, WebSocket
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from app.engine.engine import Engine
 from app.streaming.stream import Stream
-from app.web.routes.shapes import ResultJson, SourceJson, SourcesJson, StateJson, StatusJson
+from app.web.routes.shapes.common import ApiModel, StatusJson
+from app.web.routes.shapes.result import ResultJson
+from app.web.routes.shapes.state import SourceJson, SourcesJson, StateJson
 from app.web.source_catalog import catalog
 from pipeline.types.result_json import to_json
 
 
-class PlaybackChange(BaseModel):
-    """What to change; absent fields stay as they are. ``step`` pauses and moves by this many frames."""
+class PlaybackChange(ApiModel):
+    """What to change; absent fields stay as they are."""
 
     model_config = ConfigDict(extra="forbid")
 
     playing: bool | None = None
+    """False pauses."""
     seek: int | None = Field(None, ge=0, description="Frame index; clamped to the last frame")
     step: int | None = Field(None, ge=-1000, le=1000)
+    """Pauses and moves by this many frames."""
     speed: float | None = Field(None, ge=0.1, le=10.0, description="1 is real time")
     loop: bool | None = None
+    """Whether playback starts again at the end."""
 
 
-class SourceChoice(BaseModel):
+class SourceChoice(ApiModel):
     """What to open: a path or a URI."""
 
     uri: str = Field(min_length=1, max_length=4096, examples=["sim:straight"])
+    """A path, or a scheme and what follows it."""
 
 
 def playback_router(engine: Engine, stream: Stream) -> APIRouter:

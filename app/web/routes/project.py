@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from fastapi import APIRouter
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from app.core.request_shapes import CuboidShape, Finite
 from app.engine.engine import Engine
+from app.web.routes.shapes.common import ApiModel
 from pipeline.alignment.projection import resolve
 from pipeline.common.geometry import corners_of
 
@@ -16,34 +17,39 @@ MOST_CUBOIDS = 500
 Pixel = tuple[float, float]
 
 
-class Given(BaseModel):
+class Given(ApiModel):
     """Cuboids of one frame."""
 
     model_config = ConfigDict(extra="forbid")
 
     cuboids: list[CuboidShape] = Field(max_length=MOST_CUBOIDS)
+    """In the ego frame."""
 
 
-class Projected(BaseModel):
-    """For each cuboid the pixels of its 8 corners in the original image, the bottom four first; null for a corner
-    behind the camera. pixels is null without an extrinsic calibration of LiDAR and camera."""
+class Projected(ApiModel):
+    """The corners of cuboids in the image."""
 
     pixels: list[list[Pixel | None]] | None
+    """For each cuboid the pixels of its 8 corners in the original image, the bottom four first; null for a corner
+    behind the camera. Null as a whole without an extrinsic calibration of LiDAR and camera."""
 
 
-class GivenPixel(BaseModel):
+class GivenPixel(ApiModel):
     """A pixel of the original image."""
 
     model_config = ConfigDict(extra="forbid")
 
     pixel: tuple[Finite, Finite]
+    """Column and row."""
 
 
-class Ray(BaseModel):
-    """The viewing ray of a pixel: origin and direction in the ego frame. Null without an extrinsic calibration."""
+class Ray(ApiModel):
+    """The viewing ray of a pixel, ego frame. Null without an extrinsic calibration."""
 
     start: tuple[float, float, float] | None
+    """Where the camera is."""
     toward: tuple[float, float, float] | None
+    """Direction, of any length."""
 
 
 def project_router(engine: Engine) -> APIRouter:

@@ -5,20 +5,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fastapi import APIRouter
-from pydantic import BaseModel
 
 from app.engine.engine import Engine
 from app.web.routes.refusals import refusing
-from app.web.routes.shapes import RecordingJson
+from app.web.routes.shapes.common import ApiModel
+from app.web.routes.shapes.state import RecordingJson
 
 if TYPE_CHECKING:
     from pipeline.recording.recorder import RecordingState
 
 
-class RecordingChoice(BaseModel):
-    """on: start, or stop."""
+class RecordingChoice(ApiModel):
+    """Start or stop recording."""
 
     on: bool
+    """True starts."""
 
 
 def recording_router(engine: Engine) -> APIRouter:

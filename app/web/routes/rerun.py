@@ -11,7 +11,6 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, HTTPException, Query, Request
 from fastapi.responses import FileResponse
-from pydantic import BaseModel
 from starlette.background import BackgroundTask
 
 from app.clips.exports import write_clip
@@ -21,7 +20,7 @@ from app.views.rerun.web import FILES, ViewerFiles
 from app.web.quotas import while_waited_for
 from app.web.routes.clips import clip_of
 from app.web.routes.refusals import open_recording, refusing
-from app.web.routes.shapes import file_of
+from app.web.routes.shapes.common import ApiModel, file_of
 from pipeline.common.progress import Progress
 
 AROUND = 50
@@ -40,12 +39,15 @@ _TYPES = {"re_viewer.js": "text/javascript", "re_viewer_bg.wasm": "application/w
 _PAGE = Path(__file__).resolve().parents[3] / "static" / "rerun" / "index.html"
 
 
-class Address(BaseModel):
-    """Where this drive is open in the viewer, at this moment."""
+class Address(ApiModel):
+    """Where this drive is open in the viewer."""
 
     url: str
+    """Of the viewer's page, with the drive in it."""
     first: int
+    """First frame that it shows."""
     last: int
+    """Last frame, included."""
 
 
 def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:

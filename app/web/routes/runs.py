@@ -6,7 +6,7 @@ import logging
 from typing import Any, Literal
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from app.drive.background_runs import BackgroundRuns, Phase
 from app.drive.compare import compare
@@ -19,7 +19,7 @@ from app.labels.errors import DatabaseError
 from app.labels.service.desk import LabelDesk
 from app.web.routes.drive import Columns, columns_of, current
 from app.web.routes.refusals import open_recording, refusing
-from app.web.routes.shapes import MetricJson, file_of
+from app.web.routes.shapes.common import ApiModel, MetricJson, file_of
 from pipeline.params import changes_of, to_yaml
 
 logger = logging.getLogger("cipv.runs")
@@ -28,51 +28,75 @@ _MOST_SENTENCES = 100
 _NAMED_CHANGES = 3
 
 
-class Run(BaseModel):
-    """name: given by a person. label: what it changes against the base. digest: equal for equal inputs and
-    parameters."""
+class Run(ApiModel):
+    """One run over the drive."""
 
     id: int
+    """Number of the run."""
     name: str
+    """Given by a person; empty otherwise."""
     label: str
+    """What it changes against the base."""
     digest: str
+    """Equal for equal inputs and parameters."""
     preset: str
+    """That its parameters started from."""
     changes: dict[str, tuple[Any, Any]]
+    """Parameters that differ from the base's: its value and this run's."""
     done: int
+    """Frames that have been run."""
     total: int
+    """Frames of the drive."""
     phase: Phase
+    """``detect`` while networks see images for the first time, ``run`` afterwards."""
     note: str
+    """Why it failed; empty otherwise."""
     kept: bool
+    """Saved runs are not discarded when newer ones come."""
     seconds: float
+    """Of computing."""
 
 
-class Runs(BaseModel):
-    """run: the run of the present parameters. base: the run that it is compared against."""
+class Runs(ApiModel):
+    """The runs of the open recording."""
 
     base: int | None
+    """Number of the run that the present one is compared with; null without one."""
     run: int | None
+    """Number of the run of the present parameters; null without one."""
     runs: list[Run]
+    """The oldest first."""
 
 
-class Name(BaseModel):
+class Name(ApiModel):
     """A person's name for a run."""
 
     name: str = Field("", max_length=LONGEST_NAME)
+    """Shown in the list; may be empty."""
 
 
-class ComparisonJson(BaseModel):
-    """differing: first and last frame of each range whose lead differs. first: what differs where a range begins.
-    truth: the source of truth: labels made here, otherwise labels that come with the recording, or the simulator."""
+class ComparisonJson(ApiModel):
+    """Two runs side by side."""
 
     base: int
+    """Number of the run compared with."""
     run: int
+    """Number of the run itself."""
     done: int
+    """Frames that both have run."""
     differing: list[tuple[int, int]]
+    """First and last frame of each range whose lead differs."""
     frames_differing: int
+    """In all ranges together."""
     first: dict[int, str]
+    """What differs where a range begins, by that frame."""
     metrics: list[MetricJson]
+    """Those that need truth only where there is one."""
     truth: Literal["labels", "recording", "simulator"] | None
+    """Its source: labels made here, otherwise labels that come with the recording, or the simulator; null without
+    any."""
     judged: int
+    """Frames with truth."""
 
 
 def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:

@@ -25,6 +25,7 @@ AMBIGUOUS = 0.8
 @dataclass(frozen=True, eq=False)
 class Found:
     vector: F64
+    """The model's unknowns where a search ended; see ``FitModel``."""
     rows: I64
     """Of the pairs that belong together."""
     explained: float

@@ -74,6 +74,7 @@ class AlignmentFit:
     """A fitted alignment and how far it can be trusted."""
 
     model: ModelName
+    """Which of the two projections was fitted."""
     values: Mapping[str, float]
     """Of ``AlignmentParams``, by name."""
     sigmas: Mapping[str, float]

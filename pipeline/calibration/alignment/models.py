@@ -38,6 +38,7 @@ class FitModel:
     (angular)."""
 
     name: ModelName
+    """Which of the two projections it is."""
     camera: CameraCalibration | None
     """The recording's calibration; the angular model does without."""
     size: tuple[int, int]

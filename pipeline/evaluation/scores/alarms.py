@@ -13,8 +13,7 @@ from typing import Literal
 
 from pipeline.common.clips import first_frames
 from pipeline.common.geometry import closest_on_polygon
-from pipeline.decision.aeb import required_decel_mps2
-from pipeline.decision.object_motion import SMALLEST_CLOSING_MPS
+from pipeline.decision.object_motion import SMALLEST_CLOSING_MPS, required_decel_mps2
 from pipeline.evaluation.lead_verdict import nearest_face_m
 from pipeline.evaluation.scores.truth import FrameTruth
 from pipeline.labels.link_identities import MAX_GAP_S
@@ -30,13 +29,16 @@ _ACTING: dict[AlarmKind, frozenset[str]] = {
 
 @dataclass(frozen=True)
 class Alarm:
-    """One dangerous moment, or one false alarm. due_ns, acted_ns: None where there was none. delay_s: acted after it
-    was due; negative: before. true_ttc_s: of the true lead when it acted, None where it had none."""
+    """One dangerous moment, or one false alarm."""
 
     kind: AlarmKind
+    """Warning or braking."""
     due_ns: int | None
+    """When the labels say it was due; None for a false alarm."""
     acted_ns: int | None
+    """When the pipeline acted; None when it did not."""
     true_ttc_s: float | None
+    """Of the true lead when the pipeline acted; None where it had none."""
 
     @property
     def delay_s(self) -> float | None:

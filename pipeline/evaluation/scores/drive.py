@@ -13,7 +13,7 @@ from pipeline.evaluation.scores.alarms import Alarm, alarms
 from pipeline.evaluation.scores.episodes import (
     Acquisition,
     CutIn,
-    Moment,
+    LeadFrame,
     acquisitions,
     count_switches,
     cut_ins,
@@ -31,37 +31,53 @@ class Rules:
     """The rules of scoring: which vehicle is the lead, and when the emergency brake is due."""
 
     lead: LeadRule = field(default_factory=LeadRule)
+    """Which labelled vehicle leads, and how near to it a CIPV must be."""
     aeb: AebParams = field(default_factory=AebParams)
+    """By whose thresholds warning and braking are due."""
 
 
 @dataclass(frozen=True)
 class FrameScore:
-    """One labelled frame. index: in the recording. judged: None where the lead is not known."""
+    """One labelled frame."""
 
     index: int
+    """In the recording."""
     t_ns: int
+    """Its tick."""
     name: str
+    """The recording's own name of it."""
     judged: Judged | None
+    """None where the lead is not known."""
     errors: tuple[Error, ...]
+    """Of the matched vehicles."""
 
 
 @dataclass(frozen=True)
 class DriveScore:
-    """One recording. clips: how many it is made of, each judged as a drive of its own. judged_s: how long the lead was
-    judged; guarded_s: for how much of it ego speed was known, and with it warning and braking. tracking: None without
-    trackeval."""
+    """One recording against its truth."""
 
     uri: str
+    """As it was opened."""
     frames: tuple[FrameScore, ...]
+    """The labelled ones."""
     judged_s: float
+    """How long the lead was judged."""
     clips: int
+    """How many it is made of, each judged as a drive of its own."""
     guarded_s: float
+    """For how much of ``judged_s`` ego speed was known, and with it warning and braking."""
     switches: int
+    """How often the CIPV changed while the lead did not."""
     acquisitions: tuple[Acquisition, ...]
+    """Every lead, from when it leads."""
     cut_ins: tuple[CutIn, ...]
+    """Labelled ones, or those that follow from the true leads."""
     alarms: tuple[Alarm, ...]
+    """Due, given, or both."""
     tracking: tracking.Counts | None
+    """None without trackeval."""
     notes: tuple[str, ...] = ()
+    """What a reader of the figures should know, one sentence each."""
 
     def index_of(self, t_ns: int) -> int:
         """The judged frame nearest to a tick."""
@@ -107,9 +123,9 @@ def judged(result: Result, known: FrameTruth, rules: Rules) -> Judged | None:
     return judge_lead(result, known.lead, rules.lead) if known.lead_known else None
 
 
-def _moment(result: Result, known: FrameTruth, judged: Judged) -> Moment:
+def _moment(result: Result, known: FrameTruth, judged: Judged) -> LeadFrame:
     """A lead beyond the scored range counts as none."""
     lead = known.lead.id if known.lead is not None and judged.truth_m is not None else None
     if known.lead_box is not None:
         lead = known.lead_box[0]
-    return Moment(result.t_ns, lead, result.cipv.id if result.cipv is not None else None, judged)
+    return LeadFrame(result.t_ns, lead, result.cipv.id if result.cipv is not None else None, judged)

@@ -13,41 +13,52 @@ from pipeline.labels.link_identities import MAX_GAP_S
 
 
 @dataclass(frozen=True)
-class Moment:
-    """One frame with a known lead. lead: None where there is none; chosen: the CIPV's id."""
+class LeadFrame:
+    """One frame with a known lead."""
 
     t_ns: int
+    """Its tick."""
     lead: int | None
+    """Of the truth; None where there is none."""
     chosen: int | None
+    """Id of the CIPV; None where there is none."""
     judged: Judged
+    """The verdict on it."""
 
 
 @dataclass(frozen=True)
 class Acquisition:
-    """One lead from when it leads. range_m: its range in the first frame in which it was correctly chosen, None when it
-    never was; after_s: how long that took. from_start: it was the lead when the recording began, so its start is
-    unknown. drop_outs: how often it was lost again, with no CIPV."""
+    """One lead from when it leads."""
 
     lead: int
+    """Id in the truth."""
     t_ns: int
+    """When it began to lead."""
     range_m: float | None
+    """Its range in the first frame in which it was correctly chosen; None when it never was."""
     after_s: float | None
+    """How long that took; None when it never was."""
     from_start: bool
+    """Whether it was the lead when the recording began, so that its start is unknown."""
     drop_outs: int
+    """How often it was lost again, with no CIPV."""
 
 
 @dataclass(frozen=True)
 class CutIn:
-    """A vehicle that cuts in. latency_s: from when it becomes the lead until it is the CIPV; None when it never was."""
+    """A vehicle that cuts in."""
 
     lead: int
+    """Id in the truth."""
     t_ns: int
+    """When it becomes the lead."""
     latency_s: float | None
+    """From then until it is the CIPV; None when it never was."""
 
 
-def stretches(moments: Sequence[Moment]) -> list[list[Moment]]:
+def stretches(moments: Sequence[LeadFrame]) -> list[list[LeadFrame]]:
     """Each clip's own part."""
-    parts: list[list[Moment]] = []
+    parts: list[list[LeadFrame]] = []
     for moment in moments:
         if parts and not begins_clip(parts[-1][-1].t_ns, moment.t_ns, MAX_GAP_S):
             parts[-1].append(moment)
@@ -56,20 +67,20 @@ def stretches(moments: Sequence[Moment]) -> list[list[Moment]]:
     return parts
 
 
-def judged_s(moments: Sequence[Moment]) -> float:
+def judged_s(moments: Sequence[LeadFrame]) -> float:
     """How long the lead was judged, gaps left out."""
     return sum((part[-1].t_ns - part[0].t_ns) / 1e9 for part in stretches(moments))
 
 
-def count_switches(moments: Sequence[Moment]) -> int:
+def count_switches(moments: Sequence[LeadFrame]) -> int:
     """How often the CIPV's id changed while the lead stayed the same."""
     return sum(switches((m.lead, m.chosen) for m in part) for part in stretches(moments))
 
 
-def _reigns(moments: Sequence[Moment]) -> list[tuple[list[Moment], bool]]:
+def _reigns(moments: Sequence[LeadFrame]) -> list[tuple[list[LeadFrame], bool]]:
     """Each lead's frames from when it becomes the lead until it no longer is, and whether a stretch begins with
     them."""
-    found: list[tuple[list[Moment], bool]] = []
+    found: list[tuple[list[LeadFrame], bool]] = []
     for part in stretches(moments):
         last: int | None = None
         for n, moment in enumerate(part):
@@ -81,7 +92,7 @@ def _reigns(moments: Sequence[Moment]) -> list[tuple[list[Moment], bool]]:
     return found
 
 
-def acquisitions(moments: Sequence[Moment]) -> list[Acquisition]:
+def acquisitions(moments: Sequence[LeadFrame]) -> list[Acquisition]:
     """One per lead, in order of time."""
     found = []
     for reign, from_start in _reigns(moments):
@@ -101,7 +112,7 @@ def acquisitions(moments: Sequence[Moment]) -> list[Acquisition]:
 
 
 def cut_ins(
-    moments: Sequence[Moment], truth: Mapping[int, FrameTruth], labelled: Sequence[tuple[int, int]] | None
+    moments: Sequence[LeadFrame], truth: Mapping[int, FrameTruth], labelled: Sequence[tuple[int, int]] | None
 ) -> list[CutIn]:
     """``labelled``: tick and object of each, as people labelled them. Without them: each lead that was labelled outside
     the lane in the frame before, nearer than the lead of that frame."""
@@ -117,7 +128,7 @@ def cut_ins(
     return found
 
 
-def _labelled(reigns: Sequence[Sequence[Moment]], tick: int, lead: int) -> CutIn | None:
+def _labelled(reigns: Sequence[Sequence[LeadFrame]], tick: int, lead: int) -> CutIn | None:
     """Of an event: the next episode in which it is the lead, or the one that the event falls into. None where the lead
     is not known then."""
     reign = next((each for each in reigns if each[0].lead == lead and each[-1].t_ns >= tick), None)
@@ -126,13 +137,13 @@ def _labelled(reigns: Sequence[Sequence[Moment]], tick: int, lead: int) -> CutIn
     return CutIn(lead, tick, _latency_s(reign, max(tick, reign[0].t_ns)))
 
 
-def _cuts_in(start: Moment, earlier: FrameTruth) -> bool:
+def _cuts_in(start: LeadFrame, earlier: FrameTruth) -> bool:
     item = next((each for each in earlier.objects if each.id == start.lead), None)
     if item is None or not earlier.lead_known or earlier.lead_box is not None:
         return False
     return earlier.lead is None or (earlier.lead.id != item.id and nearest_face_m(item) < nearest_face_m(earlier.lead))
 
 
-def _latency_s(reign: Sequence[Moment], since_ns: int) -> float | None:
+def _latency_s(reign: Sequence[LeadFrame], since_ns: int) -> float | None:
     right = next((m.t_ns for m in reign if m.t_ns >= since_ns and m.judged.verdict == "correct"), None)
     return (right - since_ns) / 1e9 if right is not None else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from pipeline.evaluation.report_sections import Cell, Chart, Section, Series, Table
+from pipeline.evaluation.report_sections import Cell, Chart, ReportSection, Series, Table
 from pipeline.evaluation.scores.figures import Drives
 from pipeline.evaluation.scores.matching import MAX_RANGE_M, Error
 from pipeline.types import MOST_SENSORS_FIRST
@@ -30,10 +30,10 @@ def _all_errors(run: Drives) -> list[Error]:
     return [error for drive in run for frame in drive.frames for error in frame.errors]
 
 
-def errors_section(run: Drives) -> Section:
+def errors_section(run: Drives) -> ReportSection:
     """A table and a chart of each error."""
     every = _all_errors(run)
-    return Section(
+    return ReportSection(
         "errors",
         "Errors by range and sensor",
         (

@@ -39,7 +39,9 @@ class Figure:
     title: str
     """For reports."""
     unit: str
+    """Empty for counts and shares."""
     better: Literal["higher", "lower"]
+    """Which direction is an improvement."""
     part: Callable[[DriveScore], Any]
     """The contribution of one drive."""
     whole: Callable[[Sequence[Any]], float | None] = ratio
@@ -51,15 +53,20 @@ class Figure:
 
 @dataclass(frozen=True)
 class Interval:
+    """A 95 % confidence interval from resampling drives."""
+
     low: float
+    """2.5th percentile."""
     high: float
+    """97.5th percentile."""
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredFigure:
     """The value of a figure."""
 
     figure: Figure
+    """What was measured."""
     value: float | None
     """None where it is undefined."""
     interval: Interval | None
@@ -71,8 +78,11 @@ class Compared:
     """A figure of two runs over the same drives."""
 
     figure: Figure
+    """What was compared."""
     base: float | None
+    """Of the run compared with; None where it is undefined."""
     run: float | None
+    """Of the run itself; None where it is undefined."""
     interval: Interval | None
     """95 % confidence interval of run minus base, from drives resampled in pairs."""
 
@@ -81,12 +91,12 @@ class Compared:
         return None if self.base is None or self.run is None else self.run - self.base
 
 
-def measure(drives: Drives) -> tuple[Measured, ...]:
+def measure(drives: Drives) -> tuple[MeasuredFigure, ...]:
     """Every figure of one run."""
     measured = []
     for figure in FIGURES:
         parts = [figure.part(drive) for drive in drives]
-        measured.append(Measured(figure, figure.whole(parts), bootstrap(parts, figure.whole)))
+        measured.append(MeasuredFigure(figure, figure.whole(parts), bootstrap(parts, figure.whole)))
     return tuple(measured)
 
 

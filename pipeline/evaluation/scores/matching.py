@@ -29,17 +29,22 @@ _NEVER = 1e6
 
 
 class Error(NamedTuple):
-    """One matched vehicle in one frame: the sensors, its true range, and estimated minus true distance, position of the
-    nearest face's middle (lateral, longitudinal) and velocity along the ego car's axis; metres, m/s. Last, the standard
-    deviation that was given with the distance."""
+    """One matched vehicle in one frame. Errors are estimated minus true, of the nearest face's middle."""
 
     source: ObjectSource
+    """Which sensors see it."""
     range_m: float
+    """True range."""
     distance_m: float
+    """Error of the distance."""
     lateral_m: float
+    """Error across the ego car's axis."""
     longitudinal_m: float
+    """Error along it."""
     speed_mps: float | None
+    """Error of the velocity along it; None where either is unknown."""
     distance_sigma_m: float | None = None
+    """Standard deviation that was given with the distance; None where none was."""
 
 
 def vehicles(objects: Iterable[TruthObject]) -> list[TruthObject]:

@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from pipeline.evaluation.lead_verdict import LeadRule
-from pipeline.evaluation.report_sections import Linked, Section, Table
+from pipeline.evaluation.report_sections import Linked, ReportSection, Table
 from pipeline.evaluation.scores import tracking
 from pipeline.evaluation.scores.drive import DriveScore
 from pipeline.evaluation.scores.error_tables import COLUMNS, SIGMA_COLUMNS, error_rows, errors_section, sigma_rows
-from pipeline.evaluation.scores.figures import Compared, Drives, Interval, Measured, compare, measure
+from pipeline.evaluation.scores.figures import Compared, Drives, Interval, MeasuredFigure, compare, measure
 from pipeline.evaluation.scores.matching import MAX_RANGE_M
 from pipeline.evaluation.scores.worst import Bad, changed, worst
 
-Link = Callable[[str, int], str]
+LinkTo = Callable[[str, int], str]
 """The address that opens a recording's URI at a frame."""
 FEW = 5
 """With fewer drives a bootstrap interval says little: two drives have but three draws."""
@@ -22,7 +22,7 @@ MOST = 20
 """Rows of a list of frames."""
 
 
-def sections(run: Drives, link: Link, base: Drives | None = None) -> list[Section]:
+def sections(run: Drives, link: LinkTo, base: Drives | None = None) -> list[ReportSection]:
     """The report of a run over some drives; with ``base``, another run over the same ones, of how the two differ."""
     found = [_scores(run), errors_section(run), _moments(run, link), _worst(run, link)]
     return [_comparison(base, run, link), *found] if base is not None else found
@@ -57,7 +57,7 @@ def _interval_json(interval: Interval | None) -> list[float] | None:
     return None if interval is None else [interval.low, interval.high]
 
 
-def _measured_json(each: Measured) -> dict[str, Any]:
+def _measured_json(each: MeasuredFigure) -> dict[str, Any]:
     return {"value": each.value, "unit": each.figure.unit, "interval": _interval_json(each.interval)}
 
 
@@ -78,7 +78,7 @@ def _cut_in_json(drive: DriveScore, n: int) -> dict[str, Any]:
 # ---------------------------------------------------------------- figures
 
 
-def _scores(run: Drives) -> Section:
+def _scores(run: Drives) -> ReportSection:
     judged = sum(frame.judged is not None for drive in run for frame in drive.frames)
     seconds, rule = sum(drive.judged_s for drive in run), LeadRule()
     text = [
@@ -121,7 +121,7 @@ def _scores(run: Drives) -> Section:
     tables = [Table("Figures", columns, rows)]
     if len(run) > 1:
         tables.append(Table("By drive", ("drive", "frames", *titles), per_drive))
-    return Section("scores", "Scores", tuple(text), tuple(tables))
+    return ReportSection("scores", "Scores", tuple(text), tuple(tables))
 
 
 _GOOD = {"higher": "more", "lower": "less"}
@@ -139,7 +139,7 @@ def _many(count: int, what: str) -> str:
 # ---------------------------------------------------------------- what happened when
 
 
-def _moments(run: Drives, link: Link) -> Section:
+def _moments(run: Drives, link: LinkTo) -> ReportSection:
     leads = tuple(
         (
             Linked(f"#{each.lead}", link(drive.uri, drive.index_of(each.t_ns))),
@@ -179,14 +179,14 @@ def _moments(run: Drives, link: Link) -> Section:
             "Due: by the emergency brake's own limits, from the labelled lead's range and closing speed.",
         ),
     )
-    return Section("moments", "Timeline of events", (), tuple(table for table in tables if table.rows))
+    return ReportSection("moments", "Timeline of events", (), tuple(table for table in tables if table.rows))
 
 
 # ---------------------------------------------------------------- frames to look at
 
 
-def _worst(run: Drives, link: Link) -> Section:
-    return Section(
+def _worst(run: Drives, link: LinkTo) -> ReportSection:
+    return ReportSection(
         "worst",
         "Worst frames",
         ("Links open the dashboard at the frame while `cipv serve` runs.",),
@@ -194,7 +194,7 @@ def _worst(run: Drives, link: Link) -> Section:
     )
 
 
-def _frames(title: str, bad: Sequence[Bad], link: Link) -> Table:
+def _frames(title: str, bad: Sequence[Bad], link: LinkTo) -> Table:
     rows = tuple(
         (
             Linked(each.name, link(each.uri, each.index)),
@@ -213,7 +213,7 @@ def _frames(title: str, bad: Sequence[Bad], link: Link) -> Table:
     return Table(title, (*columns[:2], *columns[3:]), tuple((*row[:2], *row[3:]) for row in rows))
 
 
-def _comparison(base: Drives, run: Drives, link: Link) -> Section:
+def _comparison(base: Drives, run: Drives, link: LinkTo) -> ReportSection:
     rows = tuple(
         (
             each.figure.title,
@@ -227,7 +227,7 @@ def _comparison(base: Drives, run: Drives, link: Link) -> Section:
         for each in compare(base, run)
     )
     columns = ("figure", "unit", "baseline", "run", "run − baseline", "95 % low", "high", "")
-    return Section(
+    return ReportSection(
         "comparison",
         "Compared with the baseline",
         (

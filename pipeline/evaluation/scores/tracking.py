@@ -21,8 +21,8 @@ from pipeline.types import I64, Point2, Result
 ZERO_M = 4.0
 """From this distance on, the similarity is 0."""
 MATCH_M = 0.5 * ZERO_M
-MISSING = "Detection and tracking scores need trackeval, which `make install` brings."
-Named = list[tuple[int, Point2]]
+MISSING = "Detection and tracking scores need trackeval, which `make install` installs."
+NamedPositions = list[tuple[int, Point2]]
 """Ids and positions of one frame's vehicles."""
 
 
@@ -31,8 +31,11 @@ class Counts:
     """One drive's counts in trackeval's form, to be summed over drives."""
 
     clear: dict[str, Any]
+    """For MOTA, precision and recall."""
     identity: dict[str, Any]
+    """For IDF1."""
     hota: dict[str, Any]
+    """For HOTA, by localisation threshold."""
 
 
 def is_available() -> bool:
@@ -54,7 +57,7 @@ def of_frames(frames: Sequence[tuple[Result, FrameTruth]]) -> Counts | None:
     return count(truths, believed) if any(truths) else None
 
 
-def count(truths: Sequence[Named], believed: Sequence[Named]) -> Counts | None:
+def count(truths: Sequence[NamedPositions], believed: Sequence[NamedPositions]) -> Counts | None:
     """Frame by frame: the true vehicles, and the claimed ones."""
     metrics = _metrics()
     if metrics is None:
@@ -107,7 +110,7 @@ def _metrics() -> tuple[Any, Any, Any] | None:
     return CLEAR(config), Identity(config), HOTA()
 
 
-def _sequence(truths: Sequence[Named], believed: Sequence[Named]) -> dict[str, Any]:
+def _sequence(truths: Sequence[NamedPositions], believed: Sequence[NamedPositions]) -> dict[str, Any]:
     """What trackeval asks of a sequence: ids counted from 0, and similarities (truth, believed) of each frame."""
     gt_ids, gt_count = _from_zero(truths)
     tracker_ids, tracker_count = _from_zero(believed)
@@ -123,12 +126,12 @@ def _sequence(truths: Sequence[Named], believed: Sequence[Named]) -> dict[str, A
     }
 
 
-def _from_zero(frames: Sequence[Named]) -> tuple[list[I64], int]:
+def _from_zero(frames: Sequence[NamedPositions]) -> tuple[list[I64], int]:
     known = {key: n for n, key in enumerate(sorted({key for frame in frames for key, _ in frame}))}
     return [np.array([known[key] for key, _ in frame], dtype=np.int64) for frame in frames], len(known)
 
 
-def _similarity(truths: Named, believed: Named) -> np.ndarray:
+def _similarity(truths: NamedPositions, believed: NamedPositions) -> np.ndarray:
     a = np.array([place for _, place in truths]).reshape(-1, 1, 2)
     b = np.array([place for _, place in believed]).reshape(1, -1, 2)
     return np.clip(1.0 - np.hypot(*np.moveaxis(a - b, 2, 0)) / ZERO_M, 0.0, None)

@@ -32,33 +32,41 @@ class NoTruth(BadInput):
 
 @dataclass(frozen=True)
 class FrameTruth:
-    """A labelled frame. lead: None where there is none. lead_known: false where the lead is unclear, or its position is
-    not labelled. velocity_mps: relative to ego in the turning ego frame, by object id, for those that neighbouring
-    frames show. lead_box: the lead's id and image box where it is labelled in the image only; ``lead`` is None
-    then. whole: every vehicle in it is labelled. unplaced: image boxes of labelled vehicles whose position is
-    unknown."""
+    """A labelled frame."""
 
     t_ns: int
+    """Its tick."""
     objects: tuple[TruthObject, ...]
+    """Labelled vehicles with a position."""
     lead: TruthObject | None
+    """None where there is none."""
     lead_known: bool = True
+    """False where the lead is unclear, or its position is not labelled."""
     velocity_mps: Mapping[int, Point2] | None = None
+    """Relative to ego in the turning ego frame, by object id, for those that neighbouring frames show; None where not
+    computed."""
     lead_box: tuple[int, Box] | None = None
+    """The lead's id and image box where it is labelled in the image only; ``lead`` is None then."""
     whole: bool = True
+    """Whether every vehicle in it is labelled: only then is a surplus object false."""
     unplaced: tuple[Box, ...] = ()
+    """Image boxes of labelled vehicles whose position is unknown."""
 
 
 @dataclass(frozen=True)
 class DriveTruth:
-    """uri: of the recording. ticks: of all its frames. frames: the labelled ones, by tick. cut_ins: tick and object of
-    each labelled cut-in; None where they are not labelled and follow from the true leads. notes: what a user should
-    know."""
+    """The truth of one recording."""
 
     uri: str
+    """Of the recording."""
     ticks: tuple[int, ...]
+    """Of all its frames."""
     frames: Mapping[int, FrameTruth]
+    """The labelled ones, by tick."""
     cut_ins: tuple[tuple[int, int], ...] | None = None
+    """Tick and object of each labelled cut-in; None where they are not labelled and follow from the true leads."""
     notes: tuple[str, ...] = ()
+    """What a user should know."""
 
 
 def of_source(source: Source, rule: LeadRule) -> DriveTruth:

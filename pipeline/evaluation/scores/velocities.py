@@ -27,20 +27,21 @@ _PARABOLA = 4
 _MOST_BESIDE = 10
 """At most this many positions before and after a frame are used."""
 
-Sightings = Iterable[tuple[int, Mapping[int, Point2]]]
+TickPositions = Iterable[tuple[int, Mapping[int, Point2]]]
 """Labelled frames in order: the tick, and each vehicle's position by id; ego frame, metres."""
 
 
 @dataclass(frozen=True)
 class Velocities:
-    """mps: by tick and id, relative to ego in the turning ego frame, of those that neighbouring frames show. jumps:
-    tick and id of implausible moves."""
+    """What neighbouring frames say of motion."""
 
     mps: Mapping[int, Mapping[int, Point2]]
+    """By tick and id, relative to ego in the turning ego frame."""
     jumps: frozenset[tuple[int, int]]
+    """Tick and id of implausible moves."""
 
 
-def velocities(sightings: Sightings) -> Velocities:
+def velocities(sightings: TickPositions) -> Velocities:
     """One-sided where a vehicle appears or disappears; none across a gap."""
     rows = [(key, n, t_ns, *place) for n, (t_ns, places) in enumerate(sightings) for key, place in places.items()]
     rows.sort(key=lambda row: row[:2])

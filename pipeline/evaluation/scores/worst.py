@@ -14,16 +14,24 @@ _WEIGHT: dict[Verdict, int] = {"none": 0, "correct": 0, "missed": 1, "wrong": 2,
 
 @dataclass(frozen=True)
 class Bad:
-    """One frame. before: the other run's verdict, where two runs are compared. Metres; None where not available."""
+    """One frame. Metres; None where not available."""
 
     uri: str
+    """Of its recording."""
     index: int
+    """In the recording."""
     name: str
+    """The recording's own name of it."""
     verdict: Verdict
+    """On the CIPV."""
     truth_m: float | None
+    """Distance of the labelled lead."""
     distance_m: float | None
+    """Distance of the CIPV."""
     error_m: float | None
+    """Of the distance."""
     before: str = ""
+    """The other run's verdict, where two runs are compared; else empty."""
 
 
 def worst(drives: Sequence[DriveScore], most: int) -> list[Bad]:

@@ -14,14 +14,14 @@ import numpy as np
 
 from pipeline.common.fast_replace import evolve
 from pipeline.decision.path_position import near_face_middle
-from pipeline.experiments.true_lead import InSight, Way, same_place, true_lead
+from pipeline.experiments.true_lead import InSight, ScriptedWay, same_place, true_lead
 from pipeline.params import Params, with_changes
 from pipeline.path.corridor import nearest_on_path
 from pipeline.run import only
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import truth_boxes
 from pipeline.simulation.sensors.detection_model import BoxNoise, LineNoise
-from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.sensors.rig import SensorRig
 from pipeline.simulation.sensors.truth_lanes import lane_points
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.world_state import ActorState, World
@@ -52,27 +52,32 @@ LOOK_AHEAD_M = (10, 30, 60, 100)
 _TRUE_WAY_M = 130.0
 _BEYOND = 1.3
 
-Verdict = Literal["right", "missed", "decoy", "none", "false", "undecided"]
+CurveVerdict = Literal["right", "missed", "decoy", "none", "false", "undecided"]
 
 
 @dataclass(frozen=True)
-class Frames:
-    """One drive with one set of sources, one entry per frame: verdict, range of the true lead (None without one),
-    whether the car that cuts in is recognised, and (N, 4) the path's errors at 10, 30, 60, 100 m (NaN where the true
-    path ends) with its sigmas there."""
+class SourceFrames:
+    """One drive with one set of sources, one entry per frame. (N, 4): the path's errors at 10, 30, 60, 100 m."""
 
     t_s: tuple[float, ...]
-    verdicts: tuple[Verdict, ...]
+    """Since the scenario's start."""
+    verdicts: tuple[CurveVerdict, ...]
+    """On the CIPV."""
     lead_m: tuple[float | None, ...]
+    """Range of the true lead; None without one."""
     told: tuple[bool, ...]
+    """Whether the car that cuts in is recognised."""
     errors_m: tuple[tuple[float, ...], ...]
+    """(N, 4) lateral; NaN where the true path ends."""
     sigmas_m: tuple[tuple[float, ...], ...]
+    """(N, 4) the path's own at the same places."""
     over_line_s: float | None = None
+    """When the car that cuts in crosses the line; None where none does."""
 
 
 def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[World, Frame]]:
     """Each tick of a scripted drive, with given detections. lines None: the road has no lane lines."""
-    sensors = Sensors(scene, scene.ego.start_m + scene.ego.travelled_m(scene.duration_s))
+    sensors = SensorRig(scene, scene.ego.start_m + scene.ego.travelled_m(scene.duration_s))
     for index in range(scene.frame_count()):
         now = world_state.at(scene, index / scene.rate_hz)
         frame = sensors.frame(now, index, round(now.t_s * 1e9), picture=False)
@@ -83,17 +88,23 @@ def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[Wor
 
 
 @dataclass(frozen=True)
-class Moment:
-    """A frame and its truth. lead: the first vehicle in the lane within reach, None without one; doubtful: not
-    decidable. beyond: the first one within a third more than the reach."""
+class CurveFrame:
+    """A frame and its truth."""
 
     now: World
+    """The world that the frame shows."""
     frame: Frame
+    """As the pipeline is given it."""
     true_path: Path | None
+    """None where the road ends."""
     lead: ActorState | None
+    """The first vehicle in the lane within reach; None without one."""
     is_doubtful: bool
+    """Whether it cannot be decided who leads."""
     is_confirmable: bool
+    """Whether the lead has been visible for long enough to be confirmed."""
     beyond: ActorState | None
+    """The first vehicle within a third more than the reach."""
 
     @property
     def lead_m(self) -> float | None:
@@ -103,9 +114,9 @@ class Moment:
         return float(np.hypot(*self.lead.cuboid.center[:2]) - self.lead.cuboid.size[0] / 2)
 
 
-def moments(scene: Scenario, frames: Iterable[tuple[World, Frame]], reach_m: float) -> Iterator[Moment]:
+def moments(scene: Scenario, frames: Iterable[tuple[World, Frame]], reach_m: float) -> Iterator[CurveFrame]:
     """The truth of each frame of a drive. reach_m: leads beyond this do not count."""
-    way, in_sight = Way.of(scene), InSight()
+    way, in_sight = ScriptedWay.of(scene), InSight()
     for now, frame in frames:
         assert frame.camera is not None
         in_sight = in_sight.then(now, frame.camera)
@@ -114,7 +125,7 @@ def moments(scene: Scenario, frames: Iterable[tuple[World, Frame]], reach_m: flo
         beyond, _ = true_lead(now, path, _BEYOND * reach_m)
         hidden = lead is not None and in_sight.is_hidden(lead.actor.id)
         confirmable = lead is not None and in_sight.is_confirmable(lead.actor.id)
-        yield Moment(now, frame, path, lead, at_the_edge or hidden, confirmable, beyond)
+        yield CurveFrame(now, frame, path, lead, at_the_edge or hidden, confirmable, beyond)
 
 
 def driven(
@@ -124,13 +135,13 @@ def driven(
     over_line_s: float | None = None,
     settings: Mapping[str, Mapping[str, bool]] = SOURCES,
     lines: LineNoise | None = LINES,
-) -> dict[str, Frames]:
+) -> dict[str, SourceFrames]:
     """Every frame once through the sensors, and once through the pipeline for each named one of the settings.
     over_line_s: when a wheel of vehicle 2 crosses the lane line, if it cuts in. lines None: the road has no paint."""
     warm_up()
     chosen = {name: with_changes(Params(), settings[name]) for name in names}
     states = dict.fromkeys(names, State())
-    rows: dict[str, list[tuple[Moment, Result]]] = {name: [] for name in names}
+    rows: dict[str, list[tuple[CurveFrame, Result]]] = {name: [] for name in names}
     for moment in moments(scene, seen(scene, lines), reach_m):
         for name, params in chosen.items():
             given = only(moment.frame, "lidar") if name == LIDAR_ALONE else moment.frame
@@ -139,8 +150,8 @@ def driven(
     return {name: _frames(each, over_line_s) for name, each in rows.items()}
 
 
-def _frames(rows: Sequence[tuple[Moment, Result]], over_line_s: float | None) -> Frames:
-    return Frames(
+def _frames(rows: Sequence[tuple[CurveFrame, Result]], over_line_s: float | None) -> SourceFrames:
+    return SourceFrames(
         tuple(moment.now.t_s for moment, _ in rows),
         tuple(judge(moment, result) for moment, result in rows),
         tuple(moment.lead_m for moment, _ in rows),
@@ -151,7 +162,7 @@ def _frames(rows: Sequence[tuple[Moment, Result]], over_line_s: float | None) ->
     )
 
 
-def judge(moment: Moment, result: Result) -> Verdict:
+def judge(moment: CurveFrame, result: Result) -> CurveVerdict:
     """The frame's CIPV against the vehicle that really is the first in the lane."""
     chosen = result.chosen()
     place = near_face_middle(chosen.bev) if chosen is not None and chosen.bev is not None else None

@@ -16,9 +16,9 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.evaluation.report_sections import Cell, Chart, Scene, Section, Series, Table
+from pipeline.evaluation.report_sections import Cell, Chart, ReportSection, Scene, Series, Table
 from pipeline.experiments.curves import scenarios
-from pipeline.experiments.curves.drives import BOXES, LIDAR_ALONE, LINES, SOURCES, Frames, driven
+from pipeline.experiments.curves.drives import BOXES, LIDAR_ALONE, LINES, SOURCES, SourceFrames, driven
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.params import CipvParams, Params
 from pipeline.simulation.scenario import Scenario
@@ -29,14 +29,17 @@ LONGEST_WRONG_S = 0.3
 
 @dataclass(frozen=True)
 class CurveCase:
-    """kind: follow, or a car that cuts in."""
+    """One drive through a layout."""
 
     kind: Literal["follow", "cut_in"]
+    """Behind a lead, or with a car that cuts in."""
     layout: str
+    """Name of the road."""
     seed: int
+    """Of noise and traffic."""
 
 
-Outcome = dict[str, Frames]
+CurveOutcome = dict[str, SourceFrames]
 
 
 def cases(short: bool) -> list[CurveCase]:
@@ -46,7 +49,7 @@ def cases(short: bool) -> list[CurveCase]:
     return [*follow, *(CurveCase("cut_in", name, seed) for name in scenarios.LAYOUTS for seed in range(2))]
 
 
-def run(case: CurveCase) -> Outcome:
+def run(case: CurveCase) -> CurveOutcome:
     layout = scenarios.LAYOUTS[case.layout]
     scene, over_line_s = _scenario(case)
     names = ("fused",) if case.kind == "cut_in" else tuple(SOURCES)
@@ -61,7 +64,7 @@ def _scenario(case: CurveCase) -> tuple[Scenario, float | None]:
     )
 
 
-def as_drive(case: CurveCase, outcome: Outcome) -> ExperimentDrive:
+def as_drive(case: CurveCase, outcome: CurveOutcome) -> ExperimentDrive:
     """The drive with all path sources fused."""
     fused = outcome["fused"]
     share, frames = share_right([fused])
@@ -78,7 +81,7 @@ def as_drive(case: CurveCase, outcome: Outcome) -> ExperimentDrive:
     )
 
 
-def _lead_chart(drive: Frames) -> Chart:
+def _lead_chart(drive: SourceFrames) -> Chart:
     """The true lead's range, by whether it was chosen."""
     shown = {"right": ("right",), "not": ("missed", "decoy"), "not decidable": ("undecided",)}
     series = (
@@ -95,7 +98,7 @@ def _lead_chart(drive: Frames) -> Chart:
     return Chart("Range of the true lead", "time s", "range m", tuple(series))
 
 
-def share_right(drives: Sequence[Frames], reach_m: float = np.inf) -> tuple[float, int]:
+def share_right(drives: Sequence[SourceFrames], reach_m: float = np.inf) -> tuple[float, int]:
     """Share of the decidable frames whose lead is nearer than ``reach_m`` that are right, and how many there are. A
     frame without a lead is right when none is chosen."""
     judged = [
@@ -107,7 +110,7 @@ def share_right(drives: Sequence[Frames], reach_m: float = np.inf) -> tuple[floa
     return sum(verdict in ("right", "none") for verdict in judged) / max(len(judged), 1), len(judged)
 
 
-def longest_wrong_s(drive: Frames) -> float:
+def longest_wrong_s(drive: SourceFrames) -> float:
     """The longest uninterrupted time for which a decoy was the CIPV."""
     longest, since = 0.0, None
     step_s = drive.t_s[1] - drive.t_s[0]
@@ -120,7 +123,7 @@ def longest_wrong_s(drive: Frames) -> float:
     return longest
 
 
-def told_before_line_s(drive: Frames) -> float | None:
+def told_before_line_s(drive: SourceFrames) -> float | None:
     """How many seconds before its wheel crossed the lane line the car that cuts in was recognised for good; negative:
     after it. None: never."""
     assert drive.over_line_s is not None
@@ -130,10 +133,10 @@ def told_before_line_s(drive: Frames) -> float | None:
     return drive.over_line_s - drive.t_s[since]
 
 
-def report(cases: Sequence[CurveCase], outcomes: Sequence[Outcome]) -> Section:
+def report(cases: Sequence[CurveCase], outcomes: Sequence[CurveOutcome]) -> ReportSection:
     follows = _by_layout("follow", cases, outcomes)
     cut_ins = _by_layout("cut_in", cases, outcomes)
-    return Section(
+    return ReportSection(
         "curves",
         "Curves: the CIPV at up to 3 m/s² lateral, by path source",
         (
@@ -171,9 +174,9 @@ _PATH_COLUMNS = ("road", "sources", "10 m", "30 m", "60 m", "100 m", "error/σ a
 
 
 def _by_layout(
-    kind: str, cases: Sequence[CurveCase], outcomes: Sequence[Outcome]
-) -> dict[str, dict[str, list[Frames]]]:
-    found: dict[str, dict[str, list[Frames]]] = {}
+    kind: str, cases: Sequence[CurveCase], outcomes: Sequence[CurveOutcome]
+) -> dict[str, dict[str, list[SourceFrames]]]:
+    found: dict[str, dict[str, list[SourceFrames]]] = {}
     for case, outcome in zip(cases, outcomes, strict=True):
         if case.kind == kind:
             for name, frames in outcome.items():
@@ -181,7 +184,7 @@ def _by_layout(
     return found
 
 
-def _choice_rows(follows: dict[str, dict[str, list[Frames]]]) -> Iterator[tuple[Cell, ...]]:
+def _choice_rows(follows: dict[str, dict[str, list[SourceFrames]]]) -> Iterator[tuple[Cell, ...]]:
     for layout, by_source in follows.items():
         for name, drives in by_source.items():
             near, far = share_right(drives, 60.0), share_right(drives)
@@ -197,7 +200,7 @@ def _choice_rows(follows: dict[str, dict[str, list[Frames]]]) -> Iterator[tuple[
             )
 
 
-def _path_rows(follows: dict[str, dict[str, list[Frames]]]) -> Iterator[tuple[Cell, ...]]:
+def _path_rows(follows: dict[str, dict[str, list[SourceFrames]]]) -> Iterator[tuple[Cell, ...]]:
     """Mean absolute errors, and the root mean square of error over sigma: 1 means that sigma is correct."""
     for layout, by_source in follows.items():
         for name, drives in by_source.items():
@@ -213,7 +216,7 @@ def _path_rows(follows: dict[str, dict[str, list[Frames]]]) -> Iterator[tuple[Ce
             )
 
 
-def _cut_in_rows(cut_ins: dict[str, dict[str, list[Frames]]]) -> Iterator[tuple[Cell, ...]]:
+def _cut_in_rows(cut_ins: dict[str, dict[str, list[SourceFrames]]]) -> Iterator[tuple[Cell, ...]]:
     for layout, by_source in cut_ins.items():
         before = [told_before_line_s(drive) for drive in by_source["fused"]]
         known = [value for value in before if value is not None]
@@ -221,7 +224,7 @@ def _cut_in_rows(cut_ins: dict[str, dict[str, list[Frames]]]) -> Iterator[tuple[
         yield scenarios.LAYOUTS[layout].title, len(before), least, sum(known) / len(known) if known else None
 
 
-def _told_too_late(cut_ins: dict[str, dict[str, list[Frames]]]) -> Iterator[str]:
+def _told_too_late(cut_ins: dict[str, dict[str, list[SourceFrames]]]) -> Iterator[str]:
     """A cut-in must be recognised at the latest when the wheel crosses the line."""
     for layout, by_source in cut_ins.items():
         before = [told_before_line_s(drive) for drive in by_source["fused"]]
@@ -231,14 +234,14 @@ def _told_too_late(cut_ins: dict[str, dict[str, list[Frames]]]) -> Iterator[str]
             yield f"{title}: {late} of {len(before)} cut-ins recognised after the wheel crossed the line."
 
 
-def _held(layout: str, fused: list[Frames]) -> bool:
+def _held(layout: str, fused: list[SourceFrames]) -> bool:
     """Right in 99 % of the frames up to 60 m, in the required share up to the reach, and no decoy for long."""
     near, far = share_right(fused, 60.0)[0], share_right(fused)[0]
     wrong_s = max(longest_wrong_s(drive) for drive in fused)
     return near >= 0.99 and far >= scenarios.LAYOUTS[layout].wanted and wrong_s <= LONGEST_WRONG_S + 1e-9
 
 
-def _verdict(layout: str, by_source: dict[str, list[Frames]]) -> str:
+def _verdict(layout: str, by_source: dict[str, list[SourceFrames]]) -> str:
     kind, drives = scenarios.LAYOUTS[layout], by_source["fused"]
     near, far = share_right(drives, 60.0)[0], share_right(drives)[0]
     wrong_s = max(longest_wrong_s(drive) for drive in drives)

@@ -21,17 +21,23 @@ Shape = Literal["straight", "bend", "s_curve"]
 
 
 @dataclass(frozen=True)
-class Layout:
-    """A road and a speed on it; radius_m of its bends, None when straight. reach_m: how far ahead the choice is scored.
-    wanted: the required share of correct frames."""
+class CurveLayout:
+    """A road and a speed on it."""
 
     name: str
+    """For cases and files."""
     title: str
+    """For people."""
     shape: Shape
+    """Straight, bend or S-curve."""
     radius_m: float | None
+    """Of its bends; None when straight."""
     speed_kmh: float
+    """Of the ego car."""
     reach_m: float
+    """How far ahead the choice is scored."""
     wanted: float
+    """Required share of correct frames."""
 
     @property
     def speed_mps(self) -> float:
@@ -41,17 +47,17 @@ class Layout:
 LAYOUTS = {
     layout.name: layout
     for layout in (
-        Layout("straight", "straight, 100 km/h", "straight", None, 100.0, 100.0, 0.95),
-        Layout("r125", "R = 125 m, 70 km/h", "bend", 125.0, 70.0, 60.0, 0.99),
-        Layout("r250", "R = 250 m, 99 km/h", "bend", 250.0, 99.0, 60.0, 0.99),
-        Layout("r500", "R = 500 m, 139 km/h", "bend", 500.0, 139.0, 100.0, 0.95),
-        Layout("s125", "S-curve, R = 125 m, 70 km/h", "s_curve", 125.0, 70.0, 60.0, 0.99),
-        Layout("s500", "S-curve, R = 500 m, 139 km/h", "s_curve", 500.0, 139.0, 100.0, 0.95),
+        CurveLayout("straight", "straight, 100 km/h", "straight", None, 100.0, 100.0, 0.95),
+        CurveLayout("r125", "R = 125 m, 70 km/h", "bend", 125.0, 70.0, 60.0, 0.99),
+        CurveLayout("r250", "R = 250 m, 99 km/h", "bend", 250.0, 99.0, 60.0, 0.99),
+        CurveLayout("r500", "R = 500 m, 139 km/h", "bend", 500.0, 139.0, 100.0, 0.95),
+        CurveLayout("s125", "S-curve, R = 125 m, 70 km/h", "s_curve", 125.0, 70.0, 60.0, 0.99),
+        CurveLayout("s500", "S-curve, R = 500 m, 139 km/h", "s_curve", 500.0, 139.0, 100.0, 0.95),
     )
 }
 
 
-def scenario(layout: Layout, seed: int) -> Scenario:
+def scenario(layout: CurveLayout, seed: int) -> Scenario:
     """Even seeds bend to the left first, odd ones to the right. The lead drives away from 20 m to the scored reach; two
     cars drive in either lane beside, at 20–100 m, a little faster or slower than the ego car."""
     rng = np.random.default_rng([seed, list(LAYOUTS).index(layout.name)])
@@ -65,7 +71,7 @@ def scenario(layout: Layout, seed: int) -> Scenario:
     return _scene(layout, seed, [car(1, LANE, 20.0, {0.0: speed + gain}), *decoys])
 
 
-def cut_in(layout: Layout, seed: int) -> tuple[Scenario, float]:
+def cut_in(layout: CurveLayout, seed: int) -> tuple[Scenario, float]:
     """The same road with a lead at 60 m and a car that cuts in before it from the next lane within 3 s; and the time at
     which its nearer wheel crosses the lane line."""
     side = 1 if seed % 2 else -1
@@ -81,7 +87,7 @@ def cut_in(layout: Layout, seed: int) -> tuple[Scenario, float]:
     return scene, start_s + takes_s * float(over)
 
 
-def _scene(layout: Layout, seed: int, actors: list[dict[str, Any]]) -> Scenario:
+def _scene(layout: CurveLayout, seed: int, actors: list[dict[str, Any]]) -> Scenario:
     return Scenario.model_validate(
         {
             "title": layout.title,
@@ -99,7 +105,7 @@ def _scene(layout: Layout, seed: int, actors: list[dict[str, Any]]) -> Scenario:
     )
 
 
-def _segments(layout: Layout, side: float) -> list[dict[str, float]]:
+def _segments(layout: CurveLayout, side: float) -> list[dict[str, float]]:
     """The length of a transition follows from the usual lateral jerk, v³/(R·j)."""
     if layout.radius_m is None:
         return [{"length_m": 5000.0}]

@@ -14,7 +14,7 @@ from pipeline.simulation.closed_loop import Setup
 from pipeline.simulation.drive_as_scenario import as_driven
 from pipeline.simulation.scenario import Scenario
 
-Test = Literal["CCRs", "CCRm", "CCRb"]
+NcapTest = Literal["CCRs", "CCRm", "CCRb"]
 OVERLAPS = (-50, -75, 100, 75, 50)
 """Share of the ego car's width that meets the target, %. Negative: the target stands to the ego car's left."""
 EGO_WIDTH_M = 1.82
@@ -32,7 +32,7 @@ SETUPS: tuple[SensorSetup, ...] = (
     ("both", "ACC + AEB", "truth"),
 )
 NETWORK: SensorSetup = ("both", "AEB", "network")
-NETWORK_SAMPLE: tuple[tuple[Test, float, int], ...] = (
+NETWORK_SAMPLE: tuple[tuple[NcapTest, float, int], ...] = (
     *(("CCRs", speed, 100) for speed in (20.0, 40.0, 60.0, 80.0)),
     *(("CCRs", 40.0, overlap) for overlap in (-50, 50)),
     *(("CCRm", speed, 100) for speed in (40.0, 60.0, 80.0)),
@@ -48,17 +48,24 @@ def kind_said(kind: SensorSetup) -> str:
 
 @dataclass(frozen=True)
 class EuroNcapCase:
-    """speed_kmh: of the ego car. overlap: %. gap_m, decel_mps2: CCRb only. boxes: where the camera's boxes come
-    from."""
+    """One cell of the grid, driven once."""
 
-    test: Test
+    test: NcapTest
+    """Standing, moving or braking target."""
     speed_kmh: float
+    """Of the ego car."""
     overlap: int
+    """Share of the ego car's width that meets the target, %; negative: the target stands to the ego car's left."""
     sensors: Sensors
+    """Those that the pipeline is given."""
     controller: str
+    """``ACC`` or ``ACC + AEB``."""
     gap_m: float = 0.0
+    """CCRb only: at the start of braking."""
     decel_mps2: float = 0.0
+    """CCRb only: of the target."""
     boxes: Boxes = "truth"
+    """Where the camera's boxes come from."""
 
     @property
     def kind(self) -> SensorSetup:
@@ -82,12 +89,15 @@ class EuroNcapCase:
 
 
 @dataclass(frozen=True)
-class Result:
-    """impact_kmh: relative, 0 when avoided. void: why the run is not valid; empty when it is."""
+class CellResult:
+    """What a cell came to."""
 
     impact_kmh: float
+    """Relative; 0 when avoided."""
     void: str
+    """Why the run is not valid; empty when it is."""
     drive: DriveRecord | None = field(default=None, compare=False)
+    """The run itself; None when only its figures were kept."""
 
 
 def cases(short: bool) -> list[EuroNcapCase]:
@@ -95,7 +105,7 @@ def cases(short: bool) -> list[EuroNcapCase]:
     overlaps = (-50, 100) if short else OVERLAPS
     found = []
     for sensors, controller, _ in SETUPS[:2] if short else SETUPS:
-        grid: list[tuple[Test, float, int]] = [
+        grid: list[tuple[NcapTest, float, int]] = [
             (test, float(speed), overlap) for test in ("CCRs", "CCRm") for speed in speeds[test] for overlap in overlaps
         ]
         found += [EuroNcapCase(test, speed, overlap, sensors, controller) for test, speed, overlap in grid]
@@ -112,10 +122,10 @@ def cases(short: bool) -> list[EuroNcapCase]:
     return [*found, *sample, EuroNcapCase("CCRb", BRAKED_KMH, 100, sensors, controller, 40.0, 6.0, boxes)]
 
 
-def run(case: EuroNcapCase) -> Result:
+def run(case: EuroNcapCase) -> CellResult:
     """One approach, driven."""
     drive = approach(scenario(case), Setup(_params(case), case.sensors, eyes_for(case.boxes)))
-    return Result((drive.impact_mps or 0.0) / KMH, _void(case, drive), drive)
+    return CellResult((drive.impact_mps or 0.0) / KMH, _void(case, drive), drive)
 
 
 def _params(case: EuroNcapCase) -> Params:
@@ -140,7 +150,7 @@ def scenario(case: EuroNcapCase) -> Scenario:
     return scene({0.0: speed}, target, RUN_UP_S + 14.0, seed=0)
 
 
-def as_drive(case: EuroNcapCase, result: Result) -> ExperimentDrive:
+def as_drive(case: EuroNcapCase, result: CellResult) -> ExperimentDrive:
     """The drive of one cell."""
     assert result.drive is not None
     ended = f"Impact at {result.impact_kmh:.0f} km/h." if result.impact_kmh else "The impact was avoided."

@@ -10,15 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pipeline.evaluation.report_sections import Cell, Coloured, Scene, Section, Table, Tone
+from pipeline.evaluation.report_sections import Cell, Coloured, ReportSection, Scene, Table, Tone
 from pipeline.experiments.euro_ncap.drives import (
     OVERLAPS,
     RUN_UP_S,
     START_TTC_S,
+    CellResult,
     EuroNcapCase,
-    Result,
+    NcapTest,
     SensorSetup,
-    Test,
     as_drive,
     cases,
     kind_said,
@@ -31,7 +31,7 @@ from pipeline.experiments.perception import SENSORS
 from pipeline.experiments.straight_track import KMH
 
 
-def report(cases: Sequence[EuroNcapCase], results: Sequence[Result]) -> Section:
+def report(cases: Sequence[EuroNcapCase], results: Sequence[CellResult]) -> ReportSection:
     done = dict(zip(cases, results, strict=True))
     kinds = list(dict.fromkeys(case.kind for case in cases))
     tables = [_summary(kinds, done), _r152(done)]
@@ -39,7 +39,7 @@ def report(cases: Sequence[EuroNcapCase], results: Sequence[Result]) -> Section:
         mine = {case: result for case, result in done.items() if case.kind == kind}
         tables += [_grid(test, kind_said(kind), mine) for test in ("CCRs", "CCRm")]
         tables.append(_braked(kind_said(kind), mine))
-    return Section(
+    return ReportSection(
         "ncap",
         "Euro NCAP car-to-car rear grid",
         (
@@ -59,7 +59,7 @@ def report(cases: Sequence[EuroNcapCase], results: Sequence[Result]) -> Section:
     )
 
 
-def _summary(kinds: list[SensorSetup], done: dict[EuroNcapCase, Result]) -> Table:
+def _summary(kinds: list[SensorSetup], done: dict[EuroNcapCase, CellResult]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for kind in kinds:
         for test in ("CCRs", "CCRm", "CCRb"):
@@ -71,10 +71,10 @@ def _summary(kinds: list[SensorSetup], done: dict[EuroNcapCase, Result]) -> Tabl
             worst = max((result.impact_kmh for result in valid), default=None)
             rows.append((SENSORS[kind[0]], kind[1], kind[2], test, len(valid), avoided, mean, worst))
     columns = ("sensors", "controller", "boxes", "test", "valid runs", "avoided", "mean impact km/h", "worst km/h")
-    return Table("What each gives", columns, tuple(rows), decimals=1)
+    return Table("Contribution of each sensor", columns, tuple(rows), decimals=1)
 
 
-def _grid(test: Test, name: str, done: dict[EuroNcapCase, Result]) -> Table:
+def _grid(test: NcapTest, name: str, done: dict[EuroNcapCase, CellResult]) -> Table:
     mine = {(case.speed_kmh, case.overlap): (case, result) for case, result in done.items() if case.test == test}
     overlaps = [overlap for overlap in OVERLAPS if any(key[1] == overlap for key in mine)]
     rows = tuple(
@@ -84,7 +84,7 @@ def _grid(test: Test, name: str, done: dict[EuroNcapCase, Result]) -> Table:
     return Table(f"{test}: {name}", ("speed", *(f"{overlap} %" for overlap in overlaps)), rows, decimals=0)
 
 
-def _braked(name: str, done: dict[EuroNcapCase, Result]) -> Table:
+def _braked(name: str, done: dict[EuroNcapCase, CellResult]) -> Table:
     mine = {(case.decel_mps2, case.gap_m): (case, result) for case, result in done.items() if case.test == "CCRb"}
     gaps = sorted({gap for _, gap in mine})
     rows = tuple(
@@ -94,7 +94,7 @@ def _braked(name: str, done: dict[EuroNcapCase, Result]) -> Table:
     return Table(f"CCRb at 50 km/h: {name}", ("lead brakes", *(f"{gap:.0f} m" for gap in gaps)), rows, decimals=0)
 
 
-def _cell(found: tuple[EuroNcapCase, Result] | None) -> Cell | Coloured:
+def _cell(found: tuple[EuroNcapCase, CellResult] | None) -> Cell | Coloured:
     if found is None:
         return None
     case, result = found
@@ -102,7 +102,7 @@ def _cell(found: tuple[EuroNcapCase, Result] | None) -> Cell | Coloured:
     return Coloured(result.void or result.impact_kmh, tone, case.name)
 
 
-def _r152(done: dict[EuroNcapCase, Result]) -> Table:
+def _r152(done: dict[EuroNcapCase, CellResult]) -> Table:
     """Standing and moving targets, full overlap, AEB alone, against the Regulation's limits."""
     rows: list[tuple[Cell | Coloured, ...]] = []
     for test in ("CCRs", "CCRm"):
@@ -123,11 +123,11 @@ def _r152(done: dict[EuroNcapCase, Result]) -> Table:
     return Table("UN R152: largest relative impact speed", columns, tuple(rows), caption, 0)
 
 
-def _passes(case: EuroNcapCase, result: Result, limit_kmh: float) -> Coloured:
+def _passes(case: EuroNcapCase, result: CellResult, limit_kmh: float) -> Coloured:
     return Coloured(result.impact_kmh, "green" if result.impact_kmh <= limit_kmh else "red", case.name)
 
 
-def _verdict(done: dict[EuroNcapCase, Result]) -> str:
+def _verdict(done: dict[EuroNcapCase, CellResult]) -> str:
     """AEB alone: in how many cells the impact is slower with both sensors than with the LiDAR alone, and in how many
     faster."""
     pairs = [

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from pipeline.evaluation.report_sections import AnyCell, Chart, Coloured, Scene, Section, Series, Table
+from pipeline.evaluation.report_sections import AnyCell, Chart, Coloured, ReportSection, Scene, Series, Table
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
-from pipeline.experiments.iso15622.scenarios import BEND_FROM_M, CURVE_LATERAL_MPS2, RADII_M, Test, scenario
+from pipeline.experiments.iso15622.scenarios import BEND_FROM_M, CURVE_LATERAL_MPS2, RADII_M, IsoTest, scenario
 from pipeline.experiments.perception import COMPARED, GIVEN_SAID, SENSORS
 from pipeline.experiments.straight_track import gap_m, measured_m, parameters, target_of, true_range_m
 from pipeline.params import Params
@@ -22,7 +22,7 @@ from pipeline.simulation.drive_as_scenario import as_driven
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.world.actors import Motion
 
-Key = tuple[Test, float, Sensors]
+FollowingKey = tuple[IsoTest, float, Sensors]
 ACC_BRAKE_MPS2 = 3.5
 SMALLEST_TIME_GAP_S = 0.8
 _MOVING_MPS = 5.0
@@ -31,12 +31,16 @@ _KEPT = 0.95
 
 @dataclass(frozen=True)
 class FollowingCase:
-    """value: radius, m (curve), or speed, km/h (all others)."""
+    """One drive of one test."""
 
-    test: Test
+    test: IsoTest
+    """Which of the standard's situations."""
     value: float
+    """Radius in metres (curve), or speed in km/h (all others)."""
     sensors: Sensors
+    """That the pipeline is given."""
     seed: int
+    """Of noise and scenery."""
 
     @property
     def at(self) -> str:
@@ -49,24 +53,31 @@ class FollowingCase:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """acquired_m: range when the lead first was the CIPV, None if never. kept: share of the frames from then on in
-    which it still was. smallest_gap_m: range to the lead. smallest_time_gap_s: gap over ego speed while driving; None
-    when it never drove. touched: there was contact. t_s, range_m, speed_mps, motions of the ego vehicle: each tick."""
+class FollowingOutcome:
+    """What one drive came to. Tuples have a value for each tick."""
 
     acquired_m: float | None
+    """Range when the lead first was the CIPV; None if never."""
     kept: float
+    """Share of the frames from then on in which it still was."""
     smallest_gap_m: float
+    """Range to the lead."""
     smallest_time_gap_s: float | None
+    """Gap over ego speed while driving; None when it never drove."""
     touched: bool
+    """Whether there was contact."""
     t_s: tuple[float, ...]
+    """Since the scenario's start."""
     range_m: tuple[float, ...]
+    """To the lead."""
     speed_mps: tuple[float, ...]
+    """Of the ego vehicle."""
     motions: tuple[Motion, ...] = ()
+    """Of the ego vehicle."""
 
 
 def cases(short: bool) -> list[FollowingCase]:
-    plan: dict[Test, tuple[float, ...]] = (
+    plan: dict[IsoTest, tuple[float, ...]] = (
         {"stop": (50.0,)}
         if short
         else {
@@ -87,7 +98,7 @@ def cases(short: bool) -> list[FollowingCase]:
     ]
 
 
-def run(case: FollowingCase) -> Outcome:
+def run(case: FollowingCase) -> FollowingOutcome:
     driven = _scenario(case)
     rows: list[_Row] = []
     touched = False
@@ -111,7 +122,7 @@ def _params(driven: Scenario) -> Params:
     return parameters("ACC", speed, {"acc.brake_limit_mps2": ACC_BRAKE_MPS2})
 
 
-def as_drive(case: FollowingCase, outcome: Outcome) -> ExperimentDrive:
+def as_drive(case: FollowingCase, outcome: FollowingOutcome) -> ExperimentDrive:
     """The drive of one run."""
     driven = _scenario(case)
     title = f"{case.test.capitalize()}, {case.at}: {SENSORS[case.sensors]}, run {case.seed}"
@@ -146,11 +157,11 @@ class _Row(NamedTuple):
     motion: Motion
 
 
-def _outcome(rows: list[_Row], touched: bool) -> Outcome:
+def _outcome(rows: list[_Row], touched: bool) -> FollowingOutcome:
     first = next((n for n, row in enumerate(rows) if row.seen), None)
     after = [row for row in rows[first:] if row.counted] if first is not None else []
     time_gaps = [row.range_m / row.speed_mps for row in rows if row.speed_mps > _MOVING_MPS]
-    return Outcome(
+    return FollowingOutcome(
         acquired_m=rows[first].range_m if first is not None else None,
         kept=sum(row.seen for row in after) / len(after) if after else 0.0,
         smallest_gap_m=0.0 if touched else min(row.range_m for row in rows),
@@ -163,13 +174,13 @@ def _outcome(rows: list[_Row], touched: bool) -> Outcome:
     )
 
 
-def report(cases: Sequence[FollowingCase], outcomes: Sequence[Outcome]) -> Section:
-    driven: dict[Key, dict[FollowingCase, Outcome]] = {}
+def report(cases: Sequence[FollowingCase], outcomes: Sequence[FollowingOutcome]) -> ReportSection:
+    driven: dict[FollowingKey, dict[FollowingCase, FollowingOutcome]] = {}
     for case, outcome in zip(cases, outcomes, strict=True):
         driven.setdefault((case.test, case.value, case.sensors), {})[case] = outcome
     groups = {key: list(by_case.values()) for key, by_case in driven.items()}
     rows = tuple(_row(by_case) for by_case in driven.values())
-    return Section(
+    return ReportSection(
         "iso",
         "ACC, modelled on ISO 15622",
         (
@@ -204,7 +215,7 @@ _COLUMNS = (
 )
 
 
-def _row(by_case: dict[FollowingCase, Outcome]) -> tuple[AnyCell, ...]:
+def _row(by_case: dict[FollowingCase, FollowingOutcome]) -> tuple[AnyCell, ...]:
     """The runs of one test with one set of sensors; the last cell links to the first one that failed."""
     first, group = next(iter(by_case)), list(by_case.values())
     shown = next((case for case, each in by_case.items() if not passed(each)), first)
@@ -224,12 +235,12 @@ def _row(by_case: dict[FollowingCase, Outcome]) -> tuple[AnyCell, ...]:
     )
 
 
-def passed(outcome: Outcome) -> bool:
+def passed(outcome: FollowingOutcome) -> bool:
     gap = outcome.smallest_time_gap_s
     return not outcome.touched and outcome.kept >= _KEPT and (gap is None or gap >= SMALLEST_TIME_GAP_S)
 
 
-def _verdicts(groups: dict[Key, list[Outcome]]) -> list[str]:
+def _verdicts(groups: dict[FollowingKey, list[FollowingOutcome]]) -> list[str]:
     """For each test, how many runs pass with each set of sensors."""
     found = []
     for test in dict.fromkeys(key[0] for key in groups):
@@ -247,7 +258,7 @@ def _verdicts(groups: dict[Key, list[Outcome]]) -> list[str]:
     return found
 
 
-def _chart(test: Test, value: float, groups: dict[Key, list[Outcome]]) -> Chart:
+def _chart(test: IsoTest, value: float, groups: dict[FollowingKey, list[FollowingOutcome]]) -> Chart:
     name = f"R = {value:g} m" if test == "curve" else f"{value:g} km/h"
     lines = tuple(
         Series(SENSORS[sensors], groups[test, value, sensors][0].t_s, groups[test, value, sensors][0].range_m)

@@ -16,7 +16,7 @@ import numpy as np
 from pipeline.alignment.projection import Pinhole, project_cuboid
 from pipeline.common.geometry import iou_matrix
 from pipeline.decision.path_position import near_face_middle
-from pipeline.evaluation.report_sections import Cell, Chart, Section, Series, Table
+from pipeline.evaluation.report_sections import Cell, Chart, ReportSection, Series, Table
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.paper import layouts
 from pipeline.experiments.paper.layouts import LAYOUTS
@@ -44,12 +44,16 @@ PRINTED: dict[tuple[str, str], tuple[float, ...]] = {
 
 @dataclass(frozen=True)
 class BevCase:
-    """layout: a, b or c. boxes: where the camera's boxes come from."""
+    """One drive in one of the paper's layouts."""
 
     layout: str
+    """a, b or c."""
     seed: int
+    """Of noise and scenery."""
     sensors: Sensors = "both"
+    """That the pipeline is given."""
     boxes: Boxes = "truth"
+    """Where the camera's boxes come from."""
 
     @property
     def kind(self) -> BevVariant:
@@ -61,21 +65,27 @@ BevVariant = tuple[str, Sensors, Boxes]
 
 
 @dataclass(frozen=True)
-class Sighting:
-    """The target in one frame: its true range, and its estimated place; None when no object matches it."""
+class PositionSample:
+    """The target in one frame."""
 
     range_m: float
-    error: Error | None
+    """True."""
+    error: PositionError | None
+    """Of its estimated place; None when no object matches it."""
 
 
 @dataclass(frozen=True)
-class Error:
-    """source: the object's sensors. Estimated minus true range and position of the nearest face's middle, m."""
+class PositionError:
+    """Estimated minus true, of the nearest face's middle."""
 
     source: str
+    """The object's sensors."""
     distance_m: float
+    """Of the range."""
     lateral_m: float
+    """Across the ego axis."""
     longitudinal_m: float
+    """Along the ego axis."""
 
 
 def cases(short: bool) -> list[BevCase]:
@@ -84,12 +94,12 @@ def cases(short: bool) -> list[BevCase]:
     return given if short else given + [BevCase("a", seed, boxes="network") for seed in range(_BY_NETWORK)]
 
 
-def run(case: BevCase) -> list[Sighting]:
+def run(case: BevCase) -> list[PositionSample]:
     setup = Setup(_PARAMS, case.sensors, eyes_for(case.boxes), closed=False)
     return [seen for tick in drive(_scenario(case), setup) if (seen := sighting(tick)) is not None]
 
 
-def as_drive(case: BevCase, seen: list[Sighting]) -> ExperimentDrive:
+def as_drive(case: BevCase, seen: list[PositionSample]) -> ExperimentDrive:
     """The drive of one run."""
     errors = [each.error for each in seen if each.error is not None]
     who = f"{SENSORS[case.sensors]}{boxes_said(case.boxes)}"
@@ -110,7 +120,7 @@ def _scenario(case: BevCase) -> Scenario:
     return layouts.scenario(layouts.LayoutCase(case.layout, case.seed))
 
 
-def sighting(tick: LoopStep) -> Sighting | None:
+def sighting(tick: LoopStep) -> PositionSample | None:
     """The errors of the object that matches the target: the one whose image box overlaps the target's most, whatever
     its distance. Carried objects do not count. None beyond 60 m and beside the car."""
     target, camera = target_of(tick), tick.frame.camera
@@ -132,12 +142,12 @@ def sighting(tick: LoopStep) -> Sighting | None:
         overlap = float(iou_matrix(np.array([wanted]), np.array([box]))[0, 0]) if box is not None else 0.0
         if overlap > most:
             x, y = near_face_middle(item.bev)
-            best, most = Error(item.source, item.distance_m - truth_m, y - true_y, x - true_x), overlap
-    return Sighting(truth_m, best)
+            best, most = PositionError(item.source, item.distance_m - truth_m, y - true_y, x - true_x), overlap
+    return PositionSample(truth_m, best)
 
 
-def report(cases: Sequence[BevCase], runs: Sequence[list[Sighting]]) -> Section:
-    by_kind: dict[BevVariant, list[Sighting]] = {}
+def report(cases: Sequence[BevCase], runs: Sequence[list[PositionSample]]) -> ReportSection:
+    by_kind: dict[BevVariant, list[PositionSample]] = {}
     for case, run in zip(cases, runs, strict=True):
         by_kind.setdefault(case.kind, []).extend(run)
     rows: list[tuple[Cell, ...]] = []
@@ -149,7 +159,7 @@ def report(cases: Sequence[BevCase], runs: Sequence[list[Sighting]]) -> Section:
         if (layout, "both", "network") in by_kind:
             seen = by_kind[layout, "both", "network"]
             rows += [(title, source, "measured, network", *_figures(seen, source)) for source in ("VL", "V")]
-    return Section(
+    return ReportSection(
         "bev_error",
         "Position of fused objects (Table 4)",
         (
@@ -172,13 +182,13 @@ def report(cases: Sequence[BevCase], runs: Sequence[list[Sighting]]) -> Section:
     )
 
 
-def _verdict(layout: str, by_kind: dict[BevVariant, list[Sighting]]) -> str:
+def _verdict(layout: str, by_kind: dict[BevVariant, list[PositionSample]]) -> str:
     """Both sensors compared with the LiDAR alone in the same runs: how often each places the car, and the range error
     where both do."""
     title = LAYOUTS[layout].capitalize()
     fused, lidar = (by_kind.get((layout, sensors, "truth"), []) for sensors in ("both", "lidar"))
     if not fused or not lidar:
-        return f"{title}: not driven in both ways."
+        return f"{title}: not driven with both sensor sets."
     both = [
         (abs(ours.error.distance_m), abs(theirs.error.distance_m))
         for ours, theirs in zip(fused, lidar, strict=True)
@@ -202,7 +212,7 @@ def _better(more: float, less: float) -> str:
     return "better than" if more > _CLEARLY_MORE * less else "no better than"
 
 
-def _chart(title: str, seen: list[Sighting]) -> Chart:
+def _chart(title: str, seen: list[PositionSample]) -> Chart:
     series = []
     for source in ("VL", "V", "L"):
         found = [(each.range_m, each.error.distance_m) for each in seen if each.error and each.error.source == source]
@@ -221,7 +231,7 @@ _COLUMNS = (
 )
 
 
-def _figures(seen: list[Sighting], source: str) -> tuple[Cell, ...]:
+def _figures(seen: list[PositionSample], source: str) -> tuple[Cell, ...]:
     """Frames with an object of this source, frames without any object, and the errors."""
     errors = [each.error for each in seen if each.error is not None and each.error.source == source]
     figures: list[Cell] = [len(errors), sum(each.error is None for each in seen)]

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import mean
 
-from pipeline.evaluation.report_sections import AnyCell, Chart, Driven, Scene, Section, Series, Table
+from pipeline.evaluation.report_sections import AnyCell, Chart, Driven, ReportSection, Scene, Series, Table
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.paper.closed_forms import LEAD_DECEL_MPS2, PAPER, Manoeuvre, closed_forms
 from pipeline.experiments.perception import COMPARED, SENSORS, Boxes, boxes_said, detections_for, eyes_for
@@ -23,7 +23,7 @@ from pipeline.simulation.closed_loop import Setup
 from pipeline.simulation.drive_as_scenario import as_driven
 from pipeline.simulation.scenario import Scenario
 
-Key = tuple[Manoeuvre, Sensors, str, Boxes]
+BrakingKey = tuple[Manoeuvre, Sensors, str, Boxes]
 _LEAD_BRAKES_AT_S = 2.0
 _SHOWN_AT_S: dict[Manoeuvre, float] = {"CCRs": 3.0, "CCRm": 7.0, "CCRb": 3.0}
 _CLEAR_MPS, _CLEAR_M = 0.3, 0.3
@@ -32,14 +32,21 @@ _CLEAR_MPS, _CLEAR_M = 0.3, 0.3
 
 @dataclass(frozen=True)
 class BrakingCase:
+    """One manoeuvre, driven once."""
+
     manoeuvre: Manoeuvre
+    """Which of the paper's three."""
     sensors: Sensors
+    """That the pipeline is given."""
     controller: str
+    """``ACC`` or ``ACC + AEB``."""
     seed: int
+    """Of noise and scenery."""
     boxes: Boxes = "truth"
+    """Where the camera's boxes come from."""
 
     @property
-    def key(self) -> Key:
+    def key(self) -> BrakingKey:
         """What runs that differ only by their seed have in common."""
         return self.manoeuvre, self.sensors, self.controller, self.boxes
 
@@ -114,12 +121,12 @@ def _target(manoeuvre: Manoeuvre, speed_mps: float) -> tuple[dict[str, object], 
     }, 20.0
 
 
-def report(cases: Sequence[BrakingCase], drives: Sequence[DriveRecord]) -> Section:
+def report(cases: Sequence[BrakingCase], drives: Sequence[DriveRecord]) -> ReportSection:
     done = list(zip(cases, drives, strict=True))
     groups = dict.fromkeys(case.key for case in cases)
     rows = [_row(key, {case.name: drive for case, drive in done if case.key == key}) for key in groups]
     manoeuvres = list(dict.fromkeys(case.manoeuvre for case in cases))
-    return Section(
+    return ReportSection(
         "braking",
         "Braking: CCRs, CCRm and CCRb in the closed loop",
         (
@@ -153,7 +160,7 @@ _COLUMNS = (
 )
 
 
-def _row(key: Key, by_name: dict[str, DriveRecord]) -> tuple[AnyCell, ...]:
+def _row(key: BrakingKey, by_name: dict[str, DriveRecord]) -> tuple[AnyCell, ...]:
     drives = list(by_name.values())
     worst = max(by_name, key=lambda name: (by_name[name].impact_mps or 0.0, -by_name[name].smallest_gap_m))
     impacts = [drive.impact_mps / KMH for drive in drives if drive.impact_mps is not None]

@@ -15,10 +15,10 @@ from typing import Literal
 
 from pipeline.decision.path_position import near_face_middle
 from pipeline.evaluation.lead_verdict import switches
-from pipeline.evaluation.report_sections import AnyCell, Chart, Driven, Scene, Section, Series, Table
+from pipeline.evaluation.report_sections import AnyCell, Chart, Driven, ReportSection, Scene, Series, Table
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.perception import GIVEN_SAID, SENSORS
-from pipeline.experiments.true_lead import MAX_M, InSight, Way, range_m, same_place, true_lead
+from pipeline.experiments.true_lead import MAX_M, InSight, ScriptedWay, range_m, same_place, true_lead
 from pipeline.params import CipvParams, Params
 from pipeline.run import Sensors
 from pipeline.simulation import scenario
@@ -33,8 +33,8 @@ SCENARIOS = {
 }
 _SHOWN_AT = 0.4
 _MARGIN_M = 12.0
-Key = tuple[str, Sensors]
-Verdict = Literal["correct", "none", "missed", "false", "wrong", "edge", "hidden", "new"]
+ChoiceKey = tuple[str, Sensors]
+ChoiceVerdict = Literal["correct", "none", "missed", "false", "wrong", "edge", "hidden", "new"]
 UNDECIDABLE = ("edge", "hidden", "new")
 """edge: either answer is right · hidden: a nearer vehicle covers the lead · new: the lead came into sight, or the drive
 began, too recently for confirmation."""
@@ -42,9 +42,14 @@ began, too recently for confirmation."""
 
 @dataclass(frozen=True)
 class ChoiceCase:
+    """One scene, driven once."""
+
     scene: str
+    """Which of the paper's four."""
     sensors: Sensors
+    """That the pipeline is given."""
     seed: int
+    """Of noise and scenery."""
 
     @property
     def name(self) -> str:
@@ -53,15 +58,21 @@ class ChoiceCase:
 
 
 @dataclass(frozen=True)
-class Frame:
-    """One frame's verdict, with the true lead's id and range and the chosen object's id; None where there is none."""
+class ChoiceFrame:
+    """One frame's verdict."""
 
     t_s: float
-    verdict: Verdict
+    """Since the scenario's start."""
+    verdict: ChoiceVerdict
+    """On the CIPV."""
     lead: int | None
+    """The true lead's id; None where there is none."""
     lead_m: float | None
+    """Its true range."""
     chosen: int | None
+    """The CIPV's id; None where there is none."""
     chosen_m: float | None
+    """Its estimated range."""
 
 
 def cases(short: bool) -> list[ChoiceCase]:
@@ -71,10 +82,10 @@ def cases(short: bool) -> list[ChoiceCase]:
     ]
 
 
-def run(case: ChoiceCase) -> list[Frame]:
+def run(case: ChoiceCase) -> list[ChoiceFrame]:
     scene = _scenario(case)
     setup = Setup(Params(), case.sensors, closed=False)
-    way, in_sight, frames = Way.of(scene), InSight(), []
+    way, in_sight, frames = ScriptedWay.of(scene), InSight(), []
     for tick in drive(scene, setup):
         assert tick.frame.camera is not None
         in_sight = in_sight.then(tick.world, tick.frame.camera)
@@ -89,7 +100,7 @@ def _scenario(case: ChoiceCase) -> Scenario:
     return scene.model_copy(update={"seed": scene.seed + 100 * case.seed})
 
 
-def as_drive(case: ChoiceCase, frames: list[Frame]) -> ExperimentDrive:
+def as_drive(case: ChoiceCase, frames: list[ChoiceFrame]) -> ExperimentDrive:
     """The drive of one run."""
     counted = sum(frame.verdict not in UNDECIDABLE for frame in frames)
     return ExperimentDrive(
@@ -103,14 +114,14 @@ def as_drive(case: ChoiceCase, frames: list[Frame]) -> ExperimentDrive:
     )
 
 
-def judge(way: Way, tick: LoopStep, in_sight: InSight) -> Frame:
+def judge(way: ScriptedWay, tick: LoopStep, in_sight: InSight) -> ChoiceFrame:
     """The frame's CIPV compared with the vehicle that the car will really meet first."""
     lead, doubtful = true_lead(tick.world, way.ahead(tick.world))
     chosen = tick.result.chosen()
     if chosen is not None and (chosen.distance_m or 0.0) > MAX_M:
         chosen = None
     lead_m = range_m(lead) if lead is not None else None
-    verdict: Verdict
+    verdict: ChoiceVerdict
     if doubtful:
         verdict = "edge"
     elif lead is not None and in_sight.is_hidden(lead.actor.id):
@@ -123,7 +134,7 @@ def judge(way: Way, tick: LoopStep, in_sight: InSight) -> Frame:
         verdict = "missed"
     else:
         verdict = "correct" if same_place(near_face_middle(chosen.bev), lead) else "wrong"
-    return Frame(
+    return ChoiceFrame(
         tick.t_s,
         verdict,
         lead.actor.id if lead is not None else None,
@@ -133,7 +144,7 @@ def judge(way: Way, tick: LoopStep, in_sight: InSight) -> Frame:
     )
 
 
-def acquired_m(frames: Sequence[Frame]) -> list[float]:
+def acquired_m(frames: Sequence[ChoiceFrame]) -> list[float]:
     """For each true lead, its range in the first frame in which it was correctly chosen."""
     first: dict[int, float] = {}
     for frame in frames:
@@ -142,13 +153,15 @@ def acquired_m(frames: Sequence[Frame]) -> list[float]:
     return list(first.values())
 
 
-def report(cases: Sequence[ChoiceCase], runs: Sequence[list[Frame]]) -> Section:
+def report(cases: Sequence[ChoiceCase], runs: Sequence[list[ChoiceFrame]]) -> ReportSection:
     scenes = list(dict.fromkeys(case.scene for case in cases))
-    driven: dict[Key, dict[str, list[Frame]]] = {(scene, sensors): {} for scene in scenes for sensors in SENSORS}
+    driven: dict[ChoiceKey, dict[str, list[ChoiceFrame]]] = {
+        (scene, sensors): {} for scene in scenes for sensors in SENSORS
+    }
     for case, run in zip(cases, runs, strict=True):
         driven[case.scene, case.sensors][case.name] = run
     groups = {key: list(by_name.values()) for key, by_name in driven.items()}
-    return Section(
+    return ReportSection(
         "choosing",
         "Choosing the CIPV: straight, left turn, turns across",
         (
@@ -199,7 +212,7 @@ _COLUMNS = (
 )
 
 
-def _row(scene: str, sensors: Sensors, by_name: dict[str, list[Frame]]) -> tuple[AnyCell, ...]:
+def _row(scene: str, sensors: Sensors, by_name: dict[str, list[ChoiceFrame]]) -> tuple[AnyCell, ...]:
     """The runs of one scenario with one set of sensors; the share links to the worst one."""
     runs = list(by_name.values())
     worst = min(by_name, key=lambda name: _share_correct([by_name[name]]), default="")
@@ -219,12 +232,12 @@ def _row(scene: str, sensors: Sensors, by_name: dict[str, list[Frame]]) -> tuple
     )
 
 
-def _share_correct(runs: list[list[Frame]]) -> float:
+def _share_correct(runs: list[list[ChoiceFrame]]) -> float:
     frames = [frame for run in runs for frame in run if frame.verdict not in UNDECIDABLE]
     return sum(frame.verdict in ("correct", "none") for frame in frames) / max(len(frames), 1)
 
 
-def _verdict(scene: str, groups: dict[Key, list[list[Frame]]]) -> str:
+def _verdict(scene: str, groups: dict[ChoiceKey, list[list[ChoiceFrame]]]) -> str:
     share = {sensors: 100.0 * _share_correct(groups[scene, sensors]) for sensors in SENSORS}
     better = "better than" if share["both"] > share["lidar"] + 0.5 else "no better than"
     return (
@@ -233,7 +246,7 @@ def _verdict(scene: str, groups: dict[Key, list[list[Frame]]]) -> str:
     )
 
 
-def _chart(scene: str, groups: dict[Key, list[list[Frame]]]) -> Chart:
+def _chart(scene: str, groups: dict[ChoiceKey, list[list[ChoiceFrame]]]) -> Chart:
     """The first run: the true lead's range and what each set of sensors chose."""
     first = {sensors: runs[0] for (name, sensors), runs in groups.items() if name == scene and runs}
     truth = [(frame.t_s, frame.lead_m) for frame in next(iter(first.values()), []) if frame.lead_m is not None]

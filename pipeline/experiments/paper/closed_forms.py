@@ -15,16 +15,22 @@ LEAD_DECEL_MPS2 = 6.0
 
 @dataclass(frozen=True)
 class Printed:
-    """A manoeuvre as the paper computes it: speed before and after, km/h; the remaining gap, m; detection ranges, m,
-    and the decelerations printed for them."""
+    """A manoeuvre as the paper computes it."""
 
     speed_kmh: float
+    """Before."""
     end_kmh: float
+    """After."""
     keep_m: float
+    """The gap that remains."""
     lidar_m: float
+    """Detection range of the LiDAR alone."""
     fused_m: float
+    """Detection range of both sensors."""
     lidar_mps2: float
+    """Deceleration printed for the LiDAR alone."""
     fused_mps2: float
+    """Deceleration printed for both sensors."""
 
 
 PAPER: dict[Manoeuvre, Printed] = {

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.common.geometry import closest_on_polygon, transform
-from pipeline.evaluation.report_sections import Chart, Section, Series, Table
+from pipeline.evaluation.report_sections import Chart, ReportSection, Series, Table
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.paper.layouts import LAYOUTS, LayoutCase, cases, scenario, scenes
 from pipeline.experiments.perception import GIVEN_SAID
@@ -32,11 +32,14 @@ _BINS_M = (5.0, 15.0, 25.0, 35.0, 45.0, 55.0, 65.0, 75.0)
 
 @dataclass(frozen=True)
 class Sample:
-    """One box: its height as the reference camera would see it, true depth along the optical axis, true range."""
+    """One box with its truth."""
 
     height_px: float
+    """As the reference camera would see it."""
     depth_m: float
+    """True, along the optical axis."""
     range_m: float
+    """True."""
 
 
 def run(case: LayoutCase) -> list[Sample]:
@@ -72,7 +75,7 @@ def _depth_m(target: world_state.ActorState, camera: CameraCalibration) -> float
     return float(transform(camera.T_camera_ego, np.array([[x, y, target.cuboid.center[2]]]))[0, 2])
 
 
-def report(cases: Sequence[LayoutCase], runs: Sequence[list[Sample]]) -> Section:
+def report(cases: Sequence[LayoutCase], runs: Sequence[list[Sample]]) -> ReportSection:
     done = list(zip(cases, runs, strict=True))
     train = [each for case, run in done if case.layout == "a" and case.seed % 2 == 0 for each in run]
     free = fit_power_law([each.height_px for each in train], [each.depth_m for each in train])
@@ -86,7 +89,7 @@ def report(cases: Sequence[LayoutCase], runs: Sequence[list[Sample]]) -> Section
         ]
         for layout in LAYOUTS
     }
-    return Section(
+    return ReportSection(
         "regression",
         "Distance from box height",
         (

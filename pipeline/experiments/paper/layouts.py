@@ -24,10 +24,12 @@ COLOURS = ("#a3202a", "#e8e8e6", "#15181c", "#5b6f86", "#c9a227")
 
 @dataclass(frozen=True)
 class LayoutCase:
-    """layout: a, b or c."""
+    """One drive in one of the paper's layouts."""
 
     layout: str
+    """a, b or c."""
     seed: int
+    """Of noise and scenery."""
 
 
 def cases(short: bool) -> list[LayoutCase]:

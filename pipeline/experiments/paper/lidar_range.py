@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pipeline.evaluation.report_sections import Chart, Scene, Section, Series, Table
+from pipeline.evaluation.report_sections import Chart, ReportSection, Scene, Series, Table
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.straight_track import parameters, scene, target_of, true_range_m
 from pipeline.simulation.closed_loop import LoopStep, Setup, drive
@@ -29,16 +29,22 @@ COLOURS = ("#a3202a", "#e8e8e6", "#15181c", "#5b6f86")
 
 @dataclass(frozen=True)
 class RangeCase:
+    """One approach to a standing vehicle."""
+
     kind: VehicleKind
+    """What stands there: larger vehicles are detected farther away."""
     seed: int
+    """Of noise and scenery."""
 
 
 @dataclass(frozen=True)
-class Sighting:
-    """One tick: the true range, and the measured one if the car was detected in this sweep."""
+class RangeSample:
+    """One tick."""
 
     true_m: float
+    """Range of the car."""
     measured_m: float | None
+    """None when the car was not detected in this sweep."""
 
 
 def cases(short: bool) -> list[RangeCase]:
@@ -46,9 +52,9 @@ def cases(short: bool) -> list[RangeCase]:
     return [RangeCase(kind, seed) for kind in kinds for seed in range(2 if short else 10)]
 
 
-def run(case: RangeCase) -> list[Sighting]:
+def run(case: RangeCase) -> list[RangeSample]:
     setup = Setup(_PARAMS, "lidar", closed=False)
-    return [Sighting(true_range_m(target_of(tick)), _measured_m(tick)) for tick in drive(_scenario(case), setup)]
+    return [RangeSample(true_range_m(target_of(tick)), _measured_m(tick)) for tick in drive(_scenario(case), setup)]
 
 
 def _scenario(case: RangeCase) -> Scenario:
@@ -62,14 +68,14 @@ def _scenario(case: RangeCase) -> Scenario:
     return scene({0.0: _SPEED_MPS}, target, duration_s, case.seed)
 
 
-def as_drive(case: RangeCase, seen: list[Sighting]) -> ExperimentDrive:
+def as_drive(case: RangeCase, seen: list[RangeSample]) -> ExperimentDrive:
     """The drive of one run."""
     errors = [abs(each.measured_m - each.true_m) for each in seen if each.measured_m is not None]
     largest = f"; largest error {max(errors):.2f} m" if errors else ""
     return ExperimentDrive(
         f"ranging_{case.kind}_{case.seed}",
         f"LiDAR range check: {case.kind}, run {case.seed}",
-        (f"{len(errors)} of {len(seen)} sweeps hold it{largest}.",),
+        (f"{len(errors)} of {len(seen)} sweeps contain it{largest}.",),
         _scenario(case),
         _PARAMS,
         "lidar",
@@ -91,7 +97,7 @@ def _measured_m(tick: LoopStep) -> float | None:
     return min(ahead, default=None)
 
 
-def recognised_to_m(sightings: Sequence[Sighting]) -> float | None:
+def recognised_to_m(sightings: Sequence[RangeSample]) -> float | None:
     """The far edge of the last 5 m bin, coming from near, in which at least half of the sweeps hold the car."""
     reached = None
     edge = _BIN_M
@@ -104,13 +110,13 @@ def recognised_to_m(sightings: Sequence[Sighting]) -> float | None:
     return reached
 
 
-def report(cases: Sequence[RangeCase], runs: Sequence[list[Sighting]]) -> Section:
+def report(cases: Sequence[RangeCase], runs: Sequence[list[RangeSample]]) -> ReportSection:
     kinds = list(dict.fromkeys(case.kind for case in cases))
     by_kind = {
         kind: [each for case, run in zip(cases, runs, strict=True) if case.kind == kind for each in run]
         for kind in kinds
     }
-    return Section(
+    return ReportSection(
         "ranging",
         "LiDAR range check",
         (
@@ -123,7 +129,7 @@ def report(cases: Sequence[RangeCase], runs: Sequence[list[Sighting]]) -> Sectio
         (Table("Range and error", _COLUMNS, (_PRINTED_ROW, *(_row(kind, seen) for kind, seen in by_kind.items()))),),
         (
             Chart(
-                "Share of sweeps that hold the vehicle",
+                "Share of sweeps with the vehicle",
                 "true range m",
                 "share",
                 tuple(_rate(kind, seen) for kind, seen in by_kind.items()),
@@ -150,7 +156,7 @@ _PRINTED_ROW = (
 )
 
 
-def _row(kind: str, seen: list[Sighting]) -> tuple[str | float | None, ...]:
+def _row(kind: str, seen: list[RangeSample]) -> tuple[str | float | None, ...]:
     held = [(abs(each.measured_m - each.true_m), each.true_m) for each in seen if each.measured_m is not None]
     if not held:
         return (kind, None, None, None, None, None)
@@ -164,7 +170,7 @@ def _row(kind: str, seen: list[Sighting]) -> tuple[str | float | None, ...]:
     )
 
 
-def _rate(kind: str, seen: list[Sighting]) -> Series:
+def _rate(kind: str, seen: list[RangeSample]) -> Series:
     edges = [n * _BIN_M for n in range(1, round(_FROM_M / _BIN_M))]
     bins = [
         (edge, [each.measured_m is not None for each in seen if edge <= each.true_m < edge + _BIN_M]) for edge in edges
@@ -173,7 +179,7 @@ def _rate(kind: str, seen: list[Sighting]) -> Series:
     return Series(kind, tuple(x for x, _ in filled), tuple(y for _, y in filled))
 
 
-def _errors(kind: str, seen: list[Sighting]) -> Series:
+def _errors(kind: str, seen: list[RangeSample]) -> Series:
     return Series.of_points(
         kind, ((each.true_m, each.measured_m - each.true_m) for each in seen if each.measured_m is not None)
     )

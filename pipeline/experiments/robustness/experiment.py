@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from pipeline.evaluation.report_sections import AnyCell, Driven, Section, Table
+from pipeline.evaluation.report_sections import AnyCell, Driven, ReportSection, Table
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
-from pipeline.experiments.robustness import traffic
+from pipeline.experiments.robustness import road_kinds, traffic
 from pipeline.experiments.robustness.judge import KINDS, Failure, Judge, Kind
 from pipeline.params import Params, with_changes
 from pipeline.simulation.unseen import frames
@@ -30,8 +30,10 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "no minimum lead probability": {
         "cipv.become_existence": 0.0,
         "cipv.become_probability": 0.0,
+        "cipv.become_standing": 0.0,
         "cipv.stay_probability": 0.0,
     },
+    "standing like driving vehicles": {"cipv.become_standing": 0.0},
     "wide clusters not split": {"cluster.divide_m": 3.0},
     "ACC acts on one frame": {"acc.confirm_frames": 1},
     "no confirmation": {"cipv.confirm_hits": 1},
@@ -57,20 +59,26 @@ _WORST = 40
 
 @dataclass(frozen=True)
 class Kilometre:
-    """One case. variants: names of what is driven on the same frames."""
+    """One case."""
 
     seed: int
+    """Of the suite."""
     number: int
+    """Of the kilometre; with the seed it decides road and traffic."""
     variants: tuple[str, ...] = (AS_IS,)
+    """Names of what is driven on the same frames."""
 
 
 @dataclass(frozen=True)
 class DriveOutcome:
-    """What one drive came to: how far, for how long, and each variant's failures."""
+    """What one drive came to."""
 
     km: float
+    """Driven by the ego vehicle."""
     seconds: float
+    """Of driving."""
     failures: Mapping[str, tuple[Failure, ...]]
+    """By variant."""
 
 
 def run(case: Kilometre) -> DriveOutcome:
@@ -132,7 +140,7 @@ def _told(failure: Failure) -> str:
     return f"{failure.kind}{cause}: {failure.text}"
 
 
-def report(cases: Sequence[Kilometre], outcomes: Sequence[DriveOutcome]) -> Section:
+def report(cases: Sequence[Kilometre], outcomes: Sequence[DriveOutcome]) -> ReportSection:
     km, hours = sum(each.km for each in outcomes), sum(each.seconds for each in outcomes) / 3600.0
     counts = _counts(outcomes, AS_IS)
     tables = [
@@ -158,7 +166,7 @@ def report(cases: Sequence[Kilometre], outcomes: Sequence[DriveOutcome]) -> Sect
             (name, *(_counts(outcomes, name)[kind] for kind in KINDS)) for name in variants
         )
         tables.insert(1, Table("One rule switched off at a time", ("variant", *KINDS), rows, f"Counts in {km:.0f} km."))
-    return Section(
+    return ReportSection(
         "robustness",
         "Robustness: random traffic",
         (
@@ -205,8 +213,10 @@ def _causes(outcomes: Sequence[DriveOutcome]) -> Iterator[tuple[AnyCell, ...]]:
 
 
 def _by_layout(cases: Sequence[Kilometre], outcomes: Sequence[DriveOutcome]) -> Iterator[tuple[AnyCell, ...]]:
-    pairs = [(traffic.layout_of(case.seed, case.number)[1], got) for case, got in zip(cases, outcomes, strict=True)]
-    parts = {place.name: [got for layout, got in pairs if layout.place == place.name] for place in traffic.PLACES}
+    pairs = [(road_kinds.layout_of(case.seed, case.number)[1], got) for case, got in zip(cases, outcomes, strict=True)]
+    parts = {
+        place.name: [got for layout, got in pairs if layout.place == place.name] for place in road_kinds.ROAD_KINDS
+    }
     for flag in ("lead", "cut_in", "crossing", "bends", "crests", "roadworks"):
         parts[flag.replace("_", "-")] = [got for layout, got in pairs if getattr(layout, flag)]
     for name, got in parts.items():

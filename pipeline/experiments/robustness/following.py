@@ -16,11 +16,12 @@ _HARDEST_MPS2 = 6.0
 
 @dataclass(frozen=True)
 class Drive:
-    """Speeds every ``STEP_S``, and where the rear is then, metres from where the ego vehicle's bumper starts. Between
-    two steps the speed is linear, as a script's is."""
+    """How one car drives, every ``STEP_S``. Between two steps the speed is linear, as a script's is."""
 
     speeds_mps: F64
+    """(N,) at each step."""
     rear_m: F64
+    """(N,) of its rear, from where the ego vehicle's bumper starts."""
 
     def script(self) -> dict[float, float]:
         """``speed_mps`` of a scenario file."""

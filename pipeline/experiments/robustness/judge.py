@@ -12,9 +12,9 @@ from math import ceil, cos, dist, hypot, sin
 from typing import Literal, get_args
 
 from pipeline.common.geometry import closest_on_polygon
-from pipeline.decision.aeb import required_decel_mps2
+from pipeline.decision.object_motion import required_decel_mps2
 from pipeline.decision.path_position import near_face_middle
-from pipeline.experiments.true_lead import EDGE_M, MAX_M, VISIBLE_SHARE, Way, overlap, same_place, true_lead
+from pipeline.experiments.true_lead import EDGE_M, MAX_M, VISIBLE_SHARE, ScriptedWay, overlap, same_place, true_lead
 from pipeline.params import AebParams, CipvParams
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.truth_boxes import in_picture
@@ -50,10 +50,13 @@ class Failure:
     """Something that went wrong, from when to when."""
 
     kind: Kind
+    """What went wrong."""
     cause: str
     """In words that count alike."""
     from_s: float
+    """Since the drive's start."""
     to_s: float
+    """When it was over; the same as ``from_s`` for a moment."""
     text: str
     """What was believed, for a person."""
 
@@ -76,15 +79,19 @@ class _Reign:
 
 @dataclass
 class Judge:
-    """Takes a drive's results one by one. step_s: between two."""
+    """Takes a drive's results one by one."""
 
     scenario: Scenario
+    """Its traffic is the truth."""
     step_s: float
+    """Between two results."""
     failures: list[Failure] = field(default_factory=list)
+    """So far, those that are over."""
     reign: _Reign = field(default_factory=_Reign)
+    """The present CIPV and since when."""
 
     def __post_init__(self) -> None:
-        self._way = Way.of(self.scenario)
+        self._way = ScriptedWay.of(self.scenario)
         self._aeb, self._confirm_s = AebParams(), CipvParams().confirm_hits * self.step_s
 
     def take(self, now: World, camera: CameraCalibration | None, result: Result) -> None:

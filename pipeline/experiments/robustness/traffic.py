@@ -8,12 +8,12 @@ for is judged, not what would come of it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pipeline.experiments.robustness.following import STEP_S, Drive, following, places_m, steady, wandering
+from pipeline.experiments.robustness.road_kinds import DriveLayout, RoadKind, layout_of
 from pipeline.simulation.scenario import Scenario
 
 DRIVE_M = 1000.0
@@ -24,64 +24,6 @@ _JERK_MPS3 = 0.8
 _EGO, _PARKED, _ONCOMING, _BESIDE, _CROSSING = 0, 100, 1000, 2000, 3000
 _KINDS = ("car", "van", "truck", "bus", "motorcycle")
 _COLOURS = ("#e8e8e6", "#20252c", "#a3202a", "#2f5f8f", "#8090a0", "#5b6f86", "#101214", "#c7c9cc")
-
-
-@dataclass(frozen=True)
-class Place:
-    """A kind of road. sideways_mps2: of its bends, from to. kinds: shares of car, van, truck, bus, motorcycle."""
-
-    name: str
-    speed_kmh: tuple[float, float]
-    lanes: tuple[int, int]
-    lane_m: tuple[float, float]
-    median_m: float
-    shoulder_m: float
-    sideways_mps2: tuple[float, float]
-    kinds: tuple[float, float, float, float, float]
-    parked: bool = False
-    stops: bool = False
-
-
-PLACES = (
-    Place("street", (30.0, 55.0), (1, 2), (2.9, 3.3), 0.0, 2.5, (0.3, 2.0), (0.72, 0.14, 0.06, 0.04, 0.04), True, True),
-    Place("country", (60.0, 100.0), (1, 1), (3.1, 3.6), 0.0, 1.5, (0.5, 2.5), (0.7, 0.1, 0.14, 0.03, 0.03)),
-    Place("motorway", (80.0, 130.0), (2, 3), (3.5, 3.8), 4.0, 2.5, (0.2, 1.2), (0.62, 0.12, 0.22, 0.02, 0.02)),
-)
-
-
-@dataclass(frozen=True)
-class Layout:
-    """What a drive has, by which its failures are told apart."""
-
-    place: str
-    lead: bool
-    cut_in: bool
-    crossing: bool
-    bends: bool
-    crests: bool
-    roadworks: bool
-    lanes_seen: bool
-    routed: bool
-
-
-def layout_of(seed: int, number: int) -> tuple[Place, Layout, np.random.Generator]:
-    """The kind of drive that a number stands for, and the dice that are to be rolled on."""
-    rng = np.random.default_rng([seed, number])
-    place = PLACES[int(rng.choice(3, p=(0.45, 0.3, 0.25)))]
-    chance = rng.random(8)
-    many = place.name == "motorway"
-    layout = Layout(
-        place.name,
-        lead=bool(chance[0] < 0.6),
-        cut_in=bool(chance[1] < 0.4) and many,
-        crossing=bool(chance[2] < 0.7) and place.parked,
-        bends=bool(chance[3] < 0.7),
-        crests=bool(chance[4] < 0.4),
-        roadworks=bool(chance[5] < 0.25) and not place.parked,
-        lanes_seen=bool(chance[6] < (0.5 if place.parked else 0.9)),
-        routed=bool(chance[7] < 0.3),
-    )
-    return place, layout, rng
 
 
 def scenario(seed: int, number: int) -> Scenario:
@@ -159,7 +101,7 @@ def _faults(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _road(
-    rng: np.random.Generator, place: Place, layout: Layout, lanes: int, lane_m: float, usual: float
+    rng: np.random.Generator, place: RoadKind, layout: DriveLayout, lanes: int, lane_m: float, usual: float
 ) -> dict[str, Any]:
     whole, segments = 0.0, [{"length_m": float(rng.uniform(120.0, 250.0))}]
     if layout.bends:
@@ -193,19 +135,25 @@ def _road(
     return road
 
 
-def _vehicle(rng: np.random.Generator, number: int, place: Place, lane: int, drive: Drive) -> dict[str, Any]:
+def _vehicle(rng: np.random.Generator, number: int, place: RoadKind, lane: int, drive: Drive) -> dict[str, Any]:
     made = _body(rng, number, place)
     return {**made, "lane": lane, "ahead_m": round(float(drive.rear_m[0]), 2), "speed_mps": drive.script(),
             "offset_m": round(float(rng.normal(0.0, 0.15)), 2)}  # fmt: skip
 
 
-def _body(rng: np.random.Generator, number: int, place: Place) -> dict[str, Any]:
+def _body(rng: np.random.Generator, number: int, place: RoadKind) -> dict[str, Any]:
     kind = str(rng.choice(_KINDS, p=place.kinds))
     return {"id": number, "kind": kind, "colour": str(rng.choice(_COLOURS))}
 
 
 def _cut_in(
-    rng: np.random.Generator, place: Place, own: np.ndarray, own_lane: int, lanes: int, lead: Drive | None, steps: int
+    rng: np.random.Generator,
+    place: RoadKind,
+    own: np.ndarray,
+    own_lane: int,
+    lanes: int,
+    lead: Drive | None,
+    steps: int,
 ) -> tuple[int, Drive, dict[str, Any]] | None:
     """A car from beside that changes into the ego lane: from which step it is there, how it drives, and its script.
     None where the gap to the lead is too small for it."""
@@ -236,7 +184,7 @@ def _roadworks(
     ego: dict[str, Any],
     own_lane: int,
     lane_m: float,
-    place: Place,
+    place: RoadKind,
     way: np.ndarray,
 ) -> None:
     """Beacons close the outermost lane: a taper, then a row along the line. Whoever drives there changes first."""
@@ -279,7 +227,7 @@ def _parked_rows(rng: np.random.Generator, road: dict[str, Any], lanes: int, lan
             place_m += stretch + float(rng.uniform(20.0, 250.0))
 
 
-def _oncoming(rng: np.random.Generator, place: Place, lanes: int, usual: float) -> Iterator[dict[str, Any]]:
+def _oncoming(rng: np.random.Generator, place: RoadKind, lanes: int, usual: float) -> Iterator[dict[str, Any]]:
     number, spacing = _ONCOMING, float(rng.uniform(60.0, 300.0))
     for lane in range(1, lanes + 1):
         speed, place_m = usual * float(rng.uniform(0.8, 1.1)), float(rng.uniform(40.0, 200.0))
@@ -291,7 +239,7 @@ def _oncoming(rng: np.random.Generator, place: Place, lanes: int, usual: float) 
 
 
 def _beside(
-    rng: np.random.Generator, place: Place, own_lane: int, lanes: int, usual: float, taken: set[int]
+    rng: np.random.Generator, place: RoadKind, own_lane: int, lanes: int, usual: float, taken: set[int]
 ) -> Iterator[dict[str, Any]]:
     """Traffic in the lanes beside, all of a lane at one speed. Lanes from which a car cuts in stay empty."""
     number = _BESIDE

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.evaluation.report_sections import Cell, Section, Table
-from pipeline.experiments.curves.drives import BOXES, Frames, driven
+from pipeline.evaluation.report_sections import Cell, ReportSection, Table
+from pipeline.experiments.curves.drives import BOXES, SourceFrames, driven
 from pipeline.experiments.curves.experiment import longest_wrong_s, share_right
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.streets import scenarios
@@ -35,10 +35,12 @@ class StreetCase:
     """One drive through a street."""
 
     street: Street
+    """Bends, borders and traffic."""
     seed: int
+    """Of noise and scenery."""
 
 
-Outcome = dict[str, Frames]
+StreetOutcome = dict[str, SourceFrames]
 
 
 def cases(short: bool) -> list[StreetCase]:
@@ -49,12 +51,12 @@ def cases(short: bool) -> list[StreetCase]:
     return [StreetCase(street, n % 2) for n, street in enumerate(streets)]
 
 
-def run(case: StreetCase) -> Outcome:
+def run(case: StreetCase) -> StreetOutcome:
     scene = scenarios.scenario(case.street, case.seed)
     return driven(scene, REACH_M, tuple(SETTINGS), settings=SETTINGS, lines=None)
 
 
-def as_drive(case: StreetCase, outcome: Outcome) -> ExperimentDrive:
+def as_drive(case: StreetCase, outcome: StreetOutcome) -> ExperimentDrive:
     """The drive with the road's edges."""
     share, frames = share_right([outcome[WITH]])
     street = case.street
@@ -70,9 +72,9 @@ def as_drive(case: StreetCase, outcome: Outcome) -> ExperimentDrive:
     )
 
 
-def report(cases: Sequence[StreetCase], outcomes: Sequence[Outcome]) -> Section:
+def report(cases: Sequence[StreetCase], outcomes: Sequence[StreetOutcome]) -> ReportSection:
     """By what is beside the road, and all together."""
-    return Section(
+    return ReportSection(
         "streets",
         "Streets without lane markings and without a route",
         (
@@ -90,7 +92,7 @@ def report(cases: Sequence[StreetCase], outcomes: Sequence[Outcome]) -> Section:
     )
 
 
-def _rows(cases: Sequence[StreetCase], outcomes: Sequence[Outcome]) -> Iterator[tuple[Cell, ...]]:
+def _rows(cases: Sequence[StreetCase], outcomes: Sequence[StreetOutcome]) -> Iterator[tuple[Cell, ...]]:
     groups = sorted({(case.street.beside, case.street.ahead) for case in cases})
     for name in (NEITHER, WITHOUT, WITH):
         for beside, ahead in groups:
@@ -103,7 +105,7 @@ def _rows(cases: Sequence[StreetCase], outcomes: Sequence[Outcome]) -> Iterator[
         yield ("all", "all", name, *_figures([outcome[name] for outcome in outcomes]))
 
 
-def _figures(drives: Sequence[Frames]) -> tuple[Cell, ...]:
+def _figures(drives: Sequence[SourceFrames]) -> tuple[Cell, ...]:
     share, frames = share_right(drives)
     errors = np.abs([row[1] for drive in drives for row in drive.errors_m])
     return 100.0 * share, frames, max(longest_wrong_s(drive) for drive in drives), float(np.nanmean(errors))

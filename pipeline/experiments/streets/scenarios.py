@@ -21,20 +21,23 @@ _SPACING_M = 6.2
 _PARKED = 100
 _COLOURS = ("#e8e8e6", "#20252c", "#a3202a", "#2f5f8f", "#8090a0", "#5b6f86", "#101214", "#c7c9cc")
 
-Beside = Literal["parked", "hedges", "kerbs", "mixed"]
+StreetBorder = Literal["parked", "hedges", "kerbs", "mixed"]
 Ahead = Literal["lead", "nothing"]
 SPEEDS_KMH = {30.0: 24.0, 50.0: 31.0, 80.0: 39.0, 150.0: 48.0}
 """By radius: 1.5 m/s² sideways, as people drive in streets, and no faster than 50 km/h."""
-BESIDE: tuple[Beside, ...] = ("parked", "hedges", "kerbs", "mixed")
+BESIDE: tuple[StreetBorder, ...] = ("parked", "hedges", "kerbs", "mixed")
 
 
 @dataclass(frozen=True)
 class Street:
-    """radius_m: of its bends; beside: what shows where it goes; ahead: whether a car drives ahead."""
+    """A street without paint."""
 
     radius_m: float
-    beside: Beside
+    """Of its bends."""
+    beside: StreetBorder
+    """What shows where it goes."""
     ahead: Ahead
+    """Whether a car drives ahead."""
 
     @property
     def title(self) -> str:

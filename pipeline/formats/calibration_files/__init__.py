@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from pipeline.formats.calibration_files import kitti, opencv, rig, ros
+from pipeline.formats.calibration_files import kalibr, kitti, opencv, rig, ros
 from pipeline.types import CameraCalibration
 
 
@@ -27,5 +27,6 @@ FORMATS: Mapping[str, Format] = {
     "kitti": Format(kitti.read, kitti.write),
     "ros": Format(ros.read, ros.write),
     "opencv": Format(opencv.read, opencv.write),
+    "kalibr": Format(kalibr.read, kalibr.write),
     "rig": Format(None, rig.write),
 }

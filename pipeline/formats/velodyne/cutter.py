@@ -35,19 +35,24 @@ OUT_OF_ORDER = "time or azimuth out of order"
 
 @dataclass
 class DecoderCounts:
-    """What came so far. refused: packets by reason. models: other Velodynes that sent packets. lost: packets that the
-    time between their neighbours says are missing. sweeps: given. partial: rotations seen in part only (the first, the
-    last, one cut by a pause), not given. jumps: how often the sensor's clock went back or ahead by more than the time
-    that had passed, the last time by jump_s."""
+    """What came so far."""
 
     packets: int = 0
+    """Received, refused ones included."""
     refused: Counter[str] = field(default_factory=Counter)
+    """By reason."""
     models: Counter[str] = field(default_factory=Counter)
+    """Packets of other Velodynes, by model."""
     lost: int = 0
+    """Packets that the time between their neighbours says are missing."""
     sweeps: int = 0
+    """Complete rotations given."""
     partial: int = 0
+    """Rotations seen in part only (the first, the last, one cut by a pause), not given."""
     jumps: int = 0
+    """How often the sensor's clock went back, or ahead by more than the time that had passed."""
     jump_s: float = 0.0
+    """By how much, the last time."""
 
     def about_refused(self) -> str:
         """See ``say_refused``."""
@@ -63,26 +68,35 @@ def say_refused(refused: Mapping[str, int]) -> str:
     return f"{count} {'packet' if count == 1 else 'packets'} refused: {reasons}"
 
 
-class Placed(NamedTuple):
-    """A packet on the clock that counts on over the hours, and on the circle that begins behind the car; the rest as in
-    ``Packet``. origin: whatever its giver knows it by."""
+class TimedPacket(NamedTuple):
+    """A packet on a clock that does not wrap at the hour, and on the circle that begins behind the car; the rest as in
+    ``Packet``."""
 
     time_us: int
+    """Counts on over the hours."""
     phase_cdeg: float
+    """Hundredths of a degree, clockwise from straight behind."""
     rate_cdeg_us: float
+    """How fast the head turns."""
     span_us: float
+    """Time to the next packet."""
     data: bytes
+    """All 1206 bytes."""
     t_host_ns: int | None
+    """When it arrived, by this machine's clock; None from a file without one."""
     origin: int
+    """Whatever its giver knows it by."""
 
 
 class Rotation(NamedTuple):
-    """Packets in order of time. ahead_us: the sensor's time when its head looked straight ahead. t_ns: the same by the
-    stream's clock."""
+    """One turn of the head."""
 
-    packets: list[Placed]
+    packets: list[TimedPacket]
+    """In order of time."""
     ahead_us: float
+    """The sensor's time when its head looked straight ahead."""
     t_ns: int
+    """The same by the stream's clock."""
 
 
 class _Place(Enum):
@@ -106,11 +120,11 @@ class RotationCutter:
         ahead_cdeg = -np.degrees(np.arctan2(ahead[1], ahead[0])) * 100.0  # azimuth runs clockwise
         self._behind_cdeg = float((ahead_cdeg + ROTATION_CDEG / 2) % ROTATION_CDEG)
         self._keeps_partial = keeps_partial
-        self._packets: list[Placed] = []  # in order of time
+        self._packets: list[TimedPacket] = []  # in order of time
         self._began_at_cut = False
         self._reach_cdeg = (np.inf, np.inf)  # from where to where the rotation before was seen
-        self._last: Placed | None = None
-        self._suspect: Placed | None = None
+        self._last: TimedPacket | None = None
+        self._suspect: TimedPacket | None = None
         self._suspects = 0
         self._since_jump = _SETTLED_PACKETS
 
@@ -144,7 +158,7 @@ class RotationCutter:
         self._last = self._suspect = None
         return done
 
-    def _placed(self, packet: Packet, t_host_ns: int | None, origin: int) -> Placed:
+    def _placed(self, packet: Packet, t_host_ns: int | None, origin: int) -> TimedPacket:
         """The packet in the hour that is nearest to when it must have been sent."""
         time_us, azimuth_cdeg, rate_cdeg_us, span_us, _, data = packet
         if self._last is not None:
@@ -153,9 +167,9 @@ class RotationCutter:
             if not -0.5 < hours < 0.5:
                 time_us += round(hours) * HOUR_US
         phase_cdeg = (azimuth_cdeg - self._behind_cdeg) % ROTATION_CDEG
-        return Placed(time_us, phase_cdeg, rate_cdeg_us, span_us, data, t_host_ns, origin)
+        return TimedPacket(time_us, phase_cdeg, rate_cdeg_us, span_us, data, t_host_ns, origin)
 
-    def _accept(self, placed: Placed) -> _Place:
+    def _accept(self, placed: TimedPacket) -> _Place:
         """Where the packet belongs. BadPacket when it does not fit to those before it.
 
         What does not fit is not believed at once: it becomes the beginning only when the next packet follows on it.
@@ -191,7 +205,7 @@ class RotationCutter:
         self._suspect = placed
         raise BadPacket(OUT_OF_ORDER)
 
-    def _is_doubled(self, placed: Placed) -> bool:
+    def _is_doubled(self, placed: TimedPacket) -> bool:
         """Whether a packet of this time is there already; only some µs off, one of the two is spoiled."""
         apart_us = _APART_SHARE * placed.span_us
         if not self._packets or placed.time_us - self._packets[-1].time_us >= apart_us:
@@ -224,7 +238,7 @@ class RotationCutter:
         return Rotation(packets, ahead_us, self.clock.to_ns(ahead_us))
 
 
-def _turns(earlier: Placed, later: Placed) -> int | None:
+def _turns(earlier: TimedPacket, later: TimedPacket) -> int | None:
     """How often the head passed behind the car between two packets; None when their azimuths disagree with their
     times."""
     advance = (later.time_us - earlier.time_us) * later.rate_cdeg_us
@@ -234,23 +248,23 @@ def _turns(earlier: Placed, later: Placed) -> int | None:
     return turns if off <= _AZIMUTH_TOLERANCE_CDEG + _AZIMUTH_TOLERANCE_SHARE * advance else None
 
 
-def _follows(suspect: Placed, placed: Placed) -> bool:
+def _follows(suspect: TimedPacket, placed: TimedPacket) -> bool:
     """Whether two packets that fit to nothing else fit to each other."""
     ahead_us = (placed.time_us - suspect.time_us + HOUR_US // 2) % HOUR_US - HOUR_US // 2
     moved = suspect._replace(time_us=placed.time_us - ahead_us)
     return 0 < ahead_us <= _CONTINUES_US and _turns(moved, placed) is not None
 
 
-def _host_gap_us(last: Placed, t_host_ns: int | None) -> int | None:
+def _host_gap_us(last: TimedPacket, t_host_ns: int | None) -> int | None:
     """By the host's clock, how long after ``last`` a packet came; None when one of them has no host time."""
     return None if last.t_host_ns is None or t_host_ns is None else (t_host_ns - last.t_host_ns) // 1000
 
 
-def _time_us(placed: Placed) -> int:
+def _time_us(placed: TimedPacket) -> int:
     return placed.time_us
 
 
-def _missing(packets: list[Placed]) -> int:
+def _missing(packets: list[TimedPacket]) -> int:
     """Packets that must have been sent between those at hand."""
     span_us = packets[0].span_us
     gaps = np.diff([placed.time_us for placed in packets]) / span_us

@@ -49,16 +49,20 @@ class BadPacket(Exception):
 
 
 class Packet(NamedTuple):
-    """time_us: past the hour, when the first block's first laser fired. azimuth_cdeg: of the first block, hundredths of
-    a degree, clockwise from straight ahead. rate_cdeg_us: how fast the head turns. span_us: time from it to the
-    next. data: all 1206 bytes."""
+    """A data packet that passed the checks."""
 
     time_us: int
+    """Past the hour, when the first block's first laser fired."""
     azimuth_cdeg: int
+    """Of the first block: hundredths of a degree, clockwise from straight ahead."""
     rate_cdeg_us: float
+    """How fast the head turns."""
     span_us: float
+    """From this packet's first firing to the next packet's."""
     dual: bool
+    """Two returns per firing."""
     data: bytes
+    """All 1206 bytes."""
 
 
 def read_packet(data: bytes) -> Packet:

@@ -12,13 +12,16 @@ _PPS = {0: "absent", 1: "synchronising", 2: "locked", 3: "error"}
 
 
 class Position(NamedTuple):
-    """time_us: the sensor's, past the hour. pps: state of the pulse per second. nmea: the receiver's sentence as it
-    came ($GPRMC or $GPGGA), empty without one. locked: the sensor's time is UTC: pulses come, and there is a fix."""
+    """What the packet says of the sensor's clock."""
 
     time_us: int
+    """The sensor's, past the hour."""
     pps: str
+    """State of the pulse per second."""
     nmea: str
+    """The receiver's sentence as it came ($GPRMC or $GPGGA); empty without one."""
     locked: bool
+    """Whether the sensor's time is UTC: pulses come, and there is a fix."""
 
 
 def read_position(data: bytes) -> Position:

@@ -20,12 +20,13 @@ _FEWEST_PAIRS = 3
 
 
 @dataclass(frozen=True)
-class Shot:
+class FrameInfo:
     """One frame, without its data."""
 
     name: str
     """The recording's own name of the frame."""
     t_ns: int
+    """Of the tick."""
     camera: CameraCalibration | None = None
     """None where the camera has no calibration."""
     size: tuple[int, int] | None = None
@@ -34,6 +35,7 @@ class Shot:
     """(4, 4), takes ego points to the frame of KITTI's labels: the recording's rectified camera 0 if it has one, else
     the camera itself."""
     ego: EgoState | None = None
+    """Speed, yaw rate and course; None where nothing measured them."""
 
 
 def _no_points(frame: int) -> F32 | None:
@@ -45,7 +47,8 @@ class LabeledDrive:
     """The recording that labels belong to."""
 
     uri: str
-    shots: tuple[Shot, ...]
+    """As the recording was opened."""
+    shots: tuple[FrameInfo, ...]
     """Every frame, in order."""
     points: Callable[[int], F32 | None] = field(default=_no_points, compare=False)
     """Gives the (N, 4) float32 x y z intensity of a frame's sweep, None without one; read on demand."""
@@ -85,7 +88,7 @@ def drive_of(
         T_rect_ego = source.T_rect_ego(index) if isinstance(source, Rectified) else None
         if T_rect_ego is None and camera is not None:
             T_rect_ego = camera.T_camera_ego
-        shots.append(Shot(frame.name, frame.t_ns, camera, size, T_rect_ego, frame.ego))
+        shots.append(FrameInfo(frame.name, frame.t_ns, camera, size, T_rect_ego, frame.ego))
         progress(index + 1, len(source))
 
     def points(index: int) -> F32 | None:
@@ -105,6 +108,7 @@ class Imported:
     """What was read from a file of labels."""
 
     labels: LabelSet
+    """In the frames of the drive that they were read for."""
     notes: tuple[str, ...] = ()
     """What the file says that labels cannot hold, and what it does not say."""
 
@@ -113,7 +117,7 @@ Write = Callable[[LabelSet, LabeledDrive, Path], tuple[str, ...]]
 """Labels that hold nothing but what the format can, the drive, where to. Gives sentences about what was written
 otherwise than it was."""
 
-Read = Callable[[Path, LabeledDrive, Origin], Imported]
+ReadLabels = Callable[[Path, LabeledDrive, Origin], Imported]
 """The file or folder, the drive, and who made labels of which the file does not say that."""
 
 

@@ -1,8 +1,9 @@
-"""Our own file, ``cipv-labels`` version 4: JSON with every field of ``LabelSet`` under its own name; nothing is lost.
+"""Our own file, ``cipv-labels`` version 5: JSON with every field of ``LabelSet`` under its own name; nothing is lost.
 
 A reader of this version takes what it does not know for a mistake, and a newer version for one it cannot read. In
 version 1 a tag was of one frame; up to version 2 tracks had neither confidence nor heading;
-up to version 3 nothing told boxes that were set, nor truncation and occlusion.
+up to version 3 nothing told boxes that were set, nor truncation and occlusion; up to version 4 tracks had no
+attributes.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from pydantic import TypeAdapter
 from pipeline.common.errors import BadInput
 from pipeline.labels.formats.base import Imported, LabeledDrive, write_file
 from pipeline.labels.formats.reading import fit, parse_json, read_bytes
-from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel
+from pipeline.labels.model import Attribute, EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel
 from pipeline.labels.validate import check
 
 KIND = "cipv-labels"
-VERSION = 4
+VERSION = 5
 _LABELS = TypeAdapter(LabelSet)
 _AtFrame = TypeVar("_AtFrame", PathLabel, EventLabel)
-_Range = TypeVar("_Range", LeadRange, FrameTag)
+_Range = TypeVar("_Range", LeadRange, FrameTag, Attribute)
 
 
 def to_json(labels: LabelSet) -> bytes:
@@ -100,7 +101,8 @@ def onto(labels: LabelSet, drive: LabeledDrive, what: str) -> Imported:
 
 def _moved_track(track: LabelTrack, to: dict[int, int]) -> LabelTrack:
     kept = (replace(each, frame=to[each.frame]) for each in track.sightings if each.frame in to)
-    return replace(track, sightings=tuple(sorted(kept, key=lambda each: each.frame)))
+    said = tuple(part for each in track.attributes for part in _moved_range(each, to))
+    return replace(track, sightings=tuple(sorted(kept, key=lambda each: each.frame)), attributes=said)
 
 
 def _moved_range(label: _Range, to: dict[int, int]) -> list[_Range]:

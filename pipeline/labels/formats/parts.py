@@ -9,11 +9,11 @@ from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, LeadRange, P
 
 Part = Literal[
     "cuboids", "boxes", "identities", "leads", "paths", "events", "tags", "states", "origins", "comments",
-    "reviews", "keyframes", "name",
+    "reviews", "keyframes", "name", "attributes",
 ]  # fmt: skip
 """identities: that sightings in several frames are the same track. states: proposed, accepted, corrected, rejected.
 origins: who made a label, when, how, with which parameters. reviews: who found it right. keyframes: which sightings
-were interpolated. name: of a frozen version."""
+were interpolated. name: of a frozen version. attributes: what is said of tracks besides their class."""
 
 EVERYTHING: frozenset[Part] = frozenset(get_args(Part))
 
@@ -123,6 +123,9 @@ def _lost_marks(labels: LabelSet, missing: frozenset[Part]) -> list[str]:
         lost.append(_count(states.count("corrected"), "{} written like accepted ones", "corrected label"))
     if "origins" in missing and (labels.tracks or labels.leads):
         lost.append("who made each label, when and with which parameters is not written")
+    if "attributes" in missing:
+        said = sum(len(track.attributes) for track in labels.tracks)
+        lost.append(_count(said, "{} not written: the format cannot hold them", "attribute"))
     if "name" in missing and labels.name != "working":
         lost.append(f"the version's name {labels.name!r} is not written")
     return lost

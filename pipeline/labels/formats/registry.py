@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pipeline.common.errors import BadInput
 from pipeline.common.garbage_collection import gc_paused
-from pipeline.labels.formats.base import Imported, LabeledDrive, Read, Write, check_extrinsic
+from pipeline.labels.classes import ClassList, as_written, default_classes
+from pipeline.labels.formats.base import Imported, LabeledDrive, ReadLabels, Write, check_extrinsic
 from pipeline.labels.formats.parts import EVERYTHING, Part, reduce
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.labels.validate import check
 
 
 @dataclass(frozen=True)
-class Format:
+class LabelFormat:
     """One kind of file or folder that holds labels."""
 
     name: str
@@ -49,7 +50,7 @@ class Format:
     def read(self, path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
         """Read the file or folder; ``origin`` is taken where the file does not say who made a label. BadInput in one
         sentence when it cannot be read."""
-        read: Read = _imported(self.reader)
+        read: ReadLabels = _imported(self.reader)
         return read(path, drive, origin)
 
 
@@ -64,24 +65,24 @@ _TRACKED: frozenset[Part] = frozenset(("cuboids", "identities"))
 _BOXES: frozenset[Part] = frozenset(("boxes", "identities"))
 _LEADS: frozenset[Part] = frozenset(("leads", "states", "origins", "comments", "reviews"))
 
-FORMATS: dict[str, Format] = {
+FORMATS: dict[str, LabelFormat] = {
     each.name: each
     for each in (
-        Format("native", "CIPV Studio", "all labels", ".json", EVERYTHING,
+        LabelFormat("native", "CIPV Studio", "all labels", ".json", EVERYTHING,
                f"{_OURS}.native:write", f"{_OURS}.native:read", as_stored=True),
-        Format("mcap", "MCAP session", "labels as a channel", ".mcap", EVERYTHING,
+        LabelFormat("mcap", "MCAP session", "labels as a channel", ".mcap", EVERYTHING,
                f"{_OURS}.session:write", f"{_OURS}.session:read", as_stored=True),
-        Format("openlabel", "OpenLABEL", "ASAM OpenLABEL 1.0", ".json", EVERYTHING,
+        LabelFormat("openlabel", "OpenLABEL", "ASAM OpenLABEL 1.0", ".json", EVERYTHING - {"attributes"},
                f"{_OURS}.openlabel.write:write", f"{_OURS}.openlabel.read:read"),
-        Format("nuscenes", "nuScenes", "JSON tables", "", _TRACKED,
+        LabelFormat("nuscenes", "nuScenes", "JSON tables", "", _TRACKED,
                f"{_OURS}.nuscenes.write:write", f"{_OURS}.nuscenes.read:read"),
-        Format("kitti", "KITTI object", "one file per frame", "", _SHAPES,
+        LabelFormat("kitti", "KITTI object", "one file per frame", "", _SHAPES,
                f"{_OURS}.kitti.files:write_objects", f"{_OURS}.kitti.files:read_objects"),
-        Format("kitti-tracking", "KITTI tracking", "single file", "", _SHAPES | {"identities"},
+        LabelFormat("kitti-tracking", "KITTI tracking", "single file", "", _SHAPES | {"identities"},
                f"{_OURS}.kitti.files:write_tracking", f"{_OURS}.kitti.files:read_tracking"),
-        Format("coco", "COCO", "image boxes", ".json", _BOXES,
+        LabelFormat("coco", "COCO", "image boxes", ".json", _BOXES,
                f"{_OURS}.coco:write", f"{_OURS}.coco:read"),
-        Format("csv", "CSV", "lead per frame", ".csv", _LEADS,
+        LabelFormat("csv", "CSV", "lead per frame", ".csv", _LEADS,
                f"{_OURS}.lead_csv:write", f"{_OURS}.lead_csv:read"),
     )
 }  # fmt: skip
@@ -94,8 +95,11 @@ else:
 """The names as a type, for the choices of commands and of the API."""
 
 
-def export_labels(labels: LabelSet, drive: LabeledDrive, name: FormatName, out: Path) -> tuple[str, ...]:
-    """Write labels of a drive as a new file or folder. Returns a sentence for each thing that the format cannot hold.
+def export_labels(
+    labels: LabelSet, drive: LabeledDrive, name: FormatName, out: Path, classes: ClassList | None = None
+) -> tuple[str, ...]:
+    """Write labels of a drive as a new file or folder. Returns a sentence for each thing that the format cannot hold,
+    or calls otherwise. classes: the project's; those of the program otherwise.
 
     BadInput when the labels are of another recording or are not valid, when ``out`` exists, or when the format needs
     what the recording does not have (KITTI: a camera).
@@ -108,8 +112,9 @@ def export_labels(labels: LabelSet, drive: LabeledDrive, name: FormatName, out: 
         placed = onto(check(labels, "these labels"), drive, "these labels")
         follows = "boxes" in kind.holds and not kind.as_stored
         whole = following(placed.labels, drive) if follows else placed.labels
-        kept, lost = reduce(whole, kind.holds)
-        return (*placed.notes, *lost, *kind.write(kept, drive, out))
+        called, renamed = as_written(whole, classes or default_classes(), name)
+        kept, lost = reduce(called, kind.holds)
+        return (*placed.notes, *lost, *renamed, *kind.write(kept, drive, out))
 
 
 def import_labels(path: Path, drive: LabeledDrive, name: FormatName, origin: Origin) -> Imported:

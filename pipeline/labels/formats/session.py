@@ -1,10 +1,12 @@
-"""Labels inside an MCAP session: our own JSON as a message of ``/labels``, beside everything that the drive is."""
+"""Labels inside an MCAP session: our own JSON as a message of ``/labels``, beside everything that the drive is; and
+those of each frame as Foxglove draws them."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from pipeline.common.errors import BadInput
+from pipeline.labels.boxes import following
 from pipeline.labels.formats.base import Imported, LabeledDrive
 from pipeline.labels.formats.native import from_json, onto, to_json
 from pipeline.labels.model import LabelSet, Origin
@@ -13,10 +15,11 @@ from pipeline.sources import open_source
 
 def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
     """The whole recording as a new session, with these labels in place of any that it had."""
+    from pipeline.labels.formats.drawn import drawn
     from pipeline.recording.save import save  # half a second of imports: only who writes a session pays
 
     out.parent.mkdir(parents=True, exist_ok=True)
-    save(open_source(drive.uri), out, labels=to_json(labels))
+    save(open_source(drive.uri), out, labels=to_json(labels), drawn=drawn(following(labels, drive)))
     return ()
 
 

@@ -10,12 +10,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from pipeline.lanes.heads import classes, curves, row_grid, two_masks
-from pipeline.lanes.heads.head import Answer, Head, UnknownLaneHead
+from pipeline.lanes.heads.head import LaneHead, LaneOutputs, UnknownLaneHead
 from pipeline.types import F32
 
-__all__ = ["HEADS", "Head", "UnknownLaneHead", "pick_head"]
+__all__ = ["HEADS", "LaneHead", "UnknownLaneHead", "pick_head"]
 
-HEADS: tuple[Callable[[Answer], Head | None], ...] = (
+HEADS: tuple[Callable[[LaneOutputs], LaneHead | None], ...] = (
     two_masks.recognise,
     curves.recognise,
     row_grid.recognise,
@@ -24,9 +24,9 @@ HEADS: tuple[Callable[[Answer], Head | None], ...] = (
 """Each gives the head, if an answer is of its form. The first that does is taken."""
 
 
-def pick_head(outputs: Sequence[F32], names: Sequence[str]) -> Head:
+def pick_head(outputs: Sequence[F32], names: Sequence[str]) -> LaneHead:
     """The head of a network, by the shapes and the names of its outputs. UnknownLaneHead when none recognises them."""
-    answer = Answer([np.asarray(output).shape for output in outputs], names)
+    answer = LaneOutputs([np.asarray(output).shape for output in outputs], names)
     for recognise in HEADS:
         head = recognise(answer)
         if head is not None:

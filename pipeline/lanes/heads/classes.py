@@ -3,7 +3,7 @@ ENet-SAD and its like (CULane). Class 0 is nothing. CULane's mean and spread, RG
 
 from __future__ import annotations
 
-from pipeline.lanes.heads.head import Answer, Fit, Head
+from pipeline.lanes.heads.head import InputFit, LaneHead, LaneOutputs
 from pipeline.lanes.heads.masks import from_masks
 
 _CULANE = ((0.3598, 0.3653, 0.3662), (0.2573, 0.2663, 0.2756))
@@ -11,7 +11,7 @@ _CUT_ASPECT = 4.0
 """An input wider than this is for images whose sky was cut off (CULane at 976×208)."""
 
 
-def recognise(answer: Answer) -> Head | None:
+def recognise(answer: LaneOutputs) -> LaneHead | None:
     """A single map of some classes, too large for a grid of cells."""
     index = answer.only_map()
     if index is None:
@@ -20,5 +20,5 @@ def recognise(answer: Answer) -> Head | None:
     if not 2 <= channels <= 16 or rows < 32 or columns < 32:
         return None
     exists = next((i for i, shape in enumerate(answer.shapes) if shape == (1, channels - 1)), None)
-    fit: Fit = "lower" if columns > _CUT_ASPECT * rows else "stretch"
-    return Head("classes", index, from_masks, fit, exists, *_CULANE)
+    fit: InputFit = "lower" if columns > _CUT_ASPECT * rows else "stretch"
+    return LaneHead("classes", index, from_masks, fit, exists, *_CULANE)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.lanes.heads.head import IMAGENET, Answer, Head, Points
+from pipeline.lanes.heads.head import IMAGENET, LaneHead, LaneOutputs, Points
 from pipeline.types import F32
 
 _SAMPLES = 60
@@ -25,7 +25,7 @@ _HORIZON = 1e-3
 
 
 @dataclass(frozen=True)
-class CurveHead(Head):
+class CurveHead(LaneHead):
     """Its lines are there by their own scores."""
 
     scores: int = 0
@@ -54,7 +54,7 @@ def from_curves(values: F32) -> Points:
     return Points(np.column_stack([x[keep], y[keep]]), np.ones(len(line), np.float32), line)
 
 
-def recognise(answer: Answer) -> Head | None:
+def recognise(answer: LaneOutputs) -> LaneHead | None:
     """Curves of eight numbers and as many pairs of scores; the first of each, since training leaves others behind."""
     curves = next((i for i, shape in enumerate(answer.shapes) if len(shape) == 3 and shape[2] == 8), None)
     if curves is None:

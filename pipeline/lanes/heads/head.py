@@ -10,10 +10,10 @@ import numpy as np
 
 from pipeline.types import F32, F64, I32
 
-Fit = Literal["stretch", "letterbox", "lower"]
+InputFit = Literal["stretch", "letterbox", "lower"]
 """How an image is fitted to the input: stretched; scaled whole onto grey; its lower part, in the input's aspect."""
-Colour = tuple[float, float, float]
-IMAGENET: tuple[Colour, Colour] = ((0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
+PerChannel = tuple[float, float, float]
+IMAGENET: tuple[PerChannel, PerChannel] = ((0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
 """Mean and spread of the images that most networks were first trained on."""
 _THERE = 0.5
 """A line is there when its probability is higher."""
@@ -35,11 +35,13 @@ class Points:
     """(M,) which line each is of; −1 where the network does not say."""
 
 
-class Answer(NamedTuple):
+class LaneOutputs(NamedTuple):
     """The outputs of a network, to recognise its head by."""
 
     shapes: Sequence[tuple[int, ...]]
+    """Of each output, in the network's order."""
     names: Sequence[str]
+    """Of each output, as the file has them."""
 
     def only_map(self) -> int | None:
         """The index of the one output that is a map, (1, channels, rows, columns); None when there are none or more."""
@@ -48,7 +50,7 @@ class Answer(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Head:
+class LaneHead:
     """How one family of networks takes its image (RGB), and how its answer is read."""
 
     name: str
@@ -57,12 +59,13 @@ class Head:
     """Which output holds the lines."""
     read: Callable[[F32], Points]
     """That output without its batch axis → points."""
-    fit: Fit = "stretch"
+    fit: InputFit = "stretch"
+    """How the image is brought to the network's input size."""
     exists: int | None = None
     """Which output holds the probability that each line is there; None: no output does."""
-    mean: Colour = (0.0, 0.0, 0.0)
+    mean: PerChannel = (0.0, 0.0, 0.0)
     """Taken from the image's 0–1."""
-    spread: Colour = (1.0, 1.0, 1.0)
+    spread: PerChannel = (1.0, 1.0, 1.0)
     """What the difference is divided by."""
     horizon: float | None = None
     """Where its training images had the horizon, as a share of their height: so much sky is cut off that the input

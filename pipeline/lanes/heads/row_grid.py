@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.lanes.heads.head import IMAGENET, Answer, Head, Points
+from pipeline.lanes.heads.head import IMAGENET, LaneHead, LaneOutputs, Points
 from pipeline.types import F32
 
 _TUSIMPLE_ROWS = (np.arange(56) * 10 + 160) / 720
@@ -16,7 +16,7 @@ _CULANE_ROWS = (
 _MOST_LINES, _FEWEST_CELLS = 8, 50
 
 
-def recognise(answer: Answer) -> Head | None:
+def recognise(answer: LaneOutputs) -> LaneHead | None:
     """A single map of many cells, with the rows of one of the two data sets."""
     index = answer.only_map()
     if index is None:
@@ -25,7 +25,7 @@ def recognise(answer: Answer) -> Head | None:
     known_rows = rows in (len(_CULANE_ROWS), len(_TUSIMPLE_ROWS))
     if not known_rows or columns > _MOST_LINES or channels <= _FEWEST_CELLS:
         return None
-    return Head("row grid", index, from_rows, "stretch", None, *IMAGENET)
+    return LaneHead("row grid", index, from_rows, "stretch", None, *IMAGENET)
 
 
 def from_rows(values: F32) -> Points:

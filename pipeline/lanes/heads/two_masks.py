@@ -3,16 +3,16 @@
 
 from __future__ import annotations
 
-from pipeline.lanes.heads.head import IMAGENET, Answer, Head
+from pipeline.lanes.heads.head import IMAGENET, LaneHead, LaneOutputs
 from pipeline.lanes.heads.masks import from_masks
 
 
-def recognise(answer: Answer) -> Head | None:
+def recognise(answer: LaneOutputs) -> LaneHead | None:
     """The lane mask is the one whose name says so, else the second."""
     masks = [i for i, shape in enumerate(answer.shapes) if len(shape) == 4 and shape[:2] == (1, 2)]
     if len(masks) != 2:
         return None
     lanes = next((i for i in masks if answer.names[i].lower().startswith(("ll", "lane"))), masks[1])
     if any(len(shape) == 3 and shape[2] == 6 for shape in answer.shapes):
-        return Head("YOLOP", lanes, from_masks, "letterbox", None, *IMAGENET)
-    return Head("two masks", lanes, from_masks)
+        return LaneHead("YOLOP", lanes, from_masks, "letterbox", None, *IMAGENET)
+    return LaneHead("two masks", lanes, from_masks)

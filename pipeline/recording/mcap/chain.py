@@ -29,16 +29,18 @@ BEGINNING = ""
 _PIECE_BYTES = 1 << 20
 _LONGEST_LINK = 1024
 
-State = Literal["not chained", "intact", "cut off", "changed"]
+ChainState = Literal["not chained", "intact", "cut off", "changed"]
 
 
 class Link(NamedTuple):
-    """A record of the chain. previous: the hash in the record before. sha256: of that text and all bytes since that
-    record. is_last: no message follows."""
+    """A record of the chain."""
 
     previous: str
+    """The hash in the record before."""
     sha256: str
+    """Of that text and all bytes since that record."""
     is_last: bool
+    """No message follows: without it the file's end was cut off."""
 
     def record(self) -> bytes:
         """As it is in the file."""
@@ -53,7 +55,7 @@ class Link(NamedTuple):
 class Chain:
     """What the chain of a file says."""
 
-    state: State
+    state: ChainState
     """``cut off``: intact as far as it goes, and it does not go to the end."""
     changed: tuple[str, ...] = ()
     """Where the file is not as it was written, in words."""
@@ -118,7 +120,7 @@ class _Walk:
     def chain(self) -> Chain:
         end = self._follow()
         if not self._has_data_end and self._ends_whole():
-            self._changed.append(f"from byte {end:,} on it is no MCAP file")
+            self._changed.append(f"from byte {end:,} on it is not an MCAP file")
         if not self._links and not self._names_a_link():
             return Chain("not chained")
         if self._ended:
@@ -151,7 +153,7 @@ class _Walk:
             if opcode == Opcode.DATA_END:
                 self._has_data_end, self._ended = True, is_last
                 if has_more:
-                    self._changed.append(f"bytes {begin:,} to {offset:,} were put in")
+                    self._changed.append(f"bytes {begin:,} to {offset:,} were inserted")
                 return offset
             if link is None:
                 self._hashed(offset, length, part)
@@ -159,7 +161,7 @@ class _Walk:
             else:
                 told = link[0]
                 if told.previous != previous:
-                    self._changed.append(f"something before byte {begin:,} was taken out or put in")
+                    self._changed.append(f"something before byte {begin:,} was removed or inserted")
                     part = self._part(begin, offset, told.previous)
                 if part.hexdigest() != told.sha256:
                     self._changed.append(f"bytes {begin:,} to {offset:,} were changed")
@@ -210,7 +212,7 @@ class _Walk:
             (each.offset, each.length, each.start_ns, each.end_ns) for each in by_data.chunks
         ]
         same = same and (by_index.attachments, by_index.metadata) == (by_data.attachments, by_data.metadata)
-        return [] if same else ["the index at its end does not fit to the data"]
+        return [] if same else ["the index at its end does not match the data"]
 
 
 def _link(content: bytes) -> Link | None:

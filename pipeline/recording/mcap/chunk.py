@@ -23,14 +23,19 @@ LARGEST_CHUNK_BYTES = 256 << 20
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
-class Place(NamedTuple):
+class MessagePlace(NamedTuple):
     """Where a message lies in ``UnpackedChunk.data``."""
 
     channel_id: int
+    """Topic of the message."""
     log_time_ns: int
+    """When it was received."""
     publish_time_ns: int
+    """As the sender stamped it."""
     start: int
+    """First byte of its data."""
     end: int
+    """One past its last byte."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +44,11 @@ class UnpackedChunk:
     it."""
 
     data: bytes
-    messages: tuple[Place, ...]
+    """Records, uncompressed."""
+    messages: tuple[MessagePlace, ...]
+    """In the order of the file."""
     named: tuple[Schema | Channel, ...]
+    """Schemas and channels that it tells of, a channel's schema before it."""
 
 
 NOTHING = UnpackedChunk(b"", (), ())
@@ -55,7 +63,7 @@ def unpack(content: bytes) -> UnpackedChunk:
         raise Damaged("a chunk of an invalid size")
     data = _decompressed(chunk)
     length = len(data)
-    messages: list[Place] = []
+    messages: list[MessagePlace] = []
     named: list[Schema | Channel] = []
     offset = 0
     while offset < length:
@@ -65,7 +73,7 @@ def unpack(content: bytes) -> UnpackedChunk:
             raise Damaged("a chunk that ends within a message")
         if opcode == Opcode.MESSAGE:
             channel_id, _, log_time_ns, publish_time_ns = _MESSAGE_HEAD.unpack_from(data, start)
-            messages.append(Place(channel_id, log_time_ns, publish_time_ns, start + _MESSAGE_HEAD.size, offset))
+            messages.append(MessagePlace(channel_id, log_time_ns, publish_time_ns, start + _MESSAGE_HEAD.size, offset))
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             kind = Schema if opcode == Opcode.SCHEMA else Channel
             named.append(kind.read(ReadDataStream(io.BytesIO(data[start:offset]))))
@@ -78,12 +86,12 @@ def _decompressed(chunk: Chunk) -> bytes:
     size = chunk.uncompressed_size
     if chunk.compression == "zstd":
         if zstandard.frame_content_size(chunk.data) > size:
-            raise Damaged("a chunk that unpacks to more than it says")
+            raise Damaged("a chunk larger than declared")
         data = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
     elif chunk.compression == "lz4":
         data = LZ4FrameDecompressor().decompress(chunk.data, max_length=size)
     elif chunk.compression:
-        raise Damaged(f"a chunk packed with {chunk.compression!r}")
+        raise Damaged(f"a chunk with unsupported compression {chunk.compression!r}")
     else:
         data = chunk.data
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:

@@ -18,6 +18,7 @@ from mcap.reader import SeekingReader
 from mcap.records import Channel, Header, Schema
 from mcap.summary import Summary
 
+from pipeline.common.user_files import Overloaded
 from pipeline.recording import topics
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -32,31 +33,44 @@ class Unreadable(Exception):
 
 @dataclass(frozen=True)
 class ChunkEntry:
-    """Where a chunk is and what is in it; ``length`` counts the record's head. channels: ids of its messages' channels,
-    None when the file does not say for sure. index_length: bytes of the message indexes that follow the chunk."""
+    """Where a chunk is and what is in it."""
 
     offset: int
+    """Of its record in the file."""
     length: int
+    """Bytes of the record, its head included."""
     start_ns: int
+    """Earliest log time in it."""
     end_ns: int
+    """Latest log time in it."""
     channels: frozenset[int] | None = None
+    """Ids of its messages' channels; None when the file does not say for sure."""
     index_length: int = 0
+    """Bytes of the message indexes that follow the chunk."""
 
 
 @dataclass
 class Directory:
-    """attachments, metadata: name → (offset, length). problem: None for a whole file, else what it lacks. is_cut: its
-    end is missing; sound_bytes: up to where records are whole."""
+    """The contents of a file."""
 
     profile: str
+    """As its header names it."""
     chunks: list[ChunkEntry] = field(default_factory=list)
+    """In the order of the file."""
     channels: dict[int, topics.Channel] = field(default_factory=dict)
+    """By id."""
     schemas: dict[int, Schema] = field(default_factory=dict)
+    """By id."""
     attachments: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """Name → offset, length."""
     metadata: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """Name → offset, length."""
     problem: str | None = None
+    """None for a whole file; else what it lacks."""
     is_cut: bool = False
+    """Whether its end is missing."""
     sound_bytes: int = 0
+    """Up to where records are whole."""
 
     def know(self, record: Schema | Channel) -> None:
         """A channel or the schema of channels to come, met in the summary or in a chunk."""
@@ -111,6 +125,8 @@ def read_summary(file: BinaryIO, size: int) -> Summary | None:
             return None
         file.seek(0)
         summary = SeekingReader(file, record_size_limit=size).get_summary()
+    except Overloaded:  # of a store, not of the file
+        raise
     except Exception:  # damaged bytes make the library raise whatever they like; such a summary is as good as none
         return None
     if summary is None or summary.statistics is None:

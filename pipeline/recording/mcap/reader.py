@@ -9,7 +9,7 @@ from collections import OrderedDict
 from collections.abc import Collection, Iterator
 from concurrent.futures import Future
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,8 @@ from mcap.records import Attachment, Metadata
 
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
-from pipeline.common.user_files import open_regular
+from pipeline.common.remote_files import is_remote, open_remote
+from pipeline.common.user_files import Overloaded, open_regular
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
 from pipeline.recording.mcap.chunk import NOTHING, UnpackedChunk, unpack
@@ -37,9 +38,13 @@ class Stored(NamedTuple):
     """A message as it is in the file."""
 
     channel: topics.Channel
+    """Topic, schema and encoding."""
     log_time_ns: int
+    """When it was received."""
     publish_time_ns: int
+    """As the sender stamped it."""
     data: bytes
+    """Encoded as the channel says."""
 
 
 class McapFile:
@@ -49,13 +54,14 @@ class McapFile:
     walk: do not trust the summary.
     """
 
-    def __init__(self, path: Path, *, walk: bool = False) -> None:
+    def __init__(self, path: Path | str, *, walk: bool = False) -> None:
+        """path: of a file, or the address of one in a store, which is read in place by range requests."""
         self.path = path
         self.damaged: set[int] = set()
         self._held: OrderedDict[int, Future[UnpackedChunk]] = OrderedDict()
         self._lock = threading.Lock()
         try:
-            self._file = open_regular(path)
+            self._file = self.open_again()
         except OSError as error:
             raise NotMcap(f"{path}: {error.strerror}") from None
         try:
@@ -77,6 +83,11 @@ class McapFile:
 
     def close(self) -> None:
         self._file.close()
+
+    def open_again(self) -> BinaryIO:
+        """The file's bytes, open a second time. Raises what opening it raises."""
+        path = self.path
+        return open_remote(path) if isinstance(path, str) and is_remote(path) else open_regular(Path(path))
 
     def messages(
         self,
@@ -173,6 +184,8 @@ class McapFile:
             try:
                 found.set_result(self._read_chunk(place))
             except BaseException as end:  # of this thread; who waits must not wait for ever
+                with self._lock:
+                    self._held.pop(place, None)  # a store that failed now is asked again
                 found.set_exception(end)
         return found.result()
 
@@ -182,6 +195,8 @@ class McapFile:
         entry = self.directory.chunks[place]
         try:
             chunk = unpack(self._record(entry.offset, entry.length))
+        except Overloaded:  # says nothing of the file
+            raise
         except Exception:  # see ``unpack``
             self.damaged.add(place)
             return NOTHING

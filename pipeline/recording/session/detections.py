@@ -16,10 +16,15 @@ class BoxesRecord:
     """``RawBoxes``, its arrays as rows of numbers."""
 
     model: str
+    """Name of the detector that found them."""
     boxes: tuple[tuple[float, float, float, float], ...]
+    """x1 y1 x2 y2 in pixels."""
     scores: tuple[float, ...]
+    """0–1, one a box."""
     labels: tuple[str, ...]
+    """Class names, one a box."""
     law: DistanceLaw
+    """Which distances are computed from these boxes."""
 
     def raw(self) -> RawBoxes:
         """Damaged when a box lacks its score or its class."""
@@ -34,9 +39,13 @@ class LanesRecord:
     """``RawLanes``, its arrays as rows of numbers."""
 
     model: str
+    """Name of the detector that found them."""
     points: tuple[tuple[float, float], ...]
+    """x, y in pixels."""
     scores: tuple[float, ...]
+    """0–1, one a point."""
     line: tuple[int, ...]
+    """Number of the line that each point is on."""
 
     def raw(self) -> RawLanes:
         """Damaged when a point lacks its score or its line."""
@@ -48,10 +57,12 @@ class LanesRecord:
 
 @dataclass(frozen=True)
 class Given:
-    """The detections that a frame came with; None where nothing was looked for."""
+    """The detections that a frame came with."""
 
     boxes: BoxesRecord | None = None
+    """None where no vehicles were looked for."""
     lanes: LanesRecord | None = None
+    """None where no lane lines were looked for."""
 
 
 def given_of(frame: Frame) -> Given | None:

@@ -29,30 +29,38 @@ _DISTORTIONS = (0, 4, 5, 8)
 
 @dataclass(frozen=True)
 class SweepRef:
-    """The point cloud stored at ``at_ns`` (log time)."""
+    """A point cloud stored as a message of its own."""
 
     at_ns: Nanoseconds
+    """Log time of the message."""
     t_ns: Nanoseconds
+    """Its reference time, by the drive's clock."""
     channels: Annotated[int, Field(ge=1, le=255)]
+    """Rings of the sensor."""
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of the rays, ego x y z."""
 
 
 @dataclass(frozen=True)
 class PictureRef:
-    """The image stored at ``at_ns``; t_ns None where the camera gave no stamp."""
+    """An image stored as a message of its own."""
 
     at_ns: Nanoseconds
+    """Log time of the message."""
     t_ns: Nanoseconds | None
+    """When it was exposed; None where the camera gave no stamp."""
 
 
 @dataclass(frozen=True)
 class PacketsRef:
-    """A sweep that is stored as the sensor's packets, received shortly before the tick. t_ns: the sweep's stamp, which
-    is the decoder's and ``offset_ns``. T_ego_lidar: (4, 4), row by row."""
+    """A sweep that is stored as the sensor's packets, received shortly before the tick."""
 
     t_ns: Nanoseconds
+    """The sweep's stamp: the decoder's and ``offset_ns``."""
     offset_ns: Nanoseconds
+    """Added to the decoder's stamps."""
     T_ego_lidar: tuple[float, ...]
+    """(4, 4), row by row."""
 
 
 def _known_distortion(values: tuple[float, ...]) -> tuple[float, ...]:
@@ -63,15 +71,22 @@ def _known_distortion(values: tuple[float, ...]) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class CameraRecord:
-    """``CameraCalibration`` with its matrices row by row. at_ns: where ``/camera/calibration`` and ``/tf`` have it."""
+    """``CameraCalibration`` with its matrices row by row."""
 
     at_ns: Nanoseconds
+    """Where ``/camera/calibration`` and ``/tf`` have it: log time."""
     K: tuple[float, ...]
+    """(3, 3), pixels."""
     distortion: Annotated[tuple[float, ...], AfterValidator(_known_distortion)]
+    """OpenCV's coefficients; empty for none."""
     T_camera_ego: tuple[float, ...]
+    """(4, 4), takes ego points to the camera frame."""
     width: _Size
+    """Of the images, pixels."""
     height: _Size
+    """Of the images, pixels."""
     road_z_m: float | None = None
+    """Ego z of the road under the car; None where unknown."""
 
     @staticmethod
     def of(camera: CameraCalibration, at_ns: int) -> CameraRecord:
@@ -98,24 +113,38 @@ R = TypeVar("R", SweepRef | None, PictureRef | None, CameraRecord | None)
 
 @dataclass(frozen=True)
 class FrameRecord:
-    """One frame of a session, as in ``Frame``. params_at_ns: where ``/params`` has what it was run with, None when a
-    session holds inputs alone. truth: its labels, None where nobody labelled it. given: detections it came with."""
+    """One frame of a session, as in ``Frame``."""
 
     name: str
+    """Unique within the session."""
     t_ns: Nanoseconds
+    """The tick."""
     notes: tuple[str, ...] = ()
+    """What is missing and why."""
     sweep: SweepRef | None = None
+    """None without one, or when it is stored as packets."""
     packets: PacketsRef | None = None
+    """None unless the sweep is stored as packets."""
     picture: PictureRef | None = None
+    """None without an image."""
     camera: CameraRecord | None = None
+    """None without a calibration."""
     ego: EgoState | None = None
+    """None where nothing measured ego motion."""
     gnss: GnssFix | None = None
+    """None without a fix."""
     streams: tuple[StreamHealth, ...] = ()
+    """Health of live sensors; empty for a converted recording."""
     timing_ms: dict[str, float] = field(default_factory=dict)
+    """By stage, of the run that recorded it."""
     route_at_ns: Nanoseconds | None = None
+    """Where ``/route`` has the planned route: log time; None without one."""
     params_at_ns: Nanoseconds | None = None
+    """Where ``/params`` has what it was run with; None when a session holds inputs alone."""
     truth: tuple[TruthObject, ...] | None = None
+    """Its labels; None where nobody labelled it."""
     given: Given | None = None
+    """Detections it came with; None where networks find them anew."""
 
     def references(self) -> dict[str, int]:
         """Topic → log time of every message that this tick needs besides its own."""

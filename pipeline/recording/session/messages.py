@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 
 from pipeline.common.geometry import inverse
-from pipeline.common.picture_decoding import TooMuch, decode_within_budget
+from pipeline.common.image_decoding import TooMuch, decode_within_budget
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
-from pipeline.types import CameraCalibration, GnssFix, Picture, Sweep
+from pipeline.types import CameraCalibration, CameraImage, GnssFix, Sweep
 from pipeline.types.camera_shot import Shot
 
 _XYZI = ("x", "y", "z", "intensity")
@@ -71,7 +71,7 @@ def _first_of(layout: np.dtype[np.void]) -> np.dtype[np.void]:
     return np.dtype({"names": ["xyzi"], "formats": ["V16"], "offsets": [0], "itemsize": layout.itemsize})
 
 
-def image_message(picture: Picture, t_ns: int) -> bytes:
+def image_message(picture: CameraImage, t_ns: int) -> bytes:
     """``foxglove.CompressedImage``: the camera's JPEG as it came, else a PNG. t_ns: the tick, for a camera without
     stamps of its own."""
     taken_ns = t_ns if picture.t_ns is None else picture.t_ns
@@ -96,7 +96,7 @@ def _compressed(data: bytes, kind: Literal["jpeg", "png"], t_ns: int) -> bytes:
     return to_bytes(message(timestamp=stamp(t_ns), frame_id=topics.CAMERA_FRAME, data=data, format=kind))
 
 
-def picture_from(data: bytes, t_ns: int | None) -> Picture:
+def picture_from(data: bytes, t_ns: int | None) -> CameraImage:
     """The image of a message of ``image_message``. Damaged when it cannot be decoded."""
     message = _parse(topics.IMAGE, data)
     try:
@@ -105,7 +105,7 @@ def picture_from(data: bytes, t_ns: int | None) -> Picture:
         raise Damaged(f"the image cannot be decoded: {error}") from None
     if pixels is None:
         raise Damaged("the image cannot be decoded")
-    return Picture(t_ns, pixels, message.data if message.format == "jpeg" else None)
+    return CameraImage(t_ns, pixels, message.data if message.format == "jpeg" else None)
 
 
 def calibration_message(camera: CameraCalibration, t_ns: int) -> bytes:

@@ -26,8 +26,7 @@ def objects_message(result: dict[str, Any], t_ns: int) -> bytes:
         for each in result.get("objects") or ()
         if (box := _box(each)) is not None
     ]
-    message = topics.message_class(topics.OBJECTS)
-    return to_bytes(message(deletions=[{"timestamp": stamp(t_ns), "type": _DELETE_ALL}], entities=entities))
+    return scene_message(topics.OBJECTS, entities, t_ns)
 
 
 def _box(each: dict[str, Any]) -> tuple[list[float], list[float], float] | None:
@@ -46,21 +45,39 @@ def _box(each: dict[str, Any]) -> tuple[list[float], list[float], float] | None:
 def _entity(
     each: dict[str, Any], box: tuple[list[float], list[float], float], *, is_lead: bool, t_ns: int
 ) -> dict[str, Any]:
-    (x, y, z), size, yaw_rad = box
     color = _CIPV_COLOR if is_lead else _COLOR.get(each["source"], _COLOR["VL"])
-    r, g, b = (int(color[at : at + 2], 16) / 255 for at in (1, 3, 5))
     distance = "" if each.get("distance_m") is None else f" {each['distance_m']:.1f} m"
     name = f"{'CIPV ' if is_lead else ''}#{each['id']} {each.get('type') or each['source']}{distance}"
+    return box_entity(str(each["id"]), box, color, name, t_ns)
+
+
+def scene_message(topic: str, entities: list[dict[str, Any]], t_ns: int) -> bytes:
+    """``foxglove.SceneUpdate`` of these entities, in place of all that the topic showed before."""
+    message = topics.message_class(topic)
+    return to_bytes(message(deletions=[{"timestamp": stamp(t_ns), "type": _DELETE_ALL}], entities=entities))
+
+
+def rgba(color: str, opacity: float) -> dict[str, float]:
+    """``foxglove.Color`` of ``#rrggbb``."""
+    r, g, b = (int(color[at : at + 2], 16) / 255 for at in (1, 3, 5))
+    return {"r": r, "g": g, "b": b, "a": opacity}
+
+
+def box_entity(
+    number: str, box: tuple[list[float], list[float], float], color: str, name: str, t_ns: int
+) -> dict[str, Any]:
+    """A box with its name above it. box: center, size and yaw in the ego frame. color: ``#rrggbb``."""
+    (x, y, z), size, yaw_rad = box
     turned = {"z": math.sin(yaw_rad / 2), "w": math.cos(yaw_rad / 2)}
     return {
         "timestamp": stamp(t_ns),
         "frame_id": topics.EGO_FRAME,
-        "id": str(each["id"]),
+        "id": number,
         "cubes": [
             {
                 "pose": {"position": {"x": x, "y": y, "z": z}, "orientation": turned},
                 "size": dict(zip("xyz", size, strict=True)),
-                "color": {"r": r, "g": g, "b": b, "a": _OPACITY},
+                "color": rgba(color, _OPACITY),
             }
         ],
         "texts": [

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from pipeline.common.progress import Progress, silent
+from pipeline.common.remote_files import is_remote
 from pipeline.params import Params, ParamsError, with_changes
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
@@ -20,7 +21,7 @@ from pipeline.recording.session.frame_record import CameraRecord, FrameRecord, P
 from pipeline.recording.session.messages import log_text, picture_from, sweep_from
 from pipeline.recording.session.provenance import VERSION, About
 from pipeline.recording.session.velodyne_scan import sweep_of_packets
-from pipeline.types import CameraCalibration, Frame, GnssFix, Picture, Route, Sweep
+from pipeline.types import CameraCalibration, CameraImage, Frame, GnssFix, Route, Sweep
 from pipeline.types.source import Mark, Opening, SourceError, TruthObject
 
 _T = TypeVar("_T")
@@ -39,7 +40,7 @@ class SessionSource:
 
     def __init__(self, uri: str, path: str, progress: Progress = silent) -> None:
         try:
-            self.file = McapFile(Path(path).expanduser())
+            self.file = McapFile(path if is_remote(path) else Path(path).expanduser())
         except (NotMcap, OSError, RuntimeError, ValueError) as error:
             raise SourceError(str(error)) from None
         try:
@@ -53,7 +54,7 @@ class SessionSource:
         self.uri, self.origin, self.title, self.rate_hz = uri, about.origin, about.title, about.rate_hz
         self.is_simulated = about.is_of_simulator
         self.notes = (*about.notes, *self._problems(path))
-        self._picture: tuple[PictureRef, Picture] | None = None
+        self._picture: tuple[PictureRef, CameraImage] | None = None
         self._camera: tuple[CameraRecord, CameraCalibration] | None = None
         self._route: tuple[int, Route] | None = None
 
@@ -209,7 +210,7 @@ class SessionSource:
         ref = tick.sweep
         return sweep_from(self.file.message(topics.POINTS, ref.at_ns).data, ref.t_ns, ref.channels, ref.origin)
 
-    def _read_picture(self, ref: PictureRef | None) -> Picture | None:
+    def _read_picture(self, ref: PictureRef | None) -> CameraImage | None:
         """One image may serve several ticks, and is the same object then."""
         if ref is None:
             return None

@@ -27,11 +27,12 @@ _HEADER, _TIME = "std_msgs/msg/Header", "builtin_interfaces/msg/Time"
 
 @dataclass(frozen=True)
 class RawLidar:
-    """What it takes to make sweeps of a sensor's packets. T_ego_lidar: (4, 4), where it sits. offset_ns: what is added
-    to its stamps."""
+    """What it takes to make sweeps of a sensor's packets."""
 
     T_ego_lidar: F64
+    """(4, 4), where the sensor sits."""
     offset_ns: int = 0
+    """Added to its stamps."""
 
     def reference(self, sweep: Sweep) -> PacketsRef:
         """What a tick says of a sweep that is not stored itself."""

@@ -37,7 +37,7 @@ from pipeline.recording.session.messages import (
 from pipeline.recording.session.provenance import About
 from pipeline.recording.session.scene_update import objects_message
 from pipeline.recording.session.velodyne_scan import RawLidar, scan_message
-from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Result, Route, Sweep
+from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, GnssFix, Result, Route, Sweep
 from pipeline.types.camera_shot import Shot
 from pipeline.types.result_json import to_json
 from pipeline.types.source import TruthObject
@@ -70,7 +70,7 @@ class SessionWriter:
         self._kept_frames = 0
         self._header_ns = 0
         self._tick: FrameRecord | None = None
-        self._picture: Picture | None = None
+        self._picture: CameraImage | None = None
         self._camera: CameraCalibration | None = None
         self._route: Route | None = None
         self._params: Params | None = None
@@ -183,6 +183,10 @@ class SessionWriter:
         """What people say is true of the whole, as a file of labels is; the last one written counts."""
         self._add(topics.LABELS, self._clock.now(), data)
 
+    def write_drawn(self, topic: str, data: bytes) -> None:
+        """What viewers show of the labels of the last frame."""
+        self._add(topic, self._clock.now(), data)
+
     def flush(self, *, to_disk: bool = False) -> None:
         """See ``Output.flush``."""
         self._output.flush(to_disk=to_disk)
@@ -218,7 +222,7 @@ class SessionWriter:
         self._add(topics.POINTS, at_ns, points_message(sweep), sweep.t_ns)
         self._sweeps.add(sweep.points, at_ns)
 
-    def _put_picture(self, picture: Picture | None, at_ns: int) -> PictureRef | None:
+    def _put_picture(self, picture: CameraImage | None, at_ns: int) -> PictureRef | None:
         if picture is None:
             return None
         if picture is self._picture and self._tick is not None and self._tick.picture is not None:

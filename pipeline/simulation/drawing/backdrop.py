@@ -7,9 +7,9 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from pipeline.simulation.drawing.canvas import HAZE_BGR, HAZE_M, Ints
+from pipeline.simulation.drawing.canvas import HAZE_BGR, HAZE_M
 from pipeline.simulation.drawing.lens import undistorted
-from pipeline.types import F32, F64, U8, CameraCalibration
+from pipeline.types import F32, F64, I64, U8, CameraCalibration
 
 TILE_M = 24.0
 _TILE_PX = 1024
@@ -78,7 +78,7 @@ def _octaves(rng: np.random.Generator, size: int, steps: tuple[int, ...]) -> F32
     return np.asarray(total / total.max(), dtype=np.float32)
 
 
-class Ground:
+class GroundTexture:
     """Texture and haze of a flat ground under a fixed camera; only the place along the road changes."""
 
     def __init__(self, camera: CameraCalibration, ground_z_m: float, seed: int) -> None:
@@ -122,7 +122,7 @@ def _ground_under(camera: CameraCalibration, ground_z_m: float) -> tuple[int, F6
     return horizon, x, y, np.hypot(x - place[0], y - place[1])
 
 
-def _rays(camera: CameraCalibration, rows: Ints, columns: Ints) -> F64:
+def _rays(camera: CameraCalibration, rows: I64, columns: I64) -> F64:
     """(rows, columns, 3) viewing directions of pixels, camera axes, z = 1."""
     v, u = np.meshgrid(rows, columns, indexing="ij")
     K = camera.K

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pipeline.common.geometry import transform
 from pipeline.simulation.drawing.lens import distorted
-from pipeline.types import F64, U8, CameraCalibration
+from pipeline.types import F64, I64, U8, CameraCalibration
 
 NEAR_M = 0.4
 HAZE_M = 420.0
@@ -23,8 +23,7 @@ _FAR_OUTSIDE_PX = 20_000.0
 _PIECE_PX, _MOST_PIECES = 160.0, 64  # an edge of 160 px in the image's corner is bent by a quarter of a pixel
 
 Colour = tuple[float, float, float]
-Point = tuple[float, float, float]
-Ints = npt.NDArray[np.int64]
+CanvasPoint = tuple[float, float, float]
 
 
 def hazed(bgr: F64, distance_m: npt.ArrayLike) -> F64:
@@ -56,12 +55,12 @@ class Canvas:
 
     def _clear(self) -> None:
         self._points: list[F64] = []
-        self._counts: list[Ints] = []
+        self._counts: list[I64] = []
         self._colours: list[F64] = []
         self._normals: list[F64] = []
-        self._faces: list[tuple[tuple[Point, ...], Colour, Point]] = []
+        self._faces: list[tuple[tuple[CanvasPoint, ...], Colour, CanvasPoint]] = []
 
-    def add(self, points: F64, counts: Ints, colours: F64, normals: F64 | None = None) -> None:
+    def add(self, points: F64, counts: I64, colours: F64, normals: F64 | None = None) -> None:
         """Polygons: (V, 3) ego points, (P,) numbers of corners, (P, 3) colours and (P, 3) normals for shading. Without
         normals only haze is applied."""
         self._gather_faces()
@@ -70,7 +69,7 @@ class Canvas:
         self._colours.append(colours)
         self._normals.append(np.zeros((len(counts), 3)) if normals is None else normals)
 
-    def add_face(self, corners: tuple[Point, ...], bgr: Colour, normal: Point = (0.0, 0.0, 0.0)) -> None:
+    def add_face(self, corners: tuple[CanvasPoint, ...], bgr: Colour, normal: CanvasPoint = (0.0, 0.0, 0.0)) -> None:
         """One polygon given corner by corner."""
         self._faces.append((corners, bgr, normal))
 
@@ -116,7 +115,7 @@ class Canvas:
         for i in np.flatnonzero(self._inside(fixed, starts)).tolist():
             cv2.fillPoly(self.bgr, [fixed[starts_list[i] : ends[i]]], colour_list[i], cv2.LINE_AA, _SHIFT)
 
-    def _fine_edges(self, flat: F64, counts: Ints) -> tuple[F64, Ints]:
+    def _fine_edges(self, flat: F64, counts: I64) -> tuple[F64, I64]:
         """Subdivide long edges: lens distortion bends straight edges."""
         if not self._distortion.size:
             return flat, counts
@@ -131,7 +130,7 @@ class Canvas:
         fine = np.repeat(flat, pieces, axis=0) + share[:, None] * np.repeat(edge, pieces, axis=0)
         return fine, np.add.reduceat(pieces, starts)
 
-    def _inside(self, fixed: npt.NDArray[np.int32], starts: Ints) -> npt.NDArray[np.bool_]:
+    def _inside(self, fixed: npt.NDArray[np.int32], starts: I64) -> npt.NDArray[np.bool_]:
         """Which polygons touch the image and are not smaller than a fifth of a pixel."""
         low, high = np.minimum.reduceat(fixed, starts), np.maximum.reduceat(fixed, starts)
         size = np.array([self.bgr.shape[1], self.bgr.shape[0]]) << _SHIFT

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from pydantic import Field, model_validator
 
-from pipeline.simulation.world.roads import Strict
+from pipeline.simulation.world.roads import ScenarioPart
 from pipeline.types import F64, U8, CameraCalibration
 
 _EXPOSURE_PERIOD_S = 7.3
@@ -14,17 +14,19 @@ _NOISE_ROOM_PX = 64
 _WIDEST_TAN = 1.1  # tangent of the angle off the axis to which the lens is modelled; the image's corner is at 0.81
 
 
-class CameraModel(Strict):
-    """The camera's imperfections; all zero is a perfect pinhole.
-
-    k1, k2: radial distortion as OpenCV has it, r_d = r·(1 + k1·r² + k2·r⁴). blur_px: standard deviation of the blur.
-    noise: standard deviation in grey levels of 255. exposure_stops: amplitude of the exposure's variation."""
+class CameraModel(ScenarioPart):
+    """The camera's imperfections; all zero is a perfect pinhole."""
 
     k1: float = Field(default=-0.08, ge=-0.3, le=0.3)
+    """Radial distortion as OpenCV has it: r_d = r·(1 + k1·r² + k2·r⁴)."""
     k2: float = Field(default=0.012, ge=-0.1, le=0.1)
+    """The fourth-order term of the same."""
     blur_px: float = Field(default=0.4, ge=0.0, le=8.0)
+    """Standard deviation of the blur."""
     noise: float = Field(default=1.5, ge=0.0, le=40.0)
+    """Standard deviation in grey levels of 255."""
     exposure_stops: float = Field(default=0.12, ge=0.0, le=3.0)
+    """Amplitude of the exposure's variation."""
 
     @model_validator(mode="after")
     def _sees_its_corners(self) -> CameraModel:
@@ -61,7 +63,7 @@ def undistorted(flat: F64, distortion: F64) -> F64:
     return np.asarray(flat * (np.interp(radius, bent, ideal) / np.maximum(radius, 1e-9))[:, None], dtype=np.float64)
 
 
-class Sensor:
+class ImageSensor:
     """Blur, exposure and noise of one camera. seed: of the noise and of the exposure's phase."""
 
     def __init__(self, camera: CameraCalibration, model: CameraModel, seed: int) -> None:

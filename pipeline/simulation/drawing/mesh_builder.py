@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.simulation.drawing.canvas import Colour, Ints
-from pipeline.types import F64
+from pipeline.simulation.drawing.canvas import Colour
+from pipeline.types import F64, I64
 
 Bools = npt.NDArray[np.bool_]
 BODY, BRAKE = "body", "brake"
@@ -38,24 +38,30 @@ _GLOWS = frozenset({BRAKE, "head", "plate"})
 
 @dataclass(frozen=True)
 class Mesh:
-    """F faces with separate corners, one face after another.
-
-    vertices: (V, 3). counts: (F,) corners of each face. face_of_vertex: (V,). normals: (F, 3), outward. middles: (F,
-    3). base: (F, 3) blue green red. painted, brakes: (F,) faces whose colour depends on the vehicle. glows: (F,) not
-    shaded. group: (F,) index of the part; parts are painted far to near, group_x: their places along x.
-    """
+    """F faces with separate corners, one face after another."""
 
     vertices: F64
-    counts: Ints
-    face_of_vertex: Ints
+    """(V, 3) metres, in the body's own frame."""
+    counts: I64
+    """(F,) corners of each face."""
+    face_of_vertex: I64
+    """(V,) index of the face that each corner belongs to."""
     normals: F64
+    """(F, 3), outward."""
     middles: F64
+    """(F, 3) metres."""
     base: F64
+    """(F, 3) blue, green, red."""
     painted: Bools
+    """(F,) faces that take the vehicle's colour."""
     brakes: Bools
+    """(F,) faces that light up when the vehicle brakes."""
     glows: Bools
-    group: Ints
+    """(F,) faces that are not shaded."""
+    group: I64
+    """(F,) index of the part; parts are painted far to near."""
     group_x: F64
+    """Places of the parts along x, metres."""
 
     def colours_of(self, paint: Colour, brake: Colour) -> F64:
         """(F, 3) colours of a vehicle with this paint and rear lights, unshaded."""
@@ -66,11 +72,18 @@ class Mesh:
 
 @dataclass
 class MeshBuilder:
+    """Collects the faces of a mesh."""
+
     faces: list[F64] = field(default_factory=list)
+    """(K, 3) corners of each."""
     normals: list[F64] = field(default_factory=list)
+    """(3,) of each, outward."""
     colours: list[str] = field(default_factory=list)
+    """Of each: a colour, or a role such as paint."""
     groups: list[int] = field(default_factory=list)
+    """Part that each belongs to."""
     group: int = 0
+    """Part that new faces belong to."""
 
     def face(self, corners: F64, colour: str, outward: tuple[float, float, float]) -> None:
         """A flat face; its normal is oriented along ``outward``."""

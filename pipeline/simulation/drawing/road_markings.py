@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from pipeline.simulation.drawing.canvas import Canvas
-from pipeline.simulation.world.lines import Line
+from pipeline.simulation.world.lines import RoadLine
 from pipeline.simulation.world.roads import Crossing, Road
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, World
 from pipeline.types import F64
@@ -56,7 +56,7 @@ def paint_ground(canvas: Canvas, road: Road, world: World, horizon: int) -> None
     _add(canvas, world, road.line, [*_edge_lines(road, far, open_m), *_lane_lines(road, world, open_m)])
 
 
-def _add(canvas: Canvas, world: World, line: Line, strips: list[_Strip]) -> None:
+def _add(canvas: Canvas, world: World, line: RoadLine, strips: list[_Strip]) -> None:
     """Add strips along a line to the canvas."""
     s, d = (np.concatenate([strip[i] for strip in strips]) for i in (0, 1))
     flat = world.to_ego(line.to_world(s, d))

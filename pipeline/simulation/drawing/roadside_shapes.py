@@ -7,10 +7,10 @@ from math import cos, hypot, sin
 
 import numpy as np
 
-from pipeline.simulation.drawing.canvas import Canvas, Colour, Ints, Point
+from pipeline.simulation.drawing.canvas import Canvas, CanvasPoint, Colour
 from pipeline.simulation.world.roadside import RAIL_HIGH_M, RAIL_LOW_M, Thing
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M
-from pipeline.types import F64
+from pipeline.types import F64, I64
 
 _GREENS = np.array([[46.0, 92.0, 60.0], [52.0, 112.0, 84.0], [44.0, 104.0, 96.0], [58.0, 98.0, 58.0]])
 _TRUNK: Colour = (48, 62, 74)
@@ -52,7 +52,7 @@ def _tree(canvas: Canvas, thing: Thing, x: float, y: float) -> None:
 
 
 @lru_cache(maxsize=4096)
-def _tree_shape(thing: Thing, fine: bool) -> tuple[F64, Ints, F64]:
+def _tree_shape(thing: Thing, fine: bool) -> tuple[F64, I64, F64]:
     """Points from the tree's foot, corners of each polygon, colours: what ``Canvas.add`` takes."""
     radius, turn = thing.length_m / 2, _TURN if fine else _COARSE_TURN
     wave = radius * (1.0 + 0.10 * np.sin(turn * 3 + 9 * thing.variant) + 0.06 * np.sin(turn * 7 + 31 * thing.variant))
@@ -149,7 +149,7 @@ def _upright(
     low_m: float,
     high_m: float,
     bgr: Colour,
-    normal: Point = (0.0, 0.0, 0.0),
+    normal: CanvasPoint = (0.0, 0.0, 0.0),
 ) -> None:
     """An upright quad above the line from start to end (ego x, y), between two heights above the road."""
     low, high = low_m - LIDAR_HEIGHT_M, high_m - LIDAR_HEIGHT_M

@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.common.geometry import Cuboid, inverse, rotation
 from pipeline.simulation.drawing import backdrop
 from pipeline.simulation.drawing.canvas import Canvas, Colour
-from pipeline.simulation.drawing.lens import ORDINARY, CameraModel, Sensor
+from pipeline.simulation.drawing.lens import ORDINARY, CameraModel, ImageSensor
 from pipeline.simulation.drawing.road_markings import paint_ground
 from pipeline.simulation.drawing.roadside_shapes import add_thing
 from pipeline.simulation.drawing.vehicle_meshes import mesh
@@ -42,10 +42,10 @@ def calibration(model: CameraModel = ORDINARY) -> CameraCalibration:
 
 
 @lru_cache(maxsize=2)
-def _prepared(model: CameraModel, seed: int) -> tuple[Sensor, backdrop.Ground]:
+def _prepared(model: CameraModel, seed: int) -> tuple[ImageSensor, backdrop.GroundTexture]:
     """What no picture changes, and takes as long as a dozen of them: who opens a scenario again has it at once."""
     camera = calibration(model)
-    return Sensor(camera, model, seed), backdrop.Ground(camera, -LIDAR_HEIGHT_M, seed)
+    return ImageSensor(camera, model, seed), backdrop.GroundTexture(camera, -LIDAR_HEIGHT_M, seed)
 
 
 class DrawnCamera:

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from pipeline.common.geometry import inverse, rotation
 from pipeline.simulation.sensors.series import lasting
-from pipeline.simulation.world.roads import Strict
+from pipeline.simulation.world.roads import ScenarioPart
 from pipeline.types import F32, CameraCalibration, Sweep
 
 Ring = Annotated[int, Field(ge=0, le=15)]
@@ -19,7 +19,7 @@ _BLOBS_TO_M, _BLOBS_ASIDE_M = 30.0, 6.0
 _NODS_FOR_S = 0.4
 
 
-class Faults(Strict):
+class Faults(ScenarioPart):
     """Of the camera, the LiDAR and the time between them; the LiDAR's own ``dropout`` is in its model."""
 
     camera_yaw_deg: float = Field(default=0.0, ge=-5.0, le=5.0)

@@ -11,29 +11,39 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from pipeline.simulation.world.roads import Strict
+from pipeline.simulation.world.roads import ScenarioPart
 
 
-class GnssModel(Strict):
-    """Where the world's origin is, which way its x axis points (degrees clockwise from north), and how good the
-    receiver is: standard deviations of place (each way), height, speed and course."""
+class GnssModel(ScenarioPart):
+    """Where the world's origin is, and how good the receiver is (standard deviations)."""
 
     lat_deg: float = Field(default=35.6506, ge=-85.0, le=85.0)
+    """Of the origin, WGS 84."""
     lon_deg: float = Field(default=128.4022, ge=-180.0, le=180.0)
+    """Of the origin, WGS 84."""
     alt_m: float = Field(default=40.0, ge=-400.0, le=6000.0)
+    """Of the origin."""
     x_axis_deg: float = Field(default=90.0, ge=0.0, lt=360.0)
+    """Which way the world's x axis points, clockwise from north."""
     sigma_m: float = Field(default=0.01, ge=0.0, le=20.0)
+    """Of the place, along east and north each."""
     sigma_up_m: float = Field(default=0.02, ge=0.0, le=20.0)
+    """Of the height above the ellipsoid."""
     sigma_speed_mps: float = Field(default=0.02, ge=0.0, le=5.0)
+    """Of the receiver's Doppler speed."""
     sigma_course_deg: float = Field(default=0.3, ge=0.0, le=45.0)
+    """Of the direction of travel."""
 
 
-class OdometryModel(Strict):
-    """Standard deviation and bias of the yaw rate, standard deviation of the speed."""
+class OdometryModel(ScenarioPart):
+    """Errors of the car's own measurements."""
 
     sigma_yaw_rate_radps: float = Field(default=0.0024, ge=0.0, le=0.5)
+    """Standard deviation of the yaw rate."""
     bias_yaw_rate_radps: float = Field(default=0.0005, ge=-0.5, le=0.5)
+    """Constant error of the yaw rate."""
     sigma_speed_mps: float = Field(default=0.02, ge=0.0, le=5.0)
+    """Standard deviation of the speed."""
 
 
 RTK = GnssModel()

@@ -19,11 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.simulation.sensors.lidar_model import VLP16, LidarModel
-from pipeline.simulation.sensors.lidar_rays import CHANNELS, COLUMNS_PER_RAD, Ints, cast, directions, firing_times_s
+from pipeline.simulation.sensors.lidar_rays import CHANNELS, COLUMNS_PER_RAD, cast, directions, firing_times_s
 from pipeline.simulation.sensors.lidar_scene import MATERIALS, MAX_RANGE_M, ROAD, scene_boxes
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, World
-from pipeline.types import F32, F64, Sweep
+from pipeline.types import F32, F64, I64, Sweep
 
 _SECANT_M = 20.0
 """Over a crest the road is cast as a plane, which is right here: as far as the road returns rays."""
@@ -65,7 +65,7 @@ class Lidar:
         range_m, met, cosine = cast(self._beams.rays, self._times_s, shifted, below, self._beams.spare)
         return self._returns(range_m, met, cosine, boxes, rng, t_ns)
 
-    def _returns(self, range_m: F64, met: Ints, cosine: F64, boxes: F64, rng: np.random.Generator, t_ns: int) -> Sweep:
+    def _returns(self, range_m: F64, met: I64, cosine: F64, boxes: F64, rng: np.random.Generator, t_ns: int) -> Sweep:
         """The points of the rays that return: strong enough, with range noise."""
         shape = range_m.shape
         chance, noise = rng.random(shape, dtype=np.float32), rng.standard_normal(shape, dtype=np.float32)

@@ -6,22 +6,27 @@ import numpy as np
 from pydantic import Field
 
 from pipeline.common.geometry import rotation
-from pipeline.simulation.world.roads import Strict
+from pipeline.simulation.world.roads import ScenarioPart
 from pipeline.types import F64
 
 
-class LidarModel(Strict):
-    """motion: each ray is cast at its own time, so moving objects are distorted as in a raw sweep. range_sigma_m: range
-    noise. dropout: share of returns lost at random. up_m, roll_deg, pitch_deg, yaw_deg: the sensor's mount relative to
-    the ego origin; points are still given in the level ego frame. Positive pitch looks down."""
+class LidarModel(ScenarioPart):
+    """Mount relative to the ego origin, and noise. Points are given in the level ego frame whatever the mount."""
 
     motion: bool = True
+    """Each ray is cast at its own time, so moving objects are distorted as in a raw sweep."""
     range_sigma_m: float = Field(default=0.015, ge=0.0, le=0.5)
+    """Standard deviation of the range."""
     dropout: float = Field(default=0.01, ge=0.0, le=1.0)
+    """Share of returns lost at random."""
     up_m: float = Field(default=0.0, ge=-0.3, le=3.0)
+    """Above the ego origin."""
     roll_deg: float = Field(default=0.0, ge=-10.0, le=10.0)
+    """Positive leans right."""
     pitch_deg: float = Field(default=0.0, ge=-10.0, le=10.0)
+    """Positive looks down."""
     yaw_deg: float = Field(default=0.0, ge=-10.0, le=10.0)
+    """Positive looks left."""
 
     def mount(self) -> F64:
         """T_ego_lidar (4, 4)."""

@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-import numpy.typing as npt
 
-from pipeline.types import F64
+from pipeline.types import F64, I64
 
 CHANNELS = 16
 ELEVATIONS_DEG = np.arange(-15.0, 16.0, 2.0)
@@ -26,8 +25,6 @@ _BEHIND_M = 3.0  # what is farther behind cannot get ahead within a sweep
 BOX_FIELDS = 13
 """x y z of the middle, half length, width and height, cos and sin of the yaw, material, velocity x and y, yaw rate,
 share of the material's usual range."""
-
-Ints = npt.NDArray[np.int64]
 
 
 def firing_times_s() -> F64:
@@ -45,7 +42,7 @@ def directions() -> F64:
 
 
 @numba.njit(cache=True, nogil=True)
-def cast(rays: F64, times_s: F64, boxes: F64, ground: F64, spare: int) -> tuple[F64, Ints, F64]:
+def cast(rays: F64, times_s: F64, boxes: F64, ground: F64, spare: int) -> tuple[F64, I64, F64]:
     """The first hit of each ray of a sensor at the origin, every ray at its own time.
 
     rays: (COLUMNS, 16, 3). times_s: (COLUMNS,) after the moment to which the boxes belong. boxes: (B, 13). ground: z =

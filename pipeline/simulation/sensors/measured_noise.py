@@ -8,14 +8,14 @@ from pathlib import Path
 
 from pydantic import Field
 
-from pipeline.simulation.world.roads import Strict
+from pipeline.simulation.world.roads import ScenarioPart
 
 FILE = Path(__file__).with_suffix(".json")
 SHARES = (0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98)
 """Of which each list of quantiles is."""
 
 
-class FalseBoxes(Strict):
+class FalseBoxes(ScenarioPart):
     """Boxes of vehicles where none is labelled."""
 
     per_frame: float = Field(ge=0.0)
@@ -29,7 +29,7 @@ class FalseBoxes(Strict):
     """Standard deviation of ln height from frame to frame, of those that last."""
 
 
-class MeasuredNoise(Strict):
+class MeasuredNoise(ScenarioPart):
     """Lists by range have a value for each bin between two of ``ranges_m``; farther than the last: as the last bin."""
 
     measured_on: tuple[str, ...]
@@ -61,6 +61,7 @@ class MeasuredNoise(Strict):
     doubled: float = Field(ge=0.0, le=1.0)
     """Share of found vehicles with a second box of their own."""
     false_boxes: FalseBoxes
+    """How often, where and how large they are."""
 
 
 @cache

@@ -20,7 +20,7 @@ import numpy as np
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.measured_noise import SHARES, MeasuredNoise, measured
 from pipeline.simulation.sensors.series import lasting
-from pipeline.simulation.sensors.truth_boxes import LABELS, LAW, Seen, in_picture
+from pipeline.simulation.sensors.truth_boxes import LABELS, LAW, VisibleVehicle, in_picture
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, World
 from pipeline.types import F64, CameraCalibration, RawBoxes
@@ -37,17 +37,26 @@ _LONGEST_FALSE = 60
 
 @dataclass(frozen=True)
 class FalseThing:
-    """Something that is taken for a vehicle. first, last: frames; x, y: in the world; width: share of its height."""
+    """Something that is taken for a vehicle."""
 
     number: int
+    """Tells it from other false things of the drive."""
     first: int
+    """First frame in which it is seen."""
     last: int
+    """Last frame in which it is seen."""
     x: float
+    """In the world, metres."""
     y: float
+    """In the world, metres."""
     height_m: float
+    """Of the box, at its place."""
     width: float
+    """Of the box, as a share of its height."""
     score: float
+    """The detector's, 0–1."""
     label: str
+    """Class that it is taken for."""
 
 
 class RealDetector:
@@ -105,7 +114,7 @@ class RealDetector:
         kept = [missed, missed, slow, missed, *[slow] * 4]
         return lasting([self._scenario.seed, 12, actor], self._frames, np.array(kept))
 
-    def _found(self, seen: Seen) -> float:
+    def _found(self, seen: VisibleVehicle) -> float:
         """The chance that a frame has a box of it."""
         away_m = _range_m(seen)
         bin_of = next((n for n, low in enumerate(self._noise.visible[1:]) if seen.visible > low), None)
@@ -115,7 +124,7 @@ class RealDetector:
         share = float(np.interp(away_m, self._middles_m, self._noise.found[bin_of]))
         return share * 0.5 ** (max(away_m - last_m, 0.0) / _HALVES_M)
 
-    def _drawn(self, seen: Seen, series: F64, fresh: F64, camera: CameraCalibration) -> F64:
+    def _drawn(self, seen: VisibleVehicle, series: F64, fresh: F64, camera: CameraCalibration) -> F64:
         noise = self._noise
         box = np.array(seen.bbox)
         height = box[3] - box[1]
@@ -125,13 +134,13 @@ class RealDetector:
         drawn: F64 = box + lasts * series[_EDGES] + new
         return drawn
 
-    def _score(self, seen: Seen, z: float) -> float:
+    def _score(self, seen: VisibleVehicle, z: float) -> float:
         bin_of = min(
             int(np.searchsorted(self._noise.ranges_m, _range_m(seen), side="right")) - 1, len(self._middles_m) - 1
         )
         return float(np.interp(_share_below(z), SHARES, self._noise.score[max(bin_of, 0)]))
 
-    def _label(self, seen: Seen, z: float) -> str:
+    def _label(self, seen: VisibleVehicle, z: float) -> str:
         own = LABELS[seen.actor.actor.kind]
         others = self._noise.large_called if own in _LARGE else self._noise.car_called if own == "car" else {}
         share = _share_below(z)
@@ -181,7 +190,7 @@ def _false_things(scenario: Scenario, noise: MeasuredNoise) -> tuple[FalseThing,
     return tuple(things)
 
 
-def _range_m(seen: Seen) -> float:
+def _range_m(seen: VisibleVehicle) -> float:
     return float(np.hypot(*seen.actor.cuboid.center[:2])) - seen.actor.cuboid.size[0] / 2
 
 

@@ -16,12 +16,12 @@ from pipeline.simulation.sensors.lidar import Lidar
 from pipeline.simulation.world.planned_route import planned_route
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.simulation.world.world_state import World
-from pipeline.types import CameraCalibration, EgoState, Frame, Picture, Route, Sweep
+from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, Route, Sweep
 
 _BEFORE_M, _BEYOND_M = 100.0, 600.0
 
 
-class Sensors:
+class SensorRig:
     """LiDAR, camera, speedometer and GNSS. end_m: how far the ego vehicle gets along the road; the roadside ends 600 m
     beyond. The same world and index give the same frame."""
 
@@ -38,7 +38,7 @@ class Sensors:
         return evolve(
             self.outline(now, index, t_ns),
             sweep=self.sweep(now, index, t_ns),
-            picture=Picture(t_ns, self._camera.picture(now)) if picture else None,
+            picture=CameraImage(t_ns, self._camera.picture(now)) if picture else None,
             route=self._route,
         )
 

@@ -33,12 +33,15 @@ _SAMPLES = 12
 
 
 @dataclass(frozen=True)
-class Seen:
-    """A vehicle in the image: its box, and the share of it that nothing nearer covers."""
+class VisibleVehicle:
+    """A vehicle in the image."""
 
     actor: ActorState
+    """Whose box it is."""
     bbox: Box
+    """In pixels, without errors."""
     visible: float
+    """Share of the box that nothing nearer covers."""
 
 
 def boxes(now: World, camera: CameraCalibration, noise: BoxNoise, seed: int, index: int) -> RawBoxes:
@@ -63,7 +66,7 @@ def boxes(now: World, camera: CameraCalibration, noise: BoxNoise, seed: int, ind
     return RawBoxes("truth", edges, np.full(len(edges), _SCORE, np.float32), tuple(labels), LAW)
 
 
-def in_picture(now: World, camera: CameraCalibration) -> tuple[Seen, ...]:
+def in_picture(now: World, camera: CameraCalibration) -> tuple[VisibleVehicle, ...]:
     """Every vehicle ahead whose cuboid falls into the image, nearest first."""
     alignment = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
     corners = corners_of([state.cuboid for state in reversed(now.actors)])
@@ -76,7 +79,7 @@ def in_picture(now: World, camera: CameraCalibration) -> tuple[Seen, ...]:
     for n, bbox in zip(ahead.tolist(), boxes, strict=True):
         state = now.actors[-1 - n]
         if bbox is not None:
-            seen.append(Seen(state, bbox, visible_share(bbox, nearer)))
+            seen.append(VisibleVehicle(state, bbox, visible_share(bbox, nearer)))
             nearer.append(bbox)
     return tuple(seen)
 

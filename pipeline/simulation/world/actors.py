@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from pipeline.simulation.world.roads import Road, Strict
+from pipeline.simulation.world.roads import Road, ScenarioPart
 
 Extent = Annotated[float, Field(ge=0.3, le=30.0)]
 VehicleKind = Literal["car", "van", "truck", "bus", "motorcycle"]
@@ -29,15 +29,19 @@ which the pipeline assumes for what it has not measured: equal values would flat
 _SLOPE_S = 0.05
 
 
-class Brake(Strict):
+class Brake(ScenarioPart):
     """Constant deceleration down to a speed, which is then held. It starts at a time, or when the gap between the ego
     origin and the vehicle's nearest face has first shrunk to ``at_gap_m``: that is the gap of the drive as scripted, so
     a closed loop meets the same traffic whatever its ego vehicle does."""
 
     at_s: float | None = Field(default=None, ge=0.0, le=3600.0)
+    """When it starts; None when ``at_gap_m`` starts it."""
     at_gap_m: float | None = Field(default=None, gt=0.0, le=1000.0)
+    """Gap that starts it; None when ``at_s`` does."""
     decel_mps2: float = Field(gt=0.0, le=12.0)
+    """Positive slows down."""
     to_mps: float = Field(default=0.0, ge=0.0, le=100.0)
+    """Speed that is then held."""
 
     @model_validator(mode="after")
     def _one_start(self) -> Brake:
@@ -46,11 +50,13 @@ class Brake(Strict):
         return self
 
 
-class Speeds(Strict):
+class Speeds(ScenarioPart):
     """speed_mps: time in seconds → speed, linear in between, constant outside. brake: replaces it from its start on."""
 
     speed_mps: dict[float, float] = Field(min_length=1)
+    """Time in seconds → speed, linear in between, constant outside."""
     brake: Brake | None = None
+    """Replaces the speeds from its start on."""
 
     @field_validator("speed_mps")
     @classmethod
@@ -82,18 +88,26 @@ class Speeds(Strict):
         return _speed_mps(self.corners, t_s), slope
 
 
-class LaneChange(Strict):
+class LaneChange(ScenarioPart):
+    """One move to another lane."""
+
     start_s: float = Field(ge=0.0)
+    """When it begins."""
     duration_s: float = Field(gt=0.2, le=30.0)
+    """From lane middle to lane middle."""
     lane: int
+    """To which; numbered as in OpenDRIVE."""
 
 
 class Script(Speeds):
-    """How something drives along the road. offset_m: metres to the road's left of the middle of its lane."""
+    """How something drives along the road."""
 
     lane: int
+    """At the start; numbered as in OpenDRIVE."""
     offset_m: float = Field(default=0.0, ge=-20.0, le=20.0)
+    """To the road's left of the middle of its lane."""
     lane_changes: tuple[LaneChange, ...] = ()
+    """In order of time."""
 
     @model_validator(mode="after")
     def _one_change_at_a_time(self) -> Script:
@@ -108,23 +122,27 @@ class Script(Speeds):
         return self
 
 
-class Vehicle(Strict):
-    """What a vehicle is. size_m: length, width, height; None takes the kind's usual size."""
+class Vehicle(ScenarioPart):
+    """What a vehicle is."""
 
     id: int = Field(ge=1)
+    """Unique in the scenario; labels have the same."""
     kind: VehicleKind
+    """Decides shape and usual size."""
     colour: str = Field(default="#8090a0", pattern="^#[0-9a-fA-F]{6}$")
+    """#rrggbb."""
     size_m: tuple[Extent, Extent, Extent] | None = None
+    """Length, width, height; None takes the kind's usual size."""
 
     def size(self) -> tuple[float, float, float]:
         return self.size_m or SIZES_M[self.kind]
 
 
 class Actor(Vehicle, Script):
-    """A vehicle on the road. ahead_m: from the ego origin to its nearest face along the road at time 0, negative when
-    its nearest face is behind."""
+    """A vehicle on the road."""
 
     ahead_m: float = Field(ge=-1000.0, le=5000.0)
+    """From the ego origin to its nearest face along the road at time 0; negative when its nearest face is behind."""
 
     def direction(self) -> float:
         """+1 along the road, −1 against it."""
@@ -139,15 +157,20 @@ class Actor(Vehicle, Script):
 
 @dataclass(frozen=True)
 class Motion:
-    """A moment of a script. travelled_m: way driven since time 0. heading_rad: turn from the lane's own direction.
-    d_rate_mps and d_accel_mps2: of the offset d, metres to the left of the reference line."""
+    """A moment of a script."""
 
     travelled_m: float
+    """Way driven since time 0."""
     d_m: float
+    """To the left of the reference line."""
     speed_mps: float
+    """Along the way driven."""
     accel_mps2: float
+    """Along the way driven."""
     d_rate_mps: float
+    """How fast ``d_m`` grows."""
     d_accel_mps2: float
+    """How fast ``d_rate_mps`` grows."""
 
 
 def motion(script: Script, road: Road, t_s: float) -> Motion:

@@ -25,39 +25,55 @@ class Pedals:
     """0–1 each, as ``AccCommand`` gives them."""
 
     accelerator: float = 0.0
+    """1 is full throttle."""
     brake: float = 0.0
+    """1 is full braking."""
 
 
 @dataclass(frozen=True)
 class VehicleModel:
-    """A passenger car on a dry road. full_accel_mps2 and full_brake_mps2: what the pedals give at 1; they are the scale
-    that ``AccParams`` assumes. dead_time_s: from the command to the first change at the wheels. The lags are first
-    order. brake_jerk_mps3: how fast brake pressure builds up (0 to 8 m/s² in 0.32 s). friction: μ of tyre on road."""
+    """A passenger car on a dry road. The lags are first order."""
 
     full_accel_mps2: float = 2.0
+    """What the accelerator gives at 1; the scale that ``AccParams`` assumes."""
     full_brake_mps2: float = 8.0
+    """What the brake gives at 1; the scale that ``AccParams`` assumes."""
     dead_time_s: float = 0.1
+    """From the command to the first change at the wheels."""
     drive_lag_s: float = 0.3
+    """Time constant of the engine."""
     brake_lag_s: float = 0.08
+    """Time constant of the brakes."""
     drive_jerk_mps3: float = 5.0
+    """How fast the engine's force changes at most."""
     brake_jerk_mps3: float = 25.0
+    """How fast brake pressure builds up: 0 to 8 m/s² in 0.32 s."""
     friction: float = 0.9
+    """μ of tyre on road."""
 
 
 @dataclass(frozen=True)
 class VehicleState:
-    """travelled_m: way driven since time 0. d_m: left of the road's reference line. pending: (time it acts, pedals) of
-    commands still on their way, oldest first; pedals: the command that acts now."""
+    """The ego vehicle at one moment."""
 
     t_s: float
+    """Since the scenario's start."""
     travelled_m: float
+    """Way driven since time 0."""
     speed_mps: float
+    """Along the way driven."""
     accel_mps2: float
+    """Along the way driven."""
     d_m: float
+    """Left of the road's reference line."""
     d_rate_mps: float = 0.0
+    """How fast ``d_m`` grows."""
     d_accel_mps2: float = 0.0
+    """How fast ``d_rate_mps`` grows."""
     pedals: Pedals = Pedals()
+    """The command that acts now."""
     pending: tuple[tuple[float, Pedals], ...] = ()
+    """(time it acts, pedals) of commands still on their way, oldest first."""
 
     def motion(self) -> Motion:
         """As the world takes it."""

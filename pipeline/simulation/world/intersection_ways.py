@@ -9,7 +9,7 @@ from typing import Literal
 from pydantic import Field
 
 from pipeline.simulation.world.actors import Speeds, Vehicle
-from pipeline.simulation.world.lines import Line, Pose
+from pipeline.simulation.world.lines import RoadLine, WorldPose
 from pipeline.simulation.world.roads import Crossing, Road
 
 _REACH_M = 400.0
@@ -19,37 +19,42 @@ Turn = Literal["left", "straight", "right"]
 
 
 class CrossingActor(Vehicle, Speeds):
-    """A vehicle that drives over a crossing.
-
-    crossing: which one of the road's, from 0. approach: the arm it comes from as the ego vehicle sees it (``ahead``: it
-    drives the way the ego vehicle does, in front of it). turn: as its own driver sees it. arrive_s: when its middle is
-    halfway around its turn, or, going straight, abreast of the crossing's middle. radius_m: of its turn. lane: counted
-    from the middle of the road it comes on; it leaves on the innermost."""
+    """A vehicle that drives over a crossing."""
 
     crossing: int = Field(default=0, ge=0)
+    """Which one of the road's, from 0."""
     approach: Approach
+    """The arm it comes from as the ego vehicle sees it (``ahead``: it drives the way the ego vehicle does, in front of
+    it)."""
     turn: Turn = "straight"
+    """As its own driver sees it."""
     arrive_s: float = Field(ge=0.0, le=3600.0)
+    """When its middle is halfway around its turn or, going straight, abreast of the crossing's middle."""
     radius_m: float = Field(default=10.0, ge=4.0, le=60.0)
+    """Of its turn."""
     lane: int = Field(default=1, ge=1)
+    """Counted from the middle of the road it comes on; it leaves on the innermost."""
 
 
 @dataclass(frozen=True)
-class Route:
-    """A line in the world; arrival_m: s of the place that ``arrive_s`` means; bend_m: from where to where it bends, and
-    curvature_per_m there."""
+class CrossingWay:
+    """A line in the world."""
 
-    line: Line
+    line: RoadLine
+    """World x, y along the way."""
     arrival_m: float
+    """s of the place that ``arrive_s`` means."""
     bend_m: tuple[float, float]
+    """From where to where it bends."""
     curvature_per_m: float
+    """In the bend, positive to the left."""
 
     def bend(self, s_m: float) -> float:
         """Curvature at s."""
         return self.curvature_per_m if self.bend_m[0] <= s_m <= self.bend_m[1] else 0.0
 
 
-def route(actor: CrossingActor, road: Road) -> Route:
+def route(actor: CrossingActor, road: Road) -> CrossingWay:
     """The path an actor takes. ValueError when the road has no such crossing or lane."""
     if actor.crossing >= len(road.crossings):
         raise ValueError(f"actor {actor.id}: no crossing {actor.crossing}: the road has {len(road.crossings)}")
@@ -59,15 +64,15 @@ def route(actor: CrossingActor, road: Road) -> Route:
     right_m = _lane_m(actor, road, crossing)
     if actor.turn == "straight":
         start = _behind((right_m * sin(come), -right_m * cos(come)), come, _REACH_M)
-        return Route(Line([(2 * _REACH_M, 0.0)], _moved(start, x, y, heading)), _REACH_M, (0.0, -1.0), 0.0)
+        return CrossingWay(RoadLine([(2 * _REACH_M, 0.0)], _moved(start, x, y, heading)), _REACH_M, (0.0, -1.0), 0.0)
     leave, leave_right_m = _exit(actor, road, crossing)
     turned = remainder(leave - come, 2 * pi)
     corner = _meeting((come, right_m), (leave, leave_right_m))
     tangent_m = actor.radius_m * tan(abs(turned) / 2)
     start = _behind(corner, come, _REACH_M + tangent_m)
     arc_m, curvature = actor.radius_m * abs(turned), (1.0 if turned > 0 else -1.0) / actor.radius_m
-    line = Line([(_REACH_M, 0.0), (arc_m, curvature), (_REACH_M, 0.0)], _moved(start, x, y, heading))
-    return Route(line, _REACH_M + arc_m / 2, (_REACH_M, _REACH_M + arc_m), curvature)
+    line = RoadLine([(_REACH_M, 0.0), (arc_m, curvature), (_REACH_M, 0.0)], _moved(start, x, y, heading))
+    return CrossingWay(line, _REACH_M + arc_m / 2, (_REACH_M, _REACH_M + arc_m), curvature)
 
 
 def _direction_rad(approach: Approach, crossing: Crossing) -> float:
@@ -114,11 +119,11 @@ def _meeting(one: tuple[float, float], other: tuple[float, float]) -> tuple[floa
     return a_right * sin(a) + along * cos(a), -a_right * cos(a) + along * sin(a)
 
 
-def _behind(place: tuple[float, float], direction: float, way_m: float) -> Pose:
+def _behind(place: tuple[float, float], direction: float, way_m: float) -> WorldPose:
     return place[0] - way_m * cos(direction), place[1] - way_m * sin(direction), direction
 
 
-def _moved(pose: Pose, x: float, y: float, heading: float) -> Pose:
+def _moved(pose: WorldPose, x: float, y: float, heading: float) -> WorldPose:
     """A pose beside the crossing's middle as one in the world."""
     c, s = cos(heading), sin(heading)
     return x + pose[0] * c - pose[1] * s, y + pose[0] * s + pose[1] * c, heading + pose[2]

@@ -13,14 +13,14 @@ import numpy.typing as npt
 
 from pipeline.types import F64
 
-Pose = tuple[float, float, float]
+WorldPose = tuple[float, float, float]
 _LONG_M = 1e5
 
 
-class Line:
+class RoadLine:
     """arcs: (length in metres, curvature per metre, positive to the left) of each; start: x, y, heading."""
 
-    def __init__(self, arcs: Sequence[tuple[float, float]], start: Pose = (0.0, 0.0, 0.0)) -> None:
+    def __init__(self, arcs: Sequence[tuple[float, float]], start: WorldPose = (0.0, 0.0, 0.0)) -> None:
         self._curvature = np.array([curvature for _, curvature in arcs])
         lengths = np.array([length for length, _ in arcs])
         self._starts = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])

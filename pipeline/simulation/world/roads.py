@@ -16,14 +16,14 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from pipeline.simulation.world.lines import Line
+from pipeline.simulation.world.lines import RoadLine
 from pipeline.types import F64
 
 _TRANSITION_STEP_M = 0.5
 _CROSSING_REACH_M = 250.0
 
 
-class Strict(BaseModel):
+class ScenarioPart(BaseModel):
     """A part of a scenario file: unknown keys and infinite numbers are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -34,14 +34,17 @@ class Strict(BaseModel):
         return type(self).model_validate({**fields, **(update or {})})
 
 
-class Segment(Strict):
+class Segment(ScenarioPart):
     """A stretch of road, straight by default; curvature is positive to the left. ``radius_m`` may stand for
     ``curvature_per_m``. With ``end_curvature_per_m`` the curvature changes evenly along the segment: a transition
     (clothoid) between a straight and a bend."""
 
     length_m: float = Field(gt=0.0, le=100_000.0)
+    """Along the reference line."""
     curvature_per_m: float = Field(default=0.0, ge=-0.2, le=0.2)
+    """At its beginning; positive to the left."""
     end_curvature_per_m: float | None = Field(default=None, ge=-0.2, le=0.2)
+    """At its end; None keeps it constant."""
 
     @model_validator(mode="before")
     @classmethod
@@ -73,53 +76,79 @@ class Segment(Strict):
         return [(self.length_m / count, bend) for bend in bends.tolist()]
 
 
-class Crossing(Strict):
-    """Another road, straight and level, across this one. s_m: where the two middle lines meet. angle_deg: by how much
-    its own direction is turned to the left of this road's there; 90 runs from right to left."""
+class Crossing(ScenarioPart):
+    """Another road, straight and level, across this one."""
 
     s_m: float = Field(ge=0.0, le=100_000.0)
+    """Where the two middle lines meet."""
     angle_deg: float = Field(default=90.0, ge=40.0, le=140.0)
+    """By how much its own direction is turned to the left of this road's there; 90 runs from right to left."""
     lanes_each_way: int = Field(default=1, ge=1, le=3)
+    """Of the other road."""
     lane_width_m: float = Field(default=3.5, ge=2.5, le=5.0)
+    """Of the other road."""
 
     def half_width_m(self) -> float:
         return self.lanes_each_way * self.lane_width_m
 
 
-class Beacon(Strict):
-    """Something that stands on the road, as at roadworks: its middle, size and how high it is."""
+class Beacon(ScenarioPart):
+    """Something that stands on the road, as at roadworks."""
 
     s_m: float
+    """Of its middle, along the road."""
     d_m: float
+    """Of its middle, to the left of the reference line."""
     length_m: float = Field(default=0.1, ge=0.05, le=50.0)
+    """Along the road."""
     width_m: float = Field(default=0.25, ge=0.05, le=5.0)
+    """Across the road."""
     high_m: float = Field(default=1.05, ge=0.1, le=5.0)
+    """Of its top above the road."""
 
 
-class Strip(Strict):
-    """A kerb with its pavement, a hedge or a wall along the road: where its middle runs, how wide and high it is."""
+class Strip(ScenarioPart):
+    """A kerb with its pavement, a hedge or a wall along the road."""
 
     kind: Literal["kerb", "hedge", "wall"]
+    """Decides what it looks like."""
     d_m: float
+    """Where its middle runs, to the left of the reference line."""
     from_m: float = 0.0
+    """Where along the road it begins."""
     to_m: float = Field(default=100_000.0, gt=0.0)
+    """Where along the road it ends."""
     width_m: float = Field(default=0.3, ge=0.05, le=10.0)
+    """Across the road."""
     high_m: float = Field(default=1.2, ge=0.03, le=6.0)
+    """Of its top above the road."""
 
 
-class Road(Strict):
+class Road(ScenarioPart):
+    """A road and what belongs to it."""
+
     segments: tuple[Segment, ...] = Field(min_length=1)
+    """One after another from s = 0."""
     crossings: tuple[Crossing, ...] = ()
+    """Other roads across this one."""
     lane_width_m: float = Field(default=3.6, ge=2.0, le=6.0)
+    """Of every lane."""
     lanes_forward: int = Field(default=3, ge=1, le=6)
+    """Lanes of the ego vehicle's direction."""
     lanes_oncoming: int = Field(default=2, ge=0, le=6)
+    """Lanes of the other direction."""
     median_m: float = Field(default=4.0, ge=0.0, le=30.0)
+    """Between the directions, without lanes."""
     shoulder_m: float = Field(default=2.5, ge=0.0, le=10.0)
+    """Beside the outermost lanes."""
     crest_radius_m: float | None = Field(default=None, ge=300.0)
     """Least vertical radius of its crests and sags; None: it is level."""
     crests_every_m: float = Field(default=400.0, ge=50.0)
+    """Distance from crest to crest."""
     beacons: tuple[Beacon, ...] = ()
+    """Obstacles on the road."""
     strips: tuple[Strip, ...] = ()
+    """What runs along the road."""
 
     @model_validator(mode="after")
     def _wide_enough_bends(self) -> Road:
@@ -168,15 +197,15 @@ class Road(Strict):
         return self.line.to_world(s_m, d_m)
 
     @cached_property
-    def line(self) -> Line:
+    def line(self) -> RoadLine:
         """The reference line."""
-        return Line([arc for segment in self.segments for arc in segment.arcs()])
+        return RoadLine([arc for segment in self.segments for arc in segment.arcs()])
 
     @cached_property
-    def crossing_lines(self) -> tuple[Line, ...]:
+    def crossing_lines(self) -> tuple[RoadLine, ...]:
         """The middle line of each crossing road; s = 0 is where it meets this road's."""
         lines = []
         for crossing in self.crossings:
             x, y, heading = self.to_world(crossing.s_m, 0.0)[0].tolist()
-            lines.append(Line([(_CROSSING_REACH_M, 0.0)], (x, y, heading + float(np.radians(crossing.angle_deg)))))
+            lines.append(RoadLine([(_CROSSING_REACH_M, 0.0)], (x, y, heading + float(np.radians(crossing.angle_deg)))))
         return tuple(lines)

@@ -33,17 +33,24 @@ _LEAST_MEDIAN_M = 1.0
 
 @dataclass(frozen=True)
 class Thing:
-    """An upright box beside the road: its middle (s, d), length along the road, width across, from low to high above
-    the road. variant: a number from 0 to 1 that varies colour and shape."""
+    """An upright box beside the road."""
 
     kind: ThingKind
+    """Decides its shape and colour."""
     s_m: float
+    """Of its middle, along the road."""
     d_m: float
+    """Of its middle, to the left of the reference line."""
     length_m: float
+    """Along the road."""
     width_m: float
+    """Across the road."""
     low_m: float
+    """Of its lower side above the road."""
     high_m: float
+    """Of its top above the road."""
     variant: float
+    """A number from 0 to 1 that varies colour and shape."""
 
 
 def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, ...]:
@@ -89,8 +96,11 @@ class Roadside:
     """Placed items with their world poses, ready to be filtered by distance."""
 
     things: tuple[Thing, ...]
+    """In order along the road."""
     s_m: F64
+    """(N,) of the things, to look them up by."""
     poses: F64
+    """(N, 3) world x, y and heading of the things."""
 
     @staticmethod
     def build(road: Road, seed: int, start_m: float, end_m: float) -> Roadside:

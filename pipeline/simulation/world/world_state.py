@@ -28,27 +28,38 @@ _SLOWEST_STEER_MPS = 2.0  # slower than this a lane change is a creep to the sid
 
 @dataclass(frozen=True)
 class ActorState:
-    """An actor at one moment, in the ego frame. speed_mps: over ground, the way it points. braking: its brake lights
-    are on. yaw_rate_radps: of its own turning in the world."""
+    """An actor at one moment, in the ego frame."""
 
     actor: Vehicle
+    """What it is."""
     cuboid: Cuboid
+    """In the ego frame."""
     speed_mps: float
+    """Over ground, the way it points."""
     braking: bool
+    """Whether its brake lights are on."""
     yaw_rate_radps: float
+    """Of its own turning in the world."""
 
 
 @dataclass(frozen=True)
 class World:
-    """The ego pose (world x, y, heading), its place (s, d) on the road, its motion and the actors, farthest first."""
+    """The world at one moment."""
 
     t_s: float
+    """Since the scenario's start."""
     pose: tuple[float, float, float]
+    """Of the ego origin: world x, y, heading."""
     s_m: float
+    """Of the ego origin along the road."""
     d_m: float
+    """Of the ego origin, to the left of the reference line."""
     speed_mps: float
+    """Of the ego vehicle."""
     yaw_rate_radps: float
+    """Of the ego vehicle, positive to the left."""
     actors: tuple[ActorState, ...]
+    """Farthest first, so that nearer ones are drawn over them."""
     hump_per_m: float = 0.0
     """Vertical curvature of the road here, positive on a crest."""
 

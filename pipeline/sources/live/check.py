@@ -18,17 +18,21 @@ _ENOUGH_HZ = 5.0
 
 @dataclass(frozen=True)
 class SensorReport:
-    """clock_offset_ms: host time less the sensor's, the shortest delay on the way included; of a VLP-16, which counts
-    from the full hour, at most half an hour either way; None where the sensor sends no time. pps: what the LiDAR says
-    of the pulse per second; None where it says nothing. skew_ms: median of image less sweep, over the ticks. cost:
-    what it costs that a receiver whose speed is the own speed sends so seldom; None where it costs nothing."""
+    """How one sensor does."""
 
     health: StreamHealth
+    """Rate, age and errors of its stream."""
     clock_offset_ms: float | None = None
+    """Host time less the sensor's, the shortest delay on the way included; of a VLP-16, which counts from the full
+    hour, at most half an hour either way. None where the sensor sends no time."""
     refused: int = 0
+    """Messages that could not be used."""
     pps: str | None = None
+    """What the LiDAR says of the pulse per second; None where it says nothing."""
     skew_ms: float | None = None
+    """Median of image less sweep, over the ticks; None without both."""
     cost: str | None = None
+    """What it costs that a receiver whose speed is the ego speed sends so seldom; None where it costs nothing."""
 
     @property
     def is_good(self) -> bool:

@@ -36,20 +36,25 @@ _DEVICES, _DEVICE_PATH = 64, re.compile(r"/dev/[^\s\0]+")
 Device = Annotated[int | str, BeforeValidator(_is_device)]
 
 
-class Strict(BaseModel):
+class ConfigPart(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-class Mount(Strict):
-    """Where a sensor sits in the ego frame (x forward, y left, z up, from the LiDAR) and how it is turned: roll and
-    pitch as the sensor sits, positive pitch looks down, positive yaw looks left."""
+class Mount(ConfigPart):
+    """Where a sensor sits in the ego frame (x forward, y left, z up, from the LiDAR) and how it is turned."""
 
     x_m: Metres = 0.0
+    """Forward of the LiDAR."""
     y_m: Metres = 0.0
+    """Left of the LiDAR."""
     z_m: Metres = 0.0
+    """Above the LiDAR."""
     roll_deg: Degrees = 0.0
+    """Positive leans right."""
     pitch_deg: Degrees = 0.0
+    """Positive looks down."""
     yaw_deg: Degrees = 0.0
+    """Positive looks left."""
 
     def T_ego_sensor(self) -> F64:
         """(4, 4), axes of the sensor x forward, y left, z up."""
@@ -59,31 +64,46 @@ class Mount(Strict):
         return T
 
 
-class LidarConfig(Strict):
-    """A Velodyne on the network. interface: address of the network card to listen on; 0.0.0.0 is all of them. sender:
-    the sensor's address; None for the first that sends packets of a VLP-16."""
+class LidarConfig(ConfigPart):
+    """A Velodyne on the network."""
 
     model: Literal["VLP-16"] = "VLP-16"
+    """The one that packets are decoded for."""
     data_port: Port = 2368
+    """UDP port of the points."""
     position_port: Port | None = 8308
+    """UDP port of time and NMEA; None does not listen."""
     interface: str = "0.0.0.0"
+    """Address of the network card to listen on; 0.0.0.0 is all of them."""
     sender: Host | None = None
+    """The sensor's address; None for the first that sends packets of a VLP-16."""
     multicast_group: str | None = None
+    """Address to join; None for unicast or broadcast."""
     time_offset_ms: OffsetMs = 0.0
+    """Added to the sensor's times."""
     mount: Mount = Mount()
+    """In the car; the ego frame's origin is where the LiDAR should be."""
 
 
-class CalibrationConfig(Strict):
+class CalibrationConfig(ConfigPart):
     """Pinhole camera with OpenCV distortion; ``mount`` has the optical axis along x."""
 
     fx_px: float = Field(gt=1.0, le=1e5)
+    """Focal length along the rows."""
     fy_px: float = Field(gt=1.0, le=1e5)
+    """Focal length along the columns."""
     cx_px: float = Field(ge=-1e5, le=1e5)
+    """Column of the principal point."""
     cy_px: float = Field(ge=-1e5, le=1e5)
+    """Row of the principal point."""
     width_px: int = Field(ge=16, le=16384)
+    """Of the images that the numbers hold for."""
     height_px: int = Field(ge=16, le=16384)
+    """Of the images that the numbers hold for."""
     distortion: tuple[float, ...] = ()
+    """OpenCV's coefficients: 0, 4, 5 or 8."""
     mount: Mount = Mount()
+    """Of the optical centre."""
 
     @model_validator(mode="after")
     def _check(self) -> CalibrationConfig:
@@ -98,15 +118,19 @@ class CalibrationConfig(Strict):
         return CameraCalibration(K, np.array(self.distortion), T, self.width_px, self.height_px)
 
 
-class CameraConfig(Strict):
-    """Exactly one of device (its number or path), url (rtsp:// or http://, MJPEG too) and file (a video, played in a
-    loop)."""
+class CameraConfig(ConfigPart):
+    """One camera: exactly one of device, url and file."""
 
     device: Device | None = None
+    """Number or path of a local camera."""
     url: str | None = Field(default=None, pattern=r"^(rtsp|rtsps|http|https)://\S+$")
+    """rtsp:// or http://, MJPEG too."""
     file: Path | None = None
+    """A video, played in a loop."""
     time_offset_ms: OffsetMs = 0.0
+    """Added to the camera's times."""
     calibration: CalibrationConfig | None = None
+    """Without it, LiDAR and camera are not fused."""
 
     @model_validator(mode="after")
     def _check(self) -> CameraConfig:
@@ -114,17 +138,23 @@ class CameraConfig(Strict):
         return self
 
 
-class GnssConfig(Strict):
-    """A receiver's NMEA sentences: exactly one of serial (its device), tcp (host:port to connect to), udp_port (to
-    listen on). interface, sender: of the UDP port, as of the LiDAR."""
+class GnssConfig(ConfigPart):
+    """A receiver's NMEA sentences: exactly one of serial, tcp, udp_port."""
 
     serial: str | None = None
+    """Its device, such as /dev/ttyUSB0."""
     baud: Annotated[int, Field(ge=1200, le=4_000_000)] = 115_200
+    """Of the serial port."""
     tcp: str | None = Field(default=None, pattern=r"^.+:\d{1,5}$")
+    """host:port to connect to."""
     udp_port: Port | None = None
+    """To listen on."""
     interface: str = "0.0.0.0"
+    """Address of the network card that the UDP port listens on; 0.0.0.0 is all of them."""
     sender: Host | None = None
+    """Whose datagrams the UDP port takes; None for the first sender of NMEA."""
     time_offset_ms: OffsetMs = 0.0
+    """Added to the receiver's times."""
 
     @model_validator(mode="after")
     def _check(self) -> GnssConfig:
@@ -132,31 +162,43 @@ class GnssConfig(Strict):
         return self
 
 
-class SignalConfig(Strict):
-    """One signal of a DBC file, and what to multiply it with to get m/s or rad/s (turning left positive)."""
+class SignalConfig(ConfigPart):
+    """One signal of a DBC file."""
 
     message: str
+    """Its message in the DBC file."""
     signal: str
+    """Its name in that message."""
     factor: float = 1.0
+    """What to multiply it with to get m/s, or rad/s with left turns positive."""
 
 
-class CanConfig(Strict):
+class CanConfig(ConfigPart):
     """python-can's interface and channel, and which signals of the DBC file are speed and yaw rate."""
 
     interface: str = "socketcan"
+    """One of python-can's."""
     channel: str = "can0"
+    """What the interface is called on this machine."""
     bitrate: int | None = None
+    """Bits per second; None leaves it as it is set up."""
     dbc: Path
+    """The file that describes the bus."""
     speed_mps: SignalConfig
+    """Which signal is the ego speed."""
     yaw_rate_radps: SignalConfig | None = None
+    """Which signal is the yaw rate; None where the bus has none."""
 
 
-class EgoConfig(Strict):
-    """Own speed and yaw rate: from the GNSS receiver, or from CAN."""
+class EgoConfig(ConfigPart):
+    """Ego speed and yaw rate."""
 
     source: Literal["gnss", "can"] = "gnss"
+    """Whose speed is used."""
     can: CanConfig | None = None
+    """Required when the source is ``can``."""
     time_offset_ms: OffsetMs = 0.0
+    """Added to the source's times."""
 
     @model_validator(mode="after")
     def _check(self) -> EgoConfig:
@@ -165,14 +207,19 @@ class EgoConfig(Strict):
         return self
 
 
-class LiveConfig(Strict):
+class LiveConfig(ConfigPart):
     """A car's sensors. Each may be left out, but not both LiDAR and camera."""
 
     title: str = "live"
+    """Names sessions and the window."""
     lidar: LidarConfig | None = None
+    """None for a car without one."""
     camera: CameraConfig | None = None
+    """None for a car without one."""
     gnss: GnssConfig | None = None
+    """None for a car without one."""
     ego: EgoConfig | None = None
+    """None where neither receiver nor bus gives the ego speed."""
 
     @model_validator(mode="after")
     def _check(self) -> LiveConfig:

@@ -21,9 +21,9 @@ from pipeline.sources.live.devices.gnss import GnssInput
 from pipeline.sources.live.devices.lidar import LidarInput
 from pipeline.sources.live.devices.sensor_input import Input
 from pipeline.sources.live.health import StreamStats, not_delivering
-from pipeline.sources.live.sync import Stream, Synchroniser, Together
+from pipeline.sources.live.sync import SensorBuffer, Synchroniser, Together
 from pipeline.sources.rig import calibration_for
-from pipeline.types import F64, EgoState, Frame, GnssFix, Picture, StreamHealth, Sweep
+from pipeline.types import F64, CameraImage, EgoState, Frame, GnssFix, StreamHealth, Sweep
 from pipeline.types.camera_shot import Shot
 from pipeline.types.source import Opening, Tap
 
@@ -60,7 +60,7 @@ class LiveSensors:
         """An input for each sensor of the config, each delivering to its own stream."""
         self.inputs: dict[str, Input] = {}
         sync = self._sync
-        self._streams: dict[str, Stream[Any]] = {
+        self._streams: dict[str, SensorBuffer[Any]] = {
             "lidar": sync.sweeps,
             "camera": sync.pictures,
             "gnss": sync.fixes,
@@ -150,7 +150,7 @@ class LiveSensors:
                     return together
                 self._came.wait(min(left_s, _LOOK_AGAIN_S))
 
-    def _add(self, stream: Stream[T], t_ns: int, value: T, arrived_ns: int) -> bool:
+    def _add(self, stream: SensorBuffer[T], t_ns: int, value: T, arrived_ns: int) -> bool:
         """What comes, into its stream; false when it was refused."""
         with self._came:
             was_taken = stream.add(t_ns, value, arrived_ns)
@@ -211,7 +211,7 @@ class LiveSensors:
             },
         )
 
-    def _picture(self, together: Together[Shot], notes: list[str]) -> Picture | None:
+    def _picture(self, together: Together[Shot], notes: list[str]) -> CameraImage | None:
         if together.picture is None:
             return None
         shot = together.picture.value
@@ -219,7 +219,7 @@ class LiveSensors:
         if bgr is None:
             notes.append("the image is damaged")
             return None
-        return Picture(together.picture.t_ns, bgr, shot.encoded)
+        return CameraImage(together.picture.t_ns, bgr, shot.encoded)
 
 
 def _about(config: LiveConfig) -> tuple[str, ...]:

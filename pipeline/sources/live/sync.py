@@ -30,14 +30,17 @@ its next word. The last is for one that has spoken once."""
 
 @dataclass(frozen=True)
 class Stamped(Generic[T]):
-    """What a sensor gave, when it measured it and when it arrived."""
+    """A sensor's message."""
 
     t_ns: int
+    """When it was measured, by the drive's clock."""
     value: T
+    """What was measured."""
     arrived_ns: int
+    """When it arrived, by this machine's clock."""
 
 
-class Stream(Generic[T]):
+class SensorBuffer(Generic[T]):
     """What one sensor gave lately, in order of time. taken: messages kept, of them ``late`` ones that were overtaken.
     duplicates, implausible: messages refused, by reason."""
 
@@ -81,28 +84,36 @@ class Stream(Generic[T]):
 
 @dataclass(frozen=True)
 class Together(Generic[P]):
-    """The messages of one tick. skew_ns: image minus sweep. replaced: ticks before it that nobody took in time.
-    arrived_ns: when the message that ticks was complete. notes: what is missing and why."""
+    """The messages of one tick."""
 
     t_ns: int
+    """Of the message that ticks."""
     arrived_ns: int
+    """When that message was complete."""
     sweep: Stamped[Sweep] | None
+    """None when the LiDAR is missing."""
     picture: Stamped[P] | None
+    """The image nearest in time; None when the camera is missing."""
     skew_ns: int | None
+    """Image minus sweep; None without both."""
     ego: EgoState | None
+    """Ego motion at ``t_ns``; None when too old."""
     gnss: GnssFix | None
+    """The newest fix; None when too old."""
     replaced: int
+    """Ticks before it that nobody took in time."""
     notes: tuple[str, ...]
+    """What is missing and why."""
 
 
 class Synchroniser(Generic[P]):
     """``P`` is what an image is here: anything. A sensor that is not configured is simply never added."""
 
     def __init__(self) -> None:
-        self.sweeps: Stream[Sweep] = Stream()
-        self.pictures: Stream[P] = Stream(_PICTURES_KEPT)
-        self.egos: Stream[EgoState] = Stream()
-        self.fixes: Stream[GnssFix] = Stream()
+        self.sweeps: SensorBuffer[Sweep] = SensorBuffer()
+        self.pictures: SensorBuffer[P] = SensorBuffer(_PICTURES_KEPT)
+        self.egos: SensorBuffer[EgoState] = SensorBuffer()
+        self.fixes: SensorBuffer[GnssFix] = SensorBuffer()
         self._ticked_ns: int | None = None
         self._taken = (0, 0)
 
@@ -178,7 +189,7 @@ class Synchroniser(Generic[P]):
         return max(0, self.sweeps.taken - sweeps - 1 if leader_is_sweep else self.pictures.taken - pictures - 1)
 
 
-def _own_motion_at(stream: Stream[T], t_ns: int, offset_ms: float) -> T | None:
+def _own_motion_at(stream: SensorBuffer[T], t_ns: int, offset_ms: float) -> T | None:
     """What a speedometer or receiver said nearest to a moment; None when that is further away than it holds."""
     at_ns = t_ns - round(offset_ms * 1e6)
     item = stream.nearest(at_ns)

@@ -38,12 +38,16 @@ _UDP = 17
 
 
 class Datagram(NamedTuple):
-    """origin: where its record begins in the file. t_ns: when it was captured, unix. port: to which it was sent."""
+    """One UDP datagram of a capture."""
 
     origin: int
+    """Where its record begins in the file."""
     t_ns: int
+    """When it was captured, Unix time."""
     port: int
+    """To which it was sent: tells data from position packets."""
     payload: bytes
+    """Without UDP's header."""
 
 
 class _Interface(NamedTuple):

@@ -54,9 +54,9 @@ class PcapSource:
         self.uri, self.title = uri, file.stem
         self._capture = Capture(file)
         rig = rig_of(file, options)
-        self._T_ego_lidar = rig.lidar.mount.T_ego_sensor()
+        self.T_ego_lidar = rig.lidar.mount.T_ego_sensor()
         self._port = int(number_option(options, "port", 0)) or _lidar_port(self._capture)
-        self._index = _Index(self._capture, self._port, self._T_ego_lidar, progress)
+        self._index = _Index(self._capture, self._port, self.T_ego_lidar, progress)
         if not len(self._index):
             raise SourceError(f"{file.name}: {self._index.about_nothing(self._port)}")
         self._beside = Beside(file, options, rig, self._index.begin_ns, self._index.fixes, progress)
@@ -96,7 +96,7 @@ class PcapSource:
 
     def _sweep(self, index: int, notes: list[str]) -> Sweep | None:
         """Decoded anew from its stretch of the file, in which the ends of its neighbours may lie too."""
-        decoder, found = Vlp16Decoder(self._T_ego_lidar, keeps_partial=True), list[Sweep | None]()
+        decoder, found = Vlp16Decoder(self.T_ego_lidar, keeps_partial=True), list[Sweep | None]()
         try:
             for datagram in self._capture.datagrams(self._index.first[index], self._index.last[index]):
                 if datagram.port == self._port:
@@ -151,9 +151,9 @@ class _Index:
         """What a person should know of the whole."""
         counts = self._cutter.counts
         says = {
-            "gps": "LiDAR times are UTC: the sensor follows GPS",
-            "host": "LiDAR times are the sensor's own steps from when the host captured them; it follows no GPS",
-            "sensor": "LiDAR times begin at the sensor's own hour",
+            "gps": "LiDAR times are UTC: the sensor is synchronised to GPS",
+            "host": "LiDAR times count from the host's capture time; the sensor is not synchronised to GPS",
+            "sensor": "LiDAR times count from the full hour of the sensor's own clock",
         }
         notes = [says[self._clock.reference]]
         notes += [counts.about_refused()] if counts.refused else []
@@ -166,7 +166,7 @@ class _Index:
         counts = self._cutter.counts
         if counts.models:
             return f"packets of a Velodyne {counts.models.most_common(1)[0][0]}; only the VLP-16 is supported"
-        says = [f"no whole sweep in {counts.packets} packets to port {port}"] if counts.packets else []
+        says = [f"no complete sweep in {counts.packets} packets to port {port}"] if counts.packets else []
         says = says or [f"no packets of a VLP-16 to port {port} in it"]
         says += [counts.about_refused()] if counts.refused else []
         says += [f"the file is {self._capture.damage}"] if self._capture.damage else []

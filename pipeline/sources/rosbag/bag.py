@@ -19,11 +19,16 @@ _SUFFIXES = (".bag", ".db3", ".mcap")
 
 
 class Topic(NamedTuple):
-    """kind: the message type without its package path, as ``PointCloud2``. held: how many messages."""
+    """One topic of a bag."""
 
     name: str
+    """With its slashes."""
     kind: str
+    """The message type without its package path, as ``PointCloud2``."""
     held: int
+    """Number of messages."""
+    is_defined: bool
+    """Whether the bag, or ROS where it holds no definitions, says how its messages are read."""
 
 
 class BagError(Exception):
@@ -92,7 +97,8 @@ def _topics(reader: AnyReader) -> dict[str, Topic]:
         kind = connection.msgtype.rpartition("/")[2]
         if not isinstance(connection.topic, str):
             raise ValueError("a topic with an invalid name")
-        found[connection.topic] = Topic(connection.topic, kind, count + connection.msgcount)
+        is_defined = connection.msgtype in reader.typestore.fielddefs
+        found[connection.topic] = Topic(connection.topic, kind, count + connection.msgcount, is_defined)
     return found
 
 

@@ -21,7 +21,7 @@ _TELL_EVERY = 64
 """Messages between two words of progress."""
 
 
-class Stream:
+class TopicIndex:
     """times_ns: (N,) ascending, of each message's header. recorded_ns: (N,), when it was written, which finds it."""
 
     def __init__(self, topic: str) -> None:
@@ -54,8 +54,8 @@ class BagIndex:
 
     def __init__(self, bag: Bag, topics: TopicMap, progress: Progress = silent) -> None:
         self.damage: str | None = None
-        self.lidar = Stream(topics.lidar) if topics.lidar else None
-        self.camera = Stream(topics.camera) if topics.camera else None
+        self.lidar = TopicIndex(topics.lidar) if topics.lidar else None
+        self.camera = TopicIndex(topics.camera) if topics.camera else None
         self.tree, self.camera_info = TransformTree(), None
         self.fixes: list[GnssFix] = []
         self.own: list[EgoState] = []

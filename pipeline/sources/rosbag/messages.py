@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pipeline.formats.file_reading import decode_image
 from pipeline.formats.point_cloud_fields import Cloud, cloud_of
-from pipeline.types import U8, EgoState, GnssFix, GnssQuality, Picture
+from pipeline.types import U8, CameraImage, EgoState, GnssFix, GnssQuality
 from pipeline.types.source import SourceError
 
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -86,7 +86,7 @@ def packets(message: Any) -> list[tuple[bytes, int]]:
     ]
 
 
-def picture(message: Any, t_ns: int) -> Picture:
+def picture(message: Any, t_ns: int) -> CameraImage:
     """An Image or a CompressedImage; of the latter a JPEG is kept as it is."""
     data = np.asarray(message.data, dtype=np.uint8)
     if not hasattr(message, "encoding"):
@@ -94,8 +94,8 @@ def picture(message: Any, t_ns: int) -> Picture:
             bgr, encoded = decode_image(data.tobytes(), str(getattr(message, "format", "image")) or "image")
         except SourceError as error:
             raise BadMessage(str(error)) from None
-        return Picture(t_ns, bgr, encoded)
-    return Picture(t_ns, _raw_picture(message, data))
+        return CameraImage(t_ns, bgr, encoded)
+    return CameraImage(t_ns, _raw_picture(message, data))
 
 
 def _raw_picture(message: Any, data: npt.NDArray[np.uint8]) -> U8:

@@ -18,12 +18,12 @@ from pipeline.formats.velodyne import Vlp16Decoder
 from pipeline.sources import rig as rig_files
 from pipeline.sources.rosbag import messages
 from pipeline.sources.rosbag.bag import Bag, BagError, bag_path
-from pipeline.sources.rosbag.index import BagIndex, Stream
+from pipeline.sources.rosbag.index import BagIndex, TopicIndex
 from pipeline.sources.rosbag.rig import calibration
-from pipeline.sources.rosbag.topics import ROLES, map_topics
+from pipeline.sources.rosbag.topics import ROLES, map_topics, why_missing
 from pipeline.sources.sidecar_files import rig_of
 from pipeline.sources.uri_options import split_options
-from pipeline.types import CameraCalibration, EgoState, Frame, Picture, Sweep
+from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
 _PICTURE_WITHIN_NS = 100_000_000
@@ -51,6 +51,12 @@ class RosbagSource:
         self._index = BagIndex(self._bag, topics, progress)
         self._ticks = self._ticking(path)
         notes = [topics.about(self._bag.topics), *self._about_times()]
+        self._missing = {
+            role: f"{name}: {why}"
+            for role, name in (("lidar", "LiDAR"), ("camera", "camera"))
+            if getattr(topics, role) is None and role not in options and (why := why_missing(role, self._bag.topics))
+        }
+        notes += self._missing.values()
         self._place(rig_of(file.resolve(), options), notes)
         self._own, self._fixes = self._own_motion(notes)
         if self._index.damage:
@@ -95,7 +101,7 @@ class RosbagSource:
         self.t_ns(index)
         return None
 
-    def _ticking(self, path: str) -> Stream:
+    def _ticking(self, path: str) -> TopicIndex:
         """The LiDAR's messages; the camera's where it has none."""
         for stream in (self._index.lidar, self._index.camera):
             if stream is not None and len(stream.times_ns):
@@ -112,13 +118,13 @@ class RosbagSource:
         index, lidar = self._index, self._index.lidar
         frame_id = lidar.frame_id if lidar is not None else ""
         mounted = rig.lidar.mount.T_ego_sensor()
-        self._T_ego_lidar = index.tree.T_ego_lidar(frame_id) if np.array_equal(mounted, np.eye(4)) else mounted
+        self.T_ego_lidar = index.tree.T_ego_lidar(frame_id) if np.array_equal(mounted, np.eye(4)) else mounted
         self._camera: CameraCalibration | None = rig.camera_calibration()
         if self._camera is None and index.camera is not None:
             if index.camera_info is None:
                 notes.append("no CameraInfo: LiDAR and camera are not fused")
             else:
-                self._camera = calibration(index.camera_info, index.tree, frame_id, self._T_ego_lidar, notes)
+                self._camera = calibration(index.camera_info, index.tree, frame_id, self.T_ego_lidar, notes)
 
     def _own_motion(self, notes: list[str]) -> tuple[Timeline[EgoState], Timeline[Any]]:
         """Own speed from odometry, else from GNSS."""
@@ -150,7 +156,11 @@ class RosbagSource:
 
     def _sweep(self, index: int, t_ns: int, notes: list[str]) -> Sweep | None:
         lidar = self._index.lidar
-        if lidar is None or lidar is not self._ticks:
+        if lidar is None:
+            notes += [self._missing["lidar"]] if "lidar" in self._missing else []
+            return None
+        if lidar is not self._ticks:
+            notes.append("LiDAR: no complete sweep in the bag")
             return None
         recorded_ns = int(lidar.recorded_ns[index])
         try:
@@ -158,7 +168,7 @@ class RosbagSource:
                 return self._packets_sweep(recorded_ns, t_ns, notes)
             message = self._message(lidar, recorded_ns, t_ns)
             if message is not None:
-                return messages.cloud(message, t_ns, notes).sweep(t_ns, self._T_ego_lidar)
+                return messages.cloud(message, t_ns, notes).sweep(t_ns, self.T_ego_lidar)
             notes.append("LiDAR: its message is missing")
         except (BagError, messages.BadMessage) as error:
             notes.append(f"LiDAR: {error}")
@@ -168,7 +178,7 @@ class RosbagSource:
         """The sweep of the packets in the message that holds its first, and in those after it."""
         lidar = self._index.lidar
         assert lidar is not None
-        decoder, found = Vlp16Decoder(self._T_ego_lidar, keeps_partial=True), list[Sweep]()
+        decoder, found = Vlp16Decoder(self.T_ego_lidar, keeps_partial=True), list[Sweep]()
         with self._lock, closing(self._bag.messages([lidar.topic], recorded_ns, onward=True)) as read:
             scans = list(islice(read, _MESSAGES_A_SWEEP))
         for _, at_ns, message in scans:
@@ -183,9 +193,10 @@ class RosbagSource:
             return None
         return evolve(sweep, t_ns=t_ns)
 
-    def _picture(self, t_ns: int, notes: list[str]) -> Picture | None:
+    def _picture(self, t_ns: int, notes: list[str]) -> CameraImage | None:
         camera = self._index.camera
         if camera is None:
+            notes += [self._missing["camera"]] if "camera" in self._missing else []
             return None
         index = nearest(camera.times_ns, t_ns, _PICTURE_WITHIN_NS)
         if index is None:
@@ -201,7 +212,7 @@ class RosbagSource:
             notes.append(f"camera: {error}")
         return None
 
-    def _message(self, stream: Stream, recorded_ns: int, t_ns: int) -> Any:
+    def _message(self, stream: TopicIndex, recorded_ns: int, t_ns: int) -> Any:
         """The message that was written then and is of that time; None when there is none. BagError when the bag is
         damaged there."""
         # a bag is read at one place at a time

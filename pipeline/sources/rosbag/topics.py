@@ -30,10 +30,15 @@ class TopicMap(NamedTuple):
     """Topic of each role; None where the bag has none."""
 
     lidar: str | None
+    """Point clouds."""
     camera: str | None
+    """Images, compressed or raw."""
     camera_info: str | None
+    """Calibration of that camera."""
     gnss: str | None
+    """Fixes."""
     odometry: str | None
+    """Ego speed and yaw rate."""
 
     def about(self, topics: Mapping[str, Topic]) -> str:
         """``topics: lidar /velodyne_points (PointCloud2), …``."""
@@ -51,9 +56,19 @@ def map_topics(topics: Mapping[str, Topic], wanted: Mapping[str, str]) -> TopicM
         elif role == "camera_info":
             chosen[role] = _info_of(chosen["camera"], topics)
         else:
-            fitting = [topic for topic in topics.values() if topic.kind in kinds and topic.held]
+            fitting = [topic for topic in topics.values() if topic.kind in kinds and topic.held and topic.is_defined]
             chosen[role] = max(fitting, key=lambda topic: _rank(role, topic)).name if fitting else None
     return TopicMap(**chosen)
+
+
+def why_missing(role: str, topics: Mapping[str, Topic]) -> str | None:
+    """Why a role has no topic, in a bag that may hold its messages: those of its types have none, or nothing defines
+    what a topic's messages are, as where the bag's metadata is damaged. None for a bag without such topics."""
+    empty = sorted(topic.name for topic in topics.values() if topic.kind in ROLES[role] and not topic.held)
+    unknown = sorted(f"{topic.name} ({topic.kind})" for topic in topics.values() if topic.held and not topic.is_defined)
+    why = [f"no messages on {', '.join(empty)}"] if empty else []
+    why += [f"messages of unknown types on {', '.join(unknown)}"] if unknown else []
+    return "; ".join(why) or None
 
 
 def _checked(role: str, name: str, topics: Mapping[str, Topic]) -> str:

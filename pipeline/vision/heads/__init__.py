@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pipeline.inference.graph import Size
 from pipeline.types import F32
 from pipeline.vision.heads import detr, end_to_end, yolov3, yolov5, yolov6, yolov8, yolox
-from pipeline.vision.heads.decoder import Answer, Decoder, Head, UnknownHead
+from pipeline.vision.heads.decoder import BoxOutputs, Decoder, Head, UnknownHead
 
 __all__ = ["HEADS", "Decoder", "Head", "UnknownHead", "pick_decoder"]
 
@@ -42,7 +42,7 @@ def pick_decoder(outputs: Sequence[F32], size: Size, metadata: Mapping[str, str]
     Raises:
         UnknownHead: no head recognises the outputs; the text names their shapes.
     """
-    answer = Answer(outputs, size, metadata or {})
+    answer = BoxOutputs(outputs, size, metadata or {})
     for head in HEADS:
         decoder = head.recognise(answer)
         if decoder is not None:

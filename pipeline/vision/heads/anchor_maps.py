@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.inference.graph import Size
 from pipeline.types import F32
-from pipeline.vision.heads.decoder import STRIDES, Answer, Decoded, above
+from pipeline.vision.heads.decoder import STRIDES, BoxOutputs, Decoded, above
 
 ANCHORS: Mapping[int, tuple[Size, ...]] = {
     8: ((10, 13), (16, 30), (33, 23)),
@@ -18,7 +18,7 @@ ANCHORS: Mapping[int, tuple[Size, ...]] = {
 """Anchor widths and heights in input pixels by stride, of YOLOv3 on COCO (Redmon 2018, section 2.3); v5 kept them."""
 
 
-def are_maps(answer: Answer, axes: tuple[int, int], dims: int) -> bool:
+def are_maps(answer: BoxOutputs, axes: tuple[int, int], dims: int) -> bool:
     """Whether the outputs are one map a stride, each with three anchors of the same number of channels. axes: of rows
     and columns. dims: of each map; with 4 the anchors lie side by side in the channels."""
     shapes = [output.shape for output in answer.outputs]

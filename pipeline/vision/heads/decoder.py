@@ -46,12 +46,15 @@ class Decoder:
     """(outputs, input size, lowest score) → candidates."""
 
 
-class Answer(NamedTuple):
+class BoxOutputs(NamedTuple):
     """What a network gave for some image, to recognise its head by."""
 
     outputs: Sequence[F32]
+    """In the network's order."""
     size: Size
+    """Height, width of its input in pixels."""
     metadata: Mapping[str, str]
+    """Of the file: some exporters write down the family there."""
 
     @property
     def single(self) -> F32 | None:
@@ -69,7 +72,7 @@ class Head(NamedTuple):
 
     family: str
     """What people call the networks that have it."""
-    recognise: Callable[[Answer], Decoder | None]
+    recognise: Callable[[BoxOutputs], Decoder | None]
     """The decoder, if an answer is of this form."""
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.inference.graph import Size
 from pipeline.types import F32
-from pipeline.vision.heads.decoder import Answer, Decoded, Decoder, Head
+from pipeline.vision.heads.decoder import BoxOutputs, Decoded, Decoder, Head
 
 _CLASSES = 80
 """Labels number COCO's classes from 0."""
@@ -33,7 +33,7 @@ def _parts(outputs: Sequence[F32]) -> tuple[np.ndarray, F32, F32]:
     return labels, boxes, scores
 
 
-def _three(answer: Answer) -> Decoder | None:
+def _three(answer: BoxOutputs) -> Decoder | None:
     try:
         labels, boxes, scores = _parts(answer.outputs)
     except ValueError:

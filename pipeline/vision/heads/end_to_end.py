@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.inference.graph import Size
 from pipeline.types import F32
-from pipeline.vision.heads.decoder import Answer, Decoded, Decoder, Head
+from pipeline.vision.heads.decoder import BoxOutputs, Decoded, Decoder, Head
 
 _MOST_ROWS = 1000
 
@@ -20,19 +20,19 @@ def decode(outputs: Sequence[F32], size: Size, floor: float) -> Decoded:
     return rows[:, :4].astype(np.float32), rows[:, 4].astype(np.float32), rows[:, 5].astype(np.int64)
 
 
-def _marked(answer: Answer) -> Decoder | None:
+def _marked(answer: BoxOutputs) -> Decoder | None:
     """The graph itself says so."""
     return _by_shape(answer) if answer.metadata.get("end2end") == "True" else None
 
 
-def _by_shape(answer: Answer) -> Decoder | None:
+def _by_shape(answer: BoxOutputs) -> Decoder | None:
     table = answer.single
     if table is None or table.shape[1] != 6:
         return None
     return Decoder("end to end", 0, True, 1 / 255, False, decode)
 
 
-def _few_rows(answer: Answer) -> Decoder | None:
+def _few_rows(answer: BoxOutputs) -> Decoder | None:
     """Six columns, and no more rows than an export keeps."""
     table = answer.single
     return _by_shape(answer) if table is not None and len(table) <= _MOST_ROWS else None

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.inference.graph import Size
 from pipeline.types import F32
 from pipeline.vision.heads.anchor_maps import are_maps, decode_maps, sigmoid
-from pipeline.vision.heads.decoder import Answer, Decoded, Decoder, Head
+from pipeline.vision.heads.decoder import BoxOutputs, Decoded, Decoder, Head
 
 
 def decode(outputs: Sequence[F32], size: Size, floor: float) -> Decoded:
@@ -29,7 +29,7 @@ def _split_anchors(output: F32) -> F32:
     return output.reshape(3, channels // 3, rows, columns).transpose(0, 2, 3, 1)
 
 
-def _recognise(answer: Answer) -> Decoder | None:
+def _recognise(answer: BoxOutputs) -> Decoder | None:
     if not are_maps(answer, (-2, -1), 4):
         return None
     return Decoder("yolov3 maps", answer.outputs[0].shape[1] // 3 - 5, True, 1 / 255, True, decode)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pipeline.inference.graph import Size
 from pipeline.types import F32
 from pipeline.vision.heads.anchor_maps import are_maps, decode_maps, sigmoid
-from pipeline.vision.heads.decoder import STRIDE_SETS, Answer, Decoded, Decoder, Head, decode_objectness
+from pipeline.vision.heads.decoder import STRIDE_SETS, BoxOutputs, Decoded, Decoder, Head, decode_objectness
 
 
 def decode(outputs: Sequence[F32], size: Size, floor: float) -> Decoded:
@@ -21,13 +21,13 @@ def decode(outputs: Sequence[F32], size: Size, floor: float) -> Decoded:
     )
 
 
-def _maps(answer: Answer) -> Decoder | None:
+def _maps(answer: BoxOutputs) -> Decoder | None:
     if not are_maps(answer, (-3, -2), 5):
         return None
     return Decoder("yolov5 maps", answer.outputs[0].shape[-1] - 5, True, 1 / 255, True, decode)
 
 
-def _rows(answer: Answer) -> Decoder | None:
+def _rows(answer: BoxOutputs) -> Decoder | None:
     """Three anchors in each cell, a row each."""
     table = answer.single
     if table is None or table.shape[1] <= 5 or len(table) not in {3 * answer.cells(each) for each in STRIDE_SETS}:

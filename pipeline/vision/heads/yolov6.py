@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.vision.heads.decoder import Answer, Decoder, Head, decode_objectness
+from pipeline.vision.heads.decoder import BoxOutputs, Decoder, Head, decode_objectness
 
 
-def _recognise(answer: Answer) -> Decoder | None:
+def _recognise(answer: BoxOutputs) -> Decoder | None:
     table = answer.single
     if table is None or len(table) != answer.cells() or table.shape[1] <= 5 or not np.all(table[:, 4] == 1.0):
         return None

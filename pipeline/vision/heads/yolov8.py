@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from pipeline.inference.graph import Size
 from pipeline.types import F32
-from pipeline.vision.heads.decoder import STRIDE_SETS, Answer, Decoded, Decoder, Head, above
+from pipeline.vision.heads.decoder import STRIDE_SETS, BoxOutputs, Decoded, Decoder, Head, above
 
 
 def decode(outputs: Sequence[F32], size: Size, floor: float) -> Decoded:
@@ -15,7 +15,7 @@ def decode(outputs: Sequence[F32], size: Size, floor: float) -> Decoded:
     return above(rows[:, :2], rows[:, 2:4], rows[:, 4:], floor)
 
 
-def _recognise(answer: Answer) -> Decoder | None:
+def _recognise(answer: BoxOutputs) -> Decoder | None:
     table = answer.single
     if table is None or len(table) <= 4 or table.shape[1] not in {answer.cells(each) for each in STRIDE_SETS}:
         return None

@@ -10,7 +10,7 @@ from pipeline.inference.graph import Size
 from pipeline.types import F32
 from pipeline.vision.heads.decoder import (
     STRIDES,
-    Answer,
+    BoxOutputs,
     Decoded,
     Decoder,
     Head,
@@ -31,7 +31,7 @@ def decode_yolox(outputs: Sequence[F32], size: Size, floor: float) -> Decoded:
     return above(centre, extent, kept[:, 4:5] * kept[:, 5:], floor)
 
 
-def _raw(answer: Answer) -> Decoder | None:
+def _raw(answer: BoxOutputs) -> Decoder | None:
     """Centres are offsets of about a cell, where pixels would be hundreds."""
     table = _one_row_a_cell(answer)
     if table is None or float(np.median(np.abs(table[:, :2]))) >= STRIDES[0]:
@@ -39,14 +39,14 @@ def _raw(answer: Answer) -> Decoder | None:
     return Decoder("yolox", table.shape[1] - 5, False, 1.0, True, decode_yolox)
 
 
-def _decoded(answer: Answer) -> Decoder | None:
+def _decoded(answer: BoxOutputs) -> Decoder | None:
     table = _one_row_a_cell(answer)
     if table is None:
         return None
     return Decoder("yolox decoded", table.shape[1] - 5, False, 1.0, False, decode_objectness)
 
 
-def _one_row_a_cell(answer: Answer) -> F32 | None:
+def _one_row_a_cell(answer: BoxOutputs) -> F32 | None:
     table = answer.single
     return table if table is not None and len(table) == answer.cells() and table.shape[1] > 5 else None
 

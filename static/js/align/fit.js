@@ -6,6 +6,7 @@ import { request } from "../core/api.js";
 import { el, text } from "../core/dom.js";
 import { get, on } from "../core/store.js";
 import { change } from "../panels/params.js";
+import { save as saveVersion } from "./versions.js";
 
 /** @typedef {import("../core/types.js").AlignmentFit} AlignmentFit */
 
@@ -112,8 +113,9 @@ function show(fit) {
   showWarnings(fit.result.warnings);
   buttons.hidden = false;
   apply.hidden = save.hidden = false;
-  apply.onclick = () => {
+  apply.onclick = async () => {
     change(/** @type {any} */ (changes), true);
+    await saveVersion("Fit"); // while the server still has the fit, whose score belongs to it
     dismiss();
   };
 }

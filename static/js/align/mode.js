@@ -7,6 +7,8 @@ import { $, el, press, text } from "../core/dom.js";
 import { get, on, set } from "../core/store.js";
 import { change, reveal } from "../panels/params.js";
 import { fitControl, resultPanel } from "./fit.js";
+import { drawRegions, rangesRow, regionsButton, showRegions } from "./regions.js";
+import { versionsButton, versionsPanel } from "./versions.js";
 import { followHand } from "./pointer.js";
 import { drawEdges } from "./picture_edges.js";
 import { addLayer } from "../views/camera.js";
@@ -14,7 +16,7 @@ import { grow } from "../workspace/panes.js";
 
 /** Pause between two scores during a drag: each takes the server 0.1 s. */
 const PAUSE_MS = 250;
-const OFF = { on: false, blend: 0.5, edges: true };
+const OFF = { on: false, blend: 0.5, edges: true, regions: true };
 
 const bar = $("#align-bar"),
   button = $("#align-button");
@@ -31,6 +33,8 @@ const fetchScore = newestOnly(async () => {
   );
   text(score, found instanceof Error ? "no score" : found.brief);
   score.title = found instanceof Error ? found.message : found.text;
+  showRegions(found instanceof Error ? null : found);
+  if (isOn()) set("align", { ...(get("align") ?? OFF) }); // paints the regions
   await new Promise((done) => setTimeout(done, PAUSE_MS));
 });
 
@@ -43,14 +47,17 @@ export function setUp() {
     el("span", { class: "facts match", textContent: "Match" }),
     score,
     fitControl,
+    versionsButton,
     el("span", { class: "spacer" }),
     how,
     blendSlider(),
     edgesButton(),
+    regionsButton,
   );
-  bar.after(el("div", { class: "fit-place" }, resultPanel));
+  bar.after(rangesRow, el("div", { class: "fit-place" }, resultPanel, versionsPanel));
   followHand($("#camera", HTMLCanvasElement), isOn);
   addLayer((ctx, frame, place) => isOn() && get("align")?.edges && drawEdges(ctx, frame, place));
+  addLayer((ctx, frame, place) => isOn() && get("align")?.regions && drawRegions(ctx, frame, place), "over");
   on(["frame"], () => isOn() && fetchScore(undefined));
   on(["align", "params"], reflect);
 }
@@ -66,7 +73,7 @@ export function toggleAlign() {
 }
 
 function reflect() {
-  bar.hidden = !isOn();
+  bar.hidden = rangesRow.hidden = !isOn();
   $(".fit-place").hidden = !isOn();
   press(button, isOn());
   document.body.classList.toggle("is-aligning", isOn());

@@ -4,7 +4,7 @@ import { drawNow, get, set } from "./store.js";
 
 const PING_MS = 2000;
 const RETRY_MS = [300, 600, 1200, 2500, 5000];
-/** The server scales images in steps of this width (app/streaming/picture.py). */
+/** The server scales images in steps of this width (app/streaming/sent_image.py). */
 const WIDTH_STEP_PX = 160;
 
 /**

@@ -18,11 +18,12 @@
  * @property {number} scrub the requested frame, until it is shown
  * @property {{first: number, last: number}} clip what is marked for export
  * @property {import("../workspace/panes.js").Layout} layout
- * @property {{on: boolean, blend: number, edges: boolean}} align alignment mode
+ * @property {{on: boolean, blend: number, edges: boolean, regions: boolean}} align alignment mode
  * @property {number} lanes how many lanes the timeline has
  * @property {Labeling} labeling state of the labeling mode
  * @property {import("../labeling/state/labels.js").Labels} labels
  * @property {number} labelFrames incremented when labels of some frames have arrived
+ * @property {import("../labeling/state/classes.js").ClassList} classes what people choose from
  * @property {number} track id of the selected label
  * @property {import("../labeling/state/draft.js").Draft} draft a label being edited or saved
  * @property {import("../labeling/state/marked_frames.js").Marked} marked frames marked for labeling
@@ -30,6 +31,7 @@
  * @property {import("../labeling/acts/queue.js").Saving} saving
  * @property {import("../labeling/views/three.js").Dragged} dragged the selected label being dragged in the 3D view
  * @property {string} person name of the annotator, once known
+ * @property {number} keys incremented when keys were changed
  * @property {import("../labeling/state/undo_state.js").Steps} steps
  * @property {number} threshold how sure a proposal must be to be shown, 0–1
  * @property {string} said status message of the labeling mode

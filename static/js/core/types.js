@@ -229,6 +229,22 @@
  * @property {Record<string, number>} better
  * @property {string} brief
  * @property {string} text
+ * @property {number} columns
+ * @property {number} rows
+ * @property {MatchRegion[]} regions
+ * @property {MatchRange[]} ranges
+ *
+ * @typedef {object} MatchRegion
+ * @property {number} borders
+ * @property {number|null} score
+ * @property {[number, number]|null} shift_px
+ *
+ * @typedef {object} MatchRange
+ * @property {number} borders
+ * @property {number|null} score
+ * @property {[number, number]|null} shift_px
+ * @property {number} from_m
+ * @property {number|null} to_m
  *
  * @typedef {object} AlignmentFit
  * @property {"none"|"waiting"|"running"|"done"|"failed"|"cancelled"} state
@@ -245,5 +261,15 @@
  * @property {number} iou_after
  * @property {string} text
  * @property {string[]} warnings
+ *
+ * @typedef {object} AlignmentVersion
+ * @property {number} id
+ * @property {string} saved_at
+ * @property {string} drive
+ * @property {string} note
+ * @property {Record<string, ParamValue>} values
+ * @property {number|null} match
+ * @property {number|null} iou
+ * @property {boolean} is_present
  */
 export {};

@@ -1,6 +1,8 @@
 /** The help overlay: keyboard shortcuts, colours and links. */
 import { $, el } from "../core/dom.js";
+import { nameOf } from "./keyboard.js";
 import { keymap } from "./keymap.js";
+import { change, reset, shownAs } from "./own_keys.js";
 
 const COLORS = [
   ["cipv", "CIPV: closest in-path vehicle"],
@@ -47,9 +49,14 @@ export function show() {
         el("p", {}, el("a", { href: "drive/", textContent: "Touch display for small screens" })),
       ),
     ),
-    el("form", { method: "dialog" }, el("button", { textContent: "Close" })),
+    el(
+      "form",
+      { method: "dialog" },
+      el("button", { type: "button", textContent: "Change keys", onclick: edit }),
+      el("button", { textContent: "Close" }),
+    ),
   );
-  dialog.showModal();
+  if (!dialog.open) dialog.showModal();
   dialog.scrollTop = 0; // the first focusable element is at the bottom
 }
 
@@ -58,6 +65,85 @@ const link = (href, words) => el("a", { href, target: "_blank", rel: "noopener",
 
 /** Active shortcuts come first. @returns {import("./keymap.js").Group[]} */
 const groups = () => [...keymap()].sort((a, b) => Number(isIdle(a)) - Number(isIdle(b)));
+
+/** The page on which keys are changed: press one, then the new key. */
+function edit() {
+  const said = el("p", { class: "facts", role: "status", textContent: "Choose a key, then press the new one." });
+  const shownGroups = keymap().filter(({ bindings }) => bindings.some(({ words }) => words));
+  dialog.replaceChildren(
+    el("h2", { textContent: "Keys" }),
+    said,
+    el("div", { class: "columns keys-page" }, ...shownGroups.map((each) => changeable(each, said))),
+    el(
+      "form",
+      { method: "dialog" },
+      el("button", {
+        type: "button",
+        textContent: "Reset all",
+        onclick: () => {
+          reset();
+          edit();
+        },
+      }),
+      el("button", { type: "button", textContent: "Back", onclick: show }),
+      el("button", { textContent: "Close" }),
+    ),
+  );
+  dialog.scrollTop = 0;
+}
+
+/** @param {import("./keymap.js").Group} group @param {HTMLElement} said */
+const changeable = (group, said) =>
+  el(
+    "div",
+    {},
+    el("h2", { textContent: group.title }),
+    ...group.bindings
+      .filter(({ words }) => words)
+      .map((binding) => {
+        const button = el("button", {
+          type: "button",
+          class: binding.isOwn ? "key is-own" : "key",
+          textContent: binding.shown,
+          title: `Change the key: ${binding.words}`,
+          onclick: () => listen(button, group, binding, said),
+        });
+        return el("div", { class: "pair" }, button, el("span", { textContent: binding.words }));
+      }),
+  );
+
+/**
+ * Wait for the new key; Escape keeps the old one.
+ * @param {HTMLElement} button
+ * @param {import("./keymap.js").Group} group
+ * @param {import("./keymap.js").Binding} binding
+ * @param {HTMLElement} said
+ */
+function listen(button, group, binding, said) {
+  button.textContent = "press a key";
+  const hear = (/** @type {KeyboardEvent} */ event) => {
+    if (["Shift", "Control", "Alt", "Meta"].includes(event.key)) return;
+    event.preventDefault();
+    event.stopPropagation();
+    end();
+    if (event.key === "Escape") return edit();
+    const name = nameOf(event),
+      taken = change(keymap(), group, binding, name);
+    if (!taken) return edit();
+    button.textContent = binding.shown;
+    said.textContent = `${shownAs(name)} is already: ${taken}. Change that first.`;
+  };
+  const end = () => {
+    removeEventListener("keydown", hear, true);
+    button.removeEventListener("blur", leave);
+  };
+  const leave = () => {
+    end();
+    button.textContent = binding.shown;
+  };
+  addEventListener("keydown", hear, true);
+  button.addEventListener("blur", leave);
+}
 
 /** Whether a group belongs to an inactive mode. @param {import("./keymap.js").Group} group */
 const isIdle = ({ mode, bindings }) => mode !== undefined && bindings.every(({ isOn }) => isOn && !isOn());

@@ -1,5 +1,6 @@
 /** Global keyboard shortcuts (keymap.js). Ignored while typing; a focused slider keeps its arrow keys. */
 import { $ } from "../core/dom.js";
+import { on } from "../core/store.js";
 import { keymap } from "./keymap.js";
 
 /** Camera movement keys of the 3D view (viser's CAMERA_MOVEMENT_KEYS), with any modifier. */
@@ -17,7 +18,8 @@ const FLYING = new Set([
 ]);
 
 export function setUp() {
-  const bindings = keymap().flatMap((group) => group.bindings);
+  let bindings = keymap().flatMap((group) => group.bindings);
+  on(["keys", "person"], () => (bindings = keymap().flatMap((group) => group.bindings)));
   const act = (/** @type {KeyboardEvent} */ event) => {
     if (event.altKey || event.defaultPrevented || isTaken(event)) return;
     const name = nameOf(event),
@@ -53,7 +55,7 @@ function giveBack(view) {
  * Key name, independent of keyboard layout for digits: "Shift+1", "Ctrl+z", "?", "Space".
  * @param {KeyboardEvent} event
  */
-function nameOf({ key, code, shiftKey, ctrlKey, metaKey }) {
+export function nameOf({ key, code, shiftKey, ctrlKey, metaKey }) {
   const digit = /^Digit(\d)$/.exec(code)?.[1];
   const bare =
     key === " " ? "Space" : shiftKey && digit ? digit : key.length === 1 && !shiftKey ? key.toLowerCase() : key;

@@ -5,6 +5,7 @@ import { toDifference, toEvent } from "../drive/jumps.js";
 import { seekTo } from "../drive/seek.js";
 import * as shuttle from "../drive/shuttle.js";
 import * as help from "./help.js";
+import { withOwn } from "./own_keys.js";
 import { labelKeys } from "../labeling/keys.js";
 import * as labeling from "../labeling/state/mode.js";
 import * as sources from "../panels/open_dialog.js";
@@ -22,7 +23,9 @@ import { toggleTheme } from "../workspace/theme.js";
 /**
  * keys: as `nameOf` in keyboard.js returns them; isOn: whether the binding is active, the first active one wins.
  * Bindings without words are not listed in the help.
- * @typedef {{keys: string[], shown: string, words: string, act: () => unknown, isOn?: () => boolean}} Binding
+ * id: its default keys, as `own_keys.js` names it; isOwn: somebody changed its key.
+ * @typedef {{keys: string[], shown: string, words: string, act: () => unknown, isOn?: () => boolean, id?: string,
+ *   isOwn?: boolean}} Binding
  */
 /**
  * mode: keys of a mode take precedence while it is on.
@@ -39,8 +42,11 @@ import { toggleTheme } from "../workspace/theme.js";
 const key = (keys, shown, words, act) => ({ keys: keys.split(" "), shown, words, act });
 const last = () => Math.max(0, (get("state")?.count ?? 1) - 1);
 
+/** With the keys that the person here has changed. @returns {Group[]} */
+export const keymap = () => withOwn(defaults());
+
 /** @returns {Group[]} */
-export const keymap = () => [
+const defaults = () => [
   ...labelKeys(),
   {
     title: "Playback",

@@ -215,6 +215,7 @@ export const labelKeys = () => [
       key("Shift+X", "Shift X", "turn the track round: front and rear are swapped", commands.flip, "turn round"),
       key("s", "S", "fit the cuboid to the points", commands.snap, "snap"),
       key("Shift+S", "Shift S", "the image box follows the cuboid again", commands.boxFollows),
+      key("Shift+C", "Shift C", "carry the track on, before and after", () => commands.propagate("both"), "carry on"),
       key("w", "W", "apply this size to the whole track", commands.sizeAlong, "size along"),
       key("k", "K", "set keyframe", commands.keyframe, "keyframe"),
       key("Shift+K", "Shift K", "remove keyframe", commands.dropKeyframe),

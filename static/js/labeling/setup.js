@@ -4,6 +4,7 @@ import { addLayer } from "../views/camera.js";
 import { addLane } from "../timeline/lanes/registry.js";
 import * as acts from "./acts/queue.js";
 import * as bar from "./panels/bar.js";
+import * as classes from "./state/classes.js";
 import * as data from "./state/sync.js";
 import * as draft from "./state/draft.js";
 import * as frames from "./state/sightings.js";
@@ -21,7 +22,8 @@ import * as steps from "./state/undo_state.js";
 import * as three from "./views/three.js";
 
 export function setUp() {
-  for (const part of [mode, acts, data, steps, frames, draft, projection, three, bar, panel, pictureHand]) part.setUp();
+  const parts = [mode, acts, data, steps, frames, draft, projection, three, bar, panel, pictureHand, classes];
+  for (const part of parts) part.setUp();
   addMode({ isOn: mode.isOn, draw: drawInPlan, ...planHand });
   addLayer(drawInPicture, "over");
   for (const lane of [...tags, leads, track]) addLane(lane, "lead"); // above the pipeline's lead

@@ -18,6 +18,7 @@ const KINDS = {
   range_sigmas: { label: "Range difference", test: "most", unit: "σ", param: "fusion.range_gate_sigmas" },
   class_size: { label: "Length for class", test: "most", unit: "m", param: "fusion.size_gate" },
   free_road: { label: "LiDAR sees through it", test: "most", param: "existence.enabled" },
+  own_returns: { label: "LiDAR returns of its own", test: "least", param: "existence.enabled" },
   vehicle_class: { label: "Vehicle class", test: "flag" },
   distance_known: { label: "Distance known", test: "flag", unit: "m" },
   hits: { label: "Detections", test: "least", param: "cipv.confirm_hits" },

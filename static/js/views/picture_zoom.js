@@ -61,6 +61,31 @@ export function setUp(canvas, place, redraw) {
     held = { x: event.offsetX, y: event.offsetY };
   });
   for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => (held = null));
+  pinch(canvas, place);
+}
+
+/** Two fingers zoom where they are, and move the image. @param {HTMLCanvasElement} canvas @param {() => Place} place */
+function pinch(canvas, place) {
+  /** @type {Map<number, {x: number, y: number}>} */
+  const fingers = new Map();
+  const grip = () => {
+    const [a, b] = [...fingers.values()];
+    return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, apart: Math.max(1, Math.hypot(a.x - b.x, a.y - b.y)) };
+  };
+  const put = (/** @type {PointerEvent} */ { pointerId, offsetX, offsetY }) =>
+    fingers.set(pointerId, { x: offsetX, y: offsetY });
+  canvas.addEventListener("pointerdown", (event) => event.pointerType === "touch" && put(event));
+  canvas.addEventListener("pointermove", (event) => {
+    if (!fingers.has(event.pointerId)) return;
+    const before = fingers.size === 2 ? grip() : null;
+    put(event);
+    if (!before || get("align")?.on || !imageSize()) return;
+    const now = grip();
+    pan(place(), now.x - before.x, now.y - before.y);
+    zoomAt(canvas, place(), now.x, now.y, now.apart / before.apart);
+  });
+  for (const name of /** @type {const} */ (["pointerup", "pointercancel"]))
+    canvas.addEventListener(name, ({ pointerId }) => fingers.delete(pointerId));
 }
 
 /**

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from app.bench.broadcast import RATE_HZ
-from app.bench.clients import Client, Run, _lags, _measure, _per_frame_ms, _rate_hz, _server
+from app.bench.clients import Client, ClientRun, _lags, _measure, _per_frame_ms, _rate_hz, _server
 from tests.app.waiting import loop_apart
 
 
-def run_of(*lags_s: list[float], cpu_s: float = 1.0, spent_s: float = 10.0) -> Run:
-    return Run([Client(each) for each in lags_s], cpu_s, spent_s)
+def run_of(*lags_s: list[float], cpu_s: float = 1.0, spent_s: float = 10.0) -> ClientRun:
+    return ClientRun([Client(each) for each in lags_s], cpu_s, spent_s)
 
 
 def test_making_a_frame_is_no_cost_of_a_client():

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from app.bench.demands import DEMANDS, PAGE_DEMANDS, Demand, broken, page_rows
+from app.bench.demands import DEMANDS, PAGE_DEMANDS, Requirement, broken, page_rows
 
 
-def figures(demands: tuple[Demand, ...] = DEMANDS) -> dict[str, dict[str, Any]]:
+def figures(demands: tuple[Requirement, ...] = DEMANDS) -> dict[str, dict[str, Any]]:
     """Each just as good as demanded."""
     made: dict[str, dict[str, Any]] = {}
     for demand in demands:

@@ -29,7 +29,7 @@ from pipeline.params import Params
 from pipeline.run import run
 from pipeline.sources import open_source
 from pipeline.step import State, step
-from pipeline.types import Frame, Picture, Result
+from pipeline.types import CameraImage, Frame, Result
 from pipeline.types.result_json import to_json
 from tests.app.engine.recording_helpers import HEIGHT, WIDTH, CountingDetector, Recording
 
@@ -137,7 +137,7 @@ def test_a_clip_that_is_too_long_is_refused(clip: Clip):
 
 def test_a_large_picture_is_made_smaller_and_even(results: Results):
     frame, result = results[5]
-    large = Frame(**{**vars(frame), "picture": Picture(None, np.full((621, 2049, 3), 90, np.uint8))})
+    large = Frame(**{**vars(frame), "picture": CameraImage(None, np.full((621, 2049, 3), 90, np.uint8))})
     height, width = draw_frame(large, result, Params()).shape[:2]
     assert width == WIDTH_PX
     assert (height % 2, abs(height - 621 * WIDTH_PX / 2049) <= 2) == (0, True)

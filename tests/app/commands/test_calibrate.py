@@ -5,15 +5,20 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
 from app.cli import main
+from pipeline.common.geometry import rotation
 from pipeline.inference.distance_laws import find_law
 from pipeline.inference.model_registry import EMBEDDED, find
 from pipeline.params import Params, from_yaml
+from pipeline.sources import open_source
+from tests.pipeline.sources.clouds_on_disk import pcd, rows_of
 
 SCENE = """
 title: cars ahead
@@ -97,10 +102,63 @@ def test_an_alignment_is_fitted_and_written_as_parameters(tmp_path: Path, capsys
 
 @pytest.mark.parametrize(
     ("what", "arguments"),
-    [("alignment", ["--keep"]), ("distance", ["--offset"]), ("alignment", ["--offset", "--model", "angular"])],
+    [
+        ("mount", ["--model", "angular"]),
+        ("alignment", ["--keep"]),
+        ("distance", ["--offset"]),
+        ("alignment", ["--offset", "--model", "angular"]),
+    ],
 )
 def test_options_of_the_other_fit_are_refused(
     what: str, arguments: list[str], scene: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert calibrate(scene, *arguments, what=what) == 2
     assert arguments[0] in capsys.readouterr().err
+
+
+def test_a_mount_is_fitted_to_a_drive_and_corrected_by_its_rig_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive, turn = open_source("sim:curve_125"), rotation(*np.radians([0.0, 2.0, 3.0])).astype(np.float32)
+    for index in range(60):
+        sweep = drive.frame(index).sweep
+        assert sweep is not None
+        points = sweep.points.copy()
+        points[:, :3] = points[:, :3] @ turn
+        rows = rows_of(replace(sweep, points=points))
+        rows["time"] = sweep.time_s
+        (tmp_path / f"{index / drive.rate_hz:.3f}.pcd").write_bytes(pcd(rows))
+    before, rig = f"pcd:{tmp_path}", tmp_path / "rig.yaml"
+    assert calibrate(before, "--json", "--out", str(rig), what="mount") == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["values"]["yaw_deg"] == pytest.approx(3.0, abs=0.6)
+    assert calibrate(before, "--json", what="mount") == 0, "the rig file beside the sweeps is used"
+    left = json.loads(capsys.readouterr().out)["values"]
+    assert left["yaw_deg"] == pytest.approx(0.0, abs=0.3)
+    assert left["pitch_deg"] == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_recording_with_its_own_mounts_takes_no_rig_file(
+    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert calibrate(scene, "--out", str(tmp_path / "rig.yaml"), what="mount") == 2
+    assert "own mounts" in capsys.readouterr().err
+    assert calibrate(scene, what="mount") == 2
+    assert "no yaw" in capsys.readouterr().err, "five frames"
+
+
+def test_the_time_of_a_drive_is_told_and_written_as_parameters(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], data_dir: Path
+) -> None:
+    out, drive = tmp_path / "sync.yaml", data_dir / "kitti_0009" / "2011_09_26" / "2011_09_26_drive_0009_sync"
+    assert calibrate(f"kitti:{drive}", "--json", "--out", str(out), what="time") == 0
+    printed = capsys.readouterr()
+    camera = json.loads(printed.out)["camera"]
+    assert abs(camera["camera_offset_ms"]) < 20.0, "its trigger was the LiDAR"
+    assert from_yaml(out, Params()).sync.camera_offset_ms == camera["camera_offset_ms"]
+    assert "ego speed" in printed.err, "five seconds"
+
+
+def test_a_drive_that_tells_no_time_is_one_sentence(scene: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert calibrate(scene, what="time") == 2
+    assert "frames with an image" in capsys.readouterr().err

@@ -37,7 +37,7 @@ def test_truth_goes_out_and_comes_back(drive: Path, tmp_path: Path, capsys: pyte
     file = tmp_path / "labels.json"
     assert cipv("labels", "import", drive, tmp_path / "out.json", "--format", "openlabel", "--out", file) == 0
     labels = json.loads(file.read_text())
-    assert (labels["format"], labels["version"]) == ("cipv-labels", 4)
+    assert (labels["format"], labels["version"]) == ("cipv-labels", 5)
     assert [track["id"] for track in labels["labels"]["tracks"]] == [7]
     assert cipv("labels", "export", drive, "--labels", file, "--format", "csv", "--out", tmp_path / "lead.csv") == 0
     assert "cipv: 1 track not written: the format cannot hold them" in capsys.readouterr().err

@@ -14,7 +14,7 @@ from app.cli import main
 from app.commands import scenarios
 from app.reports.html import html
 from pipeline.common.fast_replace import evolve
-from pipeline.evaluation.report_sections import Section
+from pipeline.evaluation.report_sections import ReportSection
 from pipeline.experiments.euro_ncap.experiment import NCAP
 from pipeline.experiments.paper import braking
 from pipeline.experiments.straight_track import DriveRecord
@@ -104,7 +104,7 @@ def test_a_demand_that_does_not_hold_fails_the_command(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], failures: tuple[str, ...], code: int
 ) -> None:
     """The figures are written all the same."""
-    section = Section("choosing", "Choosing", failures=failures)
+    section = ReportSection("choosing", "Choosing", failures=failures)
     monkeypatch.setattr(scenarios, "run_all", lambda *_: [section])
     with pytest.raises(SystemExit) as ended:
         main(["scenarios", "run", "--suite", "choosing", "--json"])

@@ -8,7 +8,7 @@ import pytest
 
 import app.commands.serve as command
 from app.commands.record import Record
-from app.commands.run import Run
+from app.commands.run import RunPipeline
 from app.commands.serve import Serve
 from app.commands.support.options import SourceOptions
 from pipeline.common.errors import BadInput
@@ -62,7 +62,7 @@ def test_what_cannot_be_opened_is_said_before_anything_starts(opened: Opened) ->
 FOO = SourceOptions("foo")
 
 
-@pytest.mark.parametrize("begin", [Serve("foo").engine, Record(FOO), Run(FOO)], ids=["serve", "record", "run"])
+@pytest.mark.parametrize("begin", [Serve("foo").engine, Record(FOO), RunPipeline(FOO)], ids=["serve", "record", "run"])
 def test_who_takes_live_sensors_names_them_among_what_can_be_typed(begin: Callable[[], object]) -> None:
     with pytest.raises(SourceError, match=r"foo: not a source; use one of .*, live:<config.yaml>$"):
         begin()

@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.common.progress import Progress, silent
 from pipeline.inference.cancellation import Stopped, of_this_thread
-from pipeline.types import F32, U8, CameraCalibration, EgoState, Frame, Picture, RawBoxes, RawLanes, Sweep
+from pipeline.types import F32, U8, CameraCalibration, CameraImage, EgoState, Frame, RawBoxes, RawLanes, Sweep
 from pipeline.types.source import SourceError, TruthObject
 
 WIDTH, HEIGHT = 320, 180
@@ -146,11 +146,11 @@ def _points(distance_m: float) -> tuple[F32, U8]:
     return points, np.zeros(len(points), np.uint8)
 
 
-def _picture(t_ns: int, distance_m: float) -> Picture:
+def _picture(t_ns: int, distance_m: float) -> CameraImage:
     """A red car on grey, as the camera sees it, as a JPEG."""
     bgr = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
     left, right = (round(WIDTH / 2 + FOCAL_PX * y / distance_m) for y in (-0.8, 0.8))
     top, bottom = (round(HEIGHT / 2 - FOCAL_PX * (z - 0.6) / distance_m) for z in (0.8, -0.5))
     cv2.rectangle(bgr, (left, top), (right, bottom), (20, 20, 220), cv2.FILLED)
     encoded = cv2.imencode(".jpg", bgr)[1].tobytes()
-    return Picture(t_ns, bgr, encoded)
+    return CameraImage(t_ns, bgr, encoded)

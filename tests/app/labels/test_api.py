@@ -171,6 +171,25 @@ def test_the_cuboid_is_laid_on_the_points_and_a_car_lifted_out_of_the_picture(
     assert (nothing.status_code, "draw a box" in nothing.json()["detail"]) == (409, True)
 
 
+def test_a_track_is_carried_on_from_one_frame_by_one_act_and_taken_back_by_one(
+    engine: Engine, client: httpx.Client
+) -> None:
+    act(client, kind="lift", frame=10, pixel=[160, 92], label="car")
+    (track,) = labels(client)["tracks"]
+    carried = act(client, kind="propagate", track=track["id"], revision=track["revision"])
+    assert carried.is_success, carried.text
+    (after,) = labels(client)["tracks"]
+    assert (after["first"], after["last"], after["keyframes"]) == (0, COUNT - 1, [10])
+    frames = client.get("/api/labels/frames?first=0&last=19").json()["sightings"]
+    rear = [rows[0]["cuboid"]["center"][0] - rows[0]["cuboid"]["size"][0] / 2 for rows in frames.values()]
+    assert rear == pytest.approx([30.0 - 0.4 * index for index in range(20)], abs=0.3)
+    again = act(client, kind="propagate", track=after["id"], revision=after["revision"])
+    assert (again.status_code, "beyond its ends" in again.json()["detail"]) == (409, True)
+    move(client, "undo", "Ada")
+    (back,) = labels(client)["tracks"]
+    assert (back["first"], back["last"]) == (10, 10)
+
+
 def test_a_name_is_the_same_however_it_is_spaced(client: httpx.Client) -> None:
     spaced = " Ada  Lovelace "
     assert act(client, spaced, kind="tag", first=3, last=3, tag="night").is_success

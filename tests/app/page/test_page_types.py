@@ -99,8 +99,11 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "Metric": comparison["metrics"][0],
         "Comparison": comparison,
         "Job": job,
-        "AlignmentScore": get("/api/alignment/score"),
+        "AlignmentScore": (alignment := get("/api/alignment/score")),
+        "MatchRegion": alignment["regions"][0],
+        "MatchRange": alignment["ranges"][0],
         "AlignmentFit": get("/api/alignment/fit"),
+        "AlignmentVersion": client.post("/api/alignment/versions", json={"note": ""}).json(),
         "AlignmentFitResult": dict.fromkeys(FitResult.model_fields),
         **labelled(engine, client),
     }
@@ -158,6 +161,8 @@ def labelled(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "Found": get("/next?what=unlabelled&frame=0"),
         "Still": get(f"/tracks/{track['id']}/filmstrip")[0],
         "Problem": get("/checks")["problems"][0],
+        "LabelClass": get("/classes")["classes"][0],
+        "AttributeKind": get("/classes")["attributes"][0],
     }
 
 

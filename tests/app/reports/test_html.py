@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from app.reports.html import html, in_words
 from app.reports.svg_charts import chart_svg, ticks
-from pipeline.evaluation.report_sections import Chart, Coloured, Section, Series, Table
+from pipeline.evaluation.report_sections import Chart, Coloured, ReportSection, Series, Table
 
-SECTION = Section(
+SECTION = ReportSection(
     "one",
     "A <b>title</b>",
     ("Text & more",),

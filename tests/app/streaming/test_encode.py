@@ -16,12 +16,12 @@ from app.drive.frame_rows import column_names
 from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
-from app.streaming.picture import MAX_WIDTH_PX, encode_picture, width_for
 from app.streaming.points import UNKNOWN_AGE, UNSEEN
+from app.streaming.sent_image import MAX_WIDTH_PX, encode_picture, width_for
 from pipeline.alignment.projection import resolve
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
-from pipeline.types import DROPPED, GROUND, U8, UNCLUSTERED, Picture
+from pipeline.types import DROPPED, GROUND, U8, UNCLUSTERED, CameraImage
 from pipeline.types.lane import EgoLane, LaneLine, Side
 from pipeline.types.result_json import to_json
 from tests.app.engine.recording_helpers import GROUND_M, CountingDetector, Recording
@@ -134,7 +134,7 @@ def test_the_cameras_own_jpeg_goes_through_untouched():
 )
 def test_a_picture_is_encoded_when_it_must_be_and_never_too_wide(width: int, own_jpeg: bool, sent: int):
     bgr = np.full((300, width, 3), 77, np.uint8)
-    picture = Picture(0, bgr, cv2.imencode(".jpg", bgr)[1].tobytes() if own_jpeg else None)
+    picture = CameraImage(0, bgr, cv2.imencode(".jpg", bgr)[1].tobytes() if own_jpeg else None)
     made = encode_picture(picture)
     decoded = cv2.imdecode(np.frombuffer(made.jpeg, np.uint8), cv2.IMREAD_COLOR)
     assert decoded is not None
@@ -151,7 +151,7 @@ def _wide() -> U8:
 
 
 def test_boxes_are_in_pixels_of_the_sent_picture():
-    header, _, _ = taken_apart(Encoder().message(snapshot(picture=Picture(0, _wide()), index=0)) or b"")
+    header, _, _ = taken_apart(Encoder().message(snapshot(picture=CameraImage(0, _wide()), index=0)) or b"")
     assert header["picture"]["scale"] == 0.5
     [box] = header["display"]["vision_boxes"].values()
     assert box == pytest.approx([300, 50, 450, 100], abs=1.0)
@@ -234,14 +234,14 @@ def test_pictures_are_sent_as_wide_as_they_are_shown_in_steps(shown_px: float, s
 
 
 def test_a_wider_picture_is_encoded_when_somebody_shows_it_wider():
-    shown = snapshot(picture=Picture(0, _wide()), index=0)
+    shown = snapshot(picture=CameraImage(0, _wide()), index=0)
     encoder = Encoder()
     widths = [taken_apart(encoder.message(shown, width) or b"")[0]["picture"]["width"] for width in (640, 960, 640)]
     assert widths == [640, 960, 640]
 
 
 def test_the_picture_is_encoded_once_while_a_parameter_changes(monkeypatch: pytest.MonkeyPatch):
-    made: list[Picture] = []
+    made: list[CameraImage] = []
     monkeypatch.setattr(
         "app.streaming.encode.encode_picture",
         lambda picture, width: made.append(picture) or encode_picture(picture, width),

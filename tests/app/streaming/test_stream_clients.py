@@ -23,14 +23,14 @@ from app.core.server_address import listen_socket
 from app.engine.page_frames import PageFrames
 from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.snapshot import Snapshot
-from app.streaming.picture import MAX_WIDTH_PX
+from app.streaming.sent_image import MAX_WIDTH_PX
 from app.streaming.slot import FRAMES_UNDER_WAY
 from app.streaming.stream import Stream
 from app.web.server import Server
 from pipeline.common.geometry import Cuboid
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
-from pipeline.types import Picture
+from pipeline.types import CameraImage
 from tests.app.engine.recording_helpers import CountingDetector, Recording
 
 WAIT_S = 180.0
@@ -83,7 +83,7 @@ def _first() -> Snapshot:
     tick = pipeline.seek(0, Params())
     assert tick is not None
     noise = np.random.default_rng(0).integers(0, 255, (900, 2560, 3), np.uint8)
-    tick = replace(tick, frame=replace(tick.frame, picture=Picture(0, noise)))
+    tick = replace(tick, frame=replace(tick.frame, picture=CameraImage(0, noise)))
     return Snapshot(Params(), uri=pipeline.source.uri, count=1, processed=tick)
 
 

@@ -16,7 +16,10 @@ from websockets.sync.client import connect
 
 from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder
-from app.web.routes import shapes
+from app.web.routes.shapes.common import Refusal
+from app.web.routes.shapes.parameters import ParamsJson
+from app.web.routes.shapes.result import ResultJson
+from app.web.routes.shapes.state import SourcesJson, StateJson
 from app.web.server import create_app
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import Recording, opener
@@ -131,7 +134,7 @@ def test_a_refusal_is_described_as_it_is_sent(client: httpx.Client, app: FastAPI
     }
     assert [answer.status_code for answer in refused.values()] == list(refused)
     for answer in refused.values():
-        assert shapes.Refusal.model_validate(answer.json()).detail
+        assert Refusal.model_validate(answer.json()).detail
     for name, operation in operations(app).items():
         schema = operation["responses"]["4XX"]["content"]["application/json"]["schema"]
         assert schema == {"$ref": "#/components/schemas/Refusal"}, name
@@ -163,11 +166,19 @@ def test_every_model_has_words(app: FastAPI):
     assert [name for name, model in own.items() if not model.get("description") and "enum" not in model] == []
 
 
+def test_every_field_has_words(app: FastAPI):
+    models = app.openapi()["components"]["schemas"]
+    own = {name: model for name, model in models.items() if "Validation" not in name}
+    fields = {f"{name}.{key}": each for name, model in own.items() for key, each in model.get("properties", {}).items()}
+    assert len(fields) > 300
+    assert {name for name, each in fields.items() if not each.get("description") and "const" not in each} == set()
+
+
 ANSWERS: dict[str, type[BaseModel]] = {
-    "/api/state": shapes.StateJson,
-    "/api/result": shapes.ResultJson,
-    "/api/params": shapes.ParamsJson,
-    "/api/sources": shapes.SourcesJson,
+    "/api/state": StateJson,
+    "/api/result": ResultJson,
+    "/api/params": ParamsJson,
+    "/api/sources": SourcesJson,
 }
 
 

@@ -32,11 +32,11 @@ GET /api/params.yaml · GET /api/recording · POST /api/recording · GET /api/dr
 GET /api/drive/events · POST /api/marks · GET /api/runs · GET /api/runs/{number}/columns ·
 GET /api/runs/{number}/params.yaml · GET /api/compare · GET /api/labels · GET /api/labels/frames ·
 GET /api/labels/tracks/{number} · GET /api/labels/tracks/{number}/filmstrip ·
-GET /api/labels/tracks/{number}/close_up · GET /api/labels/checks ·
+GET /api/labels/tracks/{number}/close_up · GET /api/labels/checks · GET /api/labels/classes ·
 GET /api/labels/next · GET /api/labels/score · GET /api/labels/history ·
 GET /api/labels/formats · GET /api/labels/export · GET /api/labels/export/notes · GET /api/labels/versions ·
 GET /api/labels/versions/{name} · GET /api/jobs · GET /api/jobs/{number} · GET /api/jobs/{number}/file ·
-GET /api/alignment/score · GET /api/alignment/fit · GET /api/alignment/fit.yaml ·
+GET /api/alignment/score · GET /api/alignment/fit · GET /api/alignment/fit.yaml · GET /api/alignment/versions ·
 GET /api/rerun/open · GET /api/rerun.rrd · GET /openapi.json · HEAD /openapi.json ·
 WEBSOCKET /api/stream · GET /rerun/re_viewer.js · GET /rerun/re_viewer_bg.wasm · GET /rerun/ · GET /help ·
 GET /help/{address:path} · GET /palette.css · GET / · HEAD /
@@ -47,6 +47,7 @@ POST /api/params/redo · POST /api/params/preset · DELETE /api/marks/{number} �
 POST /api/runs/{number}/base · POST /api/runs/{number}/use · DELETE /api/runs/{number} · POST /api/labels/act ·
 POST /api/labels/undo · POST /api/labels/redo · POST /api/labels/import · POST /api/labels/versions · POST /api/clip ·
 DELETE /api/jobs/{number} · POST /api/alignment/fit · DELETE /api/alignment/fit ·
+POST /api/alignment/versions · DELETE /api/alignment/versions/{number} ·
 POST /api/project · POST /api/project/ray · WEBSOCKET /viser · WEBSOCKET /viser/ ·
 WEBSOCKET /viser/of/{name} · GET /viser/of/{name}/{path:path} · GET /viser · GET /viser/{path:path}
 """

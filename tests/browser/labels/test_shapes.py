@@ -296,3 +296,42 @@ def test_the_opposite_face_is_held_whatever_the_heading(hand: Hand):
     for (grip, to, center, size), got in zip(EDGES, sizes, strict=True):
         assert got["center"][:2] == pytest.approx(center), (grip, to)
         assert got["size"][:2] == pytest.approx(size), (grip, to)
+
+
+def test_classes_and_attributes_are_chosen_from_the_projects_list(hand: Hand, labels: Labels):
+    page = hand.page
+    made = draw(hand, labels)
+    is_saved(page)
+    classes = page.locator(".detail-head select")
+    expect(classes.locator("option")).to_contain_text(["car", "truck", "van (car)"])
+    classes.select_option("van")
+    labels.wait_for(lambda now: now.tracks[made]["label"] == "van")
+    hand.keys("t")
+    labels.wait_for(lambda now: now.tracks[made]["label"] == "semitrailer truck")
+
+    motion, occlusion = page.get_by_label("motion", exact=True), page.get_by_label("occlusion", exact=True)
+    motion.select_option("parked")
+    labels.wait_for(
+        lambda now: [(each["name"], each["value"]) for each in now.tracks[made]["attributes"]] == [("motion", "parked")]
+    )
+    occlusion.select_option("1")
+    labels.wait_for(lambda now: now.sighting(made, START)["occlusion"] == 1)
+    expect(motion).to_have_value("parked")
+    expect(occlusion).to_have_value("1")
+    page.keyboard.press("Control+z")
+    labels.wait_for(lambda now: now.sighting(made, START)["occlusion"] is None)
+    expect(occlusion).to_have_value("")
+
+
+def test_a_track_is_carried_on_by_one_key_and_taken_back_by_one(hand: Hand, labels: Labels):
+    page = hand.page
+    cuboid = {"center": [18.47, -3.6, 1.4], "size": [12.0, 2.5, 3.8], "yaw_rad": 0.0}
+    added = labels.act("Bob", {"kind": "add_track", "label": "truck", "frame": START, "cuboid": cuboid, "bbox": None})
+    made = added["changed"]["tracks"][0]["id"]
+    page.locator(f".track-row[data-id='{made}']").click()
+    hand.keys("Shift+C")
+    labels.wait_for(lambda now: now.tracks[made]["last"] - now.tracks[made]["first"] > 10)
+    assert labels.tracks[made]["keyframes"] == [START], "nobody has placed the others"
+    expect(page.locator(".said")).to_contain_text(f"carried #{made} on over")
+    page.keyboard.press("Control+z")
+    labels.wait_for(lambda now: (now.tracks[made]["first"], now.tracks[made]["last"]) == (START, START))

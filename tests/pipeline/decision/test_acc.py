@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pipeline.decision.acc import AccState, control, desired_gap_m, follow, pid
 from pipeline.decision.cipv import CipvState, choose
 from pipeline.decision.object_motion import describe
-from pipeline.params import AccParams, CipvParams, MotionParams, PathParams
+from pipeline.params import AccParams, AebParams, CipvParams, MotionParams, PathParams, preset
 from pipeline.path.corridor import corridor
 from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Situation
 from tests.pipeline.build import fused, moment
@@ -19,6 +19,7 @@ from tests.pipeline.build import fused, moment
 PARAMS = AccParams(
     set_speed_kmh=108.0, min_gap_m=5.0, time_gap_s=1.5, ttc_limit_s=2.5, confirm_frames=1, kp=2.0, ki=0.05
 )
+EMERGENCY = AebParams()
 PATH = corridor(None, PathParams(half_width_m=1.5))
 
 
@@ -30,7 +31,7 @@ def test_a_single_sweep_does_not_brake_for_what_is_beside_the_path() -> None:
     there, gone = (Situation(moment(ego, 0.1), PATH, seen, None) for seen in (objects, ()))
     params, state, said = PARAMS.model_copy(update={"confirm_frames": 2}), AccState(), []
     for now in (there, gone, there, there):
-        state, result = control(state, now, params)
+        state, result = control(state, now, params, EMERGENCY)
         assert result is not None
         said.append(result.state)
     assert said == ["cruise", "cruise", "cruise", "warn"]
@@ -40,7 +41,7 @@ def command(speed_mps: float, gap_m: float | None, *others: FusedObject, state: 
     lead = None if gap_m is None else Cipv(99, gap_m, None, None, "")
     ego = EgoState(0, speed_mps)
     objects = choose(CipvState(), describe(others, ego, MotionParams()), PATH, moment(ego), CipvParams())[1].objects
-    _, result = control(state or AccState(), Situation(moment(ego, 0.1), PATH, objects, lead), PARAMS)
+    _, result = control(state or AccState(), Situation(moment(ego, 0.1), PATH, objects, lead), PARAMS, EMERGENCY)
     assert result is not None
     return result
 
@@ -108,7 +109,7 @@ def test_it_names_the_lead_that_it_slows_down_for(distance_m: float | None, obje
 
 
 def test_no_ego_speed_no_command() -> None:
-    state, result = control(AccState(5.0, 1.0), Situation(moment(None, 0.1), PATH, (), None), PARAMS)
+    state, result = control(AccState(5.0, 1.0), Situation(moment(None, 0.1), PATH, (), None), PARAMS, EMERGENCY)
     assert result is None
     assert state == AccState()
 
@@ -144,7 +145,9 @@ def test_approaching_a_standing_car_from_100_m_at_72_km_h_the_car_stops_before_i
     speed, gap, state = 20.0, 100.0, AccState()
     for _ in range(1200):
         ego = EgoState(0, speed)
-        state, result = control(state, Situation(moment(ego, 0.05), PATH, (), Cipv(1, gap, speed, None, "")), defaults)
+        state, result = control(
+            state, Situation(moment(ego, 0.05), PATH, (), Cipv(1, gap, speed, None, "")), defaults, EMERGENCY
+        )
         assert result is not None
         speed = max(speed + result.accel_mps2 * 0.05, 0.0)
         gap -= speed * 0.05
@@ -158,16 +161,18 @@ def test_on_an_unknown_path_acc_does_not_accelerate() -> None:
     vague = dataclasses.replace(PATH, usable=False, reach_m=12.0, doubt="path known only 12 m ahead")
     limits = ((20.0, 20.0, "ACC will not accelerate"), (0.0, 3.0, "ACC will not exceed 11 km/h"))
     for speed_mps, wanted_mps, limit in limits:
-        _, held = control(AccState(), Situation(moment(EgoState(0, speed_mps), 0.1), vague, (), None), PARAMS)
+        _, held = control(
+            AccState(), Situation(moment(EgoState(0, speed_mps), 0.1), vague, (), None), PARAMS, EMERGENCY
+        )
         assert held is not None
         assert held.desired_speed_mps == wanted_mps
         assert held.reason == f"path known only 12 m ahead: {limit}"
     eager, fast = AccState(integral_m=50.0, error_mps=0.0), moment(EgoState(0, 20.0), 0.1)
-    assert control(eager, Situation(fast, PATH, (), None), PARAMS)[1].accelerator > 0.0  # type: ignore[union-attr]
-    _, held = control(eager, Situation(fast, vague, (), None), PARAMS)
+    assert control(eager, Situation(fast, PATH, (), None), PARAMS, EMERGENCY)[1].accelerator > 0.0  # type: ignore[union-attr]
+    _, held = control(eager, Situation(fast, vague, (), None), PARAMS, EMERGENCY)
     assert held is not None
     assert held.accelerator == 0.0, "whatever the integral has gathered"
-    _, follows = control(AccState(), Situation(fast, vague, (), Cipv(1, 20.0, None, None, "")), PARAMS)
+    _, follows = control(AccState(), Situation(fast, vague, (), Cipv(1, 20.0, None, None, "")), PARAMS, EMERGENCY)
     assert follows is not None
     assert follows.state == "follow"
     assert follows.desired_speed_mps == pytest.approx(10.0)
@@ -193,3 +198,26 @@ def test_a_slow_lead_is_slowed_down_for_before_the_gap(
         assert demand.speed_mps == pytest.approx(allowed_mps, abs=0.1), case
     off = follow(ego, Cipv(1, distance_m, closing_mps, None, ""), AccParams(approach_decel_mps2=0.0))
     assert off.state == "cruise", "as in the paper"
+
+
+@pytest.mark.parametrize(
+    ("case", "gap_m", "lead_mps", "hardest_mps2"),
+    [
+        pytest.param("cuts in and pulls away", 15.0, 22.0, 3.5, id="the gap opens: comfortable"),
+        pytest.param("cuts in, as fast as we are", 15.0, 20.0, 3.5, id="too near, but no nearer: comfortable"),
+        pytest.param("slower by 5 m/s", 15.0, 15.0, 3.5, id="1 m/s² would do: comfortable"),
+        pytest.param("slower by 14 m/s", 22.0, 6.0, 5.83, id="as hard as it takes"),
+        pytest.param("stands, near", 20.0, 0.0, 8.0, id="as hard as the car can"),
+    ],
+)
+def test_acc_brakes_hard_only_where_that_avoids_a_collision(
+    case: str, gap_m: float, lead_mps: float, hardest_mps2: float
+) -> None:
+    ego = EgoState(0, 20.0)
+    lead = Cipv(1, gap_m, 20.0 - lead_mps, None, "")
+    _, result = control(AccState(), Situation(moment(ego, 0.1), PATH, (), lead), AccParams(), EMERGENCY)
+    assert result is not None
+    assert result.accel_mps2 == pytest.approx(-hardest_mps2, abs=0.05), case
+    _, printed = control(AccState(), Situation(moment(ego, 0.1), PATH, (), lead), preset("paper").acc, EMERGENCY)
+    assert printed is not None
+    assert printed.accel_mps2 == -8.0, "the paper's law alone brakes fully inside the desired gap"

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.decision.aeb import AebState, guard, required_decel_mps2
+from pipeline.decision.aeb import AebState, guard
 from pipeline.decision.cipv import CipvState, choose
-from pipeline.decision.object_motion import describe
+from pipeline.decision.object_motion import describe, required_decel_mps2
 from pipeline.params import AccParams, AebParams, CipvParams, MotionParams, PathParams, preset
 from pipeline.path.corridor import corridor
 from pipeline.types import AccCommand, EgoState, FusedObject, Situation

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from pipeline.decision import gates
@@ -38,7 +39,7 @@ def decide(objects: tuple[FusedObject, ...]) -> tuple[Choice, Situation, list[Ac
     situation = Situation(now, PATH, choice.objects, choice.lead)
     commands, acc_state, aeb_state = [], AccState(), AebState()
     for _ in range(3):
-        acc_state, command = control(acc_state, situation, AccParams())
+        acc_state, command = control(acc_state, situation, AccParams(), AebParams())
         aeb_state, command = guard(aeb_state, command, situation, AebParams(), AccParams())
         commands.append(command)
     return choice, situation, commands
@@ -83,3 +84,42 @@ def test_an_object_that_was_not_judged_starts_no_reaction() -> None:
     item = dataclasses.replace(fused(1, 20.0), gates=shown)
     assert not gates.is_solid(item)
     assert not gates.may_cut_in(item)
+
+
+@pytest.mark.parametrize(
+    ("existence", "offset_m", "leads", "why_not"),
+    [
+        pytest.param(0.98, 0.0, True, None, id="surely there and in the path"),
+        pytest.param(0.65, 0.0, False, "only 65 % likely to exist", id="a weak box"),
+        pytest.param(0.98, 1.45, True, None, id="surely there, at the edge"),
+        pytest.param(0.75, 1.45, False, "likely to exist and be in path", id="barely there, and at the edge"),
+    ],
+)
+def test_a_new_lead_has_to_be_probable_as_a_whole(
+    existence: float, offset_m: float, leads: bool, why_not: str | None
+) -> None:
+    item = dataclasses.replace(fused(1, 30.0, offset_m), existence=existence, distance_sigma_m=0.2)
+    choice, _, _ = decide((item,))
+    assert (choice.lead is not None) == leads
+    assert all(why_not is not None and why_not in each.reason for each in choice.rejected)
+    assert len(choice.rejected) == (0 if leads else 1)
+
+
+@pytest.mark.parametrize(("speed_mps", "leads"), [(0.0, False), (9.0, True), (None, True)])
+def test_a_standing_vehicle_at_the_edge_is_taken_for_a_parked_one(speed_mps: float | None, leads: bool) -> None:
+    """In the path with 51 %: on a bend that is not known well every car parked beside it is."""
+    vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 1.5))
+    item = dataclasses.replace(fused(1, 30.0, 1.2), existence=0.98)
+    velocity = None if speed_mps is None else (speed_mps - EGO.speed_mps, 0.0)
+    (known,) = describe((dataclasses.replace(item, velocity_mps=velocity),), EGO, MotionParams())
+    choice = choose(CipvState(), (known,), vague, moment(EGO, 0.1), CipvParams())[1]
+    assert (choice.lead is not None) == leads
+    centred = dataclasses.replace(known, **fused_place(30.0, 0.0))
+    sure = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 0.3))
+    assert choose(CipvState(), (centred,), sure, moment(EGO, 0.1), CipvParams())[1].lead is not None
+
+
+def fused_place(x: float, y: float) -> dict[str, object]:
+    """Where a vehicle is, to be put into another one."""
+    there = fused(1, x, y)
+    return {name: getattr(there, name) for name in ("bev", "cuboid", "closest_point", "distance_m")}

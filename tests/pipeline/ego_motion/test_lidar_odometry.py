@@ -6,7 +6,7 @@ from math import cos, sin
 
 import pytest
 
-from pipeline.ego_motion.lidar_odometry import Followed, OdometryState, follow
+from pipeline.ego_motion.lidar_odometry import OdometryState, OdometryStep, follow
 from pipeline.types import EgoState
 from tests.pipeline.ego_motion.streets import ROAD, seen, street, tunnel
 
@@ -15,9 +15,9 @@ STREET = street()
 
 def drive(
     world: object, speed_mps: float, yaw_rate_radps: float = 0.0, sweeps: int = 8, prior: EgoState | None = None
-) -> list[Followed]:
+) -> list[OdometryStep]:
     """Odometry along a road at a steady speed, a sweep each 0.1 s."""
-    found = [Followed(OdometryState(), None)]
+    found = [OdometryStep(OdometryState(), None)]
     x = y = heading = 0.0
     for k in range(sweeps):
         sweep = seen(world, x, y, heading, k * 100_000_000)  # type: ignore[arg-type]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from pipeline.ego_motion import own_motion
-from pipeline.ego_motion.own_motion import Measured, OwnMotionState, Seen
+from pipeline.ego_motion.own_motion import Measured, OdometryContext, OwnMotionState
 from pipeline.params import MotionParams
 from pipeline.types import EgoState, Frame, GnssFix
 from tests.pipeline.ego_motion.streets import ROAD, seen, street
@@ -28,7 +28,7 @@ def driven(source: str, recorded: EgoState | None, gnss_mps: float | None = None
         gnss = fix(t_ns, gnss_mps) if gnss_mps is not None else None
         frame = Frame(k, str(k), t_ns, seen(STREET, 1.2 * k, 0.0, 0.0, t_ns), ego=recorded, gnss=gnss)
         params = MotionParams.model_validate({"source": source})
-        last = own_motion.measure(last.state, frame, recorded, Seen(ROAD, (), None), 0.1, params)
+        last = own_motion.measure(last.state, frame, recorded, OdometryContext(ROAD, (), None), 0.1, params)
     return last
 
 
@@ -66,7 +66,7 @@ def test_what_is_recorded_is_passed_on_as_it_is_and_the_lidar_not_asked() -> Non
 
 def test_a_lidar_that_sees_too_little_is_said_only_where_it_is_missed() -> None:
     bare = Frame(1, "1", 0, seen(STREET[:3], 0.0, 0.0, 0.0, 1), gnss=fix(0, 12.0))
-    params, around = MotionParams(), Seen(ROAD, (), None)
+    params, around = MotionParams(), OdometryContext(ROAD, (), None)
     assert own_motion.measure(OwnMotionState(), bare, None, around, 0.1, params).notes == ()
     alone = own_motion.measure(OwnMotionState(), replace(bare, gnss=None), None, around, 0.1, params)
     assert alone.notes == ("LiDAR odometry: too few static objects nearby",)

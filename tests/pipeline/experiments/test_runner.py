@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from pipeline.evaluation.report_sections import Chart, Coloured, Section, Series, Table, as_json
+from pipeline.evaluation.report_sections import Chart, Coloured, ReportSection, Series, Table, as_json
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.runner import EXPERIMENTS, SUITES, NoSuchSuite, count_cases, of_suite, run_all
 from pipeline.params import Params
@@ -22,8 +22,8 @@ def _square(case: int) -> int:
     return case * case
 
 
-def _report(cases: Sequence[int], outcomes: Sequence[int]) -> Section:
-    return Section("squares", "Squares", (), (Table("t", ("n", "n²"), tuple(zip(cases, outcomes, strict=True))),))
+def _report(cases: Sequence[int], outcomes: Sequence[int]) -> ReportSection:
+    return ReportSection("squares", "Squares", (), (Table("t", ("n", "n²"), tuple(zip(cases, outcomes, strict=True))),))
 
 
 def _replay(case: int, outcome: int) -> ExperimentDrive:
@@ -75,7 +75,7 @@ def test_every_experiment_has_a_short_form_that_is_part_of_the_long_one() -> Non
 
 def test_as_json_keeps_colours_and_lines() -> None:
     table = Table("t", ("a",), ((Coloured(3.0, "red"),), (None,)))
-    section = Section("s", "S", ("text",), (table,), (Chart("c", "x", "y", (Series("l", (1.0,), (2.0,)),)),))
+    section = ReportSection("s", "S", ("text",), (table,), (Chart("c", "x", "y", (Series("l", (1.0,), (2.0,)),)),))
     data = as_json(section)
     assert data["tables"][0]["rows"] == [[{"value": 3.0, "tone": "red"}], [None]]
     assert data["charts"][0]["series"] == [{"name": "l", "x": [1.0], "y": [2.0]}]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.experiments.true_lead import InSight, Way, true_lead
+from pipeline.experiments.true_lead import InSight, ScriptedWay, true_lead
 from pipeline.simulation.sensors.camera import calibration
 from pipeline.simulation.world import world_state
 from tests.pipeline.simulation.worlds import with_actors
@@ -14,7 +14,7 @@ from tests.pipeline.simulation.worlds import with_actors
 def lead_of(actors: str, segments: str = "{length_m: 2000}") -> int | None:
     scene = with_actors(actors, segments)
     now = world_state.at(scene, 0.0)
-    lead, doubtful = true_lead(now, Way.of(scene).ahead(now))
+    lead, doubtful = true_lead(now, ScriptedWay.of(scene).ahead(now))
     assert not doubtful
     return lead.actor.id if lead is not None else None
 
@@ -45,7 +45,7 @@ def test_in_a_curve_the_lead_is_on_the_way_driven_not_straight_ahead() -> None:
     scene = with_actors("{id: 1, kind: car, lane: -2, ahead_m: 45, speed_mps: {0: 20}}", bend)
     now = world_state.at(scene, 0.0)
     assert now.actors[0].cuboid.center[1] > 5.0, "it stands well to the left of straight ahead"
-    path = Way.of(scene).ahead(now)
+    path = ScriptedWay.of(scene).ahead(now)
     assert path is not None
     assert np.hypot(*np.diff(path.center, axis=0).T).sum() == pytest.approx(90.0, abs=6.0)
 
@@ -53,7 +53,7 @@ def test_in_a_curve_the_lead_is_on_the_way_driven_not_straight_ahead() -> None:
 def test_one_at_the_edge_is_doubtful() -> None:
     scene = with_actors("{id: 1, kind: car, lane: -2, offset_m: 1.5, ahead_m: 30, speed_mps: {0: 20}}")
     now = world_state.at(scene, 0.0)
-    assert true_lead(now, Way.of(scene).ahead(now))[1]
+    assert true_lead(now, ScriptedWay.of(scene).ahead(now))[1]
 
 
 def test_what_has_just_come_into_sight_cannot_be_confirmed_yet() -> None:

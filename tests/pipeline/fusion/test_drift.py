@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.alignment.projection import project_cuboid, resolve
 from pipeline.common.geometry import Cuboid
-from pipeline.fusion.drift import FEWEST_FRAMES, Drift, DriftState, Sighting, follow, judge
+from pipeline.fusion.drift import FEWEST_FRAMES, CuboidOffset, Drift, DriftState, follow, judge
 from pipeline.fusion.fuse import Fusion
 from pipeline.params import AlignmentParams, FusionParams
 from tests.pipeline.build import fused
@@ -69,15 +69,15 @@ def test_clusters_of_another_width_say_nothing():
     assert after(20, wide=1.6, yaw_deg=2.0) is None
 
 
-def vehicles(*yaws_deg: float) -> tuple[Sighting, ...]:
-    return tuple(Sighting(k, 0, 20, yaw, 0.0, 3.0) for k, yaw in enumerate(yaws_deg))
+def vehicles(*yaws_deg: float) -> tuple[CuboidOffset, ...]:
+    return tuple(CuboidOffset(k, 0, 20, yaw, 0.0, 3.0) for k, yaw in enumerate(yaws_deg))
 
 
 @pytest.mark.parametrize(
     ("yaws_deg", "told"),
     [
-        ((1.5, 1.4, 1.6), False),
-        ((1.5, 1.4, 1.6, 1.5), True),
+        ((1.5, 1.4), False),
+        ((1.5, 1.4, 1.6), True),
         ((0.1, -0.1, 6.0, 0.0), False),
         ((3.0, -3.0, 2.5, -2.0, 2.8), False),
         ((0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3), False),
@@ -86,6 +86,63 @@ def vehicles(*yaws_deg: float) -> tuple[Sighting, ...]:
 )
 def test_vehicles_must_agree(yaws_deg: tuple[float, ...], told: bool):
     assert (judge(vehicles(*yaws_deg), PARAMS) is not None) is told
+
+
+def test_a_wrong_time_between_the_sensors_is_no_angle():
+    """Bearings that all change the same way are off the same way."""
+    off = (0.8, 0.75, 0.82, 0.78)
+    told = [judge(tuple(each._replace(rate_degps=rate) for each in vehicles(*off)), PARAMS) for rate in (0.0, 5.0)]
+    assert [each is not None for each in told] == [True, False]
+    both_ways = tuple(
+        CuboidOffset(k, 0, 20, 1.5 + 0.05 * rate, 0.0, 3.0, rate) for k, rate in enumerate((5.0, -5.0, 3.0, -4.0))
+    )
+    found = judge(both_ways, PARAMS)
+    assert found is not None
+    assert found.yaw_deg == pytest.approx(1.5, abs=0.1)
+
+
+def test_a_camera_that_is_knocked_on_the_way_is_told_by_the_cars_that_stay():
+    aligned, state, found = resolve(AlignmentParams(), CAMERA), DriftState(), []
+    for k in range(170):
+        turned = AlignmentParams(yaw_deg=1.5 if k >= 100 else 0.0)
+        state, told = follow(state, seen(turned, k), aligned, SIZE, k * 100_000_000, PARAMS)
+        found.append(told)
+    assert not any(found[:100])
+    first = next(k for k, told in enumerate(found) if told is not None)
+    assert first < 150
+    assert found[-1] is not None
+    assert found[-1].yaw_deg == pytest.approx(1.5, abs=0.3)
+
+
+def test_a_side_that_the_lidar_does_not_meet_is_no_angle():
+    """Trucks in the next lane: the box begins at the far end of the side, the cluster is the rear alone."""
+    aligned, state, found = resolve(AlignmentParams(), CAMERA), DriftState(), None
+    assert aligned is not None
+    for k in range(20):
+        objects, boxes = [], {}
+        for number, (x, y) in enumerate(((14.0, -3.5), (20.0, -3.6), (27.0, -3.4), (33.0, -3.5))):
+            truck = Cuboid((x + 6.0, y, ROAD_M + 1.9), (12.0, 2.5, 3.8), 0.0)
+            box = project_cuboid(aligned, truck.corners(), *SIZE)
+            assert box is not None
+            rear = Cuboid((x + 0.1, y, ROAD_M + 1.9), (0.2, 2.5, 3.8), 0.0)
+            item = replace(fused(number, x, y, "VL"), cuboid=rear, distance_m=float(np.hypot(x, y)))
+            objects.append(item)
+            boxes[number] = box
+        state, found = follow(state, Fusion(tuple(objects), {}, boxes), aligned, SIZE, k * 100_000_000, PARAMS)
+        assert found is None
+    assert sum(each.frames >= FEWEST_FRAMES for each in state.sightings) >= 2, "they were looked at"
+
+
+def test_vehicles_that_are_passed_and_parts_of_vehicles_say_nothing():
+    aligned = resolve(AlignmentParams(), CAMERA)
+    frame = seen(AlignmentParams(yaw_deg=2.0), 0)
+    passed = tuple(replace(item, velocity_mps=(-30.0, 0.0)) for item in frame.objects)
+    state, _ = follow(DriftState(), replace(frame, objects=passed), aligned, SIZE, 0, PARAMS)
+    assert len(state.sightings) < len(PLACES)
+    parts = tuple(
+        replace(item, cuboid=item.cuboid._replace(size=(0.2, 1.1, 1.5))) for item in frame.objects if item.cuboid
+    )
+    assert follow(DriftState(), replace(frame, objects=parts), aligned, SIZE, 0, PARAMS)[0] == DriftState()
 
 
 def test_what_is_long_gone_is_forgotten():

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from pipeline.fusion.existence import ExistenceState, weigh
-from pipeline.params import ExistenceParams
-from pipeline.types import F32, I32, U8, FusedObject, Ground, Point3
-from tests.pipeline.build import fused
+from pipeline.params import CipvParams, ExistenceParams
+from pipeline.types import F32, I32, U8, CameraImage, EgoState, Frame, FusedObject, Ground, Point3, RawBoxes
+from tests.pipeline.build import fused, moment
 
 PARAMS = ExistenceParams()
+FRAME = Frame(0, "0", 0)
 ROAD_M = -0.6
 ROAD = Ground(np.zeros(0, bool), np.array([[0.0, 0.0, 1.0, -ROAD_M]]), np.array([0.0, 100.0]), np.ones(1, bool))
 
@@ -54,7 +55,7 @@ def camera_car(range_m: float = 12.0, sigma_m: float = 1.2, score: float = 0.8) 
 def after(item: FusedObject, rays: Rays, frames: int = 5, params: ExistenceParams = PARAMS) -> FusedObject:
     state = ExistenceState()
     for k in range(frames):
-        state, (found,) = weigh(state, (item,), rays, 0.1 if k else None, params)
+        state, (found,) = weigh(state, (item,), rays, FRAME, moment(None, 0.1 if k else None), params)
     return found
 
 
@@ -111,6 +112,16 @@ def test_near_by_a_vehicle_has_a_cluster_of_its_own(range_m: float, exists: bool
     found = after(camera_car(range_m), Rays(returns(range_m + 0.5), cluster=3))
     assert found.existence is not None
     assert (found.existence > 0.5) == exists
+    said = [(each.value, each.limit, each.passed) for each in found.gates if each.name == "own_returns"]
+    assert said == ([] if exists else [(0.0, 3, False)])
+
+
+def test_a_lead_whose_cluster_was_joined_with_its_neighbours_is_still_there() -> None:
+    """A van followed for half a minute stops beside a parked car: their points are one cluster, the parked car's."""
+    van = replace(camera_car(8.0), camera_ranges=300)
+    found = after(van, Rays(returns(8.5), cluster=3))
+    assert found.existence is not None
+    assert found.existence > 0.9
 
 
 def test_rays_start_at_the_sensor() -> None:
@@ -147,9 +158,109 @@ def test_a_cluster_speaks_for_it_whatever_the_box_says() -> None:
 def test_what_the_lidar_knew_lasts_a_while_when_it_loses_it() -> None:
     state = ExistenceState()
     for item in [fused(1, 12.0, source="VL")] * 5 + [camera_car(score=0.4)]:
-        state, (found,) = weigh(state, (item,), Rays(NOTHING), 0.1, PARAMS)
+        state, (found,) = weigh(state, (item,), Rays(NOTHING), FRAME, moment(None, 0.1), PARAMS)
     assert found.existence is not None
     assert found.existence > 0.9
+
+
+def seen_through(frames: int = 5) -> ExistenceState:
+    state = ExistenceState()
+    for _ in range(frames):
+        state, (found,) = weigh(state, (camera_car(score=0.7),), Rays(returns(40.0)), FRAME, moment(None, 0.1), PARAMS)
+    assert found.existence is not None
+    assert found.existence < 0.2
+    return state
+
+
+def existence_after(state: ExistenceState, item: FusedObject, frames: int = 1) -> float:
+    for _ in range(frames):
+        state, (found,) = weigh(state, (item,), Rays(NOTHING), FRAME, moment(None, 0.1), PARAMS)
+    assert found.existence is not None
+    return found.existence
+
+
+def test_that_a_place_was_empty_says_nothing_of_another_place() -> None:
+    """The camera's place began anew, far from where the LiDAR looked through it."""
+    car = camera_car(45.0, score=0.7)
+    kept = seen_through()
+    assert existence_after(kept, car) < 0.5
+    begun = ExistenceState({1: kept.known[1]._replace(camera_ranges=12)})
+    assert existence_after(begun, replace(car, camera_ranges=1)) > 0.85
+
+
+def test_an_empty_place_is_forgotten_where_the_lidar_cannot_tell_any_more() -> None:
+    car = camera_car(45.0, score=0.7)
+    assert existence_after(seen_through(), car, 5) < 0.5
+    assert existence_after(seen_through(), car, 30) > 0.85
+    assert existence_after(seen_through(), replace(car, returns=2), 8) > 0.85, "returns of its own say the contrary"
+
+
+EMPTY = RawBoxes("net", np.zeros((0, 4), np.float32), np.zeros(0, np.float32), ())
+IMAGE = Frame(0, "0", 0, picture=CameraImage(None, np.zeros((720, 1280, 3), np.uint8)), raw_boxes=EMPTY)
+
+
+def unseen(followed: int, images: int, frame: Frame = IMAGE, *others: FusedObject, u: float = 600.0) -> float:
+    """Existence of a camera car 50 m away, seen in so many images with a score of 0.7, then in none of the next."""
+    car = replace(camera_car(50.0, score=0.7), bbox=(u, 350.0, u + 30.0, 375.0))
+    state = ExistenceState()
+    for k in range(followed):
+        state, _ = weigh(state, (car,), Rays(NOTHING), IMAGE, moment(None, 0.1 if k else None), PARAMS)
+    for _ in range(images):
+        carried = replace(car, seen_by="")
+        state, (found, *_) = weigh(state, (carried, *others), Rays(NOTHING), frame, moment(None, 0.1), PARAMS)
+    assert found.existence is not None
+    return found.existence
+
+
+def test_a_burst_of_false_boxes_is_over_when_it_ends_and_a_car_that_is_missed_is_not() -> None:
+    assert unseen(3, 4) < CipvParams().stay_probability
+    assert unseen(40, 4) > 0.6
+
+
+@pytest.mark.parametrize(
+    ("case", "frame", "others", "u"),
+    [
+        ("nobody looked", replace(IMAGE, raw_boxes=None), (), 600.0),
+        ("it has left the image", IMAGE, (), 1270.0),
+        ("a nearer car hides it", IMAGE, (replace(fused(2, 10.0), bbox=(500.0, 300.0, 700.0, 450.0)),), 600.0),
+    ],
+)
+def test_what_could_not_be_seen_is_not_missed(
+    case: str, frame: Frame, others: tuple[FusedObject, ...], u: float
+) -> None:
+    assert unseen(3, 6, frame, *others, u=u) > 0.85, case
+
+
+def test_where_the_far_view_sits_out_a_frame_nothing_is_missed() -> None:
+    far = replace(IMAGE, raw_boxes=replace(EMPTY, far=(400, 200, 816, 616)))
+    state = weigh(ExistenceState(), (), Rays(NOTHING), far, moment(), PARAMS)[0]
+    assert state.looks_far
+    car = replace(camera_car(50.0, score=0.7), bbox=(600.0, 350.0, 630.0, 375.0))
+    state, _ = weigh(state, (car,), Rays(NOTHING), far, moment(None, 0.1), PARAMS)
+    known = state.known[1].score
+    state, _ = weigh(state, (replace(car, seen_by=""),), Rays(NOTHING), IMAGE, moment(None, 0.1), PARAMS)
+    assert state.known[1].score == known
+    state, _ = weigh(state, (replace(car, seen_by=""),), Rays(NOTHING), far, moment(None, 0.1), PARAMS)
+    assert state.known[1].score < known  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("case", "closing_mps", "exists"),
+    [("it keeps its distance", 0.0, True), ("it is slower by 5 m/s", 5.0, True), ("it stands", 20.0, False)],
+)
+def test_a_weak_box_that_goes_along_is_a_vehicle(case: str, closing_mps: float, exists: bool) -> None:
+    """At 72 km/h, with scores that half of the time are of nothing."""
+    state = ExistenceState()
+    for k in range(16):
+        car = replace(camera_car(60.0 - 0.1 * closing_mps * k, score=0.45), camera_ranges=k + 1)
+        now = moment(EgoState(0, 20.0), 0.1 if k else None)
+        state, (found,) = weigh(state, (car,), Rays(NOTHING), FRAME, now, PARAMS)
+    assert found.existence is not None
+    assert (found.existence > CipvParams().become_existence) == exists, case
+    again = replace(car, camera_ranges=1)
+    now = moment(EgoState(0, 20.0), 0.1)
+    begun = weigh(state, (again,), Rays(NOTHING), FRAME, now, PARAMS)[1][0].existence
+    assert begun == pytest.approx(0.5), "a place begun anew may be another thing"
 
 
 def test_switched_off_nothing_is_said() -> None:

@@ -11,7 +11,7 @@ import onnxruntime as ort
 import pytest
 from onnx import TensorProto, helper
 
-from pipeline.inference.cancellation import Stop, Stopped, of_this_thread
+from pipeline.inference.cancellation import Cancellation, Stopped, of_this_thread
 from pipeline.inference.runtime import DetectorError, open_session, run_session
 from tests.pipeline.vision.networks import IR_VERSION
 
@@ -54,7 +54,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> ort.InferenceSession:
 
 
 def test_a_run_is_ended_from_another_thread_and_the_next_one_answers(session: ort.InferenceSession) -> None:
-    stop, ended = Stop(), []
+    stop, ended = Cancellation(), []
 
     def run() -> None:
         try:
@@ -74,7 +74,7 @@ def test_a_run_is_ended_from_another_thread_and_the_next_one_answers(session: or
 
 
 def test_what_is_to_end_already_does_not_begin(session: ort.InferenceSession) -> None:
-    stop = Stop()
+    stop = Cancellation()
     stop.set()
     with stop.here(), pytest.raises(Stopped):
         run_session(session, ONE)
@@ -82,12 +82,12 @@ def test_what_is_to_end_already_does_not_begin(session: ort.InferenceSession) ->
 
 
 def test_a_network_that_fails_is_not_taken_for_one_that_was_stopped(session: ort.InferenceSession) -> None:
-    with Stop().here(), pytest.raises(DetectorError):
+    with Cancellation().here(), pytest.raises(DetectorError):
         run_session(session, np.ones((2, 2), np.float32))
 
 
 def test_blocks_within_each_other_and_other_threads_have_their_own() -> None:
-    outer, inner, elsewhere = Stop(), Stop(), []
+    outer, inner, elsewhere = Cancellation(), Cancellation(), []
     with outer.here():
         with inner.here():
             assert of_this_thread() is inner

@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.inference import tuning
 from pipeline.inference.runtime import open_session, ways_of
-from pipeline.inference.tuning import Trial, Way, fastest, keep, kept_way, tune, untuned
+from pipeline.inference.tuning import RunSettings, Trial, fastest, keep, kept_way, tune, untuned
 from pipeline.types import F32
 from tests.pipeline.vision import networks
 
@@ -26,7 +26,7 @@ def network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_kept_way_is_the_one_it_runs_in(network: Path) -> None:
-    keep(network, Way((CPU,), 3, "ORT_ENABLE_BASIC", arena=False))
+    keep(network, RunSettings((CPU,), 3, "ORT_ENABLE_BASIC", arena=False))
     options = open_session(network.read_bytes(), network, 2).get_session_options()
     assert options.intra_op_num_threads == 3
     assert options.graph_optimization_level.name == "ORT_ENABLE_BASIC"
@@ -34,14 +34,14 @@ def test_a_kept_way_is_the_one_it_runs_in(network: Path) -> None:
 
 
 def test_it_belongs_to_the_file_the_processor_and_the_version(network: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    keep(network, Way((CPU,), 3))
+    keep(network, RunSettings((CPU,), 3))
     assert kept_way(network, 2).threads == 3
     monkeypatch.setattr(tuning, "_processor", lambda: "another")
     assert kept_way(network, 2) == untuned(2)
 
 
 def test_another_file_runs_untuned(network: Path, tmp_path: Path) -> None:
-    keep(network, Way((CPU,), 3))
+    keep(network, RunSettings((CPU,), 3))
     other = tmp_path / "other.onnx"
     other.write_bytes(network.read_bytes() + b"\0")
     assert kept_way(other, 2) == untuned(2)
@@ -49,13 +49,15 @@ def test_another_file_runs_untuned(network: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("damage", ["no JSON", "[]", '{"a": 1}'])
 def test_what_is_kept_may_be_damaged(network: Path, damage: str) -> None:
-    keep(network, Way((CPU,), 3))
+    keep(network, RunSettings((CPU,), 3))
     (tuning.store() / "tuning.json").write_text(damage, encoding="utf-8")
     assert kept_way(network, 2) == untuned(2)
 
 
-@pytest.mark.parametrize("way", [Way(("NoSuchProvider",), 2), Way((CPU,), 0), Way((CPU,), 2, "FASTEST")])
-def test_a_way_that_cannot_be_gone_is_not(network: Path, way: Way) -> None:
+@pytest.mark.parametrize(
+    "way", [RunSettings(("NoSuchProvider",), 2), RunSettings((CPU,), 0), RunSettings((CPU,), 2, "FASTEST")]
+)
+def test_a_way_that_cannot_be_gone_is_not(network: Path, way: RunSettings) -> None:
     keep(network, way)
     assert kept_way(network, 2) == untuned(2)
 
@@ -67,10 +69,12 @@ def test_every_way_of_a_real_network_is_tried_and_gives_its_outputs(network: Pat
     assert not [trial for trial in trials if trial.best_ms is None]
 
 
-def _made(slow: Callable[[Way], bool], output: Callable[[Way], float]) -> Callable[[Way], Callable[[], Sequence[F32]]]:
+def _made(
+    slow: Callable[[RunSettings], bool], output: Callable[[RunSettings], float]
+) -> Callable[[RunSettings], Callable[[], Sequence[F32]]]:
     """Ways that take 5 ms or nothing, and give one number."""
 
-    def run(way: Way) -> Callable[[], Sequence[F32]]:
+    def run(way: RunSettings) -> Callable[[], Sequence[F32]]:
         def once() -> Sequence[F32]:
             if slow(way):
                 sleep(0.005)
@@ -82,7 +86,7 @@ def _made(slow: Callable[[Way], bool], output: Callable[[Way], float]) -> Callab
 
 
 def test_the_faster_one_is_chosen_unless_its_outputs_differ() -> None:
-    def is_slow(way: Way) -> bool:
+    def is_slow(way: RunSettings) -> bool:
         return way.optimisation != "ORT_ENABLE_BASIC"
 
     honest = list(tune(_made(is_slow, lambda _: 1.0), 2))
@@ -93,6 +97,6 @@ def test_the_faster_one_is_chosen_unless_its_outputs_differ() -> None:
 
 
 def test_a_gain_within_the_spread_changes_nothing() -> None:
-    usual, little = Trial(Way((CPU,), 2), 10.0), Trial(Way((CPU,), 1), 9.9)
+    usual, little = Trial(RunSettings((CPU,), 2), 10.0), Trial(RunSettings((CPU,), 1), 9.9)
     assert fastest([usual, little]) is usual
-    assert fastest([usual, little, Trial(Way((CPU,), 4), 5.0)]).way.threads == 4
+    assert fastest([usual, little, Trial(RunSettings((CPU,), 4), 5.0)]).way.threads == 4

@@ -11,7 +11,7 @@ from pipeline.alignment.projection import Pinhole
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.close_up import HEIGHT_PX, WIDTH_PX, close_up, fit_of
 from pipeline.labels.model import Sighting
-from pipeline.types import Frame, Picture, Sweep
+from pipeline.types import CameraImage, Frame, Sweep
 from tests.pipeline.labels.formats.sets import camera
 
 CAR = Cuboid((20.0, 2.0, 0.5), (4.0, 1.8, 1.5), 0.3)
@@ -35,7 +35,7 @@ def test_points_beside_a_cuboid_are_a_misfit_and_those_of_the_road_are_not() -> 
 def test_four_views_show_picture_and_points_on_their_side() -> None:
     """What is at the rear is left in the views from above and from the side; what is on the left, from behind."""
     eye = camera()
-    picture = Picture(0, np.full((eye.height, eye.width, 3), 77, dtype=np.uint8), b"")
+    picture = CameraImage(0, np.full((eye.height, eye.width, 3), 77, dtype=np.uint8), b"")
     sweep = Sweep(0, cloud((-2.0, 0.8, 0.5)), np.zeros(1, np.uint8), 16)
     frame = Frame(0, "0", 0, sweep=sweep, picture=picture, camera=eye)
     drawn = close_up(frame, Sighting(0, CAR), Pinhole(eye.K, eye.distortion, eye.T_camera_ego))

@@ -12,7 +12,7 @@ import pytest
 from pipeline.alignment.projection import project_cuboid, resolve
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.cuboid_from_pixel import NothingThere, lift
-from pipeline.labels.snap import TooFewPoints, refit
+from pipeline.labels.cuboids.snap import TooFewPoints, refit
 from pipeline.params import Params
 from pipeline.sources import open_source
 from pipeline.types import F32, Box, Frame, RawBoxes
@@ -49,15 +49,21 @@ def standing(x: float, y: float, yaw_rad: float = 0.0, size: tuple[float, float,
     return Cuboid((x, y, GROUND_M + size[2] / 2), size, yaw_rad)
 
 
-@pytest.mark.parametrize(("dx", "dy", "dyaw"), [(0.0, 0.0, 0.0), (0.4, -0.3, 0.1), (-0.5, 0.4, -0.2), (0.5, 0.0, 0.0)])
+@pytest.mark.parametrize(("dx", "dy", "dyaw"), [(0.4, -0.3, 0.1), (-0.5, 0.4, -0.2), (0.5, 0.0, 0.0)])
 def test_a_cuboid_near_a_car_is_laid_on_it(dx: float, dy: float, dyaw: float) -> None:
     car = standing(15.0, 4.0, 0.3)
     found = refit(sweep_of(car), standing(15.0 + dx, 4.0 + dy, 0.3 + dyaw))
-    assert found.turned
+    assert (found.is_better, found.turned) == (True, dyaw != 0.0)
     assert found.points > 200
     assert found.cuboid.center == pytest.approx(car.center, abs=0.12)
     assert found.cuboid.size == pytest.approx(car.size, abs=0.12)
     assert found.cuboid.yaw_rad == pytest.approx(0.3, abs=math.radians(2.0))
+
+
+def test_a_cuboid_that_fits_is_left_as_it_is() -> None:
+    car = standing(15.0, 4.0, 0.3)
+    found = refit(sweep_of(car), car)
+    assert (found.is_better, found.cuboid) == (False, car)
 
 
 def test_of_a_car_seen_from_behind_length_and_turn_are_a_hands() -> None:

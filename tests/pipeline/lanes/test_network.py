@@ -12,7 +12,7 @@ from pipeline.inference.runtime import DetectorError, DetectorMissing
 from pipeline.lanes import heads
 from pipeline.lanes.classical import ClassicalLanes
 from pipeline.lanes.heads import UnknownLaneHead, pick_head
-from pipeline.lanes.heads.head import Answer, Head, Points
+from pipeline.lanes.heads.head import LaneHead, LaneOutputs, Points
 from pipeline.lanes.network import LaneNetwork, open_lane_network
 from pipeline.lanes.open_detector import OFF, open_lanes
 from pipeline.types import U8, CameraCalibration
@@ -135,9 +135,9 @@ def _points_in_a_table(values: np.ndarray) -> Points:
     return Points(values[:, :2].astype(np.float64), values[:, 2], np.zeros(len(values), np.int32))
 
 
-def _recognise(answer: Answer) -> Head | None:
+def _recognise(answer: LaneOutputs) -> LaneHead | None:
     one_table = len(answer.shapes) == 1 and len(answer.shapes[0]) == 3 and answer.shapes[0][2] == 3
-    return Head("table", 0, _points_in_a_table) if one_table else None
+    return LaneHead("table", 0, _points_in_a_table) if one_table else None
 
 
 def test_a_head_is_added_by_a_file_and_one_entry(monkeypatch: pytest.MonkeyPatch) -> None:

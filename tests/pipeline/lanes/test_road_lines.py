@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.alignment.projection import Angular
-from pipeline.lanes.road_lines import LaneState, Pitch, RoadView, follow, in_picture, measure, polylines, road_plane
+from pipeline.lanes.drawn_lines import in_image, polylines
+from pipeline.lanes.road_lines import LaneState, Pitch, RoadView, follow, measure, road_plane
 from pipeline.lidar.ground import Ground
 from pipeline.params import LaneParams
 from pipeline.types import EgoState, RawLanes
@@ -166,7 +167,7 @@ def test_points_on_vehicles_are_no_paint() -> None:
 def test_lines_are_drawn_back_onto_the_paint(pitch_deg: float) -> None:
     raw = paint(through=aligned(pitch_down_deg=pitch_deg))
     lane = seen(raw, params=PARAMS.model_copy(update={"pitch_sigma_deg": 2.0}))
-    drawn = in_picture(lane, aligned())
+    drawn = in_image(lane, aligned())
     for uv, points in ((drawn["left"], raw.points[:50]), (drawn["right"], raw.points[60:110])):
         rows = np.interp(-points[:, 1], -uv[:, 1], uv[:, 0])
         inside = (points[:, 1] < uv[0, 1]) & (points[:, 1] > uv[-1, 1])

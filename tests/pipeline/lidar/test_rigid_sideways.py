@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.lidar.tracking import rigid_sideways
+from pipeline.lidar.track_history import rigid_sideways
 
 
 def history(low: np.ndarray, high: np.ndarray) -> np.ndarray:

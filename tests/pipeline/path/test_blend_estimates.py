@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from pipeline.path import blend_estimates
 from pipeline.path.blend_estimates import FusedPath
-from pipeline.path.estimates import PathEstimate, SourceName, arc, samples
+from pipeline.path.estimates import PathEstimate, PathSourceName, arc, samples
 
 S = samples(100.0)
 
 
-def estimate(source: SourceName, aside_m: float = 0.0, sigma: float = 0.2, curvature: float = 0.0) -> PathEstimate:
+def estimate(source: PathSourceName, aside_m: float = 0.0, sigma: float = 0.2, curvature: float = 0.0) -> PathEstimate:
     center, _ = arc(curvature, S)
     return PathEstimate(source, center + np.array([0.0, aside_m]), np.full(len(S), sigma))
 
@@ -78,7 +78,7 @@ def test_the_only_source_is_never_left_out() -> None:
     st.lists(st.tuples(st.floats(-0.3, 0.3), st.floats(0.05, 3.0)), min_size=1, max_size=3), st.floats(-0.008, 0.008)
 )
 def test_the_mean_lies_between_its_sources(things: list[tuple[float, float]], curvature: float) -> None:
-    names: tuple[SourceName, ...] = ("lane", "gnss", "yaw_rate")
+    names: tuple[PathSourceName, ...] = ("lane", "gnss", "yaw_rate")
     estimates = [estimate(name, aside, sigma, curvature) for name, (aside, sigma) in zip(names, things, strict=False)]
     path, _ = fused(*estimates)
     sides = [aside for aside, _ in things]

@@ -17,7 +17,7 @@ import pytest
 
 from pipeline.common.fast_replace import evolve
 from pipeline.experiments.curves import scenarios
-from pipeline.experiments.curves.drives import Moment, judge, moments, seen
+from pipeline.experiments.curves.drives import CurveFrame, judge, moments, seen
 from pipeline.params import Params, with_changes
 from pipeline.step import State, step
 from pipeline.types import CameraCalibration, Frame, Result
@@ -30,14 +30,14 @@ Break = Callable[[Frame], Frame]
 
 
 @cache
-def drive(layout: str = "r250", ends_s: float = ENDS_S) -> list[Moment]:
+def drive(layout: str = "r250", ends_s: float = ENDS_S) -> list[CurveFrame]:
     warm_up()
     scene, reach_m = scenarios.scenario(scenarios.LAYOUTS[layout], 0), scenarios.LAYOUTS[layout].reach_m
     return list(takewhile(lambda moment: moment.now.t_s < ends_s, moments(scene, seen(scene), reach_m)))
 
 
 def driven(
-    broken: Break, from_start: bool = False, moments: Callable[[], list[Moment]] = drive
+    broken: Break, from_start: bool = False, moments: Callable[[], list[CurveFrame]] = drive
 ) -> tuple[list[Result], list[str]]:
     """The results from the break on, and what was chosen in each: right, missed, decoy, …"""
     state, results, verdicts = State(), [], []

@@ -13,7 +13,7 @@ from pipeline.common.geometry import Cuboid
 from pipeline.params import Params
 from pipeline.recording.session.provenance import About
 from pipeline.recording.session.writer import SessionWriter
-from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Route, StreamHealth, Sweep
+from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, GnssFix, Route, StreamHealth, Sweep
 from pipeline.types.source import TruthObject
 
 PERIOD_NS = 100_000_000
@@ -38,14 +38,14 @@ def sweep(index: int = 0, points: int = 40, t_ns: int | None = None) -> Sweep:
     return Sweep(PERIOD_NS * (1 + index) if t_ns is None else t_ns, xyzi, ring, 16)
 
 
-def picture(index: int = 0, kind: str = ".jpg", t_ns: int | None = None) -> Picture:
+def picture(index: int = 0, kind: str = ".jpg", t_ns: int | None = None) -> CameraImage:
     """Noise, the same for the same index; only a JPEG has its encoded form."""
     bgr = np.random.default_rng(index).integers(0, 255, (24, 32, 3)).astype(np.uint8)
     if kind != ".jpg":
-        return Picture(t_ns, bgr)
+        return CameraImage(t_ns, bgr)
     encoded = cv2.imencode(kind, bgr)[1].tobytes()
     decoded = cv2.imdecode(np.frombuffer(encoded, np.uint8), cv2.IMREAD_COLOR)
-    return Picture(t_ns, np.asarray(decoded, np.uint8), encoded)
+    return CameraImage(t_ns, np.asarray(decoded, np.uint8), encoded)
 
 
 def full(index: int) -> Frame:

@@ -23,7 +23,7 @@ from pipeline.params import Params, with_changes
 from pipeline.recording import recorder as recorder_module
 from pipeline.recording.recorder import Recorder, RecordingState
 from pipeline.recording.rewrite import recover
-from pipeline.recording.segments import Rotation, Segments
+from pipeline.recording.segments import FileRotation, Segments
 from pipeline.recording.session.source import Mark, SessionSource
 from pipeline.recording.session.velodyne_scan import RawLidar
 from pipeline.types.camera_shot import Shot
@@ -181,7 +181,7 @@ def test_what_a_slow_disk_leaves_no_room_for_is_counted_by_kind(
 
 
 def test_a_new_file_holds_the_picture_and_the_sweep_of_its_first_frame(tmp_path: Path) -> None:
-    parts = Segments(tmp_path / "a.mcap", ABOUT, Rotation(max_s=0.2))
+    parts = Segments(tmp_path / "a.mcap", ABOUT, FileRotation(max_s=0.2))
     frames = [full(index) for index in range(8)]
     for frame in frames:
         assert frame.picture is not None
@@ -250,8 +250,8 @@ def test_a_file_that_exists_is_never_written_over(tmp_path: Path) -> None:
     assert (tmp_path / "a.mcap").read_text() == "precious"
 
 
-@pytest.mark.parametrize("rotation", [Rotation(max_s=1.0), Rotation(max_bytes=300_000.0)], ids=["time", "size"])
-def test_each_file_of_a_long_recording_can_be_read_alone(rotation: Rotation, tmp_path: Path) -> None:
+@pytest.mark.parametrize("rotation", [FileRotation(max_s=1.0), FileRotation(max_bytes=300_000.0)], ids=["time", "size"])
+def test_each_file_of_a_long_recording_can_be_read_alone(rotation: FileRotation, tmp_path: Path) -> None:
     frames = [replace(full(index), sweep=sweep(index, points=6000)) for index in range(35)]
     parts = Segments(tmp_path / "drive.mcap", ABOUT, rotation)
     for frame in frames:
@@ -270,7 +270,7 @@ def test_each_file_of_a_long_recording_can_be_read_alone(rotation: Rotation, tmp
 
 def test_frames_are_counted_once_when_the_next_file_cannot_be_made(tmp_path: Path) -> None:
     (tmp_path / "a_001.mcap").write_text("in the way")
-    recorder = Recorder(tmp_path / "a.mcap", ABOUT, Rotation(max_s=0.3))
+    recorder = Recorder(tmp_path / "a.mcap", ABOUT, FileRotation(max_s=0.3))
     for index in range(6):
         recorder.put(full(index))
     state = recorder.stop()

@@ -9,6 +9,7 @@ from mcap.reader import make_reader
 
 from pipeline.common.errors import BadInput
 from pipeline.recording import topics
+from pipeline.recording.drawn_labels import Drawn
 from pipeline.recording.mcap import output as mcap_output
 from pipeline.recording.mcap.reader import McapFile, Stored
 from pipeline.recording.relabel import relabel
@@ -66,6 +67,29 @@ def test_labels_take_the_place_of_labels_again_and_again(tmp_path: Path) -> None
         save(source, path, labels=b"%d" % turn)
     assert [stored.data for stored in messages(path) if stored.channel.topic == topics.LABELS] == [b"3"]
     assert len(messages(path)) == len(messages(tmp_path / "1.mcap"))
+
+
+@pytest.mark.parametrize("labels_at", [None, 4], ids=["copied bytes", "copied messages"])
+def test_what_viewers_show_takes_the_place_of_what_they_showed(labels_at: int | None, tmp_path: Path) -> None:
+    path = drive(tmp_path / "0.mcap", labels_at)
+    for turn in (b"first", b"second"):
+        source = SessionSource("", str(path))
+        path = tmp_path / f"{turn.decode()}.mcap"
+        drawn = {at: [Drawn(topics.LABEL_SCENE, turn), Drawn(topics.LABEL_IMAGE, turn)] for at in (3, 4, FRAMES - 1)}
+        save(source, path, labels=turn, drawn=drawn)
+    back = SessionSource("", str(path))
+    shown = [each for each in messages(path) if each.channel.topic in (topics.LABEL_SCENE, topics.LABEL_IMAGE)]
+    assert {each.data for each in shown} == {b"second"}
+    at_frames = {(each.channel.topic, each.log_time_ns, each.publish_time_ns) for each in shown}
+    assert at_frames == {
+        (topic, back.log_time_ns(at), back.t_ns(at))
+        for topic in (topics.LABEL_SCENE, topics.LABEL_IMAGE)
+        for at in (3, 4, FRAMES - 1)
+    }
+    assert all(same(back.frame(index), full(index)) for index in range(FRAMES))
+    clip(back, 2, 5, tmp_path / "clip.mcap")
+    kept = [each for each in messages(tmp_path / "clip.mcap") if each.channel.topic == topics.LABEL_SCENE]
+    assert len(kept) == 2, "a clip keeps what its frames show"
 
 
 def test_the_library_s_own_reader_finds_everything_by_the_index(tmp_path: Path) -> None:

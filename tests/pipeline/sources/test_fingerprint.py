@@ -13,7 +13,7 @@ import pytest
 from pipeline.recording.save import save
 from pipeline.sources import open_source
 from pipeline.sources.fingerprint import content_key, fingerprint
-from pipeline.types import Frame, Picture
+from pipeline.types import CameraImage, Frame
 from tests.app.engine.recording_helpers import Recording
 
 
@@ -87,7 +87,7 @@ def test_another_recording_has_another_key() -> None:
         def frame(self, index: int) -> Frame:
             frame = super().frame(index)
             assert frame.picture is not None
-            return frame if index else replace(frame, picture=Picture(frame.t_ns, frame.picture.bgr // 2))
+            return frame if index else replace(frame, picture=CameraImage(frame.t_ns, frame.picture.bgr // 2))
 
     class Later(Recording):
         """The same at another time."""

@@ -121,8 +121,8 @@ def test_nmea_logs_say_how_good_they_are(tmp_path: Path, text: str, sigma_m: flo
     [
         pytest.param("a.csv", "", "no route:", id="empty"),
         pytest.param("a.csv", "a,b\n1,2\n", "no columns named lat and lon", id="other columns"),
-        pytest.param("a.csv", "lat,lon\n48,11\n48,11\n", "1 distinct positions on the Earth", id="one place"),
-        pytest.param("a.csv", "lat,lon\n480,11\n481,11\n", "0 distinct positions on the Earth", id="not on the Earth"),
+        pytest.param("a.csv", "lat,lon\n48,11\n48,11\n", "1 distinct valid positions", id="one place"),
+        pytest.param("a.csv", "lat,lon\n480,11\n481,11\n", "0 distinct valid positions", id="not on the Earth"),
         pytest.param("a.csv", 'lat,lon\n"48,11\n' + "48.1,11.2\n" * 20_000, "not CSV: field larger", id="open quote"),
         pytest.param("a.gpx", "<gpx", "not XML", id="cut off"),
         pytest.param("a.gpx", '<!DOCTYPE x [<!ENTITY a "b">]><gpx/>', "document type", id="entities"),

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.detection import CALM_TICKS, Detectors, LiveDetectors, detect
 from pipeline.params import DetectionParams
-from pipeline.types import CameraCalibration, EgoState, Frame, Picture, RawBoxes
+from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, RawBoxes
 from pipeline.vision.detector import open_detector
 from pipeline.vision.far_view import FarView, open_far_view, window_of
 from pipeline.vision.nms import select
@@ -112,7 +112,7 @@ class Answers:
 def test_both_looks_at_one_car_are_one_detection_and_the_parameter_takes_one_back() -> None:
     whole = Answers("whole", raw([[900, 250, 1000, 330], [100, 300, 300, 500]], [0.5, 0.9]))
     native = Answers("native", raw([[85, 155, 184, 233], [200, 190, 220, 206]], [0.8, 0.7]))
-    taken = Frame(0, "0", 0, picture=Picture(0, bright_at()))
+    taken = Frame(0, "0", 0, picture=CameraImage(0, bright_at()))
     seen = detect(taken, Detectors(whole, far=FarView(native)))
     assert seen.raw_boxes is not None
     found = select(seen.raw_boxes, DetectionParams())
@@ -127,14 +127,14 @@ def test_both_looks_at_one_car_are_one_detection_and_the_parameter_takes_one_bac
 def test_every_nth_frame_by_its_index() -> None:
     native = Answers("native", raw([[85, 155, 184, 233]], [0.8]))
     asked = Detectors(Answers("whole", raw([[1, 1, 2, 2]], [0.1])), far=FarView(native), far_every=2)
-    picture = Picture(0, bright_at())
+    picture = CameraImage(0, bright_at())
     seen = [detect(Frame(k, str(k), k, picture=picture), asked).raw_boxes for k in range(4)]
     assert [boxes is not None and boxes.far is not None for boxes in seen] == [True, False, True, False]
 
 
 def test_where_ticks_are_dropped_the_far_view_sits_out_every_other_one() -> None:
     asked = LiveDetectors(Detectors(far=FarView(Answers("native", raw([[1, 1, 2, 2]], [0.1])))))
-    tick = Frame(0, "0", 0, picture=Picture(0, bright_at()))
+    tick = Frame(0, "0", 0, picture=CameraImage(0, bright_at()))
     looked = [asked.of(replace(tick, index=index)).far is not None for index in (0, 1, 2, 4, 5, 6, 7, 9, 10)]
     assert looked == [True, True, True, False, True, False, True, False, True]
     calm = [asked.of(replace(tick, index=index)).far is not None for index in range(11, 11 + 2 * CALM_TICKS)]

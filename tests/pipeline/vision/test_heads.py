@@ -10,7 +10,7 @@ import pytest
 from pipeline.vision import heads
 from pipeline.vision.heads import UnknownHead, pick_decoder
 from pipeline.vision.heads.anchor_maps import ANCHORS
-from pipeline.vision.heads.decoder import Answer, Decoded, Decoder, Head
+from pipeline.vision.heads.decoder import BoxOutputs, Decoded, Decoder, Head
 
 SIZE = (64, 96)
 CELLS = 8 * 12 + 4 * 6 + 2 * 3
@@ -163,7 +163,7 @@ def _corners_first(outputs: Sequence[np.ndarray], size: tuple[int, int], floor: 
     return rows[:, :4], rows[:, 4], rows[:, 5].astype(np.int64)
 
 
-def _recognise(answer: Answer) -> Decoder | None:
+def _recognise(answer: BoxOutputs) -> Decoder | None:
     one_table = len(answer.outputs) == 1 and answer.outputs[0].ndim == 2
     return Decoder("tables", 5, True, 1.0, True, _corners_first) if one_table else None
 

@@ -13,14 +13,14 @@ from pipeline.common import kalman
 from pipeline.params import VisionTrackingParams
 from pipeline.types import Detection, VisionMeasurement, VisionTrack
 from pipeline.vision import place_filter
-from pipeline.vision.place_filter import Sighting
+from pipeline.vision.place_filter import PlaceMeasurement
 from pipeline.vision.tracking import VisionTrackerState, track
 
 PARAMS = VisionTrackingParams()
 
 
-def sighting(range_m: float, bearing_rad: float = 0.0, share: float = 0.05) -> Sighting:
-    return Sighting(range_m, bearing_rad, share, 0.005)
+def sighting(range_m: float, bearing_rad: float = 0.0, share: float = 0.05) -> PlaceMeasurement:
+    return PlaceMeasurement(range_m, bearing_rad, share, 0.005)
 
 
 def seen(range_m: float, u: float = 600.0, height_px: float | None = None) -> VisionMeasurement:
@@ -103,3 +103,31 @@ def test_the_covariance_stays_positive() -> None:
     for _ in range(50):
         state = place_filter.update(kalman.predict(state, 0.1, 3.0), sighting(40.0 + rng.normal(), rng.normal() * 0.01))
         assert np.linalg.eigvalsh(state.cov).min() > 0.0
+
+
+@pytest.mark.parametrize(("expected_m", "found_m"), [(77.0, 42.7), (42.7, 77.0), (30.0, 12.0)])
+def test_a_precise_sighting_far_from_a_vague_place_is_where_the_place_goes(expected_m: float, found_m: float) -> None:
+    """One linear step in the logarithm overshoots: from 77 m to a sighting at 42.7 m it ends at 32 m."""
+    vague = place_filter.start(sighting(expected_m, share=0.6), 0.0, 8.0)
+    x, y = place_filter.position(place_filter.update(vague, sighting(found_m, share=0.012)))
+    assert math.hypot(x, y) == pytest.approx(found_m, rel=0.01)
+
+
+def test_half_a_vehicle_drawn_for_a_moment_does_not_send_it_sideways() -> None:
+    """The right half of the box only, twice: its centre jumps by a quarter of a car, 0.45 m. That is no lane change."""
+    whole = [seen(40.0, u=600.0) for _ in range(15)]
+    x1, y1, x2, y2 = whole[0].detection.bbox
+    middle = (x1 + 3 * x2) / 4
+    half = VisionMeasurement(
+        Detection(((x1 + x2) / 2, y1, x2, y2), "car", 0.8), 40.0, 4.0, (40.0, (600.0 - middle) / 721.0 * 40.0), 0.07
+    )
+    moved = VisionMeasurement(
+        Detection((x1 + middle - 600.0, y1, x2 + middle - 600.0, y2), "car", 0.8), 40.0, 4.0, half.position, 0.07
+    )
+
+    def sideways_mps(box: VisionMeasurement) -> float:
+        (last,) = follow([[each] for each in (*whole, box, box)])[-1]
+        assert last.velocity_mps is not None
+        return abs(last.velocity_mps[1])
+
+    assert sideways_mps(half) < 0.5 * sideways_mps(moved), "a whole box that has moved is believed"

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pipeline.params import VisionTrackingParams
 from pipeline.types import Box, Detection, VisionMeasurement, VisionTrack
-from pipeline.vision.place_filter import Sighting, start
+from pipeline.vision.place_filter import PlaceMeasurement, start
 from pipeline.vision.tracking import VisionTrackerState, track
 
 QUEUE = VisionTrackingParams(filter="queue")
@@ -192,7 +192,7 @@ def test_a_distance_without_a_place_is_shown_as_it_is() -> None:
 
 def test_noise_lies_along_the_ray() -> None:
     range_m = 20 * 2**0.5
-    noise = start(Sighting(range_m, np.pi / 4, 3.0 / range_m, np.radians(0.3)), 0.0, 8.0).cov[:2, :2]
+    noise = start(PlaceMeasurement(range_m, np.pi / 4, 3.0 / range_m, np.radians(0.3)), 0.0, 8.0).cov[:2, :2]
     along, across = np.array([1.0, 1.0]) / 2**0.5, np.array([-1.0, 1.0]) / 2**0.5
     assert along @ noise @ along == pytest.approx(9.0)
     assert across @ noise @ across == pytest.approx((20 * 2**0.5 * np.radians(0.3)) ** 2)

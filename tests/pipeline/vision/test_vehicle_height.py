@@ -117,3 +117,14 @@ def test_returns_of_a_far_vehicle_place_it_without_seeming_motion() -> None:
     assert one.velocity_mps is not None
     assert abs(one.velocity_mps[0]) < 3.0
     assert one.ranges == 20, "its place was not begun anew"
+
+
+def test_a_place_that_rests_on_ranges_stays_when_a_height_is_unlearned() -> None:
+    """The first box held the upper part of the car only, beside a range. The next one is whole: it has not moved."""
+    state, speeds = VisionTrackerState(), []
+    for k in range(8):
+        measured = replace(seen(50.0 if k < 2 else 40.0), ranged_m=40.0, ranged_sigma_m=0.5, returns=2)
+        state, (one,) = track(state, (measured,), 0.1 if k else None, PARAMS, 0.0)
+        speeds.append(one.velocity_mps[0] if one.velocity_mps is not None else 0.0)
+    assert max(abs(speed) for speed in speeds) < 4.0
+    assert one.distance_m == pytest.approx(40.0, abs=0.5)

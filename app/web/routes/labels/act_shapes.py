@@ -5,21 +5,23 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 from uuid import UUID
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from app.labels.acts.request_fields import Person, PersonOrNobody, Strict
 from app.labels.acts.requests import Act
 from app.labels.service.tasks import TaskKind
 from app.labels.store.values import LONGEST_ITEM
 from app.web.routes.labels.shapes import ItemKey, LabelChanges
+from app.web.routes.shapes.common import ApiModel
 
 DriveKey = Annotated[str, Field(max_length=LONGEST_ITEM, description="Id of the recording, of GET /api/labels")]
 
 
 class Sent(Strict):
-    """act_id: made by who sends it, one for each act: sent again, the act is not done again, and answered as before."""
+    """A change."""
 
     act_id: UUID | None = None
+    """Made by who sends it, one for each act: sent again, the act is not done again, and answered as before."""
 
     @property
     def sent_as(self) -> str | None:
@@ -28,45 +30,61 @@ class Sent(Strict):
 
 
 class ActBody(Sent):
-    """person: whose act it is. drive: the recording that is meant; 409 when another one is open."""
+    """An act on labels."""
 
     person: Person
+    """Whose act it is."""
     drive: DriveKey
+    """The recording that is meant; 409 when another one is open."""
     act: Act
+    """What is to be done."""
 
 
 class Who(Sent):
-    """person: whose newest act is meant. drive: as of an act; null where what is open has no frames to label."""
+    """Whose newest act to undo, or to redo."""
 
     person: PersonOrNobody = ""
+    """Empty for changes that nobody put a name to."""
     drive: DriveKey | None
+    """As of an act; null where what is open has no frames to label."""
 
 
-class ActedJson(BaseModel):
-    """It is on disk. act: its number, null when nothing changed. what: in a few words. changed: what others get as
-    changes. note: what there is to say about it."""
+class ActedJson(ApiModel):
+    """An act that was done and saved."""
 
     revision: int
+    """Of the labels after it."""
     act: int | None
+    """Its number; null when nothing changed."""
     what: str
+    """In a few words."""
     changed: LabelChanges | None
+    """What others get as changes; null when no labels changed."""
     note: str
+    """What else there is to say about it."""
 
 
-class TaskBegun(BaseModel):
-    """It goes on; ``state.labels.task`` tells how far it is. task: its id there."""
+class TaskBegun(ApiModel):
+    """The act takes longer than a request; ``state.labels.task`` reports its progress."""
 
     status: Literal["begun"]
+    """Tells it from an act that is done."""
     what: TaskKind
+    """Kind of work."""
     task: int
+    """Its id in the state."""
 
 
-class StaleJson(BaseModel):
-    """Nothing was written. item: what somebody changed; theirs: it as it is now, null when it was removed; yours: what
-    was sent; revision: of the labels in which it is so, to base the act on when it is sent again."""
+class StaleJson(ApiModel):
+    """A conflict: somebody else changed the item first, and nothing was saved."""
 
     detail: str
+    """What happened, in a sentence."""
     item: ItemKey | None = None
+    """What somebody changed; null where it is not one item."""
     theirs: dict[str, Any] | None = None
+    """The item as it is now; null when it was removed."""
     yours: dict[str, Any] | None = None
+    """What was sent."""
     revision: int | None = None
+    """Of the labels in which it is so, to base the act on when it is sent again."""

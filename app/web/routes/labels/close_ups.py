@@ -38,8 +38,8 @@ def label_close_ups_router(desk: LabelDesk) -> APIRouter:
 
     @router.get("/{number}/close_up", response_class=Response, responses={200: {"content": {"image/jpeg": {}}}})
     def close_up(number: Id, frame: Annotated[Index, Query()]) -> Response:
-        """Get a picture of a track in a frame: the camera's, and its points from above, the side and behind. Nothing
-        (204) where it is not, as while somebody else removes it."""
+        """Get a close-up of a track in a frame: of the image, and of its points from above, the side and behind. 204
+        when the track has no sighting there, for example because somebody else just removed it."""
         with refusing():
             track = _track(desk, number)
             jpeg = close_up_jpeg(track, frame, desk.recording, desk.params) if track is not None else None

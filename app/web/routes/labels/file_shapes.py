@@ -4,51 +4,64 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from app.labels.acts.request_fields import Person, Strict
 from app.labels.store.values import LONGEST_NAME
+from app.web.routes.shapes.common import ApiModel
 
 VERSION_NAME = r"^[A-Za-z0-9][A-Za-z0-9._ -]*$"
 """A version's name is shown and asked for in addresses; it is never a path."""
 
 
-class VersionJson(BaseModel):
-    """A frozen label set. frames: that have a label."""
+class VersionJson(ApiModel):
+    """A frozen label set."""
 
     name: str
+    """Unique within the drive."""
     person: str
+    """Who froze it."""
     t_unix_ms: int
+    """When, in Unix milliseconds."""
     tracks: int
+    """Labelled vehicles."""
     frames: int
+    """That have a label."""
 
 
 class NewVersion(Strict):
     """Freeze the labels as they are now."""
 
     name: Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=VERSION_NAME)]
+    """As files may be called."""
     person: Person
+    """Who freezes it."""
 
 
-class NativeFile(BaseModel):
-    """Our own file: every field of a label set under its own name."""
+class NativeFile(ApiModel):
+    """The native file format: every field of a label set under its own name."""
 
     format: Literal["cipv-labels"]
+    """Tells the file from others."""
     version: int
+    """Of the format."""
     labels: dict[str, Any]
+    """The label set."""
 
 
-class FormatJson(BaseModel):
+class FormatJson(ApiModel):
     """A format of labels."""
 
     name: str
     """As the other routes take it."""
     title: str
+    """For people."""
     about: str
     """What it is, in a few words."""
 
 
-class LostJson(BaseModel):
+class LostJson(ApiModel):
     """What a format cannot express, one sentence each."""
 
     lost: list[str]
+    """Empty when everything has a place."""

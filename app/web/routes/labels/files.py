@@ -21,7 +21,8 @@ from app.labels.wording import WORKING
 from app.web.routes.labels.act_shapes import TaskBegun
 from app.web.routes.labels.file_shapes import VERSION_NAME, FormatJson, LostJson, NativeFile, NewVersion, VersionJson
 from app.web.routes.refusals import refusing
-from app.web.routes.shapes import file_of
+from app.web.routes.shapes.common import file_of
+from pipeline.labels.classes import as_written
 from pipeline.labels.formats.registry import FORMATS, FormatName
 from pipeline.labels.selection import Selection, selected
 
@@ -65,7 +66,7 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
 
     @router.get("/formats")
     def formats() -> list[FormatJson]:
-        """Every format in which labels can be exported and imported."""
+        """List the formats in which labels can be exported and imported."""
         return [FormatJson(name=each.name, title=each.title, about=each.about) for each in FORMATS.values()]
 
     @router.get("/export", response_class=FileResponse, responses=_FILE)
@@ -76,7 +77,7 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         from app.labels.transfer.files import exported  # the formats' libraries: only who exchanges labels pays
 
         with refusing():
-            made = exported(desk.recording, desk.labels.label_set(version), format, only)
+            made = exported(desk.recording, desk.labels.label_set(version), format, only, desk.classes)
         return FileResponse(
             made.file,
             filename=made.file.name,
@@ -91,8 +92,9 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         from pipeline.labels.formats.parts import reduce
 
         with refusing():
-            _, lost = reduce(selected(desk.labels.label_set(version), only), FORMATS[format].holds)
-        return LostJson(lost=list(lost))
+            labels, renamed = as_written(selected(desk.labels.label_set(version), only), desk.classes, format)
+            _, lost = reduce(labels, FORMATS[format].holds)
+        return LostJson(lost=[*lost, *renamed])
 
     @router.get("/versions", responses={200: {"model": list[VersionJson]}})
     def versions() -> Response:

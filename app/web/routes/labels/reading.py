@@ -15,7 +15,10 @@ from app.labels.store.values import HistoryEntry, ItemKind
 from app.web.routes.drive import current
 from app.web.routes.labels.score_shapes import BadFrameJson, ScoreJson, errors_json
 from app.web.routes.labels.shapes import (
+    AttributeKindJson,
     ChecksJson,
+    ClassJson,
+    ClassListJson,
     ItemKey,
     LabelsOfPerson,
     NextJson,
@@ -24,7 +27,7 @@ from app.web.routes.labels.shapes import (
     Window,
 )
 from app.web.routes.refusals import refusing
-from app.web.routes.shapes import MetricJson
+from app.web.routes.shapes.common import MetricJson
 
 LONGEST_WINDOW = 200
 
@@ -32,6 +35,18 @@ LONGEST_WINDOW = 200
 def labels_router(desk: LabelDesk) -> APIRouter:
     """Routes that read labels."""
     router = APIRouter(prefix="/api/labels", tags=["labels"])
+
+    @router.get("/classes")
+    def classes() -> ClassListJson:
+        """List the classes and attributes of the project."""
+        known = desk.classes
+        return ClassListJson(
+            classes=[
+                ClassJson(name=each.name, of=each.of, size=each.size, exports=dict(each.exports))
+                for each in known.classes.values()
+            ],
+            attributes=[AttributeKindJson(name=name, values=list(values)) for name, values in known.attributes.items()],
+        )
 
     @router.get("", responses={200: {"model": LabelsOfPerson}})
     def changes(since: Annotated[Id, Query()] = 0, person: Annotated[PersonOrNobody, Query()] = "") -> Response:
@@ -99,7 +114,7 @@ def labels_router(desk: LabelDesk) -> APIRouter:
 
     @router.get("/checks")
     def checks() -> ChecksJson:
-        """List what can hardly be so: jumps, overlaps, empty cuboids, boxes apart, leads without a track."""
+        """List what is implausible: jumps, overlaps, empty cuboids, boxes off their cuboids, leads without a track."""
         with refusing():
             found = desk.checks.of(desk.labels, desk.recording)
         return ChecksJson(revision=found.revision, problems=[ProblemJson(**vars(each)) for each in found.problems])

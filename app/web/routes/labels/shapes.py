@@ -4,195 +4,307 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel
-
 from app.labels.service.filmstrip import Why
 from app.labels.store.values import ItemKind
-from app.web.routes.shapes import CuboidJson, Point
+from app.web.routes.shapes.common import ApiModel, CuboidJson, Point
 from pipeline.labels.model import Heading, State
 
 
-class OriginJson(BaseModel):
-    """Who made a label. params, calibration: digests of what the pipeline ran with. how: what its place was measured
-    by, where a person only pointed at it; empty otherwise."""
+class OriginJson(ApiModel):
+    """Who made a label, and with what."""
 
     maker: Literal["pipeline", "person", "import"]
+    """Kind of author."""
     name: str
+    """The person, or the file or run that it came from."""
     t_unix_ms: int
+    """When, in Unix milliseconds."""
     params: str | None
+    """Digest of what the pipeline ran with; null for others."""
     calibration: str | None
+    """Digest of what the pipeline ran with; null for others."""
     how: str
+    """What its place was measured by, where a person only pointed at it; empty otherwise."""
 
 
-class LabelItem(BaseModel):
-    """revision: the act that changed it last; an edit carries the one that it is based on."""
+class LabelItem(ApiModel):
+    """What every label has."""
 
     id: int
+    """Among those of its kind."""
     revision: int
+    """The act that changed it last; an edit carries the one that it is based on."""
 
 
 class StatedItem(LabelItem):
-    """comment: why it was sent back. reviewer: who found it right, another than who made it; empty while nobody has."""
+    """A label that can be proposed, accepted and reviewed."""
 
     state: State
+    """How far it has come."""
     origin: OriginJson
+    """Who made it."""
     comment: str
+    """Why it was sent back; empty otherwise."""
     reviewer: str
+    """Who found it right, another than who made it; empty while nobody has."""
+
+
+class AttributeJson(ApiModel):
+    """One attribute of a track over a range of frames."""
+
+    first: int
+    """First frame of the range."""
+    last: int
+    """Last frame of the range, inclusive."""
+    name: str
+    """As in the class list."""
+    value: str
+    """One of the attribute's values."""
+
+
+class ClassJson(ApiModel):
+    """A class of road users."""
+
+    name: str
+    """What labels call it."""
+    of: str | None
+    """The class that it is a kind of; null at the top."""
+    size: tuple[float, float, float] | None
+    """Usual length, width and height in metres; null for that of its parent."""
+    exports: dict[str, str]
+    """What label formats call it, by format."""
+
+
+class AttributeKindJson(ApiModel):
+    """An attribute that tracks can have."""
+
+    name: str
+    """What labels call it."""
+    values: list[str]
+    """What it can be."""
+
+
+class ClassListJson(ApiModel):
+    """The classes and attributes of the project."""
+
+    classes: list[ClassJson]
+    """In the order in which people choose."""
+    attributes: list[AttributeKindJson]
+    """In the order in which they are shown."""
 
 
 class TrackHead(StatedItem):
-    """A track without its sightings. first, last: frames; null while it has none. sightings: how many. confidence: of a
-    proposal, how sure it is a road user, 0–1; null for others. heading: what told front from rear of a proposal:
-    ``motion``, ``lane`` or ``unknown``, which somebody has to look at; empty once somebody has."""
+    """A track without its sightings."""
 
     label: str
+    """Class of the vehicle."""
     confidence: float | None
+    """Of a proposal: how sure it is a road user, 0–1; null for others."""
     heading: Heading
+    """What told front from rear of a proposal: ``motion``, ``lane`` or ``unknown``, which somebody has to look at;
+    empty once somebody has."""
+    attributes: list[AttributeJson]
+    """What is said of it besides its class, in ranges of frames."""
     first: int | None
+    """First frame; null while it has no sighting."""
     last: int | None
+    """Last frame; null while it has no sighting."""
     keyframes: list[int]
+    """Frames put there by a person or a file."""
     sightings: int
+    """How many."""
 
 
 class LeadJson(StatedItem):
-    """Who leads from first to last."""
+    """The lead in a range of frames."""
 
     first: int
+    """First frame of the range."""
     last: int
+    """Last frame, included."""
     lead: int | Literal["none", "unknown"]
+    """Id of a track; ``none`` when nobody leads, ``unknown`` when it cannot be told."""
 
 
 class PathLabelJson(StatedItem):
-    """The ego lane's lines in a frame, ego x, y."""
+    """The borders of the ego lane in a frame: ego x, y."""
 
     frame: int
+    """The only one that the lines hold in."""
     left: list[Point] | None
+    """From near to far; null where only the other was drawn."""
     right: list[Point] | None
+    """From near to far; null where only the other was drawn."""
 
 
 class EventLabelJson(StatedItem):
-    """kind: ``cut_in``, ``cut_out``, or another word."""
+    """Something that happens at a frame."""
 
     frame: int
+    """When."""
     kind: str
+    """``cut_in``, ``cut_out``, or another word."""
     tracks: list[int]
+    """Who takes part."""
 
 
 class TagJson(LabelItem):
-    """A word about the frames from first to last."""
+    """A tag on a range of frames."""
 
     first: int
+    """First frame of the range."""
     last: int
+    """Last frame, included."""
     tag: str
+    """The word."""
     origin: OriginJson
+    """Who said it."""
 
 
-class ItemKey(BaseModel):
-    """Which item."""
+class ItemKey(ApiModel):
+    """A reference to an item."""
 
     kind: ItemKind
+    """Numbers are unique within a kind only."""
     id: int
+    """Among those of its kind."""
 
 
 class Removed(ItemKey):
-    """What is no longer there."""
+    """An item that is gone."""
 
 
-class LabelledDrive(BaseModel):
-    """id: of its content: the same wherever it lies."""
+class LabelledDrive(ApiModel):
+    """The recording that labels belong to."""
 
     id: str
+    """Of its content: the same wherever it lies."""
     uri: str
+    """As it was opened."""
     count: int
+    """Of its frames."""
 
 
-class LabelChanges(BaseModel):
-    """Everything that changed after ``since``."""
+class LabelChanges(ApiModel):
+    """Everything that changed after the revision asked for."""
 
     revision: int
+    """The newest; the next ``since``."""
     drive: LabelledDrive
+    """Whose labels they are."""
     tracks: list[TrackHead]
+    """Added or changed."""
     leads: list[LeadJson]
+    """Added or changed."""
     paths: list[PathLabelJson]
+    """Added or changed."""
     events: list[EventLabelJson]
+    """Added or changed."""
     tags: list[TagJson]
+    """Added or changed."""
     removed: list[Removed]
+    """Items that are gone."""
 
 
 class LabelsOfPerson(LabelChanges):
-    """can_undo, can_redo: of the person who asks."""
+    """Changes, and whether the person who asks can undo and redo."""
 
     can_undo: bool
+    """Of the person who asks."""
     can_redo: bool
+    """Of the person who asks."""
 
 
-class PlacedJson(BaseModel):
-    """keyframe: a person or a file put it there; else it follows those that are. box_set: somebody set the box; else it
-    is where the cuboid is in the picture."""
+class PlacedJson(ApiModel):
+    """Where a vehicle is in a frame."""
 
     cuboid: CuboidJson | None
+    """Ego frame; null where it is only seen in the image."""
     bbox: tuple[float, float, float, float] | None
+    """x1 y1 x2 y2 in pixels of the raw image; null where it is outside."""
     keyframe: bool
+    """A person or a file put it there; else it follows those that are."""
     box_set: bool
+    """Somebody set the box; else it is where the cuboid is in the image."""
 
 
 class PlacedTrack(PlacedJson):
-    """A track in a frame."""
+    """A track in the frame."""
 
     track: int
+    """Its id."""
 
 
 class PlacedFrame(PlacedJson):
-    """A frame of a track."""
+    """A frame of the track."""
 
     frame: int
+    """Of the drive, from 0."""
 
 
-class Window(BaseModel):
-    """By frame, whatever is in it."""
+class Window(ApiModel):
+    """All sightings in a window of frames."""
 
     revision: int
+    """Of the labels."""
     sightings: dict[int, list[PlacedTrack]]
+    """Of the frames that were asked for."""
 
 
 class WholeTrack(StatedItem):
-    """With every sighting."""
+    """A track with every sighting."""
 
     label: str
+    """Class of the vehicle."""
     confidence: float | None
+    """As of ``TrackHead``."""
     heading: Heading
+    """As of ``TrackHead``."""
     sightings: list[PlacedFrame]
+    """By frame."""
 
 
-class ProblemJson(BaseModel):
-    """What can hardly be so. track: what it is about; null for the lead alone."""
+class ProblemJson(ApiModel):
+    """Something implausible in the labels."""
 
     frame: int
+    """Where to look."""
     track: int | None
+    """What it is about; null for the lead alone."""
     words: str
+    """One sentence."""
 
 
-class ChecksJson(BaseModel):
-    """Of the labels as they were after act ``revision``."""
+class ChecksJson(ApiModel):
+    """The outcome of all checks."""
 
     revision: int
+    """The act after which the labels were checked."""
     problems: list[ProblemJson]
+    """By frame."""
 
 
-class StillJson(BaseModel):
-    """One frame of a track. inside, beside: points in its cuboid and right beside it; null without points or cuboid."""
+class StillJson(ApiModel):
+    """One frame of a track."""
 
     frame: int
+    """Of the drive, from 0."""
     why: Why
+    """Why this frame was chosen."""
     inside: int | None
+    """Points in its cuboid; null without points or cuboid."""
     beside: int | None
+    """Points right beside its cuboid; null without points or cuboid."""
 
 
-class NextJson(BaseModel):
-    """frame: null when there is none. why: one sentence. item: what it is about, where that is one label. left: how
-    many such places there are in the drive."""
+class NextJson(ApiModel):
+    """The next frame with something to do."""
 
     frame: int | None
+    """Null when there is none."""
     why: str
+    """One sentence."""
     item: ItemKey | None
+    """What it is about, where that is one label."""
     left: int
+    """How many such places there are in the drive."""

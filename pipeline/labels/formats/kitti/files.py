@@ -16,7 +16,7 @@ from pipeline.common.errors import BadInput
 from pipeline.formats.file_reading import check_looks_ahead, files_by_name
 from pipeline.formats.kitti_calibration import parse_object_calibration
 from pipeline.formats.kitti_records import DONT_CARE, UNLABELLED, LabelRow, kind_of, truth_of
-from pipeline.labels.formats.base import Imported, LabeledDrive, Shot, make_folder
+from pipeline.labels.formats.base import FrameInfo, Imported, LabeledDrive, make_folder
 from pipeline.labels.formats.kitti import rows as kitti_rows
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
@@ -55,7 +55,7 @@ def write_objects(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str
 def write_tracking(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
     """``label_02/0000.txt`` and ``calib/0000.txt``; all frames in the first one's calibration, as the format has it."""
     shot = next((each for each in drive.shots if each.camera is not None), None)
-    T_rect_ego, camera = _view(shot or Shot("", 0))
+    T_rect_ego, camera = _view(shot or FrameInfo("", 0))
     rows = sorted(
         (sighting.frame, track.id, kitti_rows.to_line(track.label, sighting, T_rect_ego, camera))
         for track, sighting in _sightings(labels)
@@ -109,7 +109,7 @@ def read_tracking(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     if len(files) != 1:
         raise BadInput(f"{path}: {len(files)} tracking files; choose one")
     ((name, file),) = files.items()
-    shot = next((each for each in drive.shots if each.camera is not None), Shot("", 0))
+    shot = next((each for each in drive.shots if each.camera is not None), FrameInfo("", 0))
     T_rect_ego, camera = _view_beside(home, name, shot)
     found: dict[int, tuple[str, dict[int, Sighting]]] = {}
     rows: list[LabelRow] = []
@@ -154,7 +154,7 @@ def _sightings(labels: LabelSet) -> Iterator[tuple[LabelTrack, Sighting]]:
     return ((track, sighting) for track in in_order for sighting in track.sightings)
 
 
-def _view(shot: Shot) -> tuple[F64, CameraCalibration]:
+def _view(shot: FrameInfo) -> tuple[F64, CameraCalibration]:
     """Where labels of a frame are, and its camera. BadInput without one."""
     if shot.camera is None or shot.T_rect_ego is None:
         raise BadInput("KITTI labels are in the camera's frame; this recording has no camera calibration")
@@ -162,7 +162,7 @@ def _view(shot: Shot) -> tuple[F64, CameraCalibration]:
     return shot.T_rect_ego, shot.camera
 
 
-def _view_beside(home: Path, name: str, shot: Shot) -> tuple[F64, CameraCalibration | None]:
+def _view_beside(home: Path, name: str, shot: FrameInfo) -> tuple[F64, CameraCalibration | None]:
     """As ``_view``, but of the calibration beside the labels where there is one."""
     file = home / _CALIBRATION / f"{name}.txt"
     if not file.is_file():

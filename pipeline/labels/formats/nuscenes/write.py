@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.common.geometry import inverse, rotation
 from pipeline.formats.file_reading import check_looks_ahead
-from pipeline.labels.formats.base import LabeledDrive, Shot, make_folder
+from pipeline.labels.formats.base import FrameInfo, LabeledDrive, make_folder
 from pipeline.labels.formats.points import points_inside
 from pipeline.labels.model import LabelSet, LabelTrack, Sighting
 from pipeline.types import F64
@@ -41,7 +41,7 @@ LIDAR, CAMERA = "LIDAR_TOP", "CAM_FRONT"
 _VISIBILITY = ("0-40", "40-60", "60-80", "80-100")
 _NO_TURN = [1.0, 0.0, 0.0, 0.0]
 _FOLDERS = {LIDAR: ("samples/LIDAR_TOP", "pcd.bin", "pcd"), CAMERA: ("samples/CAM_FRONT", "jpg", "jpg")}
-Row = dict[str, Any]
+TableRow = dict[str, Any]
 
 
 def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
@@ -49,7 +49,7 @@ def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
     poses, is_known = _poses(drive)
     turns = _quaternions(poses)
     annotations = _annotations(labels, drive, poses, turns)
-    tables: dict[str, list[Row]] = {
+    tables: dict[str, list[TableRow]] = {
         "attribute": [],
         "category": _categories(labels),
         "visibility": [
@@ -84,7 +84,7 @@ def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
     return _changes(labels, drive, is_known)
 
 
-def _json(rows: list[Row]) -> str:
+def _json(rows: list[TableRow]) -> str:
     """A row a line; row by row, which Python does in C, as it does not with an indent."""
     lines = map(json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode, rows)
     return "[\n" + ",\n".join(lines) + "\n]\n"
@@ -92,11 +92,11 @@ def _json(rows: list[Row]) -> str:
 
 def _annotations(
     labels: LabelSet, drive: LabeledDrive, poses: list[F64], turns: list[list[float]]
-) -> dict[int, list[Row]]:
+) -> dict[int, list[TableRow]]:
     """Rows by track. turns: of the poses, w x y z."""
     inside = points_inside(labels, drive)  # which the benchmark filters by
     samples = [_token("sample", index) for index in range(len(drive.shots))]
-    rows: dict[int, list[Row]] = {}
+    rows: dict[int, list[TableRow]] = {}
     for track in labels.tracks:
         seen = [each for each in track.sightings if each.cuboid is not None]
         instance, tokens = instance_token(track.id), [_token("annotation", track.id, each.frame) for each in seen]
@@ -118,7 +118,7 @@ def _annotations(
     return rows
 
 
-def _box(sighting: Sighting, T_global_ego: F64, turn: list[float]) -> Row:
+def _box(sighting: Sighting, T_global_ego: F64, turn: list[float]) -> TableRow:
     """turn: of the ego frame, w x y z."""
     assert sighting.cuboid is not None
     length, width, height = sighting.cuboid.size
@@ -129,16 +129,16 @@ def _box(sighting: Sighting, T_global_ego: F64, turn: list[float]) -> Row:
     return {"translation": center.tolist(), "size": [width, length, height], "rotation": rotation_wxyz}
 
 
-def _categories(labels: LabelSet) -> list[Row]:
+def _categories(labels: LabelSet) -> list[TableRow]:
     names = sorted({CATEGORIES.get(track.label, track.label) for track in labels.tracks})
     return [{"token": _token("category", name), "name": name, "description": ""} for name in names]
 
 
-def _instances(labels: LabelSet, annotations: dict[int, list[Row]]) -> list[Row]:
+def _instances(labels: LabelSet, annotations: dict[int, list[TableRow]]) -> list[TableRow]:
     return [_instance(track, annotations[track.id]) for track in labels.tracks if annotations[track.id]]
 
 
-def _instance(track: LabelTrack, rows: list[Row]) -> Row:
+def _instance(track: LabelTrack, rows: list[TableRow]) -> TableRow:
     return {
         "token": instance_token(track.id),
         "category_token": _token("category", CATEGORIES.get(track.label, track.label)),
@@ -148,7 +148,7 @@ def _instance(track: LabelTrack, rows: list[Row]) -> Row:
     }
 
 
-def _scene(drive: LabeledDrive) -> Row:
+def _scene(drive: LabeledDrive) -> TableRow:
     last = len(drive.shots) - 1
     return {
         "token": _token("scene"),
@@ -161,7 +161,7 @@ def _scene(drive: LabeledDrive) -> Row:
     }
 
 
-def _sample(index: int, drive: LabeledDrive) -> Row:
+def _sample(index: int, drive: LabeledDrive) -> TableRow:
     return {
         "token": _token("sample", index),
         "timestamp": drive.shots[index].t_ns // 1000,
@@ -171,12 +171,12 @@ def _sample(index: int, drive: LabeledDrive) -> Row:
     }
 
 
-def _sensor_tables(drive: LabeledDrive) -> dict[str, list[Row]]:
+def _sensor_tables(drive: LabeledDrive) -> dict[str, list[TableRow]]:
     """``sample_data`` and ``calibrated_sensor``: the LiDAR's points are in the ego frame already; a row for each
     calibration that the camera has in the drive."""
-    calibrated: dict[str, Row] = {}
-    sensors: dict[tuple[str, int], Row] = {}
-    data: list[Row] = []
+    calibrated: dict[str, TableRow] = {}
+    sensors: dict[tuple[str, int], TableRow] = {}
+    data: list[TableRow] = []
     names = drive.file_names()
     for channel in (LIDAR, CAMERA):
         shots = [(i, s) for i, s in enumerate(drive.shots) if channel == LIDAR or s.camera is not None]
@@ -206,9 +206,9 @@ def _sensor_tables(drive: LabeledDrive) -> dict[str, list[Row]]:
     return {"sample_data": data, "calibrated_sensor": list(calibrated.values())}
 
 
-def _calibrated(channel: str, shot: Shot) -> Row:
+def _calibrated(channel: str, shot: FrameInfo) -> TableRow:
     camera = shot.camera if channel == CAMERA else None
-    row: Row = {"sensor_token": _token("sensor", channel), "camera_intrinsic": []}
+    row: TableRow = {"sensor_token": _token("sensor", channel), "camera_intrinsic": []}
     if camera is None:
         row |= {"translation": [0.0, 0.0, 0.0], "rotation": _NO_TURN}
     else:

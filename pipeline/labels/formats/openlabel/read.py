@@ -16,7 +16,7 @@ from pipeline.common.geometry import Cuboid, transform
 from pipeline.formats.file_reading import rigid_transform
 from pipeline.labels.formats.base import Imported, LabeledDrive
 from pipeline.labels.formats.openlabel import write as ol
-from pipeline.labels.formats.openlabel.file_types import Agent, Content, Data, Element, File, Shape
+from pipeline.labels.formats.openlabel.file_types import Agent, Data, Element, File, FileContent, FileShape
 from pipeline.labels.formats.reading import fit, parse_as, read_bytes
 from pipeline.labels.model import (
     EventLabel,
@@ -51,7 +51,7 @@ def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
 class _Reading:
     """One file on its way to labels."""
 
-    def __init__(self, content: Content, drive: LabeledDrive, origin: Origin, what: str) -> None:
+    def __init__(self, content: FileContent, drive: LabeledDrive, origin: Origin, what: str) -> None:
         self.content, self.drive, self.origin, self.what = content, drive, origin, what
         self.is_ours = ol.OURS in content.metadata
         if str(content.metadata.get("schema_version")) != "1.0.0":
@@ -117,7 +117,7 @@ class _Reading:
             *_hidden(data),
         )
 
-    def _cuboid(self, shape: Shape) -> Cuboid:
+    def _cuboid(self, shape: FileShape) -> Cuboid:
         """Nine numbers with Euler angles, or ten with a quaternion; only its turn about z is kept."""
         val = _of_length(shape.val, (9, 10), f"{self.what}: a cuboid")
         if len(val) == 10:

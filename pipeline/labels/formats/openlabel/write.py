@@ -27,7 +27,7 @@ LEAD, NO_LEAD, LEAD_UNKNOWN = "lead", "no_lead", "lead_unknown"
 EGO_TYPE, PATH_TYPE, TAG_TYPE = "ego_vehicle", "ego_path", "frame_tag"
 OURS = "cipv"
 """Key in the metadata by which a file of ours is known."""
-Element = dict[str, Any]
+JsonElement = dict[str, Any]
 
 
 def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
@@ -58,10 +58,10 @@ def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
     return ()
 
 
-def _coordinate_systems(drive: LabeledDrive) -> Element:
+def _coordinate_systems(drive: LabeledDrive) -> JsonElement:
     """``ego``, and the first calibration of the camera in it."""
     camera = next((shot.camera for shot in drive.shots if shot.camera is not None), None)
-    systems: Element = {EGO: {"type": "local_cs", "parent": "", "children": [CAMERA] if camera is not None else []}}
+    systems: JsonElement = {EGO: {"type": "local_cs", "parent": "", "children": [CAMERA] if camera is not None else []}}
     if camera is not None:
         check_looks_ahead(camera, "the recording's calibration")
         pose = {"matrix4x4": inverse(camera.T_camera_ego).ravel().tolist()}
@@ -69,8 +69,8 @@ def _coordinate_systems(drive: LabeledDrive) -> Element:
     return systems
 
 
-def _objects(labels: LabelSet) -> dict[str, Element]:
-    objects: dict[str, Element] = {EGO_UID: {"name": "ego", "type": EGO_TYPE}}
+def _objects(labels: LabelSet) -> dict[str, JsonElement]:
+    objects: dict[str, JsonElement] = {EGO_UID: {"name": "ego", "type": EGO_TYPE}}
     for track in labels.tracks:
         objects[str(track.id)] = {
             "name": f"{track.label} {track.id}",
@@ -86,19 +86,19 @@ def _objects(labels: LabelSet) -> dict[str, Element]:
     return objects
 
 
-def _line(name: str, line: tuple[Point2, ...]) -> Element:
+def _line(name: str, line: tuple[Point2, ...]) -> JsonElement:
     flat = [value for x, y in line for value in (x, y, 0.0)]
     return {"name": name, "val": flat, "closed": False, "coordinate_system": EGO}
 
 
-def _lead_action(lead: LeadRange) -> Element:
+def _lead_action(lead: LeadRange) -> JsonElement:
     kind = NO_LEAD if lead.lead == "none" else LEAD_UNKNOWN if lead.lead == "unknown" else LEAD
     return _element(kind, kind, lead.first, lead.last) | {"action_data": _marks(lead.origin, lead)}
 
 
-def _relations(labels: LabelSet) -> dict[str, Element]:
+def _relations(labels: LabelSet) -> dict[str, JsonElement]:
     """Leads have the number of their action; events come after them."""
-    relations: dict[str, Element] = {}
+    relations: dict[str, JsonElement] = {}
     for place, lead in enumerate(labels.leads):
         if isinstance(lead.lead, int):
             relations[str(place)] = _element(LEADS, LEADS, lead.first, lead.last) | {
@@ -114,9 +114,9 @@ def _relations(labels: LabelSet) -> dict[str, Element]:
     return relations
 
 
-def _frames(labels: LabelSet, drive: LabeledDrive) -> dict[str, Element]:
+def _frames(labels: LabelSet, drive: LabeledDrive) -> dict[str, JsonElement]:
     """Each frame with its objects; what an interval says is pointed to from the frames in it."""
-    frames: list[Element] = [{"frame_properties": {"timestamp": str(shot.t_ns)}} for shot in drive.shots]
+    frames: list[JsonElement] = [{"frame_properties": {"timestamp": str(shot.t_ns)}} for shot in drive.shots]
     for track in labels.tracks:
         for sighting in track.sightings:
             frames[sighting.frame].setdefault("objects", {})[str(track.id)] = {"object_data": _seen(sighting)}
@@ -137,8 +137,8 @@ def _frames(labels: LabelSet, drive: LabeledDrive) -> dict[str, Element]:
     return {str(index): frame for index, frame in enumerate(frames)}
 
 
-def _seen(sighting: Sighting) -> Element:
-    data: Element = {"boolean": [{"name": "keyframe", "val": sighting.keyframe}]}
+def _seen(sighting: Sighting) -> JsonElement:
+    data: JsonElement = {"boolean": [{"name": "keyframe", "val": sighting.keyframe}]}
     if sighting.box_set:
         data["boolean"].append({"name": "box_set", "val": True})
     numbers = (("truncation", sighting.truncation), ("occlusion", sighting.occlusion))
@@ -156,7 +156,7 @@ def _seen(sighting: Sighting) -> Element:
     return data
 
 
-def _marks(origin: Origin, marked: LabelTrack | LeadRange | PathLabel | EventLabel | None = None) -> Element:
+def _marks(origin: Origin, marked: LabelTrack | LeadRange | PathLabel | EventLabel | None = None) -> JsonElement:
     """State, review and origin as the texts and numbers that any element may have. marked: None for what has no
     state."""
     texts: dict[str, str | None] = {"maker": origin.maker, "by": origin.name, "how": origin.how or None}
@@ -173,17 +173,17 @@ def _marks(origin: Origin, marked: LabelTrack | LeadRange | PathLabel | EventLab
     }
 
 
-def _element(name: str, kind: str, first: int, last: int) -> Element:
+def _element(name: str, kind: str, first: int, last: int) -> JsonElement:
     return {"name": name, "type": kind, "frame_intervals": [_interval(first, last)]}
 
 
-def _interval(first: int, last: int) -> Element:
+def _interval(first: int, last: int) -> JsonElement:
     return {"frame_start": first, "frame_end": last}
 
 
-def _intervals(frames: Iterable[int]) -> list[Element]:
+def _intervals(frames: Iterable[int]) -> list[JsonElement]:
     """Ascending frames as intervals without gaps."""
-    found: list[Element] = []
+    found: list[JsonElement] = []
     for frame in frames:
         if found and found[-1]["frame_end"] == frame - 1:
             found[-1]["frame_end"] = frame

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pipeline.sources.live.clock import FollowedClock, HostClock
 from pipeline.sources.live.config import CameraConfig
 from pipeline.sources.live.devices import mjpeg, video_stream
-from pipeline.sources.live.devices.device_reader import Read, Reader, Stop
+from pipeline.sources.live.devices.device_reader import ReadDevice, Reader, ReaderStop
 from pipeline.sources.live.devices.sensor_input import Deliver
 from pipeline.sources.live.health import StreamStats
 from pipeline.types.camera_shot import Shot, is_whole_jpeg
@@ -26,7 +26,7 @@ class CameraInput:
     def clock_offset_ms(self) -> float | None:
         return self._own.offset_ms
 
-    def _read(self, config: CameraConfig) -> Read:
+    def _read(self, config: CameraConfig) -> ReadDevice:
         if config.url is not None:
             return _HttpOrVideo(config.url, self.receive, self._shot)
         if config.file is not None:
@@ -63,11 +63,11 @@ class CameraInput:
 class _HttpOrVideo:
     """An address: MJPEG where it gives that, else video. What it gave once it is taken to give again."""
 
-    def __init__(self, url: str, jpeg: mjpeg.Receive, shot: video_stream.Receive) -> None:
+    def __init__(self, url: str, jpeg: mjpeg.ReceiveImage, shot: video_stream.ReceiveShot) -> None:
         self._url, self._jpeg, self._shot = url, jpeg, shot
         self._is_video = not url.startswith("http")
 
-    def __call__(self, stop: Stop) -> None:
+    def __call__(self, stop: ReaderStop) -> None:
         if not self._is_video:
             try:
                 return mjpeg.read_mjpeg(self._url, self._jpeg, stop)

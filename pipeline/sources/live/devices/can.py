@@ -14,7 +14,7 @@ import cantools
 from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import CanConfig, SignalConfig
-from pipeline.sources.live.devices.device_reader import POLL_S, DeviceLost, Reader, Stop
+from pipeline.sources.live.devices.device_reader import POLL_S, DeviceLost, Reader, ReaderStop
 from pipeline.sources.live.devices.sensor_input import Deliver
 from pipeline.sources.live.health import StreamStats
 from pipeline.types import EgoState
@@ -46,7 +46,7 @@ class CanInput:
     def clock_offset_ms(self) -> float | None:
         return None
 
-    def _read(self, stop: Stop) -> None:
+    def _read(self, stop: ReaderStop) -> None:
         config = self._config
         options: dict[str, Any] = {"bitrate": config.bitrate} if config.bitrate is not None else {}
         try:

@@ -26,7 +26,7 @@ class DeviceLost(Exception):
     """A device that cannot be opened or read any more; the text says which and why, for a person."""
 
 
-class Stop:
+class ReaderStop:
     """Asked by whoever reads, set when the reading shall end. asked_s: when it was asked last."""
 
     def __init__(self) -> None:
@@ -45,16 +45,16 @@ class Stop:
         self._event.wait(seconds)
 
 
-Read = Callable[[Stop], None]
-"""Opens a device and reads it until it is lost (``DeviceLost``, ``OSError``), ends, or ``Stop`` is set."""
+ReadDevice = Callable[[ReaderStop], None]
+"""Opens a device and reads it until it is lost (``DeviceLost``, ``OSError``), ends, or ``ReaderStop`` is set."""
 
 
 class Reader:
     """``read`` in a thread, again and again. ``say`` is told why it cannot, and an empty text when it can."""
 
-    def __init__(self, name: str, read: Read, say: Callable[[str], None]) -> None:
+    def __init__(self, name: str, read: ReadDevice, say: Callable[[str], None]) -> None:
         self._read, self._say = read, say
-        self._stop = Stop()
+        self._stop = ReaderStop()
         self._logged = ""
         self._name = f"cipv-{name}"
         self.hung = 0
@@ -73,7 +73,7 @@ class Reader:
             return
         logger.error("%s hangs for %.0f s and is restarted", self._name, hangs_s)
         self._stop.set()
-        self.hung, self._stop = self.hung + 1, Stop()
+        self.hung, self._stop = self.hung + 1, ReaderStop()
         self._thread = self._fresh()
         self._thread.start()
 
@@ -96,14 +96,14 @@ class Reader:
             logger.exception("while reading %s", self._thread.name)
         self._logged = text
 
-    def _work(self, stop: Stop) -> None:
+    def _work(self, stop: ReaderStop) -> None:
         while not stop:
             text = self._tried(stop)
             if text and not stop:
                 self._say(text)
             stop.wait(RETRY_S)
 
-    def _tried(self, stop: Stop) -> str:
+    def _tried(self, stop: ReaderStop) -> str:
         """Why the reading ended."""
         try:
             self._read(stop)

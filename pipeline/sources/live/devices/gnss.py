@@ -13,7 +13,7 @@ import serial
 from pipeline.formats.nmea import BadSentence, NmeaReader, parse_sentence
 from pipeline.sources.live.clock import FollowedClock, HostClock
 from pipeline.sources.live.config import GnssConfig
-from pipeline.sources.live.devices.device_reader import CONNECT_S, POLL_S, DeviceLost, Read, Reader, Stop
+from pipeline.sources.live.devices.device_reader import CONNECT_S, POLL_S, DeviceLost, ReadDevice, Reader, ReaderStop
 from pipeline.sources.live.devices.sender_pin import SenderPin
 from pipeline.sources.live.devices.sensor_input import Deliver
 from pipeline.sources.live.devices.udp import read_datagrams
@@ -57,7 +57,7 @@ class GnssInput:
     def clock_offset_ms(self) -> float | None:
         return self._own.offset_ms
 
-    def _read(self, config: GnssConfig) -> Read:
+    def _read(self, config: GnssConfig) -> ReadDevice:
         if config.udp_port is not None:
             port, interface = config.udp_port, config.interface
             return lambda stop: read_datagrams(port, interface, None, self.receive, self._pin, stop)
@@ -120,7 +120,7 @@ def _is_nmea(data: bytes) -> bool:
     return False
 
 
-def _read_tcp(host: str, port: int, receive: Callable[[bytes], None], stop: Stop) -> None:
+def _read_tcp(host: str, port: int, receive: Callable[[bytes], None], stop: ReaderStop) -> None:
     try:
         connection = socket.create_connection((host, port), timeout=CONNECT_S)
     except (OSError, OverflowError) as error:
@@ -138,7 +138,7 @@ def _read_tcp(host: str, port: int, receive: Callable[[bytes], None], stop: Stop
                 receive(data)
 
 
-def _read_serial(device: str, baud: int, receive: Callable[[bytes], None], stop: Stop) -> None:
+def _read_serial(device: str, baud: int, receive: Callable[[bytes], None], stop: ReaderStop) -> None:
     try:
         with serial.Serial(device, baud, timeout=POLL_S) as line:
             while not stop:

@@ -8,7 +8,7 @@ from functools import partial
 from pipeline.formats.velodyne import OUT_OF_ORDER, BadPacket, Vlp16Decoder, read_packet, read_position
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import LidarConfig
-from pipeline.sources.live.devices.device_reader import Read, Reader
+from pipeline.sources.live.devices.device_reader import ReadDevice, Reader
 from pipeline.sources.live.devices.sender_pin import BesidePin, SenderPin
 from pipeline.sources.live.devices.sensor_input import Deliver, whole_hours_off
 from pipeline.sources.live.devices.udp import read_datagrams
@@ -96,7 +96,7 @@ class LidarInput:
     def _about_clock(self) -> str:
         """What was wrong with the stamps of its packets."""
         if self._mixed:
-            return "many packets do not fit to the others: does a second LiDAR have the same address?"
+            return "many packets do not match the others: does a second LiDAR have the same address?"
         jumps, last_s = self._decoder.counts.jumps, self._decoder.counts.jump_s
         often = "once" if jumps == 1 else f"{jumps} times, last"
         return f"its clock jumped {often} by {last_s:+.3f} s" if jumps else ""
@@ -113,6 +113,6 @@ def _is_data(data: bytes) -> bool:
     return True
 
 
-def _until_stopped(read: Callable[..., None]) -> Read:
+def _until_stopped(read: Callable[..., None]) -> ReadDevice:
     """A reading whose ``stop`` is given last."""
     return lambda stop: read(stop=stop)

@@ -7,7 +7,7 @@ import http.client
 from collections.abc import Callable, Mapping
 from urllib.parse import urlsplit
 
-from pipeline.sources.live.devices.device_reader import CONNECT_S, SILENCE_S, DeviceLost, Stop
+from pipeline.sources.live.devices.device_reader import CONNECT_S, SILENCE_S, DeviceLost, ReaderStop
 
 _LARGEST = 32 << 20
 _LONGEST_LINE = 8192
@@ -19,7 +19,7 @@ _STAMPS = ("x-timestamp", "x-sendtimestamp")
 _END_OF_TIME_US = (1 << 63) // 1000
 """Later than that, in the year 2262, nanoseconds leave 64 bits."""
 
-Receive = Callable[[bytes, int | None], None]
+ReceiveImage = Callable[[bytes, int | None], None]
 """Takes a JPEG and its own stamp, µs since 1970, if it has one."""
 
 
@@ -31,7 +31,7 @@ class NotMjpeg(Exception):
     """The address answers, with something else."""
 
 
-def read_mjpeg(url: str, receive: Receive, stop: Stop) -> None:
+def read_mjpeg(url: str, receive: ReceiveImage, stop: ReaderStop) -> None:
     """Read until ``stop``. DeviceLost when the camera cannot be reached, ends or falls silent; NotMjpeg when the
     address gives no MJPEG."""
     connection = _connection(url)
@@ -68,7 +68,7 @@ def _connection(url: str) -> http.client.HTTPConnection:
         raise DeviceLost(f"{url}: not an address") from None
 
 
-def _next_part(response: http.client.HTTPResponse, url: str, stop: Stop) -> tuple[bytes, int | None]:
+def _next_part(response: http.client.HTTPResponse, url: str, stop: ReaderStop) -> tuple[bytes, int | None]:
     """One JPEG: its headers say how long it is; of a camera that does not say, up to the JPEG's end."""
     headers = _headers(response, url, stop)
     length = headers.get("content-length", "")
@@ -80,7 +80,7 @@ def _next_part(response: http.client.HTTPResponse, url: str, stop: Stop) -> tupl
     return _until_jpeg_end(response, url, stop), _stamp_us(headers)
 
 
-def _headers(response: http.client.HTTPResponse, url: str, stop: Stop) -> Mapping[str, str]:
+def _headers(response: http.client.HTTPResponse, url: str, stop: ReaderStop) -> Mapping[str, str]:
     """Of the next part: lines after its boundary, up to an empty one. DeviceLost when they do not end."""
     headers: dict[str, str] = {}
     for _ in range(_MOST_LINES):
@@ -97,7 +97,7 @@ def _headers(response: http.client.HTTPResponse, url: str, stop: Stop) -> Mappin
     raise DeviceLost(f"{url}: unexpected response: headers without end")
 
 
-def _until_jpeg_end(response: http.client.HTTPResponse, url: str, stop: Stop) -> bytes:
+def _until_jpeg_end(response: http.client.HTTPResponse, url: str, stop: ReaderStop) -> bytes:
     data = bytearray()
     while not data.endswith(b"\xff\xd9") and len(data) < _LARGEST:
         line = _line(response, url, stop)
@@ -106,7 +106,7 @@ def _until_jpeg_end(response: http.client.HTTPResponse, url: str, stop: Stop) ->
     return bytes(data)
 
 
-def _line(response: http.client.HTTPResponse, url: str, stop: Stop) -> bytes:
+def _line(response: http.client.HTTPResponse, url: str, stop: ReaderStop) -> bytes:
     """The next one with its end, or as much as a line may have."""
     if stop:
         raise _Stopped

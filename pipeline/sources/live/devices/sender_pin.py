@@ -10,13 +10,13 @@ import time
 from collections import Counter
 from collections.abc import Callable
 
-Address = tuple[str, int]
+SocketAddress = tuple[str, int]
 """A sender's IPv4 address and port."""
 
 _NAMED_S = 3.0
 """Others are named for so long after they were heard last."""
 _MOST_NAMED = 3
-OTHERS = "of another sender"
+OTHERS = "from another sender"
 """Under which their datagrams are counted."""
 
 
@@ -45,14 +45,14 @@ class SenderPin:
     ) -> None:
         self._what, self._allowed, self._is_valid, self._refused = what, allowed, is_valid, refused
         self._by_port, self._silent_s, self._now_s = by_port, silent_s, now_s
-        self.sender: Address | None = None
+        self.sender: SocketAddress | None = None
         """Who sends; port 0 stands for any. None before the first, and once it has fallen silent."""
         self._heard_s, self._sent_ns = 0.0, 0
-        self._last: Address | None = None
+        self._last: SocketAddress | None = None
         self._before: str | None = None
         self._others: dict[str, tuple[float, bool]] = {}
 
-    def takes(self, data: bytes, sender: Address, at_ns: int) -> bool:
+    def takes(self, data: bytes, sender: SocketAddress, at_ns: int) -> bool:
         """Whether to read a datagram that came at ``at_ns``. While there is no sender everything of an allowed address
         is read, so that the reader can say what is wrong with it."""
         host, port = sender
@@ -84,12 +84,12 @@ class SenderPin:
             for text in (
                 f"a second {self._what} on this port is ignored: {_named(second)}" if second else "",
                 f"datagrams of {_named(noise)} are ignored" if noise else "",
-                f"comes from {sender[0]} now, before from {self._before}" if self._before and sender else "",
+                f"now comes from {sender[0]}, previously from {self._before}" if self._before and sender else "",
             )
             if text
         )
 
-    def _choose(self, who: Address) -> None:
+    def _choose(self, who: SocketAddress) -> None:
         last = self.sender or self._last
         if last is not None and last[0] != who[0]:
             self._before = last[0]
@@ -114,11 +114,11 @@ class BesidePin:
         self._first, self._allowed = first, allowed
 
     @property
-    def sender(self) -> Address | None:
+    def sender(self) -> SocketAddress | None:
         first = self._first.sender
         return (first[0], 0) if first is not None else None
 
-    def takes(self, data: bytes, sender: Address, at_ns: int) -> bool:
+    def takes(self, data: bytes, sender: SocketAddress, at_ns: int) -> bool:
         """As of ``SenderPin``. Others are counted where the sweeps come from, not here."""
         first = self._first.sender
         return sender[0] == first[0] if first is not None else self._allowed in (None, sender[0])

@@ -16,8 +16,8 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-from pipeline.sources.live.devices.device_reader import POLL_S, DeviceLost, Stop
-from pipeline.sources.live.devices.sender_pin import Address
+from pipeline.sources.live.devices.device_reader import POLL_S, DeviceLost, ReaderStop
+from pipeline.sources.live.devices.sender_pin import SocketAddress
 
 _SO_TIMESTAMPNS = 35
 """Linux: receive times with every datagram (socket(7)); Python has no name for it, nor for the next."""
@@ -30,7 +30,7 @@ _ONE_OF = 32
 """So many of others' datagrams are turned away for one that is looked at; a power of two. A second LiDAR sends 754 a
 second and is noticed at once; a flood of 100,000 a second costs as much as four LiDARs."""
 
-Receive = Callable[[bytes, int], None]
+ReceiveDatagram = Callable[[bytes, int], None]
 """Takes a datagram and the system's clock when it came, nanoseconds since 1970."""
 
 
@@ -38,16 +38,18 @@ class Pin(Protocol):
     """Whose datagrams are read. See ``sender_pin``."""
 
     @property
-    def sender(self) -> Address | None: ...
+    def sender(self) -> SocketAddress | None: ...
 
-    def takes(self, data: bytes, sender: Address, at_ns: int) -> bool: ...
+    def takes(self, data: bytes, sender: SocketAddress, at_ns: int) -> bool: ...
 
     def nothing_came(self) -> None: ...
 
 
-def read_datagrams(port: int, interface: str, group: str | None, receive: Receive, pin: Pin, stop: Stop) -> None:
+def read_datagrams(
+    port: int, interface: str, group: str | None, receive: ReceiveDatagram, pin: Pin, stop: ReaderStop
+) -> None:
     """Listen until ``stop``. DeviceLost names the port when it cannot be listened on."""
-    let_in: Address | None = None
+    let_in: SocketAddress | None = None
     with _listening(port, interface, group) as bound:
         while not stop:
             if pin.sender != let_in:
@@ -86,7 +88,7 @@ def _listening(port: int, interface: str, group: str | None) -> socket.socket:
     return bound
 
 
-def _let_in(bound: socket.socket, sender: Address | None) -> None:
+def _let_in(bound: socket.socket, sender: SocketAddress | None) -> None:
     """Have the system turn away what others send, but one of ``_ONE_OF``; None lets in everybody. Where it cannot,
     ``Pin.takes`` alone decides."""
     if sys.platform != "linux":
@@ -98,7 +100,7 @@ def _let_in(bound: socket.socket, sender: Address | None) -> None:
         bound.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, told)
 
 
-def _program(sender: Address | None) -> list[tuple[int, int, int, int]]:
+def _program(sender: SocketAddress | None) -> list[tuple[int, int, int, int]]:
     """In the classic BPF (linux/Documentation/networking/filter.rst): operation, lines to skip if true and if false,
     operand. A datagram begins with its UDP header; the IP header is at an offset of its own."""
     load, load_half, masked, if_equal, end = 0x20, 0x28, 0x54, 0x15, 0x06

@@ -14,17 +14,17 @@ import cv2
 import numpy as np
 
 from pipeline.formats.video_file import open_video, within_budget
-from pipeline.sources.live.devices.device_reader import SILENCE_S, DeviceLost, Stop
+from pipeline.sources.live.devices.device_reader import SILENCE_S, DeviceLost, ReaderStop
 from pipeline.types.camera_shot import Shot
 
 _OPEN_S = 2.0
 _RTSP = {"rtsp_transport": "tcp", "fflags": "nobuffer", "flags": "low_delay"}
 _SLOWEST_HZ, _FASTEST_HZ, _USUAL_HZ = 1.0, 240.0, 30.0
 
-Receive = Callable[[Shot], None]
+ReceiveShot = Callable[[Shot], None]
 
 
-def read_stream(url: str, receive: Receive, stop: Stop) -> None:
+def read_stream(url: str, receive: ReceiveShot, stop: ReaderStop) -> None:
     """RTSP or video over HTTP. DeviceLost when it cannot be opened, ends or falls silent."""
     options = _RTSP if url.startswith("rtsp") else {"fflags": "nobuffer"}
     try:
@@ -39,7 +39,7 @@ def read_stream(url: str, receive: Receive, stop: Stop) -> None:
     raise DeviceLost(f"{url}: the camera closed the connection")
 
 
-def play_file(path: Path, receive: Receive, stop: Stop) -> None:
+def play_file(path: Path, receive: ReceiveShot, stop: ReaderStop) -> None:
     """A video at its own rate, again and again. DeviceLost when it is none."""
     while not stop:
         begun, shown = time.monotonic(), 0
@@ -57,14 +57,14 @@ def play_file(path: Path, receive: Receive, stop: Stop) -> None:
             raise DeviceLost(f"{path}: no images")
 
 
-def read_device(device: int | str, receive: Receive, stop: Stop) -> None:
+def read_device(device: int | str, receive: ReceiveShot, stop: ReaderStop) -> None:
     """A camera plugged in, by number or path. DeviceLost when there is none or it was pulled out."""
     number = device_number(device)
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)  # what is wrong is said once, and by us
     capture = cv2.VideoCapture(number)
     try:
         if not capture.isOpened():
-            raise DeviceLost(f"camera {device}: not plugged in, or used by another program")
+            raise DeviceLost(f"camera {device}: not connected, or in use by another program")
         capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
         while not stop:
             ok, pixels = capture.read()
@@ -82,7 +82,7 @@ def device_number(device: int | str) -> int:
         return device
     found = re.fullmatch(r"/dev/video(\d+)", os.path.realpath(device))
     if found is None:
-        raise DeviceLost(f"camera {device}: not plugged in, or no camera")
+        raise DeviceLost(f"camera {device}: not connected, or not a camera")
     return int(found[1])
 
 

@@ -3,7 +3,8 @@ import { request } from "../../core/api.js";
 import { seekTo } from "../../drive/seek.js";
 import { get, set } from "../../core/store.js";
 import { act } from "./queue.js";
-import { CLASSES, grown, moved, turned, usualSize } from "../views/cuboid.js";
+import { grown, moved, turned } from "../views/cuboid.js";
+import { classNames, usualSize } from "../state/classes.js";
 import * as draft from "../state/draft.js";
 import { chosen, leadAt, shown, trackOf } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
@@ -139,6 +140,9 @@ export const boxFollows = () =>
   });
 
 export const snap = () => withTrack(({ id, revision }) => act({ kind: "refit", track: id, revision, frame: shown() }));
+/** Carry the track on beyond its ends, as far as its points are found. @param {"both"|"forward"|"backward"} way */
+export const propagate = (way) =>
+  withTrack(({ id, revision }) => act({ kind: "propagate", track: id, revision, way }));
 /** Turn the track's cuboids round, in every frame: front and rear were mistaken. */
 export const flip = () => withTrack(({ id, revision }) => act({ kind: "flip", track: id, revision }));
 export const splitHere = () =>
@@ -185,7 +189,8 @@ export const notHere = () =>
 /** @param {1|-1} direction */
 export const nextClass = (direction) =>
   withTrack(({ label }) => {
-    relabel(CLASSES[(CLASSES.indexOf(label) + direction + CLASSES.length) % CLASSES.length]);
+    const all = classNames();
+    if (all.length) relabel(all[(all.indexOf(label) + direction + all.length) % all.length]);
   });
 
 /** Change the class, and offer the new one's usual size. @param {string} label */

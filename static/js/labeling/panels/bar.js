@@ -4,11 +4,12 @@ import { get, on, paint, set } from "../../core/store.js";
 import { possible, redo, undo } from "../../panels/undo.js";
 import { discard, send } from "../acts/queue.js";
 import * as commands from "../acts/commands.js";
-import { CLASSES } from "../views/cuboid.js";
+import { fill } from "../state/classes.js";
 import { present } from "../state/draft.js";
 import { isKnown } from "../state/sightings.js";
 import { leadAt, leadName, shown, trackOf } from "../state/labels.js";
 import { labelKeys } from "../keys.js";
+import { withOwn } from "../../keys/own_keys.js";
 import { setTool, toggleFollows } from "../state/mode.js";
 import { newLabel, setNewLabel } from "../state/new_class.js";
 import { askName, knownName } from "../state/person.js";
@@ -109,14 +110,17 @@ const under = el("span", { class: "under" }),
     }),
   );
 
-const kind = el(
-  "select",
-  { class: "kind", aria: { label: "Class of new labels" }, title: "Class of new labels" },
-  ...CLASSES.map((label) => el("option", { value: label, textContent: label })),
-);
+const kind = el("select", {
+  class: "kind",
+  aria: { label: "Class of new labels" },
+  title: "Class of new labels",
+});
 
 export function setUp() {
-  kind.value = newLabel();
+  on(["classes"], () => {
+    fill(kind);
+    kind.value = newLabel();
+  });
   kind.addEventListener("change", () => {
     setNewLabel(kind.value);
     kind.blur();
@@ -160,13 +164,8 @@ export function setUp() {
     ),
     el("div", { class: "label-row label-line" }, reviewed, said, offer.setUp(), task, saved, again, discarded),
   );
-  $("#label-keys").append(
-    el("span", {}, el("kbd", { textContent: "?" }), " all shortcuts"),
-    ...labelKeys()
-      .flatMap(({ bindings }) => bindings)
-      .filter(({ brief }) => brief)
-      .map(({ shown: keys, brief }) => el("span", {}, el("kbd", { textContent: keys }), ` ${brief}`)),
-  );
+  showKeys();
+  on(["keys", "person"], showKeys);
   paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft"], reflect);
   on(["saving", "said", "link"], reflectSaving);
   on(["state"], reflectTask);
@@ -282,5 +281,18 @@ function reflectTask() {
   text(
     $(".facts", HTMLElement, task),
     isFailed ? `${current.what} failed: ${current.error}` : `${current.what} ${current.done}/${current.total}`,
+  );
+}
+
+/** The keys that apply in this mode, below the timeline. */
+function showKeys() {
+  const bindings = /** @type {import("../keys.js").LabelBinding[]} */ (
+    withOwn(labelKeys()).flatMap((group) => group.bindings)
+  );
+  $("#label-keys").replaceChildren(
+    el("span", {}, el("kbd", { textContent: "?" }), " all shortcuts"),
+    ...bindings
+      .filter(({ brief }) => brief)
+      .map(({ shown: keys, brief }) => el("span", {}, el("kbd", { textContent: keys }), ` ${brief}`)),
   );
 }

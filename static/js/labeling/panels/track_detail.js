@@ -3,12 +3,13 @@ import { el, text } from "../../core/dom.js";
 import { num, percent } from "../../core/format.js";
 import { on, paint } from "../../core/store.js";
 import * as commands from "../acts/commands.js";
-import { CLASSES } from "../views/cuboid.js";
+import { classNames, fill } from "../state/classes.js";
 import { presentOf } from "../state/draft.js";
 import { boxOf, isFollowing } from "../views/picture_drawing.js";
 import { chosen, nameOf } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
 import { Past } from "./history_list.js";
+import * as attributes from "./attributes.js";
 import * as closeUp from "./close_up.js";
 import * as numbers from "./numbers.js";
 import * as review from "../acts/review.js";
@@ -16,11 +17,7 @@ import * as review from "../acts/review.js";
 const head = el("div", { class: "detail-head" }),
   title = el("b", {}),
   state = el("span", { class: "tag" });
-const classes = el(
-  "select",
-  { aria: { label: "Class" }, title: "Class (T)" },
-  ...CLASSES.map((label) => el("option", { value: label, textContent: label })),
-);
+const classes = el("select", { aria: { label: "Class" }, title: "Class (T)" });
 const facts = el("p", { class: "facts" }),
   comment = el("p", { class: "comment" }),
   how = el("p", { class: "how" }),
@@ -53,6 +50,9 @@ export function setUp(parent) {
       button("Send back", "H", "Send back with a comment", review.sendBack),
       button("Reviewed", "Shift H", "Approve as a second annotator", review.reviewOk),
       button("Snap", "S", "Fit the cuboid to the points", commands.snap),
+      button("Carry on", "Shift C", "Carry the track on before and after, as far as it is found", () =>
+        commands.propagate("both"),
+      ),
       button("Turn round", "Shift X", "Front and rear are swapped: turn the whole track round", commands.flip),
       button("Size along", "W", "Apply this size to the whole track", commands.sizeAlong),
       button("Keyframe", "K", "Set a keyframe in this frame", commands.keyframe),
@@ -65,12 +65,15 @@ export function setUp(parent) {
     ),
     numbers.node,
     closeUp.node,
+    attributes.node,
     past.node,
   );
   parent.append(panel);
   numbers.setUp();
+  attributes.setUp();
   closeUp.setUp();
-  paint(["track", "labels", "labelFrames", "frame", "draft", "projected"], show);
+  on(["classes"], () => fill(classes));
+  paint(["track", "labels", "classes", "labelFrames", "frame", "draft", "projected"], show);
   on(["track", "labels"], () => {
     const track = chosen();
     if (track) past.look("track", track.id, track.revision);
@@ -80,7 +83,8 @@ export function setUp(parent) {
 /** A class that people here cannot choose, from a file or a detector, is shown too. @param {string} label */
 function showClass(label) {
   classes.querySelector(".foreign")?.remove();
-  if (!CLASSES.includes(label)) classes.append(el("option", { class: "foreign", value: label, textContent: label }));
+  const isForeign = !classNames().includes(label);
+  if (isForeign) classes.append(el("option", { class: "foreign", value: label, textContent: label }));
   classes.value = label;
 }
 

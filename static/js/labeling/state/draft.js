@@ -46,7 +46,9 @@ function presentIn(frame) {
     known = sightingsAt(frame);
   if (!draft || draft.frame !== frame || draft.track === null) return known;
   const { cuboid, bbox, box_set } = draft,
-    held = { track: draft.track, cuboid, bbox, box_set, keyframe: true };
+    before = known.find(({ track }) => track === draft.track),
+    said = { truncation: before?.truncation ?? null, occlusion: before?.occlusion ?? null },
+    held = { track: draft.track, cuboid, bbox, box_set, keyframe: true, ...said };
   return [...known.filter(({ track }) => track !== held.track), held];
 }
 

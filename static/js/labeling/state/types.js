@@ -26,6 +26,7 @@
  * @property {string} reviewer who approved it, other than its author; "" if not reviewed
  * @property {number|null} confidence of a proposal, 0–1; null for others
  * @property {""|"motion"|"lane"|"unknown"} heading what told its front from its rear; "" once somebody has looked
+ * @property {{first: number, last: number, name: string, value: string}[]} attributes
  * @property {number|null} first null if the track is in no frame
  * @property {number|null} last
  * @property {number[]} keyframes
@@ -36,6 +37,16 @@
  * @property {Box|null} bbox
  * @property {boolean} keyframe
  * @property {boolean} box_set somebody set the box; else it follows the cuboid, if there is one
+ * @property {number|null} truncation share of it outside the image, 0–1
+ * @property {number|null} occlusion 0 visible, 1 partly, 2 largely hidden
+ * @typedef {object} LabelClass
+ * @property {string} name
+ * @property {string|null} of the class that it is a kind of
+ * @property {[number, number, number]|null} size usual length, width, height
+ * @property {Record<string, string>} exports what formats call it
+ * @typedef {object} AttributeKind
+ * @property {string} name
+ * @property {string[]} values
  * @typedef {object} LeadRange both ends included
  * @property {number} id
  * @property {number} revision

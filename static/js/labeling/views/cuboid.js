@@ -1,4 +1,5 @@
-/** Editing a cuboid seen from above: grips and their effects. Pure functions, in metres. */
+/** Editing a cuboid seen from above: grips and their effects. In metres. */
+import { usualSize } from "../state/classes.js";
 
 /** @typedef {import("../state/types.js").Cuboid} Cuboid */
 /** @typedef {import("../../views/drawing/viewport.js").Place} Place */
@@ -16,22 +17,8 @@ const CORNERS = [
   [-0.5, 0.5],
 ];
 const SMALLEST_M = 0.2;
-/**
- * Default size of a new cuboid: length, width, height, as in pipeline/fusion/vehicle_sizes.py.
- * @type {Record<string, [number, number, number]>}
- */
-const TYPICAL_M = {
-  car: [4.5, 1.8, 1.5],
-  truck: [8, 2.5, 3.2],
-  bus: [11, 2.55, 3.2],
-  motorcycle: [2.1, 0.8, 1.5],
-  bicycle: [1.8, 0.6, 1.7],
-  person: [0.6, 0.6, 1.75],
-};
-export const CLASSES = Object.keys(TYPICAL_M);
-
-/** Length, width, height; null where there is none. @param {string} label @returns {[number, number, number]|null} */
-export const usualSize = (label) => TYPICAL_M[label] ?? null;
+/** Of a class without a usual size. @type {[number, number, number]} */
+const A_CAR_M = [4.5, 1.8, 1.5];
 /** A shorter drag sets only the position, not length and heading. */
 const SAYS_FROM_M = 1;
 
@@ -179,7 +166,7 @@ export function dragged(cuboid, grip, from, to) {
  * @returns {Cuboid}
  */
 export function drawn(from, to, label, ground_m) {
-  const [length, width, height] = TYPICAL_M[label] ?? TYPICAL_M.car,
+  const [length, width, height] = usualSize(label) ?? A_CAR_M,
     far = Math.hypot(to.x - from.x, to.y - from.y);
   const says = far >= SAYS_FROM_M,
     yaw_rad = says ? Math.atan2(to.y - from.y, to.x - from.x) : 0;

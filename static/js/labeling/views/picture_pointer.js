@@ -28,12 +28,16 @@ export function setUp() {
   /** @type {{x: number, y: number, hasMoved: boolean, drag: Drag|null}|null} */
   let down = null;
   canvas.addEventListener("pointerdown", (event) => {
-    if (!isOn() || get("taping") || event.button !== 0) return;
+    if (!event.isPrimary) {
+      down = null; // a second finger zooms
+      drop();
+    }
+    if (!isOn() || get("taping") || event.button !== 0 || !event.isPrimary) return;
     canvas.setPointerCapture(event.pointerId);
     down = { x: event.offsetX, y: event.offsetY, hasMoved: false, drag: takes(pixelAt(event)) };
   });
   canvas.addEventListener("pointermove", (event) => {
-    if (!down) return;
+    if (!down || !event.isPrimary) return;
     if (!down.drag && down.hasMoved && isZoomed()) pan(place(), event.movementX, event.movementY);
     down.hasMoved ||= Math.hypot(event.offsetX - down.x, event.offsetY - down.y) >= CLICK_PX;
     if (down.hasMoved) down.drag?.moved(pixelAt(event));

@@ -16,7 +16,7 @@ from tests.app.labels.acts.doing import act, leads, track
 
 
 def test_a_new_track_is_a_persons_and_has_a_new_number(labels: DriveLabels) -> None:
-    act(labels, kind="add_track", label="van", frame=40, bbox=[1, 2, 30, 40])
+    act(labels, kind="add_track", label="vehicle", frame=40, bbox=[1, 2, 30, 40])
     found = track(labels, 3)
     assert (found.label, found.state, found.origin.maker) == ("car", "corrected", "person")
     assert found.sightings == (Sighting(40, None, (1.0, 2.0, 30.0, 40.0), True),)

@@ -86,7 +86,7 @@ def test_an_address_that_cannot_be_opened_is_said_without_its_password(url: str,
 @pytest.mark.parametrize(
     ("url", "driver", "says"),
     [
-        ("postgresql://me@host/labels", "psycopg", "psycopg is not installed, which `make install` brings"),
+        ("postgresql://me@host/labels", "psycopg", "psycopg is not installed, which `make install` installs"),
         ("postgresql+pg8000://me@host/labels", "pg8000", "pg8000 is not installed"),
     ],
 )

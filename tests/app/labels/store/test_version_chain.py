@@ -37,7 +37,7 @@ def test_one_whose_predecessor_was_taken_out_is_refused(frozen: DriveLabels) -> 
     mine = VersionRow.drive_id == frozen._id
     with frozen._database.writing() as connection:
         connection.execute(delete(VersionRow).where(mine, VersionRow.name == "second"))
-    with pytest.raises(ActRefused, match="before 'third' was changed or taken out"):
+    with pytest.raises(ActRefused, match="before 'third' was changed or removed"):
         frozen.label_set("third")
     assert len(frozen.label_set("first").tracks) == 1
 

@@ -6,6 +6,7 @@ import pytest
 
 from app.web.routes.alignment import _json
 from pipeline.calibration.edge_match import EdgeScore
+from pipeline.calibration.local_match import NO_MATCH
 
 
 @pytest.mark.parametrize(
@@ -25,13 +26,13 @@ from pipeline.calibration.edge_match import EdgeScore
     ids=["few", "flat", "right", "turned", "slid", "zoomed"],
 )
 def test_a_score_in_words(found: EdgeScore, brief: str, told: str):
-    said = _json(found, 20)
+    said = _json(found, NO_MATCH, 20)
     assert said.brief == brief
     assert told in said.text
     assert said.better == dict(found.better)
 
 
 def test_without_a_picture_there_is_nothing_to_match():
-    said = _json(EdgeScore(None, None, 0), 0)
+    said = _json(EdgeScore(None, None, 0), NO_MATCH, 0)
     assert (said.score, said.brief) == (None, "nothing to match")
     assert "both an image and LiDAR points" in said.text

@@ -312,7 +312,9 @@ def test_every_route_of_the_timeline_is_described(client: httpx.Client):
 def test_the_alignment_is_scored(client: httpx.Client):
     """Each image of the small recording has one car's sides, and its points' borders lie elsewhere."""
     found = client.get("/api/alignment/score").json()
-    assert set(found) == {"score", "sigmas", "borders", "better", "brief", "text"}
+    whole = {"score", "sigmas", "borders", "better", "brief", "text"}
+    assert set(found) == whole | {"columns", "rows", "regions", "ranges"}
+    assert len(found["regions"]) == found["columns"] * found["rows"]
     assert found["borders"] >= FEWEST
     assert found["score"] < 0.5
     assert found["brief"].startswith(f"{100 * found['score']:.0f} % · better ")

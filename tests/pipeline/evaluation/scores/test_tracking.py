@@ -12,14 +12,14 @@ pytest.importorskip("trackeval", reason="the extra `scores` is not installed")
 from pipeline.evaluation.scores import tracking
 from pipeline.evaluation.scores.figures import FIGURES
 from pipeline.evaluation.scores.matching import claims, vehicles
-from pipeline.evaluation.scores.tracking import Counts, Named, count, hota_of
+from pipeline.evaluation.scores.tracking import Counts, NamedPositions, count, hota_of
 from tests.pipeline.build import fused
 from tests.pipeline.evaluation.scores.drives import believed, labelled
 
 A, B = (20.0, 0.0), (30.0, 3.5)
 
 
-def counted(truths: list[Named], found: list[Named]) -> Counts:
+def counted(truths: list[NamedPositions], found: list[NamedPositions]) -> Counts:
     counts = count(truths, found)
     assert counts is not None
     return counts
@@ -35,7 +35,7 @@ def ratios(counts: Counts) -> dict[str, float]:
     return {name: of(counts)[0] / of(counts)[1] for name, of in sums.items()}
 
 
-TRUTH: list[Named] = [[(1, A), (2, B)]] * 4
+TRUTH: list[NamedPositions] = [[(1, A), (2, B)]] * 4
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ TRUTH: list[Named] = [[(1, A), (2, B)]] * 4
         pytest.param([[(5, A), (6, B)]] * 2 + [[(5, A), (7, B)]] * 2, 1.0, 1.0, 7 / 8, 12 / 16, id="a new number"),
     ],
 )
-def test_counts(found: list[Named], precision: float, recall: float, mota: float, idf1: float) -> None:
+def test_counts(found: list[NamedPositions], precision: float, recall: float, mota: float, idf1: float) -> None:
     expected = {"precision": precision, "recall": recall, "mota": mota, "idf1": idf1}
     assert ratios(counted(TRUTH, found)) == pytest.approx(expected)
 

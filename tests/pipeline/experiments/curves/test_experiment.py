@@ -7,20 +7,26 @@ import pytest
 
 from pipeline.common.fast_replace import evolve
 from pipeline.experiments.curves import experiment, scenarios
-from pipeline.experiments.curves.drives import SOURCES, Frames, seen
-from pipeline.experiments.curves.experiment import CurveCase, Outcome, longest_wrong_s, share_right, told_before_line_s
+from pipeline.experiments.curves.drives import SOURCES, SourceFrames, seen
+from pipeline.experiments.curves.experiment import (
+    CurveCase,
+    CurveOutcome,
+    longest_wrong_s,
+    share_right,
+    told_before_line_s,
+)
 from pipeline.simulation.sensors.senses import Senses
 from pipeline.simulation.world import world_state
 
 
 def drive(
     *verdicts: str, lead_m: float = 30.0, told: tuple[bool, ...] = (), over_line_s: float | None = None
-) -> Frames:
+) -> SourceFrames:
     count = len(verdicts)
     times = tuple(k / 10 for k in range(count))
     known = tuple(lead_m if verdict in ("right", "missed", "decoy") else None for verdict in verdicts)
     rows = ((0.0,) * 4,) * count
-    return Frames(times, verdicts, known, told or (False,) * count, rows, rows, over_line_s)  # type: ignore[arg-type]
+    return SourceFrames(times, verdicts, known, told or (False,) * count, rows, rows, over_line_s)  # type: ignore[arg-type]
 
 
 def test_what_counts_as_right() -> None:
@@ -53,7 +59,7 @@ def test_a_cut_in_that_is_told_too_late_is_a_demand_that_fails(told: tuple[bool,
 
 
 @pytest.mark.parametrize("layout", scenarios.LAYOUTS.values(), ids=lambda layout: layout.name)
-def test_the_roads_bend_as_hard_as_said(layout: scenarios.Layout) -> None:
+def test_the_roads_bend_as_hard_as_said(layout: scenarios.CurveLayout) -> None:
     scene = scenarios.scenario(layout, 0)
     hardest = max(abs(now.speed_mps * now.yaw_rate_radps) for now in (world_state.at(scene, t / 5) for t in range(60)))
     assert hardest == pytest.approx(0.0 if layout.radius_m is None else 3.0, abs=0.2)
@@ -62,11 +68,11 @@ def test_the_roads_bend_as_hard_as_said(layout: scenarios.Layout) -> None:
 
 
 @pytest.fixture(scope="module")
-def outcomes() -> dict[CurveCase, Outcome]:
+def outcomes() -> dict[CurveCase, CurveOutcome]:
     return {case: experiment.run(case) for case in experiment.cases(short=True)}
 
 
-def test_in_a_bend_of_125_m_the_lead_is_the_cipv(outcomes: dict[CurveCase, Outcome]) -> None:
+def test_in_a_bend_of_125_m_the_lead_is_the_cipv(outcomes: dict[CurveCase, CurveOutcome]) -> None:
     """Fused: in 99 % of the frames to 60 m, never 0.3 s on a decoy; a straight guess shows what is at stake."""
     (outcome,) = (outcome for case, outcome in outcomes.items() if case.kind == "follow")
     share, frames = share_right([outcome["fused"]], 60.0)
@@ -78,7 +84,7 @@ def test_in_a_bend_of_125_m_the_lead_is_the_cipv(outcomes: dict[CurveCase, Outco
     assert share_right([outcome["yaw rate"]])[0] > share_right([outcome["straight guess"]])[0] + 0.3
 
 
-def test_a_drive_seen_again_has_the_boxes_and_lines_that_it_had(outcomes: dict[CurveCase, Outcome]) -> None:
+def test_a_drive_seen_again_has_the_boxes_and_lines_that_it_had(outcomes: dict[CurveCase, CurveOutcome]) -> None:
     case, outcome = next((case, outcome) for case, outcome in outcomes.items() if case.kind == "follow")
     kept = experiment.as_drive(case, outcome)
     scene = kept.as_seen()
@@ -92,14 +98,14 @@ def test_a_drive_seen_again_has_the_boxes_and_lines_that_it_had(outcomes: dict[C
     assert len(kept.charts[0].series[0].x) > 90
 
 
-def test_a_cut_in_is_told_before_the_wheel_is_over_the_line(outcomes: dict[CurveCase, Outcome]) -> None:
+def test_a_cut_in_is_told_before_the_wheel_is_over_the_line(outcomes: dict[CurveCase, CurveOutcome]) -> None:
     (outcome,) = (outcome for case, outcome in outcomes.items() if case.kind == "cut_in")
     before_s = told_before_line_s(outcome["fused"])
     assert before_s is not None
     assert before_s >= 0.0
 
 
-def test_the_report_says_what_held(outcomes: dict[CurveCase, Outcome]) -> None:
+def test_the_report_says_what_held(outcomes: dict[CurveCase, CurveOutcome]) -> None:
     section = experiment.report(list(outcomes), list(outcomes.values()))
     assert any(text.startswith("R = 125 m, 70 km/h: right in ") for text in section.text)
     choice, path, cut_in = section.tables

@@ -5,12 +5,21 @@ from __future__ import annotations
 import pytest
 
 from pipeline.evaluation.report_sections import Coloured
-from pipeline.experiments.euro_ncap.drives import OVERLAPS, SETUPS, EuroNcapCase, Result, Test, as_drive, cases, run
+from pipeline.experiments.euro_ncap.drives import (
+    OVERLAPS,
+    SETUPS,
+    CellResult,
+    EuroNcapCase,
+    NcapTest,
+    as_drive,
+    cases,
+    run,
+)
 from pipeline.experiments.euro_ncap.experiment import report
 
 
 @pytest.mark.parametrize(("test", "speeds"), [("CCRs", range(10, 81, 5)), ("CCRm", range(30, 81, 5))])
-def test_the_grid_is_the_protocols(test: Test, speeds: range) -> None:
+def test_the_grid_is_the_protocols(test: NcapTest, speeds: range) -> None:
     mine = [case for case in cases(False) if case.test == test and case.kind == SETUPS[0]]
     assert {(case.speed_kmh, case.overlap) for case in mine} == {(float(v), o) for v in speeds for o in OVERLAPS}
 
@@ -22,7 +31,7 @@ def test_a_braking_lead_brakes_twice_as_hard_from_two_gaps() -> None:
 
 def test_aeb_avoids_a_standing_car_at_40_and_without_brakes_there_is_an_impact() -> None:
     fused = EuroNcapCase("CCRs", 40.0, 100, "both", "AEB")
-    assert run(fused) == Result(0.0, "")
+    assert run(fused) == CellResult(0.0, "")
     blind = run(EuroNcapCase("CCRs", 80.0, 100, "lidar", "AEB"))
     assert not blind.void
     assert 5.0 < blind.impact_kmh < 80.0, "too fast for the LiDAR's reach, but braked"
@@ -55,7 +64,9 @@ def test_the_report_has_a_coloured_cell_for_each_run() -> None:
     chosen = [
         EuroNcapCase("CCRs", 30.0, overlap, sensors, "AEB") for sensors in ("both", "lidar") for overlap in (-50, 100)
     ]
-    section = report(chosen, [Result(0.0, ""), Result(8.0, ""), Result(30.0, ""), Result(0.0, "speed off")])
+    section = report(
+        chosen, [CellResult(0.0, ""), CellResult(8.0, ""), CellResult(30.0, ""), CellResult(0.0, "speed off")]
+    )
     grids = {table.title: table.rows for table in section.tables}
     assert grids["CCRs: fused, AEB"] == (
         (

@@ -6,10 +6,18 @@ import pytest
 
 from pipeline.common.fast_replace import evolve
 from pipeline.evaluation.report_sections import Coloured
-from pipeline.experiments.iso15622.experiment import FollowingCase, Outcome, as_drive, cases, passed, report, run
+from pipeline.experiments.iso15622.experiment import (
+    FollowingCase,
+    FollowingOutcome,
+    as_drive,
+    cases,
+    passed,
+    report,
+    run,
+)
 from tests.pipeline.experiments.conftest import SeeAgain
 
-GOOD = Outcome(50.0, 1.0, 12.0, 1.4, False, (0.0, 0.1), (50.0, 49.0), (20.0, 20.0))
+GOOD = FollowingOutcome(50.0, 1.0, 12.0, 1.4, False, (0.0, 0.1), (50.0, 49.0), (20.0, 20.0))
 
 
 @pytest.mark.parametrize(

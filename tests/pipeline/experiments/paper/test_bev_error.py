@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from pipeline.experiments.paper.bev_error import PRINTED, BevCase, Error, Sighting, as_drive, cases, report, run
+from pipeline.experiments.paper.bev_error import (
+    PRINTED,
+    BevCase,
+    PositionError,
+    PositionSample,
+    as_drive,
+    cases,
+    report,
+    run,
+)
 from tests.pipeline.experiments.conftest import SeeAgain
 
 
@@ -44,11 +53,18 @@ def test_the_lidar_alone_is_driven_and_the_network_too() -> None:
 )
 def test_the_verdict_is_what_was_measured(fused_m: float | None, lidar_m: float, says: tuple[str, str | None]) -> None:
     """20 m are placed by both, or by the LiDAR alone; 50 m by fused alone, or by nobody."""
-    near = Error("VL", fused_m, 0.0, 0.0) if fused_m is not None else None
-    far = Error("V", 2.0, 0.0, 0.0) if fused_m is not None else None
-    fused = [Sighting(20.0, near), Sighting(20.0, Error("VL", fused_m or 0.2, 0.0, 0.0)), Sighting(50.0, far)]
-    lidar = [Sighting(20.0, Error("L", lidar_m, 0.0, 0.0)), Sighting(20.0, Error("L", lidar_m, 0.0, 0.0))]
-    text = report([BevCase("a", 0), BevCase("a", 0, "lidar")], [fused, [*lidar, Sighting(50.0, None)]]).text
+    near = PositionError("VL", fused_m, 0.0, 0.0) if fused_m is not None else None
+    far = PositionError("V", 2.0, 0.0, 0.0) if fused_m is not None else None
+    fused = [
+        PositionSample(20.0, near),
+        PositionSample(20.0, PositionError("VL", fused_m or 0.2, 0.0, 0.0)),
+        PositionSample(50.0, far),
+    ]
+    lidar = [
+        PositionSample(20.0, PositionError("L", lidar_m, 0.0, 0.0)),
+        PositionSample(20.0, PositionError("L", lidar_m, 0.0, 0.0)),
+    ]
+    text = report([BevCase("a", 0), BevCase("a", 0, "lidar")], [fused, [*lidar, PositionSample(50.0, None)]]).text
     (verdict,) = (each for each in text if each.startswith("Straight ahead: fused places"))
     assert f"frames, {says[0]} than the LiDAR alone, which does" in verdict
     assert says[1] is None or f"on average, {says[1]} than the LiDAR alone" in verdict
@@ -57,7 +73,7 @@ def test_the_verdict_is_what_was_measured(fused_m: float | None, lidar_m: float,
 
 def test_however_far_off_it_counts() -> None:
     """What is placed 20 m off and 6 m aside is an error of 20 m and 6 m, not an object of something else."""
-    seen = [Sighting(50.0, Error("V", 20.0, 6.0, 19.0)), Sighting(40.0, None)]
+    seen = [PositionSample(50.0, PositionError("V", 20.0, 6.0, 19.0)), PositionSample(40.0, None)]
     row = report([BevCase("a", 0)], [seen]).tables[0].rows[3]
     assert row[3:5] == (1, 1)
     assert row[6] == 20.0

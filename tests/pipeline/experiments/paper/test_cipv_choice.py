@@ -9,8 +9,8 @@ from pipeline.evaluation.report_sections import as_json
 from pipeline.experiments.paper.cipv_choice import (
     UNDECIDABLE,
     ChoiceCase,
-    Frame,
-    Verdict,
+    ChoiceFrame,
+    ChoiceVerdict,
     acquired_m,
     as_drive,
     report,
@@ -23,9 +23,9 @@ from tests.pipeline.experiments.conftest import SeeAgain
 
 
 @pytest.mark.parametrize(("verdict", "fails"), [("correct", False), ("missed", True), ("new", False)])
-def test_one_wrong_frame_of_the_fused_fails_the_suite(verdict: Verdict, fails: bool) -> None:
+def test_one_wrong_frame_of_the_fused_fails_the_suite(verdict: ChoiceVerdict, fails: bool) -> None:
     cases = [ChoiceCase("straight", sensors, 0) for sensors in SENSORS]
-    good, other = Frame(0.0, "correct", 1, 20.0, 1, 20.0), Frame(0.1, verdict, 1, 20.0, None, None)
+    good, other = ChoiceFrame(0.0, "correct", 1, 20.0, 1, 20.0), ChoiceFrame(0.1, verdict, 1, 20.0, None, None)
     section = report(cases, [[good], [good], [good, other]])
     assert bool(section.failures) is fails
     assert not report(cases, [[good, other], [good], [good]]).failures, "it is the fused line that is judged"
@@ -43,8 +43,8 @@ def test_every_decidable_frame_is_right(see_again: SeeAgain) -> None:
     assert near == [frame.chosen for frame in frames[:40]], "seen again, it chooses the same"
 
 
-def frame(verdict: str, lead: int | None, chosen: int | None, lead_m: float = 30.0) -> Frame:
-    return Frame(0.0, verdict, lead, lead_m if lead else None, chosen, lead_m if chosen else None)  # type: ignore[arg-type]
+def frame(verdict: str, lead: int | None, chosen: int | None, lead_m: float = 30.0) -> ChoiceFrame:
+    return ChoiceFrame(0.0, verdict, lead, lead_m if lead else None, chosen, lead_m if chosen else None)  # type: ignore[arg-type]
 
 
 def test_switches_and_first_acquisition() -> None:

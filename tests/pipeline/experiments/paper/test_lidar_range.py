@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from pipeline.experiments.paper.lidar_range import PRINTED, RangeCase, Sighting, as_drive, recognised_to_m, report, run
+from pipeline.experiments.paper.lidar_range import (
+    PRINTED,
+    RangeCase,
+    RangeSample,
+    as_drive,
+    recognised_to_m,
+    report,
+    run,
+)
 from tests.pipeline.experiments.conftest import SeeAgain
 
 
@@ -29,8 +37,8 @@ def test_near_it_is_exact_and_far_it_is_blind(see_again: SeeAgain) -> None:
 
 
 def test_the_limit_is_the_first_bin_that_holds_too_little_coming_from_near() -> None:
-    def sweeps(low: int, high: int, every: int) -> list[Sighting]:
-        return [Sighting(d / 10, d / 10 if d % every == 0 else None) for d in range(low * 10, high * 10)]
+    def sweeps(low: int, high: int, every: int) -> list[RangeSample]:
+        return [RangeSample(d / 10, d / 10 if d % every == 0 else None) for d in range(low * 10, high * 10)]
 
     assert recognised_to_m(sweeps(5, 30, 1) + sweeps(30, 100, 3)) == 30.0
     assert recognised_to_m(sweeps(5, 10, 3) + sweeps(10, 40, 1)) is None, "blind near: nothing is recognised"

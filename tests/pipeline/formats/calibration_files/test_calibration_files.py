@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from pipeline.common.geometry import inverse, rotation
-from pipeline.formats.calibration_files import FORMATS
+from pipeline.formats.calibration_files import FORMATS, kalibr
 from pipeline.formats.calibration_files.ros import TRANSFORM
 from pipeline.sources.rig import load_rig
 from pipeline.types import CameraCalibration
@@ -24,6 +24,7 @@ BENT = replace(STRAIGHT, distortion=np.array([-0.31, 0.12, 0.001, -0.002, 0.01])
 
 
 def written(name: str, camera: CameraCalibration, folder: Path) -> Path:
+    folder.mkdir(exist_ok=True)
     path = folder / f"{name}.yaml"
     FORMATS[name].write(path, camera)
     return path
@@ -38,10 +39,11 @@ def same(a: CameraCalibration | None, b: CameraCalibration) -> None:
 
 
 @pytest.mark.parametrize("camera", [STRAIGHT, BENT], ids=["undistorted", "distorted"])
-@pytest.mark.parametrize("name", ["kitti", "ros", "opencv"])
+@pytest.mark.parametrize("name", ["kitti", "ros", "opencv", "kalibr"])
 def test_what_is_written_is_read(name: str, camera: CameraCalibration, tmp_path: Path):
-    if name == "kitti" and camera is BENT:
-        with pytest.raises(SourceError, match="undistorted"):
+    refusals = {"kitti": "undistorted", "kalibr": "this camera has more"}
+    if name in refusals and camera is BENT:
+        with pytest.raises(SourceError, match=refusals[name]):
             written(name, camera, tmp_path)
         return
     read = FORMATS[name].read
@@ -89,6 +91,48 @@ def test_rotations_that_are_none_are_refused(rotation_: dict[str, float], named:
     changed(folder, transform={"translation": {"x": 0.0, "y": 0.0, "z": 0.0}, "rotation": rotation_})
     with pytest.raises(SourceError, match=named):
         FORMATS["ros"].read(folder, None)  # type: ignore[misc]
+
+
+FOUR = replace(STRAIGHT, distortion=BENT.distortion[:4])
+
+
+def chain(folder: Path, **values: object) -> Path:
+    """A Kalibr folder with something changed in the camera's part."""
+    file = written("kalibr", FOUR, folder) / kalibr.CHAIN
+    loaded = yaml.safe_load(file.read_text())
+    loaded["cam0"].update(values)
+    file.write_text(yaml.safe_dump(loaded))
+    return file.parent
+
+
+def test_kalibr_takes_the_transform_from_either_place_and_either_way(tmp_path: Path):
+    same(kalibr.read(written("kalibr", FOUR, tmp_path), None), FOUR)
+    inside = chain(tmp_path / "a", T_lidar_cam=inverse(FOUR.T_camera_ego).tolist())
+    (inside / kalibr.TRANSFORM).unlink()
+    same(kalibr.read(inside, None), FOUR)
+    beside = written("kalibr", FOUR, tmp_path / "b")
+    (beside / kalibr.TRANSFORM).write_text(yaml.safe_dump({"T_cam_lidar": inverse(FOUR.T_camera_ego).tolist()}))
+    with pytest.raises(SourceError, match="is its extrinsic inverted"):
+        kalibr.read(beside, None)
+    (beside / kalibr.TRANSFORM).unlink()
+    with pytest.raises(SourceError, match="no T_cam_lidar"):
+        kalibr.read(beside, None)
+
+
+@pytest.mark.parametrize(
+    ("values", "named"),
+    [
+        ({"camera_model": "omni"}, "omni is not supported"),
+        ({"distortion_model": "equidistant"}, "equidistant distortion; radtan"),
+        ({"intrinsics": [800.0, 800.0]}, "incomplete"),
+        ({"resolution": [0, 0]}, "make no sense"),
+        ({"intrinsics": [-800.0, 800.0, 1.0, 1.0]}, "not a camera matrix"),
+        ({"T_cam_lidar": [[2.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}, "not a rigid transform"),
+    ],
+)
+def test_what_kalibr_says_and_cannot_be_meant_is_named(values: dict[str, object], named: str, tmp_path: Path):
+    with pytest.raises(SourceError, match=named):
+        kalibr.read(chain(tmp_path, **values), None)
 
 
 def test_a_file_of_something_else_is_refused(tmp_path: Path):

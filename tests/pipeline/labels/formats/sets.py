@@ -12,8 +12,18 @@ import pytest
 from hypothesis import strategies as st
 
 from pipeline.common.geometry import Cuboid, inverse, rotation
-from pipeline.labels.formats.base import LabeledDrive, Shot
-from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
+from pipeline.labels.formats.base import FrameInfo, LabeledDrive
+from pipeline.labels.model import (
+    Attribute,
+    EventLabel,
+    FrameTag,
+    LabelSet,
+    LabelTrack,
+    LeadRange,
+    Origin,
+    PathLabel,
+    Sighting,
+)
 from pipeline.types import CameraCalibration, EgoState
 
 COUNT = 6
@@ -35,7 +45,7 @@ def camera(distortion: tuple[float, ...] = (), pitch_rad: float = 0.03) -> Camer
 def drive(of: CameraCalibration | None = None, yaw_rate_radps: float | None = 0.1) -> LabeledDrive:
     eye = of if of is not None else camera()
     shots = tuple(
-        Shot(f"{i:06d}", 10**9 + i * 10**8, eye, (1280, 720), eye.T_camera_ego, EgoState(0, 12.0, yaw_rate_radps))
+        FrameInfo(f"{i:06d}", 10**9 + i * 10**8, eye, (1280, 720), eye.T_camera_ego, EgoState(0, 12.0, yaw_rate_radps))
         for i in range(COUNT)
     )
     return LabeledDrive("sim:somewhere", shots)
@@ -88,7 +98,14 @@ def label_sets(draw: st.DrawFn) -> LabelSet:
         )
         tracks.append(
             LabelTrack(
-                number, draw(st.sampled_from(CLASSES)), seen, draw(STATES), draw(ORIGINS), draw(TEXTS), draw(TEXTS)
+                number,
+                draw(st.sampled_from(CLASSES)),
+                seen,
+                draw(STATES),
+                draw(ORIGINS),
+                draw(TEXTS),
+                draw(TEXTS),
+                attributes=draw(several(st.builds(lambda ends, *said: Attribute(*ends, *said), RANGES, TEXTS, TEXTS))),
             )
         )
     here = drive()

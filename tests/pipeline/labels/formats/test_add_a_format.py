@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.labels.formats import registry
-from pipeline.labels.formats.registry import FORMATS, Format, export_labels, import_labels
+from pipeline.labels.formats.registry import FORMATS, LabelFormat, export_labels, import_labels
 from pipeline.labels.model import Origin
 from tests.pipeline.labels.formats.sets import drive
 from tests.pipeline.labels.formats.test_round_trip import full_set
@@ -31,7 +31,7 @@ def write(labels, drive, out):
 def read(path, drive, origin):
     return Imported(drive.empty(), (f"{len(json.loads(path.read_bytes()))} names are not kept",))
 """
-ONE_REGISTRATION = Format(
+ONE_REGISTRATION = LabelFormat(
     "names", "Names", "what there is", ".json", frozenset(("cuboids", "boxes")), "names_of_things:write",
     "names_of_things:read",
 )  # fmt: skip

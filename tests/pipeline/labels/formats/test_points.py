@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.common.geometry import Cuboid
-from pipeline.labels.formats.base import LabeledDrive, Shot
+from pipeline.labels.formats.base import FrameInfo, LabeledDrive
 from pipeline.labels.formats.points import count_inside, points_inside
 from pipeline.labels.model import LabelSet, LabelTrack, Sighting
 from pipeline.types import F32
@@ -55,7 +55,7 @@ def test_every_frame_is_counted_with_its_own_points() -> None:
         return None if index % 3 == 0 else np.tile(np.array([[10.0, 0.0, 0.0, 1.0]], dtype=np.float32), (index, 1))
 
     seen = tuple(Sighting(index, None if index % 5 == 0 else cuboid, (0.0, 0.0, 9.0, 9.0)) for index in range(count))
-    shots = tuple(Shot(f"{index:06d}", index * 10**8) for index in range(count))
+    shots = tuple(FrameInfo(f"{index:06d}", index * 10**8) for index in range(count))
     labels = LabelSet("test:drive", (), (), (LabelTrack(7, "car", seen, "accepted", IMPORT),))
     found = points_inside(labels, LabeledDrive("test:drive", shots, points))
     assert found == {(7, index): index for index in range(count) if index % 3 and index % 5}

@@ -108,3 +108,17 @@ def test_astyx_truth_comes_back(astyx: tuple[str, LabeledDrive], name: str, tmp_
     back = import_labels(tmp_path / "out", drive, name, IMPORT)  # type: ignore[arg-type]
     wanted = following(labels, drive) if name in ("kitti", "kitti-tracking", "openlabel") else labels
     assert_same(back.labels, wanted, 1e-5)
+
+
+def test_the_tracking_benchmarks_own_file_is_read(data_dir: Path) -> None:
+    """Its regions have their missing numbers in another order than those of the object benchmark."""
+    folder = data_dir / "kitti_0009"
+    if not folder.is_dir():
+        pytest.skip(f"no KITTI drive at {folder}")
+    drive = drive_of(open_source(f"kitti:{folder / '2011_09_26' / '2011_09_26_drive_0009_sync'}"))
+    rows = [line.split() for line in (folder / "label_02.txt").read_text(encoding="utf-8").splitlines()]
+    found = import_labels(folder / "label_02.txt", drive, "kitti-tracking", IMPORT).labels
+    placed = [track for track in found.tracks if track.sightings[0].cuboid is not None]
+    regions = [track for track in found.tracks if track.sightings[0].cuboid is None]
+    assert sorted(track.id for track in placed) == sorted({int(row[1]) for row in rows if row[2] != "DontCare"})
+    assert len(regions) == sum(row[2] == "DontCare" for row in rows)

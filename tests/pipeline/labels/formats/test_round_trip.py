@@ -41,6 +41,8 @@ def wanted(labels: LabelSet, name: FormatName) -> LabelSet:
         labels = following(labels, drive())
     if holds == EVERYTHING:
         return labels
+    if holds == EVERYTHING - {"attributes"}:
+        return replace(labels, tracks=tuple(replace(track, attributes=()) for track in labels.tracks))
     if "leads" in holds:
         return replace(plain(labels), tracks=(), leads=tuple(r for r in labels.leads if r.state != "rejected"))
     kept = plain(labels, cuboids="cuboids" in holds, boxes="boxes" in holds)

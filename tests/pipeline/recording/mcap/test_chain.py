@@ -65,7 +65,7 @@ def test_a_part_taken_out_or_put_in_twice_is_found(whole: Path, tmp_path: Path) 
         first, second = (file.directory.chunks[k].offset for k in (2, 3))
     for changed in (data[:first] + data[second:], data[:second] + data[first:second] + data[second:]):
         path.write_bytes(changed)
-        assert "was taken out or put in" in verify(path).changed[0]
+        assert "was removed or inserted" in verify(path).changed[0]
 
 
 def test_one_that_was_cut_is_intact_as_far_as_it_goes_and_an_old_one_has_no_chain(

@@ -21,10 +21,10 @@ from pipeline.sources import SourceError, open_source
 from pipeline.types import (
     REAL_VEHICLES,
     CameraCalibration,
+    CameraImage,
     EgoState,
     Frame,
     GnssFix,
-    Picture,
     RawBoxes,
     RawLanes,
     Route,
@@ -94,7 +94,7 @@ def test_every_field_is_written() -> None:
         Frame: "index name t_ns sweep picture camera ego raw_boxes notes gnss raw_lanes route streams timing_ms "
         "detections_given",
         Sweep: "t_ns points ring channels time_s origin",
-        Picture: "t_ns bgr encoded",
+        CameraImage: "t_ns bgr encoded",
         CameraCalibration: "K distortion T_camera_ego width height road_z_m",
         Route: "name lat_deg lon_deg sigma_m",
     }

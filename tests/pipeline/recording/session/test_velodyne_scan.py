@@ -12,7 +12,7 @@ from pipeline.formats.velodyne import Vlp16Decoder
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.rewrite import recover
 from pipeline.recording.save import save
-from pipeline.recording.segments import Rotation, Segments
+from pipeline.recording.segments import FileRotation, Segments
 from pipeline.recording.session.source import SessionSource
 from pipeline.recording.session.velodyne_scan import RawLidar, packets_from
 from pipeline.types import Frame, Sweep
@@ -80,7 +80,7 @@ def test_a_pipeline_that_lags_behind_the_sensor_loses_no_sweep(tmp_path: Path) -
 
 def test_a_new_file_begins_with_the_packets_of_its_first_sweep(tmp_path: Path) -> None:
     lidar = mounted()
-    parts = Segments(tmp_path / "a.mcap", ABOUT, Rotation(max_s=0.8), raw_lidar=lidar)
+    parts = Segments(tmp_path / "a.mcap", ABOUT, FileRotation(max_s=0.8), raw_lidar=lidar)
     frames = record(parts, lidar)
     assert len(parts.files) >= 3
     sessions = [SessionSource("a", str(path)) for path in parts.files]

@@ -11,15 +11,15 @@ from pydantic import ValidationError
 
 from pipeline.common.geometry import inverse, transform
 from pipeline.simulation.drawing.canvas import Canvas
-from pipeline.simulation.drawing.lens import ORDINARY, CameraModel, Sensor, distorted, undistorted
+from pipeline.simulation.drawing.lens import ORDINARY, CameraModel, ImageSensor, distorted, undistorted
 from pipeline.simulation.sensors.camera import calibration
 
 PERFECT: dict[str, Any] = {"k1": 0.0, "k2": 0.0, "blur_px": 0.0, "noise": 0.0, "exposure_stops": 0.0}
 
 
-def lens(seed: int = 1, **changes: float) -> Sensor:
+def lens(seed: int = 1, **changes: float) -> ImageSensor:
     model = CameraModel(**{**PERFECT, **changes})
-    return Sensor(calibration(model), model, seed)
+    return ImageSensor(calibration(model), model, seed)
 
 
 GREY = np.full((720, 1280, 3), 100, dtype=np.uint8)

@@ -8,7 +8,7 @@ import pytest
 from pipeline.simulation.scenario import load
 from pipeline.simulation.sensors.camera import calibration
 from pipeline.simulation.sensors.faults import Faults, disturb_sweep, nods_rad, true_camera
-from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.sensors.rig import SensorRig
 from pipeline.simulation.world import world_state
 from pipeline.types import Sweep
 
@@ -16,7 +16,7 @@ from pipeline.types import Sweep
 @pytest.fixture(scope="module")
 def sweep() -> Sweep:
     scene = load("straight")
-    return Sensors(scene, 600.0).sweep(world_state.at(scene, 0.0), 0, 0)
+    return SensorRig(scene, 600.0).sweep(world_state.at(scene, 0.0), 0, 0)
 
 
 def test_lost_rings_and_lost_sweeps(sweep: Sweep) -> None:

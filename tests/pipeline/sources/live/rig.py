@@ -13,7 +13,7 @@ from typing import Any
 
 from pipeline.replay.faults import Fault
 from pipeline.replay.messages import Message
-from pipeline.replay.replayer import Sent, replay
+from pipeline.replay.replayer import ReplayCounts, replay
 from pipeline.replay.senders import open_senders
 from pipeline.sources.live.config import LiveConfig
 from pipeline.sources.live.source import LiveSensors
@@ -51,7 +51,7 @@ class Replaying(AbstractContextManager["Replaying"]):
         self._senders = open_senders(config)
         self._stop = threading.Event()
         self._messages, self._faults = messages, faults
-        self.sent: Sent | None = None
+        self.sent: ReplayCounts | None = None
         self.error: BaseException | None = None
         self._thread = threading.Thread(target=self._play, name="replaying")
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.params import SyncParams
-from pipeline.sources.live.sync import Stream, Synchroniser, Together
+from pipeline.sources.live.sync import SensorBuffer, Synchroniser, Together
 from pipeline.types import EgoState, Sweep
 
 MS = 1_000_000
@@ -193,7 +193,7 @@ def test_ticks_that_nobody_took_are_replaced_and_counted() -> None:
     ],
 )
 def test_a_stream_takes_what_can_be(case: str, t_ms: int, now_ms: int, taken: bool, counter: str | None) -> None:
-    stream: Stream[int] = Stream()
+    stream: SensorBuffer[int] = SensorBuffer()
     for t in (100, 200):
         assert stream.add(START + t * MS, t, START + t * MS)
     assert stream.add(START + t_ms * MS, 0, START + now_ms * MS) == taken

@@ -79,7 +79,7 @@ def test_nothing_beside(tmp_path: Path) -> None:
     frame = source.frame(1)
     assert (frame.picture, frame.camera, frame.gnss, frame.ego, frame.notes) == (None, None, None, None, ())
     assert source.notes[-1] == "no ego speed recorded"
-    assert "follows no GPS" in source.notes[0]
+    assert "not synchronised to GPS" in source.notes[0]
 
 
 def test_options_name_other_files_and_shift_the_video(tmp_path: Path) -> None:
@@ -211,7 +211,7 @@ def test_mrpt(data_dir: Path) -> None:
     """Indoors: walls within a few metres all round."""
     source = open_source(f"pcap:{data_dir / 'vlp16_packets' / 'mrpt_sample_velodyne_vlp16_gps.pcap'}")
     assert len(source) == 3
-    assert source.notes[0] == "LiDAR times are UTC: the sensor follows GPS"
+    assert source.notes[0] == "LiDAR times are UTC: the sensor is synchronised to GPS"
     frame = source.frame(1)
     assert frame.sweep is not None
     assert 18_000 < len(frame.sweep.points) < 19_000

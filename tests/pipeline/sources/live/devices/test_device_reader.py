@@ -5,14 +5,14 @@ from __future__ import annotations
 import threading
 import time
 
-from pipeline.sources.live.devices.device_reader import HANGS_S, DeviceLost, Reader, Stop
+from pipeline.sources.live.devices.device_reader import HANGS_S, DeviceLost, Reader, ReaderStop
 from tests.app.waiting import wait_until
 
 
 def test_a_reading_that_hangs_is_begun_anew() -> None:
-    gate, begun, said = threading.Event(), list[Stop](), list[str]()
+    gate, begun, said = threading.Event(), list[ReaderStop](), list[str]()
 
-    def read(stop: Stop) -> None:
+    def read(stop: ReaderStop) -> None:
         begun.append(stop)
         if len(begun) == 1:
             gate.wait()

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
-from pipeline.sources.live.devices.device_reader import DeviceLost, Stop
+from pipeline.sources.live.devices.device_reader import DeviceLost, ReaderStop
 from pipeline.sources.live.devices.mjpeg import NotMjpeg, read_mjpeg
 from tests.pipeline.sources.live.bench import small_jpeg
 
@@ -34,7 +34,7 @@ def answering(answer: bytes) -> Iterator[str]:
         thread.join(10.0)
 
 
-class StopAtLook(Stop):
+class StopAtLook(ReaderStop):
     """Set when it is looked at for the n-th time."""
 
     def __init__(self, number: int) -> None:
@@ -46,11 +46,11 @@ class StopAtLook(Stop):
         return self._looks_left <= 0
 
 
-def received(answer: bytes, stop: Stop | None = None) -> tuple[list[tuple[bytes, int | None]], Exception | None]:
+def received(answer: bytes, stop: ReaderStop | None = None) -> tuple[list[tuple[bytes, int | None]], Exception | None]:
     found: list[tuple[bytes, int | None]] = []
     with answering(answer) as url:
         try:
-            read_mjpeg(url, lambda data, stamp: found.append((data, stamp)), Stop() if stop is None else stop)
+            read_mjpeg(url, lambda data, stamp: found.append((data, stamp)), ReaderStop() if stop is None else stop)
         except (DeviceLost, NotMjpeg) as error:
             return found, error
     return found, None
@@ -111,7 +111,7 @@ def test_an_address_that_gives_something_else_is_left_to_the_video_reader() -> N
 @pytest.mark.parametrize("url", ["http://127.0.0.1:9/", "http://127.0.0.1:99999/", "http://[::1/"])
 def test_an_address_where_nobody_is_is_said(url: str) -> None:
     with pytest.raises(DeviceLost, match="http"):
-        read_mjpeg(url, lambda data, stamp: None, Stop())
+        read_mjpeg(url, lambda data, stamp: None, ReaderStop())
 
 
 @pytest.mark.parametrize("stamp", ["1e300", "-5", "nan", "inf", "1e13"])

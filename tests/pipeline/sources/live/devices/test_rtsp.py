@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.sources.live.devices.device_reader import DeviceLost, Stop
+from pipeline.sources.live.devices.device_reader import DeviceLost, ReaderStop
 from pipeline.sources.live.devices.video_stream import read_stream
 from pipeline.sources.live.source import LiveSensors
 from tests.pipeline.sources.live.rig import frames_until, free_port, loopback_config
@@ -97,7 +97,7 @@ def test_a_camera_that_floods_instead_of_answering_is_given_up_and_takes_no_memo
         before, began_s = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.monotonic()
         try:
             with pytest.raises(DeviceLost):
-                read_stream(f"rtsp://127.0.0.1:{listener.getsockname()[1]}/", lambda shot: None, Stop())
+                read_stream(f"rtsp://127.0.0.1:{listener.getsockname()[1]}/", lambda shot: None, ReaderStop())
         finally:
             ended.set()
             listener.shutdown(socket.SHUT_RDWR)

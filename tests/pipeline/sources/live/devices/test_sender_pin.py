@@ -7,7 +7,7 @@ import socket
 import threading
 from collections import Counter
 
-from pipeline.sources.live.devices.device_reader import Stop
+from pipeline.sources.live.devices.device_reader import ReaderStop
 from pipeline.sources.live.devices.sender_pin import OTHERS, BesidePin, SenderPin
 from pipeline.sources.live.devices.udp import read_datagrams
 from tests.pipeline.sources.live.rig import PATIENCE_S, free_port
@@ -51,7 +51,7 @@ def test_one_that_fell_silent_is_replaced_and_that_is_said() -> None:
     chosen.takes(b"valid", FIRST, 0)
     assert not chosen.takes(b"valid", OTHER, SECOND)
     assert chosen.takes(b"valid", OTHER, SECOND + 1)
-    assert chosen.said() == "comes from 10.0.0.2 now, before from 10.0.0.1"
+    assert chosen.said() == "now comes from 10.0.0.2, previously from 10.0.0.1"
 
 
 def test_a_configured_address_is_the_only_one_for_good() -> None:
@@ -76,7 +76,7 @@ def test_a_flood_of_another_sender_costs_the_first_no_datagram_and_no_memory() -
     two thousand in between and each arrives."""
     refused: Counter[str] = Counter()
     chosen = SenderPin("LiDAR", None, lambda data: data[:1] == b"s", refused, by_port=True, silent_s=60.0)
-    port, stop, came, first = free_port(socket.SOCK_DGRAM), Stop(), [], threading.Event()
+    port, stop, came, first = free_port(socket.SOCK_DGRAM), ReaderStop(), [], threading.Event()
 
     def receive(data: bytes, at_ns: int) -> None:
         came.append(data[:3])

@@ -33,7 +33,7 @@ def test_a_link_leads_to_the_number_that_the_camera_has_now(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("device", ["/dev/v4l/by-id/not-there", "/dev/null", "/dev/video"])
 def test_what_leads_to_no_camera_is_said(device: str) -> None:
-    with pytest.raises(DeviceLost, match=f"camera {device}: not plugged in"):
+    with pytest.raises(DeviceLost, match=f"camera {device}: not connected"):
         device_number(device)
 
 
@@ -83,7 +83,7 @@ def test_a_camera_that_is_not_plugged_in_is_said(sensors: list[LiveSensors]) -> 
         source.next(0.05)
         if source.health()[0].note:
             break
-    assert "camera 63: not plugged in" in source.health()[0].note
+    assert "camera 63: not connected" in source.health()[0].note
 
 
 def film(path: Path, count: int) -> None:

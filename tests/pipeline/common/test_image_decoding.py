@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.common.picture_decoding import MOST_PIXELS, TooMuch, decode_within_budget
+from pipeline.common.image_decoding import MOST_PIXELS, TooMuch, decode_within_budget
 
 GREY = np.full((24, 40, 3), 90, np.uint8)
 
@@ -72,6 +72,6 @@ def test_every_decoder_of_pictures_is_behind_it():
         for path in (root / folder).rglob("*.py")
         if any(call in path.read_text(encoding="utf-8") for call in calls)
     }
-    assert found - {"pipeline/common/picture_decoding.py"} <= {
+    assert found - {"pipeline/common/image_decoding.py"} <= {
         path for path in found if path.startswith("pipeline/training/")
     }

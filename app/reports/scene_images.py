@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.evaluation.report_sections import Scene
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.sensors.rig import SensorRig
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.world_state import World
 from pipeline.types import F64
@@ -112,7 +112,7 @@ def _points(points: F64) -> str:
 
 def _picture(scenario: Scenario, now: World) -> str:
     """As an address that holds the image itself."""
-    sensors = Sensors(scenario, now.s_m)
+    sensors = SensorRig(scenario, now.s_m)
     drawn = sensors.frame(now, 0, round(now.t_s * 1e9)).picture
     assert drawn is not None
     small = cv2.resize(drawn.bgr, _PICTURE_PX, interpolation=cv2.INTER_AREA)

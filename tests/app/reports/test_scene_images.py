@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.reports.scene_pictures import plan_svg, scene_html
+from app.reports.scene_images import plan_svg, scene_html
 from pipeline.evaluation.report_sections import Scene
 from pipeline.simulation import scenario
 from pipeline.simulation.world import world_state

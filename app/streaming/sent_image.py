@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from pipeline.types import U8, Picture
+from pipeline.types import U8, CameraImage
 
 MAX_WIDTH_PX = 1280
 """For pages that do not say how wide they show the image."""
@@ -17,13 +17,17 @@ _JPEG = b"\xff\xd8"
 
 
 @dataclass(frozen=True)
-class SentPicture:
-    """The JPEG of an image and its size; scale is sent pixels per image pixel."""
+class SentImage:
+    """The image as it is sent."""
 
     jpeg: bytes
+    """Encoded bytes."""
     width: int
+    """Sent pixels."""
     height: int
+    """Sent pixels."""
     scale: float
+    """Sent pixels per image pixel."""
 
 
 def width_for(shown_px: float) -> int:
@@ -32,15 +36,15 @@ def width_for(shown_px: float) -> int:
     return max(MIN_WIDTH_PX, int(np.ceil(shown_px / WIDTH_STEP_PX)) * WIDTH_STEP_PX)
 
 
-def encode_picture(picture: Picture, width_px: int = MAX_WIDTH_PX) -> SentPicture:
+def encode_picture(picture: CameraImage, width_px: int = MAX_WIDTH_PX) -> SentImage:
     """The camera's own JPEG if there is one and it is small enough; otherwise the image encoded at most ``width_px``
     wide."""
     height, width = picture.bgr.shape[:2]
     if picture.encoded is not None and picture.encoded[:2] == _JPEG and width <= width_px:
-        return SentPicture(picture.encoded, width, height, 1.0)
+        return SentImage(picture.encoded, width, height, 1.0)
     bgr = _shrunk(picture.bgr, width_px)
     _, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    return SentPicture(jpeg.tobytes(), bgr.shape[1], bgr.shape[0], bgr.shape[1] / width)
+    return SentImage(jpeg.tobytes(), bgr.shape[1], bgr.shape[0], bgr.shape[1] / width)
 
 
 def _shrunk(bgr: U8, width_px: int) -> U8:

@@ -1,0 +1,144 @@
+"""`cipv labels queue`, `agreement` and `effort`: who labels what, how far people agree, and how much they have done."""
+
+from __future__ import annotations
+
+import getpass
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from app.commands.labels.files import Database, Person, say
+from app.commands.support.arguments import option
+from pipeline.common.errors import BadInput
+from pipeline.common.user_file_errors import given_path
+from pipeline.labels.formats.native import from_json
+from pipeline.labels.formats.reading import read_bytes
+
+_MOST_NAMED = 20
+State = Literal["open", "labeling", "review", "done"]
+"""As of ``app.labels.store.work``, which takes two seconds to import."""
+
+
+@dataclass(frozen=True)
+class LabelAgreement:
+    """Compare labels of one recording that two people made apart from each other: the lead in each frame, overlap and
+    class of the cuboids that both have, and what only one of them has. Both files are native exports.
+
+    Example: cipv labels agreement ada.json bob.json
+    """
+
+    first: tyro.conf.Positional[Path]
+    """Labels of the first person"""
+    second: tyro.conf.Positional[Path]
+    """Labels of the second person"""
+    json: bool = False
+    """Print the figures as JSON"""
+
+    def __call__(self) -> int:
+        from pipeline.labels.agreement import agreement  # SciPy: only who compares pays
+
+        first, second = (from_json(read_bytes(given_path(file)), str(file)) for file in (self.first, self.second))
+        found = agreement(first, second)
+        if self.json:
+            print(json.dumps(asdict(found), indent=2))
+            return 0
+        print(f"lead: {_percent(found.lead_share)} of {found.frames:,} frames agree")
+        if found.lead_disagreements:
+            named = ", ".join(str(frame + 1) for frame in found.lead_disagreements[:_MOST_NAMED])
+            print(f"  not in frames {named}{' …' if len(found.lead_disagreements) > _MOST_NAMED else ''}")
+        overlap = "-" if found.iou is None else f"{found.iou:.2f}"
+        print(f"cuboids: {found.vehicles:,} in both, median IoU {overlap}")
+        print(f"  only in the first {found.only_first:,}, only in the second {found.only_second:,}")
+        print(f"class: {_percent(found.class_share)} agree; reversed: {_percent(found.reversed_share)}")
+        return 0
+
+
+@dataclass(frozen=True)
+class LabelEffort:
+    """List acts and active time of each person on each recording, also per frame. Pauses of more than two minutes do
+    not count.
+
+    Example: cipv labels effort --json
+    """
+
+    database: Database = None
+    """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
+    json: bool = False
+    """Print the list as JSON"""
+
+    def __call__(self) -> int:
+        from app.labels.store.database import open_database
+        from app.labels.store.effort import efforts
+
+        database = open_database(self.database)
+        try:
+            found = efforts(database)
+        finally:
+            database.close()
+        if self.json:
+            rates = [{"acts_per_frame": each.acts_per_frame, "s_per_frame": each.s_per_frame} for each in found]
+            print(json.dumps([asdict(each) | rate for each, rate in zip(found, rates, strict=True)], indent=2))
+            return 0
+        for each in found:
+            print(
+                f"{each.title}: {each.person}: acts {each.acts:,} ({each.acts_per_frame:.2f} a frame), "
+                f"{each.active_s / 60:.0f} min ({each.s_per_frame:.1f} s a frame)"
+            )
+        if not found:
+            say("no labels yet")
+        return 0
+
+
+@dataclass(frozen=True)
+class LabelQueue:
+    """List the recordings to label, what is worth most first: whose each is, its state, how much is labelled and
+    reviewed, and its worth (unsure proposals and unclear leads per frame). With --drive and --assign or --state: change
+    one. Who labels a recording cannot call it done.
+
+    Example: cipv labels queue --drive "Astyx HiRes2019" --assign Ada
+    """
+
+    drive: Annotated[str | None, option("NAME")] = None
+    """Title, address or key of the recording to change"""
+    assign: Annotated[str | None, option("PERSON")] = None
+    """Who is to label it"""
+    state: State | None = None
+    """How far it is"""
+    database: Database = None
+    """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
+    person: Person = field(default_factory=getpass.getuser)
+    """Who says so"""
+    json: bool = False
+    """Print the list as JSON"""
+
+    def __call__(self) -> int:
+        from app.labels.store.database import open_database
+        from app.labels.store.work import put, queue
+
+        if (self.drive is None) != (self.assign is None and self.state is None):
+            raise BadInput("--drive and --assign or --state belong together")
+        database = open_database(self.database)
+        try:
+            if self.drive is not None:
+                put(database, self.drive, self.person, person=self.assign, state=self.state)
+            found = queue(database)
+        finally:
+            database.close()
+        if self.json:
+            print(json.dumps([asdict(each) for each in found], indent=2))
+            return 0
+        for each in found:
+            print(
+                f"{each.title}: {each.state}, {each.person or 'nobody'}; labelled {_percent(each.labelled)}, "
+                f"reviewed {_percent(each.reviewed)}, proposals {each.proposals:,}, worth {each.worth:.2f}"
+            )
+        if not found:
+            say("no recordings yet: open one and label it, or run `cipv labels propose`")
+        return 0
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100 * share:.0f} %"

@@ -1,0 +1,78 @@
+"""`cipv scores`: what a batch's tables say of its runs, with and without labels."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from app.fleet.extra import need_extra
+from pipeline.common.errors import BadInput
+
+if TYPE_CHECKING:
+    from app.fleet.compare.worth import Worth
+
+
+@dataclass(frozen=True)
+class Scores:
+    """The scores of a batch's runs that need no labels, and, over drives with labels, how well each ranks drives and
+    runs as the labels do.
+
+    Example: cipv scores --out drives
+    """
+
+    out: Annotated[str, tyro.conf.arg(metavar="DIR")]
+    """The folder of the batch, or its address in a store"""
+    run: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="RUN")] = ()
+    """Only this run; default: all"""
+    json: bool = False
+    """Print the figures as JSON"""
+
+    def __call__(self) -> int:
+        need_extra()
+        from app.fleet.compare.worth import values_of, worths
+        from app.fleet.find import FleetTables
+        from app.fleet.pack import packs_of
+        from app.fleet.runs import runs_of
+        from app.fleet.store import Store
+        from app.reports.terminal_tables import show
+        from pipeline.evaluation.label_free.score import SCORES
+        from pipeline.evaluation.report_sections import ReportSection, Table
+
+        store = Store(self.out)
+        names = self.run or tuple(name for name in runs_of(store) if packs_of(store, name))
+        if not names:
+            raise BadInput(f"{store.address}: no tables of `cipv batch` here")
+        rows = {name: FleetTables(store, name).scores() for name in names}
+        values = {name: values_of(found) for name, found in rows.items()}
+        worth = worths(rows)
+        if self.json:
+            print(json.dumps({"runs": values, "worth": {each.score.name: _json(each) for each in worth}}, indent=1))
+            return 0
+        by_run = tuple((each.title, each.unit, *(values[name].get(each.name) for name in names)) for each in SCORES)
+        against = tuple(
+            (each.score.title, each.score.counterpart, each.drives, each.pairs, each.rank_correlation)
+            + ((each.interval.low, each.interval.high) if each.interval is not None else (None, None))
+            + (each.over_runs,)
+            for each in worth
+            if each.pairs
+        )
+        tables = [Table("Scores without labels", ("score", "unit", *names), by_run, decimals=3)]
+        if against:
+            heads = ("score", "against labels", "drives", "pairs", "rank correlation", "95 % low", "high", "over runs")
+            tables.append(Table("Beside the labels", heads, against))
+        show([ReportSection("scores", "Scores of a fleet", (), tuple(tables))])
+        return 0
+
+
+def _json(each: Worth) -> dict[str, Any]:
+    return {
+        "counterpart": each.score.counterpart,
+        "drives": each.drives,
+        "pairs": each.pairs,
+        "rank_correlation": each.rank_correlation,
+        "interval": None if each.interval is None else [each.interval.low, each.interval.high],
+        "over_runs": each.over_runs,
+    }

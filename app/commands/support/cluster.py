@@ -1,0 +1,74 @@
+"""Options of commands that run many drives, and the running with its progress bar."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from app.commands.support.arguments import option
+from app.commands.support.progress_bars import drives_progress
+from pipeline.common.errors import BadInput
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    from app.fleet.batch.plan import PlannedWork
+    from app.fleet.batch.schedule import Tally
+
+
+@dataclass(frozen=True)
+class ClusterOptions:
+    """Where drives are run."""
+
+    workers: Annotated[int | None, option("N")] = None
+    """Processes on this machine. Default: half its cores, since each runs networks on two threads"""
+    memory: Annotated[str, tyro.conf.arg(metavar="SIZE")] = "3GB"
+    """Limit of each process; one above it is started anew"""
+    scheduler: Annotated[str | None, option("ADDRESS")] = None
+    """A running Dask scheduler, e.g. tcp://10.0.0.5:8786, whose workers have the same version installed"""
+
+    def check(self) -> None:
+        """BadInput for what cannot be."""
+        if self.workers is not None and self.workers < 1:
+            raise BadInput(f"--workers {self.workers}: expected at least 1")
+
+    @contextmanager
+    def client(self, drives: int) -> Iterator[Client]:
+        """Dask, for so many drives. Its page's address is printed. BadInput where the scheduler does not answer."""
+        from app.fleet.batch.schedule import client_of, usual_workers
+
+        count = max(1, min(self.workers or usual_workers(), drives)) if self.scheduler is None else 0
+        with client_of(self.scheduler, count, self.memory) as client:
+            print(f"cipv: Dask's own page: {client.dashboard_link}", file=sys.stderr)
+            yield client
+
+
+def run_with_bar(client: Client, work: PlannedWork, tally: Tally, title: str = "drives") -> None:
+    """Run what is left of a batch, with a progress bar. Raises what ``run_batch`` raises."""
+    from app.fleet.batch.schedule import run_batch
+
+    with drives_progress() as bar:
+        task = bar.add_task(title, total=tally.total, completed=tally.total - tally.left, rate="")
+        start = time.monotonic()
+
+        def told(now: Tally) -> None:
+            rate = now.frames / max(time.monotonic() - start, 1e-3)
+            bar.update(task, completed=now.total - now.left, rate=f"{rate:.1f} frames/s")
+
+        run_batch(client, work.jobs, tally, told)
+
+
+def tally_of(work: PlannedWork) -> Tally:
+    """What an earlier batch has done of it."""
+    from app.fleet.batch.schedule import Tally
+    from app.fleet.runs import set_aside
+
+    wanted = {recording.address for recording in work.all}
+    aside = {name: why for name, why in set_aside(work.store, work.key.name).items() if name in wanted}
+    return Tally(len(work.all), work.done_before - len(aside), aside=aside)

@@ -1,0 +1,55 @@
+"""The frames by which an alignment is scored: some of the whole recording, or the last shown ones of live sensors."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+
+import numpy as np
+
+from app.drive.open_recording import OpenRecording
+from pipeline.calibration.depth_edges import edge_scene
+from pipeline.calibration.edge_match import Seen
+from pipeline.types import Frame
+
+FRAMES = 20
+"""Frames that are looked at, over the whole drive or the last shown ones: one sweep of 16 rings has few borders."""
+APART_NS = 500_000_000
+"""Of live sensors, frames nearer to each other than this show the same once more."""
+
+
+class AlignmentScenes:
+    """The looked-at frames of what was asked about last. Any thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._of: OpenRecording | str | None = None
+        self._newest_ns = 0
+        self._seen: deque[Seen] = deque(maxlen=FRAMES)
+
+    def of_recording(self, recording: OpenRecording) -> list[Seen]:
+        """Frames all over a recording; they are looked at once."""
+        with self._lock:
+            if self._of is not recording:
+                self._begin(recording)
+                for index in np.unique(np.linspace(0, recording.setup.total - 1, FRAMES).round().astype(int)).tolist():
+                    self._look(recording.as_read(index))
+            return list(self._seen)
+
+    def of_shown(self, uri: str, frame: Frame) -> list[Seen]:
+        """The frames that were shown when this was called, and the one that is shown now."""
+        with self._lock:
+            if self._of != uri:
+                self._begin(uri)
+            if not self._seen or abs(frame.t_ns - self._newest_ns) >= APART_NS:
+                self._look(frame)
+            return list(self._seen)
+
+    def _begin(self, of: OpenRecording | str) -> None:
+        self._of = of
+        self._seen.clear()
+
+    def _look(self, frame: Frame) -> None:
+        if frame.sweep is not None and frame.picture is not None:
+            self._newest_ns = frame.t_ns
+            self._seen.append((edge_scene(frame.sweep, frame.picture.bgr), frame.camera))

@@ -1,0 +1,119 @@
+"""Alignments that a person kept: with date, drive, score and note, so that an earlier one is one press away."""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from pipeline.common.errors import BadInput
+from pipeline.params import Params, flat, with_changes
+
+MOST = 500
+LONGEST_NOTE = 200
+SECTION = "alignment."
+
+
+class VersionRefused(BadInput):
+    """A version that cannot be kept; the text says why."""
+
+
+@dataclass(frozen=True)
+class AlignmentVersion:
+    """One alignment as it was."""
+
+    id: int
+    """Its number."""
+    saved_at: str
+    """When, ISO 8601, UTC."""
+    drive: str
+    """Title of the recording that was open."""
+    note: str
+    """What the person wrote."""
+    values: Mapping[str, Any]
+    """Every alignment parameter by dotted name."""
+    match: float | None
+    """Share of the best nearby alignment's edge score, 0–1; None where the drive could not tell."""
+    iou: float | None
+    """Mean overlap of boxes and projected clusters, where the version is a fit's; else None."""
+
+
+class AlignmentVersions:
+    """Any thread. file: where they are kept; None keeps them in memory only."""
+
+    def __init__(self, file: Path | None = None) -> None:
+        self._file = file
+        self._lock = threading.Lock()
+        self._versions = _read(file)
+
+    def all(self) -> list[AlignmentVersion]:
+        """The newest first."""
+        with self._lock:
+            return self._versions[::-1]
+
+    def add(
+        self, params: Params, drive: str, saved_at: str, note: str = "", *, match: float | None, iou: float | None
+    ) -> AlignmentVersion:
+        """Keep the alignment of ``params``. VersionRefused when there are too many, or when it cannot be saved."""
+        with self._lock:
+            if len(self._versions) >= MOST:
+                raise VersionRefused(f"{MOST} alignments are saved; delete some")
+            number = max((each.id for each in self._versions), default=0) + 1
+            words = " ".join(note.split())[:LONGEST_NOTE]
+            version = AlignmentVersion(number, saved_at, drive, words, alignment_of(params), match, iou)
+            self._save([*self._versions, version])
+            return version
+
+    def remove(self, number: int) -> bool:
+        """False when there is no such version."""
+        with self._lock:
+            rest = [each for each in self._versions if each.id != number]
+            if len(rest) == len(self._versions):
+                return False
+            self._save(rest)
+            return True
+
+    def _save(self, versions: list[AlignmentVersion]) -> None:
+        if self._file is not None:
+            text = json.dumps([asdict(each) for each in versions], ensure_ascii=False, indent=1)
+            try:
+                self._file.parent.mkdir(parents=True, exist_ok=True)
+                partial = self._file.with_suffix(".part")
+                partial.write_text(text, encoding="utf-8")
+                os.replace(partial, self._file)
+            except OSError as error:
+                raise VersionRefused(f"{self._file}: the alignment cannot be saved: {error.strerror}") from None
+        self._versions = versions
+
+
+def alignment_of(params: Params) -> dict[str, Any]:
+    """Every alignment parameter by dotted name."""
+    return {name: value for name, value in flat(params).items() if name.startswith(SECTION)}
+
+
+def _read(file: Path | None) -> list[AlignmentVersion]:
+    """What was kept. A file that is missing or damaged holds nothing, nor does an entry that no longer applies."""
+    if file is None:
+        return []
+    try:
+        rows = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return []
+    return [version for row in rows if (version := _version(row)) is not None] if isinstance(rows, list) else []
+
+
+def _version(row: Any) -> AlignmentVersion | None:
+    try:
+        values = {str(name): value for name, value in row["values"].items() if str(name).startswith(SECTION)}
+        with_changes(Params(), values)
+        texts = (str(row[name]) for name in ("saved_at", "drive", "note"))
+        scores = (None if row[name] is None else float(row[name]) for name in ("match", "iou"))
+        saved_at, drive, note = texts
+        match, iou = scores
+        return AlignmentVersion(int(row["id"]), saved_at, drive, note, values, match, iou)
+    except (BadInput, ValueError, KeyError, TypeError, AttributeError):
+        return None

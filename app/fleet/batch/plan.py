@@ -1,0 +1,111 @@
+"""What a batch is to do: which drives of which run, and which of them are done already."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from app.fleet.batch.addresses import Recording, recordings
+from app.fleet.batch.keys import RunKey, code_digest, networks_digest
+from app.fleet.batch.work import Job, aside_file, done_file
+from app.fleet.runs import LATEST
+from app.fleet.store import Store
+from pipeline.common.errors import BadInput
+from pipeline.detection import DetectorChoice
+from pipeline.params import Params, ParamsError
+from pipeline.run import Sensors
+
+_PLAN = "batch.json"
+_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A batch as it was asked for."""
+
+    addresses: tuple[str, ...]
+    """As they were typed."""
+    params: Params
+    """Of the pipeline, the same for every recording."""
+    choice: DetectorChoice
+    """Of networks."""
+    sensors: Sensors = "both"
+    """An ablation with one of them runs as if the cars had no other."""
+    rings: int = 16
+    """LiDAR channels that are kept of a recording with more."""
+    keeps_results: bool = False
+    """Also write the results as JSON lines."""
+
+    def save(self, store: Store) -> None:
+        """For ``--resume``."""
+        said = {
+            "version": _VERSION,
+            "addresses": list(self.addresses),
+            "params": self.params.model_dump(mode="json"),
+            "choice": asdict(self.choice),
+            "sensors": self.sensors,
+            "rings": self.rings,
+            "results": self.keeps_results,
+        }
+        store.write(_PLAN, json.dumps(said, ensure_ascii=False, indent=1).encode())
+
+    @staticmethod
+    def load(store: Store) -> Plan:
+        """What the last batch in a folder was asked for. BadInput where there was none."""
+        data = store.read(_PLAN)
+        if data is None:
+            raise BadInput(f"{store.address}: no batch to resume here; name the recordings")
+        try:
+            said: dict[str, Any] = json.loads(data)
+            if said["version"] != _VERSION:
+                raise BadInput(f"{store.address}/{_PLAN}: version {said['version']!r}; this program reads {_VERSION}")
+            return Plan(
+                tuple(map(str, said["addresses"])),
+                Params.model_validate(said["params"]),
+                DetectorChoice(**said["choice"]),
+                said["sensors"],
+                int(said["rings"]),
+                bool(said["results"]),
+            )
+        except (ValueError, KeyError, TypeError, ParamsError):
+            raise BadInput(f"{store.address}/{_PLAN}: damaged; name the recordings again") from None
+
+
+@dataclass(frozen=True)
+class PlannedWork:
+    """A plan, and how far it is."""
+
+    store: Store
+    """Where its tables are."""
+    key: RunKey
+    """What the run is made from; names the run in the store."""
+    jobs: tuple[Job, ...]
+    """Drives that are still to be run."""
+    all: tuple[Recording, ...]
+    """Every drive of the plan."""
+
+    @property
+    def done_before(self) -> int:
+        """Drives of the plan that an earlier batch finished."""
+        return len(self.all) - len(self.jobs)
+
+
+def work_of(plan: Plan, store: Store) -> PlannedWork:
+    """What is to be done. BadInput for an address that names no recording."""
+    key = RunKey(code_digest(), networks_digest(plan.choice), plan.params, plan.sensors, plan.rings)
+    found = recordings(plan.addresses)
+    done = {*store.names(f"done/run={key.name}"), *store.names(f"aside/run={key.name}")}
+    jobs = [
+        Job(recording, key, plan.choice, store, plan.keeps_results)
+        for recording in found
+        if not {done_file(key.name, recording), aside_file(key.name, recording)} & done
+    ]
+    return PlannedWork(store, key, tuple(jobs), tuple(found))
+
+
+def begin(plan: Plan, work: PlannedWork, store: Store) -> None:
+    """Write down what the batch is, before its first drive. BadInput where the store cannot be written."""
+    plan.save(store)
+    store.write(LATEST, json.dumps({"run": work.key.name}).encode())
+    store.write(f"runs/{work.key.name}.json", json.dumps(work.key.to_json(plan.choice), indent=1).encode())

@@ -1,0 +1,249 @@
+"""A batch on Dask: which pieces of work there are, what follows from each, and what was said of it. Dask decides where
+and when each piece runs, and runs the pieces of a worker that died again."""
+
+from __future__ import annotations
+
+import logging
+import os
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import dask
+from distributed import Client, KilledWorker, LocalCluster, as_completed
+
+from app.fleet.batch.work import Job, Outcome, TooLong, WrongWorker, look_at_piece, run_drive, set_aside
+from pipeline.common.errors import BadInput, first_line
+from pipeline.common.user_files import Overloaded
+
+IN_FLIGHT_A_THREAD = 3
+"""Pieces of work that Dask knows of at once, for each thread of its workers: one runs, the next are ready."""
+TRIES = 2
+"""A piece whose worker died too often for Dask is handed over again, alone in its suspicion, before it is set aside."""
+_SETTINGS = {
+    "distributed.scheduler.allowed-failures": 5,
+    # the same number of threads as `cipv run` has: sums in another order would be other bytes
+    "distributed.nanny.pre-spawn-environ": {"MALLOC_TRIM_THRESHOLD_": 65536},
+    "distributed.scheduler.worker-saturation": 1.0,
+    "distributed.comm.timeouts.connect": "60s",
+    "distributed.scheduler.work-stealing": True,
+    "distributed.admin.large-graph-warning-threshold": "100MB",
+}
+
+
+class SchedulerLost(Exception):
+    """The scheduler has gone; what is done is kept."""
+
+
+@dataclass
+class Tally:
+    """What became of a batch so far."""
+
+    total: int
+    """Drives of the batch."""
+    before: int = 0
+    """Drives that an earlier run of the batch had done."""
+    done: int = 0
+    """Drives that were run now."""
+    frames: int = 0
+    """Of those."""
+    looked_at: int = 0
+    """Images that networks looked at."""
+    aside: dict[str, str] = field(default_factory=dict)
+    """Address → reason, of recordings that were set aside for good: tried again only once they change."""
+    failed: dict[str, str] = field(default_factory=dict)
+    """Address → reason, of drives that failed for a reason that may pass: they are tried again by the next batch."""
+
+    @property
+    def left(self) -> int:
+        """Drives of which nothing is known yet."""
+        return self.total - self.before - self.done - len(self.aside) - len(self.failed)
+
+
+def usual_workers() -> int:
+    """Processes on this machine: half its cores, since each runs networks on two threads, and steps beside them."""
+    return max(1, (os.cpu_count() or 1) // 2)
+
+
+@contextmanager
+def client_of(scheduler: str | None, workers: int, memory: str) -> Iterator[Client]:
+    """A client of Dask: of a running scheduler, or of a cluster in processes of this machine, that ends with it.
+
+    Args:
+        scheduler: its address; None: a cluster of this machine.
+        workers: how many processes that has.
+        memory: limit of each, e.g. ``"1.5GB"``; a worker above it is started anew.
+
+    Raises:
+        BadInput: no scheduler answers there.
+    """
+    with dask.config.set(_SETTINGS), _quiet():
+        if scheduler is not None:
+            try:
+                client = Client(scheduler, timeout=30)
+            except (OSError, ValueError, TimeoutError) as error:
+                raise BadInput(f"--scheduler {scheduler}: no Dask scheduler answers: {first_line(error)}") from None
+            with client:
+                yield client
+            return
+        cluster = LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            memory_limit=memory,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            silence_logs=50,
+            security=True,  # other users of this machine cannot send it work
+        )
+        with cluster, Client(cluster) as client:
+            yield client
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without what Dask says of itself: tracebacks of connections that ended, which are told in one line here."""
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] == "distributed"]
+    levels = {name: logging.getLogger(name).level for name in names}
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module="distributed")
+        try:
+            for name in names:
+                logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+            yield
+        finally:
+            for name, level in levels.items():
+                logging.getLogger(name).setLevel(level)
+
+
+def run_batch(client: Client, jobs: Sequence[Job], tally: Tally, told: Callable[[Tally], object]) -> None:
+    """Run every job.
+
+    Args:
+        client: of Dask.
+        jobs: drives that are not done.
+        tally: changed as drives end.
+        told: called after each change of it.
+
+    Raises:
+        SchedulerLost: Dask has gone; what is done is kept.
+        WrongWorker: the workers run other code or have other networks.
+    """
+    _Batch(client, jobs, tally, told).run()
+
+
+@dataclass
+class _Piece:
+    """One piece of work at Dask's: a whole drive, or (first is not None) images of one."""
+
+    job: Job
+    first: int | None = None
+    is_last_look: bool = False
+    """Of a whole drive: its images have been looked at."""
+    tries: int = 1
+
+
+class _Batch:
+    def __init__(self, client: Client, jobs: Sequence[Job], tally: Tally, told: Callable[[Tally], object]) -> None:
+        self._client, self._tally, self._told = client, tally, told
+        self._waiting = deque(_Piece(job) for job in jobs)
+        self._at_work: dict[str, _Piece] = {}
+        self._looks_left: dict[str, int] = {}
+        """Pieces of long recordings that are still to be looked at, by drive."""
+
+    def run(self) -> None:
+        results = as_completed([], with_results=False, raise_errors=False)
+        try:
+            while self._waiting or self._at_work:
+                self._hand_over(results)
+                future = next(results)
+                piece = self._at_work.pop(str(future.key))
+                self._take(piece, future)
+                future.release()
+                self._told(self._tally)
+        except (OSError, TimeoutError, StopIteration, RuntimeError) as error:
+            raise SchedulerLost(first_line(error)) from error
+
+    def _hand_over(self, results: as_completed) -> None:
+        """Let Dask have as many pieces as keep its workers busy."""
+        threads = max(1, sum(self._client.nthreads().values()))
+        while self._waiting and len(self._at_work) < IN_FLIGHT_A_THREAD * threads:
+            piece = self._waiting.popleft()
+            key = _key(piece)
+            future = self._client.submit(*_call(piece), key=key, pure=False, retries=0)
+            self._at_work[key] = piece
+            results.add(future)
+
+    def _take(self, piece: _Piece, future: Any) -> None:
+        """What follows from a piece that has ended."""
+        if future.status == "finished":
+            self._finished(piece, future.result())
+            return
+        if future.status == "lost" or future.status == "cancelled":
+            raise SchedulerLost("the scheduler has lost the work that it was given")
+        error = future.exception()
+        if isinstance(error, WrongWorker):
+            raise error
+        if isinstance(error, KilledWorker) and piece.tries < TRIES:
+            self._waiting.append(_Piece(piece.job, piece.first, piece.is_last_look, piece.tries + 1))
+        elif isinstance(error, KilledWorker):
+            self._set_aside(piece, "it ends the process of every worker that opens it: too little memory, or a crash")
+        elif isinstance(error, BadInput):
+            self._set_aside(piece, str(error))
+        else:
+            what = str(error) if isinstance(error, Overloaded) else f"{type(error).__name__}: {first_line(error)}"
+            self._fail(piece, what)
+
+    def _finished(self, piece: _Piece, result: Outcome | TooLong | int) -> None:
+        tally, drive = self._tally, piece.job.recording.drive
+        if isinstance(result, TooLong):
+            self._looks_left[drive] = len(result.pieces)
+            self._waiting.extendleft(_Piece(piece.job, first) for first in reversed(result.pieces))
+        elif isinstance(result, Outcome):
+            tally.looked_at += result.looked_at
+            if result.reason:
+                tally.aside[piece.job.recording.address] = result.reason
+            else:
+                tally.done, tally.frames = tally.done + 1, tally.frames + result.frames
+        else:
+            tally.looked_at += result
+            self._one_look_less(piece)
+
+    def _one_look_less(self, piece: _Piece) -> None:
+        """The drive itself follows its last piece."""
+        drive = piece.job.recording.drive
+        if drive not in self._looks_left:
+            return  # another piece has failed
+        self._looks_left[drive] -= 1
+        if not self._looks_left[drive]:
+            del self._looks_left[drive]
+            self._waiting.appendleft(_Piece(piece.job, is_last_look=True))
+
+    def _set_aside(self, piece: _Piece, reason: str) -> None:
+        if self._gives_up(piece):
+            set_aside(piece.job, reason)
+            self._tally.aside[piece.job.recording.address] = reason
+
+    def _fail(self, piece: _Piece, reason: str) -> None:
+        if self._gives_up(piece):
+            self._tally.failed[piece.job.recording.address] = reason
+
+    def _gives_up(self, piece: _Piece) -> bool:
+        """Whether a drive is given up now, and was not before with another of its pieces."""
+        drive = piece.job.recording.drive
+        return piece.first is None or self._looks_left.pop(drive, None) is not None
+
+
+def _call(piece: _Piece) -> tuple[Any, ...]:
+    if piece.first is not None:
+        return look_at_piece, piece.job, piece.first
+    return run_drive, piece.job, not piece.is_last_look
+
+
+def _key(piece: _Piece) -> str:
+    """Its name at Dask's, and on Dask's page."""
+    what = "run" if piece.first is None else f"look-{piece.first}"
+    last = "-whole" if piece.is_last_look else ""
+    return f"{what}{last}-{piece.job.recording.drive}-{piece.job.key.name}-{piece.tries}"

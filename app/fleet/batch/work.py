@@ -1,0 +1,304 @@
+"""What a worker does: run one recording, or look at a piece of one. Everything it makes goes to the batch's store,
+whole files at once, so a worker may be killed at any moment and its work done again by another."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import zstandard
+
+from app.drive.events import find_events
+from app.drive.frame_rows import Objects, Row, objects_of, row_of
+from app.fleet.batch.addresses import Recording
+from app.fleet.batch.answers import PIECE_FRAMES, KeptLook, answers_file
+from app.fleet.batch.drive_scores import scores_of
+from app.fleet.batch.drive_tables import FrameTables, gap_of, write_drive, write_events, write_scores
+from app.fleet.batch.keys import RunKey, code_digest, networks_digest
+from app.fleet.batch.tables import DRIVES, EVENTS, FRAMES, OBJECTS, SCORES, TIMINGS, file_of
+from app.fleet.store import Store
+from pipeline.common.errors import BadInput
+from pipeline.detection import DetectorChoice, Detectors, detect, open_detectors, picture_size
+from pipeline.evaluation.label_free.history import History
+from pipeline.evaluation.scores.results_file import EMPTY
+from pipeline.run import patiently, run, used
+from pipeline.sources import open_source
+from pipeline.types import Frame, Result
+from pipeline.types.result_json import to_line
+from pipeline.types.source import Source, SourceError, is_simulated
+
+MOST_LABELLED = 6000
+"""Results of labelled frames are held until the drive's end, some 20 KB each: no drive is scored against more."""
+
+
+class WrongWorker(BadInput):
+    """A worker with other code or other networks than the batch was started with."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One drive of a batch."""
+
+    recording: Recording
+    """What is run, as it was when the batch was planned."""
+    key: RunKey
+    """Parameters, sensors and rings, and the code and networks that a worker must have to run it."""
+    choice: DetectorChoice
+    """Networks by name, opened by the worker from its own files."""
+    store: Store
+    """Where tables, answers of networks and marks of what is done are written."""
+    keeps_results: bool = False
+    """Also write the results as JSON lines."""
+    piece_frames: int = PIECE_FRAMES
+    """Images of a longer recording are looked at in pieces of so many frames."""
+
+    def answers(self, detectors: Detectors, first: int) -> str:
+        """The name in the store of what these detectors saw in the piece that begins with a frame."""
+        return answers_file(self.recording.mark, detectors, first, self.piece_frames)
+
+    @property
+    def done_file(self) -> str:
+        """Its presence says that all of the drive's files are there."""
+        return done_file(self.key.name, self.recording)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a drive."""
+
+    drive: str
+    """Its name in tables, ``Recording.drive``."""
+    frames: int
+    """0 for one that was set aside."""
+    looked_at: int
+    """Images that networks looked at now."""
+    seconds: float
+    """It took."""
+    reason: str = ""
+    """Why it was set aside; empty for one that was run."""
+
+
+@dataclass(frozen=True)
+class TooLong:
+    """A recording whose images several workers shall look at first."""
+
+    pieces: tuple[int, ...]
+    """First frame of each piece."""
+
+
+def done_file(run: str, recording: Recording) -> str:
+    """The name in the store of what says that a drive is done."""
+    return f"done/run={run}/{recording.drive}.{recording.mark}.json"
+
+
+def aside_file(run: str, recording: Recording) -> str:
+    """The name in the store of what says why a recording was set aside."""
+    return f"aside/run={run}/{recording.drive}.{recording.mark}.json"
+
+
+def run_drive(job: Job, may_split: bool = False) -> Outcome | TooLong:
+    """Run one recording, write its tables, and say that it is done. A recording that cannot be read is set aside, with
+    the reason.
+
+    Args:
+        job: which one.
+        may_split: return ``TooLong`` instead where a recording's images are worth looking at piece by piece.
+
+    Raises:
+        WrongWorker: see there. Overloaded: a store that goes on failing.
+    """
+    start = perf_counter()
+    _check(job)
+    before = _before(job)
+    if before is not None:
+        return before
+    try:
+        source = open_source(job.recording.address, rings=job.key.rings)
+        if not len(source):
+            raise SourceError(f"{job.recording.address}: the recording holds no frames")
+        detectors = _detectors(source, job)
+        if may_split and _missing_pieces(source, detectors, job):
+            return TooLong(tuple(range(0, len(source), job.piece_frames)))
+        with tempfile.TemporaryDirectory(prefix="cipv-batch-") as folder:
+            looked_at = _run(job, source, detectors, Path(folder))
+    except WrongWorker:
+        raise
+    except BadInput as error:
+        return set_aside(job, str(error), perf_counter() - start)
+    _write(job, job.done_file, {"frames": len(source)})
+    return Outcome(job.recording.drive, len(source), looked_at, perf_counter() - start)
+
+
+def look_at_piece(job: Job, first: int) -> int:
+    """Let the detectors look at the images of one piece of a recording, and keep their answers. Returns how many images
+    networks looked at. Raises BadInput for a recording that cannot be read, and what ``run_drive`` raises."""
+    _check(job)
+    source = open_source(job.recording.address, rings=job.key.rings)
+    detectors = _detectors(source, job)
+    if job.store.has(job.answers(detectors, first)):
+        return 0
+    kept = KeptLook(job.store, job.recording.mark, detectors, job.piece_frames)
+    for index in range(first, min(first + job.piece_frames, len(source))):
+        detect(patiently(source, index), used(detectors, job.key.params), kept)
+    kept.close()
+    return kept.asked
+
+
+def set_aside(job: Job, reason: str, seconds: float = 0.0) -> Outcome:
+    """Note why a recording could not be run; it is not tried again unless it changes."""
+    _write(job, aside_file(job.key.name, job.recording), {"reason": reason})
+    return Outcome(job.recording.drive, 0, 0, seconds, reason)
+
+
+def _write(job: Job, name: str, what: dict[str, object]) -> None:
+    said = {"drive": job.recording.drive, "address": job.recording.address, "mark": job.recording.mark} | what
+    job.store.write(name, json.dumps(said, ensure_ascii=False, indent=1).encode())
+
+
+def _before(job: Job) -> Outcome | None:
+    """What became of it before; None where nothing has."""
+    for name in (job.done_file, aside_file(job.key.name, job.recording)):
+        data = job.store.read(name)
+        if data is not None:
+            said = json.loads(data)
+            return Outcome(job.recording.drive, int(said.get("frames", 0)), 0, 0.0, str(said.get("reason", "")))
+    return None
+
+
+def _check(job: Job) -> None:
+    if code_digest() != job.key.code:
+        raise WrongWorker("a worker runs another version of CIPV Studio, or other libraries, than `cipv batch`")
+    if networks_digest(job.choice) != job.key.networks:
+        raise WrongWorker("a worker has other networks installed than the machine of `cipv batch`")
+
+
+def _detectors(source: Source, job: Job) -> Detectors:
+    """Networks are opened once for each kind of image; the classical lane detector knows the camera too."""
+    if job.key.sensors == "lidar":
+        return Detectors()
+    first = patiently(source, 0)
+    camera = first.camera
+    numbers = () if camera is None else (camera.K.tobytes(), camera.T_camera_ego.tobytes(), camera.road_z_m)
+    kind = (is_simulated(source), picture_size(source), source.rate_hz, first.detections_given, numbers)
+    return _opened(_Opening(source, kind), job.choice, job.key.sensors)
+
+
+class _Opening:
+    """A source that is equal to all others of its kind, for the cache below."""
+
+    def __init__(self, source: Source, kind: tuple[object, ...]) -> None:
+        self.source, self._kind = source, kind
+
+    def __hash__(self) -> int:
+        return hash(self._kind)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Opening) and self._kind == other._kind
+
+
+@lru_cache(maxsize=2)
+def _opened(opening: _Opening, choice: DetectorChoice, sensors: str) -> Detectors:
+    detectors = open_detectors(opening.source, choice, sensors)
+    del opening.source  # only its kind is held
+    return detectors
+
+
+def _missing_pieces(source: Source, detectors: Detectors, job: Job) -> bool:
+    """Whether networks have to look at more than one piece of it."""
+    if not detectors.names or len(source) <= job.piece_frames:
+        return False
+    return not all(job.store.has(job.answers(detectors, first)) for first in range(0, len(source), job.piece_frames))
+
+
+def _run(job: Job, source: Source, detectors: Detectors, folder: Path) -> int:
+    """Write the drive's part of every table. Returns how many images networks looked at."""
+    kept = KeptLook(job.store, job.recording.mark, detectors, job.piece_frames)
+    run_name, drive = job.key.name, job.recording.drive
+    rows: list[Row] = []
+    objects: list[Objects] = []
+    labelled: list[Result] = []
+    history, light = History(), float("nan")
+    with FrameTables(folder) as tables, _Lines(folder, job.keeps_results) as lines:
+        for frame, result in run(source, job.key.params, detectors, job.key.sensors, kept):
+            row, records = row_of(frame, result), objects_of(result)
+            tables.add(frame, result, row, records)
+            lines.add(result)
+            history.add(result)
+            rows.append(row)
+            objects.append(records)
+            if np.isnan(light):
+                light = _brightness(frame)
+            if len(labelled) < MOST_LABELLED and source.truth(frame.index) is not None:
+                labelled.append(replace(result, layers=EMPTY))
+    kept.close()
+    gap_s = job.key.params.time.reset_gap_s
+    gaps = [gap_of(row, records) for row, records in zip(rows, objects, strict=True)]
+    write_events(folder / f"{EVENTS.name}.parquet", find_events(rows, objects, job.key.params), rows, gaps, gap_s)
+    write_scores(folder / f"{SCORES.name}.parquet", scores_of(history, labelled, source, job.key.params))
+    write_drive(folder / f"{DRIVES.name}.parquet", _drive_values(job, source, rows, len(labelled), light))
+    for shape in (FRAMES, OBJECTS, TIMINGS, EVENTS, SCORES, DRIVES):
+        job.store.put(file_of(shape.name, run_name, drive), folder / f"{shape.name}.parquet")
+    if job.keeps_results:
+        job.store.put(f"results/run={run_name}/{drive}.jsonl.zst", folder / _Lines.NAME)
+    return kept.asked
+
+
+class _Lines:
+    """Results as `cipv run --out` writes them, packed, without timings: equal inputs give equal bytes."""
+
+    NAME = "results.jsonl.zst"
+
+    def __init__(self, folder: Path, wanted: bool) -> None:
+        self._file = (folder / self.NAME).open("wb") if wanted else None
+        self._packer = zstandard.ZstdCompressor().stream_writer(self._file) if self._file is not None else None
+
+    def __enter__(self) -> _Lines:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._packer is not None:
+            self._packer.close()  # closes the file too
+
+    def add(self, result: Result) -> None:
+        if self._packer is not None:
+            self._packer.write(to_line(replace(result, timing_ms={})).encode())
+
+
+def _drive_values(job: Job, source: Source, rows: list[Row], labelled: int, light: float) -> tuple[object, ...]:
+    """The drive's row of the table ``drives``."""
+    speeds = np.array([row.speed_mps for row in rows if row.speed_mps is not None])
+    bends = [
+        abs(row.yaw_rate_radps / row.speed_mps)
+        for row in rows
+        if row.yaw_rate_radps is not None and row.speed_mps is not None and row.speed_mps > 3.0
+    ]
+    leads = [row.distance_m for row in rows if row.distance_m is not None]
+    return (
+        job.recording.address,
+        source.title,
+        job.recording.mark,
+        len(rows),
+        (rows[-1].t_ns - rows[0].t_ns) / 1e9,
+        rows[0].t_ns,
+        _mean(speeds),
+        _mean(bends),
+        _mean(leads),
+        len(leads),
+        labelled,
+        light,
+    )
+
+
+def _mean(values: object) -> float | None:
+    found = np.asarray(values, np.float64)
+    return float(found.mean()) if found.size else None
+
+
+def _brightness(frame: Frame) -> float:
+    """Mean of the image; NaN without one."""
+    return float(frame.picture.bgr.mean()) if frame.picture is not None else float("nan")

@@ -1,0 +1,188 @@
+"""Questions to a batch's tables, in SQL, answered by DuckDB: which moments, frames, objects or drives fulfil a
+condition. A question reads the batch's folder and nothing else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import duckdb
+
+from app.drive.events import event_kinds
+from app.fleet.batch.tables import EQUAL_TABLES, TableShape
+from app.fleet.pack import packed_file, packs_of
+from app.fleet.runs import latest_run, runs_of
+from app.fleet.store import Store
+from pipeline.common.errors import BadInput
+
+QueryTable = Literal["events", "frames", "objects", "drives"]
+_ALWAYS = ("drive", "address", "index", "t_s")
+_SHOWN: dict[QueryTable, tuple[str, ...]] = {
+    "events": ("kind", "text", "distance_m", "ttc_s", "min_ttc_s", "max_gap_sigmas", "speed_mps"),
+    "frames": ("cipv_id", "source", "distance_m", "closing_speed_mps", "ttc_s", "vl_gap_sigmas", "speed_mps"),
+    "objects": ("id", "source", "type", "distance_m", "closing_speed_mps", "ttc_s", "in_path", "vl_gap_sigmas"),
+    "drives": ("title", "frames", "duration_s", "mean_speed_mps", "frames_with_lead"),
+}
+NAMED = {
+    "disagreement": "max_gap_sigmas > 3",
+    "close": "min_ttc_s < 1.5",
+    "night": "brightness < 60",
+    "bend": "speed_mps > 3 AND abs(yaw_rate_radps) > 0.004 * speed_mps",
+}
+"""Conditions by name, beside the kinds of event: usable in events like a column."""
+
+
+@dataclass(frozen=True)
+class QueryResult:
+    """What a question found."""
+
+    columns: tuple[str, ...]
+    """Names, in the order of each row's values."""
+    rows: tuple[tuple[Any, ...], ...]
+    """At most as many as were asked for; None: unknown."""
+    total: int
+    """How many there are in all."""
+
+
+class FleetTables:
+    """The tables of one run, open for questions. For one thread.
+
+    Args:
+        store: the batch's folder.
+        run: name of the run; None: the last batch's.
+
+    Raises:
+        BadInput: there is no such run.
+    """
+
+    def __init__(self, store: Store, run: str | None = None) -> None:
+        self.store, self.run = store, run or latest_run(store)
+        if self.run not in runs_of(store):
+            raise BadInput(f"{store.address}: no run {self.run!r}; there are {', '.join(runs_of(store)) or 'none'}")
+        self._numbers = [each.number for each in packs_of(store, self.run)]
+        if not self._numbers:
+            raise BadInput(f"{store.address}: run {self.run} has no drives yet")
+        self._duckdb = duckdb.connect()
+        self._shut_in()
+        for shape in EQUAL_TABLES:
+            self._make_view(shape)
+
+    def find(self, where: str, of: QueryTable = "events", limit: int = 100, columns: Sequence[str] = ()) -> QueryResult:
+        """What fulfils a condition, drive by drive in order of time.
+
+        Args:
+            where: a condition of SQL over the columns of docs/reference/fleet-tables.md, names of events and ``NAMED``.
+            of: which table.
+            limit: most rows returned.
+            columns: shown beside drive, address and time; default: the usual ones.
+
+        Raises:
+            BadInput: the condition is none, or names what is not there.
+        """
+        shown = [name for name in _ALWAYS if of != "drives" or name in ("drive", "address")]
+        shown += columns or _SHOWN[of]
+        names = ", ".join(_quoted(name) for name in shown)
+        condition = where.strip() or "true"
+        order = ", ".join(_quoted(name) for name in shown if name in ("drive", "index"))
+        # on a line of its own, so that a comment ends with it
+        fulfilled = f"FROM {of} WHERE (\n{condition}\n)"
+        rows = self._ask(f"SELECT {names}, count(*) OVER () AS found {fulfilled} ORDER BY {order} LIMIT {limit}", where)
+        total = int(rows[0][-1]) if rows else 0
+        return QueryResult(tuple(shown), tuple(tuple(map(_plain, row[:-1])) for row in rows), total)
+
+    def scores(self) -> list[tuple[str, str, float, float]]:
+        """(drive, score, over, under) of every drive."""
+        rows = self._duckdb.execute('SELECT drive, score, "over", under FROM scores ORDER BY ALL').fetchall()
+        return [(str(drive), str(score), float(over), float(under)) for drive, score, over, under in rows]
+
+    def drives(self) -> list[str]:
+        """Names of all drives."""
+        return [str(row[0]) for row in self._duckdb.execute("SELECT drive FROM drives ORDER BY drive").fetchall()]
+
+    def rows(self, table: QueryTable) -> list[dict[str, Any]]:
+        """Every row of a table, by column."""
+        found = self._duckdb.execute(f"SELECT * FROM {table} ORDER BY ALL")
+        names = [column[0] for column in found.description or ()]
+        return [dict(zip(names, row, strict=True)) for row in found.fetchall()]
+
+    def arrow(self, table: QueryTable, columns: str) -> Any:
+        """Columns of a table, named in SQL, as a pyarrow table."""
+        return self._duckdb.sql(f"SELECT {columns} FROM {table}").to_arrow_table()
+
+    def histogram(self, where: str, of: QueryTable, column: str, bins: int = 24) -> tuple[list[float], list[int]]:
+        """(bins + 1) edges and how many values of a column, of what fulfils a condition, lie between them. Raises what
+        ``find`` raises."""
+        name, condition = _quoted(column), where.strip() or "true"
+        values = f"SELECT {name}::DOUBLE AS v FROM {of} WHERE (\n{condition}\n) AND isfinite({name}::DOUBLE)"
+        low, high = self._ask(f"SELECT min(v), max(v) FROM ({values})", where)[0]
+        if low is None:
+            return [], []
+        width = (high - low) / bins or 1.0
+        place = f"least({bins - 1}, floor((v - {low!r}) / {width!r}))::INT"
+        counts = dict(self._ask(f"SELECT {place} AS b, count(*) FROM ({values}) GROUP BY b", where))
+        return [low + n * width for n in range(bins + 1)], [int(counts.get(n, 0)) for n in range(bins)]
+
+    def _ask(self, sql: str, where: str) -> list[tuple[Any, ...]]:
+        try:
+            statements = self._duckdb.extract_statements(sql)
+            if len(statements) != 1 or statements[0].type != duckdb.StatementType.SELECT:
+                raise BadInput(f"{where!r}: expected one condition")
+            return self._duckdb.execute(statements[0]).fetchall()
+        except duckdb.Error as error:
+            raise BadInput(f"{where!r}: {_reason(error)}") from None
+
+    def _shut_in(self) -> None:
+        """Questions may come from a page: they read the batch's folder only."""
+        if self.store.folder is None:
+            self._duckdb.register_filesystem(self.store.system)
+            self._duckdb.execute("SET allowed_directories = [$1]", [f"{self.store.address}/packed/"])
+        else:
+            self._duckdb.execute("SET allowed_directories = [$1]", [f"{self.store.folder}/packed/"])
+        for setting in ("autoinstall_known_extensions", "autoload_known_extensions", "enable_external_access"):
+            self._duckdb.execute(f"SET {setting} = false")
+        self._duckdb.execute("SET lock_configuration = true")
+
+    def _make_view(self, shape: TableShape) -> None:
+        files = [self._path(packed_file(shape.name, self.run, number)) for number in self._numbers]
+        source = f"read_parquet([{', '.join(_text(file) for file in files)}])"
+        if shape.name in ("drives", "scores"):
+            self._duckdb.execute(f"CREATE VIEW {shape.name} AS SELECT * FROM {source}")
+            return
+        # one row a drive: joining it costs little, and lets a condition name what belongs to the drive
+        about = "d.address, d.title, d.brightness, d.mean_speed_mps, d.mean_bend_radpm"
+        time = "" if any(column.name == "t_s" for column in shape.columns) else ", (t.t_ns - d.began_ns) / 1e9 AS t_s"
+        named = ""
+        if shape.name == "events":
+            kinds = "".join(f", kind = {_text(kind)} AS {_quoted(kind)}" for kind in event_kinds())
+            named = kinds + "".join(f", coalesce({sql}, false) AS {name}" for name, sql in NAMED.items())
+        self._duckdb.execute(
+            f"CREATE VIEW {shape.name} AS SELECT t.*, {about}{time}{named} FROM {source} t JOIN drives d USING (drive)"
+        )
+
+    def _path(self, name: str) -> str:
+        if self.store.folder is not None:
+            return str(self.store.folder / name)
+        return str(self.store.system.unstrip_protocol(self.store.path(name)))
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"'
+
+
+def _text(value: str) -> str:
+    return "'" + value.replace("'", "''") + "'"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return round(value, 4) if math.isfinite(value) else None
+    return value
+
+
+def _reason(error: Exception) -> str:
+    """What DuckDB says, without the place in the statement that was made of the condition."""
+    first = str(error).strip().splitlines()[0]
+    _, _, said = first.partition(": ")
+    return (said or first).rstrip()

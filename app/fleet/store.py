@@ -1,0 +1,116 @@
+"""The folder of a batch, on a disk or in a store: whole files by name, written so that none is ever seen half."""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Iterable
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from pipeline.common.errors import BadInput
+from pipeline.common.remote_files import NotReachable, file_system, is_remote, patiently
+
+
+class Store:
+    """Files below one address. Any process; it can be sent to another one.
+
+    Raises BadInput for a place that cannot be used, ``Overloaded`` while a store goes on failing.
+    """
+
+    def __init__(self, address: str) -> None:
+        self.address = address.rstrip("/") if is_remote(address) else str(Path(address).expanduser().absolute())
+
+    def __reduce__(self) -> tuple[type[Store], tuple[str]]:
+        return Store, (self.address,)
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder on this machine; None in a store."""
+        return None if is_remote(self.address) else Path(self.address)
+
+    @cached_property
+    def _opened(self) -> tuple[Any, str]:
+        return file_system(self.address)
+
+    @property
+    def system(self) -> Any:
+        """fsspec's file system of it."""
+        return self._opened[0]
+
+    def path(self, name: str) -> str:
+        """What a file is called in ``system``."""
+        return f"{self._opened[1].rstrip('/')}/{name}"
+
+    def read(self, name: str) -> bytes | None:
+        """A whole file; None where there is none."""
+        try:
+            return patiently(lambda: bytes(self.system.cat_file(self.path(name))), f"{self.address}/{name}")
+        except NotReachable:
+            if self.has(name):
+                raise
+            return None
+
+    def has(self, name: str) -> bool:
+        """Whether there is such a file."""
+        self.system.invalidate_cache()
+        return bool(patiently(lambda: self.system.isfile(self.path(name)), f"{self.address}/{name}"))
+
+    def write(self, name: str, data: bytes) -> None:
+        """Write a whole file, in place of any that is there: afterwards the old one or the new one is there, whatever
+        happens meanwhile. BadInput when the place cannot be written."""
+        if self.folder is None:
+            patiently(lambda: self.system.pipe_file(self.path(name), data), f"{self.address}/{name}")
+            return
+        target = self.folder / name
+        part = target.with_name(f".{target.name}.{uuid.uuid4().hex}")
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                with part.open("wb") as file:
+                    file.write(data)
+                    file.flush()
+                    os.fsync(file.fileno())
+                part.replace(target)
+            finally:
+                part.unlink(missing_ok=True)
+        except OSError as error:
+            raise BadInput(f"{target} cannot be written: {error.strerror or error}") from None
+
+    def put(self, name: str, file: Path) -> None:
+        """The same of a file of this machine, which is not held in memory."""
+        if self.folder is None:
+            patiently(lambda: self.system.put_file(str(file), self.path(name)), f"{self.address}/{name}")
+            return
+        target = self.folder / name
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            part = target.with_name(f".{target.name}.{uuid.uuid4().hex}")
+            try:
+                with file.open("rb") as source, part.open("wb") as written:
+                    while block := source.read(1 << 20):
+                        written.write(block)
+                    written.flush()
+                    os.fsync(written.fileno())
+                part.replace(target)
+            finally:
+                part.unlink(missing_ok=True)
+        except OSError as error:
+            raise BadInput(f"{target} cannot be written: {error.strerror or error}") from None
+
+    def names(self, folder: str) -> list[str]:
+        """Every file below a folder, as names of this store, sorted; none where there is no such folder."""
+        if self.folder is not None:
+            top = self.folder / folder
+            found = [
+                str(Path(parent, name).relative_to(self.folder)) for parent, _, names in os.walk(top) for name in names
+            ]
+            return sorted(name for name in found if not name.rpartition("/")[2].startswith("."))
+        self.system.invalidate_cache()
+        start = self.path("")
+        try:
+            listed: Iterable[str] = patiently(lambda: self.system.find(self.path(folder)), f"{self.address}/{folder}")
+        except NotReachable:
+            return []
+        return sorted(name.removeprefix(start) for name in listed)

@@ -1,0 +1,102 @@
+"""A space of parameters: which sets of them are tried, and which of those are best."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipeline.common.errors import BadInput
+from pipeline.common.user_file_errors import parse_yaml
+from pipeline.params import ParamsError
+
+MOST_POINTS = 1000
+"""Sets of parameters that a sweep may try."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One parameter and what it may be."""
+
+    name: str
+    """Such as ``cluster.tolerance_m``."""
+    values: tuple[Any, ...]
+    """Those that a grid takes."""
+    low: float | None = None
+    """Lower end of a range, in the parameter's unit; None for a list of values."""
+    high: float | None = None
+    """Upper end, which a grid includes; None for a list of values."""
+
+
+def parse_axis(text: str) -> Axis:
+    """``NAME=a,b,c``, or ``NAME=low:high:count``. BadInput for anything else."""
+    name, separator, values = text.partition("=")
+    if not separator or not name or not values:
+        raise BadInput(f"--over {text}: expected NAME=VALUE,VALUE,… or NAME=LOW:HIGH:COUNT")
+    parts = values.split(":")
+    if len(parts) == 1:
+        return Axis(name, tuple(parse_yaml(value, f"--over {text}", ParamsError) for value in values.split(",")))
+    try:
+        low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
+    except (ValueError, IndexError):
+        raise BadInput(f"--over {text}: expected NAME=LOW:HIGH:COUNT, three numbers") from None
+    if len(parts) != 3 or not low < high or not 2 <= count <= MOST_POINTS:
+        raise BadInput(f"--over {text}: expected LOW below HIGH, and a COUNT of 2 to {MOST_POINTS}")
+    return Axis(name, tuple(round(float(value), 6) for value in np.linspace(low, high, count)), low, high)
+
+
+def grid(axes: Sequence[Axis]) -> list[dict[str, Any]]:
+    """Every combination. BadInput for too many."""
+    count = int(np.prod([len(axis.values) for axis in axes]))
+    if count > MOST_POINTS:
+        raise BadInput(f"the grid has {count} points, more than {MOST_POINTS}; use fewer values, or --latin N")
+    names = [axis.name for axis in axes]
+    return [dict(zip(names, values, strict=True)) for values in itertools.product(*(axis.values for axis in axes))]
+
+
+def latin(axes: Sequence[Axis], count: int, seed: int = 0) -> list[dict[str, Any]]:
+    """So many combinations, each parameter spread evenly over its range (Latin hypercube): of a range any value, of a
+    list each value about equally often. The same seed gives the same."""
+    from scipy.stats.qmc import LatinHypercube  # takes half a second to import
+
+    shares = LatinHypercube(len(axes), rng=np.random.default_rng(seed)).random(count)
+    return [{axis.name: _at(axis, float(share)) for axis, share in zip(axes, row, strict=True)} for row in shares]
+
+
+def _at(axis: Axis, share: float) -> Any:
+    if axis.low is None or axis.high is None:
+        return axis.values[min(int(share * len(axis.values)), len(axis.values) - 1)]
+    return round(axis.low + share * (axis.high - axis.low), 6)
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One set of parameters and what came of it."""
+
+    run: str
+    """Name of the run."""
+    changes: Mapping[str, Any]
+    """Parameter → value."""
+    missed: float | None
+    """Of a score of which less is better: leads that are missed."""
+    phantoms: float | None
+    """The same of phantom leads."""
+
+
+def front(tried: Sequence[Tried]) -> list[Tried]:
+    """Those that no other one beats in one score without losing in the other, by the first score. One of several equal
+    ones."""
+    known = [each for each in tried if each.missed is not None and each.phantoms is not None]
+    best: list[Tried] = []
+    for each in sorted(known, key=lambda one: (one.missed, one.phantoms, one.run)):
+        if not best or each.phantoms < best[-1].phantoms:  # type: ignore[operator]
+            best.append(each)
+    return best
+
+
+def best_of(tried: Sequence[Tried]) -> Tried | None:
+    """The one of the front with the least sum of both scores; None where none has both."""
+    return min(front(tried), key=lambda one: (one.missed or 0.0) + (one.phantoms or 0.0), default=None)

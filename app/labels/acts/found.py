@@ -1,0 +1,25 @@
+"""What acts come to whose numbers are found in the sensors' data. Clients do not send these."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from app.labels.acts.request_fields import OfTrack, Placed, Word
+
+
+class AddSightings(OfTrack):
+    """What a ``Propagate`` becomes once the track is followed."""
+
+    kind: Literal["propagate"]
+    sightings: tuple[Placed, ...]
+    """The new keyframes."""
+
+
+class AddMeasured(Placed):
+    """What a ``Lift`` becomes once the vehicle is measured."""
+
+    kind: Literal["lift"]
+    label: Word
+    """Class of the vehicle."""
+    how: str
+    """What it was measured by, in words."""

@@ -1,0 +1,63 @@
+"""Who has done how much on each recording: acts, and the time between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from sqlalchemy import select
+
+from app.labels.store.database import Database
+from app.labels.store.tables import ActRow, DriveRow
+
+_PAUSE_S = 120.0
+"""Whoever does nothing for longer does something else."""
+_NO_ACTS = ("params", "nudge")
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Of one person on one recording."""
+
+    title: str
+    """The recording."""
+    frames: int
+    """Its length."""
+    person: str
+    """Who."""
+    acts: int
+    """Changes of labels; undo and redo count too: they are work."""
+    active_s: float
+    """Time from act to act, without pauses of more than two minutes."""
+
+    @property
+    def acts_per_frame(self) -> float:
+        return self.acts / self.frames
+
+    @property
+    def s_per_frame(self) -> float:
+        return self.active_s / self.frames
+
+
+def efforts(database: Database) -> list[Effort]:
+    """By recording and person, in order."""
+    with database.reading() as connection:
+        rows = connection.execute(
+            select(DriveRow.id, DriveRow.title, DriveRow.count, ActRow.person, ActRow.t_unix_ms)
+            .join(DriveRow, DriveRow.id == ActRow.drive_id)
+            .where(DriveRow.count > 0, ActRow.kind.not_in(_NO_ACTS))
+            .order_by(DriveRow.title, DriveRow.id, ActRow.person, ActRow.number)
+        ).all()
+    found: dict[tuple[Any, ...], list[int]] = {}
+    for drive, title, count, person, t_unix_ms in rows:
+        found.setdefault((drive, title, count, person), []).append(t_unix_ms)
+    return [
+        Effort(title, count, person, len(times), _active_s(times)) for (_, title, count, person), times in found.items()
+    ]
+
+
+def _active_s(times_ms: Sequence[int]) -> float:
+    steps = ((after - before) / 1e3 for before, after in pairwise(sorted(times_ms)))
+    return sum(step for step in steps if step <= _PAUSE_S)

@@ -1,0 +1,116 @@
+"""Work over many recordings: whose each is, how far it is, and which is worth most to label next."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from typing import Any, Literal, cast, get_args
+
+from sqlalchemy import Connection, func, or_, select
+
+from app.labels.errors import ActRefused, NoSuchLabel
+from app.labels.store.database import Database
+from app.labels.store.items import read_items
+from app.labels.store.tables import DriveRow, SightingRow, WorkRow
+from pipeline.labels.model import LabelTrack, LeadRange
+
+State = Literal["open", "labeling", "review", "done"]
+"""open: nobody has begun. review: labelled, and a second person looks at it."""
+STATES: tuple[State, ...] = get_args(State)
+
+
+@dataclass(frozen=True)
+class Work:
+    """One recording."""
+
+    key: str
+    """Of its content."""
+    title: str
+    """For people."""
+    uri: str
+    """Where it was first opened."""
+    frames: int
+    """How many it has."""
+    person: str
+    """Who labels it; empty for nobody yet."""
+    state: State
+    """How far it is."""
+    labelled: float
+    """Share of its frames in which somebody has said who leads."""
+    reviewed: float
+    """Share of its accepted tracks that a second person has reviewed."""
+    proposals: int
+    """Tracks that nobody has looked at."""
+    worth: float
+    """What there is to learn from a label, per frame: proposals that may as well be none, weighted by how unsure they
+    are (1 at a confidence of 0.5, 0 at 0 and 1), and frames in which it is unclear who leads."""
+
+
+def queue(database: Database) -> list[Work]:
+    """What is to do first, then what is done; of each, what is worth most first."""
+    with database.reading() as connection:
+        rows = connection.execute(
+            select(
+                DriveRow.id, DriveRow.key, DriveRow.title, DriveRow.uri, DriveRow.count, WorkRow.person, WorkRow.state
+            )
+            .outerjoin(WorkRow, WorkRow.drive_id == DriveRow.id)
+            .where(DriveRow.count > 0)
+        ).all()
+        found = [_work(connection, row, row.person or "", cast("State", row.state or "open")) for row in rows]
+    return sorted(found, key=lambda each: (each.state == "done", -each.worth, each.title, each.key))
+
+
+def put(database: Database, drive: str, by: str, *, person: str | None = None, state: State | None = None) -> Work:
+    """Assign a recording, or say how far it is. drive: its title, address or key. NoSuchLabel for none or several of
+    that name; ActRefused where who labels it would say that it is reviewed, or nothing was labelled."""
+    with database.reading() as connection:
+        matches = or_(DriveRow.key == drive, DriveRow.title == drive, DriveRow.uri == drive)
+        rows = connection.execute(select(DriveRow.id, DriveRow.key).where(matches, DriveRow.count > 0)).all()
+    if len(rows) != 1:
+        raise NoSuchLabel(f"{drive}: {len(rows) or 'no'} such recordings; `cipv labels queue` lists them")
+    number, key = rows[0]
+    now = next(each for each in queue(database) if each.key == key)
+    new = replace(now, person=now.person if person is None else person, state=now.state if state is None else state)
+    if state == "done" and by == new.person:
+        raise ActRefused(f"{by} labels {now.title}: a second person must say that it is done")
+    if state in ("review", "done") and not now.labelled:
+        raise ActRefused(f"{now.title}: nothing is labelled yet")
+    if person and state is None and now.state == "open":
+        new = replace(new, state="labeling")
+    values = {"drive_id": number, "person": new.person, "state": new.state, "t_unix_ms": int(time.time() * 1000)}
+    with database.writing() as connection:
+        if not database.insert_new(connection, WorkRow, values):
+            connection.execute(
+                WorkRow.__table__.update().where(WorkRow.drive_id == number).values(values)  # type: ignore[attr-defined]
+            )
+    return new
+
+
+def _work(connection: Connection, drive: Any, person: str, state: State) -> Work:
+    tracks = [cast("LabelTrack", item.value) for item in read_items(connection, drive.id, "track").values()]
+    leads = [cast("LeadRange", item.value) for item in read_items(connection, drive.id, "lead").values()]
+    counted = connection.execute(
+        select(SightingRow.track, func.count()).where(SightingRow.drive_id == drive.id).group_by(SightingRow.track)
+    )
+    lengths = {track: count for track, count in counted}
+    proposed = [each for each in tracks if each.state == "proposed"]
+    accepted = [each for each in tracks if each.state in ("accepted", "corrected")]
+    unsure = sum(
+        (1.0 - abs(2.0 * each.confidence - 1.0)) * lengths.get(each.id, 0)
+        for each in proposed
+        if each.confidence is not None
+    )
+    unclear = sum(each.last + 1 - each.first for each in leads if each.state == "proposed" and each.lead == "unknown")
+    said = sum(each.last + 1 - each.first for each in leads if each.state in ("accepted", "corrected"))
+    return Work(
+        drive.key,
+        drive.title,
+        drive.uri,
+        drive.count,
+        person,
+        state,
+        min(said / drive.count, 1.0),
+        sum(bool(each.reviewer) for each in accepted) / len(accepted) if accepted else 0.0,
+        len(proposed),
+        round((unsure + unclear) / drive.count, 3),
+    )

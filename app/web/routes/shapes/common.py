@@ -1,0 +1,66 @@
+"""What the shapes of all routes share."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+Point = tuple[float, float]
+
+
+def file_of(media_type: str) -> dict[int | str, dict[str, Any]]:
+    """What OpenAPI says of an answer that is a file."""
+    return {200: {"content": {media_type: {}}, "description": "The file"}}
+
+
+class ApiModel(BaseModel):
+    """What OpenAPI describes: the line under each field is its description there."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+
+class Exact(ApiModel):
+    """No key more than is said."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class StatusJson(Exact):
+    """An answer without content."""
+
+    status: str
+    """What became of the request."""
+
+
+class Refusal(Exact):
+    """Why a request was refused."""
+
+    detail: str
+    """One sentence."""
+
+
+class CuboidJson(Exact):
+    """A cuboid in the ego frame, metres."""
+
+    center: tuple[float, float, float]
+    """x, y, z of its middle."""
+    size: tuple[float, float, float]
+    """Length, width, height."""
+    yaw_rad: float
+    """Heading, positive to the left of ego x."""
+
+
+class MetricJson(ApiModel):
+    """One figure of two runs."""
+
+    name: str
+    """For people."""
+    unit: str
+    """Empty for counts."""
+    base: float | None
+    """Of the run compared with; null where it is undefined."""
+    run: float | None
+    """Of the run itself; null where it is undefined."""
+    better: Literal["higher", "lower"] | None
+    """Which direction is good; null where neither is."""

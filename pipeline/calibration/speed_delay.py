@@ -1,0 +1,103 @@
+"""How late the car's own speed is, against the LiDAR's odometry: while it accelerates or brakes, a late speed lags."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.common.errors import BadInput
+from pipeline.types import F64
+
+REACH_MS, STEP_MS = 500.0, 20.0
+FEWEST, WINDOW = 40, 7
+"""Pairs without which nothing is said; how many are averaged."""
+BLOCK_NS = 1_000_000_000
+BOOTSTRAPS = 60
+TOLD_MS = 45.0
+"""With a larger standard deviation nothing is said."""
+OFF_MPS = 0.3
+"""Displacements that are off by more count less."""
+
+
+class NoDelay(BadInput):
+    """A drive that tells nothing of the speed's delay; the text says why."""
+
+
+class SpeedPair(NamedTuple):
+    """Between two sweeps."""
+
+    t_ns: int
+    """Half-way."""
+    lidar_mps: float
+    """By the displacement of the LiDAR."""
+    recorded_mps: float
+    """The car's own speed that the later frame has."""
+    recorded_ns: int
+    """When that was measured, as it says."""
+
+
+@dataclass(frozen=True)
+class SpeedDelay:
+    """When the car's own speed really was measured, against what it says."""
+
+    ego_offset_ms: float
+    """What to add to its times; negative where it is late."""
+    sigma_ms: float
+    """Standard deviation."""
+    scale: float
+    """What the LiDAR drives for each metre of the car's own speed."""
+
+
+def forward_m(before: F64, after: F64) -> float:
+    """Way along x between two (4, 4) poses, at half of the turn."""
+    step = np.linalg.inv(before) @ after
+    half = 0.5 * float(np.arctan2(step[1, 0], step[0, 0]))
+    return float(step[0, 3]) * cos(half) + float(step[1, 3]) * sin(half)
+
+
+def speed_delay(pairs: Sequence[SpeedPair]) -> SpeedDelay:
+    """The shift of the recorded speed that fits the LiDAR's best. NoDelay where the drive cannot tell."""
+    if len(pairs) < FEWEST:
+        raise NoDelay("too little ego speed beside LiDAR odometry: its delay is not told")
+    begin_ns = pairs[0].t_ns
+    t_s, at_s = np.array([(each.t_ns - begin_ns, each.recorded_ns - begin_ns) for each in pairs]).T / 1e9
+    lidar, recorded = np.array([(each.lidar_mps, each.recorded_mps) for each in pairs]).T
+    shifts_s = np.arange(-REACH_MS, REACH_MS + STEP_MS / 2, STEP_MS) / 1e3
+    kept = (t_s > at_s[0] + REACH_MS / 1e3) & (t_s < at_s[-1] - REACH_MS / 1e3)
+    if np.count_nonzero(kept) < FEWEST:
+        raise NoDelay("too short a drive to tell the delay of ego speed")
+    # recorded at t, had its times been later by the shift
+    seen = np.array([np.interp(t_s[kept], at_s + shift, recorded) for shift in shifts_s])
+    number = np.array([each.t_ns // BLOCK_NS for each in pairs])
+    scale = float(np.sum(lidar[kept]) / max(float(np.sum(np.interp(t_s[kept], at_s, recorded))), 1e-3))
+    # single displacements are noisy, but what one is too long the next is too short
+    seen, lidar = _averaged(seen), _averaged(lidar[kept])
+    number = number[kept][WINDOW // 2 :][: len(lidar)]
+    off = np.abs(lidar - scale * seen)
+    cost = np.where(off < OFF_MPS, 0.5 * off**2, OFF_MPS * (off - 0.5 * OFF_MPS))
+    sums = np.array([cost[:, number == block].sum(axis=1) for block in np.unique(number)])
+    best = _lowest(sums.sum(axis=0), shifts_s)
+    rng = np.random.default_rng(0)
+    drawn = [_lowest(sums[rng.integers(0, len(sums), len(sums))].sum(axis=0), shifts_s) for _ in range(BOOTSTRAPS)]
+    sigma_ms = max(1e3 * float(np.std(drawn, ddof=1)), 1.0)
+    if sigma_ms > TOLD_MS or abs(best) > (REACH_MS - STEP_MS) / 1e3:
+        raise NoDelay("ego speed changes too little to tell its delay; accelerate and brake")
+    return SpeedDelay(round(1e3 * best, 1), round(sigma_ms, 1), round(scale, 4))
+
+
+def _averaged(values: F64) -> F64:
+    """Means of ``WINDOW`` neighbours along the last axis."""
+    sums = np.cumsum(np.pad(values, [(0, 0)] * (values.ndim - 1) + [(1, 0)]), axis=-1)
+    return np.asarray((sums[..., WINDOW:] - sums[..., :-WINDOW]) / WINDOW)
+
+
+def _lowest(cost: F64, at: F64) -> float:
+    """Where the cost is least, between the steps."""
+    k = int(np.argmin(cost))
+    low, high = max(k - 2, 0), min(k + 3, len(cost))
+    a, b, _ = np.polyfit(at[low:high], cost[low:high], 2)
+    return float(np.clip(-b / (2 * a), at[low], at[high - 1])) if a > 0 else float(at[k])

@@ -1,0 +1,136 @@
+"""Files of a store that is reached by address (``s3://…``, ``gs://…``, ``az://…``, ``http://…``), read in place by
+range requests. fsspec and the store's own package come with the extra ``fleet``, and are imported on use."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import time
+from collections.abc import Callable
+from typing import Any, BinaryIO, TypeVar
+
+from pipeline.common.errors import BadInput, first_line
+from pipeline.common.user_files import FOLDERS_VARIABLE, Overloaded
+
+ADDRESSES_VARIABLE = "CIPV_ADDRESSES"
+"""Beginnings of addresses that may be opened where ``CIPV_FOLDERS`` is set, separated by spaces."""
+BLOCK_BYTES = 256 << 10
+"""What is read at least with one request: heads of records lie near one another."""
+_TRIES = 6
+_FIRST_PAUSE_S = 0.1
+_T = TypeVar("_T")
+
+
+class NotReachable(BadInput):
+    """An address that cannot be used: nothing there, no right to it, or no package for its store."""
+
+
+def is_remote(address: str) -> bool:
+    """Whether an address names a store, and not a file of this machine."""
+    scheme, separator, _ = address.partition("://")
+    return bool(separator) and scheme.isalnum() and len(scheme) > 1 and scheme != "file"
+
+
+def file_system(address: str) -> tuple[Any, str]:
+    """fsspec's file system for an address, and the path in it. NotReachable when the package for it is missing."""
+    try:
+        from fsspec.core import url_to_fs
+    except ImportError:
+        raise NotReachable(
+            f"{address}: stores need fsspec; `make install` installs it with the extra `fleet`"
+        ) from None
+    try:
+        system, path = url_to_fs(address)
+    except (ImportError, ValueError) as error:
+        raise NotReachable(f"{address}: {first_line(error)}") from None
+    return system, path
+
+
+def patiently(work: Callable[[], _T], what: str) -> _T:
+    """The answer of a store, asked again a few times while it fails. NotReachable when nothing is there or access is
+    denied; Overloaded when the store goes on failing."""
+    pause_s = _FIRST_PAUSE_S
+    for left in reversed(range(_TRIES)):
+        try:
+            return work()
+        except FileNotFoundError:
+            raise NotReachable(f"{what}: nothing is there") from None
+        except PermissionError as error:
+            raise NotReachable(f"{what}: access denied: {first_line(error)}") from None
+        except Exception as error:  # each store's package has errors of its own, without a common base
+            if not left:
+                raise Overloaded(f"{what}: the store fails: {first_line(error)}") from error
+            time.sleep(pause_s)
+            pause_s *= 2
+    raise AssertionError("unreachable")
+
+
+def facts(address: str) -> dict[str, Any]:
+    """What a store says of a file: at least its ``size`` in bytes. Raises what ``patiently`` raises."""
+    system, path = file_system(address)
+    found = patiently(lambda: system.info(path), address)
+    return dict(found)
+
+
+def version_of(facts: dict[str, Any]) -> str:
+    """What is another when a file of a store was replaced: its ETag, else its time of change; with its size."""
+    tag = facts.get("ETag") or facts.get("etag") or facts.get("LastModified") or facts.get("mtime") or ""
+    return f"{facts.get('size')} {tag}"
+
+
+def open_remote(address: str) -> BinaryIO:
+    """A file of a store, open for reading. Raises what ``patiently`` raises, and OSError where addresses are not
+    allowed."""
+    check_allowed_address(address)
+    system, path = file_system(address)
+    size = patiently(lambda: system.info(path), address).get("size")
+    if not size:
+        raise NotReachable(f"{address}: an empty file, or one whose size the store does not say")
+    return io.BufferedReader(_Ranges(system, path, address, int(size)), BLOCK_BYTES)
+
+
+def check_allowed_address(address: str) -> None:
+    """OSError for an address that is not one of ``CIPV_ADDRESSES`` where ``CIPV_FOLDERS`` limits what may be opened."""
+    if os.environ.get(FOLDERS_VARIABLE) is None:
+        return
+    allowed = os.environ.get(ADDRESSES_VARIABLE, "").split()
+    if ".." in address.split("/") or not any(address.startswith(each) for each in allowed):
+        raise OSError(errno.EACCES, "outside the allowed addresses", address)
+
+
+class _Ranges(io.RawIOBase):
+    """A file of which each read is one request."""
+
+    def __init__(self, system: Any, path: str, address: str, size: int) -> None:
+        self._system, self._path, self._address, self._size = system, path, address, size
+        self._at = 0
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        begin = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._size}[whence]
+        self._at = max(0, begin + offset)
+        return self._at
+
+    def tell(self) -> int:
+        return self._at
+
+    def readinto(self, buffer: Any) -> int:
+        end = min(self._at + len(buffer), self._size)
+        if end <= self._at:
+            return 0
+        data = patiently(lambda: self._range(self._at, end), self._address)
+        buffer[: len(data)] = data
+        self._at += len(data)
+        return len(data)
+
+    def _range(self, start: int, end: int) -> bytes:
+        data = bytes(self._system.cat_file(self._path, start=start, end=end))
+        if len(data) != end - start:
+            raise OSError(errno.EIO, f"{len(data)} bytes instead of {end - start}")
+        return data

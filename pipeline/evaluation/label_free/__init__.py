@@ -1,0 +1,1 @@
+"""Scores of a drive without labels, from what became known of its objects later."""

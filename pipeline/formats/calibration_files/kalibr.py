@@ -1,0 +1,90 @@
+"""Kalibr: a folder with ``camchain.yaml``, of which the first camera is read, and ``transform.yaml`` with
+``T_cam_lidar`` (4, 4), since Kalibr itself knows no LiDAR. ``T_lidar_cam``, the inverse, is read too, and both also
+from the camera's part of the chain. Names as in Kalibr's documentation of its YAML formats."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from pipeline.common.geometry import inverse
+from pipeline.common.user_file_errors import read_yaml
+from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
+from pipeline.types import F64, CameraCalibration
+from pipeline.types.source import SourceError
+
+CHAIN, TRANSFORM = "camchain.yaml", "transform.yaml"
+_CAMERA = "cam0"
+_FORWARD, _BACKWARD = ("T_cam_lidar", "T_camera_lidar"), ("T_lidar_cam", "T_lidar_camera")
+
+
+def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
+    chain = _mapping(path / CHAIN)
+    camera = chain.get(_CAMERA)
+    if not isinstance(camera, dict):
+        raise SourceError(f"{CHAIN}: no {_CAMERA}")
+    try:
+        model, distortion_model = str(camera["camera_model"]), str(camera.get("distortion_model", "none"))
+        fu, fv, pu, pv = (float(each) for each in camera["intrinsics"])
+        distortion = np.asarray(camera.get("distortion_coeffs", []), dtype=np.float64)
+        width, height = (int(each) for each in camera["resolution"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise SourceError(f"{CHAIN}: {_CAMERA} is incomplete: {error}") from None
+    if model != "pinhole":
+        raise SourceError(f"{CHAIN}: camera_model {model} is not supported; calibrate as pinhole")
+    if np.any(distortion) and (distortion_model != "radtan" or distortion.shape != (4,)):
+        raise SourceError(f"{CHAIN}: {distortion.size} numbers of {distortion_model} distortion; radtan with 4 is read")
+    if not np.all(np.isfinite(distortion)) or min(width, height) < 16:
+        raise SourceError(f"{CHAIN}: distortion_coeffs or resolution make no sense")
+    K = camera_matrix([[fu, 0.0, pu], [0.0, fv, pv], [0.0, 0.0, 1.0]], f"{CHAIN}: intrinsics")
+    lens = distortion if np.any(distortion) else np.zeros(0)
+    found = CameraCalibration(K, lens, _transform(path, camera), width, height)
+    check_looks_ahead(found, str(path.name))
+    return found
+
+
+def write(path: Path, camera: CameraCalibration) -> None:
+    """SourceError for a lens that radtan's four numbers cannot say."""
+    if camera.distortion.size > 4 and np.any(camera.distortion[4:]):
+        raise SourceError("Kalibr's radtan has four distortion coefficients; this camera has more")
+    K, lens = camera.K, np.zeros(4)
+    lens[: min(4, camera.distortion.size)] = camera.distortion[:4]
+    chain = {
+        _CAMERA: {
+            "camera_model": "pinhole",
+            "intrinsics": [float(each) for each in (K[0, 0], K[1, 1], K[0, 2], K[1, 2])],
+            "distortion_model": "radtan",
+            "distortion_coeffs": lens.tolist(),
+            "resolution": [camera.width, camera.height],
+            "rostopic": "/camera/image_raw",
+        }
+    }
+    path.mkdir(parents=True, exist_ok=True)
+    transform = {_FORWARD[0]: camera.T_camera_ego.tolist()}
+    for name, content in ((CHAIN, chain), (TRANSFORM, transform)):
+        text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
+        (path / name).write_text(text, encoding="utf-8")
+
+
+def _transform(path: Path, camera: Mapping[str, Any]) -> F64:
+    """T_camera_lidar of the chain, else of the file beside it."""
+    places = [(CHAIN, camera)]
+    if (path / TRANSFORM).is_file():
+        places.append((TRANSFORM, _mapping(path / TRANSFORM)))
+    for file, given in places:
+        for name in (*_FORWARD, *_BACKWARD):
+            if name in given:
+                T = rigid_transform(given[name], f"{file}: {name}")
+                return T if name in _FORWARD else inverse(T)
+    raise SourceError(f"{path.name}: no {_FORWARD[0]} in {CHAIN} or {TRANSFORM}")
+
+
+def _mapping(path: Path) -> dict[str, Any]:
+    loaded = read_yaml(path, path.name, SourceError)
+    if not isinstance(loaded, dict):
+        raise SourceError(f"{path.name}: expected names with values")
+    return loaded

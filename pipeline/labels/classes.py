@@ -1,0 +1,169 @@
+"""The class list of a project: a YAML file with classes, sub-classes, their names in each export, and attributes."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pipeline.common.errors import BadInput
+from pipeline.common.user_files import read_regular
+from pipeline.labels.model import LabelSet
+from pipeline.vision.classes import canonical
+
+FILE = Path(__file__).with_name("classes.yaml")
+"""Those of a project that has none of its own."""
+EXPORTS = ("kitti", "nuscenes", "coco", "openlabel")
+OF_SIGHTINGS = ("occlusion", "truncation")
+"""Attributes that a sighting has a place for."""
+_LARGEST = 1 << 20
+_LONGEST_NAME = 40
+_MOST = 200
+
+
+@dataclass(frozen=True)
+class LabelClass:
+    """What a vehicle or person can be."""
+
+    name: str
+    """As people choose it."""
+    of: str | None = None
+    """The class that it is a kind of; None for one of its own."""
+    size: tuple[float, float, float] | None = None
+    """Usual length, width, height in metres."""
+    exports: Mapping[str, str] = field(default_factory=dict)
+    """What formats call it, by one of ``EXPORTS``."""
+
+
+@dataclass(frozen=True)
+class ClassList:
+    """Of a project, in the order in which people choose."""
+
+    classes: Mapping[str, LabelClass]
+    """By name."""
+    attributes: Mapping[str, tuple[str, ...]]
+    """Values by name."""
+
+    def named(self, word: str) -> str:
+        """The class that a word means: one of the list, else as detectors call it."""
+        lowered = word.strip().lower().replace("_", " ")
+        return lowered if lowered in self.classes else canonical(word)
+
+    def base(self, name: str) -> str:
+        """The class that it is scored as."""
+        known = self.classes.get(name)
+        return known.of or name if known is not None else name
+
+    def written(self, name: str, export: str) -> str:
+        """What an export calls it."""
+        known = self.classes.get(name)
+        return known.exports.get(export, known.of or name) if known is not None else name
+
+
+@cache
+def default_classes() -> ClassList:
+    """Those that come with the program."""
+    return read_classes(FILE)
+
+
+def read_classes(path: Path) -> ClassList:
+    """A class list from a file. BadInput in one sentence when it is none."""
+    try:
+        body = yaml.safe_load(read_regular(path, _LARGEST))
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        raise BadInput(f"{path}: not YAML: {str(error).splitlines()[0]}") from None
+    try:
+        return _parsed(body)
+    except ValueError as error:
+        raise BadInput(f"{path}: {error}") from None
+
+
+def as_bases(labels: LabelSet, classes: ClassList) -> LabelSet:
+    """Each track as the class that it is scored as."""
+    return replace(labels, tracks=tuple(replace(track, label=classes.base(track.label)) for track in labels.tracks))
+
+
+def as_written(labels: LabelSet, classes: ClassList, name: str) -> tuple[LabelSet, tuple[str, ...]]:
+    """The labels with their classes as a format calls them, and a sentence for each that is another. name: of the
+    format; where it holds any class as it is, nothing changes."""
+    export = "kitti" if name == "kitti-tracking" else name
+    if export not in EXPORTS or export == "openlabel":
+        return labels, ()
+    changed = Counter(
+        (track.label, called)
+        for track in labels.tracks
+        if (called := classes.written(track.label, export)) != track.label
+    )
+    tracks = tuple(replace(track, label=classes.written(track.label, export)) for track in labels.tracks)
+    notes = tuple(
+        f"{count:,} {'track' if count == 1 else 'tracks'} of class {label!r} written as {called!r}"
+        for (label, called), count in sorted(changed.items())
+    )
+    return replace(labels, tracks=tracks), notes
+
+
+def _parsed(body: Any) -> ClassList:
+    _require(isinstance(body, dict) and isinstance(body.get("classes"), dict) and body["classes"], "no classes")
+    unknown = sorted(map(str, body.keys() - {"classes", "attributes"}))
+    _require(not unknown, f"unknown entry {unknown[0][:_LONGEST_NAME]!r}" if unknown else "")
+    _require(len(body["classes"]) <= _MOST, f"more than {_MOST} classes")
+    classes = {each.name: each for each in (_class(name, said) for name, said in body["classes"].items())}
+    for each in classes.values():
+        parent = classes.get(each.of) if each.of is not None else None
+        _require(each.of is None or parent is not None, f"{each.name} is of {each.of!r}, which is no class here")
+        _require(parent is None or parent.of is None, f"{each.name} is of {each.of!r}, which is a sub-class itself")
+    attributes = body.get("attributes") or {}
+    _require(isinstance(attributes, dict), "attributes must be a mapping of names to lists of values")
+    return ClassList(classes, {_name(name): _values(name, values) for name, values in attributes.items()})
+
+
+def _class(name: Any, said: Any) -> LabelClass:
+    said = {} if said is None else said
+    named = _name(name)
+    _require(isinstance(said, dict), f"{named}: must be a mapping")
+    unknown = sorted(map(str, said.keys() - {"of", "size", "exports"}))
+    _require(not unknown, f"{named}: unknown entry {unknown[0][:_LONGEST_NAME]!r}" if unknown else "")
+    size, exports = said.get("size"), said.get("exports") or {}
+    _require(isinstance(exports, dict), f"{named}: exports must be a mapping of formats to names")
+    for export, called in exports.items():
+        _require(export in EXPORTS, f"{named}: unknown export {str(export)[:_LONGEST_NAME]!r}")
+        _require(isinstance(called, str) and bool(called.strip()), f"{named}: {export} must be a name")
+    return LabelClass(
+        named,
+        _name(said["of"]) if said.get("of") is not None else None,
+        _size(named, size) if size is not None else None,
+        exports,
+    )
+
+
+def _size(name: str, size: Any) -> tuple[float, float, float]:
+    is_one = isinstance(size, list) and len(size) == 3 and all(type(side) in (int, float) for side in size)
+    _require(is_one and all(math.isfinite(side) and 0.05 < side <= 100 for side in size), f"{name}: invalid size")
+    return float(size[0]), float(size[1]), float(size[2])
+
+
+def _values(name: Any, values: Any) -> tuple[str, ...]:
+    is_list = isinstance(values, list) and 0 < len(values) <= _MOST
+    _require(
+        is_list and all(isinstance(each, str) for each in values), f"{name}: values must be a list of texts in quotes"
+    )
+    return tuple(_name(value) for value in values)
+
+
+def _name(name: Any) -> str:
+    is_one = isinstance(name, str) and name.strip() == name and 0 < len(name) <= _LONGEST_NAME and name.isprintable()
+    _require(is_one, f"{str(name)[:_LONGEST_NAME]!r} is no name")
+    return str(name)
+
+
+def _require(holds: bool, otherwise: str) -> None:
+    if not holds:
+        raise ValueError(otherwise)

@@ -1,0 +1,1 @@
+"""Cuboids from points: one sweep or several laid over each other, snapped, refined, carried on."""

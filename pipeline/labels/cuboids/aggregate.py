@@ -1,0 +1,207 @@
+"""A vehicle's points of several sweeps laid over each other, in the ego frame of one of them.
+
+Sixteen beams show a few dozen points of a car in a sweep; a dozen sweeps show its outline. A standing vehicle's points
+are carried along by own motion, a moving one's by its own track: which of both holds them together better is tried, as
+nobody has to have said whether it stands. Each sweep is then registered to those that are laid already (Open3D's
+point-to-point ICP, Besl and McKay 1992, seen from above: beams pass over a body at other heights in each sweep).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import Cuboid
+from pipeline.labels.cuboids.points_of import Clustered, points_of
+from pipeline.labels.headings import Pose
+from pipeline.labels.model import Sighting
+from pipeline.types import F32, F64
+
+MOST_SWEEPS = 12
+"""More blur the outline: what is laid on what was laid before drifts."""
+_FEWEST_POINTS = 6
+"""In a sweep, to be registered."""
+_MOST_REGISTERED = 150
+"""Of a sweep's points; a car near by has a thousand, which say no more."""
+_REACHES_M = (0.5, 0.35)
+"""Where a sweep shows a side that those before did not, its points must not be drawn to the corner of theirs: only
+those count in the end that are near."""
+_CARRIED_REACHES_M = (0.3,)
+"""Own motion is so near at once."""
+_CAP_M = 0.5
+_MOST_MOVED_M, _MOST_TURNED_RAD = 0.8, math.radians(8.0)
+"""A registration that says more than this has slid along a side."""
+_TIGHTER = 0.95
+"""A standing vehicle's points lie closer together over own motion than along its track, if it stands."""
+
+Planar = tuple[float, float, float]
+"""x, y, yaw of one frame in another one, seen from above."""
+Sweeps = Callable[[int], Clustered | None]
+"""The sweep of a frame; None where there is none."""
+
+
+@dataclass(frozen=True)
+class Aggregate:
+    """A vehicle's points of several sweeps."""
+
+    frame: int
+    """The frame in whose ego frame everything is."""
+    points: F32
+    """(N, 4) x y z intensity."""
+    eyes: F64
+    """(K, 2) where the ego origin was at each sweep, as seen from the vehicle."""
+    placed: Mapping[int, Planar]
+    """How each sweep's ego frame lies in this one, so that the vehicle is in one place."""
+
+
+def aggregated(
+    sightings: Sequence[Sighting], frame: int, sweeps: Sweeps, poses: Mapping[int, Pose] | None = None
+) -> Aggregate | None:
+    """The points of a vehicle in the ego frame of a frame in which it has a cuboid; None where there are no points.
+
+    Args:
+        sightings: of one track. Those without a cuboid count for nothing.
+        frame: the frame.
+        sweeps: asked for the frames that are taken.
+        poses: own motion, where it is known.
+    """
+    cuboids = {each.frame: each.cuboid for each in sightings if each.cuboid is not None}
+    clouds: dict[int, F32] = {}
+    for at in _chosen(sorted(cuboids), frame):
+        sweep = sweeps(at)
+        points = points_of(sweep, cuboids[at]) if sweep is not None else None
+        if points is not None and len(points) >= _FEWEST_POINTS:
+            clouds[at] = points
+    if not clouds:
+        return None
+    along = {at: _between(cuboids[frame], cuboids[at]) for at in clouds}
+    found = _laid(frame, clouds, along, _REACHES_M)
+    carried = _by_own_motion(frame, clouds, poses or {})
+    if carried is not None and len(clouds) > 1:
+        standing = _laid(frame, clouds, carried, _CARRIED_REACHES_M)
+        if _looseness_m(standing) < _TIGHTER * _looseness_m(found):
+            found = standing
+    points = np.vstack([_moved(clouds[at], found[at]) for at in found])
+    return Aggregate(frame, points.astype(np.float32), np.array([found[at][:2] for at in found]), found.poses)
+
+
+class _Laid(dict[int, Planar]):
+    """Planar transforms by frame, with the clouds that they move."""
+
+    def __init__(self, clouds: Mapping[int, F32], poses: Mapping[int, Planar]) -> None:
+        super().__init__(poses)
+        self.clouds = clouds
+
+    @property
+    def poses(self) -> dict[int, Planar]:
+        return dict(self)
+
+
+def _chosen(frames: Sequence[int], frame: int) -> list[int]:
+    """The nearest in time on both sides."""
+    return sorted(sorted(frames, key=lambda each: abs(each - frame))[:MOST_SWEEPS])
+
+
+def _laid(frame: int, clouds: Mapping[int, F32], guesses: Mapping[int, Planar], reaches_m: Sequence[float]) -> _Laid:
+    """Each cloud registered to those that are nearer in time to the frame."""
+    order = sorted(clouds, key=lambda each: abs(each - frame))
+    first, *rest = order
+    placed: dict[int, Planar] = {first: guesses[first]}
+    model = _moved(clouds[first], guesses[first])[:, :2]
+    for at in rest:
+        placed[at] = _registered(clouds[at][:, :2].astype(np.float64), model, guesses[at], reaches_m)
+        model = np.vstack([model, _moved(clouds[at], placed[at])[:, :2]])
+    return _Laid(clouds, placed)
+
+
+def _registered(points: F64, model: F64, guess: Planar, reaches_m: Sequence[float]) -> Planar:
+    """A cloud onto others, seen from above; the guess where that says nothing certain."""
+    library = _library()
+    registration = library.pipelines.registration
+    source, target = _cloud(library, _turned(_some(points), guess)), _cloud(library, _some(model, MOST_SWEEPS))
+    T = np.eye(4)
+    for reach_m in reaches_m:
+        how = registration.TransformationEstimationPointToPoint()
+        T = np.asarray(registration.registration_icp(source, target, reach_m, T, how).transformation)
+    turn_rad = math.atan2(T[1, 0], T[0, 0])
+    middle = _turned(points, guess).mean(axis=0)
+    shifted = T[:2, :2] @ middle + T[:2, 3] - middle
+    is_certain = T[2, 2] > 0.0 and abs(turn_rad) <= _MOST_TURNED_RAD and float(np.hypot(*shifted)) <= _MOST_MOVED_M
+    if not is_certain:
+        return guess
+    x, y = T[:2, :2] @ np.array(guess[:2]) + T[:2, 3]
+    return float(x), float(y), guess[2] + turn_rad
+
+
+def _by_own_motion(frame: int, clouds: Mapping[int, F32], poses: Mapping[int, Pose]) -> dict[int, Planar] | None:
+    """Where each frame was as seen from the first one, if own motion is known between all of them."""
+    here = poses.get(frame)
+    there = {at: poses[at] for at in clouds if at in poses}
+    if here is None or len(there) < len(clouds) or any(each.stretch != here.stretch for each in there.values()):
+        return None
+    c, s = math.cos(here.yaw_rad), math.sin(here.yaw_rad)
+    return {
+        at: (
+            c * (each.x - here.x) + s * (each.y - here.y),
+            c * (each.y - here.y) - s * (each.x - here.x),
+            each.yaw_rad - here.yaw_rad,
+        )
+        for at, each in there.items()
+    }
+
+
+def _between(here: Cuboid, there: Cuboid) -> Planar:
+    """What carries a cuboid of another frame onto this one's."""
+    turn_rad = math.remainder(here.yaw_rad - there.yaw_rad, math.tau)
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    x, y = there.center[:2]
+    return here.center[0] - (c * x - s * y), here.center[1] - (s * x + c * y), turn_rad
+
+
+def _looseness_m(laid: _Laid) -> float:
+    """How far points of a sweep are from those of the others, in the mean."""
+    moved = [_moved(laid.clouds[at], laid[at])[:, :2] for at in laid]
+    apart = []
+    for index, each in enumerate(moved):
+        others = np.vstack([cloud for other, cloud in enumerate(moved) if other != index])
+        apart.append(np.minimum(cKDTree(others).query(_some(each))[0], _CAP_M))
+    return float(np.concatenate(apart).mean())
+
+
+def _turned(points: F64, by: Planar) -> F64:
+    c, s = math.cos(by[2]), math.sin(by[2])
+    return np.asarray(points @ np.array([[c, s], [-s, c]]) + by[:2])
+
+
+def _moved(points: F32, by: Planar) -> F64:
+    out = points.astype(np.float64)
+    out[:, :2] = _turned(out[:, :2], by)
+    return out
+
+
+def _some(points: F64, sweeps: int = 1) -> F64:
+    """Every so many of them, where there are more than are needed."""
+    return points[:: -(-len(points) // (sweeps * _MOST_REGISTERED)) or 1]
+
+
+def _cloud(library: Any, points: F64) -> Any:
+    flat = np.column_stack([points, np.zeros(len(points))])
+    return library.geometry.PointCloud(library.utility.Vector3dVector(flat))
+
+
+@cache
+def _library() -> Any:
+    """Open3D, which takes seconds to import. BadInput, in one sentence, when a system library that it needs is
+    missing."""
+    try:
+        import open3d
+    except (ImportError, OSError) as error:
+        raise BadInput(f"Open3D cannot be loaded ({str(error).splitlines()[0]})") from None
+    return open3d

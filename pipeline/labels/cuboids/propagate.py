@@ -1,0 +1,222 @@
+"""A track carried on beyond its ends, from sweep to sweep.
+
+From the frame at an end, where a person or the pipeline has put it, the vehicle is predicted over the ground (constant
+velocity; a single frame is tried both standing and driving along with us), and laid on the points that are found there.
+It keeps its size, and lies on its points as it did at the end: what a hand has seen besides them stays. Where no points
+are, the prediction stands in, but for no longer than ``_BLIND_S``: there the track ends.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.common.clips import begins_clip
+from pipeline.common.geometry import Cuboid
+from pipeline.labels.cuboids.aggregate import Sweeps
+from pipeline.labels.cuboids.outline import misfit_m, outline, placed
+from pipeline.labels.cuboids.points_of import Clustered, points_of
+from pipeline.labels.headings import Pose
+from pipeline.labels.link_identities import MAX_GAP_S
+from pipeline.labels.model import Sighting
+from pipeline.types import F32, F64
+
+MOST_FRAMES = 100
+"""At once, on each side: a person looks at what came of it."""
+FARTHEST_M = 60.0
+"""Farther off, sixteen beams touch no car often enough to follow it."""
+_FEWEST_POINTS = 6
+_BLIND_S = 1.0
+_NEAR_M, _NEAR_MPS = 0.6, 1.0
+"""What is found farther from where the vehicle was foreseen is another one; the farther, the longer since the last."""
+_LONGER_M = 0.9
+_LOOSEST_M = 0.45
+"""Points that lie farther off its sides, in the mean, are of no vehicle of its size."""
+_GAIN = 0.6
+"""Of what was found against what was foreseen: points on a bumper wander by 10 cm."""
+_STEPS = 6
+"""The last frames that tell the velocity."""
+_HELD_M = 0.4
+"""How far a hand's cuboid may lie off the points, and stay so."""
+_ORIGIN = np.zeros((1, 2))
+
+
+@dataclass(frozen=True)
+class _At:
+    """The vehicle over the ground at a time."""
+
+    t_s: float
+    xy: F64
+    yaw_rad: float
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What was found, and how far, in the mean, from where it was foreseen."""
+
+    found: tuple[Sighting, ...]
+    off_m: float
+
+
+def propagated(
+    sightings: Sequence[Sighting], t_ns: Sequence[int], sweeps: Sweeps, poses: Mapping[int, Pose], *, forward: bool
+) -> tuple[Sighting, ...]:
+    """The frames after the last cuboid of a track, or before the first, in which it was found: none of them a keyframe.
+
+    Args:
+        sightings: of the track, by ascending frame.
+        t_ns: of every frame of the recording.
+        sweeps: of every frame.
+        poses: own motion, where it is known; elsewhere what stands is taken to keep its place before us.
+        forward: in time.
+    """
+    cuboids = [(each.frame, each.cuboid) for each in sightings if each.cuboid is not None]
+    if not cuboids:
+        return ()
+    ends = cuboids[-_STEPS:] if forward else cuboids[:_STEPS][::-1]
+    start, cuboid = ends[-1]
+    step = 1 if forward else -1
+    frames = _reachable(start, step, t_ns, poses)
+    if len(cuboids) > 1:
+        past = [_over_ground(each, _pose(poses, at), t_ns[at]) for at, each in ends if _joins(at, start, t_ns, poses)]
+        return _carried(start, cuboid, past, frames, t_ns, sweeps, poses).found
+    stands = _over_ground(cuboid, _pose(poses, start), t_ns[start])
+    runs = [
+        _carried(start, cuboid, past, frames, t_ns, sweeps, poses)
+        for past in ([stands], [stands, _along_with_us(cuboid, start, frames, t_ns, poses)])
+    ]
+    longest = max(len(each.found) for each in runs)
+    likely = (each for each in runs if 2 * len(each.found) >= longest)
+    return min(likely, key=lambda each: each.off_m).found
+
+
+def _carried(
+    start: int,
+    cuboid: Cuboid,
+    past: list[_At],
+    frames: Sequence[int],
+    t_ns: Sequence[int],
+    sweeps: Sweeps,
+    poses: Mapping[int, Pose],
+) -> _Run:
+    """past: where it was, oldest first; one that is ahead in time is where it would be."""
+    foreseen_by = sorted(past, key=lambda each: abs(each.t_s - t_ns[start] / 1e9), reverse=True)
+    held = _held_off(cuboid, sweeps(start))
+    found: list[Sighting] = []
+    seen = 0
+    off_m: list[float] = []
+    last_seen_s = t_ns[start] / 1e9
+    track = list(foreseen_by)
+    for frame in frames:
+        t_s, pose = t_ns[frame] / 1e9, _pose(poses, frame)
+        expected = _in_ego(_foreseen(track, t_s), pose, cuboid)
+        if math.hypot(*expected.center[:2]) > FARTHEST_M or abs(t_s - last_seen_s) > _BLIND_S:
+            break
+        sweep = sweeps(frame)
+        points = points_of(sweep, expected) if sweep is not None else None
+        since_s = abs(t_s - track[-1].t_s)
+        laid = _laid(expected, points, held, _NEAR_M + _NEAR_MPS * since_s)
+        if laid is not None:
+            last_seen_s, seen = t_s, len(found) + 1
+            off_m.append(math.dist(laid.center[:2], expected.center[:2]))
+        now = _mixed(expected, laid, _GAIN) if laid is not None else expected
+        found.append(Sighting(frame, _stood(now, sweep), keyframe=False))
+        track = [*track[-_STEPS + 1 :], _over_ground(now, pose, t_ns[frame])]
+    return _Run(tuple(found[:seen]), float(np.mean(off_m)) if off_m else math.inf)
+
+
+def _laid(expected: Cuboid, points: F32 | None, held: F64, near_m: float) -> Cuboid | None:
+    """On its points; None where these are too few or of something else."""
+    if points is None or len(points) < _FEWEST_POINTS:
+        return None
+    found = outline(points, _ORIGIN, expected.yaw_rad)
+    if (found.span > np.array(expected.size[:2]) + _LONGER_M).any():
+        return None
+    x, y = np.array(placed(found, expected, expected.size[:2], found.seen)) + found.axes.T @ held
+    laid = expected._replace(center=(float(x), float(y), expected.center[2]))
+    off_m = math.dist(laid.center[:2], expected.center[:2])
+    is_it = off_m <= near_m and misfit_m(points, _ORIGIN, laid) <= _LOOSEST_M
+    return laid if is_it else None
+
+
+def _held_off(cuboid: Cuboid, sweep: Clustered | None) -> F64:
+    """(2,) how far along its axes a cuboid was put off its points."""
+    points = points_of(sweep, cuboid) if sweep is not None else None
+    if points is None or len(points) < _FEWEST_POINTS:
+        return np.zeros(2)
+    found = outline(points, _ORIGIN, cuboid.yaw_rad)
+    off = found.axes @ (np.array(cuboid.center[:2]) - placed(found, cuboid, cuboid.size[:2], found.seen))
+    return np.asarray(np.where(np.abs(off) <= _HELD_M, off, 0.0))
+
+
+def _foreseen(track: Sequence[_At], t_s: float) -> _At:
+    """Straight on, as the last places were driven through."""
+    last = track[-1]
+    if len(track) < 2:
+        return _At(t_s, last.xy, last.yaw_rad)
+    times = np.array([each.t_s for each in track]) - last.t_s
+    if np.ptp(times) <= 0.0:
+        return _At(t_s, last.xy, last.yaw_rad)
+    speed = np.polyfit(times, np.array([each.xy for each in track]), 1)[0]
+    return _At(t_s, last.xy + speed * (t_s - last.t_s), last.yaw_rad)
+
+
+def _reachable(start: int, step: int, t_ns: Sequence[int], poses: Mapping[int, Pose]) -> list[int]:
+    """The frames beyond one, as far as the same clip goes."""
+    frames: list[int] = []
+    at = start
+    while len(frames) < MOST_FRAMES and 0 <= at + step < len(t_ns) and _joins(at + step, at, t_ns, poses):
+        at += step
+        frames.append(at)
+    return frames
+
+
+def _joins(a: int, b: int, t_ns: Sequence[int], poses: Mapping[int, Pose]) -> bool:
+    """Whether two frames are of one clip, and comparable over the ground."""
+    first, last = sorted((a, b))
+    if any(begins_clip(t_ns[at], t_ns[at + 1], MAX_GAP_S) for at in range(first, last)):
+        return False
+    here, there = poses.get(a), poses.get(b)
+    return (here.stretch if here else None) == (there.stretch if there else None)
+
+
+def _along_with_us(
+    cuboid: Cuboid, start: int, frames: Sequence[int], t_ns: Sequence[int], poses: Mapping[int, Pose]
+) -> _At:
+    """Where it would be in the next frame if it kept its distance."""
+    at = frames[0] if frames else start
+    return _over_ground(cuboid, _pose(poses, at), t_ns[at])
+
+
+def _pose(poses: Mapping[int, Pose], frame: int) -> Pose:
+    return poses.get(frame) or Pose(0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _over_ground(cuboid: Cuboid, pose: Pose, t_ns: int) -> _At:
+    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    x, y, _ = cuboid.center
+    return _At(t_ns / 1e9, np.array([pose.x + c * x - s * y, pose.y + s * x + c * y]), cuboid.yaw_rad + pose.yaw_rad)
+
+
+def _in_ego(place: _At, pose: Pose, cuboid: Cuboid) -> Cuboid:
+    dx, dy = place.xy[0] - pose.x, place.xy[1] - pose.y
+    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    yaw_rad = math.remainder(place.yaw_rad - pose.yaw_rad, math.tau)
+    return Cuboid((float(c * dx + s * dy), float(c * dy - s * dx), cuboid.center[2]), cuboid.size, yaw_rad)
+
+
+def _mixed(a: Cuboid, b: Cuboid, share: float) -> Cuboid:
+    x, y = (u + share * (v - u) for u, v in zip(a.center[:2], b.center[:2], strict=True))
+    return a._replace(center=(x, y, a.center[2]))
+
+
+def _stood(cuboid: Cuboid, sweep: Clustered | None) -> Cuboid:
+    """On the road there, where that is known."""
+    if sweep is None:
+        return cuboid
+    x, y, _ = cuboid.center
+    bottom = float(sweep.ground.height(np.array([[x, y]]))[0])
+    return cuboid._replace(center=(x, y, bottom + cuboid.size[2] / 2)) if math.isfinite(bottom) else cuboid

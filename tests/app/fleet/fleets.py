@@ -1,0 +1,61 @@
+"""A small fleet of sessions, batches of it in this process and on Dask, and what is compared of them."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from app.fleet.batch.addresses import recordings
+from app.fleet.batch.keys import RunKey, code_digest, networks_digest
+from app.fleet.batch.plan import Plan, PlannedWork, begin, work_of
+from app.fleet.batch.tables import TIMINGS
+from app.fleet.batch.work import Job
+from app.fleet.store import Store
+from pipeline.detection import DetectorChoice
+from pipeline.params import Params
+from pipeline.recording.save import save
+from pipeline.sources import open_source
+
+CHOICE = DetectorChoice(lanes="off", far_px=None)
+DRIVES = {"near": ("sim:cut_in", 60, 67), "far": ("sim:straight", 0, 7), "left": ("sim:cut_out", 40, 47)}
+"""Name → scenario, first and last frame."""
+BAD = "torn.mcap"
+
+
+def make_fleet(folder: Path, copies: int = 1) -> Path:
+    """Sessions of eight frames, and one that is none."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, (uri, first, last) in DRIVES.items():
+        save(open_source(uri), folder / f"{name}-0.mcap", first, last)
+        for number in range(1, copies):
+            (folder / f"{name}-{number}.mcap").write_bytes((folder / f"{name}-0.mcap").read_bytes())
+    (folder / BAD).write_bytes(b"\x89MCAP0\r\n" + bytes(200))
+    return folder
+
+
+def plan_of(*addresses: object, params: Params | None = None, sensors: str = "both", results: bool = False) -> Plan:
+    """A batch of these addresses."""
+    return Plan(tuple(map(str, addresses)), params or Params(), CHOICE, sensors, 16, results)  # type: ignore[arg-type]
+
+
+def begun(plan: Plan, out: object) -> PlannedWork:
+    """What is to be done of a batch that has been written down."""
+    store = Store(str(out))
+    work = work_of(plan, store)
+    begin(plan, work, store)
+    return work
+
+
+def job_of(address: str, out: object, **more: object) -> Job:
+    """One drive, as a batch with the default parameters would run it."""
+    key = RunKey(code_digest(), networks_digest(CHOICE), Params(), "both", 16)
+    (recording,) = recordings([address])
+    return Job(recording, key, CHOICE, Store(str(out)), **more)  # type: ignore[arg-type]
+
+
+def contents(out: object) -> dict[str, str]:
+    """Name → SHA-256 of every file of a batch that equal inputs give in equal bytes: all but the timings, and what
+    names the folder's own place."""
+    store = Store(str(out))
+    names = [name for name in store.names("") if f"/{TIMINGS.name}/" not in name and name != "batch.json"]
+    return {name: hashlib.sha256(store.read(name) or b"").hexdigest() for name in names}

@@ -1,0 +1,178 @@
+"""Packs of tables, and questions to them."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from app.bench.fleet_tables import make_tables
+from app.cli import main
+from app.fleet.batch.tables import EQUAL_TABLES, EVENTS, FRAMES
+from app.fleet.batch.work import run_drive
+from app.fleet.find import FleetTables
+from app.fleet.pack import finished, pack, packed_file, packs_of
+from app.fleet.store import Store
+from pipeline.common.errors import BadInput
+from tests.app.fleet.fleets import BAD, begun, plan_of
+
+
+@pytest.fixture(scope="module")
+def batch(fleet: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A batch of the fleet with LiDAR alone, packed."""
+    out = tmp_path_factory.mktemp("batch")
+    work = begun(plan_of(fleet, sensors="lidar"), out)
+    for job in work.jobs:
+        run_drive(job)
+    pack(Store(str(out)), work.key.name)
+    return out
+
+
+@pytest.fixture
+def tables(batch: Path) -> FleetTables:
+    return FleetTables(Store(str(batch)))
+
+
+def parts(batch: Path, name: str) -> list[dict]:
+    """Every row of a table, from the files of drives."""
+    return [
+        row | {"drive": file.parent.name.removeprefix("drive=")}
+        for file in sorted(batch.glob(f"tables/{name}/*/*/part.parquet"))
+        for row in pq.read_table(file, partitioning=None).to_pylist()
+    ]
+
+
+def test_packs_hold_the_rows_of_every_drive(batch: Path, tables: FleetTables):
+    for shape in EQUAL_TABLES:
+        packed = pq.read_table(batch / packed_file(shape.name, tables.run, 0), partitioning=None)
+        assert packed.column_names == ["drive", *(column.name for column in shape.columns)]
+        assert packed.to_pylist() == [{"drive": row["drive"]} | row for row in parts(batch, shape.name)]
+
+
+def test_a_bad_recording_has_no_rows(batch: Path, tables: FleetTables):
+    drives = finished(tables.store, tables.run)
+    assert len(drives) == 9
+    assert not [drive for drive in drives if Path(BAD).stem in drive]
+
+
+def test_events_by_name_and_by_sql(batch: Path, tables: FleetTables):
+    events = parts(batch, EVENTS.name)
+    kinds = {row["kind"] for row in events}
+    assert "first_acquisition" in kinds
+    for kind in kinds:
+        assert tables.find(kind).total == sum(row["kind"] == kind for row in events)
+    near = tables.find("first_acquisition AND distance_m < 30", columns=("distance_m",))
+    expected = [row for row in events if row["kind"] == "first_acquisition" and row["distance_m"] < 30]
+    assert near.total == len(expected) > 0
+    assert near.columns == ("drive", "address", "index", "t_s", "distance_m")
+    assert sorted(row[4] for row in near.rows) == pytest.approx(sorted(row["distance_m"] for row in expected), abs=1e-3)
+    assert all(Path(row[1]).is_file() for row in near.rows)
+
+
+def test_frames_objects_and_drives(batch: Path, tables: FleetTables):
+    frames = parts(batch, FRAMES.name)
+    assert tables.find("cipv_id IS NOT NULL", "frames").total == sum(row["cipv_id"] is not None for row in frames)
+    assert tables.find("cipv", "objects").total == tables.find("cipv_id IS NOT NULL", "frames").total
+    assert tables.find("", "drives").total == 9
+    assert len(tables.find("", "frames", limit=5).rows) == 5
+    assert tables.find("", "frames", limit=5).total == 72
+
+
+def test_a_histogram_counts_what_was_found(tables: FleetTables):
+    edges, counts = tables.histogram("cipv_id IS NOT NULL", "frames", "distance_m", 8)
+    assert (len(edges), len(counts)) == (9, 8)
+    assert sum(counts) == tables.find("cipv_id IS NOT NULL", "frames").total
+    assert tables.histogram("false", "frames", "distance_m") == ([], [])
+
+
+def test_drives_that_come_later_are_packed_too_and_replaced_ones_anew(fleet: Path, tmp_path: Path):
+    inside, out = tmp_path / "in", tmp_path / "out"
+    inside.mkdir()
+    for name in ("near", "far"):
+        shutil.copy(fleet / f"{name}-0.mcap", inside / f"{name}.mcap")
+        run = _run_all(inside, out)
+    store = Store(str(out))
+    (first,) = packs_of(store, run)
+    assert len(first.marks) == 2
+    before = FleetTables(store).find("", "frames").total
+    (inside / "near.mcap").write_bytes((fleet / "left-0.mcap").read_bytes())
+    _run_all(inside, out)
+    (second,) = packs_of(store, run)
+    assert second.marks.keys() == first.marks.keys()
+    assert second.marks != first.marks
+    assert FleetTables(store).find("", "frames").total == before
+    assert {row["t_ns"] for row in parts(out, FRAMES.name) if row["drive"].startswith("near")} != set()
+    near = next(drive for drive in second.marks if drive.startswith("near"))
+    packed = pq.read_table(out / packed_file("frames", run, 0), partitioning=None).to_pylist()
+    assert [row["t_ns"] for row in packed if row["drive"] == near] == [
+        row["t_ns"] for row in parts(out, FRAMES.name) if row["drive"] == near
+    ]
+
+
+def _run_all(inside: Path, out: Path) -> str:
+    work = begun(plan_of(inside, sensors="lidar"), out)
+    for job in work.jobs:
+        run_drive(job)
+    pack(Store(str(out)), work.key.name)
+    return work.key.name
+
+
+WRONG = {
+    "no column": "no_such_column > 1",
+    "another file": "drive IN (SELECT column0 FROM read_csv('/etc/passwd'))",
+    "a second statement": "true) ; DROP VIEW events; SELECT (1",
+    "writing": "true); COPY (SELECT 1) TO '/tmp/x.csv'; SELECT (true",
+    "a setting": "true); SET enable_external_access = true; SELECT (true",
+    "unfinished": "cut_in AND (",
+}
+
+
+@pytest.mark.parametrize("where", WRONG.values(), ids=WRONG)
+def test_what_is_no_condition_is_refused_in_one_line(tables: FleetTables, where: str):
+    with pytest.raises(BadInput) as refused:
+        tables.find(where)
+    assert "\n" not in str(refused.value).removeprefix(repr(where))
+
+
+def test_only_the_packs_can_be_read(tables: FleetTables, batch: Path):
+    with pytest.raises(BadInput, match="Cannot access"):
+        tables.find(f"address IN (SELECT content FROM read_text('{batch / 'batch.json'}'))")
+
+
+def test_cipv_find_prints_rows_with_links(batch: Path, capsys: pytest.CaptureFixture[str]):
+    assert _cipv("find", "first_acquisition", "--out", batch, "--json") == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["total"] == len(said["rows"]) > 0
+    assert said["rows"][0]["link"].startswith("http://127.0.0.1:8420/#uri=")
+    assert _cipv("find", "first_acquisition", "--out", batch) == 0
+    assert "acquired at" in capsys.readouterr().out
+
+
+def test_cipv_find_says_what_is_wrong_in_one_line(batch: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    for typed in (
+        ("find", "nonsense", "--out", batch),
+        ("find", "cut_in", "--out", tmp_path),
+        ("find", "cut_in", "--out", batch, "--run", "nothing"),
+        ("find", "cut_in", "--out", batch, "--limit", "0"),
+    ):
+        assert _cipv(*typed) == 2
+        said = capsys.readouterr().err.strip().splitlines()
+        assert len(said) == 1, said
+        assert said[0].startswith("cipv: ")
+
+
+def _cipv(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as end:
+        main([str(argument) for argument in arguments])
+    return int(end.value.code or 0)
+
+
+def test_made_up_tables_are_as_real_ones(tmp_path: Path):
+    """What the benchmark asks of them."""
+    rows = make_tables(tmp_path, 3)
+    tables = FleetTables(Store(str(tmp_path)))
+    assert tables.find("", "frames").total == rows["frames"] == 1800
+    assert 0 < tables.find("cut_in", "events").total < rows["events"]

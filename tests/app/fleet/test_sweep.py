@@ -1,0 +1,87 @@
+"""Spaces of parameters, the front, and a sweep over two drives."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.cli import main
+from app.fleet.sweep import Tried, best_of, front, grid, latin, parse_axis
+from pipeline.common.errors import BadInput
+from pipeline.params import Params, from_yaml
+
+
+def test_a_grid_has_every_combination():
+    axes = [parse_axis("cluster.tolerance_m=0.6:1.2:3"), parse_axis("fusion.assignment=greedy,hungarian")]
+    points = grid(axes)
+    assert len(points) == 6
+    assert points[0] == {"cluster.tolerance_m": 0.6, "fusion.assignment": "greedy"}
+    assert {point["cluster.tolerance_m"] for point in points} == {0.6, 0.9, 1.2}
+
+
+def test_a_latin_hypercube_spreads_each_parameter_evenly():
+    axes = [parse_axis("a.x=0:10:5"), parse_axis("a.y=1,2")]
+    points = latin(axes, 20)
+    assert points == latin(axes, 20)
+    assert np.histogram([point["a.x"] for point in points], bins=20, range=(0, 10))[0].tolist() == [1] * 20
+    assert [sum(point["a.y"] == value for point in points) for value in (1, 2)] == [10, 10]
+
+
+WRONG = ("cluster.tolerance_m", "=1", "a.x=", "a.x=1:2", "a.x=2:1:3", "a.x=1:2:1", "a.x=1:2:3:4", "a.x=a:b:c")
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_what_is_no_axis_is_refused(text: str):
+    with pytest.raises(BadInput, match="--over"):
+        parse_axis(text)
+
+
+def test_a_grid_that_is_too_large_is_refused():
+    with pytest.raises(BadInput, match="--latin"):
+        grid([parse_axis("a.x=0:1:50"), parse_axis("a.y=0:1:50")])
+
+
+def test_the_front_is_what_no_other_one_beats():
+    scores = {"a": (1.0, 5.0), "b": (2.0, 2.0), "c": (3.0, 3.0), "d": (4.0, 0.0), "e": (2.0, 2.0), "f": (None, 0.0)}
+    tried = [Tried(run, {}, *pair) for run, pair in scores.items()]
+    assert [each.run for each in front(tried)] == ["a", "b", "d"]
+    best = best_of(tried)
+    assert best is not None
+    assert best.run == "b"
+    assert best_of([tried[-1]]) is None
+
+
+def test_a_sweep_saves_the_best_as_a_preset(fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """A LiDAR that takes fewer than 50 points for nothing misses leads that the other one finds."""
+    typed = ["sweep", str(fleet / "far-0.mcap"), str(fleet / "left-0.mcap"), "--out", str(tmp_path / "out")]
+    typed += ["--over", "cluster.min_points=50,4", "--sensors", "lidar", "--lanes", "off", "--far-view-px", "0"]
+    typed += ["--save", str(tmp_path / "best.yaml"), "--report", str(tmp_path / "sweep.html"), "--json"]
+    assert _cipv(*typed) == 0
+    said = json.loads(capsys.readouterr().out)
+    (blind, sane) = said["tried"]
+    assert (blind["set"], sane["set"]) == ({"cluster.min_points": 50}, {"cluster.min_points": 4})
+    assert blind["labelled.lead_missed"] > sane["labelled.lead_missed"]
+    assert said["best"] == sane["run"]
+    assert from_yaml(tmp_path / "best.yaml", Params()).cluster.min_points == 4
+    assert "<svg" in (tmp_path / "sweep.html").read_text(encoding="utf-8")
+
+
+def test_what_is_wrong_is_said_before_any_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    for more in (
+        (),
+        ("--over", "cluster.min_points=500"),
+        ("--over", "no.such=1"),
+        ("--over", "cluster.min_points=4,5", "--latin", "0"),
+    ):
+        assert _cipv("sweep", "sim:straight", "--out", str(tmp_path / "out"), *more) == 2
+        assert len(capsys.readouterr().err.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def _cipv(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    return int(end.value.code or 0)

@@ -1,0 +1,147 @@
+"""Fit as a person uses it: pressed, watched, cancelled, applied, undone, kept and restored; and the sliders alone."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.engine.engine import Engine
+from pipeline.params import Params, with_changes
+from pipeline.sources import open_source
+from tests.browser.conftest import WAIT_MS, CountedDetector, OpenPage, Site, opening
+from tests.browser.looks import pixels, repainted
+
+WAIT_S = WAIT_MS / 1e3
+SCENE = """
+title: a knocked camera
+seed: 4
+duration_s: 5
+rate_hz: 10
+road: {segments: [{length_m: 1000}], lanes_forward: 3}
+ego: {lane: -2, speed_mps: {0: 12}}
+detections: {boxes: {}}
+faults: {camera_yaw_deg: 2.0, camera_pitch_deg: -1.5}
+actors:
+  - {id: 1, kind: car, lane: -2, ahead_m: 18, speed_mps: {0: 10}}
+  - {id: 2, kind: car, lane: -1, ahead_m: 12, speed_mps: {0: 14}}
+  - {id: 3, kind: car, lane: -3, ahead_m: 14, speed_mps: {0: 13}}
+  - {id: 4, kind: car, lane: -1, ahead_m: 30, speed_mps: {0: 11}}
+  - {id: 5, kind: van, lane: -3, ahead_m: 28, speed_mps: {0: 12}}
+"""
+
+
+@pytest.fixture(scope="module")
+def knocked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A dashboard on a drive whose camera is turned against its calibration."""
+    scene = tmp_path_factory.mktemp("scene") / "knocked.yaml"
+    scene.write_text(SCENE)
+    engine = Engine(open_source, CountedDetector, Params(), uri=f"sim:{scene}", whole_drives=True)
+    engine.start()
+    engine.wait_for(lambda s: s.processed is not None, WAIT_S)
+    site = Site(engine, 0)
+    site.start()
+    yield site
+    site.stop()
+    engine.stop()
+
+
+@pytest.fixture
+def page(pages, knocked: Site) -> Iterator[Page]:
+    knocked.engine.control.set_params(Params(), "default")
+    knocked.engine.wait_for(  # until the run of what the test before left is gone
+        lambda s: s.params == Params() and s.drive.done == s.drive.total > 0, WAIT_S
+    )
+    with opening(pages, knocked) as begin:
+        page = begin()
+        page.keyboard.press("a")
+        yield page
+
+
+def alignment(site: Site) -> Params:
+    return site.engine.control.peek().params
+
+
+def test_a_fit_is_watched_applied_kept_and_undone(page: Page, knocked: Site):
+    page.get_by_role("button", name="Fit", exact=True).click()
+    expect(page.get_by_label("Fitting the alignment")).to_be_visible()
+    result = page.get_by_label("Fitted alignment")
+    expect(result).to_contain_text(re.compile(r"Fitted to \d+ vehicles in \d+ frames"))
+    expect(result).to_contain_text("±")
+    assert alignment(knocked) == Params(), "nothing changes before Apply"
+    result.get_by_role("button", name="Apply").click()
+    fitted = knocked.engine.wait_for(lambda s: s.params != Params(), WAIT_S).params
+    assert fitted.alignment.yaw_deg == pytest.approx(2.0, abs=0.3)
+    assert fitted.alignment.pitch_deg == pytest.approx(-1.5, abs=0.3)
+    expect(result).to_be_hidden()
+
+    page.get_by_role("button", name="Versions").click()
+    versions = page.get_by_label("Saved alignments")
+    expect(versions).to_contain_text(re.compile(r"IoU \d+ %.*Fit"))
+    expect(versions.get_by_role("button", name="Restore alignment 1")).to_be_disabled()
+    page.locator("#camera").click(position={"x": 5, "y": 5})
+    page.keyboard.press("Control+z")
+    knocked.engine.wait_for(lambda s: s.params == Params(), WAIT_S)
+    versions.get_by_role("button", name="Restore alignment 1").click()
+    knocked.engine.wait_for(lambda s: s.params == fitted, WAIT_S)
+    page.locator("#camera").click(position={"x": 5, "y": 5})
+    page.keyboard.press("Control+z")
+    knocked.engine.wait_for(lambda s: s.params == Params(), WAIT_S)
+
+    versions.get_by_label("Note").fill("as delivered")
+    versions.get_by_role("button", name="Save").click()
+    expect(versions.locator("li")).to_have_count(2)
+    expect(versions.locator("li").first).to_contain_text("as delivered")
+    for number in (1, 2):
+        versions.get_by_role("button", name=f"Delete alignment {number}").click()
+        expect(versions.locator("li")).to_have_count(2 - number)
+
+
+def test_a_fit_is_cancelled_and_changes_nothing(page: Page, knocked: Site):
+    page.get_by_role("button", name="Fit", exact=True).click()
+    page.get_by_role("button", name="Cancel", exact=True).click()
+    expect(page.get_by_role("button", name="Fit", exact=True)).to_be_visible()
+    expect(page.get_by_label("Fitted alignment")).to_be_hidden()
+    assert page.request.get(f"{knocked.address}/api/alignment/fit").json()["state"] == "none"
+    assert alignment(knocked) == Params()
+
+
+MOST_MOVES, MOST_S = 8, 120.0
+
+
+def test_the_sliders_alone_align_a_turned_rig(open_page: OpenPage, site: Site, paused_in_traffic: None):
+    turned = with_changes(Params(), {"alignment.yaw_deg": -2.0, "alignment.pitch_deg": 1.5})
+    site.engine.control.set_params(turned, "default")
+    page = open_page()
+    page.keyboard.press("a")
+    expect(page.locator("#align-bar .score")).to_have_text(re.compile(r"\d+ %"))
+    begun, moves = time.monotonic(), 0
+    while suggested := re.findall(r"(yaw|pitch) ([+-][\d.]+)°", page.locator("#align-bar .score").inner_text()):
+        for name, by in suggested:
+            slider = page.locator(f"[data-param='alignment.{name}_deg'] input[type=range]")
+            slider.fill(f"{float(slider.input_value()) + float(by):.2f}")
+            moves += 1
+        wanted = {name: float(page.locator(f"[data-param='alignment.{name}_deg'] input[type=range]").input_value())
+                  for name, _ in suggested}  # fmt: skip
+        site.engine.wait_for(
+            lambda s, wanted=wanted: all(getattr(s.params.alignment, f"{k}_deg") == v for k, v in wanted.items()),
+            WAIT_S,
+        )
+        score = page.request.get(f"{site.address}/api/alignment/score").json()
+        expect(page.locator("#align-bar .score")).to_have_text(score["brief"])
+        assert moves <= MOST_MOVES
+    took_s = time.monotonic() - begun
+    found = site.engine.control.peek().params.alignment
+    print(f"aligned by {moves} moves in {took_s:.1f} s: yaw {found.yaw_deg:.2f}°, pitch {found.pitch_deg:.2f}°")
+    assert moves > 0
+    assert abs(found.yaw_deg) <= 0.5
+    assert abs(found.pitch_deg) <= 1.75, "drawn images have few edges that end above or below"
+    assert took_s < MOST_S
+    assert "%" in page.locator(".ranges").inner_text()
+    regions = page.get_by_role("button", name="Regions")
+    shown = pixels(page, "#camera")
+    regions.click()
+    assert repainted(page, "#camera", shown), "the heat map goes"

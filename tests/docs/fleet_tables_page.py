@@ -1,0 +1,66 @@
+"""The page of a fleet's tables, from their declaration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from app.drive.events import event_kinds
+from app.fleet.batch.tables import TABLES
+from app.fleet.find import NAMED
+
+
+def tables_page(made: str) -> str:
+    """Every table of a batch with its columns."""
+    return "\n".join(_tables_lines(made)) + "\n"
+
+
+def _tables_lines(made: str) -> Iterator[str]:
+    yield from (
+        "# Tables of a fleet",
+        "",
+        made,
+        "",
+        "`cipv batch` writes these tables as Parquet; `cipv find` asks them. See [Run a fleet](../guides/fleet.md).",
+        "",
+        "| file | holds |",
+        "|---|---|",
+        "| `tables/TABLE/run=RUN/drive=DRIVE/part.parquet` | the rows of one drive |",
+        "| `packed/TABLE/run=RUN/NUMBER.parquet` | the same rows of some hundred drives, with a column `drive` |",
+        "| `done/run=RUN/DRIVE.MARK.json` | says that all files of a drive are there |",
+        "| `aside/run=RUN/DRIVE.MARK.json` | says why a recording was set aside |",
+        "| `runs/RUN.json` | what a run is made from: code, networks, parameters |",
+        "| `boxes/MARK/…` | what networks saw in a recording's images |",
+        "| `results/run=RUN/DRIVE.jsonl.zst` | with `--results`: JSON lines as of `cipv run`, without timings |",
+        "",
+        "A missing value is null. Equal recordings, code, parameters and networks give equal bytes in every file but",
+        "those of `timings`, whatever the number of workers.",
+    )
+    for table in TABLES:
+        yield from (
+            "",
+            f"## {table.name}",
+            "",
+            table.about,
+            "",
+            "| column | type | unit | meaning |",
+            "|---|---|---|---|",
+        )
+        for column in table.columns:
+            yield f"| `{column.name}` | {column.kind} | {column.unit} | {_in_cell(column.about)} |"
+    yield from (
+        "",
+        "## In questions",
+        "",
+        "`cipv find` adds to every table but `drives` the drive's `address`, `title`, `brightness`, `mean_speed_mps`",
+        "and `mean_bend_radpm`, and `t_s`. In `events` each kind of event is a column that is true for it:",
+        ", ".join(f"`{kind}`" for kind in event_kinds()) + ".",
+        "Further conditions by name:",
+        "",
+        "| name | stands for |",
+        "|---|---|",
+        *(f"| `{name}` | `{_in_cell(sql)}` |" for name, sql in NAMED.items()),
+    )
+
+
+def _in_cell(text: str) -> str:
+    return text.replace("|", "\\|")
