@@ -348,5 +348,5 @@ def test_a_page_with_its_own_playhead_gets_its_frame_again_with_other_parameters
         assert index_of(next_header(own)) == 3
         other = with_changes(Params(), {"cluster.min_points": 7})
         site.show(6, params=other)
-        again = next_header(own)
-        assert (index_of(again), sequence_of(again)) == (3, 6)
+        again = header_where(own, lambda header: sequence_of(header) == 6)  # its own exact frame may come before
+        assert index_of(again) == 3

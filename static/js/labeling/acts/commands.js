@@ -186,11 +186,15 @@ export const notHere = () =>
     span.over((frames) => act({ kind: "drop_sightings", track: id, revision, ...frames })),
   );
 
+/** Classes chosen and not yet answered, by track: a quick second press goes on from the first. @type {Map<number, string>} */
+const askedClass = new Map();
+
 /** @param {1|-1} direction */
 export const nextClass = (direction) =>
-  withTrack(({ label }) => {
-    const all = classNames();
-    if (all.length) relabel(all[(all.indexOf(label) + direction + all.length) % all.length]);
+  withTrack(({ id, label }) => {
+    const all = classNames(),
+      now = all.indexOf(askedClass.get(id) ?? label);
+    if (all.length) relabel(all[(now + direction + all.length) % all.length]);
   });
 
 /** Change the class, and offer the new one's usual size. @param {string} label */
@@ -198,7 +202,9 @@ export const relabel = (label) =>
   withTrack(async ({ id, revision }) => {
     const cuboid = draft.presentOf(id)?.cuboid,
       size = usualSize(label);
+    askedClass.set(id, label);
     const answer = await act({ kind: "relabel", track: id, revision, label });
+    if (askedClass.get(id) === label) askedClass.delete(id);
     if (!answer || !cuboid || !size || cuboid.size.every((side, axis) => side === size[axis])) return;
     set("offer", {
       words: `Size of a ${label}: ${size.join(" × ")} m`,
