@@ -179,6 +179,7 @@ class Pages:
         devtools = page.context.new_cdp_session(page)
         devtools.send("Storage.clearDataForOrigin", {"origin": origin, "storageTypes": "all"})
         devtools.detach()
+        page.evaluate("sessionStorage.clear()")  # the tab's own, which is no origin's data to DevTools
         page.context.clear_permissions()
         page.unroute_all()
         page.mouse.move(0, 0)
