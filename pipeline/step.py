@@ -96,7 +96,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     aligned = projection.resolve(params.alignment, frame.camera)
 
     # LiDAR: what stands on the ground in this sweep, followed from sweep to sweep
-    sweep = segmentation.segment(frame.sweep, now.ego, params, clock)
+    sweep = segmentation.segment(frame.sweep, now.ego, params, clock, state.lidar, now.dt_s)
     lidar_state, lidar_tracks = lidar_tracking.track(state.lidar, sweep.obstacles, now.dt_s, params.lidar_tracking)
     clock.lap("lidar_tracking")
 

@@ -51,6 +51,10 @@ and 6 were silent; with one as sure as it gets, none and 10. Sweeps follow each 
 witnesses, so one is worth less."""
 
 
+_FOLLOWED_S = 0.5
+"""A box was joined with a neighbour's cluster for a moment; what the LiDAR has seen for longer it has followed."""
+
+
 class Existence(NamedTuple):
     """Of one object, what earlier frames leave."""
 
@@ -68,6 +72,8 @@ class Existence(NamedTuple):
     """How far the car has driven since."""
     shrunk_m: float = 0.0
     """By how much its distance has shrunk since."""
+    cluster_s: float = 0.0
+    """How long the LiDAR has seen it."""
 
     @property
     def goes_along(self) -> bool:
@@ -108,7 +114,7 @@ def weigh(
     judged = []
     for item in objects:
         before = state.known.get(item.id, Existence(None, 0.0))
-        found = _updated(before, item, rays.get(item.id), item.id in missed, now, params)
+        found = _updated(before, item, rays.get(item.id), item.id in missed, now)
         known[item.id] = found
         camera = (found.score - _EVEN_SCORE) * _SCORE_SLOPE if found.score is not None else 0.0
         camera += _ALONG if found.goes_along else 0.0
@@ -131,9 +137,7 @@ def _missed(objects: tuple[FusedObject, ...], size: tuple[int, int] | None) -> f
     return frozenset(asked[index].id for index in np.flatnonzero(inside).tolist())
 
 
-def _updated(
-    before: Existence, item: FusedObject, rays: Rays | None, missed: bool, now: Moment, params: ExistenceParams
-) -> Existence:
+def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bool, now: Moment) -> Existence:
     dt_s = now.dt_s or 0.0
     score, lidar, age_s = before.score, before.lidar, before.age_s + dt_s
     if item.seen_by_camera and item.score is not None:
@@ -151,8 +155,9 @@ def _updated(
         travelled_m += now.speed_mps * dt_s
         if item.measured and item.distance_m is not None:
             shrunk_m = from_m - item.distance_m
-    lidar = _bounded(lidar + _said_by_lidar(item, rays, params))
-    return Existence(score, lidar, item.camera_ranges, age_s, from_m, travelled_m, shrunk_m)
+    cluster_s = before.cluster_s + (dt_s if item.seen_by_lidar else 0.0)
+    lidar = _bounded(lidar + _said_by_lidar(item, rays, cluster_s >= _FOLLOWED_S))
+    return Existence(score, lidar, item.camera_ranges, age_s, from_m, travelled_m, shrunk_m, cluster_s)
 
 
 def _weight(dt_s: float, mean_s: float) -> float:
@@ -160,9 +165,9 @@ def _weight(dt_s: float, mean_s: float) -> float:
     return 1.0 - math.exp(-dt_s / mean_s)
 
 
-def _said_by_lidar(item: FusedObject, rays: Rays | None, params: ExistenceParams) -> float:
-    """What this sweep adds to the log-odds. A second box on a vehicle lasts for moments: what the camera has followed
-    for long, and whose returns are another's now, has been joined with its neighbour into one cluster."""
+def _said_by_lidar(item: FusedObject, rays: Rays | None, was_followed: bool) -> float:
+    """What this sweep adds to the log-odds. What the LiDAR had followed, and whose returns are another's now, has been
+    joined with its neighbour; what it never followed is a second box on that neighbour."""
     if item.seen_by_lidar:
         return _CLUSTER
     if rays is not None and rays.is_free:
@@ -175,8 +180,8 @@ def _said_by_lidar(item: FusedObject, rays: Rays | None, params: ExistenceParams
         return _SILENT
     if rays.is_stopped:
         return _STOPPED
-    is_new = item.camera_ranges < params.camera_ranges
-    return _TAKEN if is_new and rays.is_taken and (item.distance_m or 0.0) < NEAR_M else 0.0
+    is_near = (item.distance_m or 0.0) < NEAR_M
+    return _TAKEN if is_near and rays.is_taken and not was_followed else 0.0
 
 
 def _told(item: FusedObject, probability: float, rays: Rays | None) -> FusedObject:

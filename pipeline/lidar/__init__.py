@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.lidar import boxes, cluster, deskew, downsample, ground, tracking
+from pipeline.lidar import boxes, cluster, deskew, divide_tracked, downsample, ground, tracking
 from pipeline.params import DeskewParams, Params
 from pipeline.types import EgoState, Sweep
 
@@ -28,7 +28,8 @@ def warm_up() -> None:
         labels = cluster.cluster(points, cluster.candidates(points, plane, keep, params.cluster), params.cluster)
         obstacles = boxes.fit_obstacles(points, labels, plane, params.box)
         state, _ = tracking.track(tracking.LidarTrackerState(), obstacles, None, params.lidar_tracking)
-        tracking.track(state, obstacles, 0.1, params.lidar_tracking)
+        state, tracks = tracking.track(state, obstacles, 0.1, params.lidar_tracking)
+        divide_tracked.warm_up(points, labels, tracks)
         cluster.kinds(labels, keep, plane.mask)
         deskew.deskew(sweep, EgoState(0, 10.0, 0.0), DeskewParams(enabled=True))
         downsample.keep_mask(sweep, params.downsample)

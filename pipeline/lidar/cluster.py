@@ -22,7 +22,7 @@ from pipeline.params import ClusterParams
 from pipeline.types import DROPPED, F32, F64, GROUND, I32, UNCLUSTERED, Mask
 
 UNLABELLED = -1
-_WIDEST_M = 2.6
+WIDEST_M = 2.6
 """No vehicle's rear is wider (Directive 96/53/EC: 2.55 m, 2.60 m if refrigerated)."""
 
 
@@ -58,7 +58,7 @@ def cluster(points: F32, candidates: Mask, params: ClusterParams) -> I32:
 def _divide(points: F32, chosen: I32, roots: I32, params: ClusterParams) -> None:
     """Gives the points of components that are too wide for one vehicle the roots that a tolerance of ``divide_m`` has,
     in place."""
-    wide = np.flatnonzero(_is_wide(points, chosen, roots, _WIDEST_M)).astype(np.int32)
+    wide = np.flatnonzero(_is_wide(points, chosen, roots, WIDEST_M)).astype(np.int32)
     if not len(wide):
         return
     cell_m = params.divide_m / np.sqrt(3.0) * (1.0 - 1e-6)

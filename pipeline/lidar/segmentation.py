@@ -1,4 +1,4 @@
-"""One sweep as obstacles on the ground: deskew → down-sample → ground → cluster → boxes (paper, Point Cloud
+"""One sweep as obstacles on the ground: deskew → down-sample → ground → cluster → divide → boxes (paper, Point Cloud
 Segmentation)."""
 
 from __future__ import annotations
@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.common.stopwatch import Stopwatch
-from pipeline.lidar import boxes, cluster, deskew, downsample, ground
+from pipeline.lidar import boxes, cluster, deskew, divide_tracked, downsample, ground
+from pipeline.lidar.tracking import LidarTrackerState
 from pipeline.params import Params
 from pipeline.types import F32, I32, U8, EgoState, Ground, Obstacle, Sweep
 
@@ -39,8 +40,16 @@ class SegmentedSweep:
 _NO_SWEEP = SegmentedSweep(np.zeros((0, 4), np.float32), np.zeros(0, np.uint8), np.zeros(0, np.int32), None, None)
 
 
-def segment(sweep: Sweep | None, ego: EgoState | None, params: Params, clock: Stopwatch) -> SegmentedSweep:
-    """Obstacles and ground of a sweep. ego: own motion, for deskewing. clock: gets a lap for each stage."""
+def segment(
+    sweep: Sweep | None,
+    ego: EgoState | None,
+    params: Params,
+    clock: Stopwatch,
+    before: LidarTrackerState | None = None,
+    dt_s: float | None = None,
+) -> SegmentedSweep:
+    """Obstacles and ground of a sweep. ego: own motion, for deskewing. clock: gets a lap for each stage. before: what
+    is followed since earlier sweeps, dt_s ago; None where each sweep stands for itself."""
     # Points as they were at the tick, not while the sensor turned
     sweep = deskew.deskew(sweep, ego, params.deskew)
     clock.lap("deskew")
@@ -58,6 +67,8 @@ def segment(sweep: Sweep | None, ego: EgoState | None, params: Params, clock: St
     # What stands on it: points near each other are one object, across the gaps between rings too
     candidates = cluster.candidates(sweep.points, plane, keep, params.cluster)
     labels = cluster.cluster(sweep.points, candidates, params.cluster)
+    if before is not None:  # unless they are known to drive apart
+        labels = divide_tracked.divide(sweep.points, labels, before.tracks, before.filters, dt_s, params.cluster)
     clock.lap("cluster")
 
     # An upright box around each cluster

@@ -128,7 +128,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "default": {},
     "paper": {
         "motion": {"source": "can"},
-        "cluster": {"divide_m": 3.0},
+        "cluster": {"divide_m": 3.0, "divide_tracked": False},
         "box": {"method": "axis_aligned"},
         "lidar_tracking": {"filter": "trajectory", "rigid_sideways": False},
         "detection": {"far_view": False, "car_prior": 1.0},
@@ -159,6 +159,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "become_existence": 0.0,
             "become_probability": 0.0,
             "become_standing": 0.0,
+            "become_oncoming": 0.0,
             "stay_probability": 0.0,
         },
         "acc": {"comfort_decel_mps2": 8.0, "approach_decel_mps2": 0.0, "confirm_frames": 1},

@@ -135,6 +135,14 @@ class CipvParams(Section):
         "",
         "The same for a vehicle that stands: far more of them are parked beside the path than stopped in it",
     )
+    become_oncoming: float = slider(
+        0.9,
+        0.0,
+        0.95,
+        0.01,
+        "",
+        "The same for oncoming traffic: it keeps to its lane, and a bend whose path is not known makes it seem in ours",
+    )
     stay_probability: float = slider(
         0.4, 0.0, 0.95, 0.05, "", "The lead is kept while both probabilities are at least this"
     )

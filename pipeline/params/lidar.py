@@ -51,6 +51,7 @@ class ClusterParams(Section):
     divide_m: float = slider(
         0.7, 0.1, 3.0, 0.05, "m", "The same inside a cluster wider than any vehicle; equal to the tolerance: off"
     )
+    divide_tracked: bool = choice(True, "Divide a cluster that covers two tracked objects which move apart")
     z_weight: float = slider(0.4, 0.05, 1.0, 0.05, "", "Weight on height: below 1 joins rings that are 2° apart")
     min_points: int = slider(4, 1, 50, 1, "points", "Smaller clusters are dropped")
     max_points: int = slider(20000, 100, 50000, 100, "points", "Larger clusters are dropped")

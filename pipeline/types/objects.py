@@ -213,6 +213,8 @@ class FusedObject:
     """The tests it went through, for display."""
     speed_over_ground_mps: float | None = None
     """None where own speed is not known."""
+    oncoming: bool | None = None
+    """Whether it drives towards the ego vehicle; None while its own speed is not known."""
     moving: bool | None = None
     """Whether it moves over the ground; None where own speed is not known."""
     ttc_s: float | None = None

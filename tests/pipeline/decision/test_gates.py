@@ -105,9 +105,9 @@ def test_a_new_lead_has_to_be_probable_as_a_whole(
     assert len(choice.rejected) == (0 if leads else 1)
 
 
-@pytest.mark.parametrize(("speed_mps", "leads"), [(0.0, False), (9.0, True), (None, True)])
-def test_a_standing_vehicle_at_the_edge_is_taken_for_a_parked_one(speed_mps: float | None, leads: bool) -> None:
-    """In the path with 51 %: on a bend that is not known well every car parked beside it is."""
+@pytest.mark.parametrize(("speed_mps", "leads"), [(0.0, False), (9.0, True), (-9.0, False), (None, True)])
+def test_at_the_edge_only_what_goes_along_leads(speed_mps: float | None, leads: bool) -> None:
+    """In the path with 51 %: on a bend that is not known well every parked and every oncoming car is."""
     vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 1.5))
     item = dataclasses.replace(fused(1, 30.0, 1.2), existence=0.98)
     velocity = None if speed_mps is None else (speed_mps - EGO.speed_mps, 0.0)

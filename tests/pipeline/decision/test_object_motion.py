@@ -55,6 +55,20 @@ def test_a_parked_car_aside_stands_still_while_we_turn() -> None:
     assert item.speed_over_ground_mps == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("velocity", "oncoming"),
+    [
+        pytest.param((-35.0, 0.0), True, id="drives towards us"),
+        pytest.param((-20.0, 0.0), False, id="stands"),
+        pytest.param((-15.0, 0.0), False, id="is slower than we are"),
+        pytest.param((-20.0, 8.0), False, id="crosses"),
+    ],
+)
+def test_oncoming_is_what_comes_nearer_by_its_own_motion(velocity: tuple[float, float], oncoming: bool) -> None:
+    (item,) = describe([fused(1, 30.0, velocity=velocity)], EgoState(0, 20.0), PARAMS)
+    assert item.oncoming is oncoming
+
+
 def test_an_object_without_a_place_has_no_ttc() -> None:
     (item,) = describe([fused(1, None, source="V")], EgoState(0, 20.0), PARAMS)
     assert (item.ttc_s, item.speed_over_ground_mps, item.moving) == (None, None, None)

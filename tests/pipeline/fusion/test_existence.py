@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from pipeline.fusion.existence import ExistenceState, weigh
+from pipeline.fusion.existence import Existence, ExistenceState, weigh
 from pipeline.params import CipvParams, ExistenceParams
 from pipeline.types import F32, I32, U8, CameraImage, EgoState, Frame, FusedObject, Ground, Point3, RawBoxes
 from tests.pipeline.build import fused, moment
@@ -116,12 +116,21 @@ def test_near_by_a_vehicle_has_a_cluster_of_its_own(range_m: float, exists: bool
     assert said == ([] if exists else [(0.0, 3, False)])
 
 
-def test_a_lead_whose_cluster_was_joined_with_its_neighbours_is_still_there() -> None:
-    """A van followed for half a minute stops beside a parked car: their points are one cluster, the parked car's."""
-    van = replace(camera_car(8.0), camera_ranges=300)
-    found = after(van, Rays(returns(8.5), cluster=3))
+@pytest.mark.parametrize(
+    ("seconds", "exists"), [pytest.param(1.0, True, id="was followed"), pytest.param(0.1, False, id="for one sweep")]
+)
+def test_a_lead_whose_cluster_was_joined_with_its_neighbours_is_still_there(seconds: float, exists: bool) -> None:
+    """A van that the LiDAR followed stops beside a parked car: their points are one cluster, the parked car's. A box
+    that was joined with a cluster once is no van."""
+    van, rays = camera_car(8.0), Rays(returns(8.5), cluster=3)
+    ranged = replace(van, source="VL", seen_by="VL")
+    state = ExistenceState({van.id: Existence(0.8, 0.0)})
+    for _ in range(round(seconds / 0.1)):
+        state, _ = weigh(state, (ranged,), rays, FRAME, moment(None, 0.1), PARAMS)
+    for _ in range(10):
+        state, (found,) = weigh(state, (van,), rays, FRAME, moment(None, 0.1), PARAMS)
     assert found.existence is not None
-    assert found.existence > 0.9
+    assert (found.existence > 0.5) == exists
 
 
 def test_rays_start_at_the_sensor() -> None:

@@ -1,0 +1,267 @@
+"""Clusters that cover two tracked vehicles, divided by where the tracks expect each of them.
+
+A cluster sees one moment. A lead that stands or passes 0.7 m beside a parked car becomes one with it, since returns of
+one car lie as far apart. The tracks know better: both were followed while they were apart. They are two where they move
+apart, for the parts of a rigid body share its velocity; and where together they are wider than any vehicle and leave a
+gap that no surface has.
+
+Returns within an expected footprint are its seeds. Every other return of the cluster joins whom it is linked with by
+the shortest steps (a minimum spanning forest, as a watershed): a flank that comes into view follows its rear, from
+which returns lead to it at centimetres, whatever lies beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from pipeline.common import kalman
+from pipeline.lidar.cluster import WIDEST_M
+from pipeline.params import ClusterParams
+from pipeline.types import F32, F64, I32, I64, LidarTrack, Mask
+
+MIN_HITS = 5
+"""Sightings of a track, half a second at 10 Hz, before a cluster is divided for it: its velocity has settled."""
+_APART_MPS, _APART_SIGMAS = 2.0, 3.0
+"""Two tracks move apart when their velocities differ by more than both. A footprint that grows as we pass moves its
+reference point at up to 1–2 m/s."""
+_GAP_M = 0.3
+"""Neighbouring returns of one surface are nearer: along a ring of a VLP-16 0.1 m at 28 m, twice that where it is
+thinned out."""
+_AROUND_M = 0.3
+"""Returns so far outside of an expected footprint are its own: two standard deviations of a cluster's position."""
+_DIRECTIONS = np.radians(np.arange(0.0, 180.0, 5.0))
+_LEAST_SEEDS = 2
+"""One return may be a stray one."""
+_MOST_POINTS = 4000
+"""Of a cluster to be divided. Joining takes time with the square of it, 20 ms for so many."""
+
+
+class _Expected(NamedTuple):
+    """Tracks that a cluster may be divided for, where they are expected now."""
+
+    footprints: F64
+    """(T, 6) x, y, half length, half width, cos and sin of the yaw."""
+    velocity: F64
+    """(T, 2) m/s."""
+    variance: F64
+    """(T,) of the velocity, both axes."""
+
+
+def divide(
+    points: F32,
+    labels: I32,
+    tracks: Sequence[LidarTrack],
+    filters: kalman.CvState,
+    dt_s: float | None,
+    params: ClusterParams,
+) -> I32:
+    """(N,) int32 labels as ``cluster`` gives them, each vehicle that had to share a cluster with a label of its own.
+
+    points: (N, 4) float32 ``x y z intensity``, ego frame. labels: (N,) int32. tracks, filters: of the sweep before,
+    with their constant-velocity filters, in the same order. dt_s: time since then; None at a start. A part of a divided
+    cluster joins the cluster that has most of its track, so that a flank is not cut off from its rear.
+    """
+    count = int(labels.max(initial=-1)) + 1
+    known = [n for n, each in enumerate(tracks) if each.hits >= MIN_HITS and each.velocity_mps is not None]
+    if not params.divide_tracked or dt_s is None or len(known) < 2 or count == 0:
+        return labels
+    expected = _expect([tracks[n] for n in known], filters.cov[known], dt_s)
+    owner = _owners(points, labels, expected.footprints)
+    seeds = _counted(labels, owner, len(known), count)
+    pieces, parts = labels.copy(), []
+    for which in np.flatnonzero((seeds >= _LEAST_SEEDS).sum(axis=0) >= 2).tolist():
+        present = np.flatnonzero(seeds[:, which] >= _LEAST_SEEDS)
+        members = np.flatnonzero(labels == which)
+        part = _parts(points[members], owner[members], present, expected, params)
+        if part is not None:
+            numbers = np.concatenate([[which], pieces.max() + np.arange(1, part.max() + 1)]).astype(np.int32)
+            pieces[members] = numbers[part]
+            parts.append(numbers.tolist())
+    return _renumbered(_homed(pieces, parts, owner, len(known), params.min_points)) if parts else labels
+
+
+def _homed(pieces: I32, parts: list[list[int]], owner: I32, tracks: int, min_points: int) -> I32:
+    """The pieces, those of divided clusters joined with what else there is of their tracks.
+
+    parts: numbers of the pieces of each divided cluster. What is too small for a cluster and has no home stays with its
+    cluster's largest part."""
+    seeds, sizes = _counted(pieces, owner, tracks, int(pieces.max()) + 1), np.bincount(pieces[pieces >= 0])
+    goes_to = np.arange(len(sizes), dtype=np.int32)
+    for numbers in parts:
+        largest = max(numbers, key=lambda number: int(sizes[number]))
+        for number in numbers:
+            home = int(seeds[int(seeds[:, number].argmax())].argmax())
+            if home != number and goes_to[home] == home and home not in numbers:
+                goes_to[number] = home
+            elif sizes[number] < min_points:
+                goes_to[number] = largest
+    for _ in parts:  # a home may have moved itself
+        goes_to = goes_to[goes_to]
+    goes_to = np.append(goes_to, -1).astype(np.int32)  # the last for what has no cluster
+    return goes_to[pieces]
+
+
+def warm_up(points: F32, labels: I32, tracks: Sequence[LidarTrack]) -> None:
+    """Compile the kernels before the first frame."""
+    expected = _expect(tracks, np.zeros((len(tracks), 4, 4)), 0.0)
+    owner = _owners(points, labels, expected.footprints)
+    _counted(labels, owner, len(tracks), 1)
+    joined = _joined(points[:2], np.arange(2, dtype=np.int32), 1.0)
+    _gaps(points[:2], joined, 2, 1.0)
+
+
+def _expect(tracks: Sequence[LidarTrack], cov: F64, dt_s: float) -> _Expected:
+    """cov: (T, 4, 4) of the tracks' filters."""
+    velocity = np.array([each.velocity_mps or (0.0, 0.0) for each in tracks])
+    rows = [(*each.obstacle.cuboid.center[:2], *each.obstacle.cuboid.size[:2]) for each in tracks]
+    footprints = np.array(rows) * (1.0, 1.0, 0.5, 0.5)
+    footprints[:, :2] += velocity * dt_s
+    yaw = np.array([each.obstacle.cuboid.yaw_rad for each in tracks])
+    return _Expected(np.column_stack([footprints, np.cos(yaw), np.sin(yaw)]), velocity, cov[:, 2, 2] + cov[:, 3, 3])
+
+
+def _parts(points: F32, owner: I32, present: I64, expected: _Expected, params: ClusterParams) -> I32 | None:
+    """(M,) int32 the part of each point of a cluster, 0 first; None where it stays whole.
+
+    owner: (M,) the track of each point that is a seed, else −1. present: tracks with enough of them."""
+    apart = _move_apart(expected.velocity[present], expected.variance[present])
+    wide = _are_wide(expected.footprints[present])
+    if not (apart | wide).any() or len(points) > _MOST_POINTS:
+        return None
+    number = np.full(len(expected.velocity) + 1, -1, dtype=np.int32)  # the last for what is no seed
+    number[present] = np.arange(len(present), dtype=np.int32)
+    part = _joined(points, number[owner], params.z_weight)
+    gaps = _gaps(points, part, len(present), params.z_weight)
+    # those that neither sets apart are what they would be without the others
+    together = np.where(wide, _GAP_M, params.tolerance_m)
+    part = _grouped(((gaps <= together) & ~apart) | np.eye(len(present), dtype=np.bool_))[part]
+    return part if part.max() > 0 else None
+
+
+def _move_apart(velocity: F64, variance: F64) -> Mask:
+    """(T, T) whether two tracks surely move at different velocities."""
+    differ = np.hypot(*(velocity[:, None] - velocity[None]).transpose(2, 0, 1))
+    apart: Mask = differ > np.maximum(_APART_MPS, _APART_SIGMAS * np.sqrt(variance[:, None] + variance[None]))
+    return apart
+
+
+def _are_wide(footprints: F64) -> Mask:
+    """(T, T) whether two footprints together are wider than any vehicle: across the line of sight to the nearer one, or
+    in every direction."""
+    x, y, length, width, cos, sin = (column[:, None] for column in footprints.T)
+    along, across = length * np.array([1, 1, -1, -1]), width * np.array([1, -1, -1, 1])
+    corner_x, corner_y = x + along * cos - across * sin, y + along * sin + across * cos
+    turn, away_m = np.arctan2(corner_y, corner_x), np.hypot(corner_x, corner_y).min(axis=1)
+    seen_m = _together(turn[:, :, None])[:, :, 0] * np.minimum(away_m[:, None], away_m[None])
+    # (T, 4, D) how far the corners reach in D directions
+    reach = corner_x[:, :, None] * np.cos(_DIRECTIONS) + corner_y[:, :, None] * np.sin(_DIRECTIONS)
+    wide: Mask = (seen_m > WIDEST_M) | (_together(reach).min(axis=2) > WIDEST_M)
+    return wide
+
+
+def _together(corners: F64) -> F64:
+    """(T, T, D) extent of two footprints together, of what their corners (T, 4, D) are at."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    extent: F64 = np.maximum(high[:, None], high[None]) - np.minimum(low[:, None], low[None])
+    return extent
+
+
+def _grouped(same: Mask) -> I32:
+    """(T,) int32 number of the component of each, 0 first, of a symmetric relation (T, T)."""
+    groups = np.full(len(same), -1, dtype=np.int32)
+    for n in range(len(same)):
+        if groups[n] < 0:
+            number, reached = groups.max() + 1, [n]
+            while reached:
+                at = reached.pop()
+                groups[at] = number
+                reached += np.flatnonzero(same[at] & (groups < 0)).tolist()
+    return groups
+
+
+def _renumbered(labels: I32) -> I32:
+    """The same clusters, numbered in order of their first point."""
+    known, first = np.unique(labels, return_index=True)
+    clusters = known >= 0
+    number = np.full(int(known.max()) + 2, -1, dtype=np.int32)  # the last for what has no cluster
+    number[known[clusters][np.argsort(first[clusters])]] = np.arange(clusters.sum(), dtype=np.int32)
+    return number[labels]
+
+
+@numba.njit(cache=True, nogil=True)
+def _owners(points: F32, labels: I32, footprints: F64) -> I32:
+    """(N,) int32 the only footprint in or around which a clustered point lies, −1 for none and for several."""
+    owner = np.full(len(points), -1, dtype=np.int32)
+    for i in range(len(points)):
+        if labels[i] < 0:
+            continue
+        found = 0
+        for t in range(len(footprints)):
+            x, y, length, width, cos, sin = footprints[t]
+            dx, dy = points[i, 0] - x, points[i, 1] - y
+            along, across = abs(dx * cos + dy * sin) - length, abs(dy * cos - dx * sin) - width
+            if np.hypot(max(along, 0.0), max(across, 0.0)) <= _AROUND_M:
+                owner[i] = t
+                found += 1
+        if found > 1:
+            owner[i] = -1
+    return owner
+
+
+@numba.njit(cache=True, nogil=True)
+def _counted(labels: I32, owner: I32, tracks: int, clusters: int) -> I32:
+    """(T, C) int32 how many seeds each track has in each cluster."""
+    counts = np.zeros((tracks, clusters), dtype=np.int32)
+    for i in range(len(labels)):
+        if labels[i] >= 0 and owner[i] >= 0:
+            counts[owner[i], labels[i]] += 1
+    return counts
+
+
+@numba.njit(cache=True, nogil=True)
+def _joined(points: F32, seeds: I32, z_weight: float) -> I32:
+    """(M,) int32 the group of each point: that of the seed which a minimum spanning forest joins it with (Prim).
+
+    seeds: (M,) group of each seed, −1 for the others."""
+    group = seeds.copy()
+    done = np.zeros(len(points), dtype=np.bool_)
+    step2 = np.full(len(points), np.inf)
+    for i in range(len(points)):
+        if seeds[i] >= 0:
+            step2[i] = 0.0
+    for _ in range(len(points)):
+        at, least = -1, np.inf
+        for i in range(len(points)):
+            if not done[i] and step2[i] < least:
+                at, least = i, step2[i]
+        if at < 0:
+            break
+        done[at] = True
+        for i in range(len(points)):
+            if done[i]:
+                continue
+            dx, dy = points[i, 0] - points[at, 0], points[i, 1] - points[at, 1]
+            dz = z_weight * (points[i, 2] - points[at, 2])
+            away2 = dx * dx + dy * dy + dz * dz
+            if away2 < step2[i]:
+                step2[i], group[i] = away2, group[at]
+    return group
+
+
+@numba.njit(cache=True, nogil=True)
+def _gaps(points: F32, part: I32, parts: int, z_weight: float) -> F64:
+    """(P, P) least distance between points of two parts, m."""
+    gaps = np.full((parts, parts), np.inf)
+    for i in range(len(points)):
+        for j in range(i):
+            if part[i] != part[j]:
+                dx, dy = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
+                dz = z_weight * (points[i, 2] - points[j, 2])
+                away = np.sqrt(dx * dx + dy * dy + dz * dz)
+                if away < gaps[part[i], part[j]]:
+                    gaps[part[i], part[j]] = gaps[part[j], part[i]] = away
+    return gaps

@@ -1,0 +1,140 @@
+"""Clusters that cover two tracked vehicles are divided between them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.common import kalman
+from pipeline.common.geometry import Cuboid
+from pipeline.lidar.cluster import cluster
+from pipeline.lidar.divide_tracked import MIN_HITS, divide
+from pipeline.params import ClusterParams
+from pipeline.types import F32, I32, LidarTrack, Obstacle
+
+DT_S = 0.1
+PARAMS = ClusterParams()
+STANDS, DRIVES = (-7.0, 0.0), (-1.0, 0.0)
+"""Relative to a car at 7 m/s."""
+
+
+def wall(start: tuple[float, float], end: tuple[float, float], step_m: float = 0.08) -> F32:
+    """Returns of two rings along an upright surface."""
+    count = int(np.hypot(end[0] - start[0], end[1] - start[1]) / step_m) + 1
+    xy = np.linspace(start, end, count)
+    rings = [np.column_stack([xy, np.full((count, 1), z), np.zeros((count, 1))]) for z in (-0.8, -0.4)]
+    return np.vstack(rings).astype(np.float32)
+
+
+def track(
+    number: int, rear: tuple[float, float], size: tuple[float, float], velocity: tuple[float, float], hits: int = 10
+) -> LidarTrack:
+    """As it was a sweep ago. rear: x of the near side and y of the middle, now. size: length, width."""
+    x, y = rear[0] + size[0] / 2 - velocity[0] * DT_S, rear[1] - velocity[1] * DT_S
+    cuboid = Cuboid((x, y, -0.6), (*size, 1.5), 0.0)
+    return LidarTrack(number, Obstacle(0, cuboid, (x, y, -0.6), 50, 10.0, (1.0, 1.0, 1.0)), velocity, hits, 0, False)
+
+
+def filters(count: int, speed_sigma: float = 0.2) -> kalman.CvState:
+    return kalman.CvState(
+        np.zeros((count, 4)), np.tile(np.diag([0.1, 0.1, speed_sigma, speed_sigma]) ** 2, (count, 1, 1))
+    )
+
+
+def divided(points: F32, tracks: list[LidarTrack], params: ClusterParams = PARAMS) -> tuple[I32, I32]:
+    """Labels before and after."""
+    before = cluster(points, np.ones(len(points), dtype=np.bool_), params)
+    return before, divide(points, before, tracks, filters(len(tracks)), DT_S, params)
+
+
+LEAD, PARKED = wall((12.0, -1.0), (12.0, 1.0)), wall((10.0, -3.5), (10.0, -1.6))
+FLANK = wall((10.1, -1.6), (13.5, -1.6))
+BESIDE = np.vstack([LEAD, PARKED, FLANK])
+"""A lead's rear, and beside it, 0.6 m away, a parked car whose flank has come into view."""
+LEAD_TRACK, PARKED_TRACK = ((12.0, 0.0), (0.1, 2.0)), ((10.0, -2.55), (1.0, 1.9))
+
+
+@pytest.mark.parametrize(
+    ("what", "lead_velocity"), [("the lead drives", DRIVES), ("both stand, wider than any vehicle", STANDS)]
+)
+def test_a_lead_and_the_parked_car_beside_it_are_two(what: str, lead_velocity: tuple[float, float]):
+    tracks = [track(1, *LEAD_TRACK, lead_velocity), track(2, *PARKED_TRACK, STANDS)]
+    before, after = divided(BESIDE, tracks)
+    assert set(before) == {0}, "the clusters touch"
+    assert set(after[: len(LEAD)]) == {0}
+    assert set(after[len(LEAD) :]) == {1}, "the flank is the parked car's, though parts of it are nearer to the lead"
+
+
+def test_a_flank_that_was_joined_with_the_lead_comes_home():
+    """The parked car's rear has a cluster; of its flank only what lies beside the lead was seen."""
+    flank = wall((11.8, -1.6), (12.2, -1.6))
+    points = np.vstack([LEAD, flank, PARKED])
+    tracks = [track(1, *LEAD_TRACK, DRIVES), track(2, (10.0, -2.55), (2.5, 1.8), STANDS)]
+    before, after = divided(points, tracks)
+    home = before[-1]
+    assert before[len(LEAD)] == before[0] != home
+    assert set(after[len(LEAD) : len(LEAD) + len(flank)]) == {after[-1]}
+    assert set(after[: len(LEAD)]) == {after[0]} != {after[-1]}
+
+
+SIDE = wall((15.0, -4.0), (15.0, 4.0))
+UNDIVIDED = {
+    "one long surface that was followed as two": (
+        SIDE,
+        [track(1, (15.0, -2.0), (0.1, 4.0), STANDS), track(2, (15.0, 2.0), (0.1, 4.0), STANDS)],
+    ),
+    "two halves of one car": (
+        np.vstack([wall((10.0, -0.9), (10.0, 0.9)), wall((10.6, -0.9), (10.6, 0.9))]),
+        [track(1, (10.0, 0.0), (0.1, 1.8), STANDS), track(2, (10.6, 0.0), (0.1, 1.8), STANDS)],
+    ),
+    "the lead has just been found": (
+        BESIDE,
+        [track(1, *LEAD_TRACK, DRIVES, hits=MIN_HITS - 1), track(2, *PARKED_TRACK, STANDS)],
+    ),
+    "only one is known": (BESIDE, [track(1, *LEAD_TRACK, DRIVES)]),
+    "one of them is elsewhere": (BESIDE, [track(1, *LEAD_TRACK, DRIVES), track(2, (20.0, -2.55), (1.0, 1.9), STANDS)]),
+}
+
+
+@pytest.mark.parametrize("case", UNDIVIDED)
+def test_what_may_be_one_stays_one(case: str):
+    points, tracks = UNDIVIDED[case]
+    before, after = divided(points, tracks)
+    assert set(before) == set(after) == {0}
+
+
+def test_speeds_known_too_poorly_set_nothing_apart():
+    """Two halves of one car, one of which seems to move at 3 m/s, give or take 2."""
+    points = np.vstack([wall((10.0, -0.9), (10.0, 0.9)), wall((10.6, -0.9), (10.6, 0.9))])
+    tracks = [track(1, (10.0, 0.0), (0.1, 1.8), STANDS), track(2, (10.6, 0.0), (0.1, 1.8), (-4.0, 0.0))]
+    labels = cluster(points, np.ones(len(points), dtype=np.bool_), PARAMS)
+    unsure = divide(points, labels, tracks, filters(2, 2.0), DT_S, PARAMS)
+    sure = divide(points, labels, tracks, filters(2, 0.2), DT_S, PARAMS)
+    assert (set(unsure), set(sure)) == ({0}, {0, 1})
+
+
+@pytest.mark.parametrize(
+    ("changes", "dt_s"), [({"divide_tracked": False}, DT_S), ({}, None)], ids=["switched off", "at a start"]
+)
+def test_without_it_or_without_a_sweep_before_nothing_is_divided(changes: dict[str, bool], dt_s: float | None):
+    params = PARAMS.model_copy(update=changes)
+    tracks = [track(1, *LEAD_TRACK, DRIVES), track(2, *PARKED_TRACK, STANDS)]
+    labels = cluster(BESIDE, np.ones(len(BESIDE), dtype=np.bool_), params)
+    assert divide(BESIDE, labels, tracks, filters(2), dt_s, params) is labels
+
+
+@given(
+    st.lists(st.tuples(st.floats(5, 20), st.floats(-4, 4)), min_size=1, max_size=60),
+    st.lists(st.tuples(st.floats(5, 20), st.floats(-4, 4), st.floats(-10, 10)), max_size=5),
+)
+def test_every_clustered_point_keeps_a_cluster_and_no_other_gets_one(
+    places: list[tuple[float, float]], known: list[tuple[float, float, float]]
+):
+    points = np.array([(x, y, -0.5, 0.0) for x, y in places], dtype=np.float32)
+    tracks = [track(n, (x, y), (1.0, 1.8), (v, 0.0)) for n, (x, y, v) in enumerate(known)]
+    before, after = divided(points, tracks)
+    assert np.array_equal(before < 0, after < 0)
+    assert set(after[after >= 0]) == set(range(int(after.max()) + 1))
+    assert all(count >= PARAMS.min_points for count in np.bincount(after[after >= 0]))
