@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.types import FusedObject, Gate, Result
 
-_OF_FUSION = frozenset({"iou", "range_sigmas", "class_size"})
+_OF_FUSION = frozenset({"iou", "range_sigmas", "class_size", "cluster_hits"})
 """Gates between the objects of two sensors: failing one splits a pair into two rows, and excludes neither from being
 the CIPV."""
 BEHIND = "behind"

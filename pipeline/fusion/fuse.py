@@ -19,9 +19,14 @@ from pipeline.common.geometry import F64, corners_of, iou_matrix
 from pipeline.fusion.rows import box_row, hit_row, lidar_sigma_m, quad, range_m
 from pipeline.fusion.vehicle_sizes import LONGEST_M
 from pipeline.params import FusionParams
-from pipeline.types import Box, FusedObject, Gate, LidarTrack, Point2, VisionTrack
+from pipeline.types import Box, FusedObject, Gate, LidarTrack, Mask, Point2, VisionTrack
 
 _SURELY_ONE = 0.5
+_KEPT_IOU = 0.2
+"""By so much more must another cluster overlap a box than the one that it was joined with: boxes of a VLP-16's few
+rings and of a network change by as much from frame to frame."""
+_TAKES_OVER_HITS = 2
+"""Sightings of a cluster before it may take the place of one that is still there: a spurious one lasts for a sweep."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +89,9 @@ def fuse(
         projected = project_cuboids(alignment, _to_the_gaps(corners, ranges_m, params), *picture_size)
     # What overlaps, agrees in range and has a plausible size may be joined; the best pairs are
     overlap = _overlap(vision, projected)
-    joinable, gates = _gates(overlap, vision, lidar, ranges_m, sigmas_m, params)
-    partner = _assign(overlap, joinable, params)
+    were_one = _were_one(state, vision, lidar) & params.keep_partners
+    joinable, gates = _gates(overlap, were_one, vision, lidar, ranges_m, sigmas_m, params)
+    partner = _assign(overlap + _KEPT_IOU * were_one, joinable, params)
     nearest_of_vision, nearest_of_lidar = _most_overlapping(overlap), _most_overlapping(overlap.T)
 
     # Every pair, and everything that is alone, is one object, under the id that its tracks had before
@@ -151,16 +157,25 @@ def _overlap(vision: tuple[VisionTrack, ...], projected: list[Box | None]) -> F6
     return iou_matrix(np.array([v.bbox for v in vision]), np.array([box or nowhere for box in projected]))
 
 
+def _were_one(state: FusionState, vision: tuple[VisionTrack, ...], lidar: tuple[LidarTrack, ...]) -> Mask:
+    """(n, m) bool: the pairs that were one object in the last frame."""
+    hits = np.array([state.by_lidar.get(each.id, -1) for each in lidar])
+    seen = np.array([state.by_vision.get(each.id, -2) for each in vision])
+    return np.asarray(seen[:, None] == hits[None])
+
+
 def _gates(
     overlap: F64,
+    were_one: Mask,
     vision: tuple[VisionTrack, ...],
     lidar: tuple[LidarTrack, ...],
     ranges_m: list[float],
     sigmas_m: list[float],
     params: FusionParams,
 ) -> tuple[np.ndarray, dict[tuple[int, int], tuple[Gate, ...]]]:
-    """Which pairs may be one object, and the tests each overlapping pair went through. ranges_m, sigmas_m: of the LiDAR
-    tracks."""
+    """Which pairs may be one object, and the tests each overlapping pair went through. were_one: as ``_were_one`` gives
+    it. ranges_m, sigmas_m: of the LiDAR tracks."""
+    is_held = np.any(were_one & np.array([not each.carried for each in lidar], dtype=np.bool_), axis=1).tolist()
     lengths_m = [max(track.obstacle.cuboid.size[:2]) for track in lidar]
     joinable = np.zeros(overlap.shape, dtype=bool)
     gates: dict[tuple[int, int], tuple[Gate, ...]] = {}
@@ -176,6 +191,9 @@ def _gates(
         longest_m = LONGEST_M.get(vision[i].label) if params.size_gate else None
         if longest_m is not None:
             tests.append(Gate("class_size", lengths_m[j], longest_m, lengths_m[j] <= longest_m))
+        if is_held[i] and not were_one[i, j]:
+            hits = lidar[j].hits
+            tests.append(Gate("cluster_hits", hits, _TAKES_OVER_HITS, hits >= _TAKES_OVER_HITS))
         joinable[i, j] = all(test.passed for test in tests)
         gates[i, j] = tuple(tests)
     return joinable, gates

@@ -148,6 +148,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "ring_gap_deg": 0.0,
             "range_gate": False,
             "size_gate": False,
+            "keep_partners": False,
             "single_returns": False,
         },
         "existence": {"enabled": False},

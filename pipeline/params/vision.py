@@ -177,6 +177,9 @@ class FusionParams(Section):
     single_returns: bool = choice(
         True, "Range far vehicles by single LiDAR returns inside their boxes, too few for a cluster"
     )
+    keep_partners: bool = choice(
+        True, "A box stays with the cluster that it was joined with, unless another one fits clearly better"
+    )
     size_gate: bool = choice(
         True, "Do not join a box with a cluster longer than any vehicle of its class: hedges, walls, rails"
     )

@@ -45,6 +45,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "wide camera gate": {"vision_tracking.gate_sigmas": 10.0},
     "no range gate": {"fusion.range_gate": False},
     "no size gate": {"fusion.size_gate": False},
+    "boxes change clusters freely": {"fusion.keep_partners": False},
     "AEB acts on one frame": {"aeb.confirm_frames": 1},
 }
 """Each rule against false leads, switched off by its parameter."""

@@ -16,6 +16,7 @@ import { reveal } from "./params.js";
 const KINDS = {
   iou: { label: "Box overlap (IoU)", test: "least", param: "fusion.min_iou" },
   range_sigmas: { label: "Range difference", test: "most", unit: "σ", param: "fusion.range_gate_sigmas" },
+  cluster_hits: { label: "Detections of the cluster", test: "least", unit: "frames" },
   class_size: { label: "Length for class", test: "most", unit: "m", param: "fusion.size_gate" },
   free_road: { label: "LiDAR sees through it", test: "most", param: "existence.enabled" },
   own_returns: { label: "LiDAR returns of its own", test: "least", param: "existence.enabled" },

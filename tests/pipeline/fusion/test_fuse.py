@@ -120,6 +120,39 @@ def test_boxes_of_one_place_and_size_are_one_object_though_the_height_law_errs()
     assert result.objects[0].distance_m == pytest.approx(30.0)
 
 
+@pytest.mark.parametrize(
+    ("hits", "carried", "params", "ranged_m"),
+    [
+        pytest.param(1, False, OPTIMAL, 40.0, id="seen once"),
+        pytest.param(5, False, OPTIMAL, 20.0, id="fits better, and is there"),
+        pytest.param(1, True, OPTIMAL, 20.0, id="the old one is gone"),
+        pytest.param(1, False, FusionParams(keep_partners=False), 20.0, id="switched off"),
+    ],
+)
+def test_a_box_stays_with_the_cluster_that_it_was_joined_with(
+    hits: int, carried: bool, params: FusionParams, ranged_m: float
+) -> None:
+    """A box that was drawn too tall for once fits a spurious cluster before the lead better than the lead's own."""
+    lead, spurious = lidar_track(1, 40.0), lidar_track(2, 20.0)._replace(hits=hits)
+    state, result = joined([lead], [vision_track(1, box_of(lead), 40.0)], params)
+    assert [item.source for item in result.objects] == ["VL"]
+    tall = vision_track(1, box_of(spurious), 24.0, sigma_m=8.0)
+    _, result = joined([lead._replace(carried=carried), spurious], [tall], params, state)
+    (pair,) = [item for item in result.objects if item.source == "VL"]
+    assert pair.distance_m == pytest.approx(ranged_m)
+    gates = [gate.passed for item in result.objects for gate in item.gates if gate.name == "cluster_hits"]
+    assert all(gates) == (hits > 1 or carried or not params.keep_partners)
+
+
+def test_a_slightly_better_overlap_is_no_reason_to_change() -> None:
+    lead, beside = lidar_track(1, 30.0), lidar_track(2, 29.5, 0.3)._replace(hits=9)
+    state, _ = joined([lead], [vision_track(1, box_of(lead), 30.0)])
+    seen = vision_track(1, box_of(beside), 29.5)
+    for params, track in ((OPTIMAL, 1), (FusionParams(keep_partners=False), 2)):
+        _, result = joined([lead, beside], [seen], params, state)
+        assert [item.lidar_track for item in result.objects if item.source == "VL"] == [track]
+
+
 HEDGE_M, LORRY_M = 35.0, 16.5
 
 
