@@ -20,6 +20,8 @@ from pipeline.types import AccCommand, Braking, Cipv, EgoState, FusedObject, Pat
 STANDSTILL_MPS = 0.1
 CREEP_MPS = 3.0
 """Below this speed own motion shows no curve: a car that may not creep would never learn its path."""
+_SLOW_MPS, _FAST_MPS = 5.0, 20.0
+"""Speeds between which ISO 15622's limits change."""
 State = Literal["cruise", "follow", "stop", "warn"]
 
 
@@ -31,6 +33,8 @@ class AccState:
     """Integral of the speed error over time."""
     error_mps: float | None = None
     """Speed error of the frame before; None at the start."""
+    accel_mps2: float = 0.0
+    """Commanded in the frame before."""
     on_course: Mapping[int, int] = field(default_factory=dict)
     """By object id, for how many frames in a row its course has led into the corridor."""
 
@@ -72,10 +76,10 @@ def control(
         key=lambda wish: wish.speed_mps,
     )
     # A PID turns the speed error into an acceleration, and that into pedals
-    hardest = _hardest_mps2(demand.object_id, situation, params, emergency)
+    hardest = _hardest_mps2(state, demand.object_id, situation, params, emergency)
     state, accel = pid(state, demand.speed_mps - ego.speed_mps, situation.now.dt_s, params, hardest)
     accel = min(accel, 0.0) if demand.no_faster else accel
-    return replace(state, on_course=on_course), AccCommand(
+    return replace(state, on_course=on_course, accel_mps2=accel), AccCommand(
         state=demand.state,
         desired_speed_mps=demand.speed_mps,
         accel_mps2=accel,
@@ -86,16 +90,30 @@ def control(
     )
 
 
-def _hardest_mps2(object_id: int | None, situation: Situation, params: AccParams, emergency: AebParams) -> float:
-    """The hardest braking that the object slowed down for calls for: comfortable, unless avoiding a collision takes
-    more and what is known of the object justifies it. A gap that is too short but does not shrink, as after a cut-in,
-    is opened gently: the paper's law alone would brake fully for it."""
-    if object_id is None or situation.now.ego is None:
+def _hardest_mps2(
+    state: AccState, object_id: int | None, situation: Situation, params: AccParams, emergency: AebParams
+) -> float:
+    """The hardest braking that is called for: comfortable in strength and onset, unless avoiding a collision takes more
+    and what is known of the object justifies it. A gap that is too short but does not shrink, as after a cut-in, is
+    opened gently, where the paper's law alone would brake fully; and what leads for a few frames hardly slows the
+    car."""
+    assert situation.now.ego is not None
+    required, strongest = 0.0, math.inf
+    if object_id is not None:
+        item = next((each for each in situation.objects if each.id == object_id), None)
+        required, strongest = _required_mps2(object_id, item, situation, emergency), params.comfort_decel_mps2
+        if item is None or item.justifies is Braking.FULL:
+            strongest = max(strongest, required)
+    return min(strongest, max(_onset_mps2(state, situation.now.ego, situation.now.dt_s, params), required))
+
+
+def _onset_mps2(state: AccState, ego: EgoState, dt_s: float | None, params: AccParams) -> float:
+    """The deceleration that comfort permits ``dt_s`` after the last. ISO 15622: it grows by no more than 2.5
+    m/s³ above 20 m/s and 5 m/s³ below 5 m/s, linearly between them."""
+    if dt_s is None or params.comfort_jerk_mps3 <= 0.0:
         return math.inf
-    item = next((each for each in situation.objects if each.id == object_id), None)
-    if item is not None and item.justifies is not Braking.FULL:
-        return params.comfort_decel_mps2
-    return max(params.comfort_decel_mps2, _required_mps2(object_id, item, situation, emergency))
+    slowness = min(max((_FAST_MPS - ego.speed_mps) / (_FAST_MPS - _SLOW_MPS), 0.0), 1.0)
+    return max(-state.accel_mps2, 0.0) + params.comfort_jerk_mps3 * (1.0 + slowness) * dt_s
 
 
 def _required_mps2(object_id: int, item: FusedObject | None, situation: Situation, emergency: AebParams) -> float:

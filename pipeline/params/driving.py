@@ -171,6 +171,15 @@ class AccParams(Section):
         "m/s²",
         "Hardest ACC braking unless a collision takes more to avoid, and evidence is strong (ISO 15622: 3.5 at speed)",
     )
+    comfort_jerk_mps3: float = slider(
+        2.5,
+        0.0,
+        20.0,
+        0.1,
+        "m/s³",
+        "Deceleration grows by no more than this above 20 m/s, twice this below 5 m/s (ISO 15622), unless a collision "
+        "takes more to avoid; 0: no limit",
+    )
     approach_decel_mps2: float = slider(
         2.5,
         0.0,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from pipeline.decision.acc import AccState, control, desired_gap_m, follow, pid
 from pipeline.decision.cipv import CipvState, choose
-from pipeline.decision.object_motion import describe
+from pipeline.decision.object_motion import describe, required_decel_mps2
 from pipeline.params import AccParams, AebParams, CipvParams, MotionParams, PathParams, preset
 from pipeline.path.corridor import corridor
 from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Situation
@@ -215,9 +215,37 @@ def test_acc_brakes_hard_only_where_that_avoids_a_collision(
 ) -> None:
     ego = EgoState(0, 20.0)
     lead = Cipv(1, gap_m, 20.0 - lead_mps, None, "")
-    _, result = control(AccState(), Situation(moment(ego, 0.1), PATH, (), lead), AccParams(), EMERGENCY)
-    assert result is not None
-    assert result.accel_mps2 == pytest.approx(-hardest_mps2, abs=0.05), case
+    braking = [-each for each in accelerations(ego, lead, 20)]
+    assert braking[-1] == pytest.approx(hardest_mps2, abs=0.05), case
+    at_once = min(max(required_decel_mps2(gap_m, 20.0 - lead_mps, EMERGENCY), 0.25), 8.0)
+    assert braking[0] == pytest.approx(at_once, abs=0.05), case
     _, printed = control(AccState(), Situation(moment(ego, 0.1), PATH, (), lead), preset("paper").acc, EMERGENCY)
     assert printed is not None
     assert printed.accel_mps2 == -8.0, "the paper's law alone brakes fully inside the desired gap"
+
+
+def accelerations(ego: EgoState, lead: Cipv, frames: int, params: AccParams = PARAMS) -> list[float]:
+    """Commanded in each of so many frames in which nothing changes."""
+    state, given = AccState(), []
+    for _ in range(frames):
+        state, result = control(state, Situation(moment(ego, 0.1), PATH, (), lead), params, EMERGENCY)
+        assert result is not None
+        given.append(result.accel_mps2)
+    return given
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "jerk_mps3"),
+    [
+        pytest.param(27.0, 2.5, id="fast"),
+        pytest.param(12.5, 3.75, id="halfway"),
+        pytest.param(4.0, 5.0, id="slow"),
+    ],
+)
+def test_braking_for_comfort_sets_in_gently(speed_mps: float, jerk_mps3: float) -> None:
+    """What leads for three frames slows the car by less than 0.2 m/s."""
+    lead = Cipv(1, 6.0 + 0.5 * speed_mps, 0.0, None, "")
+    gentle = accelerations(EgoState(0, speed_mps), lead, 3)
+    assert gentle == pytest.approx([-jerk_mps3 * 0.1 * n for n in (1, 2, 3)])
+    (at_will,) = accelerations(EgoState(0, speed_mps), lead, 1, AccParams(comfort_jerk_mps3=0.0))
+    assert at_will < 2.0 * gentle[-1]
