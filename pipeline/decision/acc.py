@@ -98,10 +98,10 @@ def _hardest_mps2(
     opened gently, where the paper's law alone would brake fully; and what leads for a few frames hardly slows the
     car."""
     assert situation.now.ego is not None
-    required, strongest = 0.0, math.inf
+    required, strongest = 0.0, params.comfort_decel_mps2  # to the set speed, too
     if object_id is not None:
         item = next((each for each in situation.objects if each.id == object_id), None)
-        required, strongest = _required_mps2(object_id, item, situation, emergency), params.comfort_decel_mps2
+        required = _required_mps2(object_id, item, situation, emergency)
         if item is None or item.justifies is Braking.FULL:
             strongest = max(strongest, required)
     return min(strongest, max(_onset_mps2(state, situation.now.ego, situation.now.dt_s, params), required))

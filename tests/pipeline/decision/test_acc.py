@@ -249,3 +249,15 @@ def test_braking_for_comfort_sets_in_gently(speed_mps: float, jerk_mps3: float) 
     assert gentle == pytest.approx([-jerk_mps3 * 0.1 * n for n in (1, 2, 3)])
     (at_will,) = accelerations(EgoState(0, speed_mps), lead, 1, AccParams(comfort_jerk_mps3=0.0))
     assert at_will < 2.0 * gentle[-1]
+
+
+def test_a_lower_set_speed_is_reached_in_comfort() -> None:
+    """At 115 km/h with 100 km/h set, and nothing ahead."""
+    state, given = AccState(), []
+    for _ in range(30):
+        state, result = control(
+            state, Situation(moment(EgoState(0, 32.0), 0.1), PATH, (), None), AccParams(), EMERGENCY
+        )
+        assert result is not None
+        given.append(result.accel_mps2)
+    assert (min(given), given[0]) == (-3.5, pytest.approx(-0.25))
