@@ -76,8 +76,8 @@ def edge_score(scenes: Iterable[Seen], params: AlignmentParams) -> EdgeScore:
         around = surroundings(params, camera)
         if not around:
             continue
-        pictures = _Pictures.of(members, around[0].aligned)
-        sums = np.array([pictures.under(each.aligned) for each in around])
+        images = _Images.of(members, around[0].aligned)
+        sums = np.array([images.under(each.aligned) for each in around])
         met, usually, near = met + sums[:, 0], usually + sums[:, 1], around
         borders += int(sums[0, 2])
     if borders < FEWEST:
@@ -142,8 +142,8 @@ def _by_camera(scenes: Iterable[Seen]) -> list[tuple[CameraCalibration | None, l
 
 
 @dataclass(frozen=True, eq=False)
-class _Pictures:
-    """Pictures of one camera under each other, and the borders that may fall into them. first_row: (E,) of the border's
+class _Images:
+    """Images of one camera under each other, and the borders that may fall into them. first_row: (E,) of the border's
     own image."""
 
     points: F64
@@ -153,7 +153,7 @@ class _Pictures:
     height: int
 
     @classmethod
-    def of(cls, scenes: Sequence[EdgeScene], present: Alignment) -> _Pictures:
+    def of(cls, scenes: Sequence[EdgeScene], present: Alignment) -> _Images:
         height, width = scenes[0].strength.shape
         points = np.concatenate([scene.points for scene in scenes])
         first_row = np.repeat(np.arange(len(scenes)) * height, [len(scene.points) for scene in scenes])

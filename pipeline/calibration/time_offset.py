@@ -156,14 +156,14 @@ def time_offset(scenes: Sequence[MovingScene]) -> TimeOffset:
 def _scene(frame: Frame, ego: EgoState, params: AlignmentParams) -> MovingScene | None:
     aligned = resolve(params, frame.camera)
     sweep = deskew(frame.sweep, ego, _DESKEW)
-    if sweep is None or frame.picture is None or aligned is None:
+    if sweep is None or frame.image is None or aligned is None:
         return None
-    edges = edge_scene(sweep, frame.picture.bgr)
+    edges = edge_scene(sweep, frame.image.bgr)
     range_m = np.hypot(edges.points[:, 0], edges.points[:, 1])
     near = np.flatnonzero((range_m > NEAREST_M) & (range_m < FARTHEST_M))
     near = near[:: -(-len(near) // MOST) or 1]
     edges = EdgeScene(edges.points[near], edges.strength, edges.usual)
-    skew_s = (frame.picture.t_ns - sweep.t_ns) / 1e9 if frame.picture.t_ns is not None else 0.0
+    skew_s = (frame.image.t_ns - sweep.t_ns) / 1e9 if frame.image.t_ns is not None else 0.0
     return MovingScene(edges, aligned, ego.speed_mps, ego.yaw_rate_radps or 0.0, skew_s, frame.t_ns)
 
 

@@ -106,7 +106,7 @@ def _overlap(a: Cuboid, b: Cuboid) -> float:
 
 
 def _boxes_apart(tracks: Sequence[LabelTrack], drive: LabeledDrive) -> Iterator[Problem]:
-    """Boxes that somebody set, away from where the cuboid is in the picture."""
+    """Boxes that somebody set, away from where the cuboid is in the image."""
     for track in tracks:
         for each in track.sightings:
             if each.box_set and each.cuboid is not None and each.bbox is not None and _is_apart(each, drive):

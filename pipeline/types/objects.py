@@ -269,7 +269,7 @@ class FusedObject:
         return is_ranging_in(self.source)
 
     @property
-    def pictured(self) -> bool:
+    def imaged(self) -> bool:
         """The camera follows it, so that its class is known."""
         return is_camera_in(self.source)
 

@@ -6,6 +6,8 @@ import ast
 import re
 from collections import defaultdict
 
+import pytest
+
 from tests.docs.pages import ROOT
 
 SHARED = {
@@ -18,6 +20,7 @@ SHARED = {
 }
 """Those that still do, and as what."""
 A_TYPE = re.compile(r"[A-Z][a-z]\w*")
+A_PICTURE = re.compile(r"\w*picture\w*", re.IGNORECASE)
 
 
 def named() -> dict[str, list[str]]:
@@ -49,3 +52,20 @@ def test_no_two_types_share_a_name() -> None:
 def test_no_exception_is_kept_longer_than_needed() -> None:
     found = named()
     assert {name for name in SHARED if len(found[name]) < 2} == set()
+
+
+KEPT_AS_PICTURE = {
+    "picture": "recorded in the frames of sessions, in timings, in training data, and sent to the page",
+    "picture_px": "sent by the page",
+    "pictures": "a kind of source",
+    "pictures_lost": "a field of scenarios",
+}
+"""Where what the camera takes is still called a picture: these are stored or sent, and cannot change."""
+
+
+@pytest.mark.parametrize("suffix", ["py", "js"])
+def test_what_the_camera_takes_is_called_an_image(suffix: str) -> None:
+    files = [file for root in ("pipeline", "app", "static") for file in (ROOT / root).rglob(f"*.{suffix}")]
+    assert len(files) > 100
+    words = {word for file in files for word in A_PICTURE.findall(f"{file.name}\n{file.read_text(encoding='utf-8')}")}
+    assert words <= KEPT_AS_PICTURE.keys()

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from app.fleet.batch.addresses import Recording, recordings
+from app.fleet.batch.job import Job, aside_file, done_file
 from app.fleet.batch.keys import RunKey, code_digest, networks_digest
-from app.fleet.batch.work import Job, aside_file, done_file
 from app.fleet.runs import LATEST
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput

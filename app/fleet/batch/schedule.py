@@ -15,7 +15,8 @@ from typing import Any
 import dask
 from distributed import Client, KilledWorker, LocalCluster, as_completed
 
-from app.fleet.batch.work import Job, Outcome, TooLong, WrongWorker, look_at_piece, run_drive, set_aside
+from app.fleet.batch.job import Job, Outcome, TooLong
+from app.fleet.batch.work import WrongWorker, look_at_piece, run_drive, set_aside
 from pipeline.common.errors import BadInput, first_line
 from pipeline.common.user_files import Overloaded
 

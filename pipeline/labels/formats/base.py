@@ -100,7 +100,7 @@ def drive_of(
 
 def _size(frame: Frame) -> tuple[int, int] | None:
     """Of the image, where no calibration tells it."""
-    return (frame.picture.bgr.shape[1], frame.picture.bgr.shape[0]) if frame.picture is not None else None
+    return (frame.image.bgr.shape[1], frame.image.bgr.shape[0]) if frame.image is not None else None
 
 
 @dataclass(frozen=True)

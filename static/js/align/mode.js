@@ -10,7 +10,7 @@ import { fitControl, resultPanel } from "./fit.js";
 import { drawRegions, rangesRow, regionsButton, showRegions } from "./regions.js";
 import { versionsButton, versionsPanel } from "./versions.js";
 import { followHand } from "./pointer.js";
-import { drawEdges } from "./picture_edges.js";
+import { drawEdges } from "./image_edges.js";
 import { addLayer } from "../views/camera.js";
 import { grow } from "../workspace/panes.js";
 

@@ -69,12 +69,12 @@ const hue = (score) => String(Math.round(GOOD_HUE * score));
  * @param {{x: number, y: number, scale: number}} place
  */
 export function drawRegions(ctx, frame, place) {
-  const { picture } = frame;
-  if (!picture || !known?.regions.length) return;
+  const { image } = frame;
+  if (!image || !known?.regions.length) return;
   const { columns, rows, regions } = known;
-  const width = (picture.width * place.scale) / columns,
-    height = (picture.height * place.scale) / rows;
-  const perPixel = place.scale * (picture.scale ?? 1);
+  const width = (image.width * place.scale) / columns,
+    height = (image.height * place.scale) / rows;
+  const perPixel = place.scale * (image.scale ?? 1);
   ctx.save();
   regions.forEach((region, number) => {
     if (region.score === null || !region.shift_px) return;

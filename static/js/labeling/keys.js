@@ -6,7 +6,7 @@ import * as commands from "./acts/commands.js";
 import { bringHere } from "./acts/range_ends.js";
 import { cancel, isOn, setTool, toggleObjects } from "./state/mode.js";
 import * as review from "./acts/review.js";
-import { zoomBy } from "./views/picture_pointer.js";
+import { zoomBy } from "./views/image_pointer.js";
 import * as span from "./state/marked_frames.js";
 import { toggleWhole } from "./acts/tags.js";
 

@@ -5,7 +5,7 @@ import { on, paint } from "../../core/store.js";
 import * as commands from "../acts/commands.js";
 import { classNames, fill } from "../state/classes.js";
 import { presentOf } from "../state/draft.js";
-import { boxOf, isFollowing } from "../views/picture_drawing.js";
+import { boxOf, isFollowing } from "../views/image_drawing.js";
 import { chosen, nameOf } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
 import { Past } from "./history_list.js";

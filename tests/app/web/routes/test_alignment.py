@@ -32,7 +32,7 @@ def test_a_score_in_words(found: EdgeScore, brief: str, told: str):
     assert said.better == dict(found.better)
 
 
-def test_without_a_picture_there_is_nothing_to_match():
+def test_without_an_image_there_is_nothing_to_match():
     said = _json(EdgeScore(None, None, 0), NO_MATCH, 0)
     assert (said.score, said.brief) == (None, "nothing to match")
     assert "both an image and LiDAR points" in said.text
