@@ -99,7 +99,7 @@ class Row(NamedTuple):
     yaw_rate_radps: float | None = None
     """Own yaw rate; None where nothing gives it."""
     reach_m: float = 0.0
-    """How far ahead a vehicle in the path would have been noticed (``lead_reach_m``)."""
+    """How far ahead a vehicle in the path would be detected (``lead_reach_m``)."""
 
 
 _INSIDE = ("t_ns", "judged", "extra", "yaw_rate_radps", "reach_m")
@@ -141,7 +141,7 @@ def row_of(frame: Frame, result: Result, judged: Judged | None = None) -> Row:
 
 
 def lead_reach_m(frame: Frame, result: Result) -> float:
-    """How far ahead a vehicle in the path would have been noticed: as far as it is known where the path goes. 0 unless
+    """How far ahead a vehicle in the path would be detected: as far as it is known where the path goes. 0 unless
     the camera looks: a LiDAR of 16 beams has hardly a point on a car beyond 35 m."""
     looks = frame.image is not None and frame.raw_boxes is not None
     return result.path.reach_m if looks else 0.0

@@ -45,7 +45,7 @@ NEAREST_M, FARTHEST_M = 3.0, 30.0
 MOST = 500
 """Borders of one frame that are looked at."""
 _DESKEW = DeskewParams(enabled=True)
-_NOT_CLEAR = "no lag between camera and LiDAR puts borders on edges clearly best; drive past parked cars"
+_NOT_CLEAR = "no lag between camera and LiDAR matches the edges clearly best; drive past parked cars"
 
 
 class NoOffset(BadInput):
@@ -126,7 +126,7 @@ def time_offset(scenes: Sequence[MovingScene]) -> TimeOffset:
     moving = [each for each in scenes if _moves(each)]
     if len(moving) < FEWEST_FRAMES:
         raise NoOffset(
-            f"only {len(moving)} frames with an image while the car drives: the time between the sensors is not told"
+            f"only {len(moving)} frames with an image while the car drives: the time between the sensors is unknown"
         )
     lags_s = np.arange(-REACH_MS, REACH_MS + STEP_MS / 2, STEP_MS) / 1e3
     strength = np.array([_strengths(each, lags_s) for each in moving])
@@ -143,13 +143,13 @@ def time_offset(scenes: Sequence[MovingScene]) -> TimeOffset:
     if sigma_ms > TOLD_MS:
         raise NoOffset(_NOT_CLEAR)
     warnings: tuple[str, ...] = (
-        (f"the time offset is known to ±{sigma_ms:.0f} ms only",) if sigma_ms > UNSURE_MS else ()
+        (f"the time offset is known only to ±{sigma_ms:.0f} ms",) if sigma_ms > UNSURE_MS else ()
     )
     speeds = np.array([each.speed_mps for each in moving])
     turning = np.array([abs(each.yaw_rate_radps) for each in moving])
     if np.std(speeds) < 1.0 and np.quantile(turning, 0.8) < SLOWEST_RADPS:
         cm = float(np.mean(speeds)) / 10.0
-        warnings += (f"one speed and no bends: a camera {cm:.1f} cm farther ahead looks like 1 ms later",)
+        warnings += (f"constant speed and no bends: a camera {cm:.1f} cm farther ahead looks like 1 ms later",)
     return TimeOffset(round(1e3 * best, 1), round(sigma_ms, 2), round(height, 1), len(moving), warnings)
 
 

@@ -191,7 +191,7 @@ class Frame:
     index: int
     """Its number in the recording, from 0; of live sensors the number of the tick, dropped ones included."""
     name: str
-    """The recording's own name of the frame."""
+    """The frame's name in the recording."""
     t_ns: int
     """The tick."""
     sweep: Sweep | None = None

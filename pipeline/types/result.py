@@ -169,7 +169,7 @@ class Result:
     docs/reference/results.md says."""
 
     frame: str
-    """The recording's own name of the frame."""
+    """The frame's name in the recording."""
     t_ns: int
     """The tick."""
     sensors: SensorHealth

@@ -28,7 +28,7 @@ class TruthObject:
     cuboid: Cuboid
     """In the ego frame."""
     id: int | None = None
-    """The same from frame to frame; None where the labels follow no identity over time."""
+    """Id of the object, stable from frame to frame; None where the labels follow no identity over time."""
     bbox: Box | None = None
     """Pixels of the raw image; None where the labels have no box."""
     called: str = ""

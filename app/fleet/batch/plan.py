@@ -55,7 +55,7 @@ class Plan:
         """What the last batch in a folder was asked for. BadInput where there was none."""
         data = store.read(_PLAN)
         if data is None:
-            raise BadInput(f"{store.address}: no batch to resume here; name the recordings")
+            raise BadInput(f"{store.address}: no batch to resume here; give the recordings")
         try:
             said: dict[str, Any] = json.loads(data)
             if said["version"] != _VERSION:
@@ -69,7 +69,7 @@ class Plan:
                 bool(said["results"]),
             )
         except (ValueError, KeyError, TypeError, ParamsError):
-            raise BadInput(f"{store.address}/{_PLAN}: damaged; name the recordings again") from None
+            raise BadInput(f"{store.address}/{_PLAN}: damaged; give the recordings again") from None
 
 
 @dataclass(frozen=True)

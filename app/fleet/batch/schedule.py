@@ -86,7 +86,7 @@ def client_of(scheduler: str | None, workers: int, memory: str) -> Iterator[Clie
             try:
                 client = Client(scheduler, timeout=30)
             except (OSError, ValueError, TimeoutError) as error:
-                raise BadInput(f"--scheduler {scheduler}: no Dask scheduler answers: {first_line(error)}") from None
+                raise BadInput(f"--scheduler {scheduler}: cannot reach a Dask scheduler: {first_line(error)}") from None
             with client:
                 yield client
             return
@@ -129,7 +129,7 @@ def run_batch(client: Client, jobs: Sequence[Job], tally: Tally, told: Callable[
         told: called after each change of it.
 
     Raises:
-        SchedulerLost: Dask has gone; what is done is kept.
+        SchedulerLost: the connection to Dask is lost; finished drives are kept.
         WrongWorker: the workers run other code or have other networks.
     """
     _Batch(client, jobs, tally, told).run()
@@ -183,14 +183,14 @@ class _Batch:
             self._finished(piece, future.result())
             return
         if future.status == "lost" or future.status == "cancelled":
-            raise SchedulerLost("the scheduler has lost the work that it was given")
+            raise SchedulerLost("the scheduler lost the task")
         error = future.exception()
         if isinstance(error, WrongWorker):
             raise error
         if isinstance(error, KilledWorker) and piece.tries < TRIES:
             self._waiting.append(_Piece(piece.job, piece.first, piece.is_last_look, piece.tries + 1))
         elif isinstance(error, KilledWorker):
-            self._set_aside(piece, "it ends the process of every worker that opens it: too little memory, or a crash")
+            self._set_aside(piece, "every worker that opened it died: out of memory, or a crash")
         elif isinstance(error, BadInput):
             self._set_aside(piece, str(error))
         else:

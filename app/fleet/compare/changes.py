@@ -1,4 +1,4 @@
-"""Where two runs differ: the drives and frames with another lead, and the events that came and went."""
+"""Where two runs differ: the drives and frames with a different lead, and the events that came and went."""
 
 from __future__ import annotations
 

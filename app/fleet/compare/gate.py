@@ -80,7 +80,7 @@ def broken(
     """What is broken, in sentences. drives: that both runs have. aside: recordings that only the run set aside."""
     said = []
     if drives < rules.drives_at_least:
-        said.append(f"{drives} drives are in both runs; at least {rules.drives_at_least} are demanded")
+        said.append(f"{drives} drives are in both runs; at least {rules.drives_at_least} are required")
     if aside > rules.aside_at_most:
         said.append(f"{aside} more recordings were set aside; at most {rules.aside_at_most} may be")
     by_score, by_kind = {each.info.name: each for each in scores}, {each.kind: each for each in events}
@@ -116,4 +116,4 @@ def _limits(rule: Rule, name: str, value: float, unit: str) -> Iterator[str]:
     if rule.at_most is not None and value > rule.at_most:
         yield f"{name}: {value:.4g}{unit}; at most {rule.at_most:g} is allowed"
     if rule.at_least is not None and value < rule.at_least:
-        yield f"{name}: {value:.4g}{unit}; at least {rule.at_least:g} is demanded"
+        yield f"{name}: {value:.4g}{unit}; at least {rule.at_least:g} is required"

@@ -24,7 +24,7 @@ class FrameInfo:
     """One frame, without its data."""
 
     name: str
-    """The recording's own name of the frame."""
+    """The frame's name in the recording."""
     t_ns: int
     """Of the tick."""
     camera: CameraCalibration | None = None

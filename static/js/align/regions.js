@@ -37,7 +37,7 @@ export function showRegions(score) {
   known = score;
   rangesRow.replaceChildren("Match by distance: ", ...(score?.ranges ?? []).flatMap(rangeText));
   rangesRow.title = score
-    ? `Match by distance, and how far the points should move there. “?”: too few or unclear borders.`
+    ? `Match by distance, and how far the points should move there. “?”: too few or unclear edges.`
     : "";
 }
 
@@ -48,7 +48,11 @@ function rangeText({ from_m, to_m, score, shift_px: shift, borders }) {
   const said = score === null ? "?" : `${Math.round(100 * score)} %${move}`;
   return [
     el("span", { textContent: `${name} ` }),
-    el("b", { textContent: said, title: `${borders} borders`, style: score === null ? {} : { "--hue": hue(score) } }),
+    el("b", {
+      textContent: said,
+      title: `${borders} depth edges`,
+      style: score === null ? {} : { "--hue": hue(score) },
+    }),
   ];
 }
 

@@ -184,7 +184,7 @@ def test_a_track_is_carried_on_from_one_frame_by_one_act_and_taken_back_by_one(
     rear = [rows[0]["cuboid"]["center"][0] - rows[0]["cuboid"]["size"][0] / 2 for rows in frames.values()]
     assert rear == pytest.approx([30.0 - 0.4 * index for index in range(20)], abs=0.3)
     again = act(client, kind="propagate", track=after["id"], revision=after["revision"])
-    assert (again.status_code, "beyond its ends" in again.json()["detail"]) == (409, True)
+    assert (again.status_code, "before its first or after its last frame" in again.json()["detail"]) == (409, True)
     move(client, "undo", "Ada")
     (back,) = labels(client)["tracks"]
     assert (back["first"], back["last"]) == (10, 10)

@@ -46,7 +46,7 @@ def test_a_key_is_changed_refused_where_it_is_taken_and_kept_for_its_person(hand
     )
     assert twice == [], "no key that is on does two things"
     dialog.get_by_role("button", name="Close").click()
-    expect(page.locator("#label-keys")).to_contain_text("Ctrl B turn round")
+    expect(page.locator("#label-keys")).to_contain_text("Ctrl B reverse")
 
     yaw = labels.cuboid(made, START)["yaw_rad"]
     page.keyboard.press("Shift+X")
@@ -62,7 +62,7 @@ def test_a_key_is_changed_refused_where_it_is_taken_and_kept_for_its_person(hand
           return document.querySelector("#label-keys").textContent;
         }"""
     )
-    assert "Shift X turn round" in other, "another person has other keys"
+    assert "Shift X reverse" in other, "another person has other keys"
     page.evaluate("async () => (await import('/js/core/store.js')).set('person', null)")
     page.keyboard.press("?")
     dialog.get_by_role("button", name="Change keys").click()

@@ -186,7 +186,10 @@ export const notHere = () =>
     span.over((frames) => act({ kind: "drop_sightings", track: id, revision, ...frames })),
   );
 
-/** Classes chosen and not yet answered, by track: a quick second press goes on from the first. @type {Map<number, string>} */
+/**
+ * Classes chosen and not yet confirmed by the server, by track: a quick second press continues from the first.
+ * @type {Map<number, string>}
+ */
 const askedClass = new Map();
 
 /** @param {1|-1} direction */

@@ -120,7 +120,7 @@ const FRAMES = ["frame", "first", "last"];
 const ACTS = {
   set_sighting: "position",
   drop_keyframe: "no keyframe",
-  drop_sightings: "not here",
+  drop_sightings: "removed here",
   size_along: "size",
   refit: "fit to points",
   relabel: "class",
