@@ -1,5 +1,4 @@
-"""How well LiDAR and images lie on each other: do borders in depth fall on edges of the image, more than with the
-mount turned a little?
+"""How well LiDAR and images match: do depth edges fall on image edges, more than with the mount turned a little?
 
 How strong the edges under the borders are says little by itself: it differs from road to road more than from a right
 mount to a wrong one. So the same is asked of the mount turned to all sides, as Levinson and Thrun (2013) do to judge
@@ -41,7 +40,7 @@ MOST = 8000
 
 @dataclass(frozen=True)
 class EdgeScore:
-    """How well one alignment puts depth edges on edges of the image."""
+    """How well one alignment matches depth edges to image edges."""
 
     score: float | None
     """0–1: 1 where no alignment near is better, 0 where the usual one of them is as good. None where too few borders
@@ -66,8 +65,8 @@ class Near:
 
 
 def edge_score(scenes: Iterable[Seen], params: AlignmentParams) -> EdgeScore:
-    """The score over several frames: a single sweep of 16 rings has few borders. Frames that nothing aligns are left
-    out. A tenth of a second for 20 frames."""
+    """The score over several frames, since a single sweep of 16 rings has few depth edges. Skips frames without an
+    alignment. Takes a tenth of a second for 20 frames."""
     met: F64 = np.zeros(1)
     usually: F64 = np.zeros(1)
     borders = 0

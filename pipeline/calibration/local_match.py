@@ -1,4 +1,4 @@
-"""Where LiDAR and images lie beside each other: by region of the image and by distance, over several frames at once.
+"""Where LiDAR and images mismatch: by image region and by distance, over several frames at once.
 
 The borders in depth that fall into a region are shifted over the images by some pixels to all sides. Where they meet
 edges clearly better after one shift than after most, that shift is the region's arrow; where no shift stands out, the
@@ -37,7 +37,7 @@ MOST = 6000
 
 @dataclass(frozen=True)
 class Region:
-    """How borders and edges lie in a part of the image, or at a range of distances."""
+    """How depth edges and image edges match in a region of the image, or at a range of distances."""
 
     borders: int
     """Depth borders in it, of all frames."""
@@ -67,7 +67,8 @@ NO_MATCH = LocalMatch(COLUMNS, ROWS, (_NOTHING,) * (COLUMNS * ROWS), (_NOTHING,)
 
 
 def local_match(scenes: Iterable[Seen], params: AlignmentParams) -> LocalMatch:
-    """Over frames of the camera of the last one; frames that nothing aligns are left out. 50 ms for 20 frames."""
+    """The match over the frames that have the last frame's camera. Skips frames without an alignment. Takes 50 ms for
+    20 frames."""
     seen = list(scenes)
     if not seen:
         return NO_MATCH

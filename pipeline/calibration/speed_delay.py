@@ -1,4 +1,4 @@
-"""How late the car's own speed is, against the LiDAR's odometry: while it accelerates or brakes, a late speed lags."""
+"""The delay of the car's own speed relative to LiDAR odometry, visible while the car accelerates or brakes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OFF_MPS = 0.3
 
 
 class NoDelay(BadInput):
-    """A drive that tells nothing of the speed's delay; the text says why."""
+    """The drive does not determine the delay of ego speed; the text says why."""
 
 
 class SpeedPair(NamedTuple):
@@ -53,14 +53,14 @@ class SpeedDelay:
 
 
 def forward_m(before: F64, after: F64) -> float:
-    """Way along x between two (4, 4) poses, at half of the turn."""
+    """Distance along x between two (4, 4) poses, at half the rotation."""
     step = np.linalg.inv(before) @ after
     half = 0.5 * float(np.arctan2(step[1, 0], step[0, 0]))
     return float(step[0, 3]) * cos(half) + float(step[1, 3]) * sin(half)
 
 
 def speed_delay(pairs: Sequence[SpeedPair]) -> SpeedDelay:
-    """The shift of the recorded speed that fits the LiDAR's best. NoDelay where the drive cannot tell."""
+    """The shift of the recorded speed that best fits the LiDAR's. Raises NoDelay if the drive does not determine it."""
     if len(pairs) < FEWEST:
         raise NoDelay("too few ego speeds with LiDAR odometry: their delay is unknown")
     begin_ns = pairs[0].t_ns

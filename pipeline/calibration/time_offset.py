@@ -1,4 +1,4 @@
-"""The time between camera and LiDAR, from own motion: when does what stands beside the road lie on its edges?
+"""The time offset between camera and LiDAR, from ego motion: at which lag do objects beside the road match their edges?
 
 An image that shows the world later than its time says shows everything nearer: what stands to the left has moved on to
 the left, what stands to the right to the right, and in a bend everything to one side. So the borders in depth are moved
@@ -49,7 +49,7 @@ _NOT_CLEAR = "no lag between camera and LiDAR matches the edges clearly best; dr
 
 
 class NoOffset(BadInput):
-    """A drive that tells nothing of the time between the sensors; the text says why."""
+    """The drive does not determine the time offset between the sensors; the text says why."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def _speeds(before: State, after: State, frame: Frame) -> list[SpeedPair]:
 
 
 def time_offset(scenes: Sequence[MovingScene]) -> TimeOffset:
-    """The lag at which the scenes' borders meet edges best. NoOffset where they cannot tell."""
+    """The lag at which the scenes' depth edges match image edges best. Raises NoOffset if no lag stands out."""
     moving = [each for each in scenes if _moves(each)]
     if len(moving) < FEWEST_FRAMES:
         raise NoOffset(

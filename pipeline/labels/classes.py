@@ -73,7 +73,7 @@ def default_classes() -> ClassList:
 
 
 def read_classes(path: Path) -> ClassList:
-    """A class list from a file. BadInput in one sentence when it is none."""
+    """A class list from a file. Raises BadInput, in one sentence, if it is invalid."""
     try:
         body = yaml.safe_load(read_regular(path, _LARGEST))
     except OSError as error:

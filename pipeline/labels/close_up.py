@@ -1,4 +1,4 @@
-"""A label from close by: the image around it, and its points from above, from the side and from behind.
+"""A close-up of a label: the image around it, and its points from above, from the side and from behind.
 
 Also how well a cuboid fits its points, by which the frames to look at first are found.
 """

@@ -1,4 +1,4 @@
-"""What in labels can hardly be so: things to look at before they are exported. Nothing is changed."""
+"""Finds implausible labels to check before export. Changes nothing."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _LEAST_BOX_IOU = 0.3
 
 @dataclass(frozen=True)
 class Problem:
-    """Something in labels that can hardly be so."""
+    """Something implausible in labels."""
 
     frame: int
     """Where to look."""

@@ -1,4 +1,4 @@
-"""Whether a label set is one: what no file, database or hand may bring in, said in one sentence."""
+"""Validates label sets from files, databases and people; an error is one sentence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From what a person types to recordings: folders, globs, stores, list files, and any source by its scheme."""
+"""Resolves addresses to recordings: folders, globs, stores, list files, and any source by its scheme."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Recording:
 
 
 def recordings(addresses: Iterable[str]) -> list[Recording]:
-    """Every recording that the addresses name, once, sorted. BadInput for an address that names none."""
+    """Every recording that the addresses name, once each, sorted. Raises BadInput for an address without recordings."""
     found: dict[str, Recording] = {}
     for address in addresses:
         here = {each.address: each for each in _of(address.strip())}

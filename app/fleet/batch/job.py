@@ -1,4 +1,4 @@
-"""A drive of a batch: what a worker is told of it, and what it says when it is done."""
+"""A drive of a batch: what a worker gets, and what it returns."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class Job:
     """Images of a longer recording are looked at in pieces of so many frames."""
 
     def answers(self, detectors: Detectors, first: int) -> str:
-        """The name in the store of what these detectors saw in the piece that begins with a frame."""
+        """Store name of these detectors' detections in the piece that begins with frame ``first``."""
         return answers_file(self.recording.mark, detectors, first, self.piece_frames)
 
     @property
     def done_file(self) -> str:
-        """Its presence says that all of the drive's files are there."""
+        """Name of the file whose presence means that all of the drive's files are complete."""
         return done_file(self.key.name, self.recording)
 
 
@@ -56,17 +56,17 @@ class Outcome:
 
 @dataclass(frozen=True)
 class TooLong:
-    """A recording whose images several workers shall look at first."""
+    """A recording whose images several workers should process first."""
 
     pieces: tuple[int, ...]
     """First frame of each piece."""
 
 
 def done_file(run: str, recording: Recording) -> str:
-    """The name in the store of what says that a drive is done."""
+    """Store name of the file that marks a drive as done."""
     return f"done/run={run}/{recording.drive}.{recording.mark}.json"
 
 
 def aside_file(run: str, recording: Recording) -> str:
-    """The name in the store of what says why a recording was set aside."""
+    """Store name of the file that says why a recording was set aside."""
     return f"aside/run={run}/{recording.drive}.{recording.mark}.json"

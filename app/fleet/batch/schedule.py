@@ -1,5 +1,5 @@
-"""A batch on Dask: which pieces of work there are, what follows from each, and what was said of it. Dask decides where
-and when each piece runs, and runs the pieces of a worker that died again."""
+"""Runs a batch on Dask: creates tasks, follows up on their results, and counts them. Dask decides where and when each
+task runs, and reruns the tasks of a worker that died."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ _SETTINGS = {
 
 
 class SchedulerLost(Exception):
-    """The scheduler has gone; what is done is kept."""
+    """The connection to the scheduler is lost; finished drives are kept."""
 
 
 @dataclass
 class Tally:
-    """What became of a batch so far."""
+    """The state of a batch so far."""
 
     total: int
     """Drives of the batch."""
@@ -60,12 +60,12 @@ class Tally:
 
     @property
     def left(self) -> int:
-        """Drives of which nothing is known yet."""
+        """Drives without an outcome yet."""
         return self.total - self.before - self.done - len(self.aside) - len(self.failed)
 
 
 def usual_workers() -> int:
-    """Processes on this machine: half its cores, since each runs networks on two threads, and steps beside them."""
+    """Default number of processes on this machine: half its cores, since each runs networks on two threads."""
     return max(1, (os.cpu_count() or 1) // 2)
 
 
@@ -76,10 +76,10 @@ def client_of(scheduler: str | None, workers: int, memory: str) -> Iterator[Clie
     Args:
         scheduler: its address; None: a cluster of this machine.
         workers: how many processes that has.
-        memory: limit of each, e.g. ``"1.5GB"``; a worker above it is started anew.
+        memory: limit of each, e.g. ``"1.5GB"``; a worker that exceeds it is restarted.
 
     Raises:
-        BadInput: no scheduler answers there.
+        BadInput: the scheduler cannot be reached.
     """
     with dask.config.set(_SETTINGS), _quiet():
         if scheduler is not None:

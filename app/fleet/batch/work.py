@@ -1,5 +1,5 @@
-"""What a worker does: run one recording, or look at a piece of one. Everything it makes goes to the batch's store,
-whole files at once, so a worker may be killed at any moment and its work done again by another."""
+"""A worker's tasks: run one recording, or the networks on a piece of one. All output goes to the batch's store as
+whole files, so a worker may be killed at any time and another one can repeat its work."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ class WrongWorker(BadInput):
 
 
 def run_drive(job: Job, may_split: bool = False) -> Outcome | TooLong:
-    """Run one recording, write its tables, and say that it is done. A recording that cannot be read is set aside, with
-    the reason.
+    """Run one recording, write its tables, and mark it as done. A recording that cannot be read is set aside, with the
+    reason.
 
     Args:
         job: which one.
-        may_split: return ``TooLong`` instead where a recording's images are worth looking at piece by piece.
+        may_split: return ``TooLong`` instead if several workers should process the recording's images first.
 
     Raises:
-        WrongWorker: see there. Overloaded: a store that goes on failing.
+        WrongWorker: see there. Overloaded: the store keeps failing.
     """
     start = perf_counter()
     _check(job)
@@ -73,8 +73,8 @@ def run_drive(job: Job, may_split: bool = False) -> Outcome | TooLong:
 
 
 def look_at_piece(job: Job, first: int) -> int:
-    """Let the detectors look at the images of one piece of a recording, and keep their answers. Returns how many images
-    networks looked at. Raises BadInput for a recording that cannot be read, and what ``run_drive`` raises."""
+    """Run the detectors on the images of one piece of a recording, and save their detections. Returns how many images
+    networks processed. Raises BadInput for a recording that cannot be read, and what ``run_drive`` raises."""
     _check(job)
     source = open_source(job.recording.address, rings=job.key.rings)
     detectors = detectors_for(source, job)

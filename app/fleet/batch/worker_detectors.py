@@ -11,7 +11,8 @@ from pipeline.types.source import Source, is_simulated
 
 
 def detectors_for(source: Source, job: Job) -> Detectors:
-    """Networks are opened once for each kind of image; the classical lane detector knows the camera too."""
+    """The detectors for a recording. Networks are opened once per kind of image and, for the classical lane detector,
+    camera."""
     if job.key.sensors == "lidar":
         return Detectors()
     first = patiently(source, 0)

@@ -1,4 +1,4 @@
-"""Rules that a run must keep, in a file: `cipv compare --gate rules.yaml` ends with 1 where one is broken."""
+"""Rules that a run must meet, from a file: `cipv compare --gate rules.yaml` exits with 1 if one is broken."""
 
 from __future__ import annotations
 
@@ -77,7 +77,8 @@ def read_rules(file: Path) -> GateRules:
 def broken(
     rules: GateRules, scores: Sequence[PairedScore], events: Sequence[EventChange], drives: int, aside: int
 ) -> list[str]:
-    """What is broken, in sentences. drives: that both runs have. aside: recordings that only the run set aside."""
+    """The broken rules, as sentences. drives: how many both runs have. aside: recordings that only the run set
+    aside."""
     said = []
     if drives < rules.drives_at_least:
         said.append(f"{drives} drives are in both runs; at least {rules.drives_at_least} are required")

@@ -41,7 +41,7 @@ class FleetComparison:
 
 
 def compare_runs(base: FleetTables, run: FleetTables, most: int = 20) -> FleetComparison:
-    """Compare two runs. most: changes that are listed. BadInput where they have no drive in common."""
+    """Compare two runs. most: how many changes to list. Raises BadInput if they have no drive in common."""
     rows = {str(row["drive"]): row for row in base.rows("drives")}
     shared = sorted(rows.keys() & set(run.drives()))
     if not shared:

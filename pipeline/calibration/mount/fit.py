@@ -71,9 +71,7 @@ def fit_mount(record: MountRecord) -> MountFit:
     if len(record.roads) >= FEWEST_ROADS:
         _take(values, sigmas, _against_road(record.roads))
     else:
-        warnings.append(
-            f"the road is seen in {len(record.roads)} of {record.frames} frames: no pitch, roll, height"
-        )
+        warnings.append(f"the road is seen in {len(record.roads)} of {record.frames} frames: no pitch, roll, height")
     if len(record.pieces) >= FEWEST_PIECES:
         way = _against_travel(record.pieces)
         if way["ahead_of_axle_m"][1] > TOLD_M:
@@ -106,8 +104,8 @@ def mount_sentence(fit: MountFit) -> str:
 
 
 def turned(fit: MountFit, T_ego_lidar: F64, camera: CameraCalibration | None) -> tuple[CameraCalibration | None, F64]:
-    """Camera and LiDAR (4, 4) in the ego frame as the fit turns it: level, x along the direction of travel. What the
-    drive does not tell stays as it is; the two sensors keep their place to each other."""
+    """Camera and LiDAR (4, 4) in the ego frame as the fit turns it: level, x along the direction of travel. Values
+    that the drive does not determine stay as they are; the two sensors keep their relative pose."""
     turn = np.eye(4)
     turn[:3, :3] = turn_of(fit.values)
     moved = replace(camera, T_camera_ego=camera.T_camera_ego @ inverse(turn)) if camera is not None else None
