@@ -80,7 +80,7 @@ function reflect() {
   const isAngular = get("params")?.values["alignment.model"] === "angular";
   text(
     how,
-    isAngular ? "Drag: origin · scroll: h_res and v_res · Shift + scroll: v_res" : "Drag: yaw and pitch · scroll: roll",
+    isAngular ? "Drag: origin · scroll: h_res and v_res · Shift + scroll: v_res" : "Drag: yaw, pitch · scroll: roll",
   );
   for (const choice of bar.querySelectorAll("[data-model]"))
     press(choice, /** @type {HTMLElement} */ (choice).dataset.model === get("params")?.values["alignment.model"]);

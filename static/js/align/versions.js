@@ -67,7 +67,7 @@ function row(version) {
   const when = new Date(version.saved_at);
   const restore = el("button", {
     type: "button",
-    textContent: version.is_present ? "Present" : "Restore",
+    textContent: version.is_present ? "Current" : "Restore",
     disabled: version.is_present,
     title: "Use this alignment (can be undone)",
     aria: { label: `Restore alignment ${version.id}` },

@@ -58,7 +58,7 @@ export function setUp(parent) {
       button("Keyframe", "K", "Set a keyframe in this frame", commands.keyframe),
       button("Reset box", "Shift S", "Make the image box follow the cuboid again", commands.boxFollows),
       button("Draw", "Shift G", "Draw the shape in this frame", () => setTool("shape")),
-      button("Remove here", "Del", "Remove from this frame or the marked frames", commands.notHere),
+      button("Remove", "Del", "Remove from this frame or the marked frames", commands.notHere),
       button("Split", "X", "Split the track from this frame on", commands.splitHere),
       button("Merge", "M", "Merge with another label: click it, or select it with . and press Enter", commands.merge),
       button("Delete", "Shift Del", "Delete the track", commands.removeTrack),
