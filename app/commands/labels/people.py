@@ -119,7 +119,7 @@ class LabelQueue:
         from app.labels.store.work import put, queue
 
         if (self.drive is None) != (self.assign is None and self.state is None):
-            raise BadInput("--drive needs --assign or --state, and the reverse")
+            raise BadInput("--drive must be given together with --assign or --state")
         database = open_database(self.database)
         try:
             if self.drive is not None:
