@@ -334,6 +334,6 @@ def test_a_track_is_carried_on_by_one_key_and_taken_back_by_one(hand: Hand, labe
     hand.keys("Shift+C")
     labels.wait_for(lambda now: now.tracks[made]["last"] - now.tracks[made]["first"] > 10)
     assert labels.tracks[made]["keyframes"] == [START], "nobody has placed the others"
-    expect(page.locator(".said")).to_contain_text(f"carried #{made} on over")
+    expect(page.locator(".said")).to_contain_text(f"extended #{made} by")
     page.keyboard.press("Control+z")
     labels.wait_for(lambda now: (now.tracks[made]["first"], now.tracks[made]["last"]) == (START, START))
