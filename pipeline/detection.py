@@ -86,7 +86,7 @@ class LiveDetectors:
 
     def of(self, frame: Frame) -> Detectors:
         """The detectors for a tick; call it once for each. A tick without an image passes its turn to the next."""
-        is_due = self._since_lanes >= self._detectors.lanes_every and frame.picture is not None
+        is_due = self._since_lanes >= self._detectors.lanes_every and frame.image is not None
         self._since_lanes = 1 if is_due else self._since_lanes + 1
         lanes = self._detectors.lanes if is_due else None
         far = self._detectors.far if self._has_time_to_look_far(frame) else None
@@ -114,9 +114,9 @@ def look(detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
 def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
     """The frame with what the detectors see in its image. A frame without an image, or whose recording already holds
     detections, is returned as it is."""
-    if frame.picture is None or frame.detections_given:
+    if frame.image is None or frame.detections_given:
         return frame
-    bgr = frame.picture.bgr
+    bgr = frame.image.bgr
     if detectors.boxes is not None:
         frame = replace(frame, raw_boxes=ask(detectors.boxes, frame, bgr))
     if detectors.far is not None and detectors.looks_far(frame.index):
@@ -135,20 +135,20 @@ def detector_for(source: AnySource, spec: str | None = None) -> Detector:
     """
     if spec is None and is_simulated(source):
         spec = EMBEDDED
-    return open_detector(spec, picture_size(source))
+    return open_detector(spec, image_size(source))
 
 
 def far_view_for(source: AnySource, detector: Detects[RawBoxes] | None, size_px: int = WINDOW_PX) -> FarView | None:
     """The far view of the same network for the source's images. None without a network, and where the images are
     no larger than what it sees anyway. DetectorError when the network cannot be run at that size."""
-    size = picture_size(source)
+    size = image_size(source)
     return open_far_view(detector, size, size_px) if isinstance(detector, Detector) and size is not None else None
 
 
 def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None:
     """The lane detector for the source's images (``pipeline.lanes.open_detector.open_lanes``). None for a source
     without images, unless a detector is named."""
-    if spec is None and picture_size(source) is None:
+    if spec is None and image_size(source) is None:
         return None
     camera = source.camera if is_live_source(source) else cast("Source", source).frame(0).camera
     return open_lanes(spec, camera, is_simulated(source))
@@ -159,12 +159,12 @@ def brings_detections(source: AnySource) -> bool:
     return not is_live_source(source) and cast("Source", source).frame(0).detections_given
 
 
-def picture_size(source: AnySource) -> tuple[int, int] | None:
+def image_size(source: AnySource) -> tuple[int, int] | None:
     """(width, height) of the source's images: from the first frame of a recording, from the calibration of live
     sensors. None without image and calibration."""
     if is_live_source(source):
         return (source.camera.width, source.camera.height) if source.camera is not None else None
-    return cast("Source", source).frame(0).picture_size
+    return cast("Source", source).frame(0).image_size
 
 
 @dataclass(frozen=True)

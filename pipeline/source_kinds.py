@@ -77,7 +77,7 @@ KINDS: tuple[SourceKind, ...] = (
     SourceKind(
         "pictures",
         "pictures:<dir>",
-        "pipeline.sources.camera_alone:open_pictures",
+        "pipeline.sources.camera_alone:open_images",
         files=("*.jpg", "*.jpeg", "*.png"),
     ),
     SourceKind(

@@ -111,11 +111,11 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
 
     # Fusion: a cluster and a box that overlap in the image are one object
     fusion_state, fused = fusion.fuse(
-        state.fusion, lidar_tracks, vision_tracks, aligned, frame.picture_size, params.fusion
+        state.fusion, lidar_tracks, vision_tracks, aligned, frame.image_size, params.fusion
     )
     vision_state = vision_tracking.learn_heights(vision_state, fused.ranged_boxes(), params.vision_tracking)
     # A knocked mount: both sensors see the same vehicles, but apart
-    drift_state, turned = drift.follow(state.drift, fused, aligned, frame.picture_size, frame.t_ns, params.fusion)
+    drift_state, turned = drift.follow(state.drift, fused, aligned, frame.image_size, frame.t_ns, params.fusion)
     clock.lap("fusion")
     # Existence: the evidence of each sensor for and against every object being where it is reported
     existence_state, objects = existence.weigh(state.existence, fused.objects, sweep, frame, now, params.existence)

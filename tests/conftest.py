@@ -26,7 +26,7 @@ os.environ["CIPV_LABELS_URL"] = f"sqlite:///{_LABELS.name}/labels.db"
 ROOT = Path(__file__).resolve().parent.parent
 _TOGETHER = ("accuracy",)
 """Folders whose files stay in one process of several: they look at the same recordings with the same networks, each
-picture once (``tests.looking``)."""
+image once (``tests.looking``)."""
 _LONG = ("accuracy", "soak", "golden", "app/commands", "app/labels/test_kill.py", "pipeline/experiments")
 _WAITING = ("browser/test_dashboard.py", "browser/labels/test_astyx.py", "browser/test_rerun.py", "browser")
 """Where the files are that take longest, by what they do: compute, or wait for a browser."""

@@ -14,15 +14,15 @@ from pipeline.types import U8
 from pipeline.vision.detector import Detector
 
 
-def stages(pictures: Sequence[U8], detector: Detector, budget_s: float) -> dict[str, dict[str, Any]]:
-    """``{"detector": …}`` as ``cipv bench --json`` prints it, or nothing without an image. pictures: (H, W, 3) uint8,
+def stages(images: Sequence[U8], detector: Detector, budget_s: float) -> dict[str, dict[str, Any]]:
+    """``{"detector": …}`` as ``cipv bench --json`` prints it, or nothing without an image. images: (H, W, 3) uint8,
     taken in turn. The peer runs the same graph at the same size with the same number of threads; it is left out where
     it cannot."""
-    if not pictures:
+    if not images:
         return {}
-    ours = _in_turn(detector.detect, pictures)
+    ours = _in_turn(detector.detect, images)
     contestants = {"ours": ours}
-    peer = _opencv(detector, pictures)
+    peer = _opencv(detector, images)
     if peer is not None:
         contestants["cv2.dnn"] = peer
     threads = cv2.getNumThreads()
@@ -43,12 +43,12 @@ def stages(pictures: Sequence[U8], detector: Detector, budget_s: float) -> dict[
     }
 
 
-def _in_turn(work: Callable[[U8], object], pictures: Sequence[U8]) -> Callable[[], object]:
-    turn = cycle(pictures)
+def _in_turn(work: Callable[[U8], object], images: Sequence[U8]) -> Callable[[], object]:
+    turn = cycle(images)
     return lambda: work(next(turn))
 
 
-def _opencv(detector: Detector, pictures: Sequence[U8]) -> Callable[[], object] | None:
+def _opencv(detector: Detector, images: Sequence[U8]) -> Callable[[], object] | None:
     """``cv2.dnn`` on the same graph, pre-processing and decoding ours; None when OpenCV cannot read it."""
     try:
         network = cv2.dnn.readNetFromONNX(np.frombuffer(detector.graph, np.uint8))
@@ -58,7 +58,7 @@ def _opencv(detector: Detector, pictures: Sequence[U8]) -> Callable[[], object] 
             outputs = network.forward(network.getUnconnectedOutLayersNames())
             return detector.decode([np.asarray(output, np.float32) for output in outputs], bgr.shape[:2])
 
-        detect(pictures[0])
+        detect(images[0])
     except cv2.error:
         return None
-    return _in_turn(detect, pictures)
+    return _in_turn(detect, images)

@@ -59,7 +59,7 @@ def _write(file: Path, number: int, seconds: float) -> None:
     try:
         for index in range(begin, begin + frames):
             now = world_state.at(scene, index / scene.rate_hz)
-            frame = senses.sensed(sensors.frame(now, index, index * step_ns, picture=False), now)
+            frame = senses.sensed(sensors.frame(now, index, index * step_ns, image=False), now)
             writer.write(frame, truth=truth_of(now))
         writer.close()
     except BaseException:

@@ -54,8 +54,8 @@ _SEEK = """async ([frames, pause, patience]) => {
         const edges = get("projected");
         if (isThere) took.frame ??= now;
         if (isThere && isKnown(index)) took.plan ??= now;
-        if (took.plan !== undefined && edges?.frame === index && edges.pixels.size) took.picture ??= now;
-        if (took.picture !== undefined) done();
+        if (took.plan !== undefined && edges?.frame === index && edges.pixels.size) took.image ??= now;
+        if (took.image !== undefined) done();
       };
       seekTo(index);
     });
@@ -76,7 +76,7 @@ def labelled(running: Browser, address: str, count: int) -> dict[str, list[float
     frames = [(_FAR * (n + 1)) % count for n in range(_SEEKS)]
     waits = page.call(_SEEK, [frames, _PAUSE_MS, _PATIENCE_MS])
     page.close()
-    return {what: [each[what] for each in waits] for what in ("frame", "plan", "picture")}
+    return {what: [each[what] for each in waits] for what in ("frame", "plan", "image")}
 
 
 def many(drive: LabelSet, labels: int = MOST) -> LabelSet:

@@ -36,7 +36,7 @@ def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, An
     source = _source()
     print(f"cipv: measuring on {source.title}", file=sys.stderr)
     frames = [source.frame(i) for i in range(min(FRAMES, len(source)))]
-    pictures = [frame.picture.bgr for frame in frames if frame.picture is not None]
+    images = [frame.image.bgr for frame in frames if frame.image is not None]
     network, lanes = _detector(detector_spec, source), lanes_for(source)
     figures = packets_bench.stages(BUDGET_S["decode"])
     figures |= lidar_bench.stages(_sweeps(source), BUDGET_S["lidar"], params)
@@ -44,7 +44,7 @@ def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, An
     looking = Detectors(network, lanes, usual_every(lanes, SWEEPS_HZ))
     figures |= pipeline_bench.stages(source, len(frames), params, looking, BUDGET_S["line"])
     if network is not None:
-        figures |= detector_bench.stages(pictures, network, BUDGET_S["detector"])
+        figures |= detector_bench.stages(images, network, BUDGET_S["detector"])
     figures |= simulation_bench.stages(BUDGET_S["simulation"])
     return figures
 

@@ -51,8 +51,8 @@ class Clip:
         return cls(recording, params, first, last, ComputeScheduler(), source.title, source.rate_hz)
 
 
-def clip_frames(clip: Clip, progress: Progress, *, pictures: bool = True) -> Iterator[tuple[Frame, Result]]:
-    """The clip's frames with their results, in order; without ``pictures`` their pixels may be missing.
+def clip_frames(clip: Clip, progress: Progress, *, images: bool = True) -> Iterator[tuple[Frame, Result]]:
+    """The clip's frames with their results, in order; without ``images`` their pixels may be missing.
 
     The pipeline starts from the last known state of the whole-drive run at or before the clip, and from the beginning
     of the drive where no such run has been made. ``progress`` counts these frames too."""
@@ -63,7 +63,7 @@ def clip_frames(clip: Clip, progress: Progress, *, pictures: bool = True) -> Ite
     for index in range(known.at, clip.last + 1):
         is_in_clip = index >= clip.first
         with clip.scheduler.background(to_the_end=True):
-            frame = recording.frame(index) if pictures and is_in_clip else recording.input(index)
+            frame = recording.frame(index) if images and is_in_clip else recording.input(index)
             state, result = step(state, frame, params)
         if is_in_clip:
             yield frame, result

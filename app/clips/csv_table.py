@@ -24,7 +24,7 @@ _COLUMNS = (
 
 def write(clip: Clip, path: Path, progress: Progress) -> None:
     """The clip's results as a table."""
-    write_csv((to_json(result) for _, result in clip_frames(clip, progress, pictures=False)), path)
+    write_csv((to_json(result) for _, result in clip_frames(clip, progress, images=False)), path)
 
 
 def write_csv(results: Iterable[dict[str, Any] | None], out: Path) -> None:

@@ -21,7 +21,7 @@ from pipeline.evaluation.report_sections import Chart, ReportSection, Series, Ta
 from pipeline.params import Params, to_yaml
 from pipeline.types import F64, U8, Frame, Result
 
-MOST_PICTURES = 6
+MOST_IMAGES = 6
 _JPEG_QUALITY = 82
 _CURVES = (
     ("Distance to the CIPV", "m", ("distance_m",)),
@@ -58,7 +58,7 @@ def write(clip: Clip, path: Path, progress: Progress) -> None:
     recording, params = clip.recording, clip.params
     setup = recording.setup
     info = ClipInfo(clip.title, setup.uri, clip.first, clip.last, setup.timeline_s, recording.digest(params))
-    run = clip_frames(clip, progress, pictures=False)
+    run = clip_frames(clip, progress, images=False)
     text = clip_page(run, lambda index: draw_frame(*one_frame(recording, params, index), params), params, info)
     path.write_text(text, encoding="utf-8")
 
@@ -80,18 +80,18 @@ def clip_page(run: Iterable[tuple[Frame, Result]], draw: Callable[[int], U8], pa
         _events(events, names, times),
         ReportSection("curves", "Curves", charts=tuple(_charts(rows, times))),
     ]
-    said = worth_a_picture(events)
-    pictures = {place: (_jpeg(draw(info.first + place)), text) for place, text in said.items()}
-    body = "".join(map(section_html, sections)) + _pictures(pictures, names) + _made_with(params)
+    said = worth_an_image(events)
+    images = {place: (_jpeg(draw(info.first + place)), text) for place, text in said.items()}
+    body = "".join(map(section_html, sections)) + _images(images, names) + _made_with(params)
     return page(f"{info.title}: frames {names[0]} to {names[-1]}", body)
 
 
-def worth_a_picture(events: Sequence[Event]) -> dict[int, str]:
+def worth_an_image(events: Sequence[Event]) -> dict[int, str]:
     """Place in the clip and what to say below, in order: the beginning, and the weightiest events."""
     weighty = sorted(events, key=lambda event: (_WEIGHT[event.severity], event.index))
     said: dict[int, str] = {}
     for event in weighty:
-        if len(said) < MOST_PICTURES - 1:
+        if len(said) < MOST_IMAGES - 1:
             said.setdefault(event.index, event.text)
     return dict(sorted({0: "start of the clip", **said}.items()))
 
@@ -132,14 +132,14 @@ def _is_drawn(name: str, value: float) -> bool:
     return name != "ttc_s" or value <= _LONGEST_TTC_S
 
 
-def _pictures(pictures: dict[int, tuple[bytes, str]], names: Sequence[str]) -> str:
+def _images(images: dict[int, tuple[bytes, str]], names: Sequence[str]) -> str:
     figures = "".join(
         f"<figure><figcaption>{escape(names[place])}: {escape(text)}</figcaption>"
         f'<img style="width:100%" alt="Camera at frame {escape(names[place])} with the result drawn over it" '
         f'src="data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"></figure>'
-        for place, (jpeg, text) in pictures.items()
+        for place, (jpeg, text) in images.items()
     )
-    return f'<section id="pictures"><h2>Images</h2>{figures}</section>'
+    return f'<section id="images"><h2>Images</h2>{figures}</section>'
 
 
 def _made_with(params: Params) -> str:

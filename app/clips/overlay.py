@@ -35,7 +35,7 @@ def draw_frame(frame: Frame, result: Result, params: Params) -> U8:
     for item in shown:
         if stands_out(item, result):
             _draw_object(canvas, item, result, display)
-    if frame.picture is None:
+    if frame.image is None:
         _text(canvas, "no image in this frame", (24, canvas.shape[0] // 2), rgb("warning"), 0.9)
     _draw_banner(canvas, frame, result)
     return canvas
@@ -43,14 +43,14 @@ def draw_frame(frame: Frame, result: Result, params: Params) -> U8:
 
 def _background(frame: Frame) -> tuple[U8, float]:
     """A canvas and how many of its pixels one of the image's takes."""
-    if frame.picture is None:
+    if frame.image is None:
         return np.zeros((*_BLANK, 3), np.uint8), 1.0
-    height, width = frame.picture.bgr.shape[:2]
+    height, width = frame.image.bgr.shape[:2]
     scale = min(1.0, WIDTH_PX / width)
     even = (max(2, round(width * scale) // 2 * 2), max(2, round(height * scale) // 2 * 2))
     if even == (width, height):
-        return frame.picture.bgr.copy(), 1.0
-    return np.asarray(cv2.resize(frame.picture.bgr, even, interpolation=cv2.INTER_AREA), np.uint8), even[0] / width
+        return frame.image.bgr.copy(), 1.0
+    return np.asarray(cv2.resize(frame.image.bgr, even, interpolation=cv2.INTER_AREA), np.uint8), even[0] / width
 
 
 def _draw_path(canvas: U8, path: dict[str, Any] | None) -> None:

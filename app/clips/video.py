@@ -44,10 +44,10 @@ def write_film(
             if size == (0, 0):
                 size, start_s = (drawn.shape[1], drawn.shape[0]), float(timeline_s[frame.index])
                 stream.width, stream.height = size
-            picture = av.VideoFrame.from_ndarray(_fitted(drawn, size), format="bgr24")
-            picture.pts = round((float(timeline_s[frame.index]) - start_s) * _TICKS_PER_S)
-            picture.time_base = Fraction(1, _TICKS_PER_S)
-            film.mux(stream.encode(picture))
+            image = av.VideoFrame.from_ndarray(_fitted(drawn, size), format="bgr24")
+            image.pts = round((float(timeline_s[frame.index]) - start_s) * _TICKS_PER_S)
+            image.time_base = Fraction(1, _TICKS_PER_S)
+            film.mux(stream.encode(image))
         film.mux(stream.encode(None))
 
 

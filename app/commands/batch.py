@@ -26,26 +26,26 @@ _MOST_REASONS = 20
 @dataclass(frozen=True)
 class Batch:
     """Run the pipeline on many recordings, in as many processes as this machine or a Dask cluster has, and write the
-    results as tables. What an earlier batch in the same folder did with the same code, parameters and networks is not
-    done again.
+    results as tables. Work that an earlier batch in the same folder did with the same code, parameters and networks is
+    not repeated.
 
     Example: cipv batch s3://fleet/2026/*.mcap --out drives --workers 8
     """
 
     addresses: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="ADDRESS")] = ()
-    """Recordings: sources as of `cipv run`, folders, globs, s3://, gs://, az:// and http:// addresses of sessions and
-    of folders of them, and list files (.txt, one address a line)"""
+    """Recordings: sources as for `cipv run`, folders, globs, s3://, gs://, az:// and http:// addresses of sessions or
+    of folders with sessions, and list files (.txt, one address per line)"""
     out: Annotated[str, tyro.conf.arg(metavar="DIR")] = ""
-    """The folder of the tables, or an address in a store"""
+    """Output folder for the tables, or an address in a store"""
     resume: bool = False
-    """Go on with the batch of that folder: the recordings and options are those it was started with"""
+    """Continue the batch in that folder, with the recordings and options it was started with"""
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     sensors: Literal["lidar", "camera", "both"] = "both"
     """Ablation: run as if the cars had this sensor only"""
     rings: int = 16
     """KITTI: LiDAR channels to keep: 16, like a VLP-16, or 64 for all"""
     results: bool = False
-    """Also write the results as JSON lines, packed with zstd, for `cipv evaluate --results`; without timings"""
+    """Also write the results as JSON lines without timings, compressed with zstd, for `cipv evaluate --results`"""
     cluster: ClusterOptions = field(default_factory=ClusterOptions)
     json: bool = False
     """Print what was done as JSON"""
@@ -69,7 +69,10 @@ class Batch:
                 with self.cluster.client(len(work.jobs)) as client:
                     run_with_bar(client, work, tally)
             except SchedulerLost as lost:
-                print(f"cipv: Dask has gone: {lost}; `cipv batch --resume --out {self.out}` goes on", file=sys.stderr)
+                print(
+                    f"cipv: connection to Dask lost: {lost}; `cipv batch --resume --out {self.out}` continues",
+                    file=sys.stderr,
+                )
                 return 1
         with share_progress() as bar:
             pack(store, work.key.name, task_progress(bar, "packing the tables"))
@@ -78,11 +81,11 @@ class Batch:
 
     def _check(self) -> None:
         if not self.out:
-            raise BadInput("--out DIR: name the folder of the tables")
+            raise BadInput("--out DIR: give a folder for the tables")
         if bool(self.addresses) == self.resume:
-            raise BadInput("name the recordings, or --resume to go on with the batch of that folder; not both")
+            raise BadInput("give recordings, or --resume to continue the batch in that folder; not both")
         if self.resume and self.pipeline.changes_parameters():
-            raise BadInput("--resume takes the parameters that the batch was started with; leave them out")
+            raise BadInput("--resume uses the parameters that the batch was started with; remove them")
         self.cluster.check()
 
     def _plan(self) -> Plan:
@@ -105,13 +108,13 @@ class Batch:
         }
         if self.json:
             print(json.dumps(said, indent=1, ensure_ascii=False))
-        for word, found in (("set aside", tally.aside), ("failed, tried again next time", tally.failed)):
+        for word, found in (("set aside", tally.aside), ("failed, will be retried", tally.failed)):
             for address, reason in list(found.items())[:_MOST_REASONS]:
                 print(f"cipv: {word}: {address}: {reason}", file=sys.stderr)
             if len(found) > _MOST_REASONS:
                 print(f"cipv: {word}: {len(found) - _MOST_REASONS} more, see aside/run={run}", file=sys.stderr)
         print(
-            f"cipv: run {run}: {tally.done} drives done now, {tally.before} before, {len(tally.aside)} set aside, "
+            f"cipv: run {run}: {tally.done} drives done, {tally.before} done before, {len(tally.aside)} set aside, "
             f"{len(tally.failed)} failed; {tally.frames} frames in {seconds:.0f} s",
             file=sys.stderr,
         )

@@ -41,7 +41,7 @@ class Bench:
     """Measure the latency of the dashboard in a browser instead, while it plays this source, e.g. sim:straight"""
 
     drives: int = 0
-    """Measure questions to the tables of N made-up drives instead, e.g. 10000 (2 GB on the disk)"""
+    """Measure queries on the tables of N synthetic drives instead, e.g. 10000 (2 GB on disk)"""
 
     def __call__(self) -> int:
         if self.clients < 0:

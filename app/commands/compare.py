@@ -22,7 +22,7 @@ _CHANGES = 20
 @dataclass(frozen=True)
 class Compare:
     """Compare two runs of `cipv batch`, paired by drive: scores with confidence intervals, events, the largest changes.
-    With --gate, exits with 1 where a rule is broken.
+    With --gate, exits with 1 if a rule is broken.
 
     Example: cipv compare --out drives --base 0f04b5c90511 --gate rules.yaml
     """
@@ -30,13 +30,13 @@ class Compare:
     out: Annotated[str, tyro.conf.arg(metavar="DIR")]
     """The folder of the batch, or its address in a store"""
     base: Annotated[str, tyro.conf.arg(metavar="RUN")]
-    """The run to compare with, by the name that `cipv batch` printed"""
+    """The run to compare against, by the name that `cipv batch` printed"""
     run: Annotated[str | None, option("RUN")] = None
-    """The run that is compared; default: the last batch's"""
+    """The run to compare; default: the last batch's"""
     base_out: Annotated[str | None, option("DIR")] = None
-    """Folder of the base, where it is another one"""
+    """Folder of the base run, if it is another one"""
     gate: Annotated[Path | None, option("FILE")] = None
-    """Rules that the run must keep (YAML)"""
+    """Rules that the run must meet (YAML)"""
     report: Annotated[Path | None, option("FILE")] = None
     """Write an HTML file with tables and links to the largest changes"""
     dashboard: Annotated[str, tyro.conf.arg(metavar="URL")] = DASHBOARD
@@ -61,7 +61,7 @@ class Compare:
         run = FleetTables(Store(self.out), self.run)
         base = FleetTables(Store(self.base_out or self.out), self.base)
         if (base.store.address, base.run) == (run.store.address, run.run):
-            raise BadInput(f"--base {self.base}: it is the run itself; name another with --run")
+            raise BadInput(f"--base {self.base}: it is the run itself; choose another with --run")
         told = compare_runs(base, run, _CHANGES)
         link = partial(dashboard_link, self.dashboard)
         said = []

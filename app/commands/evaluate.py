@@ -88,13 +88,13 @@ class Evaluate:
     def _check(self) -> None:
         count = len(self.sources)
         if not count:
-            raise BadInput("no recording to evaluate; name at least one")
+            raise BadInput("no recording to evaluate; give at least one")
         if self.truth != ("native",) and len(self.truth) != count:
-            raise BadInput(f"--truth: {len(self.truth)} files for {count} recordings; name one for each")
+            raise BadInput(f"--truth: {len(self.truth)} files for {count} recordings; give one for each")
         if self.results and len(self.results) != count:
-            raise BadInput(f"--results: {len(self.results)} files for {count} recordings; name one for each")
+            raise BadInput(f"--results: {len(self.results)} files for {count} recordings; give one for each")
         if self.against and self._base_preset() is None and len(self.against) != count:
-            raise BadInput(f"--against: {len(self.against)} files for {count} recordings; name one for each")
+            raise BadInput(f"--against: {len(self.against)} files for {count} recordings; give one for each")
         if urlsplit(self.dashboard).scheme not in ("http", "https") or not urlsplit(self.dashboard).netloc:
             raise BadInput(f"--dashboard {self.dashboard}: not a valid address; expected e.g. {DASHBOARD}")
         if not 0.0 < self.max_range_m < 1000.0:

@@ -22,24 +22,24 @@ _PIPED_WIDTH = 240
 
 @dataclass(frozen=True)
 class Find:
-    """Ask the tables of `cipv batch`: a condition in SQL over their columns. Each kind of event is a column that is
-    true for it; `close`, `disagreement`, `night` and `bend` are conditions by name.
+    """Search the tables of `cipv batch` with an SQL condition on their columns. Each kind of event is a boolean
+    column; `close`, `disagreement`, `night` and `bend` are named conditions.
 
     Example: cipv find "cut_in and min_ttc_s < 1.5 and disagreement" --out drives
     """
 
     where: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="CONDITION")]
-    """What must hold, e.g. "cut_in and speed_mps > 20"; the columns are in the reference"""
+    """SQL condition, e.g. "cut_in and speed_mps > 20"; the reference lists the columns"""
     out: Annotated[str, tyro.conf.arg(metavar="DIR")]
     """The folder of the batch, or its address in a store"""
     of: Literal["events", "frames", "objects", "drives"] = "events"
-    """The table that is asked"""
+    """The table to search"""
     show: Annotated[tuple[str, ...], tyro.conf.arg(metavar="COLUMN")] = ()
-    """Columns to print beside drive, address and time; default: the usual ones"""
+    """Columns to print besides drive, address and time; default: the usual ones"""
     run: Annotated[str | None, option("NAME")] = None
-    """Which run; default: the last batch's"""
+    """The run to search; default: the last batch's"""
     limit: int = 100
-    """Print at most so many"""
+    """Print at most this many rows"""
     dashboard: Annotated[str, tyro.conf.arg(metavar="URL")] = DASHBOARD
     """Dashboard address for the links, as `cipv serve` prints it"""
     json: bool = False

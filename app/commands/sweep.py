@@ -30,16 +30,16 @@ _PHANTOMS = ("labelled.cipv_false", "phantom_leads")
 
 @dataclass(frozen=True)
 class ParameterSweep:
-    """Try sets of parameters on the drives of a fleet. Networks look at each image once. Prints what each set gives,
-    and which no other one beats: leads missed against phantom leads.
+    """Run a fleet's recordings with many sets of parameters. Networks process each image once. Prints the scores of
+    each set and marks the Pareto front: missed leads against phantom leads.
 
     Example: cipv sweep recordings/ --out drives --over cluster.tolerance_m=0.6:1.2:4 --over cipv.confirm_hits=2,3,4
     """
 
     addresses: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="ADDRESS")]
-    """Recordings, as of `cipv batch`"""
+    """Recordings, as for `cipv batch`"""
     out: Annotated[str, tyro.conf.arg(metavar="DIR")]
-    """The folder of the tables, or an address in a store"""
+    """Output folder for the tables, or an address in a store"""
     over: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME=VALUES")] = ()
     """A parameter and its values: NAME=a,b,c or NAME=low:high:count"""
     latin: Annotated[int | None, option("N")] = None
@@ -53,7 +53,7 @@ class ParameterSweep:
     save: Annotated[Path | None, option("FILE")] = None
     """Write the best set as a preset file (YAML)"""
     report: Annotated[Path | None, option("FILE")] = None
-    """Write an HTML file with the table and the front"""
+    """Write an HTML file with the table and the Pareto front"""
     json: bool = False
     """Print the figures as JSON"""
 
@@ -72,7 +72,7 @@ class ParameterSweep:
         try:
             runs = self._run(plan, points, store)
         except SchedulerLost as lost:
-            print(f"cipv: Dask has gone: {lost}; the same command goes on", file=sys.stderr)
+            print(f"cipv: connection to Dask lost: {lost}; run the same command again to continue", file=sys.stderr)
             return 1
         tried, names = _judged(store, list(zip(runs, sets, strict=True)))
         best = best_of(tried)
@@ -86,9 +86,9 @@ class ParameterSweep:
         from app.fleet.sweep import MOST_POINTS, grid, latin, parse_axis
 
         if not self.addresses:
-            raise BadInput("no recording to sweep over; name at least one")
+            raise BadInput("no recording to sweep over; give at least one")
         if not self.over:
-            raise BadInput("--over NAME=VALUES: name at least one parameter")
+            raise BadInput("--over NAME=VALUES: give at least one parameter")
         self.cluster.check()
         axes = [parse_axis(text) for text in self.over]
         if self.latin is None:
@@ -112,7 +112,7 @@ class ParameterSweep:
                 if work.jobs:
                     run_with_bar(client, work, tally, f"set {number} of {len(points)}")
                 for address, reason in (tally.aside | tally.failed if number == 1 else tally.failed).items():
-                    print(f"cipv: left out: {address}: {reason}", file=sys.stderr)
+                    print(f"cipv: skipped: {address}: {reason}", file=sys.stderr)
                 pack(store, work.key.name)
                 runs.append(work.key.name)
         return runs
@@ -138,7 +138,7 @@ class ParameterSweep:
             decimals=3,
         )
         chart = Chart(
-            "Each point is a set; the line joins those that no other one beats",
+            "Each point is a set of parameters; the line is the Pareto front",
             names[1],
             names[0],
             (

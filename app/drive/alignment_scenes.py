@@ -50,6 +50,6 @@ class AlignmentScenes:
         self._seen.clear()
 
     def _look(self, frame: Frame) -> None:
-        if frame.sweep is not None and frame.picture is not None:
+        if frame.sweep is not None and frame.image is not None:
             self._newest_ns = frame.t_ns
-            self._seen.append((edge_scene(frame.sweep, frame.picture.bgr), frame.camera))
+            self._seen.append((edge_scene(frame.sweep, frame.image.bgr), frame.camera))

@@ -21,10 +21,10 @@ _LIMIT_BYTES = 384e6
 
 def without_pixels(frame: Frame) -> Frame:
     """The frame with an image of the same size and stamp that takes no memory and shows nothing."""
-    if frame.picture is None:
+    if frame.image is None:
         return frame
-    blank = np.broadcast_to(np.zeros((), np.uint8), frame.picture.bgr.shape)
-    return replace(frame, picture=CameraImage(frame.picture.t_ns, blank))
+    blank = np.broadcast_to(np.zeros((), np.uint8), frame.image.bgr.shape)
+    return replace(frame, image=CameraImage(frame.image.t_ns, blank))
 
 
 class InputStore:

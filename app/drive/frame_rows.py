@@ -99,7 +99,7 @@ class Row(NamedTuple):
     yaw_rate_radps: float | None = None
     """Own yaw rate; None where nothing gives it."""
     reach_m: float = 0.0
-    """How far ahead a vehicle in the path would have been noticed (``lead_reach_m``)."""
+    """How far ahead a vehicle in the path would be detected (``lead_reach_m``)."""
 
 
 _INSIDE = ("t_ns", "judged", "extra", "yaw_rate_radps", "reach_m")
@@ -141,9 +141,9 @@ def row_of(frame: Frame, result: Result, judged: Judged | None = None) -> Row:
 
 
 def lead_reach_m(frame: Frame, result: Result) -> float:
-    """How far ahead a vehicle in the path would have been noticed: as far as it is known where the path goes. 0 unless
+    """How far ahead a vehicle in the path would be detected: as far as it is known where the path goes. 0 unless
     the camera looks: a LiDAR of 16 beams has hardly a point on a car beyond 35 m."""
-    looks = frame.picture is not None and frame.raw_boxes is not None
+    looks = frame.image is not None and frame.raw_boxes is not None
     return result.path.reach_m if looks else 0.0
 
 
@@ -203,7 +203,7 @@ def object_json(frames: Iterable[tuple[int, Objects]], object_id: int) -> dict[s
 
 
 def _missing(frame: Frame) -> list[str]:
-    sensors = {"lidar": frame.sweep, "camera": frame.picture, "ego": frame.ego}
+    sensors = {"lidar": frame.sweep, "camera": frame.image, "ego": frame.ego}
     return [name for name, gave in sensors.items() if gave is None]
 
 

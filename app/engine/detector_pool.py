@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.engine.snapshot import Notice
-from pipeline.detection import Detectors, Detects, brings_detections, far_view_for, picture_size
+from pipeline.detection import Detectors, Detects, brings_detections, far_view_for, image_size
 from pipeline.inference.runtime import DetectorError, DetectorMissing
 from pipeline.lanes.open_detector import usual_every
 from pipeline.run import Sensors
@@ -102,4 +102,4 @@ class DetectorPool:
 
 def _kind_of(source: AnySource) -> _Kind:
     """What a detector is opened for: equal kinds share it."""
-    return is_simulated(source), picture_size(source)
+    return is_simulated(source), image_size(source)

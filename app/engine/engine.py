@@ -214,18 +214,9 @@ class Engine:
         player.open()
         self._player, self.detectors = player, detectors
         self.labels.open(uri, self.drives.recording)
-        opened = self.snapshot.opened(uri, player, detectors)
+        opened = self._with_parts(self.snapshot.opened(uri, player, detectors))
         busy = None if is_warm() else _COMPILING
-        self._publisher.publish(
-            replace(
-                opened,
-                drive=self.drives.state,
-                recording=self.desk.state,
-                labels=self.labels.state,
-                notices=tuple(notices),
-                busy=busy,
-            )
-        )
+        self._publisher.publish(replace(opened, notices=tuple(notices), busy=busy))
         return True
 
     def _opened(self, uri: str, progress: Progress) -> AnySource:
@@ -272,41 +263,22 @@ class Engine:
         playing = player is not None and player.goes_on_after_failing() and self.snapshot.playing
         if not playing:
             self.control.change(playing=False)
-        notices = tuple(n for n in self.snapshot.notices if n.stays)
-        self._publisher.publish(
-            replace(self.snapshot, busy=None, playing=playing, notices=(*notices, Notice("error", text)))
-        )
+        self._publisher.publish(self.snapshot.failed(text, playing))
 
     def _show(self, wish: Wish, processed: ProcessedFrame | None) -> None:
         """The next snapshot: the new tick if there is one, and the wishes as they stand."""
         shown, player, standing = self.snapshot, self._player, self.control.peek()
         if player is not None:
             player.go_on(standing, processed.frame.index if processed is not None else shown.index)
-        shown = replace(
-            shown,
-            drive=self.drives.state,
-            recording=self.desk.state,
-            labels=self.labels.state,
-            params=wish.params,
-            preset=wish.preset,
-            params_revision=wish.params_revision,
-            playing=standing.playing,
-            speed=standing.speed,
-            loop=standing.loop,
-        )
+        shown = self._with_parts(shown.following(wish, standing))
         if player is not None:
             shown = player.health(shown)
         if processed is not None and player is not None:
-            shown = replace(
-                shown,
-                processed=processed,
-                index=processed.frame.index,
-                time_s=player.time_s(processed),
-                sequence=shown.sequence + 1,
-                skipped=player.skipped,
-                made_unix_s=time.time(),
-                notices=tuple(n for n in shown.notices if n.stays),
-            )
+            shown = shown.with_result(processed, player)
         self._publisher.publish(shown)
         if processed is not None:
             self.labels.shown()
+
+    def _with_parts(self, shown: Snapshot) -> Snapshot:
+        """With the state of the drive's run, of recording and of the labels."""
+        return replace(shown, drive=self.drives.state, recording=self.desk.state, labels=self.labels.state)

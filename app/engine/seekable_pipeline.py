@@ -169,5 +169,5 @@ class SeekablePipeline:
 
 
 def _frame_bytes(frame: Frame) -> float:
-    picture = frame.picture
-    return (frame.sweep.points.nbytes if frame.sweep else 0) + (picture.bgr.nbytes if picture else 0) + 1000.0
+    image = frame.image
+    return (frame.sweep.points.nbytes if frame.sweep else 0) + (image.bgr.nbytes if image else 0) + 1000.0

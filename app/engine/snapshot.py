@@ -14,6 +14,7 @@ from pipeline.types import StreamHealth
 from pipeline.types.result_json import streams_json
 
 if TYPE_CHECKING:
+    from app.core.control import Wish
     from app.engine.player import Player
     from pipeline.detection import Detectors
     from pipeline.recording.recorder import RecordingState
@@ -110,6 +111,40 @@ class Snapshot:
             lane_detector=detectors.lanes.name if detectors.lanes else None,
             processed=None,
         )
+
+    def following(self, wish: Wish, standing: Wish) -> Snapshot:
+        """The next snapshot with the parameters that were served and with playback as it is wished by now."""
+        return replace(
+            self,
+            params=wish.params,
+            preset=wish.preset,
+            params_revision=wish.params_revision,
+            playing=standing.playing,
+            speed=standing.speed,
+            loop=standing.loop,
+        )
+
+    def with_result(self, processed: ProcessedFrame, player: Player) -> Snapshot:
+        """The next snapshot with a new result. Notices of one tick are over."""
+        return replace(
+            self,
+            processed=processed,
+            index=processed.frame.index,
+            time_s=player.time_s(processed),
+            sequence=self.sequence + 1,
+            skipped=player.skipped,
+            made_unix_s=time.time(),
+            notices=self.lasting_notices,
+        )
+
+    def failed(self, text: str, playing: bool) -> Snapshot:
+        """The next snapshot after an error."""
+        return replace(self, busy=None, playing=playing, notices=(*self.lasting_notices, Notice("error", text)))
+
+    @property
+    def lasting_notices(self) -> tuple[Notice, ...]:
+        """Those that outlast the tick they came with."""
+        return tuple(notice for notice in self.notices if notice.stays)
 
     def state_json(self) -> dict[str, Any]:
         """The state without the result, as the page and ``/api/state`` read it."""

@@ -1,3 +1,2 @@
-"""Many recordings: the pipeline run on all of them, its results as tables, and questions to these tables.
-
-What is imported here and not elsewhere comes with the extra ``fleet``: Dask, pyarrow and DuckDB."""
+"""Fleets of recordings: run the pipeline on all of them, write the results as tables, and query these tables. Dask,
+pyarrow and DuckDB, which come with the extra ``fleet``, are imported only here."""

@@ -11,7 +11,7 @@ PACKAGES = ("dask", "distributed", "fsspec", "pyarrow", "duckdb")
 
 
 def need_extra() -> None:
-    """BadInput, in one sentence, where the extra is not installed."""
+    """Raise BadInput if the extra is not installed."""
     missing = [name for name in PACKAGES if find_spec(name) is None]
     if missing:
         raise BadInput(f"{', '.join(missing)} not installed; `make install` installs the extra `fleet`")

@@ -1,5 +1,5 @@
-"""Questions to a batch's tables, in SQL, answered by DuckDB: which moments, frames, objects or drives fulfil a
-condition. A question reads the batch's folder and nothing else."""
+"""Queries on a batch's tables, in SQL, run by DuckDB: which moments, frames, objects or drives meet a condition. A
+query can read the batch's folder and nothing else."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ NAMED = {
 
 @dataclass(frozen=True)
 class QueryResult:
-    """What a question found."""
+    """The result of a query."""
 
     columns: tuple[str, ...]
     """Names, in the order of each row's values."""
@@ -47,7 +47,7 @@ class QueryResult:
 
 
 class FleetTables:
-    """The tables of one run, open for questions. For one thread.
+    """The tables of one run, open for queries. For one thread.
 
     Args:
         store: the batch's folder.
@@ -70,16 +70,16 @@ class FleetTables:
             self._make_view(shape)
 
     def find(self, where: str, of: QueryTable = "events", limit: int = 100, columns: Sequence[str] = ()) -> QueryResult:
-        """What fulfils a condition, drive by drive in order of time.
+        """The rows that meet a condition, by drive and time.
 
         Args:
-            where: a condition of SQL over the columns of docs/reference/fleet-tables.md, names of events and ``NAMED``.
+            where: an SQL condition over the columns of docs/reference/fleet-tables.md, names of events and ``NAMED``.
             of: which table.
             limit: most rows returned.
             columns: shown beside drive, address and time; default: the usual ones.
 
         Raises:
-            BadInput: the condition is none, or names what is not there.
+            BadInput: the condition is invalid or names an unknown column.
         """
         shown = [name for name in _ALWAYS if of != "drives" or name in ("drive", "address")]
         shown += columns or _SHOWN[of]
@@ -112,7 +112,7 @@ class FleetTables:
         return self._duckdb.sql(f"SELECT {columns} FROM {table}").to_arrow_table()
 
     def histogram(self, where: str, of: QueryTable, column: str, bins: int = 24) -> tuple[list[float], list[int]]:
-        """(bins + 1) edges and how many values of a column, of what fulfils a condition, lie between them. Raises what
+        """(bins + 1) edges, and between them the counts of a column's values in rows that meet a condition. Raises what
         ``find`` raises."""
         name, condition = _quoted(column), where.strip() or "true"
         values = f"SELECT {name}::DOUBLE AS v FROM {of} WHERE (\n{condition}\n) AND isfinite({name}::DOUBLE)"

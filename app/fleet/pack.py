@@ -1,7 +1,7 @@
-"""Small parts of tables put together, so that a question to ten thousand drives opens some dozen files.
+"""Packs the small parts of tables, so that a query on ten thousand drives opens a few dozen files.
 
-Workers write one small file a table and drive. Packs hold the same rows of a few hundred drives, with the drive's name
-as a first column. They are made anew from the parts whenever these change."""
+Workers write one small file per table and drive. Packs hold the same rows of a few hundred drives, with the drive's
+name as the first column. They are rebuilt from the parts whenever these change."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def packed_file(table: str, run: str, number: int) -> str:
 
 
 def pack(store: Store, run: str, progress: Progress = silent) -> None:
-    """Put what a run has finished into packs. What is packed already and unchanged is left. progress: of packs."""
+    """Pack the finished drives of a run. Packs that are up to date are kept. progress: of packs."""
     done = finished(store, run)
     wanted = [*_planned(packs_of(store, run), done)]
     for number, fresh in enumerate(wanted):
@@ -53,7 +53,7 @@ def pack(store: Store, run: str, progress: Progress = silent) -> None:
 
 
 def finished(store: Store, run: str) -> dict[str, str]:
-    """Drive → mark of every drive that a run has tables of."""
+    """Drive → mark of every drive with tables in a run."""
     found: dict[str, list[str]] = {}
     for name in store.names(f"done/run={run}"):
         drive, mark, _ = name.rpartition("/")[2].rsplit(".", 2)

@@ -17,7 +17,7 @@ def runs_of(store: Store) -> list[str]:
 
 
 def latest_run(store: Store) -> str:
-    """The run of the last batch. BadInput where there was none."""
+    """The run of the last batch. Raises BadInput if there was none."""
     data = store.read(LATEST)
     if data is None:
         raise BadInput(f"{store.address}: no tables of `cipv batch` here")
@@ -34,7 +34,7 @@ def about_run(store: Store, run: str) -> dict[str, Any]:
 
 
 def set_aside(store: Store, run: str) -> dict[str, str]:
-    """Address → reason of every recording that a run could not be made of, and has not been made of since."""
+    """Address → reason of every recording that a run set aside and has not processed since."""
     found = {}
     done = {_drive(name) for name in store.names(f"done/run={run}")}
     for name in store.names(f"aside/run={run}"):

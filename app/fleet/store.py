@@ -1,4 +1,4 @@
-"""The folder of a batch, on a disk or in a store: whole files by name, written so that none is ever seen half."""
+"""The folder of a batch, on disk or in a store: whole files by name, written atomically."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from pipeline.common.remote_files import NotReachable, file_system, is_remote, p
 
 
 class Store:
-    """Files below one address. Any process; it can be sent to another one.
-
-    Raises BadInput for a place that cannot be used, ``Overloaded`` while a store goes on failing.
+    """Files below one address. Can be pickled and used in any process. Raises BadInput for an address that cannot be
+    used, ``Overloaded`` while a store keeps failing.
     """
 
     def __init__(self, address: str) -> None:
@@ -40,7 +39,7 @@ class Store:
         return self._opened[0]
 
     def path(self, name: str) -> str:
-        """What a file is called in ``system``."""
+        """Path of a file in ``system``."""
         return f"{self._opened[1].rstrip('/')}/{name}"
 
     def read(self, name: str) -> bytes | None:
@@ -58,8 +57,7 @@ class Store:
         return bool(patiently(lambda: self.system.isfile(self.path(name)), f"{self.address}/{name}"))
 
     def write(self, name: str, data: bytes) -> None:
-        """Write a whole file, in place of any that is there: afterwards the old one or the new one is there, whatever
-        happens meanwhile. BadInput when the place cannot be written."""
+        """Write a whole file, replacing any existing one atomically. Raises BadInput if the address is not writable."""
         if self.folder is None:
             patiently(lambda: self.system.pipe_file(self.path(name), data), f"{self.address}/{name}")
             return
@@ -79,7 +77,7 @@ class Store:
             raise BadInput(f"{target} cannot be written: {error.strerror or error}") from None
 
     def put(self, name: str, file: Path) -> None:
-        """The same of a file of this machine, which is not held in memory."""
+        """The same for a file on this machine, without reading it into memory."""
         if self.folder is None:
             patiently(lambda: self.system.put_file(str(file), self.path(name)), f"{self.address}/{name}")
             return

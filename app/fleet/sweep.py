@@ -1,4 +1,4 @@
-"""A space of parameters: which sets of them are tried, and which of those are best."""
+"""Parameter sweeps: which sets to try, and which of those are best."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_POINTS = 1000
 
 @dataclass(frozen=True)
 class Axis:
-    """One parameter and what it may be."""
+    """One parameter and its values."""
 
     name: str
     """Such as ``cluster.tolerance_m``."""
@@ -58,8 +58,8 @@ def grid(axes: Sequence[Axis]) -> list[dict[str, Any]]:
 
 
 def latin(axes: Sequence[Axis], count: int, seed: int = 0) -> list[dict[str, Any]]:
-    """So many combinations, each parameter spread evenly over its range (Latin hypercube): of a range any value, of a
-    list each value about equally often. The same seed gives the same."""
+    """``count`` combinations with each parameter spread evenly (Latin hypercube): any value of a range, each value of
+    a list about equally often. The same seed gives the same combinations."""
     from scipy.stats.qmc import LatinHypercube  # takes half a second to import
 
     shares = LatinHypercube(len(axes), rng=np.random.default_rng(seed)).random(count)
@@ -74,21 +74,21 @@ def _at(axis: Axis, share: float) -> Any:
 
 @dataclass(frozen=True)
 class Tried:
-    """One set of parameters and what came of it."""
+    """One set of parameters and its scores."""
 
     run: str
     """Name of the run."""
     changes: Mapping[str, Any]
     """Parameter → value."""
     missed: float | None
-    """Of a score of which less is better: leads that are missed."""
+    """Missed leads; less is better."""
     phantoms: float | None
-    """The same of phantom leads."""
+    """Phantom leads; less is better."""
 
 
 def front(tried: Sequence[Tried]) -> list[Tried]:
-    """Those that no other one beats in one score without losing in the other, by the first score. One of several equal
-    ones."""
+    """The Pareto front: sets that no other set beats in one score without losing in the other, ordered by the first
+    score. Of equal sets, one."""
     known = [each for each in tried if each.missed is not None and each.phantoms is not None]
     best: list[Tried] = []
     for each in sorted(known, key=lambda one: (one.missed, one.phantoms, one.run)):
@@ -98,5 +98,5 @@ def front(tried: Sequence[Tried]) -> list[Tried]:
 
 
 def best_of(tried: Sequence[Tried]) -> Tried | None:
-    """The one of the front with the least sum of both scores; None where none has both."""
+    """The set of the front with the smallest sum of both scores; None if no set has both."""
     return min(front(tried), key=lambda one: (one.missed or 0.0) + (one.phantoms or 0.0), default=None)

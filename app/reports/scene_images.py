@@ -20,7 +20,7 @@ _BEHIND_M, _AHEAD_M, _ASIDE_M = 12.0, 108.0, 30.0
 _EGO_SIZE_M = (4.5, 1.82)
 _WAY_S, _WAY_STEP_S = 4.0, 0.25
 _ROAD_STEP_M, _GRID_M = 3.0, 20.0
-_PICTURE_PX, _JPEG_QUALITY = (640, 360), 75
+_IMAGE_PX, _JPEG_QUALITY = (640, 360), 75
 
 
 def scene_html(scene: Scene) -> str:
@@ -29,7 +29,7 @@ def scene_html(scene: Scene) -> str:
     title = f"{scene.title}, at {scene.t_s:.1f} s"
     return (
         f'<figure class="scene"><figcaption>{escape(title)}</figcaption>{plan_svg(scene.scenario, now, title)}'
-        f'<img src="{_picture(scene.scenario, now)}" alt="{escape(title)}: what the camera sees"></figure>'
+        f'<img src="{_image(scene.scenario, now)}" alt="{escape(title)}: what the camera sees"></figure>'
     )
 
 
@@ -110,11 +110,11 @@ def _points(points: F64) -> str:
     return " ".join(f"{x:.2f},{-y:.2f}" for x, y in points[:, :2])
 
 
-def _picture(scenario: Scenario, now: World) -> str:
+def _image(scenario: Scenario, now: World) -> str:
     """As an address that holds the image itself."""
     sensors = SensorRig(scenario, now.s_m)
-    drawn = sensors.frame(now, 0, round(now.t_s * 1e9)).picture
+    drawn = sensors.frame(now, 0, round(now.t_s * 1e9)).image
     assert drawn is not None
-    small = cv2.resize(drawn.bgr, _PICTURE_PX, interpolation=cv2.INTER_AREA)
+    small = cv2.resize(drawn.bgr, _IMAGE_PX, interpolation=cv2.INTER_AREA)
     _, jpeg = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
     return f"data:image/jpeg;base64,{b64encode(jpeg.tobytes()).decode()}"

@@ -28,7 +28,7 @@ from app.drive.frame_rows import row_json, row_of
 from app.engine.snapshot import Snapshot
 from app.streaming.points import point_arrays
 from app.streaming.ranking import ranking_json
-from app.streaming.sent_image import MAX_WIDTH_PX, SentImage, encode_picture
+from app.streaming.sent_image import MAX_WIDTH_PX, SentImage, encode_image
 from pipeline.alignment.projection import Alignment, resolve
 from pipeline.common.geometry import corners_of
 from pipeline.lanes.drawn_lines import in_image, polylines
@@ -48,27 +48,27 @@ class Encoder:
         if snapshot.processed is None:
             return None
         frame, result = snapshot.processed.frame, snapshot.processed.result
-        picture = self._picture(frame, width_px)
-        scale = picture.scale if picture else 1.0
+        image = self._image(frame, width_px)
+        scale = image.scale if image else 1.0
         aligned = resolve(snapshot.params.alignment, frame.camera)
         header = {
             "type": "frame",
             "made_unix_ms": snapshot.made_unix_s * 1e3,
             "detect_ms": snapshot.processed.detect_ms,
             "state": snapshot.state_json(),
-            "picture": _picture_json(picture, frame),
+            "picture": _image_json(image, frame),
             "points": len(result.layers.points),
             "result": to_json(result),
             "display": display_json(result, aligned, scale),
             "row": row_json(row_of(frame, result)) if snapshot.live else None,
         }
-        return pack(header, picture.jpeg if picture else b"", point_arrays(frame, result, aligned, scale))
+        return pack(header, image.jpeg if image else b"", point_arrays(frame, result, aligned, scale))
 
-    def _picture(self, frame: Frame, width_px: int) -> SentImage | None:
-        if frame.picture is None:
+    def _image(self, frame: Frame, width_px: int) -> SentImage | None:
+        if frame.image is None:
             return None
-        if self._last is None or self._last[0] is not frame.picture or self._last[1] != width_px:
-            self._last = (frame.picture, width_px, encode_picture(frame.picture, width_px))
+        if self._last is None or self._last[0] is not frame.image or self._last[1] != width_px:
+            self._last = (frame.image, width_px, encode_image(frame.image, width_px))
         return self._last[2]
 
 
@@ -161,13 +161,13 @@ def _boxes_json(boxes: dict[int, Box], scale: float) -> dict[str, list[float]]:
     return {str(number): [round(value * scale, 1) for value in box] for number, box in sorted(boxes.items())}
 
 
-def _picture_json(picture: SentImage | None, frame: Frame) -> dict[str, Any] | None:
-    if picture is None or frame.picture is None:
+def _image_json(image: SentImage | None, frame: Frame) -> dict[str, Any] | None:
+    if image is None or frame.image is None:
         return None
     return {
-        "width": picture.width,
-        "height": picture.height,
-        "scale": picture.scale,
-        "bytes": len(picture.jpeg),
-        "full_width": frame.picture.bgr.shape[1],
+        "width": image.width,
+        "height": image.height,
+        "scale": image.scale,
+        "bytes": len(image.jpeg),
+        "full_width": frame.image.bgr.shape[1],
     }

@@ -36,13 +36,13 @@ def width_for(shown_px: float) -> int:
     return max(MIN_WIDTH_PX, int(np.ceil(shown_px / WIDTH_STEP_PX)) * WIDTH_STEP_PX)
 
 
-def encode_picture(picture: CameraImage, width_px: int = MAX_WIDTH_PX) -> SentImage:
+def encode_image(image: CameraImage, width_px: int = MAX_WIDTH_PX) -> SentImage:
     """The camera's own JPEG if there is one and it is small enough; otherwise the image encoded at most ``width_px``
     wide."""
-    height, width = picture.bgr.shape[:2]
-    if picture.encoded is not None and picture.encoded[:2] == _JPEG and width <= width_px:
-        return SentImage(picture.encoded, width, height, 1.0)
-    bgr = _shrunk(picture.bgr, width_px)
+    height, width = image.bgr.shape[:2]
+    if image.encoded is not None and image.encoded[:2] == _JPEG and width <= width_px:
+        return SentImage(image.encoded, width, height, 1.0)
+    bgr = _shrunk(image.bgr, width_px)
     _, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return SentImage(jpeg.tobytes(), bgr.shape[1], bgr.shape[0], bgr.shape[1] / width)
 

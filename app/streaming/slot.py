@@ -26,11 +26,11 @@ class FrameCounts:
 class Slot:
     """The newest unsent messages of one client, by kind. Used on the server's event loop only.
 
-    ``paced``: frames wait for ``painted``. ``traffic`` counts frames. picture_px: how wide it shows the image, None
+    ``paced``: frames wait for ``painted``. ``traffic`` counts frames. image_px: how wide it shows the image, None
     until it says so."""
 
     def __init__(self, paced: bool = False, traffic: FrameCounts | None = None) -> None:
-        self.picture_px: int | None = None
+        self.image_px: int | None = None
         self.own: OwnPlayhead | None = None
         """None while the page follows the shared playhead."""
         self._paced = paced

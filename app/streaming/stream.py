@@ -98,7 +98,7 @@ class Stream:
         await socket.accept()
         self._loop = asyncio.get_running_loop()
         slot = Slot(socket.query_params.get("paced") == "1", self.traffic)
-        slot.picture_px = _width(socket.query_params.get("picture_px"))
+        slot.image_px = _width(socket.query_params.get("picture_px"))
         self._slots.append(slot)
         self._fit_width()
         try:
@@ -132,7 +132,7 @@ class Stream:
             if (ping := _number(said.get("ping"), _LARGEST_PING)) is not None:
                 slot.put("pong", _dump({"type": "pong", "ping": ping, "server_unix_ms": time.time() * 1e3}))
             if (wanted := _width(said.get("picture_px"))) is not None:
-                slot.picture_px = wanted
+                slot.image_px = wanted
                 if self._fit_width() and self._snapshot is not None:
                     await self._put_newest(slot, self._snapshot)
             if said.get("painted") is True:
@@ -184,7 +184,7 @@ class Stream:
     def _fit_width(self) -> bool:
         """Use the width of the widest client. True when it has grown, so that the newest frame's image is too
         narrow."""
-        wanted = max((slot.picture_px or MAX_WIDTH_PX for slot in self._slots), default=MAX_WIDTH_PX)
+        wanted = max((slot.image_px or MAX_WIDTH_PX for slot in self._slots), default=MAX_WIDTH_PX)
         with self._lock:
             has_grown = wanted > self._width_px
             self._width_px = wanted

@@ -68,7 +68,7 @@ def role_of(each: FusedObject, cipv_id: int | None) -> ColorRole:
         return "cipv"
     if each.tracked_by_two_sensors:
         return "fused"
-    return "vision" if each.pictured else "lidar"
+    return "vision" if each.imaged else "lidar"
 
 
 def shade_of(color: Rgb, identity: int) -> Rgb:

@@ -47,7 +47,7 @@ def object_text(each: FusedObject) -> str:
 def stands_out(each: FusedObject, result: Result) -> bool:
     """The CIPV, and objects in the path or seen by the camera now: not every pole, and no carried objects. These get a
     name and a velocity arrow; arrows for all objects would fill the view."""
-    return each.id == cipv_id(result) or (not each.carried and (each.pictured or each.in_path))
+    return each.id == cipv_id(result) or (not each.carried and (each.imaged or each.in_path))
 
 
 def top_of(each: FusedObject, floor_m: float) -> Point3:

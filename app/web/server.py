@@ -209,11 +209,11 @@ def _overloaded(_: Request, error: Exception) -> Response:
 
 
 def _palette() -> Response:
-    """The palette that all views share, as CSS custom properties for either theme. --picture-… are the shades to draw
+    """The palette that all views share, as CSS custom properties for either theme. --image-… are the shades to draw
     over a photograph with, the same in both."""
     dark, light = palette_css("dark"), palette_css("light")
     text = (
-        f":root {{\n{dark}\n{dark.replace('--cipv-', '--picture-')}\n}}\n"
+        f":root {{\n{dark}\n{dark.replace('--cipv-', '--image-')}\n}}\n"
         f"@media (prefers-color-scheme: light) {{ :root:not([data-theme=dark]) {{\n{light}\n}} }}\n"
         f":root[data-theme=light] {{\n{light}\n}}\n"
     )

@@ -75,7 +75,7 @@ def collect_pairs(
             continue
         frame = source.frame(index)
         alignment = resolve(params.alignment, frame.camera)
-        if frame.picture is None or frame.camera is None or alignment is None:
+        if frame.image is None or frame.camera is None or alignment is None:
             continue
         cuboids = _labelled(source, index) if truth == "labels" else _clusters(frame, params)
         pairs += _frame_pairs(frame, frame.camera, cuboids, alignment, detector, params)
@@ -155,8 +155,8 @@ def _frame_pairs(
     detector: Detector,
     params: Params,
 ) -> list[Pair]:
-    assert frame.picture is not None
-    detections = [d for d in select(detector.detect(frame.picture.bgr), params.detection) if d.label in VEHICLES]
+    assert frame.image is not None
+    detections = [d for d in select(detector.detect(frame.image.bgr), params.detection) if d.label in VEHICLES]
     projected = [project_cuboid(alignment, cuboid.corners(), camera.width, camera.height) for cuboid in cuboids]
     seen = [(cuboid, box) for cuboid, box in zip(cuboids, projected, strict=True) if box is not None]
     if not detections or not seen:

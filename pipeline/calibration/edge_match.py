@@ -1,5 +1,4 @@
-"""How well LiDAR and images lie on each other: do borders in depth fall on edges of the image, more than with the
-mount turned a little?
+"""How well LiDAR and images match: do depth edges fall on image edges, more than with the mount turned a little?
 
 How strong the edges under the borders are says little by itself: it differs from road to road more than from a right
 mount to a wrong one. So the same is asked of the mount turned to all sides, as Levinson and Thrun (2013) do to judge
@@ -41,7 +40,7 @@ MOST = 8000
 
 @dataclass(frozen=True)
 class EdgeScore:
-    """How well one alignment puts depth edges on edges of the image."""
+    """How well one alignment matches depth edges to image edges."""
 
     score: float | None
     """0–1: 1 where no alignment near is better, 0 where the usual one of them is as good. None where too few borders
@@ -66,8 +65,8 @@ class Near:
 
 
 def edge_score(scenes: Iterable[Seen], params: AlignmentParams) -> EdgeScore:
-    """The score over several frames: a single sweep of 16 rings has few borders. Frames that nothing aligns are left
-    out. A tenth of a second for 20 frames."""
+    """The score over several frames, since a single sweep of 16 rings has few depth edges. Skips frames without an
+    alignment. Takes a tenth of a second for 20 frames."""
     met: F64 = np.zeros(1)
     usually: F64 = np.zeros(1)
     borders = 0
@@ -76,8 +75,8 @@ def edge_score(scenes: Iterable[Seen], params: AlignmentParams) -> EdgeScore:
         around = surroundings(params, camera)
         if not around:
             continue
-        pictures = _Pictures.of(members, around[0].aligned)
-        sums = np.array([pictures.under(each.aligned) for each in around])
+        images = _Images.of(members, around[0].aligned)
+        sums = np.array([images.under(each.aligned) for each in around])
         met, usually, near = met + sums[:, 0], usually + sums[:, 1], around
         borders += int(sums[0, 2])
     if borders < FEWEST:
@@ -142,8 +141,8 @@ def _by_camera(scenes: Iterable[Seen]) -> list[tuple[CameraCalibration | None, l
 
 
 @dataclass(frozen=True, eq=False)
-class _Pictures:
-    """Pictures of one camera under each other, and the borders that may fall into them. first_row: (E,) of the border's
+class _Images:
+    """Images of one camera under each other, and the borders that may fall into them. first_row: (E,) of the border's
     own image."""
 
     points: F64
@@ -153,7 +152,7 @@ class _Pictures:
     height: int
 
     @classmethod
-    def of(cls, scenes: Sequence[EdgeScene], present: Alignment) -> _Pictures:
+    def of(cls, scenes: Sequence[EdgeScene], present: Alignment) -> _Images:
         height, width = scenes[0].strength.shape
         points = np.concatenate([scene.points for scene in scenes])
         first_row = np.repeat(np.arange(len(scenes)) * height, [len(scene.points) for scene in scenes])

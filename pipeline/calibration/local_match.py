@@ -1,4 +1,4 @@
-"""Where LiDAR and images lie beside each other: by region of the image and by distance, over several frames at once.
+"""Where LiDAR and images mismatch: by image region and by distance, over several frames at once.
 
 The borders in depth that fall into a region are shifted over the images by some pixels to all sides. Where they meet
 edges clearly better after one shift than after most, that shift is the region's arrow; where no shift stands out, the
@@ -37,7 +37,7 @@ MOST = 6000
 
 @dataclass(frozen=True)
 class Region:
-    """How borders and edges lie in a part of the image, or at a range of distances."""
+    """How depth edges and image edges match in a region of the image, or at a range of distances."""
 
     borders: int
     """Depth borders in it, of all frames."""
@@ -67,15 +67,16 @@ NO_MATCH = LocalMatch(COLUMNS, ROWS, (_NOTHING,) * (COLUMNS * ROWS), (_NOTHING,)
 
 
 def local_match(scenes: Iterable[Seen], params: AlignmentParams) -> LocalMatch:
-    """Over frames of the camera of the last one; frames that nothing aligns are left out. 50 ms for 20 frames."""
+    """The match over the frames that have the last frame's camera. Skips frames without an alignment. Takes 50 ms for
+    20 frames."""
     seen = list(scenes)
     if not seen:
         return NO_MATCH
     shape = seen[-1][0].strength.shape
     members = [(scene, camera) for scene, camera in seen if scene.strength.shape == shape]
-    u, v, picture, range_m = _projected(members, params)
+    u, v, image, range_m = _projected(members, params)
     keep = slice(None, None, -(-len(u) // MOST) or 1)
-    u, v, picture, range_m = u[keep], v[keep], picture[keep], range_m[keep]
+    u, v, image, range_m = u[keep], v[keep], image[keep], range_m[keep]
     height, width = shape
     inside = (u >= 0) & (u < width) & (v >= 0) & (v < height)
     column = np.clip((u * COLUMNS / width).astype(np.int64), 0, COLUMNS - 1)
@@ -84,7 +85,7 @@ def local_match(scenes: Iterable[Seen], params: AlignmentParams) -> LocalMatch:
     cells = COLUMNS * ROWS
     cell = np.where(inside, row * COLUMNS + column, cells)
     band = np.where(inside, band, len(BANDS_M) - 1)
-    shifts, strengths = _shifted([scene for scene, _ in members], u, v, picture, (cell, band))
+    shifts, strengths = _shifted([scene for scene, _ in members], u, v, image, (cell, band))
     grid = _regions(shifts, strengths[0][:, :-1], np.bincount(cell, minlength=cells + 1)[:-1])
     bands = _regions(shifts, strengths[1][:, :-1], np.bincount(band, minlength=len(BANDS_M))[:-1])
     return LocalMatch(COLUMNS, ROWS, grid, bands)
@@ -104,12 +105,12 @@ def _projected(
         near = (np.abs(uv / [width, height] - 0.5) < 0.5 + MARGIN).all(axis=1)  # NaN, behind, is not
         range_m = np.hypot(scene.points[near, 0], scene.points[near, 1])
         parts.append((uv[near], np.full(int(near.sum()), number), range_m))
-    uv, picture, range_m = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return uv[:, 0], uv[:, 1], picture, range_m
+    uv, image, range_m = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return uv[:, 0], uv[:, 1], image, range_m
 
 
 def _shifted(
-    scenes: list[EdgeScene], u: F64, v: F64, picture: I64, groups: tuple[I64, I64]
+    scenes: list[EdgeScene], u: F64, v: F64, image: I64, groups: tuple[I64, I64]
 ) -> tuple[F64, tuple[F64, F64]]:
     """(S, 2) shifts in pixels, and for each of the two groupings (S, G) how much stronger than usual the edges are that
     the borders of a group then meet, per border."""
@@ -125,7 +126,7 @@ def _shifted(
     for du, dv in shifts:
         column, row = (u + du).astype(np.int64), (v + dv).astype(np.int64)
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        at = np.where(inside, row, 0) + picture * height
+        at = np.where(inside, row, 0) + image * height
         met = np.where(inside, strength[at, np.where(inside, column, 0)] - usual[at], 0.0)
         for sums, group, count in zip(found, groups, counts, strict=True):
             sums.append(np.bincount(group, weights=met, minlength=len(count)) / count)

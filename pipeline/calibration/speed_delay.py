@@ -1,4 +1,4 @@
-"""How late the car's own speed is, against the LiDAR's odometry: while it accelerates or brakes, a late speed lags."""
+"""The delay of the car's own speed relative to LiDAR odometry, visible while the car accelerates or brakes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OFF_MPS = 0.3
 
 
 class NoDelay(BadInput):
-    """A drive that tells nothing of the speed's delay; the text says why."""
+    """The drive does not determine the delay of ego speed; the text says why."""
 
 
 class SpeedPair(NamedTuple):
@@ -53,23 +53,23 @@ class SpeedDelay:
 
 
 def forward_m(before: F64, after: F64) -> float:
-    """Way along x between two (4, 4) poses, at half of the turn."""
+    """Distance along x between two (4, 4) poses, at half the rotation."""
     step = np.linalg.inv(before) @ after
     half = 0.5 * float(np.arctan2(step[1, 0], step[0, 0]))
     return float(step[0, 3]) * cos(half) + float(step[1, 3]) * sin(half)
 
 
 def speed_delay(pairs: Sequence[SpeedPair]) -> SpeedDelay:
-    """The shift of the recorded speed that fits the LiDAR's best. NoDelay where the drive cannot tell."""
+    """The shift of the recorded speed that best fits the LiDAR's. Raises NoDelay if the drive does not determine it."""
     if len(pairs) < FEWEST:
-        raise NoDelay("too little ego speed beside LiDAR odometry: its delay is not told")
+        raise NoDelay("too few ego speeds with LiDAR odometry: their delay is unknown")
     begin_ns = pairs[0].t_ns
     t_s, at_s = np.array([(each.t_ns - begin_ns, each.recorded_ns - begin_ns) for each in pairs]).T / 1e9
     lidar, recorded = np.array([(each.lidar_mps, each.recorded_mps) for each in pairs]).T
     shifts_s = np.arange(-REACH_MS, REACH_MS + STEP_MS / 2, STEP_MS) / 1e3
     kept = (t_s > at_s[0] + REACH_MS / 1e3) & (t_s < at_s[-1] - REACH_MS / 1e3)
     if np.count_nonzero(kept) < FEWEST:
-        raise NoDelay("too short a drive to tell the delay of ego speed")
+        raise NoDelay("the drive is too short to determine the delay of ego speed")
     # recorded at t, had its times been later by the shift
     seen = np.array([np.interp(t_s[kept], at_s + shift, recorded) for shift in shifts_s])
     number = np.array([each.t_ns // BLOCK_NS for each in pairs])
@@ -85,7 +85,7 @@ def speed_delay(pairs: Sequence[SpeedPair]) -> SpeedDelay:
     drawn = [_lowest(sums[rng.integers(0, len(sums), len(sums))].sum(axis=0), shifts_s) for _ in range(BOOTSTRAPS)]
     sigma_ms = max(1e3 * float(np.std(drawn, ddof=1)), 1.0)
     if sigma_ms > TOLD_MS or abs(best) > (REACH_MS - STEP_MS) / 1e3:
-        raise NoDelay("ego speed changes too little to tell its delay; accelerate and brake")
+        raise NoDelay("ego speed changes too little to determine its delay; accelerate and brake")
     return SpeedDelay(round(1e3 * best, 1), round(sigma_ms, 1), round(scale, 4))
 
 

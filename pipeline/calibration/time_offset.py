@@ -1,4 +1,4 @@
-"""The time between camera and LiDAR, from own motion: when does what stands beside the road lie on its edges?
+"""The time offset between camera and LiDAR, from ego motion: at which lag do objects beside the road match their edges?
 
 An image that shows the world later than its time says shows everything nearer: what stands to the left has moved on to
 the left, what stands to the right to the right, and in a bend everything to one side. So the borders in depth are moved
@@ -45,11 +45,11 @@ NEAREST_M, FARTHEST_M = 3.0, 30.0
 MOST = 500
 """Borders of one frame that are looked at."""
 _DESKEW = DeskewParams(enabled=True)
-_NOT_CLEAR = "no lag between camera and LiDAR puts borders on edges clearly best; drive past parked cars"
+_NOT_CLEAR = "no lag between camera and LiDAR matches the edges clearly best; drive past parked cars"
 
 
 class NoOffset(BadInput):
-    """A drive that tells nothing of the time between the sensors; the text says why."""
+    """The drive does not determine the time offset between the sensors; the text says why."""
 
 
 @dataclass(frozen=True)
@@ -122,11 +122,11 @@ def _speeds(before: State, after: State, frame: Frame) -> list[SpeedPair]:
 
 
 def time_offset(scenes: Sequence[MovingScene]) -> TimeOffset:
-    """The lag at which the scenes' borders meet edges best. NoOffset where they cannot tell."""
+    """The lag at which the scenes' depth edges match image edges best. Raises NoOffset if no lag stands out."""
     moving = [each for each in scenes if _moves(each)]
     if len(moving) < FEWEST_FRAMES:
         raise NoOffset(
-            f"only {len(moving)} frames with an image while the car drives: the time between the sensors is not told"
+            f"only {len(moving)} frames with an image while the car drives: the time between the sensors is unknown"
         )
     lags_s = np.arange(-REACH_MS, REACH_MS + STEP_MS / 2, STEP_MS) / 1e3
     strength = np.array([_strengths(each, lags_s) for each in moving])
@@ -143,27 +143,27 @@ def time_offset(scenes: Sequence[MovingScene]) -> TimeOffset:
     if sigma_ms > TOLD_MS:
         raise NoOffset(_NOT_CLEAR)
     warnings: tuple[str, ...] = (
-        (f"the time offset is known to ±{sigma_ms:.0f} ms only",) if sigma_ms > UNSURE_MS else ()
+        (f"the time offset is known only to ±{sigma_ms:.0f} ms",) if sigma_ms > UNSURE_MS else ()
     )
     speeds = np.array([each.speed_mps for each in moving])
     turning = np.array([abs(each.yaw_rate_radps) for each in moving])
     if np.std(speeds) < 1.0 and np.quantile(turning, 0.8) < SLOWEST_RADPS:
         cm = float(np.mean(speeds)) / 10.0
-        warnings += (f"one speed and no bends: a camera {cm:.1f} cm farther ahead looks like 1 ms later",)
+        warnings += (f"constant speed and no bends: a camera {cm:.1f} cm farther ahead looks like 1 ms later",)
     return TimeOffset(round(1e3 * best, 1), round(sigma_ms, 2), round(height, 1), len(moving), warnings)
 
 
 def _scene(frame: Frame, ego: EgoState, params: AlignmentParams) -> MovingScene | None:
     aligned = resolve(params, frame.camera)
     sweep = deskew(frame.sweep, ego, _DESKEW)
-    if sweep is None or frame.picture is None or aligned is None:
+    if sweep is None or frame.image is None or aligned is None:
         return None
-    edges = edge_scene(sweep, frame.picture.bgr)
+    edges = edge_scene(sweep, frame.image.bgr)
     range_m = np.hypot(edges.points[:, 0], edges.points[:, 1])
     near = np.flatnonzero((range_m > NEAREST_M) & (range_m < FARTHEST_M))
     near = near[:: -(-len(near) // MOST) or 1]
     edges = EdgeScene(edges.points[near], edges.strength, edges.usual)
-    skew_s = (frame.picture.t_ns - sweep.t_ns) / 1e9 if frame.picture.t_ns is not None else 0.0
+    skew_s = (frame.image.t_ns - sweep.t_ns) / 1e9 if frame.image.t_ns is not None else 0.0
     return MovingScene(edges, aligned, ego.speed_mps, ego.yaw_rate_radps or 0.0, skew_s, frame.t_ns)
 
 

@@ -1,4 +1,4 @@
-"""Both offsets of time that a drive tells: the camera's, and that of the car's own speed."""
+"""Both time offsets that a drive can determine: the camera's, and that of ego speed."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from pipeline.calibration.time_offset import MovingScene, NoOffset, TimeOffset, 
 
 
 class NoTimes(NoOffset):
-    """A drive that tells neither; the text says why."""
+    """The drive determines neither; the text says why."""
 
 
 def times_of(
     scenes: Sequence[MovingScene], speeds: Sequence[SpeedPair]
 ) -> tuple[TimeOffset | None, SpeedDelay | None, tuple[str, ...]]:
-    """The offset of the camera and of ego speed, None where the drive does not tell it, and why not in sentences.
-    NoTimes where it tells neither."""
+    """The offsets of the camera and of ego speed, None where the drive does not determine one, and the reasons as
+    sentences. Raises NoTimes if it determines neither."""
     camera: TimeOffset | None = None
     ego: SpeedDelay | None = None
     untold: list[str] = []

@@ -34,10 +34,10 @@ def decode_within_budget(data: bytes) -> npt.NDArray[np.uint8] | None:
     """(H, W, 3) uint8, blue green red, of a JPEG or PNG; None when it is damaged. TooMuch before it is decoded."""
     check_budget(data)
     try:
-        picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
+        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
     except (cv2.error, MemoryError):
         return None
-    return None if picture is None else np.ascontiguousarray(picture, dtype=np.uint8)
+    return None if image is None else np.ascontiguousarray(image, dtype=np.uint8)
 
 
 def check_budget(data: bytes) -> None:

@@ -55,12 +55,12 @@ def patiently(work: Callable[[], _T], what: str) -> _T:
         try:
             return work()
         except FileNotFoundError:
-            raise NotReachable(f"{what}: nothing is there") from None
+            raise NotReachable(f"{what}: not found") from None
         except PermissionError as error:
             raise NotReachable(f"{what}: access denied: {first_line(error)}") from None
         except Exception as error:  # each store's package has errors of its own, without a common base
             if not left:
-                raise Overloaded(f"{what}: the store fails: {first_line(error)}") from error
+                raise Overloaded(f"{what}: store error: {first_line(error)}") from error
             time.sleep(pause_s)
             pause_s *= 2
     raise AssertionError("unreachable")
@@ -86,7 +86,7 @@ def open_remote(address: str) -> BinaryIO:
     system, path = file_system(address)
     size = patiently(lambda: system.info(path), address).get("size")
     if not size:
-        raise NotReachable(f"{address}: an empty file, or one whose size the store does not say")
+        raise NotReachable(f"{address}: an empty file, or the store does not report its size")
     return io.BufferedReader(_Ranges(system, path, address, int(size)), BLOCK_BYTES)
 
 

@@ -125,7 +125,7 @@ def _confirmed(who: Candidate) -> Answer:
 def _sightings(item: FusedObject) -> int:
     """Of the object where it is now. A camera track whose place was reset, because its distances no longer fitted it,
     may follow another vehicle than before: only the sightings since then confirm it."""
-    return min(item.hits, item.camera_ranges) if item.pictured and not item.ranged else item.hits
+    return min(item.hits, item.camera_ranges) if item.imaged and not item.ranged else item.hits
 
 
 def _seen(who: Candidate) -> Answer:
@@ -146,7 +146,7 @@ def _not_seen(who: Candidate) -> str:
 def _size(who: Candidate) -> Answer:
     """What no camera has named must be as large as a vehicle's rear or side: kerbs, posts and hedges are not leads."""
     item, params = who.item, who.params
-    if item.pictured or item.cuboid is None:
+    if item.imaged or item.cuboid is None:
         return True, None, params.min_width_m
     length, width, height = item.cuboid.size
     across = length if length > width else width

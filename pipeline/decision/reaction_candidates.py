@@ -18,7 +18,7 @@ That the camera has followed the object for longer does not help."""
 def is_dependable(item: FusedObject) -> bool:
     """Seen now, with a measured range, and every condition of a lead met but class and place. A box height alone says
     too little about speed to brake for what is not even the lead."""
-    has_velocity = item.ranged and (not item.pictured or item.lidar_hits >= _VELOCITY_HITS)
+    has_velocity = item.ranged and (not item.imaged or item.lidar_hits >= _VELOCITY_HITS)
     return has_velocity and not item.carried and is_solid(item)
 
 

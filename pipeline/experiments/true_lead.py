@@ -11,7 +11,7 @@ from pipeline.decision.path_position import near_face_middle
 from pipeline.params import CipvParams, PathParams
 from pipeline.path.corridor import nearest_on_path
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.sensors.truth_boxes import in_picture
+from pipeline.simulation.sensors.truth_boxes import in_image
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.types import F64, CameraCalibration, Path, Point2
@@ -103,7 +103,7 @@ class InSight:
 
 
 def _covered(now: World, camera: CameraCalibration) -> frozenset[int]:
-    return frozenset(seen.actor.actor.id for seen in in_picture(now, camera) if seen.visible < VISIBLE_SHARE)
+    return frozenset(seen.actor.actor.id for seen in in_image(now, camera) if seen.visible < VISIBLE_SHARE)
 
 
 def near_face(state: ActorState) -> Point2:

@@ -82,16 +82,16 @@ def read_bytes(path: Path) -> bytes:
         raise SourceError(f"{path.name}: cannot be read: {reason_of(error)}") from None
 
 
-def decode_picture(path: Path) -> tuple[U8, bytes | None]:
+def read_image(path: Path) -> tuple[U8, bytes | None]:
     """As ``decode_image``, of a file. SourceError too when it cannot be read."""
     return decode_image(read_bytes(path), path.name)
 
 
-def picture_size(paths: Iterable[Path]) -> tuple[int, int] | None:
+def image_size(paths: Iterable[Path]) -> tuple[int, int] | None:
     """Width and height of the first readable image; None where there is none."""
     for path in paths:
         try:
-            bgr, _ = decode_picture(path)
+            bgr, _ = read_image(path)
         except SourceError:
             continue
         return bgr.shape[1], bgr.shape[0]
@@ -108,22 +108,22 @@ def decode_image(data: bytes, name: str) -> tuple[U8, bytes | None]:
         if data.startswith(start) and end not in data[-_END_BYTES:]:
             raise SourceError(f"{name}: the image is truncated")
     try:
-        picture = decode_within_budget(data)
+        image = decode_within_budget(data)
     except TooMuch as error:
         raise SourceError(f"{name}: not a readable image: {error}") from None
-    if picture is None:
+    if image is None:
         raise SourceError(f"{name}: not a readable image")
-    return picture, data if is_jpeg else None
+    return image, data if is_jpeg else None
 
 
-def picture_of(path: Path | None, t_ns: int | None, size: tuple[int, int], notes: list[str]) -> CameraImage | None:
+def image_of(path: Path | None, t_ns: int | None, size: tuple[int, int], notes: list[str]) -> CameraImage | None:
     """The image of a frame; None, and ``notes`` says why, when there is no file, when it is damaged or when it is not
     of the size (width, height) of the recording's others."""
     if path is None:
         notes.append("no image for this frame")
         return None
     try:
-        bgr, encoded = decode_picture(path)
+        bgr, encoded = read_image(path)
     except SourceError as error:
         notes.append(str(error))
         return None

@@ -62,7 +62,7 @@ class VideoFile:
         self._lock = Lock()
         self._places = [_Place(path, first, tick_ns) for _ in range(_PLACES)]  # the one used last stands last
 
-    def picture(self, index: int) -> U8:
+    def image(self, index: int) -> U8:
         """(H, W, 3) uint8 blue green red of one of ``times_ns``. SourceError when it cannot be decoded."""
         wanted_ns = int(self.times_ns[index])
         with self._lock:
@@ -71,7 +71,7 @@ class VideoFile:
             self._places.append(place)
         try:
             with overload_told_apart():
-                return place.picture(wanted_ns)
+                return place.image(wanted_ns)
         except (av.FFmpegError, OSError, ValueError, StopIteration) as error:
             raise SourceError(f"{self.path.name}: image {index} cannot be decoded: {reason_of(error)}") from None
 
@@ -91,7 +91,7 @@ class _Place:
         """Whether decoding on leads there soon."""
         return self._frames is not None and self._at_ns < wanted_ns <= self._at_ns + _DECODE_ON_NS
 
-    def picture(self, wanted_ns: int) -> U8:
+    def image(self, wanted_ns: int) -> U8:
         """The image of a time. Whatever the library raises; the next one is then read from the file anew."""
         with self._lock:
             try:

@@ -60,7 +60,7 @@ def heed(path: Path, state: AgreementState, params: FusionParams) -> Path:
 def _come_apart(near: list[FusedObject]) -> int:
     """Pairs of a car that only the camera has and a cluster that only the LiDAR has, as far away and a little aside;
     each cluster is taken once."""
-    clusters = [item for item in near if not item.pictured and not item.carried and _is_a_car_wide(item)]
+    clusters = [item for item in near if not item.imaged and not item.carried and _is_a_car_wide(item)]
     count = 0
     for box in near:
         if not box.ranged and not box.carried and box.label in VEHICLES and box.hits >= _CONFIRMED:

@@ -109,18 +109,18 @@ def follow(
     state: DriftState,
     fused: Fusion,
     aligned: Alignment | None,
-    picture_size: tuple[int, int] | None,
+    image_size: tuple[int, int] | None,
     t_ns: int,
     params: FusionParams,
 ) -> tuple[DriftState, Drift | None]:
     """The state after this frame, and the angles that it leaves little doubt of; None while there is no such doubt."""
-    if aligned is None or picture_size is None:
+    if aligned is None or image_size is None:
         return DriftState(), None
     # Each vehicle tells the angle between its box and its projected cuboid; those of the last seconds judge together
     known = {each.id: each for each in state.sightings if t_ns - each.t_ns <= params.drift_s * 1e9}
     for item in fused.objects:
         box = fused.vision_boxes.get(item.id)
-        if box is not None and _tells(item, box, picture_size):
+        if box is not None and _tells(item, box, image_size):
             assert item.cuboid is not None
             found = _angles(item.cuboid, box, aligned)
             rate_degps = _rate_degps(item)

@@ -109,7 +109,7 @@ def weigh(
     looks_far = state.looks_far or (seen is not None and seen.far is not None)
     # where a far view sits out a frame, what is far may be missing for that
     looked = seen is not None and (seen.far is not None or not looks_far)
-    missed = _missed(objects, frame.picture_size) if looked else frozenset()
+    missed = _missed(objects, frame.image_size) if looked else frozenset()
     known: dict[int, Existence] = {}
     judged = []
     for item in objects:

@@ -76,17 +76,17 @@ def fuse(
     lidar: tuple[LidarTrack, ...],
     vision: tuple[VisionTrack, ...],
     alignment: Alignment | None,
-    picture_size: tuple[int, int] | None,
+    image_size: tuple[int, int] | None,
     params: FusionParams,
 ) -> tuple[FusionState, Fusion]:
-    """One row per physical object. ``picture_size`` is (width, height) in pixels; without it or without an alignment
+    """One row per physical object. ``image_size`` is (width, height) in pixels; without it or without an alignment
     nothing can be compared, and every track keeps a row of its own."""
     # LiDAR cuboids are projected into the image, where they can be compared with boxes
     corners = corners_of([track.obstacle.cuboid for track in lidar])
     ranges_m, sigmas_m = [range_m(track) for track in lidar], [lidar_sigma_m(track) for track in lidar]
     projected: list[Box | None] = [None] * len(lidar)
-    if alignment is not None and picture_size is not None:
-        projected = project_cuboids(alignment, _to_the_gaps(corners, ranges_m, params), *picture_size)
+    if alignment is not None and image_size is not None:
+        projected = project_cuboids(alignment, _to_the_gaps(corners, ranges_m, params), *image_size)
     # What overlaps, agrees in range and has a plausible size may be joined; the best pairs are
     overlap = _overlap(vision, projected)
     were_one = _were_one(state, vision, lidar) & params.keep_partners

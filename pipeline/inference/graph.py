@@ -22,17 +22,17 @@ MIN_BUDGET = 640 * 384
 """Network pixels always allowed: a small square export (416×416) is otherwise too coarse for a car at 60 m."""
 
 
-def fitting_size(picture_size: tuple[int, int], own: Size | None) -> Size:
+def fitting_size(image_size: tuple[int, int], own: Size | None) -> Size:
     """Input (height, width) for an image (width, height): its aspect, sides multiples of 32, as large as the budget
     (the export's own number of pixels, at least 640×384) and the image itself allow.
 
     2048×618 → 256×832, 1242×375 → 256×832, 1280×720 → 384×640 (height × width) for a 416×416 export.
     """
-    picture_w, picture_h = picture_size
+    image_w, image_h = image_size
     budget = max(MIN_BUDGET, own[0] * own[1] if own else 0)
     best = (MULTIPLE, MULTIPLE)
-    for width in range(MULTIPLE, _up(picture_w) + 1, MULTIPLE):
-        height = _up(width * picture_h / picture_w)
+    for width in range(MULTIPLE, _up(image_w) + 1, MULTIPLE):
+        height = _up(width * image_h / image_w)
         if height * width <= budget:
             best = (height, width)
     return best
@@ -51,7 +51,7 @@ def input_size(model: onnx.ModelProto) -> Size | None:
     return (height, width) if height and width else None
 
 
-def with_unit_picture(model: onnx.ModelProto) -> onnx.ModelProto:
+def with_unit_image(model: onnx.ModelProto) -> onnx.ModelProto:
     """A graph whose second input is the size of the original image (N, 2), as DETR exports have it, with that bound
     to 1 × 1: its boxes become shares of the input's sides. Any other graph as it is."""
     weights = {tensor.name for tensor in model.graph.initializer}

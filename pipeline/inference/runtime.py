@@ -19,7 +19,7 @@ from pipeline.common.fast_replace import evolve
 from pipeline.inference import model_registry
 from pipeline.inference.cancellation import Stopped, of_this_thread
 from pipeline.inference.denormals import flush_to_zero, flush_weights
-from pipeline.inference.graph import Size, input_size, with_empty_masks, with_input_size, with_unit_picture
+from pipeline.inference.graph import Size, input_size, with_empty_masks, with_input_size, with_unit_image
 from pipeline.inference.known_networks import Task
 from pipeline.inference.tuning import RunSettings, kept_way
 from pipeline.types import F32, U8
@@ -107,7 +107,7 @@ def _open(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
     raise DetectorError(f"{path.name} cannot be run: {first_line(refusal)}")
 
 
-def check_picture(bgr: U8) -> None:
+def check_image(bgr: U8) -> None:
     """DetectorError for an array that is no image (H, W, 3) uint8."""
     if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
         raise DetectorError(f"expected an image of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
@@ -130,7 +130,7 @@ def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
 def ways_of(path: Path) -> Callable[[RunSettings], Callable[[], Sequence[F32]]]:
     """For ``pipeline.inference.tuning``: the network in a file on the same noisy image, one way after the other.
     DetectorError when it takes no image."""
-    model = with_empty_masks(with_unit_picture(read_graph(path)))  # each leaves the other's graphs as they are
+    model = with_empty_masks(with_unit_image(read_graph(path)))  # each leaves the other's graphs as they are
     try:
         own = input_size(model)
     except ValueError as error:

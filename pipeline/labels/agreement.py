@@ -1,4 +1,4 @@
-"""How far two people agree who have labelled the same recording apart from each other."""
+"""Agreement of two people who labelled the same recording independently."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Agreement:
 
 
 def agreement(first: LabelSet, second: LabelSet) -> Agreement:
-    """BadInput where the two are of different recordings."""
+    """Compare two label sets. Raises BadInput if they are of different recordings."""
     if first.t_ns != second.t_ns:
         raise BadInput("the two label sets are of different recordings")
     ours, theirs = _by_frame(first), _by_frame(second)

@@ -1,4 +1,4 @@
-"""Picture boxes that follow their cuboids: around the projection, clipped to the picture, unless somebody set them."""
+"""Image boxes that follow their cuboids: around the projection, clipped to the image, unless somebody set them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pipeline.types import Box, CameraCalibration
 def following(labels: LabelSet, drive: LabeledDrive) -> LabelSet:
     """The labels with the box of each cuboid where its frame's camera sees it, and how much of it is cut off. Boxes
     that were set, and truncations that were read, stay; so does everything in frames without a calibrated camera. What
-    is outside the picture has no box."""
+    is outside the image has no box."""
     by_frame: dict[int, list[tuple[int, Sighting]]] = {}
     for track in labels.tracks:
         for each in track.sightings:
@@ -41,7 +41,7 @@ def following(labels: LabelSet, drive: LabeledDrive) -> LabelSet:
 
 
 def boxes_of(cuboids: list[Cuboid], camera: CameraCalibration) -> list[tuple[Box | None, float | None]]:
-    """Of each cuboid the box around it in the raw picture, and the share 0–1 of that box that the picture cuts off.
+    """Of each cuboid the box around it in the raw image, and the share 0–1 of that box that the image cuts off.
     None for both where it is outside."""
     view = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
     corners = corners_of(cuboids)

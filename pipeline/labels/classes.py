@@ -73,7 +73,7 @@ def default_classes() -> ClassList:
 
 
 def read_classes(path: Path) -> ClassList:
-    """A class list from a file. BadInput in one sentence when it is none."""
+    """A class list from a file. Raises BadInput, in one sentence, if it is invalid."""
     try:
         body = yaml.safe_load(read_regular(path, _LARGEST))
     except OSError as error:
@@ -118,8 +118,8 @@ def _parsed(body: Any) -> ClassList:
     classes = {each.name: each for each in (_class(name, said) for name, said in body["classes"].items())}
     for each in classes.values():
         parent = classes.get(each.of) if each.of is not None else None
-        _require(each.of is None or parent is not None, f"{each.name} is of {each.of!r}, which is no class here")
-        _require(parent is None or parent.of is None, f"{each.name} is of {each.of!r}, which is a sub-class itself")
+        _require(each.of is None or parent is not None, f"{each.name} is of {each.of!r}, which is not a class")
+        _require(parent is None or parent.of is None, f"{each.name} is of {each.of!r}, which is itself a sub-class")
     attributes = body.get("attributes") or {}
     _require(isinstance(attributes, dict), "attributes must be a mapping of names to lists of values")
     return ClassList(classes, {_name(name): _values(name, values) for name, values in attributes.items()})
@@ -153,14 +153,14 @@ def _size(name: str, size: Any) -> tuple[float, float, float]:
 def _values(name: Any, values: Any) -> tuple[str, ...]:
     is_list = isinstance(values, list) and 0 < len(values) <= _MOST
     _require(
-        is_list and all(isinstance(each, str) for each in values), f"{name}: values must be a list of texts in quotes"
+        is_list and all(isinstance(each, str) for each in values), f"{name}: values must be a list of quoted strings"
     )
     return tuple(_name(value) for value in values)
 
 
 def _name(name: Any) -> str:
     is_one = isinstance(name, str) and name.strip() == name and 0 < len(name) <= _LONGEST_NAME and name.isprintable()
-    _require(is_one, f"{str(name)[:_LONGEST_NAME]!r} is no name")
+    _require(is_one, f"{str(name)[:_LONGEST_NAME]!r} is not a valid name")
     return str(name)
 
 

@@ -1,4 +1,4 @@
-"""A label from close by: the picture around it, and its points from above, from the side and from behind.
+"""A close-up of a label: the image around it, and its points from above, from the side and from behind.
 
 Also how well a cuboid fits its points, by which the frames to look at first are found.
 """
@@ -23,7 +23,7 @@ _BESIDE_M = 0.6
 _ROAD_M = 0.2
 """Points so near to its bottom may be of the road."""
 _SHOWN_M = 1.5
-_PICTURE_MARGIN = 0.4
+_IMAGE_MARGIN = 0.4
 _BACK, _POINT, _BESIDE, _EDGE, _TEXT = (24, 20, 17), (235, 225, 215), (90, 150, 255), (140, 220, 120), (190, 190, 190)
 _VIEWS = (("top", 0, 1), ("side", 0, 2), ("rear", 1, 2))
 _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
@@ -56,9 +56,9 @@ def fit_of(points: F32, cuboid: Cuboid) -> Fit:
 
 
 def close_up(frame: Frame, sighting: Sighting, alignment: Alignment | None) -> U8:
-    """(2·HEIGHT_PX, 2·WIDTH_PX, 3) BGR: picture, top and, below, side and rear. What a frame lacks stays empty.
-    alignment: where points lie in the picture; None where that is not known."""
-    views = [_in_picture(frame, sighting, alignment)]
+    """(2·HEIGHT_PX, 2·WIDTH_PX, 3) BGR: image, top and, below, side and rear. What a frame lacks stays empty.
+    alignment: where points lie in the image; None where that is not known."""
+    views = [_in_image(frame, sighting, alignment)]
     for name, across, up in _VIEWS:
         views.append(_projected(name, frame.sweep.points if frame.sweep is not None else None, sighting, across, up))
     return np.vstack([np.hstack(views[:2]), np.hstack(views[2:])])
@@ -95,20 +95,20 @@ def _projected(name: str, points: F32 | None, sighting: Sighting, across: int, u
     return view
 
 
-def _in_picture(frame: Frame, sighting: Sighting, alignment: Alignment | None) -> U8:
-    view = _empty("picture")
+def _in_image(frame: Frame, sighting: Sighting, alignment: Alignment | None) -> U8:
+    view = _empty("image")
     pixels = None
     if sighting.cuboid is not None and alignment is not None:
         pixels = alignment.project(sighting.cuboid.corners())
         pixels = None if np.isnan(pixels).any() else pixels
-    if frame.picture is None or (pixels is None and sighting.bbox is None):
+    if frame.image is None or (pixels is None and sighting.bbox is None):
         return view
     around = pixels if pixels is not None else np.array(sighting.bbox).reshape(2, 2)
     low, high = around.min(axis=0), around.max(axis=0)
-    middle, half = (low + high) / 2, (high - low) / 2 * (1.0 + _PICTURE_MARGIN)
+    middle, half = (low + high) / 2, (high - low) / 2 * (1.0 + _IMAGE_MARGIN)
     scale = min(WIDTH_PX / 2 / max(half[0], 4.0), HEIGHT_PX / 2 / max(half[1], 4.0))
     onto = np.array([[scale, 0.0, WIDTH_PX / 2 - scale * middle[0]], [0.0, scale, HEIGHT_PX / 2 - scale * middle[1]]])
-    shown = cv2.warpAffine(frame.picture.bgr, onto, (WIDTH_PX, HEIGHT_PX), flags=cv2.INTER_LINEAR, borderValue=_BACK)
+    shown = cv2.warpAffine(frame.image.bgr, onto, (WIDTH_PX, HEIGHT_PX), flags=cv2.INTER_LINEAR, borderValue=_BACK)
     if pixels is not None:
         at = np.rint(pixels * scale + onto[:, 2]).astype(int)
         for a, b in _EDGES:

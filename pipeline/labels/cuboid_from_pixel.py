@@ -1,5 +1,5 @@
-"""A vehicle that somebody points at in the image, as a cuboid: from the points that are seen there or, where there
-are too few, from how tall it looks.
+"""A cuboid for a vehicle that a person points at in the image: from the points there or, if there are too few, from
+its height in the image.
 """
 
 from __future__ import annotations

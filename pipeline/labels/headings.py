@@ -49,7 +49,7 @@ class Moment:
     yaw_rate_radps: float | None
     """Own yaw rate, positive to the left; None counts as straight on."""
     reach_m: float
-    """How far ahead a vehicle in the path would have been noticed; 0 for not at all."""
+    """How far ahead a vehicle in the path would be detected; 0 for not at all."""
 
 
 @dataclass(frozen=True)

@@ -144,7 +144,7 @@ def _shifted_beyond(track: dict[int, Sighting], old: Sighting, frame: int) -> di
 
 
 def _boxes_after(track: dict[int, Sighting], old: Sighting, frame: int, t_ns: Sequence[int]) -> dict[int, Sighting]:
-    """Picture boxes corrected as the one in ``frame`` was: less and less towards the next keyframe, all the way where
+    """Image boxes corrected as the one in ``frame`` was: less and less towards the next keyframe, all the way where
     there is none."""
     new = track[frame].bbox
     if old.bbox is None or new is None or old.bbox == new:

@@ -1,4 +1,4 @@
-"""What in labels can hardly be so: things to look at before they are exported. Nothing is changed."""
+"""Finds implausible labels to check before export. Changes nothing."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _LEAST_BOX_IOU = 0.3
 
 @dataclass(frozen=True)
 class Problem:
-    """Something in labels that can hardly be so."""
+    """Something implausible in labels."""
 
     frame: int
     """Where to look."""
@@ -106,7 +106,7 @@ def _overlap(a: Cuboid, b: Cuboid) -> float:
 
 
 def _boxes_apart(tracks: Sequence[LabelTrack], drive: LabeledDrive) -> Iterator[Problem]:
-    """Boxes that somebody set, away from where the cuboid is in the picture."""
+    """Boxes that somebody set, away from where the cuboid is in the image."""
     for track in tracks:
         for each in track.sightings:
             if each.box_set and each.cuboid is not None and each.bbox is not None and _is_apart(each, drive):

@@ -1,4 +1,4 @@
-"""What the pipeline saw in a drive, as labels that nobody has looked at yet.
+"""Turns what the pipeline saw in a drive into label proposals.
 
 Not everything it follows is worth a look: roadside returns are half of it. Proposed is what the camera has called a
 road user, and what surely drove over the ground and is as large as a vehicle; each with how sure that is. A track ends

@@ -1,4 +1,4 @@
-"""The labels of a set that somebody stands behind: for who trains or scores with them elsewhere."""
+"""Selects the accepted or reviewed labels of a set, for training or scoring elsewhere."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a label set is one: what no file, database or hand may bring in, said in one sentence."""
+"""Validates label sets from files, databases and people; an error is one sentence."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _check_track(track: LabelTrack, count: int) -> None:
             0 <= said.first <= said.last < count, f"track {track.id}: {said.name!r} is of frames that do not exist"
         )
     sure = track.confidence
-    _require(sure is None or 0.0 <= sure <= 1.0, f"track {track.id}: a confidence is between 0 and 1")
+    _require(sure is None or 0.0 <= sure <= 1.0, f"track {track.id}: a confidence must be between 0 and 1")
     for sighting in track.sightings:
         wrong = _wrong_with(sighting)
         if wrong:
@@ -91,9 +91,9 @@ def _wrong_with(sighting: Sighting) -> str:
         if not (_below(sighting.bbox, _LARGEST_PX) and x1 < x2 and y1 < y2):
             return "invalid box"
     if sighting.truncation is not None and not 0.0 <= sighting.truncation <= 1.0:
-        return "a truncation is between 0 and 1"
+        return "a truncation must be between 0 and 1"
     if sighting.occlusion not in (None, 0, 1, 2):
-        return "an occlusion is 0, 1 or 2"
+        return "an occlusion must be 0, 1 or 2"
     return ""
 
 

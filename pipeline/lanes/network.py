@@ -17,7 +17,7 @@ from pipeline.inference.graph import Size, input_size, with_empty_masks, with_in
 from pipeline.inference.runtime import (
     DetectorError,
     DetectorMissing,
-    check_picture,
+    check_image,
     find_graph,
     open_session,
     read_graph,
@@ -62,7 +62,7 @@ class LaneNetwork:
 
         DetectorError for an array that is no such image or a network that fails on it.
         """
-        check_picture(bgr)
+        check_image(bgr)
         placed = _placed((bgr.shape[0], bgr.shape[1]), self.input_size, self.head, self.horizon)
         found = self.head.points(run_session(self._session, self._blob(bgr, placed)))
         keep = found.score >= _MIN_SCORE
@@ -138,8 +138,8 @@ def _loaded(path: Path, threads: int, horizon: float) -> LaneNetwork:
     return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, count, horizon, sha256, session)
 
 
-def _placed(picture: Size, size: Size, head: LaneHead, horizon: float) -> _Placed:
-    (height, width), (rows, columns) = picture, size
+def _placed(image: Size, size: Size, head: LaneHead, horizon: float) -> _Placed:
+    (height, width), (rows, columns) = image, size
     if head.fit == "letterbox":
         scale = min(rows / height, columns / width)
         fitted = (max(1, round(height * scale)), max(1, round(width * scale)))

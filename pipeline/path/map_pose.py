@@ -1,7 +1,7 @@
 """Where the car is on the map: a filter over fixes, courses, ego speed and yaw rate (extended Kalman, three states).
 
 State [x, y, heading] in UTM metres and radians counter-clockwise from grid east. Its covariance is that against the
-receiver's own picture of the world: a receiver's place is off by its ``sigma_m`` for minutes on end, while from fix to
+receiver's own estimate of the world: a receiver's place is off by its ``sigma_m`` for minutes on end, while from fix to
 fix it scatters little, so that a jump shows at once. Measured on 60 s of a real drive (comma2k19, u-blox): 0.02 m
 sideways from fix to fix with a reported sigma of metres, course 0.31° at 17 m/s, which is 0.09 m/s sideways.
 

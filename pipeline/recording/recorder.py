@@ -146,10 +146,10 @@ class Recorder:
         if not self._takes_packets:
             self._put(lambda segments: segments.write_sweep(sweep, arrived_ns), "sweeps", _bytes_of(sweep))
 
-    def picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
+    def image(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
         """Every image, not only those of frames."""
         size = len(shot.encoded) if shot.encoded is not None else _UNPACKED_BYTES
-        self._put(lambda segments: segments.write_picture(shot, t_ns, arrived_ns), "images", size)
+        self._put(lambda segments: segments.write_image(shot, t_ns, arrived_ns), "images", size)
 
     def ego(self, ego: EgoState, arrived_ns: int) -> None:
         self._put(lambda segments: segments.write_ego(ego, arrived_ns), "samples", _SMALL_BYTES)

@@ -96,9 +96,9 @@ class Segments:
         """See ``SessionWriter.write_sweep``."""
         self._writer.write_sweep(sweep, arrived_ns)
 
-    def write_picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
-        """See ``SessionWriter.write_picture``."""
-        self._writer.write_picture(shot, t_ns, arrived_ns)
+    def write_image(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
+        """See ``SessionWriter.write_image``."""
+        self._writer.write_image(shot, t_ns, arrived_ns)
 
     def write_ego(self, ego: EgoState, arrived_ns: int) -> None:
         """See ``SessionWriter.write_ego``."""

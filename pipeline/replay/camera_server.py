@@ -9,7 +9,7 @@ import threading
 
 from pipeline.common.errors import BadInput
 
-_BOUNDARY = "picture"
+_BOUNDARY = "image"
 _HEAD = (
     "HTTP/1.1 200 OK\r\nCache-Control: no-cache\r\nConnection: close\r\n"
     f"Content-Type: multipart/x-mixed-replace; boundary={_BOUNDARY}\r\n\r\n"

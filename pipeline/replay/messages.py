@@ -46,9 +46,9 @@ def of_frame(frame: Frame) -> Iterator[Message]:
     found: list[Message] = []
     if frame.sweep is not None:
         found.append(Message(frame.sweep.t_ns, "lidar", frame.sweep))
-    if frame.picture is not None:
-        t_ns = frame.picture.t_ns if frame.picture.t_ns is not None else frame.t_ns
-        found.append(Message(t_ns, "camera", jpeg_of(frame.picture)))
+    if frame.image is not None:
+        t_ns = frame.image.t_ns if frame.image.t_ns is not None else frame.t_ns
+        found.append(Message(t_ns, "camera", jpeg_of(frame.image)))
     if frame.gnss is not None:
         found.append(Message(frame.gnss.t_ns, "gnss", frame.gnss))
     if frame.ego is not None:
@@ -56,9 +56,9 @@ def of_frame(frame: Frame) -> Iterator[Message]:
     return iter(sorted(found, key=lambda message: message.t_ns))
 
 
-def jpeg_of(picture: CameraImage) -> bytes:
+def jpeg_of(image: CameraImage) -> bytes:
     """As the camera gave it where that is a JPEG, else encoded."""
-    if picture.encoded is not None and picture.encoded.startswith(b"\xff\xd8"):
-        return picture.encoded
-    _, jpeg = cv2.imencode(".jpg", picture.bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    if image.encoded is not None and image.encoded.startswith(b"\xff\xd8"):
+        return image.encoded
+    _, jpeg = cv2.imencode(".jpg", image.bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
     return bytes(jpeg.tobytes())

@@ -38,7 +38,7 @@ class Eyes(Protocol):
     """Finds vehicles in the image."""
 
     @property
-    def needs_picture(self) -> bool: ...
+    def needs_image(self) -> bool: ...
 
     def look(self, frame: Frame, now: World, seed: int) -> Frame:
         """The frame with ``raw_boxes`` in it."""
@@ -51,7 +51,7 @@ class TruthEyes:
 
     noise: BoxNoise = BoxNoise()
     """The detector's errors."""
-    needs_picture: bool = False
+    needs_image: bool = False
     """No image is drawn."""
 
     def look(self, frame: Frame, now: World, seed: int) -> Frame:
@@ -67,7 +67,7 @@ class NetworkEyes:
     """On the whole image."""
     far: FarView | None = None
     """On its far part too; None for the whole image alone."""
-    needs_picture: bool = True
+    needs_image: bool = True
     """The image is drawn for it."""
 
     def look(self, frame: Frame, now: World, seed: int) -> Frame:
@@ -131,7 +131,7 @@ def drive(scenario: Scenario, setup: Setup) -> Iterator[LoopStep]:
 
 def _look(sensors: SensorRig, setup: Setup, scenario: Scenario, now: World, index: int) -> Frame:
     wants_boxes = setup.sensors != "lidar"
-    frame = sensors.frame(now, index, round(now.t_s * 1e9), picture=wants_boxes and setup.eyes.needs_picture)
+    frame = sensors.frame(now, index, round(now.t_s * 1e9), image=wants_boxes and setup.eyes.needs_image)
     if wants_boxes:
         frame = setup.eyes.look(frame, now, scenario.seed)
     return only(frame, setup.sensors)

@@ -19,4 +19,4 @@ def frames(scenario: Scenario) -> Iterator[tuple[World, Frame]]:
     step_ns = round(1e9 / scenario.rate_hz)
     for index in range(scenario.frame_count()):
         now = world_state.at(scenario, index * step_ns / 1e9)
-        yield now, senses.sensed(sensors.frame(now, index, index * step_ns, picture=False), now)
+        yield now, senses.sensed(sensors.frame(now, index, index * step_ns, image=False), now)

@@ -23,9 +23,9 @@ from pipeline.formats.file_reading import (
     camera_matrix,
     check_looks_ahead,
     files_by_name,
+    image_of,
+    image_size,
     in_order,
-    picture_of,
-    picture_size,
     read_bytes,
     recording_folder,
     rigid_transform,
@@ -61,15 +61,15 @@ class AstyxSource:
         self.uri, self.title = uri, folder.resolve().name
         self.notes: tuple[str, ...] = ("camera without time stamps: mid-sweep assumed", "no ego speed recorded")
         self._sweeps = files_by_name(folder / "lidar_vlp16", (".txt",))
-        self._pictures = files_by_name(folder / "camera_front", (".jpg", ".jpeg", ".png"))
+        self._images = files_by_name(folder / "camera_front", (".jpg", ".jpeg", ".png"))
         self._labels = files_by_name(folder / "groundtruth_obj3d", (".json",))
         self._calibrations = files_by_name(folder / "calibration", (".json",))
-        self._names = in_order(self._sweeps.keys() | self._pictures.keys())
+        self._names = in_order(self._sweeps.keys() | self._images.keys())
         if not self._names:
             raise SourceError(f"{path}: not an Astyx recording: neither lidar_vlp16/*.txt nor camera_front/*.jpg in it")
         if not self._calibrations:
             raise SourceError(f"{path}: no calibration/*.json")
-        self._size = picture_size(self._pictures.values()) or _NOMINAL_SIZE
+        self._size = image_size(self._images.values()) or _NOMINAL_SIZE
         self._calibration = _read_calibration(next(iter(self._calibrations.values())), self._size)
         self._stamps = _fill_gaps([_first_stamp_ns(self._sweeps.get(name)) for name in self._names])
         self.rate_hz = _rate_hz(self._stamps)
@@ -85,8 +85,8 @@ class AstyxSource:
         notes: list[str] = []
         T_ego_lidar, camera = self._calibration_of(name, notes)
         sweep = self._sweep(name, tick, T_ego_lidar, notes)
-        picture = picture_of(self._pictures.get(name), None, self._size, notes)
-        return Frame(index, name, tick, sweep, picture, camera, notes=tuple(notes))
+        image = image_of(self._images.get(name), None, self._size, notes)
+        return Frame(index, name, tick, sweep, image, camera, notes=tuple(notes))
 
     def outlines(self) -> Iterator[Frame]:
         return (self._outline(index) for index in range(len(self)))

@@ -1,4 +1,4 @@
-"""Pictures without a LiDAR: a video file, or a folder of images, with a GNSS track beside it if there is one.
+"""Images without a LiDAR: a video file, or a folder of images, with a GNSS track beside it if there is one.
 
 Without a calibration the camera is taken for a dash cam: looking straight ahead, with a diagonal field of view of 78°,
 1.3 m above the road. The notes say so; ``NAME.yaml`` beside the recording, or ``hfov_deg``, gives the real one."""
@@ -16,7 +16,7 @@ from pipeline.common.fast_replace import evolve
 from pipeline.common.nearest_in_time import Timeline
 from pipeline.common.user_file_errors import reason_of
 from pipeline.ego_motion.from_gnss import MotionFromGnss
-from pipeline.formats.file_reading import decode_picture, files_by_name, recording_file, recording_folder
+from pipeline.formats.file_reading import files_by_name, read_image, recording_file, recording_folder
 from pipeline.formats.gpx_file import parse_gpx
 from pipeline.formats.video_file import VideoFile
 from pipeline.sources import rig as rig_files
@@ -26,7 +26,7 @@ from pipeline.sources.uri_options import number_option, split_options
 from pipeline.types import U8, CameraCalibration, CameraImage, Frame, GnssFix, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
-PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png")
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png")
 _OPTIONS = ("rate_hz", "hfov_deg", "height_m", "nmea", "gpx", "rig", "gnss_offset_s")
 _RATE_HZ = 10.0
 """Frames a second that are taken of a video: more add nothing to tracking, and cost a network's time each."""
@@ -49,16 +49,16 @@ def open_video(uri: str, rest: str, how: Opening) -> CameraAlone:
     taken = range(0, len(video.times_ns), every)
     notes = [f"{recorded_hz:.0f} images a second; every {_ordinal(every)} is used"] if every > 1 else []
     return CameraAlone(
-        uri, file, options, video.times_ns[::every].tolist(), lambda index: (video.picture(taken[index]), None), notes
+        uri, file, options, video.times_ns[::every].tolist(), lambda index: (video.image(taken[index]), None), notes
     )
 
 
-def open_pictures(uri: str, rest: str, how: Opening) -> CameraAlone:
+def open_images(uri: str, rest: str, how: Opening) -> CameraAlone:
     """``pictures:DIR?rate_hz=10&…``, in order of name. Names of 16 or 19 digits are µs or ns since 1970. Called by
     name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
     path, options = split_options(rest, _OPTIONS)
     folder = recording_folder(path)
-    files = files_by_name(folder, PICTURE_SUFFIXES)
+    files = files_by_name(folder, IMAGE_SUFFIXES)
     if not files:
         raise SourceError(f"{path}: no images in it; they are .jpg, .jpeg or .png")
     names, paths = list(files), list(files.values())
@@ -67,7 +67,7 @@ def open_pictures(uri: str, rest: str, how: Opening) -> CameraAlone:
     step_ns = round(1e9 / _positive(options, "rate_hz", _RATE_HZ))
     ticks = times if stamped else [index * step_ns for index in range(len(names))]
     notes = [] if stamped else [f"no time stamps in the names: {1e9 / step_ns:g} Hz assumed; ?rate_hz= gives another"]
-    return CameraAlone(uri, folder, options, ticks, lambda index: decode_picture(paths[index]), notes, names)
+    return CameraAlone(uri, folder, options, ticks, lambda index: read_image(paths[index]), notes, names)
 
 
 class CameraAlone:
@@ -114,9 +114,9 @@ class CameraAlone:
 
     def frame(self, index: int) -> Frame:
         t_ns, notes = self.t_ns(index), list[str]()
-        picture = self._picture(index, t_ns, notes)
-        camera = rig_files.calibration_for(self._camera, picture, notes)
-        return evolve(self._outline(index), picture=picture, camera=camera, notes=tuple(notes))
+        image = self._image(index, t_ns, notes)
+        camera = rig_files.calibration_for(self._camera, image, notes)
+        return evolve(self._outline(index), image=image, camera=camera, notes=tuple(notes))
 
     def outlines(self) -> Iterator[Frame]:
         return (self._outline(index) for index in range(len(self)))
@@ -135,7 +135,7 @@ class CameraAlone:
         ego, gnss = self._own.latest(t_ns, FIX_WITHIN_NS), self._fixes.latest(t_ns, FIX_WITHIN_NS)
         return Frame(index, name, t_ns, camera=self._camera, ego=ego, gnss=gnss)
 
-    def _picture(self, index: int, t_ns: int, notes: list[str]) -> CameraImage | None:
+    def _image(self, index: int, t_ns: int, notes: list[str]) -> CameraImage | None:
         try:
             bgr, encoded = self._read(index)
         except SourceError as error:
@@ -146,12 +146,12 @@ class CameraAlone:
     def _assumed(self, options: dict[str, str], notes: list[str]) -> CameraCalibration | None:
         """A dash cam's calibration for the first readable image."""
         for index in range(len(self)):
-            picture = self._picture(index, 0, [])
-            if picture is not None:
+            image = self._image(index, 0, [])
+            if image is not None:
                 break
         else:
             return None
-        height, width = picture.bgr.shape[:2]
+        height, width = image.bgr.shape[:2]
         if "hfov_deg" in options:
             focal = 0.5 * width / tan(radians(_positive(options, "hfov_deg", 70.0)) / 2.0)
         else:

@@ -48,8 +48,8 @@ def _as_sent(frame: Frame) -> bytes:
     intensity = frame.sweep.points[:, 3] if frame.sweep is not None else np.empty(0)
     if (intensity != intensity[:1]).any():
         return intensity.tobytes()
-    if frame.picture is not None:
-        return frame.picture.encoded or np.ascontiguousarray(frame.picture.bgr).tobytes()
+    if frame.image is not None:
+        return frame.image.encoded or np.ascontiguousarray(frame.image.bgr).tobytes()
     return np.ascontiguousarray(frame.sweep.points).tobytes() if frame.sweep is not None else b""
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.formats.file_reading import picture_of, picture_size, read_bytes, recording_folder
+from pipeline.formats.file_reading import image_of, image_size, read_bytes, recording_folder
 from pipeline.formats.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
 from pipeline.formats.kitti_records import parse_labels, parse_oxts
 from pipeline.sources.hdl64_rings import (
@@ -53,7 +53,7 @@ class KittiSource:
         if not self._names:
             raise SourceError(f"{path}: not a KITTI recording: {_what_it_holds(folder)}")
         # object calibration files do not say how large the images are
-        self._size = picture_size(self._files.pictures.values()) or _NOMINAL_SIZE
+        self._size = image_size(self._files.images.values()) or _NOMINAL_SIZE
         self._calibration = self._first_calibration(path)
         self._ticks = _ticks(self._names, self._files)
         self._moved = motion_of(self._files, self._calibration)
@@ -75,9 +75,9 @@ class KittiSource:
         calibration = self._calibration_of(name, notes)
         sweep = self._sweep(name, tick, notes)
         stamp = _stamp(self._files.camera_stamps, name)
-        picture = picture_of(self._files.pictures.get(name), stamp, self._size, notes)
+        image = image_of(self._files.images.get(name), stamp, self._size, notes)
         ego, gnss = self._own_motion(name, tick, notes)
-        return Frame(index, name, tick, sweep, picture, calibration.camera, ego, notes=tuple(notes), gnss=gnss)
+        return Frame(index, name, tick, sweep, image, calibration.camera, ego, notes=tuple(notes), gnss=gnss)
 
     def outlines(self) -> Iterator[Frame]:
         return (self._outline(index) for index in range(len(self)))

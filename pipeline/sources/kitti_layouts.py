@@ -20,7 +20,7 @@ from pipeline.formats.kitti_records import parse_timestamps
 from pipeline.types import F64, EgoState
 from pipeline.types.source import SourceError
 
-_PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
+_IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _BEGIN_NS = 1_000_000_000
 """Odometry sequences count seconds from 0, which elsewhere means that there is no stamp."""
 
@@ -29,7 +29,7 @@ _BEGIN_NS = 1_000_000_000
 class Files:
     """Where a recording keeps what; files by frame name, stamps by frame number."""
 
-    pictures: dict[str, Path]
+    images: dict[str, Path]
     """Images by frame name."""
     sweeps: dict[str, Path]
     """Point clouds by frame name."""
@@ -53,7 +53,7 @@ class Files:
     @property
     def names(self) -> list[str]:
         """Of every frame, in order."""
-        return in_order(self.sweeps.keys() | self.pictures.keys())
+        return in_order(self.sweeps.keys() | self.images.keys())
 
 
 def files_of(folder: Path) -> Files:
@@ -67,7 +67,7 @@ def _raw(folder: Path) -> Files:
     names = ("calib_cam_to_cam.txt", "calib_velo_to_cam.txt")
     home = folder.resolve().parent if not (folder / names[0]).exists() else folder
     return Files(
-        pictures=files_by_name(folder / "image_02" / "data", _PICTURE_SUFFIXES),
+        images=files_by_name(folder / "image_02" / "data", _IMAGE_SUFFIXES),
         sweeps=files_by_name(folder / "velodyne_points" / "data", (".bin",)),
         oxts=files_by_name(folder / "oxts" / "data", (".txt",)),
         raw_calibration=(home / names[0], home / names[1]),
@@ -77,9 +77,9 @@ def _raw(folder: Path) -> Files:
 
 
 def _object(folder: Path) -> Files:
-    pictures = files_by_name(folder / "image_02", _PICTURE_SUFFIXES)
+    images = files_by_name(folder / "image_02", _IMAGE_SUFFIXES)
     return Files(
-        pictures=pictures or files_by_name(folder / "image_2", _PICTURE_SUFFIXES),
+        images=images or files_by_name(folder / "image_2", _IMAGE_SUFFIXES),
         sweeps=files_by_name(folder / "velodyne", (".bin",)),
         labels=files_by_name(folder / "label_2", (".txt",)),
         calibrations=files_by_name(folder / "calib", (".txt",)),
@@ -90,7 +90,7 @@ def _sequence(folder: Path) -> Files:
     home = folder.resolve()
     poses = [home / "poses.txt", home.parent.parent / "poses" / f"{home.name}.txt"]
     return Files(
-        pictures=files_by_name(folder / "image_2", _PICTURE_SUFFIXES),
+        images=files_by_name(folder / "image_2", _IMAGE_SUFFIXES),
         sweeps=files_by_name(folder / "velodyne", (".bin",)),
         lidar_stamps=_read_seconds(folder / "times.txt"),
         sequence_calibration=folder / "calib.txt",

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.formats.file_reading import files_by_name, picture_of, picture_size, read_bytes, recording_folder
+from pipeline.formats.file_reading import files_by_name, image_of, image_size, read_bytes, recording_folder
 from pipeline.formats.pcd_file import parse_pcd
 from pipeline.formats.point_cloud_fields import cloud_of
 from pipeline.sources import rig as rig_files
@@ -21,8 +21,8 @@ from pipeline.types import Frame, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
 _STEP_NS = 100_000_000
-_PICTURES = ("", "images", "image", "camera", "image_02")
-_PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
+_IMAGES = ("", "images", "image", "camera", "image_02")
+_IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _CLOUDS = ("", "pcd", "lidar", "velodyne", "points")
 _NUMBER = re.compile(r"^\d+(\.\d+)?$")
 _EPOCH_S = 631_152_000  # 1990: smaller numbers count frames
@@ -45,10 +45,8 @@ class PcdSource:
         if not self._sweeps:
             raise SourceError(f"{path}: no PCD files in it")
         self._names = list(self._sweeps)
-        self._pictures = next(
-            (found for name in _PICTURES if (found := files_by_name(folder / name, _PICTURE_SUFFIXES))), {}
-        )
-        self._size = picture_size(self._pictures.values()) or (0, 0)
+        self._images = next((found for name in _IMAGES if (found := files_by_name(folder / name, _IMAGE_SUFFIXES))), {})
+        self._size = image_size(self._images.values()) or (0, 0)
         rig = _rig(folder, options)
         self.T_ego_lidar, self._camera = rig.lidar.mount.T_ego_sensor(), rig.camera_calibration()
         stamps = [_stamp_ns(name) for name in self._names]
@@ -70,13 +68,13 @@ class PcdSource:
     def frame(self, index: int) -> Frame:
         t_ns, name, notes = self.t_ns(index), self._names[index], list[str]()
         sweep = self._sweep(name, t_ns, notes)
-        picture = picture_of(self._pictures.get(name), None, self._size, notes) if self._pictures else None
-        camera = rig_files.calibration_for(self._camera, picture, notes)
-        return Frame(index, name, t_ns, sweep, picture, camera, notes=tuple(notes))
+        image = image_of(self._images.get(name), None, self._size, notes) if self._images else None
+        camera = rig_files.calibration_for(self._camera, image, notes)
+        return Frame(index, name, t_ns, sweep, image, camera, notes=tuple(notes))
 
     def outlines(self) -> Iterator[Frame]:
         """A camera's images are of one size: the first one tells whether the calibration is theirs."""
-        first = picture_of(next(iter(self._pictures.values()), None), None, self._size, []) if self._pictures else None
+        first = image_of(next(iter(self._images.values()), None), None, self._size, []) if self._images else None
         camera = rig_files.calibration_for(self._camera, first, [])
         return (Frame(index, name, self.t_ns(index), camera=camera) for index, name in enumerate(self._names))
 
@@ -98,7 +96,7 @@ class PcdSource:
 
     def _about(self) -> tuple[str, ...]:
         notes = [] if self._has_times else ["no time stamps in the file names: 10 Hz assumed"]
-        if self._pictures and self._camera is None:
+        if self._images and self._camera is None:
             notes.append("the camera has no calibration: LiDAR and camera are not fused")
         return (*notes, "no ego speed recorded")
 

@@ -67,12 +67,12 @@ def load_rig(path: Path) -> Rig:
 
 
 def calibration_for(
-    camera: CameraCalibration | None, picture: CameraImage | None, notes: list[str]
+    camera: CameraCalibration | None, image: CameraImage | None, notes: list[str]
 ) -> CameraCalibration | None:
     """The calibration, if it is of the image's size; else None, and ``notes`` says so."""
-    if camera is None or picture is None:
+    if camera is None or image is None:
         return camera
-    height, width = picture.bgr.shape[:2]
+    height, width = image.bgr.shape[:2]
     if (width, height) == (camera.width, camera.height):
         return camera
     notes.append(

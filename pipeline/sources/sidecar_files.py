@@ -22,7 +22,7 @@ from pipeline.types.source import SourceError
 
 OPTIONS = ("video", "video_offset_s", "nmea", "rig")
 NMEA_SUFFIXES = (".nmea", ".nma", ".ubx.txt")
-_PICTURE_WITHIN_NS = 100_000_000
+_IMAGE_WITHIN_NS = 100_000_000
 FIX_WITHIN_NS = 1_500_000_000
 _LONGEST_LINE = 1024
 
@@ -65,15 +65,15 @@ class Beside:
 
     def frame(self, index: int, t_ns: int, sweep: Sweep | None, notes: list[str]) -> Frame:
         """The frame at ``t_ns``: with the nearest image within 0.1 s and the last fix within 1.5 s."""
-        picture = self._picture(t_ns, notes)
-        camera = rig_files.calibration_for(self._camera, picture, notes)
+        image = self._image(t_ns, notes)
+        camera = rig_files.calibration_for(self._camera, image, notes)
         outline = self._outline(index, t_ns, camera)
-        return evolve(outline, sweep=sweep, picture=picture, notes=tuple(notes))
+        return evolve(outline, sweep=sweep, image=image, notes=tuple(notes))
 
     def outlines(self, times_ns: Sequence[int]) -> Iterator[Frame]:
         """As ``frame`` without sweep and image, one for each of these times. A video's images are of one size: the
         first one tells whether the calibration is theirs."""
-        first = self._picture(self._video_begins_ns, []) if self._video is not None else None
+        first = self._image(self._video_begins_ns, []) if self._video is not None else None
         camera = rig_files.calibration_for(self._camera, first, [])
         return (self._outline(index, t_ns, camera) for index, t_ns in enumerate(times_ns))
 
@@ -84,15 +84,15 @@ class Beside:
     def _ego(self, t_ns: int) -> EgoState | None:
         return self._own.latest(t_ns, FIX_WITHIN_NS)
 
-    def _picture(self, t_ns: int, notes: list[str]) -> CameraImage | None:
+    def _image(self, t_ns: int, notes: list[str]) -> CameraImage | None:
         if self._video is None:
             return None
-        index = nearest(self._video.times_ns, t_ns - self._video_begins_ns, _PICTURE_WITHIN_NS)
+        index = nearest(self._video.times_ns, t_ns - self._video_begins_ns, _IMAGE_WITHIN_NS)
         if index is None:
             notes.append("no image within 0.1 s")
             return None
         try:
-            bgr = self._video.picture(index)
+            bgr = self._video.image(index)
         except SourceError as error:
             notes.append(str(error))
             return None

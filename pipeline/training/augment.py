@@ -13,15 +13,15 @@ _NEAREST_SCALE, _FARTHEST_SCALE = 1.35, 0.75
 _AIMED = 0.75
 
 
-def view(rng: np.random.Generator, picture: U8, rows: F32, size: Size) -> tuple[U8, F32]:
+def view(rng: np.random.Generator, image: U8, rows: F32, size: Size) -> tuple[U8, F32]:
     """A window of (height, width) of an image and its label rows (``dataset.COLUMNS``), boxes and visible shares cut
     to the window. A vertical shift simulates a pitching car, a scale another distance."""
     scale = float(rng.uniform(_FARTHEST_SCALE, _NEAREST_SCALE))
-    left, top = _corner(rng, picture, rows, size, scale)
+    left, top = _corner(rng, image, rows, size, scale)
     to_window = np.array([[scale, 0.0, -left], [0.0, scale, -top]])
     border = (PADDING, PADDING, PADDING)
     shrink = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR
-    window = cv2.warpAffine(picture, to_window, size[::-1], flags=shrink, borderValue=border)
+    window = cv2.warpAffine(image, to_window, size[::-1], flags=shrink, borderValue=border)
     cut = rows.copy()
     cut[:, 2:6] = cut[:, 2:6] * scale - np.array([left, top, left, top], dtype=np.float32)
     whole = (cut[:, 4] - cut[:, 2]) * (cut[:, 5] - cut[:, 3])
@@ -35,9 +35,9 @@ def view(rng: np.random.Generator, picture: U8, rows: F32, size: Size) -> tuple[
     return other_light(rng, np.ascontiguousarray(window)), cut
 
 
-def _corner(rng: np.random.Generator, picture: U8, rows: F32, size: Size, scale: float) -> tuple[float, float]:
+def _corner(rng: np.random.Generator, image: U8, rows: F32, size: Size, scale: float) -> tuple[float, float]:
     """Upper left corner of the window in the scaled image, mostly such that it contains a vehicle."""
-    free = np.array([picture.shape[1] * scale - size[1], picture.shape[0] * scale - size[0]])
+    free = np.array([image.shape[1] * scale - size[1], image.shape[0] * scale - size[0]])
     if len(rows) and rng.random() < _AIMED:
         box = rows[int(rng.integers(len(rows))), 2:6] * scale
         corner = (box[:2] + box[2:]) / 2 - rng.uniform(0.1, 0.9, 2) * (size[1], size[0])
@@ -47,12 +47,12 @@ def _corner(rng: np.random.Generator, picture: U8, rows: F32, size: Size, scale:
     return float(corner[0]), float(corner[1])
 
 
-def other_light(rng: np.random.Generator, picture: U8) -> U8:
+def other_light(rng: np.random.Generator, image: U8) -> U8:
     """Random exposure, white balance and contrast, sometimes blur and noise."""
     gamma, gain = np.exp(rng.normal(0.0, 0.25)), np.exp(rng.normal(0.0, 0.2, 3) * 0.4 + rng.normal(0.0, 0.25))
     levels = (np.arange(256)[:, None] / 255.0) ** gamma * gain * 255.0 + rng.normal(0.0, 8.0)
     table = np.clip(levels, 0, 255).astype(np.uint8).reshape(1, 256, 3)
-    lit = cv2.LUT(picture, table)
+    lit = cv2.LUT(image, table)
     if rng.random() < 0.25:
         lit = cv2.GaussianBlur(lit, (0, 0), float(rng.uniform(0.3, 0.9)))
     if rng.random() < 0.4:

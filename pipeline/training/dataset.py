@@ -28,7 +28,7 @@ def write(folder: Path, count: int, seed: int) -> None:
     camera = calibration()
     rows = []
     for number, moment in enumerate(moments(seed, count)):
-        small = cv2.resize(moment.picture, None, fx=SCALE, fy=SCALE, interpolation=cv2.INTER_LINEAR)
+        small = cv2.resize(moment.image, None, fx=SCALE, fy=SCALE, interpolation=cv2.INTER_LINEAR)
         cv2.imwrite(str(folder / f"{number:06d}.jpg"), small, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
         for label in labels(moment.world, camera):
             box = [edge * SCALE for edge in label.box]

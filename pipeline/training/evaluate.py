@@ -77,13 +77,13 @@ class Bin:
         return float(np.mean(np.abs(self.height_errors))) if self.height_errors else 0.0
 
 
-def evaluate(detector: Detector, pictures: Iterable[DrawnScene], params: DetectionParams | None = None) -> list[Bin]:
+def evaluate(detector: Detector, images: Iterable[DrawnScene], params: DetectionParams | None = None) -> list[Bin]:
     """One bin for each pair of ``EDGES_M``. A lead is the nearest vehicle straight ahead. A false positive has no
     distance; it counts at the distance of a car with its box height."""
     camera = calibration()
     bins = [Bin() for _ in EDGES_M[1:]]
-    for moment in pictures:
-        detections = select(detector.detect(moment.picture), params or DetectionParams())
+    for moment in images:
+        detections = select(detector.detect(moment.image), params or DetectionParams())
         _count(labels(moment.world, camera), detections, float(camera.K[1, 1]), bins)
     return bins
 

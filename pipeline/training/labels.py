@@ -101,8 +101,8 @@ def _inside(outline: F64, camera: CameraCalibration) -> F64:
     if len(outline) < 3:
         return np.empty((0, 2))
     w, h = camera.width, camera.height
-    picture = np.array([[0, 0], [w, 0], [w, h], [0, h]], dtype=np.float32)
-    area, common = cv2.intersectConvexConvex(outline.astype(np.float32), picture)
+    image = np.array([[0, 0], [w, 0], [w, h], [0, h]], dtype=np.float32)
+    area, common = cv2.intersectConvexConvex(outline.astype(np.float32), image)
     if area <= 0.0 or np.ptp(common[:, 0], axis=0).min() < 1.0:
         return np.empty((0, 2))
     return np.asarray(common[:, 0], dtype=np.float64)

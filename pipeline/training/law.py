@@ -44,11 +44,11 @@ class SeenPair(Pair):
     """The kind of vehicle, which may differ from the label: a van is a "car"."""
 
 
-def pairs(detector: Detector, pictures: Iterable[DrawnScene]) -> Iterator[SeenPair]:
+def pairs(detector: Detector, images: Iterable[DrawnScene]) -> Iterator[SeenPair]:
     """Every box of a whole, unoccluded vehicle, with the true depth of its nearest point."""
     camera = calibration()
-    for number, moment in enumerate(pictures):
-        detections = select(detector.detect(moment.picture), DetectionParams())
+    for number, moment in enumerate(images):
+        detections = select(detector.detect(moment.image), DetectionParams())
         truth = labels(moment.world, camera)
         if not detections or not truth:
             continue
@@ -92,7 +92,7 @@ def errors(found: Iterable[SeenPair], law: DistanceLaw) -> list[tuple[int, float
     return rows
 
 
-def _scenario_pictures() -> Iterator[DrawnScene]:
+def _scenario_images() -> Iterator[DrawnScene]:
     return itertools.chain.from_iterable(drive(name, 1.0) for name in names())
 
 
@@ -116,7 +116,7 @@ def main() -> None:
     print(law)
     judged = {
         "random traffic": [pair for seed in JUDGE_SEEDS for pair in pairs(detector, moments(seed, _JUDGE_COUNT))],
-        "built-in scenarios": list(pairs(detector, _scenario_pictures())),
+        "built-in scenarios": list(pairs(detector, _scenario_images())),
     }
     rows = {title: _rows(found, law) for title, found in judged.items()}
     for title, lines in rows.items():

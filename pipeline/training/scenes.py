@@ -37,7 +37,7 @@ BodyModels = dict[str, list[BodySize]]
 class DrawnScene:
     """A drawn image and its truth."""
 
-    picture: U8
+    image: U8
     """(720, 1280, 3) uint8 blue green red."""
     world: world_state.World
     """What it shows."""
@@ -60,7 +60,7 @@ def moments(
             now = _turned(rng, now)
         now = without_collisions(now)
         if wanted(now):
-            yield DrawnScene(camera.picture(now), now)
+            yield DrawnScene(camera.image(now), now)
 
 
 def without_collisions(now: world_state.World) -> world_state.World:
@@ -189,4 +189,4 @@ def drive(name: str, step_s: float) -> Iterator[DrawnScene]:
     camera = DrawnCamera(scenario.road, Roadside.build(scenario.road, scenario.seed, 0.0, end_m), scenario.seed)
     for t_s in np.arange(0.0, scenario.duration_s, step_s).tolist():
         now = world_state.at(scenario, t_s)
-        yield DrawnScene(camera.picture(now), now)
+        yield DrawnScene(camera.image(now), now)

@@ -53,8 +53,8 @@ class Examples:
             windows.append(window)
             labels.append(targets.labels)
             boxes.append(targets.boxes)
-        pictures = torch.from_numpy(np.stack(windows)).permute(0, 3, 1, 2).float()
-        return pictures, torch.from_numpy(np.stack(labels)), torch.from_numpy(np.stack(boxes))
+        images = torch.from_numpy(np.stack(windows)).permute(0, 3, 1, 2).float()
+        return images, torch.from_numpy(np.stack(labels)), torch.from_numpy(np.stack(boxes))
 
     def _one(self, size: Size) -> tuple[np.ndarray, F32]:
         if not self._order:
@@ -93,9 +93,9 @@ def train(
         for group in optimiser.param_groups:
             group["lr"] = rate * min(1.0, (step + 1) / _WARM_UP_STEPS) * (0.02 + 0.49 * (1 + math.cos(math.pi * done)))
         size, count = _WINDOWS[0 if examples.rng.random() < _SMALL_SHARE else 1]
-        pictures, labels, boxes = examples.batch(size, count)
+        images, labels, boxes = examples.batch(size, count)
         with torch.autocast("cpu", torch.bfloat16, enabled=bf16):
-            logits = network(pictures)
+            logits = network(images)
         found = losses(logits.float(), labels, boxes, size)
         optimiser.zero_grad(set_to_none=True)
         found.total.backward()

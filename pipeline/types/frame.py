@@ -191,12 +191,12 @@ class Frame:
     index: int
     """Its number in the recording, from 0; of live sensors the number of the tick, dropped ones included."""
     name: str
-    """The recording's own name of the frame."""
+    """The frame's name in the recording."""
     t_ns: int
     """The tick."""
     sweep: Sweep | None = None
     """The LiDAR's rotation."""
-    picture: CameraImage | None = None
+    image: CameraImage | None = None
     """The camera's image."""
     camera: CameraCalibration | None = None
     """The camera's calibration; known without an image too."""
@@ -220,8 +220,8 @@ class Frame:
     """The recording holds what was seen in the image, so no detector looks at it."""
 
     @property
-    def picture_size(self) -> tuple[int, int] | None:
+    def image_size(self) -> tuple[int, int] | None:
         """(width, height) of the image, or of the calibration where the image itself is missing."""
-        if self.picture is not None:
-            return self.picture.bgr.shape[1], self.picture.bgr.shape[0]
+        if self.image is not None:
+            return self.image.bgr.shape[1], self.image.bgr.shape[0]
         return (self.camera.width, self.camera.height) if self.camera is not None else None

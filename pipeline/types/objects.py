@@ -178,13 +178,13 @@ class FusedObject:
     """
 
     id: int
-    """The same from frame to frame, whichever sensors see the object."""
+    """Id of the object, stable from frame to frame, whichever sensors see the object."""
     source: ObjectSource
     """Which sensors' tracks it is made of."""
     label: str | None
     """Its class, by the camera; None for what only the LiDAR has."""
     score: float | None
-    """The detector's score of that class, 0–1."""
+    """The detector's score for that class, 0–1."""
     bbox: Box | None
     """Its image box, pixels; None outside the image."""
     bev: tuple[Point2, Point2, Point2, Point2] | None
@@ -271,7 +271,7 @@ class FusedObject:
         return is_ranging_in(self.source)
 
     @property
-    def pictured(self) -> bool:
+    def imaged(self) -> bool:
         """The camera follows it, so that its class is known."""
         return is_camera_in(self.source)
 

@@ -119,13 +119,13 @@ class SensorHealth:
         def age_ms(t_ns: int | None) -> float | None:
             return None if t_ns is None else (frame.t_ns - t_ns) / 1e6
 
-        sweep, picture = frame.sweep, frame.picture
-        picture_ns = picture.t_ns if picture is not None else None
+        sweep, image = frame.sweep, frame.image
+        image_ns = image.t_ns if image is not None else None
         return SensorHealth(
             lidar_age_ms=age_ms(sweep.t_ns if sweep is not None else None),
             lidar_points=len(sweep.points) if sweep is not None else None,
-            camera_age_ms=age_ms(picture_ns),
-            camera_skew_ms=(picture_ns - sweep.t_ns) / 1e6 if picture_ns is not None and sweep is not None else None,
+            camera_age_ms=age_ms(image_ns),
+            camera_skew_ms=(image_ns - sweep.t_ns) / 1e6 if image_ns is not None and sweep is not None else None,
             ego_age_ms=age_ms(frame.ego.t_ns if frame.ego is not None else None),
             far_view=frame.raw_boxes.far if frame.raw_boxes is not None else None,
         )
@@ -169,7 +169,7 @@ class Result:
     docs/reference/results.md says."""
 
     frame: str
-    """The recording's own name of the frame."""
+    """The frame's name in the recording."""
     t_ns: int
     """The tick."""
     sensors: SensorHealth

@@ -28,13 +28,13 @@ class TruthObject:
     cuboid: Cuboid
     """In the ego frame."""
     id: int | None = None
-    """The same from frame to frame; None where the labels follow no identity over time."""
+    """Id of the object, stable from frame to frame; None where the labels follow no identity over time."""
     bbox: Box | None = None
     """Pixels of the raw image; None where the labels have no box."""
     called: str = ""
     """The labels' own word for the class where it differs from ``label``, so that it can be written again."""
     truncation: float | None = None
-    """The share of it outside the picture, 0–1; None where the labels do not say it."""
+    """The share of it outside the image, 0–1; None where the labels do not say it."""
     occlusion: int | None = None
     """0 visible, 1 partly, 2 largely hidden; None where the labels do not say it."""
 
@@ -83,7 +83,7 @@ class Tap(Protocol):
         ...
 
     def sweep(self, sweep: Sweep, arrived_ns: int) -> object: ...
-    def picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> object: ...
+    def image(self, shot: Shot, t_ns: int, arrived_ns: int) -> object: ...
     def ego(self, ego: EgoState, arrived_ns: int) -> object: ...
     def fix(self, fix: GnssFix, arrived_ns: int) -> object: ...
 

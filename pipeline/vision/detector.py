@@ -18,11 +18,11 @@ import onnxruntime as ort
 from pipeline.common.data_dir import file_sha256
 from pipeline.inference import model_registry
 from pipeline.inference.distance_laws import find_law
-from pipeline.inference.graph import MULTIPLE, Size, fitting_size, input_size, with_input_size, with_unit_picture
+from pipeline.inference.graph import MULTIPLE, Size, fitting_size, input_size, with_input_size, with_unit_image
 from pipeline.inference.runtime import (
     DetectorError,
     DetectorMissing,
-    check_picture,
+    check_image,
     find_graph,
     open_session,
     read_graph,
@@ -77,7 +77,7 @@ class Detector:
 
         DetectorError for an array that is no such image or a network that fails on it.
         """
-        check_picture(bgr)
+        check_image(bgr)
         return self.decode(run_session(self._session, self.blob(bgr)), (bgr.shape[0], bgr.shape[1]))
 
     def blob(self, bgr: U8) -> F32:
@@ -89,12 +89,12 @@ class Detector:
         blob = cv2.dnn.blobFromImage(filled, scalefactor=self._decoder.scale, swapRB=self._decoder.rgb)
         return np.asarray(blob, dtype=np.float32)
 
-    def decode(self, outputs: Sequence[F32], picture: Size) -> RawBoxes:
+    def decode(self, outputs: Sequence[F32], image: Size) -> RawBoxes:
         """The network's raw outputs for an image of (height, width) as boxes in that image's pixels."""
         boxes, scores, classes = self._decoder.decode(outputs, self.input_size, FLOOR_SCORE)
-        height, width = picture
+        height, width = image
         edges = np.array([width, height, width, height], np.float32)
-        boxes = np.clip(boxes / np.float32(_scale(picture, self.input_size)), 0.0, edges)
+        boxes = np.clip(boxes / np.float32(_scale(image, self.input_size)), 0.0, edges)
         keep = (boxes[:, 2] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 1]) & (classes >= 0) & (classes < len(self.labels))
         best_first = np.flatnonzero(keep)[np.argsort(-scores[keep], kind="stable")]
         labels = tuple(self.labels[index] for index in classes[best_first])
@@ -103,20 +103,20 @@ class Detector:
 
 def open_detector(
     spec: str | None,
-    picture_size: tuple[int, int] | None,
+    image_size: tuple[int, int] | None,
     threads: int = 2,
     input_size: Size | None = None,
 ) -> Detector:
     """Load a network by name or path. Without one the default (``pipeline.inference.model_registry``), with a note when
     that is the embedded network.
 
-    picture_size (width, height): the input is given the image's aspect where the graph permits. input_size (height,
+    image_size (width, height): the input is given the image's aspect where the graph permits. input_size (height,
     width), multiples of 32: that size instead, or DetectorError. DetectorMissing when there is no file, DetectorError
     when the file is no YOLO network that can be run.
     """
     path = _locate(spec)
     notes = (_SIMULATED_ONLY,) if spec is None and path == model_registry.find(model_registry.EMBEDDED) else ()
-    model = with_unit_picture(read_graph(path))
+    model = with_unit_image(read_graph(path))
     own = _own_size(model, path)
     if input_size is not None:
         if min(input_size) < MULTIPLE or any(side % MULTIPLE for side in input_size):
@@ -124,7 +124,7 @@ def open_detector(
                 f"input width and height must be multiples of {MULTIPLE}, not {input_size[1]}×{input_size[0]}"
             )
         return _at_size(model, path, own, input_size, threads, notes)
-    wanted = fitting_size(picture_size, own) if picture_size else own or _FREE_SIZE
+    wanted = fitting_size(image_size, own) if image_size else own or _FREE_SIZE
     try:
         return _at_size(model, path, own, wanted, threads, notes)
     except DetectorError as error:
@@ -194,6 +194,6 @@ def _name_of(law: DistanceLaw | None) -> str:
     return f"-law{hashlib.sha256(repr(law).encode()).hexdigest()[:8]}" if law is not None else ""
 
 
-def _scale(picture: Size, size: Size) -> float:
+def _scale(image: Size, size: Size) -> float:
     """Input pixels per image pixel, both (height, width)."""
-    return min(size[0] / picture[0], size[1] / picture[1])
+    return min(size[0] / image[0], size[1] / image[1])

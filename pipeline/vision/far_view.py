@@ -104,10 +104,10 @@ class FarLook:
         )
 
 
-def open_far_view(detector: Detector, picture_size: tuple[int, int], size_px: int = WINDOW_PX) -> FarView | None:
+def open_far_view(detector: Detector, image_size: tuple[int, int], size_px: int = WINDOW_PX) -> FarView | None:
     """The far view by the same network as ``detector`` in images of (width, height). None where the whole image
     already reaches the network at nearly its own resolution."""
-    width, height = picture_size
+    width, height = image_size
     if min(detector.input_size[0] / height, detector.input_size[1] / width) >= _WORTH_IT:
         return None
     sides = tuple(-(-min(size_px, side) // MULTIPLE) * MULTIPLE for side in (height, width))
@@ -118,10 +118,10 @@ def open_far_view(detector: Detector, picture_size: tuple[int, int], size_px: in
     return FarView(native, size_px)
 
 
-def window_of(frame: Frame | None, picture_size: tuple[int, int], size_px: int = WINDOW_PX) -> PixelWindow:
+def window_of(frame: Frame | None, image_size: tuple[int, int], size_px: int = WINDOW_PX) -> PixelWindow:
     """The window in an image of (width, height): around the vanishing point of the way ahead, inside the image. The
     image's middle where the camera is not known."""
-    width, height = picture_size
+    width, height = image_size
     u, v = width / 2, height / 2
     camera = frame.camera if frame is not None else None
     if camera is not None:
@@ -143,10 +143,10 @@ def _bend_bearing(frame: Frame | None) -> float:
     return float(np.clip(ego.yaw_rate_radps / ego.speed_mps * LOOK_AHEAD_M / 2, -0.5, 0.5))
 
 
-def _is_whole(boxes: F32, window: PixelWindow, picture_size: tuple[int, int]) -> Mask:
+def _is_whole(boxes: F32, window: PixelWindow, image_size: tuple[int, int]) -> Mask:
     """(M,) whether the window shows all of each box that the image shows."""
     x1, y1, x2, y2 = window
-    width, height = picture_size
+    width, height = image_size
     low = (np.array([x1, y1]) > 0) & (boxes[:, :2] < np.array([x1, y1]) + _CUT_PX)
     high = (np.array([x2, y2]) < np.array([width, height])) & (boxes[:, 2:] > np.array([x2, y2]) - _CUT_PX)
     return np.logical_not((low | high).any(axis=1))

@@ -4,7 +4,7 @@
  */
 import { color } from "../js/core/colors.js";
 import { $ } from "../js/core/dom.js";
-import { isPictured } from "../js/core/object_sources.js";
+import { isImaged } from "../js/core/object_sources.js";
 import { drawOutline, drawPath } from "../js/views/drawing/plan.js";
 import { get, paint } from "../js/core/store.js";
 import { Surface } from "../js/views/drawing/surface.js";
@@ -42,7 +42,7 @@ function draw() {
     drawPath(ctx, view, result.path);
     const important = (/** @type {number} */ id) => id === lead || id === acted;
     for (const item of [...result.objects].sort((a, b) => Number(important(a.id)) - Number(important(b.id)))) {
-      if (!item.bev || !(important(item.id) || isPictured(item) || item.in_path)) continue;
+      if (!item.bev || !(important(item.id) || isImaged(item) || item.in_path)) continue;
       const tint =
         item.id === acted && isAlarmed(result)
           ? ALARM

@@ -1,10 +1,10 @@
 /** The camera image with the ego path, the lead and whatever else ACC reacts to. */
-import { showPictureAt } from "../js/core/connection.js";
-import { onPicture, ui } from "../js/core/colors.js";
+import { showImageAt } from "../js/core/connection.js";
+import { onImage, ui } from "../js/core/colors.js";
 import { $, text } from "../js/core/dom.js";
 import { num } from "../js/core/format.js";
-import { isPictured } from "../js/core/object_sources.js";
-import { drawBox, drawPath } from "../js/views/drawing/picture.js";
+import { isImaged } from "../js/core/object_sources.js";
+import { drawBox, drawPath } from "../js/views/drawing/image.js";
 import { get, on, paint } from "../js/core/store.js";
 import { Surface } from "../js/views/drawing/surface.js";
 import { isAlarmed, reactsTo } from "./acc.js";
@@ -20,7 +20,7 @@ let surface;
 
 export function setUp() {
   surface = new Surface(canvas, paint(["frame", "theme"], draw));
-  showPictureAt(canvas.clientWidth * devicePixelRatio);
+  showImageAt(canvas.clientWidth * devicePixelRatio);
   on(["frame", "state"], say);
 }
 
@@ -34,8 +34,8 @@ function draw() {
   const ctx = surface.begin(),
     frame = get("frame");
   if (!frame) return;
-  if (!frame.picture || !frame.bitmap) return sayNoPicture(ctx);
-  const { width, height } = frame.picture;
+  if (!frame.image || !frame.bitmap) return sayNoImage(ctx);
+  const { width, height } = frame.image;
   // fill the pane; only the sides are cropped, where no lead can be
   const scale = Math.max(
     Math.min(surface.width / width, surface.height / height),
@@ -45,7 +45,7 @@ function draw() {
     top = (surface.height - height * scale) / 2;
   const X = (/** @type {number} */ u) => left + u * scale,
     Y = (/** @type {number} */ v) => top + v * scale;
-  showPictureAt(width * scale * surface.ratio);
+  showImageAt(width * scale * surface.ratio);
   ctx.globalAlpha = Number(ui("light"));
   ctx.drawImage(frame.bitmap, left, top, width * scale, height * scale);
   ctx.globalAlpha = 1;
@@ -59,7 +59,7 @@ function draw() {
 }
 
 /** @param {CanvasRenderingContext2D} ctx */
-function sayNoPicture(ctx) {
+function sayNoImage(ctx) {
   ctx.fillStyle = "#9aa4b2";
   ctx.font = "600 20px system-ui, sans-serif";
   ctx.textAlign = "center";
@@ -83,15 +83,15 @@ function drawObjects(ctx, { result, display }, X, Y) {
   const farFirst = [...result.objects].sort((a, b) => (b.distance_m ?? 1e9) - (a.distance_m ?? 1e9));
   for (const item of farFirst) {
     const box = boxOf(item.id);
-    if (!box || important(item.id) || item.carried || !isPictured(item)) continue;
+    if (!box || important(item.id) || item.carried || !isImaged(item)) continue;
     ctx.globalAlpha = 0.55;
-    drawBox(ctx, box, onPicture("fused"), 1.5, X, Y);
+    drawBox(ctx, box, onImage("fused"), 1.5, X, Y);
     ctx.globalAlpha = 1;
   }
   for (const item of farFirst.filter(({ id }) => important(id))) {
     const box = boxOf(item.id);
     if (!box) continue;
-    const tint = item.id === acted && alarmed ? ALARM : item.id === lead ? onPicture("cipv") : onPicture("warning");
+    const tint = item.id === acted && alarmed ? ALARM : item.id === lead ? onImage("cipv") : onImage("warning");
     ctx.setLineDash(item.carried ? [8, 6] : []);
     drawBox(ctx, box, tint, 4, X, Y);
     ctx.setLineDash([]);

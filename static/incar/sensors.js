@@ -30,7 +30,7 @@ function update() {
    * What the frame contains. Ages alone are not enough: a recording may have no timestamps.
    * @type {Record<string, boolean>}
    */
-  const held = { lidar: Boolean(sensors.lidar?.points), camera: frame.picture !== null, ego: ego !== null };
+  const held = { lidar: Boolean(sensors.lidar?.points), camera: frame.image !== null, ego: ego !== null };
   const keys = Object.keys(NAMES).filter((key) => key in held || key in streams);
   keyed(
     list,

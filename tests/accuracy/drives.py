@@ -71,16 +71,16 @@ def drive(
     if not own_motion:
         frames = tuple(replace(frame, ego=None, gnss=None) for frame in frames)
     params = with_changes(preset(preset_name), dict(changes))
-    picture = frames[0].picture
-    assert picture is not None
-    detector = yolox_nano(folder, picture.bgr.shape[1], picture.bgr.shape[0])
+    image = frames[0].image
+    assert image is not None
+    detector = yolox_nano(folder, image.bgr.shape[1], image.bgr.shape[0])
     results, judged = {}, {}
     found = looking.lanes(uri, lanes)
     every = lanes_every or usual_every(found and found.detector, source.rate_hz)
     for frame, result in through(
         frames,
         params,
-        Detectors(detector, found, every, looking.far_view(folder, picture.bgr.shape[1], picture.bgr.shape[0])),
+        Detectors(detector, found, every, looking.far_view(folder, image.bgr.shape[1], image.bgr.shape[0])),
         sensors,
     ):
         results[frame.name] = result

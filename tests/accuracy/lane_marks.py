@@ -3,7 +3,7 @@ eight-fold enlargements to about a pixel. Null where there is a gap, or a reflec
 
 from __future__ import annotations
 
-from tests.accuracy.lane_pictures import Marks
+from tests.accuracy.lane_images import Marks
 
 MARKS: Marks = {
     "solidWhiteCurve": {348: (429.5, 548.6), 381: (386.9, 607.6), 461: (286.6, 750.6)},

@@ -32,7 +32,7 @@ _KINDS: dict[str, VehicleKind] = {
     "bus": "bus",
     "motorcycle": "motorcycle",
 }
-_PICTURE_SIZE = (2048, 618)
+_IMAGE_SIZE = (2048, 618)
 _AROUND_M, _OFF_GROUND_M = 0.2, 0.15
 _FLAT_RINGS, _FIT_M, _FIT_OFF_M = 5, 16.0, (0.6, 0.25, 0.12, 0.12)
 
@@ -64,7 +64,7 @@ def pairs(folder: Path, seed: int = 1) -> Iterator[Pair]:
     """Each labelled frame of an Astyx recording with its simulated twin."""
     source = AstyxSource(f"astyx:{folder}", str(folder))
     calibration = sorted((folder / "calibration").glob("*.json"))[0]
-    T_ego_lidar, _ = parse_calibration(calibration.read_bytes(), calibration.name, _PICTURE_SIZE)
+    T_ego_lidar, _ = parse_calibration(calibration.read_bytes(), calibration.name, _IMAGE_SIZE)
     sensor = Lidar(LidarModel(motion=False), T_ego_lidar)
     for index in range(len(source)):
         frame, truth = source.frame(index), source.truth(index)

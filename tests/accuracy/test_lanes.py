@@ -27,10 +27,10 @@ from pipeline.types import F64, GROUND, U8, Frame, Moment, RawLanes, Result
 from pipeline.types.lane import EgoLane
 from pipeline.vision.detector import open_detector
 from pipeline.warm_up import warm_up
-from tests.accuracy import lane_pictures, lane_truth
+from tests.accuracy import lane_images, lane_truth
 from tests.accuracy.drives import FOLDERS, RULE, SCORED_CLIPS, all_scored, drive
+from tests.accuracy.lane_images import Miss, alone, draw, misses, tiles
 from tests.accuracy.lane_marks import MARKS
-from tests.accuracy.lane_pictures import Miss, alone, draw, misses, tiles
 from tests.conftest import ROOT
 
 BUILD = ROOT / "build" / "lanes"
@@ -61,7 +61,7 @@ def photographs(folder: Path, kind: str) -> tuple[tuple[str, U8, EgoLane | None,
 def _in_shares(miss: Miss, bgr: U8) -> Miss:
     """The miss in shares of the image's width: the photographs are of two sizes."""
     error = None if miss.error_px is None else abs(miss.error_px) / bgr.shape[1]
-    return Miss(miss.picture, miss.row, miss.side, error)
+    return Miss(miss.image, miss.row, miss.side, error)
 
 
 FLOORS = {
@@ -111,10 +111,10 @@ def test_the_lane_is_kept_through_the_video(data_dir: Path, kind: str) -> None:
         assert ok
         looked = kind == "classical" or index % 3 == 0
         raw = detector(data_dir, kind).detect(bgr) if looked else None
-        camera = lane_pictures.guessed_camera(bgr.shape[1], bgr.shape[0])
+        camera = lane_images.guessed_camera(bgr.shape[1], bgr.shape[0])
         aligned = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
         state, lane = follow(
-            state, raw, RoadView(aligned), Moment(0, 0.04 if index else None, None, None), lane_pictures.UNSURE
+            state, raw, RoadView(aligned), Moment(0, 0.04 if index else None, None, None), lane_images.UNSURE
         )
         assert lane is not None
         assert lane.left is not None, index
@@ -212,7 +212,7 @@ def test_the_lead_is_still_right_on_astyx(data_dir: Path, kind: str, every: int 
 
 
 @pytest.mark.parametrize("light", [0.1, 0.03])
-def test_a_dark_picture_ends_in_less_confidence_and_no_wrong_lead(data_dir: Path, light: float) -> None:
+def test_a_dark_image_ends_in_less_confidence_and_no_wrong_lead(data_dir: Path, light: float) -> None:
     """A real drive at night through the whole pipeline: the box network and the classical lanes see next to nothing."""
     source = open_source(f"astyx:{data_dir / 'astyx'}")
     eyes = Detectors(open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (2048, 618)), open_classical(None))
@@ -232,9 +232,9 @@ def test_a_dark_picture_ends_in_less_confidence_and_no_wrong_lead(data_dir: Path
 
 
 def _darker(frame: Frame, light: float) -> Frame:
-    assert frame.picture is not None
-    bgr = (frame.picture.bgr * light).astype(np.uint8)
-    return evolve(frame, picture=evolve(frame.picture, bgr=bgr))
+    assert frame.image is not None
+    bgr = (frame.image.bgr * light).astype(np.uint8)
+    return evolve(frame, image=evolve(frame.image, bgr=bgr))
 
 
 @pytest.mark.parametrize("lanes", ["off", "classical"])
@@ -269,7 +269,7 @@ def test_lines_lie_on_the_simulators_paint(name: str) -> None:
     assert np.percentile(off, 95) < 3.0
 
 
-def test_a_network_that_looks_at_every_third_picture_keeps_the_lane(data_dir: Path) -> None:
+def test_a_network_that_looks_at_every_third_image_keeps_the_lane(data_dir: Path) -> None:
     warm_up()
     found = list(lane_truth.errors("straight", detector(data_dir, "twinlitenet"), range(12), every=3))
     for seen, _, most in lane_truth.summary(found).values():

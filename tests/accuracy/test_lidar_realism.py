@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.accuracy.lidar_picture import draw
+from tests.accuracy.lidar_image import draw
 from tests.accuracy.lidar_realism import BIN_M, CarSeen, Pair, cars_seen, ground_plane, pairs
 from tests.conftest import ROOT
 
 ON_THE_ROAD_M = 8.0
 """Parked cars farther to the side stand behind a hedge that nobody labelled."""
-PICTURED = "000417"
+SHOWN = "000417"
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +105,7 @@ def test_the_ground_plane_is_found(twins: list[Pair]) -> None:
     assert planes[:, 0].std() < 0.1
 
 
-def test_table_and_picture_are_written(twins: list[Pair], cars: list[CarSeen]) -> None:
+def test_table_and_image_are_written(twins: list[Pair], cars: list[CarSeen]) -> None:
     lines = [
         "Medians and quartiles. They agree where the simulated median lies between the real quartiles.",
         "",
@@ -124,10 +124,10 @@ def test_table_and_picture_are_written(twins: list[Pair], cars: list[CarSeen]) -
     build = ROOT / "build"
     build.mkdir(exist_ok=True)
     (build / "lidar_realism.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    picture = draw(next(pair for pair in twins if pair.name == PICTURED), cars)
-    assert picture.shape == (1200, 1280, 3)
-    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 5, "not empty"
-    assert cv2.imwrite(str(build / "lidar_real_and_simulated.png"), picture)
+    image = draw(next(pair for pair in twins if pair.name == SHOWN), cars)
+    assert image.shape == (1200, 1280, 3)
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 5, "not empty"
+    assert cv2.imwrite(str(build / "lidar_real_and_simulated.png"), image)
     print("\n" + "\n".join(lines))
 
 

@@ -64,7 +64,7 @@ def test_it_steps_and_seeks(open_page: OpenPage):
     wait_for_frame(page, 0)
 
 
-def test_a_slider_on_the_paused_frame_changes_picture_and_table_without_the_network(open_page: OpenPage, site: Site):
+def test_a_slider_on_the_paused_frame_changes_image_and_table_without_the_network(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
     whole_drive(page, site)
@@ -120,19 +120,19 @@ def test_a_selected_object_is_explained(open_page: OpenPage, site: Site):
     expect(page.locator("tr.is-selected")).to_have_count(0)
 
 
-def test_a_click_in_the_picture_or_the_plan_selects(open_page: OpenPage, site: Site):
+def test_a_click_in_the_image_or_the_plan_selects(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
     tick = site.engine.snapshot.processed
     assert tick is not None
-    assert tick.frame.picture is not None
+    assert tick.frame.image is not None
     lead = tick.result.cipv
     assert lead is not None
     boxes = tick.result.layers.vision_boxes or tick.result.layers.lidar_boxes
     number, box = min(boxes.items(), key=lambda item: (item[1][2] - item[1][0]) * (item[1][3] - item[1][1]))
     canvas = page.locator("#camera").bounding_box()
     assert canvas is not None
-    height, width = tick.frame.picture.bgr.shape[:2]
+    height, width = tick.frame.image.bgr.shape[:2]
     scale = min(canvas["width"] / width, canvas["height"] / height)
     left, top = (canvas["width"] - width * scale) / 2, (canvas["height"] - height * scale) / 2
     middle = {"x": left + scale * (box[0] + box[2]) / 2, "y": top + scale * (box[1] + box[3]) / 2}

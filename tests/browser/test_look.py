@@ -14,7 +14,7 @@ from tests.browser.looks import pixels, repainted, wait_for_frame, whole_drive
 
 WAIT_S = WAIT_MS / 1e3
 SCREENS = Path(__file__).resolve().parents[2] / "build" / "screens"
-"""Pictures of each view, kept as build output."""
+"""Images of each view, kept as build output."""
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
@@ -58,7 +58,7 @@ def test_fingers_find_their_targets_on_a_tablet(open_page: OpenPage, site: Site,
     site.engine.wait_for(lambda s: s.index != START, WAIT_S)
 
 
-def test_every_view_is_kept_as_a_picture(open_page: OpenPage, site: Site):
+def test_every_view_is_kept_as_an_image(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
     whole_drive(page, site)

@@ -236,11 +236,11 @@ def test_a_change_that_is_taken_back_while_its_figures_are_on_their_way_is_no_co
     expect(page.locator("#timeline-facts")).not_to_contain_text("frames differ")
 
 
-def test_the_cloud_is_dragged_over_the_picture(page: Page, site: Site):
+def test_the_cloud_is_dragged_over_the_image(page: Page, site: Site):
     page.keyboard.press("a")
     expect(page.locator("#align-bar .score")).to_have_text(re.compile(r"\d+ %"))
-    picture = box_of(page.locator("#camera"))
-    x, y = picture["x"] + picture["width"] / 2, picture["y"] + picture["height"] / 2
+    image = box_of(page.locator("#camera"))
+    x, y = image["x"] + image["width"] / 2, image["y"] + image["height"] / 2
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x + 30, y - 20, steps=5)

@@ -36,7 +36,7 @@ def on_plan(page: Page, x_m: float, y_m: float) -> tuple[float, float]:
     ) * per_metre
 
 
-def in_picture(page: Page, u: float, v: float) -> tuple[float, float]:
+def in_image(page: Page, u: float, v: float) -> tuple[float, float]:
     """Where a pixel of the sent image is on the screen."""
     box = box_of(page.locator("#camera"))
     place = page.evaluate("async () => (await import('/js/views/camera.js')).place()")
@@ -90,15 +90,15 @@ def test_the_tape_measures_metres_in_the_plan(open_page: OpenPage):
     assert repainted(page, "#bev", before, like=True), "the plan has not moved"
 
 
-def test_the_tape_holds_on_to_lidar_points_in_the_picture(open_page: OpenPage):
+def test_the_tape_holds_on_to_lidar_points_in_the_image(open_page: OpenPage):
     page = opened(open_page)
     points = of_store(
         page,
         """(() => {
-          const { count, uv, xyz, kind, picture } = get("frame"), found = [];
+          const { count, uv, xyz, kind, image } = get("frame"), found = [];
           for (let i = 0; i < count; i++) {
             const u = uv[2 * i], v = uv[2 * i + 1];
-            const isInside = u > 0.3 * picture.width && u < 0.7 * picture.width && v > 30 && v < picture.height - 60;
+            const isInside = u > 0.3 * image.width && u < 0.7 * image.width && v > 30 && v < image.height - 60;
             if (kind[i] === 2 && isInside) {
               found.push({ u, v, x: xyz[3 * i] / 100, y: xyz[3 * i + 1] / 100, z: xyz[3 * i + 2] / 100 });
             }
@@ -109,7 +109,7 @@ def test_the_tape_holds_on_to_lidar_points_in_the_picture(open_page: OpenPage):
     )
     first, last = points
     page.keyboard.down("Shift")
-    drag(page, in_picture(page, first["u"], first["v"]), in_picture(page, last["u"], last["v"]))
+    drag(page, in_image(page, first["u"], first["v"]), in_image(page, last["u"], last["v"]))
     page.keyboard.up("Shift")
     tape = of_store(page, "get('tape')")
     for end, point in (("from", first), ("to", last)):
@@ -218,11 +218,11 @@ def test_the_plan_shows_all_around_and_ahead_again(open_page: OpenPage):
     assert repainted(page, "#bev", ahead, like=True)
 
 
-def test_no_wider_picture_is_sent_than_is_shown(open_page: OpenPage, site: Site):
+def test_no_wider_image_is_sent_than_is_shown(open_page: OpenPage, site: Site):
     """And a wider one as soon as the pane grows, though nothing plays."""
     page = opened(open_page)
     shown = box_of(page.locator("#camera"))["width"]
-    sent = of_store(page, "get('frame').picture.width")
+    sent = of_store(page, "get('frame').image.width")
     assert sent < shown + WIDTH_STEP_PX, "from the first one on"
     page.locator("[data-grow=camera]").click()
     wide = box_of(page.locator("#camera"))["width"]
@@ -230,8 +230,8 @@ def test_no_wider_picture_is_sent_than_is_shown(open_page: OpenPage, site: Site)
     assert page.evaluate(
         """async (least) => {
           const { get, on } = await import("/js/core/store.js");
-          if (get("frame").picture.width >= least) return true;
-          return new Promise((done) => on(["frame"], () => get("frame").picture.width >= least && done(true)));
+          if (get("frame").image.width >= least) return true;
+          return new Promise((done) => on(["frame"], () => get("frame").image.width >= least && done(true)));
         }""",
         sent + WIDTH_STEP_PX,
     )

@@ -148,7 +148,7 @@ def _cli_lines() -> Iterator[str]:
         "| `CIPV_DATA` | folder with this machine's data sets and networks (`models/`) |",
         "| `CIPV_HOME` | folder for downloaded and registered networks and caches; default: `~/.cache/cipv` |",
         "| `CIPV_FOLDERS` | folders that the page and the API may open files from, separated by `:` |",
-        "| `CIPV_ADDRESSES` | beginnings of addresses in stores that may be opened too where `CIPV_FOLDERS` is set, "
+        "| `CIPV_ADDRESSES` | prefixes of store addresses that may be opened too when `CIPV_FOLDERS` is set, "
         "separated by spaces |",
         "| `CIPV_LABELS_URL` | label database; `--labels` and `--database` override it |",
         "| `CIPV_TOKEN`, `CIPV_DISPLAY_TOKEN` | tokens for the links that other machines use, at least 16 characters |",

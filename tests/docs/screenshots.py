@@ -16,7 +16,7 @@ from app.engine.session_recording import SessionRecorder
 from app.labels.service.desk import LabelDesk
 from app.labels.store.database import Database
 from pipeline.detection import detector_for, lanes_for
-from pipeline.params import Params
+from pipeline.params import Params, with_changes
 from pipeline.sources import open_source
 from pipeline.vision.far_view import WINDOW_PX
 from tests.browser.conftest import Site
@@ -50,10 +50,10 @@ def main() -> None:
         site.engine.control.set_params(Params(), "default")
 
         page = opened(browser, site)
-        page.keyboard.press("a")
-        expect(page.locator("#align-bar .score")).to_have_text(re.compile(r"\d+ %"))
+        aligned(page, site)
         save(page, "align")
         page.close()
+        site.engine.control.set_params(Params(), "default")
 
         page = opened(browser, site)
         labeled(page)
@@ -120,6 +120,23 @@ def what_if(page: Page) -> None:
     expect(page.locator(".timeline-pane")).to_have_attribute("aria-busy", "false")
     page.get_by_role("tab", name="Runs").click()
     expect(page.locator(".metrics tbody tr")).not_to_have_count(0)
+    painted(page)
+
+
+def aligned(page: Page, site: Site) -> None:
+    """Alignment mode with two saved alignments; the first is a little off."""
+    page.keyboard.press("a")
+    versions = page.get_by_role("region", name="Saved alignments")
+    page.get_by_role("button", name="Versions").click()
+    for count, (yaw_deg, note) in enumerate(((0.5, "after remounting the camera"), (0.0, "as calibrated")), start=1):
+        site.engine.control.set_params(with_changes(Params(), {"alignment.yaw_deg": yaw_deg}), "default")
+        expect(page.locator("#align-bar .score")).to_have_text(re.compile(r"\d+ %"))
+        versions.get_by_role("textbox", name="Note").fill(note)
+        versions.get_by_role("button", name="Save").click()
+        expect(versions.get_by_role("listitem")).to_have_count(count)
+    expect(versions.get_by_role("button", name="Restore alignment 2")).to_be_disabled()
+    site.engine.wait_for(lambda shown: shown.drive.total > 0 and shown.drive.done == shown.drive.total, WAIT_MS / 1e3)
+    expect(page.locator(".timeline-pane")).to_have_attribute("aria-busy", "false")
     painted(page)
 
 

@@ -6,6 +6,8 @@ import ast
 import re
 from collections import defaultdict
 
+import pytest
+
 from tests.docs.pages import ROOT
 
 SHARED = {
@@ -18,6 +20,7 @@ SHARED = {
 }
 """Those that still do, and as what."""
 A_TYPE = re.compile(r"[A-Z][a-z]\w*")
+A_PICTURE = re.compile("picture", re.IGNORECASE)
 
 
 def named() -> dict[str, list[str]]:
@@ -49,3 +52,34 @@ def test_no_two_types_share_a_name() -> None:
 def test_no_exception_is_kept_longer_than_needed() -> None:
     found = named()
     assert {name for name in SHARED if len(found[name]) < 2} == set()
+
+
+SAY_PICTURE = {
+    "pipeline/recording/session/frame_record.py": "a field of recorded frames",
+    "pipeline/recording/session/source.py": "the same field",
+    "pipeline/recording/session/writer.py": "the same field",
+    "pipeline/sources/live/source.py": "a stage of timing_ms",
+    "pipeline/training/dataset.py": "a column of training data",
+    "pipeline/source_kinds.py": "the source pictures:",
+    "pipeline/sources/camera_alone.py": "the source pictures:",
+    "pipeline/simulation/sensors/faults.py": "a field of scenarios, pictures_lost",
+    "pipeline/simulation/sensors/senses.py": "the same field",
+    "pipeline/experiments/robustness/traffic.py": "the same field",
+    "app/streaming/encode.py": "a field of the stream",
+    "app/streaming/stream.py": "a message of the page, picture_px",
+    "static/js/core/protocol.js": "a field of the stream",
+    "static/js/core/connection.js": "a message of the page, picture_px",
+}
+"""Where a camera's image is still called a picture, and as what: names that are stored or sent cannot change."""
+
+
+@pytest.mark.parametrize("suffix", ["py", "js"])
+def test_a_cameras_image_is_called_an_image(suffix: str) -> None:
+    files = [file for root in ("pipeline", "app", "static") for file in (ROOT / root).rglob(f"*.{suffix}")]
+    assert len(files) > 100
+    found = {
+        str(file.relative_to(ROOT))
+        for file in files
+        if A_PICTURE.search(f"{file.name} {file.read_text(encoding='utf-8')}")
+    }
+    assert found == {file for file in SAY_PICTURE if file.endswith(f".{suffix}")}

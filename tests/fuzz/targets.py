@@ -142,11 +142,11 @@ def _recovered(path: str) -> None:
 def targets(folder: Path) -> dict[str, Target]:
     """All of them; those that read files write them below ``folder``."""
     grey = np.full((24, 40, 3), 90, np.uint8)
-    pictures = tuple(cv2.imencode(suffix, grey)[1].tobytes() for suffix in (".png", ".jpg"))
+    images = tuple(cv2.imencode(suffix, grey)[1].tobytes() for suffix in (".png", ".jpg"))
     built_in = tuple(path.read_bytes() for path in sorted(scenario.FOLDER.glob("*.yaml"))[:3])
     session = write(folder / "whole.mcap", [full(index) for index in range(3)])
     found = {
-        "picture": Target(pictures, decode_within_budget),
+        "image": Target(images, decode_within_budget),
         "nmea": Target(((GGA + RMC).encode(),), _sentences),
         "velodyne": Target((b"".join(packet for packet, _ in drive(1)[:8]),), _packets),
         "yaml": Target((b"a: &a [1, 2]\nb: {c: *a, d: 2026-01-01}\n", *built_in), _text(parse_yaml)),

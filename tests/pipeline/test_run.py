@@ -48,11 +48,11 @@ def test_a_recording_is_seen_by_the_default_one(tmp_path: Path) -> None:
     assert detector_for(source).name.startswith("mine")
 
 
-def test_nothing_looks_for_lanes_in_a_recording_without_pictures() -> None:
+def test_nothing_looks_for_lanes_in_a_recording_without_images() -> None:
     source = open_source("sim:straight")
     first = source.frame(0)
     assert lanes_for(source) is not None
-    source.frame = lambda index: replace(first, picture=None, camera=None)  # type: ignore[method-assign]
+    source.frame = lambda index: replace(first, image=None, camera=None)  # type: ignore[method-assign]
     assert lanes_for(source) is None
     assert lanes_for(source, "classical") is not None, "whoever names one gets it"
 
@@ -75,8 +75,8 @@ _NO_LANES = RawLanes("lanes", np.zeros((0, 2), np.float32), np.zeros(0, np.float
 
 
 def _frames(count: int) -> list[Frame]:
-    picture = CameraImage(0, np.zeros((36, 64, 3), np.uint8))
-    return [Frame(i, f"{i}", i * 100_000_000, picture=picture) for i in range(count)]
+    image = CameraImage(0, np.zeros((36, 64, 3), np.uint8))
+    return [Frame(i, f"{i}", i * 100_000_000, image=image) for i in range(count)]
 
 
 def test_lanes_are_looked_for_in_every_nth_frame_and_boxes_in_all() -> None:
@@ -106,9 +106,9 @@ def test_of_live_sensors_lanes_are_looked_for_in_every_nth_tick_that_is_run(
     assert lanes.calls == len(looked)
 
 
-def test_of_live_sensors_a_tick_without_a_picture_passes_the_lanes_turn_on() -> None:
+def test_of_live_sensors_a_tick_without_an_image_passes_the_lanes_turn_on() -> None:
     frames = _frames(6)
-    frames[3] = replace(frames[3], picture=None)
+    frames[3] = replace(frames[3], image=None)
     turns = LiveDetectors(Detectors(None, _Seen(_NO_LANES), lanes_every=3))
     assert [frame.index for frame in frames if turns.of(frame).lanes is not None] == [0, 4]
 
@@ -138,9 +138,9 @@ def test_a_car_with_lidar_alone_asks_no_detector() -> None:
     assert result.layers.lanes is None
 
 
-def test_a_camera_without_a_picture_is_not_asked() -> None:
+def test_a_camera_without_an_image_is_not_asked() -> None:
     lanes = _Seen(_NO_LANES)
-    frame = replace(_frames(1)[0], picture=None)
+    frame = replace(_frames(1)[0], image=None)
     assert detect(frame, Detectors(None, lanes)) is frame
     assert lanes.calls == 0
 

@@ -82,9 +82,9 @@ def test_the_lead_is_found_by_both_sensors(frames: list[Frame]) -> None:
 @pytest.mark.parametrize(
     ("missing", "kinds"),
     [
-        pytest.param({"raw_boxes": None, "picture": None}, {"L"}, id="camera lost: LiDAR goes on alone"),
+        pytest.param({"raw_boxes": None, "image": None}, {"L"}, id="camera lost: LiDAR goes on alone"),
         pytest.param({"sweep": None}, {"V"}, id="LiDAR lost: the camera goes on alone"),
-        pytest.param({"sweep": None, "raw_boxes": None, "picture": None}, set(), id="both lost"),
+        pytest.param({"sweep": None, "raw_boxes": None, "image": None}, set(), id="both lost"),
         pytest.param({"camera": None}, {"L", "V"}, id="no calibration: nothing can be joined"),
     ],
 )

@@ -40,8 +40,8 @@ def clip() -> tuple[list[Frame], list[bytes]]:
         frame = sensors.frame(world_state.at(drive, FROM_S + number / 30.0), number, 0)
         if number % 3 == 0:
             frames.append(frame)
-        assert frame.picture is not None
-        jpegs.append(bytes(cv2.imencode(".jpg", frame.picture.bgr, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()))
+        assert frame.image is not None
+        jpegs.append(bytes(cv2.imencode(".jpg", frame.image.bgr, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()))
     return frames, jpegs
 
 

@@ -31,7 +31,7 @@ def report(
     grown, resident = memory.grown()
     session = [SessionSource(str(file), str(file)) for file in state.files]
     recorded = sum(len(each) for each in session)
-    pictures, sweeps = (
+    images, sweeps = (
         sum(len(times) for each in session for of, times in each.file.log_times().items() if of.topic == topic)
         for topic in (IMAGE, POINTS)
     )
@@ -62,7 +62,7 @@ def report(
         "cores_used": round(cpu_s / seconds, 2),
         "recording": {
             "frames": state.frames,
-            "pictures": pictures,
+            "images": images,
             "sweeps": sweeps,
             "sweeps_taken": taken,
             "dropped": state.dropped,

@@ -57,7 +57,7 @@ class Watcher:
 
 
 def _has(frame: Frame) -> dict[str, bool]:
-    return {"lidar": frame.sweep is not None, "camera": frame.picture is not None, "gnss": frame.gnss is not None}
+    return {"lidar": frame.sweep is not None, "camera": frame.image is not None, "gnss": frame.gnss is not None}
 
 
 class Memory:

@@ -147,13 +147,13 @@ def _write_session(path: Path, folder: Path) -> None:
         pytest.skip(f"no KITTI drive at {folder}")
     source = open_source(f"kitti:{folder}")
     frames = [source.frame(index) for index in range(len(source))]
-    pictures = [cv2.imencode(".jpg", each.picture.bgr)[1].tobytes() if each.picture else b"" for each in frames]
+    images = [cv2.imencode(".jpg", each.image.bgr)[1].tobytes() if each.image else b"" for each in frames]
     writer = SessionWriter(path, About(source.uri, source.title, source.rate_hz))
     for index in range(FRAMES):
-        frame, encoded, t_ns = frames[index % len(frames)], pictures[index % len(frames)], index * 100_000_000
-        picture = replace(frame.picture, t_ns=t_ns, encoded=encoded) if frame.picture else None
+        frame, encoded, t_ns = frames[index % len(frames)], images[index % len(frames)], index * 100_000_000
+        image = replace(frame.image, t_ns=t_ns, encoded=encoded) if frame.image else None
         sweep = replace(frame.sweep, t_ns=t_ns) if frame.sweep else None
-        writer.write(replace(frame, index=index, name=f"{index:06d}", t_ns=t_ns, sweep=sweep, picture=picture))
+        writer.write(replace(frame, index=index, name=f"{index:06d}", t_ns=t_ns, sweep=sweep, image=image))
     writer.close()
 
 

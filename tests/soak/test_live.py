@@ -31,7 +31,7 @@ def judge(report: dict[str, Any]) -> None:
     recording = report["recording"]
     assert (recording["dropped"], recording["error"]) == (0, None)
     assert recording["read_back"] == recording["frames"] > 0
-    assert recording["pictures"] > 1.2 * recording["frames"], "thirty a second came, ten a second tick"
+    assert recording["images"] > 1.2 * recording["frames"], "thirty a second came, ten a second tick"
     assert recording["sweeps"] >= recording["sweeps_taken"], "of ticks that were dropped, too"
     assert report["right_leads"] > 0.5, "a busy machine misses sweeps, and a lead needs three in a row"
 

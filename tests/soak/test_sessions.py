@@ -32,7 +32,7 @@ from dataclasses import replace
 from pathlib import Path
 import cv2, numpy as np
 from pipeline.recording.session.writer import SessionWriter
-from pipeline.types import Image
+from pipeline.types import CameraImage
 from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, sweep
 
 path, frames, limit = sys.argv[1], *map(int, sys.argv[2:])
@@ -46,7 +46,7 @@ writer = SessionWriter(Path(path), ABOUT, compression="lz4")
 for index in range(frames):
     t_ns = PERIOD_NS * (1 + index)
     shown = replace(cloud, t_ns=t_ns, points=cloud.points.copy())  # the same array would be stored once
-    writer.write(replace(full(index), sweep=shown, picture=Picture(t_ns, bgr, jpeg)), {"frame": index})
+    writer.write(replace(full(index), sweep=shown, image=CameraImage(t_ns, bgr, jpeg)), {"frame": index})
 writer.close()
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
 """
@@ -71,7 +71,7 @@ for index in np.random.default_rng(1).integers(0, len(session), 300).tolist():
     cpu_ms.append((time.process_time() - spent) * 1e3)
     assert frame.notes == ("gnss silent for 1.0 s (antenna?)",), frame.notes
     assert frame.t_ns == 100_000_000 * (1 + index)
-    assert frame.sweep.t_ns == frame.picture.t_ns == frame.t_ns
+    assert frame.sweep.t_ns == frame.image.t_ns == frame.t_ns
 found = info(Path(path))
 print(json.dumps({
     "GB": round(found.bytes / 1e9, 2), "hours": round(found.duration_s / 3600, 3), "frames": len(session),

@@ -55,7 +55,7 @@ class ExportLabels:
     labels: Annotated[Path | None, option("FILE")] = None
     """A file of labels in the native format"""
     version: Annotated[str, tyro.conf.arg(metavar="NAME")] = WORKING
-    """A frozen version of the labels in the database; default: their present state"""
+    """A frozen version of the labels in the database; default: their current state"""
     only: Selection = "all"
     """Write only accepted labels, or only those that a second person reviewed; the set's name says so"""
     database: Database = None

@@ -82,7 +82,7 @@ class ProposeLabels:
             return clustered(sweep.points) if sweep is not None else None
 
         with frames_progress() as bar:
-            progress = task_progress(bar, "laying proposals on points", len(found.tracks))
+            progress = task_progress(bar, "fitting proposals to points", len(found.tracks))
             found = replace(found, tracks=refined(found.tracks, sweeps, own_poses(moments), progress))
         database = open_database(self.database)
         try:

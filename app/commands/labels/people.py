@@ -24,8 +24,8 @@ State = Literal["open", "labeling", "review", "done"]
 
 @dataclass(frozen=True)
 class LabelAgreement:
-    """Compare labels of one recording that two people made apart from each other: the lead in each frame, overlap and
-    class of the cuboids that both have, and what only one of them has. Both files are native exports.
+    """Compare two people's independent labels of one recording: the lead in each frame, overlap and class of cuboids
+    that both have, and cuboids that only one has. Both files are native exports.
 
     Example: cipv labels agreement ada.json bob.json
     """
@@ -94,9 +94,9 @@ class LabelEffort:
 
 @dataclass(frozen=True)
 class LabelQueue:
-    """List the recordings to label, what is worth most first: whose each is, its state, how much is labelled and
-    reviewed, and its worth (unsure proposals and unclear leads per frame). With --drive and --assign or --state: change
-    one. Who labels a recording cannot call it done.
+    """List the recordings to label, most valuable first: assignee, state, how much is labelled and reviewed, and worth
+    (uncertain proposals and unclear leads per frame). With --drive and --assign or --state: change one. The person who
+    labels a recording cannot mark it as done.
 
     Example: cipv labels queue --drive "Astyx HiRes2019" --assign Ada
     """
@@ -104,13 +104,13 @@ class LabelQueue:
     drive: Annotated[str | None, option("NAME")] = None
     """Title, address or key of the recording to change"""
     assign: Annotated[str | None, option("PERSON")] = None
-    """Who is to label it"""
+    """Assign it to this person"""
     state: State | None = None
-    """How far it is"""
+    """Its new state"""
     database: Database = None
     """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
     person: Person = field(default_factory=getpass.getuser)
-    """Who says so"""
+    """Author of the change"""
     json: bool = False
     """Print the list as JSON"""
 
@@ -119,7 +119,7 @@ class LabelQueue:
         from app.labels.store.work import put, queue
 
         if (self.drive is None) != (self.assign is None and self.state is None):
-            raise BadInput("--drive and --assign or --state belong together")
+            raise BadInput("--drive must be given together with --assign or --state")
         database = open_database(self.database)
         try:
             if self.drive is not None:
@@ -132,7 +132,7 @@ class LabelQueue:
             return 0
         for each in found:
             print(
-                f"{each.title}: {each.state}, {each.person or 'nobody'}; labelled {_percent(each.labelled)}, "
+                f"{each.title}: {each.state}, {each.person or 'unassigned'}; labelled {_percent(each.labelled)}, "
                 f"reviewed {_percent(each.reviewed)}, proposals {each.proposals:,}, worth {each.worth:.2f}"
             )
         if not found:

@@ -29,7 +29,7 @@ class ClusterOptions:
     workers: Annotated[int | None, option("N")] = None
     """Processes on this machine. Default: half its cores, since each runs networks on two threads"""
     memory: Annotated[str, tyro.conf.arg(metavar="SIZE")] = "3GB"
-    """Limit of each process; one above it is started anew"""
+    """Memory limit of each process; one that exceeds it is restarted"""
     scheduler: Annotated[str | None, option("ADDRESS")] = None
     """A running Dask scheduler, e.g. tcp://10.0.0.5:8786, whose workers have the same version installed"""
 

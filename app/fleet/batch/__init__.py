@@ -1,1 +1,1 @@
-"""The pipeline on every recording of a fleet, on Dask: what decides the bytes of a batch's tables is in this folder."""
+"""Runs the pipeline on every recording of a fleet, with Dask. All code that determines a batch's tables is here."""

@@ -1,4 +1,4 @@
-"""From what a person types to recordings: folders, globs, stores, list files, and any source by its scheme."""
+"""Resolves addresses to recordings: folders, globs, stores, list files, and any source by its scheme."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ class Recording:
 
 
 def recordings(addresses: Iterable[str]) -> list[Recording]:
-    """Every recording that the addresses name, once, sorted. BadInput for an address that names none."""
+    """Every recording that the addresses name, once each, sorted. Raises BadInput for an address without recordings."""
     found: dict[str, Recording] = {}
     for address in addresses:
         here = {each.address: each for each in _of(address.strip())}
         if not here:
-            raise BadInput(f"{address}: no recording there; stores and folders are searched for *{_SESSION}")
+            raise BadInput(f"{address}: no recordings found; stores and folders are searched for *{_SESSION}")
         found |= here
     return sorted(found.values())
 
@@ -132,7 +132,7 @@ def _listed(content: bytes, name: str) -> Iterator[Recording]:
     try:
         lines: Sequence[str] = content.decode("utf-8").splitlines()
     except UnicodeDecodeError:
-        raise BadInput(f"{name}: not a text file; expected one address a line") from None
+        raise BadInput(f"{name}: not a text file; expected one address per line") from None
     for number, line in enumerate(lines, 1):
         if line.strip() and not line.lstrip().startswith("#"):
             try:

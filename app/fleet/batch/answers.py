@@ -1,5 +1,5 @@
-"""What networks saw in a recording, kept in the batch's store: no network looks at the same image twice, whatever the
-parameters, and the long recordings' images are looked at by several workers."""
+"""Detections of a recording, cached in the batch's store: a network processes each image once, whatever the
+parameters, and several workers share the images of a long recording."""
 
 from __future__ import annotations
 
@@ -48,15 +48,15 @@ class _Answer(msgspec.Struct, array_like=True):
 
 
 def answers_file(mark: str, detectors: Detectors, first: int, piece_frames: int = PIECE_FRAMES) -> str:
-    """The name in the store of the answers of these detectors about a piece of a recording, from frame ``first`` on."""
+    """Store name of these detectors' detections in a piece of a recording that begins with frame ``first``."""
     asked = [*detectors.names, detectors.lanes_every, detectors.far_every, piece_frames]
     digest = hashlib.sha256(repr(asked).encode()).hexdigest()[:12]
     return f"boxes/{mark}/{digest}/{first:08d}.bin"
 
 
 class KeptLook:
-    """A ``Look`` that answers from the store what was asked before, piece by piece, and keeps what is new. For frames
-    in order, on one thread. Call ``close`` at the end."""
+    """A ``Look`` that takes known detections from the store, piece by piece, and saves new ones. Frames must come in
+    order and on one thread. Call ``close`` at the end."""
 
     def __init__(self, store: Store, mark: str, detectors: Detectors, piece_frames: int = PIECE_FRAMES) -> None:
         self._store, self._piece_frames = store, piece_frames
@@ -98,7 +98,7 @@ def packed(answers: Answers) -> bytes:
 
 
 def unpacked(data: bytes) -> Answers:
-    """What ``packed`` wrote; nothing, if it cannot be read: then networks look again."""
+    """What ``packed`` wrote; empty if it cannot be read, so that networks run again."""
     try:
         rows = msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(data), type=list[_Answer])
         return {(row.index, row.detector): _answer(row) for row in rows}

@@ -1,4 +1,4 @@
-"""Every score of one drive: those without labels, and, where the recording has labels, those against them."""
+"""Every score of one drive: those without labels and, if the recording has labels, those against them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def scores_of(history: History, labelled: Sequence[Result], source: Source, para
 
 
 def labelled_scores(drive: DriveScore) -> DriveScores:
-    """The figures of ``cipv evaluate`` that are sums over counts, and those of the camera alone."""
+    """The figures of ``cipv evaluate`` that are sums divided by counts, and those of the camera alone."""
     scores = {figure.name: figure.part(drive) for figure in FIGURES if figure.whole is ratio}
     errors = [error for frame in drive.frames for error in frame.errors if error.source == "V"]
     shares = [100.0 * abs(error.distance_m) / error.range_m for error in errors if error.range_m > 1.0]

@@ -1,4 +1,4 @@
-"""One drive's part of each table, written as the drive is run: memory holds a few hundred frames of it."""
+"""One drive's part of each table, written while the drive runs, so that memory holds only a few hundred frames."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Values = tuple[Any, ...]
 
 
 class PartWriter:
-    """One table of one drive: a Parquet file, written in groups. Use it as a context."""
+    """One table of one drive: a Parquet file, written in groups. Use it as a context manager."""
 
     def __init__(self, shape: TableShape, path: Path) -> None:
         self._schema = shape.schema()
@@ -58,7 +58,7 @@ class PartWriter:
 
 
 class FrameTables:
-    """The tables that grow frame by frame, in a folder of this machine. Use it as a context."""
+    """The tables that grow frame by frame, in a folder of this machine. Use it as a context manager."""
 
     def __init__(self, folder: Path) -> None:
         self._stack = ExitStack()

@@ -1,4 +1,4 @@
-"""What a run is made from, so that equal keys give equal bytes: code, parameters, networks; the recording is apart."""
+"""What identifies a run: code, parameters, networks. Equal keys and recordings give equal bytes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _LIBRARIES = ("numpy", "scipy", "numba", "opencv-python-headless", "onnxruntime"
 
 @cache
 def code_digest() -> str:
-    """Twelve characters of the code that results come from, and of the libraries that compute them."""
+    """Digest of the code that computes results and of the libraries it uses, 12 characters."""
     digest = hashlib.sha256()
     for pattern in _CODE:
         for file in sorted(_ROOT.glob(pattern)):
@@ -49,7 +49,7 @@ def _version(name: str) -> str:
 
 
 def networks_digest(choice: DetectorChoice) -> str:
-    """Twelve characters of the networks that a choice means on this machine, by their content."""
+    """Digest of the networks that a choice selects on this machine, by their content, 12 characters."""
     named = [
         (find(choice.boxes) if choice.boxes is not None else None) or choice.boxes,
         (find(choice.lanes) if choice.lanes is not None else None) or choice.lanes,
@@ -85,7 +85,7 @@ class RunKey:
 
     @property
     def name(self) -> str:
-        """Twelve characters: the run's name in tables."""
+        """The run's name in tables, 12 characters."""
         made_from = [self.code, self.networks, self.params.model_dump(mode="json"), self.sensors, self.rings]
         return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:12]
 

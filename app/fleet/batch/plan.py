@@ -1,4 +1,4 @@
-"""What a batch is to do: which drives of which run, and which of them are done already."""
+"""Plans a batch: which drives to run, and which are already done."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from app.fleet.batch.addresses import Recording, recordings
+from app.fleet.batch.job import Job, aside_file, done_file
 from app.fleet.batch.keys import RunKey, code_digest, networks_digest
-from app.fleet.batch.work import Job, aside_file, done_file
 from app.fleet.runs import LATEST
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
@@ -22,7 +22,7 @@ _VERSION = 1
 
 @dataclass(frozen=True)
 class Plan:
-    """A batch as it was asked for."""
+    """A batch as requested."""
 
     addresses: tuple[str, ...]
     """As they were typed."""
@@ -52,10 +52,10 @@ class Plan:
 
     @staticmethod
     def load(store: Store) -> Plan:
-        """What the last batch in a folder was asked for. BadInput where there was none."""
+        """The plan of the last batch in a folder. Raises BadInput if there was none."""
         data = store.read(_PLAN)
         if data is None:
-            raise BadInput(f"{store.address}: no batch to resume here; name the recordings")
+            raise BadInput(f"{store.address}: no batch to resume here; give the recordings")
         try:
             said: dict[str, Any] = json.loads(data)
             if said["version"] != _VERSION:
@@ -69,12 +69,12 @@ class Plan:
                 bool(said["results"]),
             )
         except (ValueError, KeyError, TypeError, ParamsError):
-            raise BadInput(f"{store.address}/{_PLAN}: damaged; name the recordings again") from None
+            raise BadInput(f"{store.address}/{_PLAN}: damaged; give the recordings again") from None
 
 
 @dataclass(frozen=True)
 class PlannedWork:
-    """A plan, and how far it is."""
+    """A plan and its progress."""
 
     store: Store
     """Where its tables are."""
@@ -92,7 +92,7 @@ class PlannedWork:
 
 
 def work_of(plan: Plan, store: Store) -> PlannedWork:
-    """What is to be done. BadInput for an address that names no recording."""
+    """The work that is left. Raises BadInput for an address without recordings."""
     key = RunKey(code_digest(), networks_digest(plan.choice), plan.params, plan.sensors, plan.rings)
     found = recordings(plan.addresses)
     done = {*store.names(f"done/run={key.name}"), *store.names(f"aside/run={key.name}")}
@@ -105,7 +105,7 @@ def work_of(plan: Plan, store: Store) -> PlannedWork:
 
 
 def begin(plan: Plan, work: PlannedWork, store: Store) -> None:
-    """Write down what the batch is, before its first drive. BadInput where the store cannot be written."""
+    """Save the plan before the first drive runs. Raises BadInput if the store is not writable."""
     plan.save(store)
     store.write(LATEST, json.dumps({"run": work.key.name}).encode())
     store.write(f"runs/{work.key.name}.json", json.dumps(work.key.to_json(plan.choice), indent=1).encode())

@@ -1,5 +1,5 @@
-"""A batch on Dask: which pieces of work there are, what follows from each, and what was said of it. Dask decides where
-and when each piece runs, and runs the pieces of a worker that died again."""
+"""Runs a batch on Dask: creates tasks, follows up on their results, and counts them. Dask decides where and when each
+task runs, and reruns the tasks of a worker that died."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from typing import Any
 import dask
 from distributed import Client, KilledWorker, LocalCluster, as_completed
 
-from app.fleet.batch.work import Job, Outcome, TooLong, WrongWorker, look_at_piece, run_drive, set_aside
+from app.fleet.batch.job import Job, Outcome, TooLong
+from app.fleet.batch.work import WrongWorker, look_at_piece, run_drive, set_aside
 from pipeline.common.errors import BadInput, first_line
 from pipeline.common.user_files import Overloaded
 
@@ -35,12 +36,12 @@ _SETTINGS = {
 
 
 class SchedulerLost(Exception):
-    """The scheduler has gone; what is done is kept."""
+    """The connection to the scheduler is lost; finished drives are kept."""
 
 
 @dataclass
 class Tally:
-    """What became of a batch so far."""
+    """The state of a batch so far."""
 
     total: int
     """Drives of the batch."""
@@ -59,12 +60,12 @@ class Tally:
 
     @property
     def left(self) -> int:
-        """Drives of which nothing is known yet."""
+        """Drives without an outcome yet."""
         return self.total - self.before - self.done - len(self.aside) - len(self.failed)
 
 
 def usual_workers() -> int:
-    """Processes on this machine: half its cores, since each runs networks on two threads, and steps beside them."""
+    """Default number of processes on this machine: half its cores, since each runs networks on two threads."""
     return max(1, (os.cpu_count() or 1) // 2)
 
 
@@ -75,17 +76,17 @@ def client_of(scheduler: str | None, workers: int, memory: str) -> Iterator[Clie
     Args:
         scheduler: its address; None: a cluster of this machine.
         workers: how many processes that has.
-        memory: limit of each, e.g. ``"1.5GB"``; a worker above it is started anew.
+        memory: limit of each, e.g. ``"1.5GB"``; a worker that exceeds it is restarted.
 
     Raises:
-        BadInput: no scheduler answers there.
+        BadInput: the scheduler cannot be reached.
     """
     with dask.config.set(_SETTINGS), _quiet():
         if scheduler is not None:
             try:
                 client = Client(scheduler, timeout=30)
             except (OSError, ValueError, TimeoutError) as error:
-                raise BadInput(f"--scheduler {scheduler}: no Dask scheduler answers: {first_line(error)}") from None
+                raise BadInput(f"--scheduler {scheduler}: cannot reach a Dask scheduler: {first_line(error)}") from None
             with client:
                 yield client
             return
@@ -128,7 +129,7 @@ def run_batch(client: Client, jobs: Sequence[Job], tally: Tally, told: Callable[
         told: called after each change of it.
 
     Raises:
-        SchedulerLost: Dask has gone; what is done is kept.
+        SchedulerLost: the connection to Dask is lost; finished drives are kept.
         WrongWorker: the workers run other code or have other networks.
     """
     _Batch(client, jobs, tally, told).run()
@@ -182,14 +183,14 @@ class _Batch:
             self._finished(piece, future.result())
             return
         if future.status == "lost" or future.status == "cancelled":
-            raise SchedulerLost("the scheduler has lost the work that it was given")
+            raise SchedulerLost("the scheduler lost the task")
         error = future.exception()
         if isinstance(error, WrongWorker):
             raise error
         if isinstance(error, KilledWorker) and piece.tries < TRIES:
             self._waiting.append(_Piece(piece.job, piece.first, piece.is_last_look, piece.tries + 1))
         elif isinstance(error, KilledWorker):
-            self._set_aside(piece, "it ends the process of every worker that opens it: too little memory, or a crash")
+            self._set_aside(piece, "every worker that opened it died: out of memory, or a crash")
         elif isinstance(error, BadInput):
             self._set_aside(piece, str(error))
         else:

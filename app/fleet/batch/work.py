@@ -1,12 +1,11 @@
-"""What a worker does: run one recording, or look at a piece of one. Everything it makes goes to the batch's store,
-whole files at once, so a worker may be killed at any moment and its work done again by another."""
+"""A worker's tasks: run one recording, or the networks on a piece of one. All output goes to the batch's store as
+whole files, so a worker may be killed at any time and another one can repeat its work."""
 
 from __future__ import annotations
 
 import json
 import tempfile
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
@@ -15,22 +14,22 @@ import zstandard
 
 from app.drive.events import find_events
 from app.drive.frame_rows import Objects, Row, objects_of, row_of
-from app.fleet.batch.addresses import Recording
-from app.fleet.batch.answers import PIECE_FRAMES, KeptLook, answers_file
+from app.fleet.batch.answers import KeptLook
 from app.fleet.batch.drive_scores import scores_of
 from app.fleet.batch.drive_tables import FrameTables, gap_of, write_drive, write_events, write_scores
-from app.fleet.batch.keys import RunKey, code_digest, networks_digest
+from app.fleet.batch.job import Job, Outcome, TooLong, aside_file
+from app.fleet.batch.keys import code_digest, networks_digest
 from app.fleet.batch.tables import DRIVES, EVENTS, FRAMES, OBJECTS, SCORES, TIMINGS, file_of
-from app.fleet.store import Store
+from app.fleet.batch.worker_detectors import detectors_for
 from pipeline.common.errors import BadInput
-from pipeline.detection import DetectorChoice, Detectors, detect, open_detectors, picture_size
+from pipeline.detection import Detectors, detect
 from pipeline.evaluation.label_free.history import History
 from pipeline.evaluation.scores.results_file import EMPTY
 from pipeline.run import patiently, run, used
 from pipeline.sources import open_source
 from pipeline.types import Frame, Result
 from pipeline.types.result_json import to_line
-from pipeline.types.source import Source, SourceError, is_simulated
+from pipeline.types.source import Source, SourceError
 
 MOST_LABELLED = 6000
 """Results of labelled frames are held until the drive's end, some 20 KB each: no drive is scored against more."""
@@ -40,77 +39,16 @@ class WrongWorker(BadInput):
     """A worker with other code or other networks than the batch was started with."""
 
 
-@dataclass(frozen=True)
-class Job:
-    """One drive of a batch."""
-
-    recording: Recording
-    """What is run, as it was when the batch was planned."""
-    key: RunKey
-    """Parameters, sensors and rings, and the code and networks that a worker must have to run it."""
-    choice: DetectorChoice
-    """Networks by name, opened by the worker from its own files."""
-    store: Store
-    """Where tables, answers of networks and marks of what is done are written."""
-    keeps_results: bool = False
-    """Also write the results as JSON lines."""
-    piece_frames: int = PIECE_FRAMES
-    """Images of a longer recording are looked at in pieces of so many frames."""
-
-    def answers(self, detectors: Detectors, first: int) -> str:
-        """The name in the store of what these detectors saw in the piece that begins with a frame."""
-        return answers_file(self.recording.mark, detectors, first, self.piece_frames)
-
-    @property
-    def done_file(self) -> str:
-        """Its presence says that all of the drive's files are there."""
-        return done_file(self.key.name, self.recording)
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a drive."""
-
-    drive: str
-    """Its name in tables, ``Recording.drive``."""
-    frames: int
-    """0 for one that was set aside."""
-    looked_at: int
-    """Images that networks looked at now."""
-    seconds: float
-    """It took."""
-    reason: str = ""
-    """Why it was set aside; empty for one that was run."""
-
-
-@dataclass(frozen=True)
-class TooLong:
-    """A recording whose images several workers shall look at first."""
-
-    pieces: tuple[int, ...]
-    """First frame of each piece."""
-
-
-def done_file(run: str, recording: Recording) -> str:
-    """The name in the store of what says that a drive is done."""
-    return f"done/run={run}/{recording.drive}.{recording.mark}.json"
-
-
-def aside_file(run: str, recording: Recording) -> str:
-    """The name in the store of what says why a recording was set aside."""
-    return f"aside/run={run}/{recording.drive}.{recording.mark}.json"
-
-
 def run_drive(job: Job, may_split: bool = False) -> Outcome | TooLong:
-    """Run one recording, write its tables, and say that it is done. A recording that cannot be read is set aside, with
-    the reason.
+    """Run one recording, write its tables, and mark it as done. A recording that cannot be read is set aside, with the
+    reason.
 
     Args:
         job: which one.
-        may_split: return ``TooLong`` instead where a recording's images are worth looking at piece by piece.
+        may_split: return ``TooLong`` instead if several workers should process the recording's images first.
 
     Raises:
-        WrongWorker: see there. Overloaded: a store that goes on failing.
+        WrongWorker: see there. Overloaded: the store keeps failing.
     """
     start = perf_counter()
     _check(job)
@@ -121,7 +59,7 @@ def run_drive(job: Job, may_split: bool = False) -> Outcome | TooLong:
         source = open_source(job.recording.address, rings=job.key.rings)
         if not len(source):
             raise SourceError(f"{job.recording.address}: the recording holds no frames")
-        detectors = _detectors(source, job)
+        detectors = detectors_for(source, job)
         if may_split and _missing_pieces(source, detectors, job):
             return TooLong(tuple(range(0, len(source), job.piece_frames)))
         with tempfile.TemporaryDirectory(prefix="cipv-batch-") as folder:
@@ -135,11 +73,11 @@ def run_drive(job: Job, may_split: bool = False) -> Outcome | TooLong:
 
 
 def look_at_piece(job: Job, first: int) -> int:
-    """Let the detectors look at the images of one piece of a recording, and keep their answers. Returns how many images
-    networks looked at. Raises BadInput for a recording that cannot be read, and what ``run_drive`` raises."""
+    """Run the detectors on the images of one piece of a recording, and save their detections. Returns how many images
+    networks processed. Raises BadInput for a recording that cannot be read, and what ``run_drive`` raises."""
     _check(job)
     source = open_source(job.recording.address, rings=job.key.rings)
-    detectors = _detectors(source, job)
+    detectors = detectors_for(source, job)
     if job.store.has(job.answers(detectors, first)):
         return 0
     kept = KeptLook(job.store, job.recording.mark, detectors, job.piece_frames)
@@ -175,37 +113,6 @@ def _check(job: Job) -> None:
         raise WrongWorker("a worker runs another version of CIPV Studio, or other libraries, than `cipv batch`")
     if networks_digest(job.choice) != job.key.networks:
         raise WrongWorker("a worker has other networks installed than the machine of `cipv batch`")
-
-
-def _detectors(source: Source, job: Job) -> Detectors:
-    """Networks are opened once for each kind of image; the classical lane detector knows the camera too."""
-    if job.key.sensors == "lidar":
-        return Detectors()
-    first = patiently(source, 0)
-    camera = first.camera
-    numbers = () if camera is None else (camera.K.tobytes(), camera.T_camera_ego.tobytes(), camera.road_z_m)
-    kind = (is_simulated(source), picture_size(source), source.rate_hz, first.detections_given, numbers)
-    return _opened(_Opening(source, kind), job.choice, job.key.sensors)
-
-
-class _Opening:
-    """A source that is equal to all others of its kind, for the cache below."""
-
-    def __init__(self, source: Source, kind: tuple[object, ...]) -> None:
-        self.source, self._kind = source, kind
-
-    def __hash__(self) -> int:
-        return hash(self._kind)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Opening) and self._kind == other._kind
-
-
-@lru_cache(maxsize=2)
-def _opened(opening: _Opening, choice: DetectorChoice, sensors: str) -> Detectors:
-    detectors = open_detectors(opening.source, choice, sensors)
-    del opening.source  # only its kind is held
-    return detectors
 
 
 def _missing_pieces(source: Source, detectors: Detectors, job: Job) -> bool:
@@ -301,4 +208,4 @@ def _mean(values: object) -> float | None:
 
 def _brightness(frame: Frame) -> float:
     """Mean of the image; NaN without one."""
-    return float(frame.picture.bgr.mean()) if frame.picture is not None else float("nan")
+    return float(frame.image.bgr.mean()) if frame.image is not None else float("nan")

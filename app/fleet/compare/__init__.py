@@ -1,1 +1,1 @@
-"""Two runs over the same drives: what got better, what got worse, and whether that may pass."""
+"""Compares two runs over the same drives: what improved, what got worse, and whether that is acceptable."""

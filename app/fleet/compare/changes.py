@@ -1,4 +1,4 @@
-"""Where two runs differ: the drives and frames with another lead, and the events that came and went."""
+"""Where two runs differ: the drives and frames with a different lead, and the events that only one of them has."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ EVENT_SLACK_S = 1.0
 
 @dataclass(frozen=True)
 class LeadChange:
-    """A drive with another lead."""
+    """A drive in which the lead differs."""
 
     drive: str
     """Its name in the tables."""
@@ -49,8 +49,8 @@ class EventChange:
 
 
 def changed_drives(base: FleetTables, run: FleetTables, most: int = 20) -> tuple[list[LeadChange], int, int]:
-    """The drives with the longest stretch with another lead, the worst first; in how many frames the runs have another
-    lead; and how many frames both have."""
+    """The drives with the longest stretches in which the lead differs, worst first; the number of frames in which it
+    differs; and the number of frames in both runs."""
     both = _joined(base, run, "frames", "drive, address, index, t_s, cipv_id, distance_m, path_offset_m")
     near = f"abs(a.distance_m - b.distance_m) <= {SAME_PLACE_M} AND " + (
         f"coalesce(abs(a.path_offset_m - b.path_offset_m) <= {SAME_PLACE_M}, a.path_offset_m IS NULL AND "

@@ -1,4 +1,4 @@
-"""Rules that a run must keep, in a file: `cipv compare --gate rules.yaml` ends with 1 where one is broken."""
+"""Rules that a run must meet, from a file: `cipv compare --gate rules.yaml` exits with 1 if one is broken."""
 
 from __future__ import annotations
 
@@ -77,10 +77,11 @@ def read_rules(file: Path) -> GateRules:
 def broken(
     rules: GateRules, scores: Sequence[PairedScore], events: Sequence[EventChange], drives: int, aside: int
 ) -> list[str]:
-    """What is broken, in sentences. drives: that both runs have. aside: recordings that only the run set aside."""
+    """The broken rules, as sentences. drives: how many both runs have. aside: recordings that only the run set
+    aside."""
     said = []
     if drives < rules.drives_at_least:
-        said.append(f"{drives} drives are in both runs; at least {rules.drives_at_least} are demanded")
+        said.append(f"{drives} drives are in both runs; at least {rules.drives_at_least} are required")
     if aside > rules.aside_at_most:
         said.append(f"{aside} more recordings were set aside; at most {rules.aside_at_most} may be")
     by_score, by_kind = {each.info.name: each for each in scores}, {each.kind: each for each in events}
@@ -116,4 +117,4 @@ def _limits(rule: Rule, name: str, value: float, unit: str) -> Iterator[str]:
     if rule.at_most is not None and value > rule.at_most:
         yield f"{name}: {value:.4g}{unit}; at most {rule.at_most:g} is allowed"
     if rule.at_least is not None and value < rule.at_least:
-        yield f"{name}: {value:.4g}{unit}; at least {rule.at_least:g} is demanded"
+        yield f"{name}: {value:.4g}{unit}; at least {rule.at_least:g} is required"

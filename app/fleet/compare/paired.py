@@ -75,7 +75,7 @@ class PairedScore:
 
     @property
     def is_sure(self) -> bool:
-        """Whether the interval leaves out no change, and enough drives say so."""
+        """Whether the interval excludes zero and there are enough drives."""
         return self.interval is not None and self.drives >= FEW and not self.interval.low <= 0.0 <= self.interval.high
 
     @property
@@ -133,8 +133,7 @@ def _ratio(sums: F64) -> float | None:
 
 
 def difference_interval(base: F64, run: F64) -> Interval | None:
-    """95 % of the difference of two ratios of sums, when drives are drawn with replacement, in pairs, always with the
-    same seed.
+    """95 % interval of the difference of two ratios of sums, by resampling drives in pairs with a fixed seed.
 
     Args:
         base, run: (N, 2) what each drive adds to numerator and denominator.

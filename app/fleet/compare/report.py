@@ -41,7 +41,7 @@ class FleetComparison:
 
 
 def compare_runs(base: FleetTables, run: FleetTables, most: int = 20) -> FleetComparison:
-    """Compare two runs. most: changes that are listed. BadInput where they have no drive in common."""
+    """Compare two runs. most: how many changes to list. Raises BadInput if they have no drive in common."""
     rows = {str(row["drive"]): row for row in base.rows("drives")}
     shared = sorted(rows.keys() & set(run.drives()))
     if not shared:
@@ -70,29 +70,29 @@ def compare_runs(base: FleetTables, run: FleetTables, most: int = 20) -> FleetCo
 def sections(told: FleetComparison, link: FrameUrl) -> list[ReportSection]:
     """For people."""
     text = (
-        f"{told.drives} drives are in both runs. The lead is another one in {told.differing} of {told.frames} frames.",
-        "Intervals draw whole drives in pairs. Better or worse is said where the interval leaves out no change, from "
+        f"{told.drives} drives are in both runs. The lead differs in {told.differing} of {told.frames} frames.",
+        "Intervals resample whole drives in pairs. Better or worse is reported where the interval excludes 0, from "
         f"{FEW} drives on.",
     )
     columns = ("score", "unit", "base", "run", "run − base", "95 % low", "high", "drives", "better in", "worse in", "")
     tables = [Table("Scores", columns, tuple(map(_row, told.scores)), decimals=3)]
     apart = tuple((name, *_row(score)) for name, scores in told.by_condition.items() for score in scores)
     if apart:
-        tables.append(Table("Scores that surely changed, by condition", ("condition", *columns), apart, decimals=3))
+        tables.append(Table("Significant changes by condition", ("condition", *columns), apart, decimals=3))
     events = tuple((each.kind, each.base, each.run, each.lost, each.gained) for each in told.events)
     tables.append(Table("Events", ("kind", "base", "run", "only in the base", "only in the run"), events))
     changes = tuple(
         (Linked(each.drive, link(each.address, each.index)), each.index, each.frames, each.longest, each.text)
         for each in told.changes
     )
-    heads = ("drive", "frame", "frames with another lead", "longest in a row", "there")
+    heads = ("drive", "frame", "frames with a different lead", "longest in a row", "there")
     return [
         ReportSection("comparison", f"Run {told.run} compared with {told.base}", text, tuple(tables)),
         ReportSection(
             "changes",
             "Largest changes",
             ("Links open the dashboard at the first frame of the longest stretch, while `cipv serve` runs.",),
-            (Table("Another lead", heads, changes),),
+            (Table("Different lead", heads, changes),),
         ),
     ]
 

@@ -1,6 +1,5 @@
-"""How well scores without labels stand for figures against labels: rank correlation over drives and runs.
-
-Only where a score ranks drives and parameters as labels do, it may be trusted on drives that nobody labelled."""
+"""How well scores without labels predict figures against labels: rank correlation over drives and runs. A score can be
+trusted on unlabelled drives only if it ranks drives and parameters as labels do."""
 
 from __future__ import annotations
 
@@ -22,7 +21,7 @@ FEWEST = 8
 
 @dataclass(frozen=True)
 class Worth:
-    """A score beside its counterpart against labels."""
+    """A score and its counterpart against labels."""
 
     score: LabelFreeScore
     """The one that needs no labels; names its counterpart."""
@@ -39,7 +38,7 @@ class Worth:
 
     @property
     def holds(self) -> bool:
-        """Whether it surely ranks as labels do."""
+        """Whether it significantly ranks as labels do."""
         return self.interval is not None and self.interval.low > 0.0
 
 

@@ -21,7 +21,7 @@ def set_attribute(draft: Draft, scope: Scope, act: SetAttribute) -> str:
     if values is None:
         raise BadAct(f"the class list has no attribute {act.name!r}")
     if act.value is not None and act.value not in values:
-        raise BadAct(f"{act.name} is one of {', '.join(values)}, not {act.value!r}")
+        raise BadAct(f"{act.name} must be one of {', '.join(values)}, not {act.value!r}")
     if act.name in OF_SIGHTINGS:
         there = draft.sightings(track.id, act.first, act.last)
         if not there:
@@ -41,7 +41,7 @@ def _said(sighting: Sighting, name: str, value: str | None) -> Sighting:
             return replace(sighting, occlusion=int(value) if value is not None else None)
         return replace(sighting, truncation=float(value) if value is not None else None)
     except ValueError:
-        raise BadAct(f"{name} is a number, not {value!r}") from None
+        raise BadAct(f"{name} must be a number, not {value!r}") from None
 
 
 def _put(known: tuple[Attribute, ...], act: SetAttribute) -> tuple[Attribute, ...]:

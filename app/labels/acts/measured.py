@@ -58,7 +58,7 @@ def refitted(
         seen_around = around(recording, track, sighting, sweeps) if recording is not None and sweeps else None
         found = refit(frame.sweep.points, sighting.cuboid, seen_around)
         if not found.is_better:
-            raise ActRefused(f"left as it is: {found.points} points show no place of #{act.track} that fits better")
+            raise ActRefused(f"left #{act.track} as is: no position fits the {found.points} points better")
         cuboid = found.cuboid
         of = f" and those of {found.sweeps} sweeps" if found.sweeps > 1 else ""
         note = f"fitted to {found.points} points{of}" + ("" if found.turned else "; its heading stays")
@@ -85,7 +85,7 @@ def carried_on(labels: DriveLabels, recording: OpenRecording, act: Propagate) ->
     assert isinstance(track, LabelTrack)
     placed = [each.frame for each in track.sightings if each.cuboid is not None]
     if not placed:
-        raise ActRefused(f"#{act.track} has no cuboid to carry on: fit (S) or draw one first")
+        raise ActRefused(f"#{act.track} has no cuboid to extend: fit (S) or draw one first")
     sweeps = sweeps_of(recording)
     found: list[Sighting] = []
     for way, end, forward in (("forward", placed[-1], True), ("backward", placed[0], False)):
@@ -93,7 +93,7 @@ def carried_on(labels: DriveLabels, recording: OpenRecording, act: Propagate) ->
             poses = poses_around(recording, end, MOST_FRAMES)
             found += propagated(track.sightings, labels.info.t_ns, sweeps, poses, forward=forward)
     if not found:
-        raise ActRefused(f"#{act.track} was not found beyond its ends")
+        raise ActRefused(f"#{act.track} was not found before its first or after its last frame")
     shapes = tuple(Placed(frame=each.frame, cuboid=_given(each.cuboid)) for each in found if each.cuboid is not None)
     return AddSightings(kind="propagate", track=act.track, revision=act.revision, sightings=shapes)
 

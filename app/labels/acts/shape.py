@@ -70,11 +70,11 @@ def add_sightings(draft: Draft, scope: Scope, act: AddSightings) -> str:
     old = draft.sightings(track.id)
     new = {each.frame: replace(each.sighting(), keyframe=False) for each in act.sightings if each.frame not in old}
     if not new:
-        raise ActRefused(f"#{track.id} was not found beyond its ends")
+        raise ActRefused(f"#{track.id} was not found before its first or after its last frame")
     scope.check(min(new), max(new))
     draft.put_sightings(track.id, dict(new))
     corrected(draft, track)
-    return f"carried #{track.id} on over {len(new)} frames, to {frames_text(min(*new, *old), max(*new, *old))}"
+    return f"extended #{track.id} by {len(new)} frames, to {frames_text(min(*new, *old), max(*new, *old))}"
 
 
 def flip(draft: Draft, scope: Scope, act: Flip) -> str:

@@ -72,7 +72,7 @@ def put(database: Database, drive: str, by: str, *, person: str | None = None, s
     now = next(each for each in queue(database) if each.key == key)
     new = replace(now, person=now.person if person is None else person, state=now.state if state is None else state)
     if state == "done" and by == new.person:
-        raise ActRefused(f"{by} labels {now.title}: a second person must say that it is done")
+        raise ActRefused(f"{by} labels {now.title}: a second person must mark it as done")
     if state in ("review", "done") and not now.labelled:
         raise ActRefused(f"{now.title}: nothing is labelled yet")
     if person and state is None and now.state == "open":

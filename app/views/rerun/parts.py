@@ -95,9 +95,9 @@ def boxes(
     )
 
 
-def encoded(picture: CameraImage) -> rr.EncodedImage:
+def encoded(image: CameraImage) -> rr.EncodedImage:
     """The camera's own JPEG unchanged; a raw image is encoded once."""
-    if picture.encoded is not None and picture.encoded.startswith(b"\xff\xd8"):
-        return rr.EncodedImage(contents=picture.encoded, media_type="image/jpeg")
-    jpeg = cv2.imencode(".jpg", picture.bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1]
+    if image.encoded is not None and image.encoded.startswith(b"\xff\xd8"):
+        return rr.EncodedImage(contents=image.encoded, media_type="image/jpeg")
+    jpeg = cv2.imencode(".jpg", image.bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1]
     return rr.EncodedImage(contents=jpeg.tobytes(), media_type="image/jpeg")

@@ -190,7 +190,7 @@ class RerunSink:
                 image_plane_distance=3.0,
             )
             self._rec.log(CAMERA, lens)
-        self._put(f"{CAMERA}/image", None if frame.picture is None else parts.encoded(frame.picture))
+        self._put(f"{CAMERA}/image", None if frame.image is None else parts.encoded(frame.image))
         self._put(f"{OVERLAYS}/points", self._projected(frame, result))
         layers = result.layers
         lidar_colors = {number: rgb("lidar") for number in layers.lidar_boxes}
@@ -209,9 +209,9 @@ class RerunSink:
     def _projected(self, frame: Frame, result: Result) -> rr.Points2D | None:
         model = projection.resolve(self._params, frame.camera)
         points = result.layers.points
-        if model is None or frame.picture is None or not len(points):
+        if model is None or frame.image is None or not len(points):
             return None
-        height, width = frame.picture.bgr.shape[:2]
+        height, width = frame.image.bgr.shape[:2]
         pixels = model.project(points[:, :3].astype(np.float64))
         with np.errstate(invalid="ignore"):
             inside = np.all((pixels >= 0) & (pixels < [width, height]), axis=1)

@@ -17,8 +17,8 @@ from app.views.colors import Rgb, rgb
 from pipeline.common.geometry import F64, inverse, transform
 from pipeline.types import Frame, FusedObject, Path, Point3
 
-_PICTURE_DISTANCE_M = 2.5
-_PICTURE_WIDTH_PX = 640
+_IMAGE_DISTANCE_M = 2.5
+_IMAGE_WIDTH_PX = 640
 
 
 def cloud(scene: viser.SceneApi, points: npt.NDArray[np.float32], colors: outlines.U8, size_m: float) -> None:
@@ -157,25 +157,25 @@ def camera_position(frame: Frame) -> Point3:
     return float(x), float(y), float(z)
 
 
-def picture(scene: viser.SceneApi, frame: Frame, wanted: bool) -> None:
+def image(scene: viser.SceneApi, frame: Frame, wanted: bool) -> None:
     """The camera image in its frustum, true to K. Distortion is not removed."""
-    if not wanted or frame.picture is None or frame.camera is None:
-        _hide(scene, "/camera/picture")
+    if not wanted or frame.image is None or frame.camera is None:
+        _hide(scene, "/camera/image")
         return _hide(scene, "/camera/edges")
     K, T_ego_camera = frame.camera.K, inverse(frame.camera.T_camera_ego)
-    height, width = frame.picture.bgr.shape[:2]
+    height, width = frame.image.bgr.shape[:2]
     pixels = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height], [width / 2, height / 2]])
-    flat = (pixels - K[:2, 2]) / [K[0, 0], K[1, 1]] * _PICTURE_DISTANCE_M
-    *corners, middle = transform(T_ego_camera, np.column_stack([flat, np.full(5, _PICTURE_DISTANCE_M)]))
+    flat = (pixels - K[:2, 2]) / [K[0, 0], K[1, 1]] * _IMAGE_DISTANCE_M
+    *corners, middle = transform(T_ego_camera, np.column_stack([flat, np.full(5, _IMAGE_DISTANCE_M)]))
     small = cv2.resize(
-        frame.picture.bgr, (_PICTURE_WIDTH_PX, max(1, round(_PICTURE_WIDTH_PX * height / width))),
+        frame.image.bgr, (_IMAGE_WIDTH_PX, max(1, round(_IMAGE_WIDTH_PX * height / width))),
         interpolation=cv2.INTER_AREA,
     )  # fmt: skip
     scene.add_image(
-        "/camera/picture",
+        "/camera/image",
         cv2.cvtColor(small, cv2.COLOR_BGR2RGB),
-        width / K[0, 0] * _PICTURE_DISTANCE_M,
-        height / K[1, 1] * _PICTURE_DISTANCE_M,
+        width / K[0, 0] * _IMAGE_DISTANCE_M,
+        height / K[1, 1] * _IMAGE_DISTANCE_M,
         format="jpeg",
         jpeg_quality=75,
         wxyz=viser.transforms.SO3.from_matrix(T_ego_camera[:3, :3]).wxyz,

@@ -62,7 +62,7 @@ class _Display:
     color_by: scene.ColorBy = "kind"
     point_size_m: float = 0.06
     labels: str = _LABELS[0]
-    picture: bool = True
+    image: bool = True
 
 
 class ViserView:
@@ -189,14 +189,14 @@ class ViserView:
             color_by = gui.add_dropdown("Colour by", get_args(scene.ColorBy), initial_value=start.color_by)
             size = gui.add_slider("Point size (m)", 0.02, 0.4, 0.01, start.point_size_m)
             labels = gui.add_dropdown("Labels", _LABELS, initial_value=start.labels)
-            picture = gui.add_checkbox("Camera image", start.picture)
+            image = gui.add_checkbox("Camera image", start.image)
 
         def chosen(_: Any) -> None:
             with self._lock:
-                self._display = _Display(color_by.value, size.value, labels.value, picture.value)
+                self._display = _Display(color_by.value, size.value, labels.value, image.value)
                 self._draw()
 
-        for handle in (color_by, size, labels, picture):
+        for handle in (color_by, size, labels, image):
             handle.on_update(chosen)
 
     # ------------------------------------------------------------ one frame
@@ -214,7 +214,7 @@ class ViserView:
             viser_nodes.path(self._scene, result.path, floor_m)
             viser_nodes.lanes(self._scene, scene.lane_lines(result), floor_m)
             viser_nodes.floor(self._scene, floor_m)
-            viser_nodes.picture(self._scene, frame, self._display.picture)
+            viser_nodes.image(self._scene, frame, self._display.image)
         self._draw_browsers()
 
     def _draw_browsers(self) -> None:

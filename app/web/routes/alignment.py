@@ -68,7 +68,7 @@ def alignment_router(engine: Engine, scenes: AlignmentScenes) -> APIRouter:
 
     @router.get("/score")
     def score() -> Score:
-        """Score the alignment of LiDAR and camera. Compares how well depth borders match image edges with the same
+        """Score the alignment of LiDAR and camera. Compares how well depth edges match image edges with the same
         for the mount rotated by up to 3°. Uses frames of the whole recording, which takes a second the first time; for
         live sensors, the frames shown at each request. 404 when nothing is shown."""
         seen = seen_now(engine, scenes)
@@ -90,7 +90,7 @@ def seen_now(engine: Engine, scenes: AlignmentScenes) -> list[Seen]:
 
 def _json(found: EdgeScore, local: LocalMatch, frames: int) -> Score:
     """frames: how many were looked at."""
-    text = f"{_sentence(found)} ({found.borders} borders in {frames} frame{'' if frames == 1 else 's'})"
+    text = f"{_sentence(found)} ({found.borders} depth edges in {frames} frame{'' if frames == 1 else 's'})"
     return Score(
         score=found.score,
         sigmas=found.sigmas,
@@ -110,7 +110,7 @@ def _json(found: EdgeScore, local: LocalMatch, frames: int) -> Score:
 
 def _brief(found: EdgeScore) -> str:
     if found.borders < FEWEST:
-        return "too few borders"
+        return "too few edges"
     if found.score is None:
         return "no clear best"
     return f"{100 * found.score:.0f} %" + (f" · better {_words(found.better)}" if found.better else "")
@@ -118,11 +118,11 @@ def _brief(found: EdgeScore) -> str:
 
 def _sentence(found: EdgeScore) -> str:
     if found.borders < FEWEST:
-        return "Too few LiDAR depth borders in the images for a score"
+        return "Too few LiDAR depth edges in the images for a score"
     if found.score is None:
         return f"No mount rotation within {REACH_DEG:.0f}° matches the image edges clearly best; no score"
     if found.better:
-        return f"LiDAR depth borders match the image edges better with {_words(found.better)}"
+        return f"LiDAR depth edges match the image edges better with {_words(found.better)}"
     return f"No mount rotation within {REACH_DEG:.0f}° matches the image edges clearly better than the current one"
 
 

@@ -25,7 +25,7 @@ class KeptAlignment(ApiModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    note: str = Field("", max_length=LONGEST_NOTE, description="What to remember about it")
+    note: str = Field("", max_length=LONGEST_NOTE, description="A note to store with it")
 
 
 class AlignmentVersionJson(ApiModel):
@@ -66,7 +66,7 @@ def alignment_versions_router(
 
     @router.post("", status_code=201)
     def keep(body: KeptAlignment) -> AlignmentVersionJson:
-        """Save the present alignment with date, recording, score and note. 404 when nothing is shown, 409 when it
+        """Save the current alignment with date, recording, score and note. 404 when nothing is shown, 409 when it
         cannot be saved."""
         params = engine.control.peek().params
         seen = seen_now(engine, scenes)

@@ -1,4 +1,4 @@
-"""What a drive cannot tell, in sentences: too few cars, all of them in one place, values that stay unsure."""
+"""What a drive cannot determine, as sentences: too few cars, all of them in one place, uncertain values."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ def warnings_of(
     near, far = np.quantile(table.range_m[cluster], [0.1, 0.9])
     bearing_deg = np.degrees(np.arctan2(table.foot[cluster, 1, 1], table.foot[cluster, 1, 0]))
     if len(best.rows) < FEW_PAIRS:
-        warnings.append(f"only {len(best.rows)} vehicles are seen by both sensors")
+        warnings.append(f"both sensors see only {len(best.rows)} vehicles")
     if far < SAME_RANGE * near:
         warnings.append(f"all vehicles are {near:.0f}–{far:.0f} m away: an angle and an offset look alike there")
     if bearing_deg.std() < SAME_BEARING_DEG:
-        warnings.append("all vehicles are in one direction: roll and resolution show only to the sides")
+        warnings.append("all vehicles are in one direction: roll and resolution need vehicles to the sides")
     for name, sigma in sigmas.items():
         limit, unit = _limit(model, best.vector, name)
         if sigma > limit:
-            warnings.append(f"{name.rpartition('_')[0]} is known to ±{sigma:.2g}{unit} only")
+            warnings.append(f"{name.rpartition('_')[0]} is known only to ±{sigma:.2g}{unit}")
     others = [each for each in found[1:] if _apart(model, best.vector, each.vector)]
     if others and others[0].explained > AMBIGUOUS * best.explained:
         warnings.append("another alignment explains the drive nearly as well: choose a drive with more traffic")

@@ -1,4 +1,4 @@
-"""From a drive to a fitted alignment: which frames are looked at, and what of them is kept."""
+"""Fits the alignment to a drive: selects frames and collects boxes and clusters."""
 
 from __future__ import annotations
 

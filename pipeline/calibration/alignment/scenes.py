@@ -63,7 +63,7 @@ class FitScene:
 
 def fit_scene(frame: Frame, params: Params) -> FitScene | None:
     """A frame whose ``raw_boxes`` a detector has filled in. None where a box or a cluster is missing."""
-    if frame.sweep is None or frame.raw_boxes is None or frame.picture_size is None:
+    if frame.sweep is None or frame.raw_boxes is None or frame.image_size is None:
         return None
     detections = [d for d in select(frame.raw_boxes, params.detection) if d.label in VEHICLES and d.score >= MIN_SCORE]
     seen = segmentation.segment(frame.sweep, frame.ego, params, Stopwatch())
@@ -73,11 +73,11 @@ def fit_scene(frame: Frame, params: Params) -> FitScene | None:
     if not outlines:
         return None
     boxes = np.array([d.bbox for d in detections], dtype=np.float64)
-    width, height = frame.picture_size
+    width, height = frame.image_size
     whole = np.abs(boxes - [0.0, 0.0, width, height]) > BORDER_PX
     outline, roof, foot = (np.array(part) for part in zip(*outlines, strict=True))
     range_m = np.array([np.hypot(*each[1, :2]) for each in foot])
-    return FitScene(boxes, whole, outline, roof, foot, range_m, frame.picture_size, frame.camera, frame.t_ns)
+    return FitScene(boxes, whole, outline, roof, foot, range_m, frame.image_size, frame.camera, frame.t_ns)
 
 
 def _outlines(

@@ -22,7 +22,8 @@ STRAIGHT_DEG = 0.3
 def fit_mount_drive(
     frame_of: Callable[[int], Frame], count: int, params: Params, progress: Progress = silent
 ) -> MountFit:
-    """The mount, of a drive of so many frames. NoMount where it tells nothing. An exception of ``progress`` ends it."""
+    """The mount, from a drive of ``count`` frames. Raises NoMount if the drive does not determine it. An exception of
+    ``progress`` ends it."""
     total = 2 * len(looked_at(count))
     fit = fit_mount(observe(frame_of, count, params, lambda done, _: progress(done, total)))
     if abs(fit.values.get("yaw_deg", 0.0)) > STRAIGHT_DEG:

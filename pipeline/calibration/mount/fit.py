@@ -39,7 +39,7 @@ ROBUST_M = 0.1
 
 
 class NoMount(BadInput):
-    """A drive that tells nothing of the mount; the text says why."""
+    """The drive does not determine any part of the mount; the text says why."""
 
 
 @dataclass(frozen=True)
@@ -49,21 +49,21 @@ class MountFit:
     values: Mapping[str, float]
     """yaw_deg to the left of the direction of travel, pitch_deg downwards and roll_deg clockwise against the road,
     height_m of the ego origin above it; ahead_of_axle_m and left_of_axle_m of the rear axle's middle. Only those that
-    the drive tells."""
+    the drive determines."""
     sigmas: Mapping[str, float]
     """Standard deviation of each value."""
     frames: int
     """Frames with the road."""
     driven_m: float
-    """Way on which the odometry was sure."""
+    """Distance driven with reliable odometry."""
     speed_scale: float | None
     """What the LiDAR drives for each metre of the car's own speed; None without that."""
     warnings: tuple[str, ...] = ()
-    """What the drive cannot tell, in sentences."""
+    """What the drive does not determine, in sentences."""
 
 
 def fit_mount(record: MountRecord) -> MountFit:
-    """Every value that the drive tells. NoMount where it tells none."""
+    """Every value that the drive determines. Raises NoMount if there is none."""
     values: dict[str, float] = {}
     sigmas: dict[str, float] = {}
     warnings: list[str] = []
@@ -85,15 +85,15 @@ def fit_mount(record: MountRecord) -> MountFit:
                 _take(values, sigmas, along)
     else:
         driven = sum(hypot(each.forward_m, each.left_m) for each in record.pieces)
-        warnings.append(f"only {driven:.0f} m driven with sure LiDAR odometry: no yaw")
+        warnings.append(f"only {driven:.0f} m driven with reliable LiDAR odometry: no yaw")
     if not values:
         raise NoMount("; ".join(warnings))
     for name, limit in UNSURE.items():
         if sigmas.get(name, 0.0) > limit:
             unit = "°" if name.endswith("_deg") else " m"
-            warnings.append(f"{name.rpartition('_')[0]} is known to ±{sigmas[name]:.2g}{unit} only")
+            warnings.append(f"{name.rpartition('_')[0]} is known only to ±{sigmas[name]:.2g}{unit}")
     if "yaw_deg" in values and "ahead_of_axle_m" not in values:
-        warnings.append("too straight a drive: the distance to the rear axle is not told")
+        warnings.append("the drive is too straight: the distance to the rear axle is unknown")
     driven_m = sum(hypot(each.forward_m, each.left_m) for each in record.pieces)
     return MountFit(values, sigmas, len(record.roads), round(driven_m, 1), scale, tuple(warnings))
 
@@ -104,8 +104,8 @@ def mount_sentence(fit: MountFit) -> str:
 
 
 def turned(fit: MountFit, T_ego_lidar: F64, camera: CameraCalibration | None) -> tuple[CameraCalibration | None, F64]:
-    """Camera and LiDAR (4, 4) in the ego frame as the fit turns it: level, x along the direction of travel. What the
-    drive does not tell stays as it is; the two sensors keep their place to each other."""
+    """Camera and LiDAR (4, 4) in the ego frame as the fit turns it: level, x along the direction of travel. Values
+    that the drive does not determine stay as they are; the two sensors keep their relative pose."""
     turn = np.eye(4)
     turn[:3, :3] = turn_of(fit.values)
     moved = replace(camera, T_camera_ego=camera.T_camera_ego @ inverse(turn)) if camera is not None else None

@@ -1,4 +1,4 @@
-"""What a drive shows of how the LiDAR sits in the car: the road below it in every frame, and its own way.
+"""What a drive shows of the LiDAR's mount: the road below it in every frame, and its own motion.
 
 The way is that of the LiDAR's odometry, the road the plane through its returns in the own lane, where a road is
 flattest. Nothing of the camera is needed.

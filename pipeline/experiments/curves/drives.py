@@ -80,7 +80,7 @@ def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[Wor
     sensors = SensorRig(scene, scene.ego.start_m + scene.ego.travelled_m(scene.duration_s))
     for index in range(scene.frame_count()):
         now = world_state.at(scene, index / scene.rate_hz)
-        frame = sensors.frame(now, index, round(now.t_s * 1e9), picture=False)
+        frame = sensors.frame(now, index, round(now.t_s * 1e9), image=False)
         assert frame.camera is not None
         found = truth_boxes.boxes(now, frame.camera, BOXES, scene.seed, index)
         lanes = None if lines is None else lane_points(now, scene.road, frame.camera, lines, scene.seed, index)

@@ -17,7 +17,7 @@ from pipeline.decision.path_position import near_face_middle
 from pipeline.experiments.true_lead import EDGE_M, MAX_M, VISIBLE_SHARE, ScriptedWay, overlap, same_place, true_lead
 from pipeline.params import AebParams, CipvParams
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.sensors.truth_boxes import in_picture
+from pipeline.simulation.sensors.truth_boxes import in_image
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.types import CameraCalibration, FusedObject, Path, Point2, Result
@@ -247,7 +247,7 @@ def _in_path(state: ActorState, path: Path, behind_m: float = 0.0) -> bool:
 
 
 def _is_hidden(now: World, camera: CameraCalibration, lead: ActorState) -> bool:
-    seen = next((each for each in in_picture(now, camera) if each.actor.actor.id == lead.actor.id), None)
+    seen = next((each for each in in_image(now, camera) if each.actor.actor.id == lead.actor.id), None)
     return seen is not None and seen.visible < VISIBLE_SHARE
 
 

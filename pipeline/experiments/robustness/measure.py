@@ -77,10 +77,10 @@ def count(recording: int, source: Source, labels: str, detector: str | None, int
     look, parts = detector_for(source, detector), left_out(labels)
     for index, truth in enumerate(truths(source, labels)):
         frame = source.frame(index)
-        if truth is None or frame.picture is None or frame.camera is None:
+        if truth is None or frame.image is None or frame.camera is None:
             continue
         into.frames += 1
-        boxes = select(look.detect(frame.picture.bgr), DetectionParams())
+        boxes = select(look.detect(frame.image.bgr), DetectionParams())
         ignored = parts.get(index, ())
         vehicles = tuple(box for box in boxes if box.label in VEHICLES and not _is_left_out(box.bbox, ignored))
         _compare(recording, index, frame.t_ns / 1e9, truth, vehicles, frame.camera, into)

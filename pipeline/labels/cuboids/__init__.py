@@ -1,1 +1,1 @@
-"""Cuboids from points: one sweep or several laid over each other, snapped, refined, carried on."""
+"""Cuboids from points of one sweep or several overlaid sweeps: snapping, refining, extending tracks."""

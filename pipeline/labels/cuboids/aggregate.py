@@ -1,4 +1,4 @@
-"""A vehicle's points of several sweeps laid over each other, in the ego frame of one of them.
+"""Overlays a vehicle's points of several sweeps in the ego frame of one of them.
 
 Sixteen beams show a few dozen points of a car in a sweep; a dozen sweeps show its outline. A standing vehicle's points
 are carried along by own motion, a moving one's by its own track: which of both holds them together better is tried, as

@@ -1,4 +1,4 @@
-"""A track carried on beyond its ends, from sweep to sweep.
+"""Extends a track beyond its first and last frame, sweep by sweep.
 
 From the frame at an end, where a person or the pipeline has put it, the vehicle is predicted over the ground (constant
 velocity; a single frame is tried both standing and driving along with us), and laid on the points that are found there.

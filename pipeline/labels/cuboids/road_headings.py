@@ -1,4 +1,4 @@
-"""Proposed vehicles turned along the road, where their shape nearly says so.
+"""Aligns proposed vehicles with the road if their shape nearly is.
 
 A box around a few points of a car is turned by 3° to 5° at random. A road is not: a vehicle that drives or is parked
 along it faces as the car with the sensors did, or will, at the nearest place of its own way. On KITTI's drive 0009 that

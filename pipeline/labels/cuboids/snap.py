@@ -1,4 +1,4 @@
-"""A cuboid that a hand has put somewhere near a vehicle, snapped to the points of it.
+"""Snaps a cuboid that a person placed near a vehicle to the vehicle's points.
 
 The points in and near it that are not ground are clustered; the cluster with most points in it (else near it) is the
 vehicle. Several placements are tried: the sides that were turned to us laid on the points, the turn kept or taken from
@@ -46,7 +46,7 @@ _GROUND_GAP_M = 0.6
 
 
 class TooFewPoints(BadInput):
-    """There is nothing to lay a cuboid on."""
+    """There are too few points to fit a cuboid to."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Refitted:
 
 
 def refit(sweep: F32 | Clustered, cuboid: Cuboid, around: Aggregate | None = None) -> Refitted:
-    """Lay a cuboid on the points in and near it, if that fits better than where it is.
+    """Fit a cuboid to the points in and near it, if that is better than where it is.
 
     sweep: (N, 4) float32 ``x y z intensity``, ego frame. around: the same vehicle's points of several sweeps.
     TooFewPoints, with how many there are, for fewer than five.
@@ -123,7 +123,7 @@ def _shape_turn_rad(points: F32, ground: Ground, cuboid: Cuboid) -> float:
 
 
 def onto_points(points: F32, ground: Ground, cuboid: Cuboid) -> Refitted:
-    """Lay a cuboid that nobody has placed on (M, 4) points that are all of its vehicle."""
+    """Fit a cuboid that nobody has placed to (M, 4) points, all of them its vehicle's."""
     turn_rad = _shape_turn_rad(points, ground, cuboid)
     yaw_rad = cuboid.yaw_rad + turn_rad
     found = outline(points, np.zeros((1, 2)), yaw_rad)

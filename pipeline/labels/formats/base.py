@@ -1,4 +1,4 @@
-"""What a format of labels is, and what it must know of the drive that the labels belong to."""
+"""What a label format is, and what it needs to know of the recording that the labels belong to."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class FrameInfo:
     """One frame, without its data."""
 
     name: str
-    """The recording's own name of the frame."""
+    """The frame's name in the recording."""
     t_ns: int
     """Of the tick."""
     camera: CameraCalibration | None = None
@@ -62,7 +62,7 @@ class LabeledDrive:
         return tuple(shot.t_ns for shot in self.shots)
 
     def file_names(self) -> tuple[str, ...]:
-        """A name for a file of each frame: the recording's own names where they can be that, else its numbers."""
+        """A file name for each frame: the recording's own names if they are valid file names, otherwise numbers."""
         names = self.frames
         if len({name.lower() for name in names}) == len(names) and all(_FILE_NAME.fullmatch(name) for name in names):
             return names
@@ -100,7 +100,7 @@ def drive_of(
 
 def _size(frame: Frame) -> tuple[int, int] | None:
     """Of the image, where no calibration tells it."""
-    return (frame.picture.bgr.shape[1], frame.picture.bgr.shape[0]) if frame.picture is not None else None
+    return (frame.image.bgr.shape[1], frame.image.bgr.shape[0]) if frame.image is not None else None
 
 
 @dataclass(frozen=True)
@@ -122,8 +122,8 @@ ReadLabels = Callable[[Path, LabeledDrive, Origin], Imported]
 
 
 def check_extrinsic(labels: LabelSet, drive: LabeledDrive, what: str) -> None:
-    """BadInput when cuboids and boxes of the same sightings lie apart in the image: the sign of an extrinsic that was
-    taken the wrong way round, or of labels of another recording."""
+    """Raise BadInput if cuboids and boxes of the same sightings do not overlap in the image: a sign of an inverted
+    extrinsic, or of labels of another recording."""
     count, apart = 0, 0
     for frame, pairs in _pairs(labels).items():
         camera = drive.shots[frame].camera
@@ -155,7 +155,8 @@ def _touch(one: Box | None, other: Box) -> bool:
 
 
 def make_folder(out: Path) -> Path:
-    """A folder to write into, made if need be. BadInput when files are in it already: old labels among the new."""
+    """Create a folder to write into. Raises BadInput if it already contains files, which would mix old and new
+    labels."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BadInput(f"{out}: the folder is not empty; choose another name or remove it")
     out.mkdir(parents=True, exist_ok=True)
@@ -163,7 +164,7 @@ def make_folder(out: Path) -> Path:
 
 
 def write_file(out: Path, data: bytes) -> None:
-    """A new file. BadInput when there is one."""
+    """Write a new file. Raises BadInput if it exists."""
     out.parent.mkdir(parents=True, exist_ok=True)
     try:
         with out.open("xb") as file:

@@ -1,4 +1,4 @@
-"""Reading files that may be anything: one clear error, whatever is in them."""
+"""Reads files of unknown content: one clear error, whatever is in them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 
 def read_bytes(path: Path) -> bytes:
-    """The whole file. BadInput when it cannot be read, or is larger than any labels are."""
+    """The whole file. Raises BadInput if it cannot be read or is too large for labels."""
     try:
         return read_regular(path, _LARGEST_BYTES)
     except (OSError, ValueError) as error:

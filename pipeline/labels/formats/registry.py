@@ -1,4 +1,4 @@
-"""Every format of labels, declared once, and the two things that are done with one.
+"""Every label format, declared once, and how labels are exported and imported with one.
 
 A new format is one file with ``write`` and ``read``, and one entry in ``FORMATS``: the commands' ``--format``, the API
 and the page list what is here. Nothing of a format is imported before it is used.

@@ -42,7 +42,7 @@ class SweepRef:
 
 
 @dataclass(frozen=True)
-class PictureRef:
+class ImageRef:
     """An image stored as a message of its own."""
 
     at_ns: Nanoseconds
@@ -108,7 +108,7 @@ class CameraRecord:
         return CameraCalibration(K, np.array(self.distortion), T_camera_ego, self.width, self.height, self.road_z_m)
 
 
-R = TypeVar("R", SweepRef | None, PictureRef | None, CameraRecord | None)
+R = TypeVar("R", SweepRef | None, ImageRef | None, CameraRecord | None)
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class FrameRecord:
     """None without one, or when it is stored as packets."""
     packets: PacketsRef | None = None
     """None unless the sweep is stored as packets."""
-    picture: PictureRef | None = None
+    picture: ImageRef | None = None
     """None without an image."""
     camera: CameraRecord | None = None
     """None without a calibration."""

@@ -71,13 +71,13 @@ def _first_of(layout: np.dtype[np.void]) -> np.dtype[np.void]:
     return np.dtype({"names": ["xyzi"], "formats": ["V16"], "offsets": [0], "itemsize": layout.itemsize})
 
 
-def image_message(picture: CameraImage, t_ns: int) -> bytes:
+def image_message(image: CameraImage, t_ns: int) -> bytes:
     """``foxglove.CompressedImage``: the camera's JPEG as it came, else a PNG. t_ns: the tick, for a camera without
     stamps of its own."""
-    taken_ns = t_ns if picture.t_ns is None else picture.t_ns
-    if picture.encoded is not None:
-        return jpeg_message(picture.encoded, taken_ns)
-    return _compressed(cv2.imencode(".png", picture.bgr, _PNG_FAST)[1].tobytes(), "png", taken_ns)
+    taken_ns = t_ns if image.t_ns is None else image.t_ns
+    if image.encoded is not None:
+        return jpeg_message(image.encoded, taken_ns)
+    return _compressed(cv2.imencode(".png", image.bgr, _PNG_FAST)[1].tobytes(), "png", taken_ns)
 
 
 def jpeg_message(data: bytes, t_ns: int) -> bytes:
@@ -96,7 +96,7 @@ def _compressed(data: bytes, kind: Literal["jpeg", "png"], t_ns: int) -> bytes:
     return to_bytes(message(timestamp=stamp(t_ns), frame_id=topics.CAMERA_FRAME, data=data, format=kind))
 
 
-def picture_from(data: bytes, t_ns: int | None) -> CameraImage:
+def image_from(data: bytes, t_ns: int | None) -> CameraImage:
     """The image of a message of ``image_message``. Damaged when it cannot be decoded."""
     message = _parse(topics.IMAGE, data)
     try:

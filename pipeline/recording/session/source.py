@@ -17,8 +17,8 @@ from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
 from pipeline.recording.mcap.reader import McapFile, NotMcap
 from pipeline.recording.session.frame_list import I64, listed_records, listed_times
-from pipeline.recording.session.frame_record import CameraRecord, FrameRecord, PictureRef, frame_record_from, route_from
-from pipeline.recording.session.messages import log_text, picture_from, sweep_from
+from pipeline.recording.session.frame_record import CameraRecord, FrameRecord, ImageRef, frame_record_from, route_from
+from pipeline.recording.session.messages import image_from, log_text, sweep_from
 from pipeline.recording.session.provenance import VERSION, About
 from pipeline.recording.session.velodyne_scan import sweep_of_packets
 from pipeline.types import CameraCalibration, CameraImage, Frame, GnssFix, Route, Sweep
@@ -54,7 +54,7 @@ class SessionSource:
         self.uri, self.origin, self.title, self.rate_hz = uri, about.origin, about.title, about.rate_hz
         self.is_simulated = about.is_of_simulator
         self.notes = (*about.notes, *self._problems(path))
-        self._picture: tuple[PictureRef, CameraImage] | None = None
+        self._image: tuple[ImageRef, CameraImage] | None = None
         self._camera: tuple[CameraRecord, CameraCalibration] | None = None
         self._route: tuple[int, Route] | None = None
 
@@ -89,7 +89,7 @@ class SessionSource:
             tick.name,
             tick.t_ns,
             _or_note(lambda: self._sweep(tick, self.log_time_ns(index)), notes) if is_whole else None,
-            _or_note(lambda: self._read_picture(tick.picture), notes) if is_whole else None,
+            _or_note(lambda: self._read_image(tick.picture), notes) if is_whole else None,
             _or_note(lambda: self._read_camera(tick.camera), notes),
             tick.ego,
             gnss=tick.gnss,
@@ -210,13 +210,13 @@ class SessionSource:
         ref = tick.sweep
         return sweep_from(self.file.message(topics.POINTS, ref.at_ns).data, ref.t_ns, ref.channels, ref.origin)
 
-    def _read_picture(self, ref: PictureRef | None) -> CameraImage | None:
+    def _read_image(self, ref: ImageRef | None) -> CameraImage | None:
         """One image may serve several ticks, and is the same object then."""
         if ref is None:
             return None
-        held = self._picture
+        held = self._image
         if held is None or held[0] != ref:
-            held = self._picture = ref, picture_from(self.file.message(topics.IMAGE, ref.at_ns).data, ref.t_ns)
+            held = self._image = ref, image_from(self.file.message(topics.IMAGE, ref.at_ns).data, ref.t_ns)
         return held[1]
 
     def _read_camera(self, record: CameraRecord | None) -> CameraCalibration | None:

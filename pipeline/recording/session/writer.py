@@ -16,7 +16,7 @@ from pipeline.recording.session.frame_list import FrameList
 from pipeline.recording.session.frame_record import (
     CameraRecord,
     FrameRecord,
-    PictureRef,
+    ImageRef,
     SweepRef,
     ego_message,
     frame_record_message,
@@ -70,7 +70,7 @@ class SessionWriter:
         self._kept_frames = 0
         self._header_ns = 0
         self._tick: FrameRecord | None = None
-        self._picture: CameraImage | None = None
+        self._image: CameraImage | None = None
         self._camera: CameraCalibration | None = None
         self._route: Route | None = None
         self._params: Params | None = None
@@ -121,7 +121,7 @@ class SessionWriter:
             notes=frame.notes,
             sweep=self._put_sweep(frame.sweep, at_ns) if self._raw_lidar is None else None,
             packets=self._raw_lidar.reference(frame.sweep) if self._raw_lidar is not None and frame.sweep else None,
-            picture=self._put_picture(frame.picture, at_ns),
+            picture=self._put_image(frame.image, at_ns),
             camera=self._put_camera(frame.camera, at_ns),
             ego=frame.ego,
             gnss=frame.gnss,
@@ -151,7 +151,7 @@ class SessionWriter:
         if self._sweeps.log_time(sweep.points) is None:
             self._add_sweep(sweep, self._clock.log_time(sweep.t_ns, arrived_ns))
 
-    def write_picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
+    def write_image(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
         """An image when it came, whether or not a tick shows it: the JPEG as it is; of a camera that gives none, one
         of good quality. A frame with this very JPEG then refers to it."""
         data = shot.encoded if shot.encoded is not None else jpeg_of(shot)
@@ -222,17 +222,17 @@ class SessionWriter:
         self._add(topics.POINTS, at_ns, points_message(sweep), sweep.t_ns)
         self._sweeps.add(sweep.points, at_ns)
 
-    def _put_picture(self, picture: CameraImage | None, at_ns: int) -> PictureRef | None:
-        if picture is None:
+    def _put_image(self, image: CameraImage | None, at_ns: int) -> ImageRef | None:
+        if image is None:
             return None
-        if picture is self._picture and self._tick is not None and self._tick.picture is not None:
+        if image is self._image and self._tick is not None and self._tick.picture is not None:
             return self._tick.picture
-        self._picture = picture
-        came_at_ns = self._came.log_time(picture.encoded)
+        self._image = image
+        came_at_ns = self._came.log_time(image.encoded)
         if came_at_ns is not None:
-            return PictureRef(came_at_ns, picture.t_ns)
-        self._add(topics.IMAGE, at_ns, image_message(picture, self._header_ns), picture.t_ns)
-        return PictureRef(at_ns, picture.t_ns)
+            return ImageRef(came_at_ns, image.t_ns)
+        self._add(topics.IMAGE, at_ns, image_message(image, self._header_ns), image.t_ns)
+        return ImageRef(at_ns, image.t_ns)
 
     def _put_camera(self, camera: CameraCalibration | None, at_ns: int) -> CameraRecord | None:
         before = self._tick.camera if self._tick is not None else None

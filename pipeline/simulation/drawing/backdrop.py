@@ -38,19 +38,19 @@ def sky(width: int, horizon: int, seed: int) -> U8:
     rows, columns = horizon + 2, 3 * width
     height = np.linspace(1.0, 0.0, rows, dtype=np.float32)[:, None]
     gradient = (HAZE_BGR + (_ZENITH_BGR - HAZE_BGR) * (height**0.75)[..., None]).astype(np.float32)
-    picture = np.broadcast_to(gradient, (rows, columns, 3)).copy()
+    image = np.broadcast_to(gradient, (rows, columns, 3)).copy()
     stretched = cv2.resize(_octaves(rng, 256, (4, 8, 16, 32, 64)), (columns, rows * 2))[:rows]
     cloud = np.clip((stretched - 0.55) * 3.2, 0.0, 1.0) * np.clip(height * 2.2, 0.0, 1.0) * 0.8
-    picture += (np.array([252.0, 250.0, 247.0], dtype=np.float32) - picture) * cloud[..., None]
+    image += (np.array([252.0, 250.0, 247.0], dtype=np.float32) - image) * cloud[..., None]
     for distance_m, size_px, colour in ((2600, 34, (120, 128, 96)), (1300, 22, (84, 112, 78)), (600, 15, (60, 92, 66))):
-        _ridge(picture, rng, horizon, size_px, np.array(colour, dtype=float), distance_m)
-    painted: U8 = np.clip(picture, 0, 255).astype(np.uint8)
+        _ridge(image, rng, horizon, size_px, np.array(colour, dtype=float), distance_m)
+    painted: U8 = np.clip(image, 0, 255).astype(np.uint8)
     return painted
 
 
-def _ridge(picture: F32, rng: np.random.Generator, horizon: int, size_px: int, bgr: F64, distance_m: float) -> None:
+def _ridge(image: F32, rng: np.random.Generator, horizon: int, size_px: int, bgr: F64, distance_m: float) -> None:
     """A line of hills or woods along the horizon, seen through the haze."""
-    columns = picture.shape[1]
+    columns = image.shape[1]
     knots = rng.random(columns // 90 + 2)
     fine = rng.random(columns // 7 + 2)
     at = np.arange(columns)
@@ -60,9 +60,9 @@ def _ridge(picture: F32, rng: np.random.Generator, horizon: int, size_px: int, b
     colour = bgr * clear + HAZE_BGR * (1 - clear)
     top = horizon - line * size_px
     first = max(int(top.min()), 0)
-    rows = np.arange(first, picture.shape[0])[:, None]
+    rows = np.arange(first, image.shape[0])[:, None]
     cover = np.clip(rows - top[None, :], 0.0, 1.0)[..., None]
-    picture[first:] += (colour - picture[first:]) * cover
+    image[first:] += (colour - image[first:]) * cover
 
 
 def _octaves(rng: np.random.Generator, size: int, steps: tuple[int, ...]) -> F32:

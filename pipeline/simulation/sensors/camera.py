@@ -43,7 +43,7 @@ def calibration(model: CameraModel = ORDINARY) -> CameraCalibration:
 
 @lru_cache(maxsize=2)
 def _prepared(model: CameraModel, seed: int) -> tuple[ImageSensor, backdrop.GroundTexture]:
-    """What no picture changes, and takes as long as a dozen of them: who opens a scenario again has it at once."""
+    """What no image changes, and takes as long as a dozen of them: who opens a scenario again has it at once."""
     camera = calibration(model)
     return ImageSensor(camera, model, seed), backdrop.GroundTexture(camera, -LIDAR_HEIGHT_M, seed)
 
@@ -57,7 +57,7 @@ class DrawnCamera:
         self._road, self._roadside = road, roadside
         self._sky = backdrop.sky(WIDTH, self._ground.horizon, seed)
 
-    def picture(self, world: World) -> U8:
+    def image(self, world: World) -> U8:
         """(720, 1280, 3) uint8 blue green red of one moment."""
         return self._sensor.expose(self._drawn(world), world.t_s)
 

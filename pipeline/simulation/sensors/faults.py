@@ -31,7 +31,7 @@ class Faults(ScenarioPart):
     nods_deg: float = Field(default=0.0, ge=0.0, le=5.0)
     """Standard deviation by which the car, and both sensors with it, nods on bumps and when it brakes."""
     camera_skew_ms: float = Field(default=0.0, ge=-200.0, le=200.0)
-    """Pictures show the world this much after the tick that they are said to be of."""
+    """Images show the world this much after the tick that they are said to be of."""
     lost_rings: tuple[Ring, ...] = ()
     """Rings of the LiDAR that give nothing, 0 the lowest."""
     spurious_clusters: float = Field(default=0.0, ge=0.0, le=10.0)

@@ -20,7 +20,7 @@ import numpy as np
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.measured_noise import SHARES, MeasuredNoise, measured
 from pipeline.simulation.sensors.series import lasting
-from pipeline.simulation.sensors.truth_boxes import LABELS, LAW, VisibleVehicle, in_picture
+from pipeline.simulation.sensors.truth_boxes import LABELS, LAW, VisibleVehicle, in_image
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, World
 from pipeline.types import F64, CameraCalibration, RawBoxes
@@ -74,7 +74,7 @@ class RealDetector:
         """What is found in the image that ``camera`` takes of the world ``now``. index: of the frame."""
         found, scores, labels = [], [], []
         rng = np.random.default_rng([self._scenario.seed, 13, index])
-        for seen in in_picture(now, camera):
+        for seen in in_image(now, camera):
             series = self._series(seen.actor.actor.id)[min(index, self._frames - 1)]
             fresh = np.random.default_rng([self._scenario.seed, 14, index, seen.actor.actor.id]).standard_normal(8)
             if _share_below(series[_MISS]) > self._found(seen):

@@ -32,13 +32,13 @@ class SensorRig:
             scenario.road, scenario.seed, scenario.ego.start_m - _BEFORE_M, end_m + _BEYOND_M
         )
 
-    def frame(self, now: World, index: int, t_ns: int, picture: bool = True) -> Frame:
-        """What the sensors deliver at one tick. picture: render the camera's image; without it the frame is made ten
+    def frame(self, now: World, index: int, t_ns: int, image: bool = True) -> Frame:
+        """What the sensors deliver at one tick. image: render the camera's image; without it the frame is made ten
         times faster and still has the camera calibration."""
         return evolve(
             self.outline(now, index, t_ns),
             sweep=self.sweep(now, index, t_ns),
-            picture=CameraImage(t_ns, self._camera.picture(now)) if picture else None,
+            image=CameraImage(t_ns, self._camera.image(now)) if image else None,
             route=self._route,
         )
 

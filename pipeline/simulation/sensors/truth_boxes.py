@@ -47,7 +47,7 @@ class VisibleVehicle:
 def boxes(now: World, camera: CameraCalibration, noise: BoxNoise, seed: int, index: int) -> RawBoxes:
     """The boxes of one moment. The same seed, index and world give the same boxes, whatever came before."""
     found, labels = [], []
-    for seen in in_picture(now, camera):
+    for seen in in_image(now, camera):
         actor = seen.actor.actor
         lasting = np.random.default_rng([seed, 3, actor.id]).standard_normal(4)
         rng = np.random.default_rng([seed, 4, index, actor.id])
@@ -66,7 +66,7 @@ def boxes(now: World, camera: CameraCalibration, noise: BoxNoise, seed: int, ind
     return RawBoxes("truth", edges, np.full(len(edges), _SCORE, np.float32), tuple(labels), LAW)
 
 
-def in_picture(now: World, camera: CameraCalibration) -> tuple[VisibleVehicle, ...]:
+def in_image(now: World, camera: CameraCalibration) -> tuple[VisibleVehicle, ...]:
     """Every vehicle ahead whose cuboid falls into the image, nearest first."""
     alignment = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
     corners = corners_of([state.cuboid for state in reversed(now.actors)])

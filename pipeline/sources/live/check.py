@@ -48,8 +48,8 @@ def check(source: LiveSensors, seconds: float) -> list[SensorReport]:
     try:
         while (left_s := end_s - time.monotonic()) > 0.0 or (left_s > -_LATE_S and _is_one_late(source)):
             frame = source.next(max(left_s, _LOOK_S))
-            if frame is not None and frame.sweep is not None and frame.picture is not None and frame.picture.t_ns:
-                skews_ms.append((frame.picture.t_ns - frame.sweep.t_ns) / 1e6)
+            if frame is not None and frame.sweep is not None and frame.image is not None and frame.image.t_ns:
+                skews_ms.append((frame.image.t_ns - frame.sweep.t_ns) / 1e6)
         return [_report(source, health, skews_ms) for health in source.health()]
     finally:
         source.close()

@@ -62,7 +62,7 @@ class LiveSensors:
         sync = self._sync
         self._streams: dict[str, SensorBuffer[Any]] = {
             "lidar": sync.sweeps,
-            "camera": sync.pictures,
+            "camera": sync.images,
             "gnss": sync.fixes,
             "ego": sync.egos,
         }
@@ -164,8 +164,8 @@ class LiveSensors:
 
     def _take_shot(self, t_ns: int, shot: Shot, arrived_ns: int) -> None:
         tap = self._tap
-        if self._add(self._sync.pictures, t_ns, shot, arrived_ns) and tap is not None:
-            tap.picture(shot, t_ns, arrived_ns)
+        if self._add(self._sync.images, t_ns, shot, arrived_ns) and tap is not None:
+            tap.image(shot, t_ns, arrived_ns)
 
     def _take_ego(self, t_ns: int, ego: EgoState, arrived_ns: int) -> None:
         tap = self._tap
@@ -188,7 +188,7 @@ class LiveSensors:
         self.dropped += together.replaced
         self._index += 1 + together.replaced
         notes = list(together.notes)
-        picture = self._picture(together, notes)
+        image = self._image(together, notes)
         decoded_ns = self._clock.now_ns()
         streams = self.health()
         missing = not_delivering(streams)
@@ -198,8 +198,8 @@ class LiveSensors:
             f"{self._index:06d}",
             together.t_ns,
             sweep=together.sweep.value if together.sweep is not None else None,
-            picture=picture,
-            camera=calibration_for(self.camera, picture, notes),
+            image=image,
+            camera=calibration_for(self.camera, image, notes),
             ego=together.ego,
             notes=tuple(notes),
             gnss=together.gnss,
@@ -211,15 +211,15 @@ class LiveSensors:
             },
         )
 
-    def _picture(self, together: Together[Shot], notes: list[str]) -> CameraImage | None:
-        if together.picture is None:
+    def _image(self, together: Together[Shot], notes: list[str]) -> CameraImage | None:
+        if together.image is None:
             return None
-        shot = together.picture.value
+        shot = together.image.value
         bgr = shot.bgr()
         if bgr is None:
             notes.append("the image is damaged")
             return None
-        return CameraImage(together.picture.t_ns, bgr, shot.encoded)
+        return CameraImage(together.image.t_ns, bgr, shot.encoded)
 
 
 def _about(config: LiveConfig) -> tuple[str, ...]:

@@ -21,8 +21,8 @@ _PAST_NS, _FUTURE_NS = 2_000_000_000, 200_000_000
 """A message stamped outside these bounds around now is of a clock that was set, or damaged."""
 _PATIENCE_NS, _LONGEST_PATIENCE_NS = 250_000_000, 1_000_000_000
 """The LiDAR is waited for three of its periods, within these bounds, before the camera ticks instead."""
-_KEPT, _PICTURES_KEPT = 64, 24
-"""Pictures are large; so many are 0.4 s of a 60 Hz camera, and a sweep is 0.05 s old when it is whole."""
+_KEPT, _IMAGES_KEPT = 64, 24
+"""Images are large; so many are 0.4 s of a 60 Hz camera, and a sweep is 0.05 s old when it is whole."""
 _HELD_PERIODS, _HELD_AT_LEAST_NS, _HELD_UNKNOWN_NS = 1.5, 500_000_000, 1_500_000_000
 """Own motion holds for so many periods of who tells it; a receiver that sends once a second is a second late before
 its next word. The last is for one that has spoken once."""
@@ -92,7 +92,7 @@ class Together(Generic[P]):
     """When that message was complete."""
     sweep: Stamped[Sweep] | None
     """None when the LiDAR is missing."""
-    picture: Stamped[P] | None
+    image: Stamped[P] | None
     """The image nearest in time; None when the camera is missing."""
     skew_ns: int | None
     """Image minus sweep; None without both."""
@@ -111,7 +111,7 @@ class Synchroniser(Generic[P]):
 
     def __init__(self) -> None:
         self.sweeps: SensorBuffer[Sweep] = SensorBuffer()
-        self.pictures: SensorBuffer[P] = SensorBuffer(_PICTURES_KEPT)
+        self.images: SensorBuffer[P] = SensorBuffer(_IMAGES_KEPT)
         self.egos: SensorBuffer[EgoState] = SensorBuffer()
         self.fixes: SensorBuffer[GnssFix] = SensorBuffer()
         self._ticked_ns: int | None = None
@@ -121,13 +121,13 @@ class Synchroniser(Generic[P]):
         """The newest tick not given yet; None when there is none, or its image is still on the way."""
         sweep = self._newer(self.sweeps.newest())
         if sweep is not None:
-            if self._picture_is_coming(sweep, now_ns, params):
+            if self._image_is_coming(sweep, now_ns, params):
                 return None
-            return self._together(sweep, self._picture_near(sweep.t_ns, params), params)
+            return self._together(sweep, self._image_near(sweep.t_ns, params), params)
         if self.lidar_is_silent(now_ns):
-            picture = self._shifted(self.pictures.newest(), params)
-            if self._newer(picture) is not None:
-                return self._together(None, picture, params)
+            image = self._shifted(self.images.newest(), params)
+            if self._newer(image) is not None:
+                return self._together(None, image, params)
         return None
 
     def lidar_is_silent(self, now_ns: int) -> bool:
@@ -144,37 +144,37 @@ class Synchroniser(Generic[P]):
         is_new = item is not None and (self._ticked_ns is None or item.t_ns > self._ticked_ns)
         return item if is_new else None
 
-    def _picture_is_coming(self, sweep: Stamped[Sweep], now_ns: int, params: SyncParams) -> bool:
+    def _image_is_coming(self, sweep: Stamped[Sweep], now_ns: int, params: SyncParams) -> bool:
         """The camera delivers, and none of its images is from after the sweep yet; worth a short wait."""
-        newest = self._shifted(self.pictures.newest(), params)
+        newest = self._shifted(self.images.newest(), params)
         if newest is None or newest.t_ns >= sweep.t_ns or now_ns - newest.arrived_ns > _PATIENCE_NS:
             return False
         return now_ns - sweep.arrived_ns < params.wait_ms * 1e6
 
-    def _picture_near(self, t_ns: int, params: SyncParams) -> Stamped[P] | None:
+    def _image_near(self, t_ns: int, params: SyncParams) -> Stamped[P] | None:
         offset_ns = round(params.camera_offset_ms * 1e6)
-        return self._shifted(self.pictures.nearest(t_ns - offset_ns), params)
+        return self._shifted(self.images.nearest(t_ns - offset_ns), params)
 
-    def _shifted(self, picture: Stamped[P] | None, params: SyncParams) -> Stamped[P] | None:
+    def _shifted(self, image: Stamped[P] | None, params: SyncParams) -> Stamped[P] | None:
         """The image with the camera's offset added to its time."""
-        if picture is None:
+        if image is None:
             return None
-        return Stamped(picture.t_ns + round(params.camera_offset_ms * 1e6), picture.value, picture.arrived_ns)
+        return Stamped(image.t_ns + round(params.camera_offset_ms * 1e6), image.value, image.arrived_ns)
 
-    def _together(self, sweep: Stamped[Sweep] | None, picture: Stamped[P] | None, params: SyncParams) -> Together[P]:
-        leader: Stamped[Sweep] | Stamped[P] | None = sweep or picture
+    def _together(self, sweep: Stamped[Sweep] | None, image: Stamped[P] | None, params: SyncParams) -> Together[P]:
+        leader: Stamped[Sweep] | Stamped[P] | None = sweep or image
         assert leader is not None
         self._ticked_ns = t_ns = leader.t_ns
         notes = []
-        skew_ns = picture.t_ns - t_ns if picture is not None and sweep is not None else None
-        if picture is not None and skew_ns is not None and abs(skew_ns) > params.max_skew_ms * 1e6:
+        skew_ns = image.t_ns - t_ns if image is not None and sweep is not None else None
+        if image is not None and skew_ns is not None and abs(skew_ns) > params.max_skew_ms * 1e6:
             notes.append(f"no image within {params.max_skew_ms:g} ms: the nearest is {skew_ns / 1e6:+.0f} ms off")
-            picture = skew_ns = None
+            image = skew_ns = None
         return Together(
             t_ns,
             leader.arrived_ns,
             sweep,
-            picture,
+            image,
             skew_ns,
             ego=_own_motion_at(self.egos, t_ns, params.ego_offset_ms),
             gnss=_own_motion_at(self.fixes, t_ns, params.gnss_offset_ms),
@@ -184,9 +184,9 @@ class Synchroniser(Generic[P]):
 
     def _count_replaced(self, leader_is_sweep: bool) -> int:
         """How many of what ticks came since the last tick and were not taken in time. Remembers where it counted."""
-        sweeps, pictures = self._taken
-        self._taken = (self.sweeps.taken, self.pictures.taken)
-        return max(0, self.sweeps.taken - sweeps - 1 if leader_is_sweep else self.pictures.taken - pictures - 1)
+        sweeps, images = self._taken
+        self._taken = (self.sweeps.taken, self.images.taken)
+        return max(0, self.sweeps.taken - sweeps - 1 if leader_is_sweep else self.images.taken - images - 1)
 
 
 def _own_motion_at(stream: SensorBuffer[T], t_ns: int, offset_ms: float) -> T | None:

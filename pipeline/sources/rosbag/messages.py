@@ -86,7 +86,7 @@ def packets(message: Any) -> list[tuple[bytes, int]]:
     ]
 
 
-def picture(message: Any, t_ns: int) -> CameraImage:
+def image(message: Any, t_ns: int) -> CameraImage:
     """An Image or a CompressedImage; of the latter a JPEG is kept as it is."""
     data = np.asarray(message.data, dtype=np.uint8)
     if not hasattr(message, "encoding"):
@@ -95,10 +95,10 @@ def picture(message: Any, t_ns: int) -> CameraImage:
         except SourceError as error:
             raise BadMessage(str(error)) from None
         return CameraImage(t_ns, bgr, encoded)
-    return CameraImage(t_ns, _raw_picture(message, data))
+    return CameraImage(t_ns, _raw_image(message, data))
 
 
-def _raw_picture(message: Any, data: npt.NDArray[np.uint8]) -> U8:
+def _raw_image(message: Any, data: npt.NDArray[np.uint8]) -> U8:
     height, width, step = int(message.height), int(message.width), int(message.step)
     encoding = str(message.encoding).lower()
     encoding = {"8uc1": "mono8", "8uc3": "bgr8"}.get(encoding, encoding)

@@ -26,7 +26,7 @@ from pipeline.sources.uri_options import split_options
 from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
-_PICTURE_WITHIN_NS = 100_000_000
+_IMAGE_WITHIN_NS = 100_000_000
 _OWN_WITHIN_NS, _FIX_WITHIN_NS = 500_000_000, 1_500_000_000
 _MESSAGES_A_SWEEP = 3
 
@@ -76,16 +76,14 @@ class RosbagSource:
     def frame(self, index: int) -> Frame:
         t_ns, notes = self.t_ns(index), list[str]()
         sweep = self._sweep(index, t_ns, notes)
-        picture = self._picture(t_ns, notes)
-        camera = rig_files.calibration_for(self._camera, picture, notes)
-        return evolve(self._outline(index, camera), sweep=sweep, picture=picture, notes=tuple(notes))
+        image = self._image(t_ns, notes)
+        camera = rig_files.calibration_for(self._camera, image, notes)
+        return evolve(self._outline(index, camera), sweep=sweep, image=image, notes=tuple(notes))
 
     def outlines(self) -> Iterator[Frame]:
         """A camera's images are of one size: the first one tells whether the calibration is theirs."""
-        pictures = self._index.camera
-        first = (
-            self._picture(int(pictures.times_ns[0]), []) if pictures is not None and len(pictures.times_ns) else None
-        )
+        images = self._index.camera
+        first = self._image(int(images.times_ns[0]), []) if images is not None and len(images.times_ns) else None
         camera = rig_files.calibration_for(self._camera, first, [])
         return (self._outline(index, camera) for index in range(len(self)))
 
@@ -193,12 +191,12 @@ class RosbagSource:
             return None
         return evolve(sweep, t_ns=t_ns)
 
-    def _picture(self, t_ns: int, notes: list[str]) -> CameraImage | None:
+    def _image(self, t_ns: int, notes: list[str]) -> CameraImage | None:
         camera = self._index.camera
         if camera is None:
             notes += [self._missing["camera"]] if "camera" in self._missing else []
             return None
-        index = nearest(camera.times_ns, t_ns, _PICTURE_WITHIN_NS)
+        index = nearest(camera.times_ns, t_ns, _IMAGE_WITHIN_NS)
         if index is None:
             notes.append("no image within 0.1 s")
             return None
@@ -206,7 +204,7 @@ class RosbagSource:
         try:
             message = self._message(camera, int(camera.recorded_ns[index]), wanted_ns)
             if message is not None:
-                return messages.picture(message, wanted_ns)
+                return messages.image(message, wanted_ns)
             notes.append("camera: its message is missing")
         except (BagError, messages.BadMessage) as error:
             notes.append(f"camera: {error}")

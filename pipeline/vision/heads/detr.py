@@ -1,7 +1,7 @@
 """DETR exports as DEIM, D-FINE and RT-DETR publish them: ``labels``, ``boxes``, ``scores``, final but for near-doubles.
 
 Their second input, the size of the original image, is bound to 1 × 1 when the graph is read
-(``pipeline.inference.graph.with_unit_picture``), so that boxes are shares of the input's sides.
+(``pipeline.inference.graph.with_unit_image``), so that boxes are shares of the input's sides.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import { fitControl, resultPanel } from "./fit.js";
 import { drawRegions, rangesRow, regionsButton, showRegions } from "./regions.js";
 import { versionsButton, versionsPanel } from "./versions.js";
 import { followHand } from "./pointer.js";
-import { drawEdges } from "./picture_edges.js";
+import { drawEdges } from "./image_edges.js";
 import { addLayer } from "../views/camera.js";
 import { grow } from "../workspace/panes.js";
 
@@ -80,7 +80,7 @@ function reflect() {
   const isAngular = get("params")?.values["alignment.model"] === "angular";
   text(
     how,
-    isAngular ? "Drag: origin · scroll: h_res and v_res · Shift + scroll: v_res" : "Drag: yaw and pitch · scroll: roll",
+    isAngular ? "Drag: origin · scroll: h_res and v_res · Shift + scroll: v_res" : "Drag: yaw, pitch · scroll: roll",
   );
   for (const choice of bar.querySelectorAll("[data-model]"))
     press(choice, /** @type {HTMLElement} */ (choice).dataset.model === get("params")?.values["alignment.model"]);

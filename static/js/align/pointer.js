@@ -68,7 +68,7 @@ const isAngular = () => get("params")?.values["alignment.model"] === "angular";
  * @returns {Values}
  */
 function shifted(from, dx, dy) {
-  const perPixel = 1 / (place().scale * (get("frame")?.picture?.scale ?? 1));
+  const perPixel = 1 / (place().scale * (get("frame")?.image?.scale ?? 1));
   const du = dx * perPixel,
     dv = dy * perPixel;
   if (isAngular())

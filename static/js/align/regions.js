@@ -37,7 +37,7 @@ export function showRegions(score) {
   known = score;
   rangesRow.replaceChildren("Match by distance: ", ...(score?.ranges ?? []).flatMap(rangeText));
   rangesRow.title = score
-    ? `Match by distance, and how far the points should move there. “?”: too few or unclear borders.`
+    ? `Match by distance, and how far the points should move there. “?”: too few or unclear edges.`
     : "";
 }
 
@@ -48,7 +48,11 @@ function rangeText({ from_m, to_m, score, shift_px: shift, borders }) {
   const said = score === null ? "?" : `${Math.round(100 * score)} %${move}`;
   return [
     el("span", { textContent: `${name} ` }),
-    el("b", { textContent: said, title: `${borders} borders`, style: score === null ? {} : { "--hue": hue(score) } }),
+    el("b", {
+      textContent: said,
+      title: `${borders} depth edges`,
+      style: score === null ? {} : { "--hue": hue(score) },
+    }),
   ];
 }
 
@@ -69,12 +73,12 @@ const hue = (score) => String(Math.round(GOOD_HUE * score));
  * @param {{x: number, y: number, scale: number}} place
  */
 export function drawRegions(ctx, frame, place) {
-  const { picture } = frame;
-  if (!picture || !known?.regions.length) return;
+  const { image } = frame;
+  if (!image || !known?.regions.length) return;
   const { columns, rows, regions } = known;
-  const width = (picture.width * place.scale) / columns,
-    height = (picture.height * place.scale) / rows;
-  const perPixel = place.scale * (picture.scale ?? 1);
+  const width = (image.width * place.scale) / columns,
+    height = (image.height * place.scale) / rows;
+  const perPixel = place.scale * (image.scale ?? 1);
   ctx.save();
   regions.forEach((region, number) => {
     if (region.score === null || !region.shift_px) return;

@@ -13,7 +13,7 @@ const form = el(
   "form",
   { class: "row" },
   note,
-  el("button", { class: "primary", textContent: "Save", title: "Save the present alignment" }),
+  el("button", { class: "primary", textContent: "Save", title: "Save the current alignment" }),
 );
 form.addEventListener("submit", (event) => {
   event.preventDefault();
@@ -45,7 +45,7 @@ function toggle() {
   if (!versionsPanel.hidden) refresh();
 }
 
-/** Save the present alignment, once the server has the newest parameters. @param {string} words */
+/** Save the current alignment, once the server has the newest parameters. @param {string} words */
 export async function save(words) {
   await settled();
   await request("api/alignment/versions", "POST", { note: words }).then(() => (note.value = ""), fail);
@@ -67,9 +67,9 @@ function row(version) {
   const when = new Date(version.saved_at);
   const restore = el("button", {
     type: "button",
-    textContent: version.is_present ? "Present" : "Restore",
+    textContent: version.is_present ? "Current" : "Restore",
     disabled: version.is_present,
-    title: "Use this alignment; one step to undo",
+    title: "Use this alignment (can be undone)",
     aria: { label: `Restore alignment ${version.id}` },
     onclick: () => change(version.values, true),
   });

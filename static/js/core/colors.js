@@ -9,7 +9,7 @@ const cache = new Map();
 export const color = (role) => read(`--cipv-${role}`);
 
 /** A role's colour on camera images. @param {string} role */
-export const onPicture = (role) => read(`--picture-${role}`);
+export const onImage = (role) => read(`--image-${role}`);
 
 /** A colour of the page theme. @param {string} name */
 export const ui = (name) => read(`--${name}`);

@@ -40,7 +40,7 @@ export function serverNow() {
 export const isClockKnown = () => clockOffset !== null;
 
 /** Tell the server the displayed image width, so that it sends no larger one. @param {number} width device pixels */
-export function showPictureAt(width) {
+export function showImageAt(width) {
   const steps = Math.ceil(width / WIDTH_STEP_PX);
   if (steps > 0) tell("picture_px", steps * WIDTH_STEP_PX);
 }

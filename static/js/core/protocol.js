@@ -23,7 +23,7 @@ export function decode(buffer) {
     result: header.result,
     display: header.display,
     row: header.row,
-    picture: header.picture,
+    image: header.picture,
     bitmap: null,
     count,
     xyz: new Int16Array(buffer, next(6 * count), 3 * count),

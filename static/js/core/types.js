@@ -172,7 +172,7 @@
  * @property {number|null} limit
  * @property {string} reason
  *
- * @typedef {object} Picture  as sent; scale: sent pixels per camera pixel
+ * @typedef {object} SentImage  as sent; scale: sent pixels per camera pixel
  * @property {number} width
  * @property {number} height
  * @property {number} scale
@@ -187,7 +187,7 @@
  * @property {Display} display
  * @property {import("../drive/types.js").Row|null} row  of live sensors only
  * @property {boolean} [isLate]
- * @property {Picture|null} picture
+ * @property {SentImage|null} image
  * @property {ImageBitmap|null} bitmap
  * @property {number} count
  * @property {Int16Array} xyz

@@ -68,7 +68,7 @@ const groups = () => [...keymap()].sort((a, b) => Number(isIdle(a)) - Number(isI
 
 /** The page on which keys are changed: press one, then the new key. */
 function edit() {
-  const said = el("p", { class: "facts", role: "status", textContent: "Choose a key, then press the new one." });
+  const said = el("p", { class: "facts", role: "status", textContent: "Click a key, then press the new one." });
   const shownGroups = keymap().filter(({ bindings }) => bindings.some(({ words }) => words));
   dialog.replaceChildren(
     el("h2", { textContent: "Keys" }),
@@ -131,7 +131,7 @@ function listen(button, group, binding, said) {
       taken = change(keymap(), group, binding, name);
     if (!taken) return edit();
     button.textContent = binding.shown;
-    said.textContent = `${shownAs(name)} is already: ${taken}. Change that first.`;
+    said.textContent = `${shownAs(name)} is already used: ${taken}. Change that key first.`;
   };
   const end = () => {
     removeEventListener("keydown", hear, true);

@@ -1,18 +1,18 @@
-/** Keys that a person has changed, kept in this browser under that person's name. */
+/** Keys that a person has changed, stored in this browser under that person's name. */
 import { memory } from "../core/dom.js";
 import { get, set } from "../core/store.js";
 
 /** @typedef {import("./keymap.js").Binding} Binding */
 /** @typedef {import("./keymap.js").Group} Group */
 
-/** Who has changed them; "" for who has not said a name. */
+/** Who changed them; "" without a name. */
 const owner = () => get("person") || memory.read("person", "");
 const place = () => `keys ${owner()}`;
 
 /** New keys by what they are in the keymap. @returns {Record<string, string>} */
 const changed = () => memory.read(place(), /** @type {Record<string, string>} */ ({}));
 
-/** Keys of a mode and of the page are told apart. @param {Group} group @param {Binding} binding */
+/** Keys of a mode and of the page are kept separate. @param {Group} group @param {Binding} binding */
 const idOf = ({ mode }, { keys }) => `${mode ?? "page"} ${keys[0]}`;
 
 /** As people read it. @param {string} name */
@@ -36,7 +36,7 @@ export function withOwn(groups) {
 }
 
 /**
- * Give a binding another key. Returns what has the key already, in words, or null.
+ * Assign another key to a binding. Returns the words of the binding that already uses the key, or null.
  * @param {Group[]} groups with own keys
  * @param {Group} group
  * @param {Binding} binding
@@ -54,7 +54,7 @@ export function change(groups, group, binding, name) {
   return null;
 }
 
-/** All keys as they come. */
+/** Restore all default keys. */
 export function reset() {
   memory.write(place(), {});
   set("keys", (get("keys") ?? 0) + 1);

@@ -6,7 +6,7 @@ import * as commands from "./acts/commands.js";
 import { bringHere } from "./acts/range_ends.js";
 import { cancel, isOn, setTool, toggleObjects } from "./state/mode.js";
 import * as review from "./acts/review.js";
-import { zoomBy } from "./views/picture_pointer.js";
+import { zoomBy } from "./views/image_pointer.js";
 import * as span from "./state/marked_frames.js";
 import { toggleWhole } from "./acts/tags.js";
 
@@ -212,14 +212,14 @@ export const labelKeys = () => [
       key("e", "E", "rotate 1° right; Shift: 10°", () => commands.turn(-TURN_DEG)),
       key("Shift+Q", "Shift Q", "", () => commands.turn(FAR_DEG)),
       key("Shift+E", "Shift E", "", () => commands.turn(-FAR_DEG)),
-      key("Shift+X", "Shift X", "turn the track round: front and rear are swapped", commands.flip, "turn round"),
+      key("Shift+X", "Shift X", "reverse the track: swap front and rear", commands.flip, "reverse"),
       key("s", "S", "fit the cuboid to the points", commands.snap, "snap"),
-      key("Shift+S", "Shift S", "the image box follows the cuboid again", commands.boxFollows),
-      key("Shift+C", "Shift C", "carry the track on, before and after", () => commands.propagate("both"), "carry on"),
-      key("w", "W", "apply this size to the whole track", commands.sizeAlong, "size along"),
+      key("Shift+S", "Shift S", "make the image box follow the cuboid again", commands.boxFollows),
+      key("Shift+C", "Shift C", "extend the track both ways", () => commands.propagate("both"), "extend"),
+      key("w", "W", "apply this size to the whole track", commands.sizeAlong, "apply size"),
       key("k", "K", "set keyframe", commands.keyframe, "keyframe"),
       key("Shift+K", "Shift K", "remove keyframe", commands.dropKeyframe),
-      key("Delete Backspace", "Del", "remove from this frame or the marked frames", commands.notHere, "not here"),
+      key("Delete Backspace", "Del", "remove from this frame or the marked frames", commands.notHere, "remove here"),
       key("Shift+Delete Shift+Backspace", "Shift Del", "delete the track", commands.removeTrack),
       ...pair("T", "next class", commands.nextClass, "class"),
       key("Shift+P", "Shift P", "draw the ego path: drag along its centre in the plan", () => setTool("path")),

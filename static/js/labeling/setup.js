@@ -13,8 +13,8 @@ import { tags } from "./lanes/tags.js";
 import { track } from "./lanes/track.js";
 import * as mode from "./state/mode.js";
 import * as panel from "./panels/panel.js";
-import { drawInPicture } from "./views/picture_drawing.js";
-import * as pictureHand from "./views/picture_pointer.js";
+import { drawInImage } from "./views/image_drawing.js";
+import * as imageHand from "./views/image_pointer.js";
 import { drawInPlan } from "./views/plan_drawing.js";
 import * as planHand from "./views/plan_pointer.js";
 import * as projection from "./views/projection.js";
@@ -22,9 +22,9 @@ import * as steps from "./state/undo_state.js";
 import * as three from "./views/three.js";
 
 export function setUp() {
-  const parts = [mode, acts, data, steps, frames, draft, projection, three, bar, panel, pictureHand, classes];
+  const parts = [mode, acts, data, steps, frames, draft, projection, three, bar, panel, imageHand, classes];
   for (const part of parts) part.setUp();
   addMode({ isOn: mode.isOn, draw: drawInPlan, ...planHand });
-  addLayer(drawInPicture, "over");
+  addLayer(drawInImage, "over");
   for (const lane of [...tags, leads, track]) addLane(lane, "lead"); // above the pipeline's lead
 }

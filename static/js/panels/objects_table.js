@@ -3,7 +3,7 @@ import { cipvId } from "../core/colors.js";
 import { $, el, mark, text, within } from "../core/dom.js";
 import { DASH, kmh, num, side, signed } from "../core/format.js";
 import { LongList } from "../core/long_list.js";
-import { isPictured } from "../core/object_sources.js";
+import { isImaged } from "../core/object_sources.js";
 import { get, on, paintAfter, select, set } from "../core/store.js";
 
 /** @typedef {import("../core/types.js").FusedObject} FusedObject */
@@ -175,7 +175,7 @@ function update() {
  * @param {number|undefined} lead
  */
 function relevance(item, lead) {
-  const group = item.id === lead ? 0 : item.in_path ? 1 : isPictured(item) && !item.carried ? 2 : 3;
+  const group = item.id === lead ? 0 : item.in_path ? 1 : isImaged(item) && !item.carried ? 2 : 3;
   return group * 1000 + Math.min(item.distance_m ?? 999, 999);
 }
 

@@ -1,17 +1,17 @@
 /** The camera pane: the image with the pipeline's output as overlay. All projection is done by the server. */
-import { onPicture } from "../core/colors.js";
-import { showPictureAt } from "../core/connection.js";
+import { onImage } from "../core/colors.js";
+import { showImageAt } from "../core/connection.js";
 import { $, text } from "../core/dom.js";
-import { drawInPicture } from "./drawing/gates.js";
+import { drawInImage } from "./drawing/gates.js";
 import { num } from "../core/format.js";
 import { followHover } from "./hover.js";
 import { Labels } from "./drawing/text_labels.js";
-import { drawBox, drawObjects, drawPath, drawWindow } from "./drawing/picture.js";
+import { drawBox, drawObjects, drawPath, drawWindow } from "./drawing/image.js";
 import { nearestPoint, ownerOf } from "./drawing/hit_test.js";
 import { GROUND, tints } from "./drawing/point_colors.js";
 import { DotRaster } from "./drawing/dot_raster.js";
 import { get, on, paint, select, set } from "../core/store.js";
-import { placed, setUp as setUpZoom } from "./picture_zoom.js";
+import { placed, setUp as setUpZoom } from "./image_zoom.js";
 import { Surface } from "./drawing/surface.js";
 import { drawTape, measure } from "./measuring_tape.js";
 
@@ -68,7 +68,7 @@ export function setUp() {
     draw,
   );
   surface = new Surface(canvas, invalidate, "panel");
-  showPictureAt(canvas.clientWidth * devicePixelRatio); // at most as wide as its pane
+  showImageAt(canvas.clientWidth * devicePixelRatio); // at most as wide as its pane
   canvas.addEventListener(
     "click",
     (event) =>
@@ -90,9 +90,9 @@ function draw() {
     ctx = surface.begin();
   if (!frame) return;
   describe(frame);
-  if (!frame.picture) return message(ctx, "No camera image in this frame");
-  layOut(frame.picture);
-  const { width, height } = frame.picture;
+  if (!frame.image) return message(ctx, "No camera image in this frame");
+  layOut(frame.image);
+  const { width, height } = frame.image;
   ctx.save();
   ctx.beginPath();
   ctx.rect(laid.x, laid.y, width * laid.scale, height * laid.scale);
@@ -123,7 +123,7 @@ function drawBelief(ctx, frame) {
   if (layers.farView && display.far_view) drawWindow(ctx, display.far_view, X, Y);
   if (layers.points) drawPoints(ctx, frame);
   if (layers.lanes && display.lanes) for (const lane of [display.lanes.left, display.lanes.right]) drawLane(ctx, lane);
-  const labels = new Labels(ctx, surface.width, laid.y, laid.y + (frame.picture?.height ?? 0) * laid.scale);
+  const labels = new Labels(ctx, surface.width, laid.y, laid.y + (frame.image?.height ?? 0) * laid.scale);
   const hasObjects = !get("labeling")?.on || get("labeling")?.hasObjects;
   const chosen = hasObjects ? result.objects.find(({ id }) => id === get("selection")) : undefined;
   if (chosen) {
@@ -131,11 +131,11 @@ function drawBelief(ctx, frame) {
       [display.lidar_boxes, "lidar"],
       [display.vision_boxes, "vision"],
     ])) {
-      if (boxes[chosen.id]) drawBox(ctx, boxes[chosen.id], onPicture(role), 1.5, X, Y);
+      if (boxes[chosen.id]) drawBox(ctx, boxes[chosen.id], onImage(role), 1.5, X, Y);
     }
   }
   if (hasObjects) drawObjects(ctx, frame, layers, labels, X, Y);
-  if (chosen) drawInPicture(ctx, frame, chosen, labels, X, Y);
+  if (chosen) drawInImage(ctx, frame, chosen, labels, X, Y);
   const tape = get("tape");
   if (tape?.from.u != null && tape.from.v != null && tape.to.u != null && tape.to.v != null) {
     drawTape(ctx, [X(tape.from.u), Y(tape.from.v)], [X(tape.to.u), Y(tape.to.v)], tape, labels);
@@ -143,19 +143,19 @@ function drawBelief(ctx, frame) {
 }
 
 /** Fit the image into the pane, and the pane's default height to the image.
- * @param {{width: number, height: number}} picture */
+ * @param {{width: number, height: number}} image */
 function layOut({ width, height }) {
   const aspect = (width / height).toFixed(3),
     workspace = $("#workspace");
   if (workspace.style.getPropertyValue("--aspect") !== aspect) workspace.style.setProperty("--aspect", aspect);
   laid = placed(surface, { width, height });
-  const full = (get("frame")?.picture?.full_width ?? width) + 1; // more pixels than the camera has show nothing more
-  showPictureAt(Math.min(width * laid.scale * surface.ratio, full));
+  const full = (get("frame")?.image?.full_width ?? width) + 1; // more pixels than the camera has show nothing more
+  showImageAt(Math.min(width * laid.scale * surface.ratio, full));
 }
 
 /** @param {Frame} frame */
-function describe({ result: { sensors }, picture }) {
-  const facts = picture ? [`${picture.full_width}×${Math.round(picture.height / picture.scale)}`] : [];
+function describe({ result: { sensors }, image }) {
+  const facts = image ? [`${image.full_width}×${Math.round(image.height / image.scale)}`] : [];
   if (sensors.lidar?.points) facts.push(`${sensors.lidar.points.toLocaleString("en")} points`);
   if (sensors.camera?.skew_ms) facts.push(`camera skew ${num(sensors.camera.skew_ms, 0)} ms`);
   text($("#camera-facts"), facts.join(" · "));
@@ -163,11 +163,11 @@ function describe({ result: { sensors }, picture }) {
 
 /** Ground points first, smaller and fainter. @param {CanvasRenderingContext2D} ctx @param {Frame} frame */
 function drawPoints(ctx, frame) {
-  const { count, uv, kind, picture } = frame;
-  if (!picture) return;
-  const { width, height } = picture,
+  const { count, uv, kind, image } = frame;
+  if (!image) return;
+  const { width, height } = image,
     { scale } = laid;
-  const colors = tints(frame, get("colorBy")?.camera ?? "range", onPicture, 0.7);
+  const colors = tints(frame, get("colorBy")?.camera ?? "range", onImage, 0.7);
   const left = Math.max(0, laid.x),
     top = Math.max(0, laid.y);
   const right = Math.min(surface.width, laid.x + width * scale),
@@ -191,7 +191,7 @@ function drawLane(ctx, lane) {
   if (seen.length < 2) return;
   for (const [tint, width] of /** @type {[string, number][]} */ ([
     ["rgb(0 0 0 / .55)", 5],
-    [onPicture("lane"), 2.5],
+    [onImage("lane"), 2.5],
   ])) {
     ctx.strokeStyle = tint;
     ctx.lineWidth = width;

@@ -1,7 +1,7 @@
 /** The plan view: the ego frame from above, x up and y left, in metres. */
-import { color, onPicture, roleOf, ui } from "../core/colors.js";
+import { color, onImage, roleOf, ui } from "../core/colors.js";
 import { $, el, press } from "../core/dom.js";
-import { isPictured } from "../core/object_sources.js";
+import { isImaged } from "../core/object_sources.js";
 import { drawInPlan } from "./drawing/gates.js";
 import { num } from "../core/format.js";
 import { followHover } from "./hover.js";
@@ -211,12 +211,12 @@ function drawObjects(ctx, frame, layers, labels) {
   const order = result.objects.filter((item) => item.bev).sort((a, b) => Number(important(a)) - Number(important(b)));
   for (const item of order) {
     const tint = color(roleOf(item, lead)),
-      isNamed = important(item) || (!item.carried && (isPictured(item) || item.in_path));
+      isNamed = important(item) || (!item.carried && (isImaged(item) || item.in_path));
     if (layers.trails && isNamed) drawTrail(ctx, view, item.id, tint);
     ctx.fillStyle = ctx.strokeStyle = tint;
     drawOutline(ctx, view, item, important(item), item.id === lead);
-    if (isPictured(item)) drawSigma(ctx, view, item);
-    ctx.globalAlpha = !isPictured(item) && !important(item) ? 0.4 : 1;
+    if (isImaged(item)) drawSigma(ctx, view, item);
+    ctx.globalAlpha = !isImaged(item) && !important(item) ? 0.4 : 1;
     if (layers.velocity && !item.carried) drawArrow(ctx, view, item);
     ctx.globalAlpha = 1;
     if (item.id === chosen) drawRing(ctx, view, item, ui("text"));
@@ -226,7 +226,7 @@ function drawObjects(ctx, frame, layers, labels) {
   if (selected)
     drawInPlan(ctx, frame, selected, labels, { u: (y) => view.u(y), v: (x) => view.v(x), scale: view.scale });
   for (const item of order.reverse()) {
-    if (!item.bev || (!important(item) && (item.carried || (!isPictured(item) && !item.in_path)))) continue;
+    if (!item.bev || (!important(item) && (item.carried || (!isImaged(item) && !item.in_path)))) continue;
     const u = Math.max(...item.bev.map(([, y]) => view.u(y))) + 3,
       v = Math.min(...item.bev.map(([x]) => view.v(x))) + 14;
     const distance = item.distance_m === null ? "" : ` ${num(item.distance_m)}`,
@@ -234,7 +234,7 @@ function drawObjects(ctx, frame, layers, labels) {
     const words = isLead
       ? `CIPV #${item.id} ${distance} m`
       : `${item.id === next ? "next " : ""}#${item.id}${distance}`;
-    labels.put(words, u, v, onPicture(roleOf(item, lead)), isLead ? "strong" : important(item) ? "must" : "weak");
+    labels.put(words, u, v, onImage(roleOf(item, lead)), isLead ? "strong" : important(item) ? "must" : "weak");
   }
 }
 

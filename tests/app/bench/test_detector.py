@@ -21,7 +21,7 @@ def test_the_figures_have_the_contracts_form(tmp_path: Path) -> None:
     assert figures["peers"]["cv2.dnn"].keys() == {"median_ms", "ratio"}
 
 
-def test_without_pictures_there_is_nothing_to_measure(tmp_path: Path) -> None:
+def test_without_images_there_is_nothing_to_measure(tmp_path: Path) -> None:
     assert stages([], open_detector(str(networks.yolox(tmp_path / "tiny.onnx")), None), 0.0) == {}
 
 

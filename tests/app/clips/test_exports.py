@@ -15,7 +15,7 @@ import pytest
 from app.clips.clip import Clip
 from app.clips.export_queue import ExportQueue
 from app.clips.exports import MOST_FRAMES, submit, write_clip
-from app.clips.html_report import worth_a_picture
+from app.clips.html_report import worth_an_image
 from app.clips.overlay import WIDTH_PX, draw_frame
 from app.core.detection_cache import DetectionCache
 from app.core.playback_clock import timeline_s
@@ -135,35 +135,35 @@ def test_a_clip_that_is_too_long_is_refused(clip: Clip):
 # ---------------------------------------------------------------- what is drawn
 
 
-def test_a_large_picture_is_made_smaller_and_even(results: Results):
+def test_a_large_image_is_made_smaller_and_even(results: Results):
     frame, result = results[5]
-    large = Frame(**{**vars(frame), "picture": CameraImage(None, np.full((621, 2049, 3), 90, np.uint8))})
+    large = Frame(**{**vars(frame), "image": CameraImage(None, np.full((621, 2049, 3), 90, np.uint8))})
     height, width = draw_frame(large, result, Params()).shape[:2]
     assert width == WIDTH_PX
     assert (height % 2, abs(height - 621 * WIDTH_PX / 2049) <= 2) == (0, True)
 
 
-def test_a_frame_without_a_picture_says_so(results: Results):
+def test_a_frame_without_an_image_says_so(results: Results):
     frame, result = results[5]
-    drawn = draw_frame(Frame(**{**vars(frame), "picture": None}), result, Params())
+    drawn = draw_frame(Frame(**{**vars(frame), "image": None}), result, Params())
     assert drawn.shape == (720, 1280, 3)
     assert drawn.any()
 
 
-def test_the_source_picture_is_not_drawn_on(results: Results):
+def test_the_source_image_is_not_drawn_on(results: Results):
     frame, result = results[5]
-    assert frame.picture is not None
-    before = frame.picture.bgr.copy()
+    assert frame.image is not None
+    before = frame.image.bgr.copy()
     draw_frame(frame, result, Params())
-    assert np.array_equal(before, frame.picture.bgr)
+    assert np.array_equal(before, frame.image.bgr)
 
 
-def test_pictures_are_of_the_weightiest_events():
+def test_images_are_of_the_weightiest_events():
     events = [Event("cipv_switch", n, f"switch {n}", severity="info") for n in range(10)]
-    chosen = worth_a_picture([*events, Event("brake", 15, "full braking", severity="alarm")])
+    chosen = worth_an_image([*events, Event("brake", 15, "full braking", severity="alarm")])
     assert list(chosen) == [0, 1, 2, 3, 15]
     assert chosen[15] == "full braking"
-    assert worth_a_picture([]) == {0: "start of the clip"}
+    assert worth_an_image([]) == {0: "start of the clip"}
 
 
 def test_a_real_clip_looks_as_it_should(data_dir: Path):

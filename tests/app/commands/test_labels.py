@@ -56,11 +56,11 @@ def test_what_a_format_does_not_need_is_not_read(
 ) -> None:
     labels = tmp_path / "labels.json"
     assert cipv("labels", "export", drive, "--format", "native", "--out", labels) == 0
-    sweeps, pictures = Mock(wraps=session_source.sweep_from), Mock(wraps=session_source.picture_from)
+    sweeps, images = Mock(wraps=session_source.sweep_from), Mock(wraps=session_source.image_from)
     monkeypatch.setattr(session_source, "sweep_from", sweeps)
-    monkeypatch.setattr(session_source, "picture_from", pictures)
+    monkeypatch.setattr(session_source, "image_from", images)
     assert cipv("labels", "export", drive, "--labels", labels, "--format", name, "--out", tmp_path / "out") == 0
-    assert (sweeps.call_count, pictures.call_count) == READ[name]
+    assert (sweeps.call_count, images.call_count) == READ[name]
 
 
 def test_the_same_recording_gives_the_same_file(drive: Path, tmp_path: Path) -> None:

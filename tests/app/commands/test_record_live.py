@@ -109,7 +109,7 @@ def test_live_sensors_are_recorded(arguments: tuple[str, ...], tmp_path: Path) -
     assert len(frames) >= 5
     with_sweep = sum(frame.sweep is not None for frame in frames)
     assert with_sweep >= len(frames) // 2, [frame.notes for frame in frames]
-    assert any(frame.picture is not None and frame.picture.encoded is not None for frame in frames)
+    assert any(frame.image is not None and frame.image.encoded is not None for frame in frames)
     assert any(frame.gnss is not None for frame in frames)
     assert any(frame.ego is not None for frame in frames)
     assert all(frame.streams for frame in frames)
@@ -117,11 +117,11 @@ def test_live_sensors_are_recorded(arguments: tuple[str, ...], tmp_path: Path) -
     assert all(result is not None and result["sensors"]["lidar"]["state"] for result in results)
     stored = {stream.channel.topic for stream in session.file.messages()}
     assert ("/lidar/packets" in stored, "/lidar/points" in stored) == (bool(arguments), not arguments)
-    pictures = list(session.file.messages(("/camera/image",)))
-    shown = {frame.picture.t_ns for frame in frames if frame.picture is not None}
-    assert len(pictures) > len(shown), "those that came between ticks, too"
-    assert shown <= {each.publish_time_ns for each in pictures}
-    assert len({each.publish_time_ns for each in pictures}) == len(pictures)
+    images = list(session.file.messages(("/camera/image",)))
+    shown = {frame.image.t_ns for frame in frames if frame.image is not None}
+    assert len(images) > len(shown), "those that came between ticks, too"
+    assert shown <= {each.publish_time_ns for each in images}
+    assert len({each.publish_time_ns for each in images}) == len(images)
     if not arguments:
         clouds = [each.publish_time_ns for each in session.file.messages(("/lidar/points",))]
         assert {frame.sweep.t_ns for frame in frames if frame.sweep is not None} <= set(clouds)

@@ -206,11 +206,11 @@ def test_without_a_recording_there_is_nothing_to_say(drives: BackgroundRuns):
 def test_a_frame_without_pixels_is_the_same_to_the_line():
     frame = Recording().frame(3)
     light = without_pixels(frame)
-    assert light.picture is not None
-    assert frame.picture is not None
-    assert light.picture.bgr.shape == frame.picture.bgr.shape
-    assert light.picture.bgr.strides == (0, 0, 0)
-    assert light.picture.t_ns == frame.picture.t_ns
+    assert light.image is not None
+    assert frame.image is not None
+    assert light.image.bgr.shape == frame.image.bgr.shape
+    assert light.image.bgr.strides == (0, 0, 0)
+    assert light.image.t_ns == frame.image.t_ns
     one, other = (step(State(), each, Params())[1] for each in (frame, light))
     assert repr(one.objects) == repr(other.objects)
     assert one.sensors == other.sensors

@@ -26,7 +26,7 @@ def test_a_runs_score_is_the_one_of_its_results(data_dir: Path) -> None:
     kept = DriveRun(1, Params(), "default", len(source))
     state, results = State(), []
     for index in range(len(source)):
-        frame = replace(source.frame(index), picture=None)
+        frame = replace(source.frame(index), image=None)
         state, result = step(state, frame, Params())
         results.append(result)
         kept.add(frame, source.truth(index), RULE)

@@ -111,7 +111,7 @@ class Recording:
             name=f"{index:06d}",
             t_ns=t_ns,
             sweep=Sweep(t_ns, points, ring, 16),
-            picture=_picture(t_ns, distance_m),
+            image=_image(t_ns, distance_m),
             camera=_camera(),
             ego=EgoState(t_ns, 20.0, 0.0),
         )
@@ -146,7 +146,7 @@ def _points(distance_m: float) -> tuple[F32, U8]:
     return points, np.zeros(len(points), np.uint8)
 
 
-def _picture(t_ns: int, distance_m: float) -> CameraImage:
+def _image(t_ns: int, distance_m: float) -> CameraImage:
     """A red car on grey, as the camera sees it, as a JPEG."""
     bgr = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
     left, right = (round(WIDTH / 2 + FOCAL_PX * y / distance_m) for y in (-0.8, 0.8))

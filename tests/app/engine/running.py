@@ -37,7 +37,7 @@ def played(recording: Recording, first: int, last: int, params: Params, looked_f
     detector, state = CountingDetector(), State()
     for index in range(first, last + 1):
         frame = recording.frame(index)
-        assert frame.picture is not None
-        boxes = detector.detect(frame.picture.bgr) if index >= looked_from else None
+        assert frame.image is not None
+        boxes = detector.detect(frame.image.bgr) if index >= looked_from else None
         state, result = step(state, type(frame)(**{**vars(frame), "raw_boxes": boxes}), params)
     return result

@@ -72,7 +72,7 @@ def test_a_network_looks_less_often_unless_told_otherwise(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(("rate_hz", "every"), [(2.0, 1), (3.3, 1), (5.0, 1), (7.0, 2), (10.0, 3), (30.0, 3)])
-def test_a_network_looks_at_no_older_pictures_of_a_slow_recording(tmp_path: Path, rate_hz: float, every: int) -> None:
+def test_a_network_looks_at_no_older_images_of_a_slow_recording(tmp_path: Path, rate_hz: float, every: int) -> None:
     network = open_lane_network(str(lane_networks.twin(tmp_path / "tiny.onnx")))
     assert usual_every(network, rate_hz) == every
     assert usual_every(open_classical(None), rate_hz) == 1

@@ -216,10 +216,10 @@ def test_what_comes_between_ticks_is_recorded_until_the_end(start: Start, tmp_pa
     tap = sensors.tapped
     assert tap is not None
     shown = Recording().frame(0)
-    assert shown.picture is not None
+    assert shown.image is not None
     assert shown.sweep is not None
     for step in range(3):
-        tap.picture(Shot(pixels=shown.picture.bgr), shown.t_ns + step, 10**18 + step)
+        tap.image(Shot(pixels=shown.image.bgr), shown.t_ns + step, 10**18 + step)
         tap.sweep(replace(shown.sweep, points=shown.sweep.points + step), 10**18 + step)
         tap.fix(GnssFix(shown.t_ns + step, 48.0, 9.0, 300.0, None, 0.0, "single", 4.0), 10**18 + step)
     shown_after(engine, sensors, 1)

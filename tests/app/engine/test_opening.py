@@ -189,7 +189,7 @@ def test_a_car_with_only_one_sensor_is_told_on_the_page(start: Start, sensors: s
     assert [text.partition(":")[0] for text in said if text not in recording.notes] == told
 
 
-def test_the_detector_is_asked_for_again_where_pictures_are_drawn():
+def test_the_detector_is_asked_for_again_where_images_are_drawn():
     """A network for real images is not the one for the simulator, even when the images are equally large."""
     asked: list[str] = []
 
@@ -215,5 +215,5 @@ def test_sensors_can_be_taken_away(start: Start, sensors: str, sources: set[str]
     tick = engine.snapshot.processed
     assert tick is not None
     assert {item.source for item in tick.result.objects} == sources
-    assert tick.frame.picture is not None, "people still want to see the image"
+    assert tick.frame.image is not None, "people still want to see the image"
     assert (detector.calls == 0) == (sensors == "lidar")

@@ -6,10 +6,10 @@ import hashlib
 from pathlib import Path
 
 from app.fleet.batch.addresses import recordings
+from app.fleet.batch.job import Job
 from app.fleet.batch.keys import RunKey, code_digest, networks_digest
 from app.fleet.batch.plan import Plan, PlannedWork, begin, work_of
 from app.fleet.batch.tables import TIMINGS
-from app.fleet.batch.work import Job
 from app.fleet.store import Store
 from pipeline.detection import DetectorChoice
 from pipeline.params import Params

@@ -183,7 +183,7 @@ def test_rules_fail_where_nothing_can_be_said(tmp_path: Path):
     file.write_text("rules: [{score: jitter, at_most: 1}]\ndrives_at_least: 3", encoding="utf-8")
     said = broken(read_rules(file), [], [], drives=2, aside=1)
     assert said == [
-        "2 drives are in both runs; at least 3 are demanded",
+        "2 drives are in both runs; at least 3 are required",
         "1 more recordings were set aside; at most 0 may be",
         "jitter: no drive has this score in both runs",
     ]

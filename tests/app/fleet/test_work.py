@@ -12,8 +12,9 @@ import zstandard
 
 from app.cli import main
 from app.drive.events import event_kinds
+from app.fleet.batch.job import Outcome, TooLong
 from app.fleet.batch.tables import EVENTS, FRAMES, OBJECTS, SCORES, TABLES, file_of
-from app.fleet.batch.work import Outcome, TooLong, WrongWorker, look_at_piece, run_drive
+from app.fleet.batch.work import WrongWorker, look_at_piece, run_drive
 from app.fleet.store import Store
 from pipeline.params import Params, with_changes
 from tests.app.fleet.fleets import BAD, contents, job_of

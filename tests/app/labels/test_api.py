@@ -7,7 +7,7 @@ import pytest
 
 from app.engine.engine import Engine
 from app.web.routes.labels.score_shapes import ScoreJson
-from app.web.routes.labels.shapes import Window
+from app.web.routes.labels.sighting_shapes import Window
 from app.web.server import create_app
 from app.web.tokens import Tokens
 from pipeline.labels.model import WHOLE_TAG
@@ -136,7 +136,7 @@ def test_a_slider_that_is_only_tried_is_undone_first(engine: Engine, client: htt
     assert len(labels(client)["tags"]) == 1
 
 
-def test_the_cuboid_is_laid_on_the_points_and_a_car_lifted_out_of_the_picture(
+def test_the_cuboid_is_laid_on_the_points_and_a_car_lifted_out_of_the_image(
     engine: Engine, client: httpx.Client
 ) -> None:
     lifted = act(client, kind="lift", frame=10, pixel=[160, 92], label="car").json()
@@ -184,7 +184,7 @@ def test_a_track_is_carried_on_from_one_frame_by_one_act_and_taken_back_by_one(
     rear = [rows[0]["cuboid"]["center"][0] - rows[0]["cuboid"]["size"][0] / 2 for rows in frames.values()]
     assert rear == pytest.approx([30.0 - 0.4 * index for index in range(20)], abs=0.3)
     again = act(client, kind="propagate", track=after["id"], revision=after["revision"])
-    assert (again.status_code, "beyond its ends" in again.json()["detail"]) == (409, True)
+    assert (again.status_code, "before its first or after its last frame" in again.json()["detail"]) == (409, True)
     move(client, "undo", "Ada")
     (back,) = labels(client)["tracks"]
     assert (back["first"], back["last"]) == (10, 10)

@@ -88,7 +88,7 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "Display": display,
         "GroundPlanes": display["ground"],
         "Ranked": display["ranking"][0],
-        "Picture": header["picture"],
+        "SentImage": header["picture"],
         "Param": {key: None for param in every_param for key in param},
         "ParamsAnswer": params,
         "Columns": columns["columns"],

@@ -29,12 +29,12 @@ def test_the_plan_has_everybody_where_they_are(name: str) -> None:
     assert svg.count('class="tarmac"') == len(scene.road.edges_m()) + len(scene.road.crossings)
 
 
-def test_the_picture_is_in_the_page() -> None:
+def test_the_image_is_in_the_page() -> None:
     figure = scene_html(Scene("Straight <road>", scenario.load("straight"), 5.0))
     assert "Straight &lt;road&gt;, at 5.0 s" in figure
     found = re.search(r'src="data:image/jpeg;base64,([^"]+)"', figure)
     assert found is not None
-    picture = cv2.imdecode(np.frombuffer(base64.b64decode(found[1]), np.uint8), cv2.IMREAD_COLOR)
-    assert picture is not None
-    assert picture.shape == (360, 640, 3)
-    assert picture.std() > 20.0
+    image = cv2.imdecode(np.frombuffer(base64.b64decode(found[1]), np.uint8), cv2.IMREAD_COLOR)
+    assert image is not None
+    assert image.shape == (360, 640, 3)
+    assert image.std() > 20.0

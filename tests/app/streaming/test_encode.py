@@ -17,7 +17,7 @@ from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
 from app.streaming.points import UNKNOWN_AGE, UNSEEN
-from app.streaming.sent_image import MAX_WIDTH_PX, encode_picture, width_for
+from app.streaming.sent_image import MAX_WIDTH_PX, encode_image, width_for
 from pipeline.alignment.projection import resolve
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
@@ -113,7 +113,7 @@ def test_each_point_says_what_it_is_and_whose():
     np.testing.assert_allclose(arrays["xyz"][mine, 0] / 100.0, 30.0 - 0.4 * 3, atol=0.01)
 
 
-def test_moving_the_alignment_moves_the_points_in_the_picture():
+def test_moving_the_alignment_moves_the_points_in_the_image():
     straight = taken_apart(Encoder().message(snapshot()) or b"")[2]["uv"]
     turned = with_changes(Params(), {"alignment.yaw_deg": 2.0})
     moved = taken_apart(Encoder().message(snapshot(turned)) or b"")[2]["uv"]
@@ -125,17 +125,17 @@ def test_the_cameras_own_jpeg_goes_through_untouched():
     shown = snapshot()
     assert shown.processed is not None
     _, jpeg, _ = taken_apart(Encoder().message(shown) or b"")
-    assert shown.processed.frame.picture is not None
-    assert jpeg == shown.processed.frame.picture.encoded
+    assert shown.processed.frame.image is not None
+    assert jpeg == shown.processed.frame.image.encoded
 
 
 @pytest.mark.parametrize(
     ("width", "own_jpeg", "sent"), [(640, False, 640), (2048, False, MAX_WIDTH_PX), (2048, True, MAX_WIDTH_PX)]
 )
-def test_a_picture_is_encoded_when_it_must_be_and_never_too_wide(width: int, own_jpeg: bool, sent: int):
+def test_an_image_is_encoded_when_it_must_be_and_never_too_wide(width: int, own_jpeg: bool, sent: int):
     bgr = np.full((300, width, 3), 77, np.uint8)
-    picture = CameraImage(0, bgr, cv2.imencode(".jpg", bgr)[1].tobytes() if own_jpeg else None)
-    made = encode_picture(picture)
+    image = CameraImage(0, bgr, cv2.imencode(".jpg", bgr)[1].tobytes() if own_jpeg else None)
+    made = encode_image(image)
     decoded = cv2.imdecode(np.frombuffer(made.jpeg, np.uint8), cv2.IMREAD_COLOR)
     assert decoded is not None
     assert decoded.shape[1::-1] == (made.width, made.height)
@@ -150,17 +150,17 @@ def _wide() -> U8:
     return bgr
 
 
-def test_boxes_are_in_pixels_of_the_sent_picture():
-    header, _, _ = taken_apart(Encoder().message(snapshot(picture=CameraImage(0, _wide()), index=0)) or b"")
+def test_boxes_are_in_pixels_of_the_sent_image():
+    header, _, _ = taken_apart(Encoder().message(snapshot(image=CameraImage(0, _wide()), index=0)) or b"")
     assert header["picture"]["scale"] == 0.5
     [box] = header["display"]["vision_boxes"].values()
     assert box == pytest.approx([300, 50, 450, 100], abs=1.0)
 
 
-@pytest.mark.parametrize("missing", ["picture", "sweep", "camera", "ego"])
+@pytest.mark.parametrize("missing", ["image", "sweep", "camera", "ego"])
 def test_a_frame_that_lacks_something_still_makes_a_message(missing: str):
     header, jpeg, arrays = taken_apart(Encoder().message(snapshot(**{missing: None})) or b"")
-    assert (header["picture"] is None) == (missing == "picture") == (jpeg == b"")
+    assert (header["picture"] is None) == (missing == "image") == (jpeg == b"")
     assert (len(arrays["kind"]) == 0) == (missing == "sweep")
     assert (header["display"]["path"] is None) == (missing in ("sweep", "camera"))
 
@@ -184,7 +184,7 @@ def lane_line(side: Side, offset_m: float) -> LaneLine:
     return LaneLine(side, np.array([offset_m, 0.0, 1e-3, 0.0]), np.eye(4), 4.0, 30.0, 1.0, 0.0)
 
 
-def test_lane_lines_are_drawn_in_the_picture_and_in_the_plan():
+def test_lane_lines_are_drawn_in_the_image_and_in_the_plan():
     shown = snapshot()
     assert shown.processed is not None
     lane = EgoLane(lane_line("left", 1.8), None, "classical", 0.0, 0.0, None, np.array([0.0, 0.0, GROUND_M]))
@@ -229,22 +229,22 @@ def test_reflectance_between_0_and_1_uses_all_shades():
 
 
 @pytest.mark.parametrize(("shown_px", "sent"), [(0, 320), (100.5, 320), (640, 640), (833, 960), (1600, 1600)])
-def test_pictures_are_sent_as_wide_as_they_are_shown_in_steps(shown_px: float, sent: int):
+def test_images_are_sent_as_wide_as_they_are_shown_in_steps(shown_px: float, sent: int):
     assert width_for(shown_px) == sent
 
 
-def test_a_wider_picture_is_encoded_when_somebody_shows_it_wider():
-    shown = snapshot(picture=CameraImage(0, _wide()), index=0)
+def test_a_wider_image_is_encoded_when_somebody_shows_it_wider():
+    shown = snapshot(image=CameraImage(0, _wide()), index=0)
     encoder = Encoder()
     widths = [taken_apart(encoder.message(shown, width) or b"")[0]["picture"]["width"] for width in (640, 960, 640)]
     assert widths == [640, 960, 640]
 
 
-def test_the_picture_is_encoded_once_while_a_parameter_changes(monkeypatch: pytest.MonkeyPatch):
+def test_the_image_is_encoded_once_while_a_parameter_changes(monkeypatch: pytest.MonkeyPatch):
     made: list[CameraImage] = []
     monkeypatch.setattr(
-        "app.streaming.encode.encode_picture",
-        lambda picture, width: made.append(picture) or encode_picture(picture, width),
+        "app.streaming.encode.encode_image",
+        lambda image, width: made.append(image) or encode_image(image, width),
     )
     encoder, shown = Encoder(), snapshot()
     for _ in range(3):

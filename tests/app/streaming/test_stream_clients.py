@@ -83,7 +83,7 @@ def _first() -> Snapshot:
     tick = pipeline.seek(0, Params())
     assert tick is not None
     noise = np.random.default_rng(0).integers(0, 255, (900, 2560, 3), np.uint8)
-    tick = replace(tick, frame=replace(tick.frame, picture=CameraImage(0, noise)))
+    tick = replace(tick, frame=replace(tick.frame, image=CameraImage(0, noise)))
     return Snapshot(Params(), uri=pipeline.source.uri, count=1, processed=tick)
 
 
@@ -160,7 +160,7 @@ def test_who_joins_late_sees_the_present_frame_and_the_present_state(site: Site)
     assert state["state"]["playing"] is True, "also what came after the frame"
 
 
-def test_the_picture_is_as_wide_as_the_widest_page_shows_it(site: Site):
+def test_the_image_is_as_wide_as_the_widest_page_shows_it(site: Site):
     """Also while nothing plays; a page may say so as it comes."""
 
     def width(header: dict[str, Any]) -> int:
@@ -183,7 +183,7 @@ def test_the_picture_is_as_wide_as_the_widest_page_shows_it(site: Site):
         assert width(shown_next(site, small, 100)) == 320
 
 
-def test_a_pause_is_heard_while_the_picture_is_made_wider(site: Site, monkeypatch: pytest.MonkeyPatch):
+def test_a_pause_is_heard_while_the_image_is_made_wider(site: Site, monkeypatch: pytest.MonkeyPatch):
     """The frame, which says that it plays, comes late; a page must not believe it."""
     encode, begun, gate = site.stream._encoder.message, threading.Event(), threading.Event()
 

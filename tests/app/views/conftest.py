@@ -86,7 +86,7 @@ def make_frame(index: int = 0) -> Frame:
         name=f"{index:06d}",
         t_ns=t_ns,
         sweep=Sweep(t_ns, points, np.zeros(len(points), dtype=np.uint8), 16),
-        picture=CameraImage(t_ns, bgr, cv2.imencode(".jpg", bgr)[1].tobytes()),
+        image=CameraImage(t_ns, bgr, cv2.imencode(".jpg", bgr)[1].tobytes()),
         camera=CameraCalibration(K, np.zeros(0), T_camera_ego, 320, 120),
         ego=EgoState(t_ns, 15.0, 0.0),
     )

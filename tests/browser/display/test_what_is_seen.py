@@ -163,9 +163,9 @@ def test_warning_and_braking_differ_in_colour_word_and_shape(open_display: OpenD
 
 
 def brightness(page: Page) -> np.ndarray:
-    picture = cv2.imdecode(np.frombuffer(page.screenshot(), np.uint8), cv2.IMREAD_GRAYSCALE)
-    assert picture is not None
-    return picture
+    image = cv2.imdecode(np.frombuffer(page.screenshot(), np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert image is not None
+    return image
 
 
 @pytest.mark.usefixtures("paused_in_traffic")

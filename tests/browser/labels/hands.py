@@ -71,7 +71,7 @@ class Hand:
         middle = FROM_M + (box["height"] / 2 - TOOLS_PX) / scale
         return box["x"] + box["width"] / 2 - y * scale, box["y"] + box["height"] / 2 - (x - middle) * scale
 
-    def picture(self, u: float, v: float, width: int, height: int) -> Spot:
+    def image(self, u: float, v: float, width: int, height: int) -> Spot:
         """The pixel of the page where a pixel of the camera's image of that size is."""
         box = box_of(self.page.locator("#camera"))
         scale = min(box["width"] / width, box["height"] / height)

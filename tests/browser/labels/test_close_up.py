@@ -22,7 +22,7 @@ def canvas_per_pixel(page: Page) -> float:
     return page.evaluate(
         """async () => {
           const { place } = await import("/js/views/camera.js"), { get } = await import("/js/core/store.js");
-          return place().scale * (get("frame").picture.scale ?? 1);
+          return place().scale * (get("frame").image.scale ?? 1);
         }"""
     )
 
@@ -50,7 +50,7 @@ def test_the_image_is_zoomed_by_keys_wheel_and_fingers_to_single_pixels(hand: Ha
     middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.mouse.move(*middle)
     page.mouse.wheel(0, -600)
-    page.wait_for_function("async () => (await import('/js/views/picture_zoom.js')).isZoomed()")
+    page.wait_for_function("async () => (await import('/js/views/image_zoom.js')).isZoomed()")
     whole(page)
 
     def finger(kind: str, number: int, dx: float) -> None:

@@ -22,14 +22,14 @@ def test_a_key_is_changed_refused_where_it_is_taken_and_kept_for_its_person(hand
     page.keyboard.press("?")
     dialog = page.locator("#help-dialog")
     dialog.get_by_role("button", name="Change keys").click()
-    flip = dialog.locator("[title^='Change the key: turn the track round']")
+    flip = dialog.locator("[title^='Change the key: reverse the track']")
     flip.click()
     expect(flip).to_have_text("press a key")
     page.keyboard.press("a")
-    expect(dialog.get_by_role("status")).to_contain_text("A is already: in review: approve")
+    expect(dialog.get_by_role("status")).to_contain_text("A is already used: in review: approve")
     flip.click()
     page.keyboard.press("Shift+B")
-    expect(dialog.get_by_role("status")).to_contain_text("Shift B is already")
+    expect(dialog.get_by_role("status")).to_contain_text("Shift B is already used")
     flip.click()
     page.keyboard.press("Control+b")
     expect(flip).to_have_text("Ctrl B")
@@ -46,7 +46,7 @@ def test_a_key_is_changed_refused_where_it_is_taken_and_kept_for_its_person(hand
     )
     assert twice == [], "no key that is on does two things"
     dialog.get_by_role("button", name="Close").click()
-    expect(page.locator("#label-keys")).to_contain_text("Ctrl B turn round")
+    expect(page.locator("#label-keys")).to_contain_text("Ctrl B reverse")
 
     yaw = labels.cuboid(made, START)["yaw_rad"]
     page.keyboard.press("Shift+X")
@@ -62,10 +62,10 @@ def test_a_key_is_changed_refused_where_it_is_taken_and_kept_for_its_person(hand
           return document.querySelector("#label-keys").textContent;
         }"""
     )
-    assert "Shift X turn round" in other, "another person has other keys"
+    assert "Shift X reverse" in other, "another person has other keys"
     page.evaluate("async () => (await import('/js/core/store.js')).set('person', null)")
     page.keyboard.press("?")
     dialog.get_by_role("button", name="Change keys").click()
     dialog.get_by_role("button", name="Reset all").click()
-    expect(dialog.locator("[title^='Change the key: turn the track round']")).to_have_text("Shift X")
+    expect(dialog.locator("[title^='Change the key: reverse the track']")).to_have_text("Shift X")
     dialog.get_by_role("button", name="Close").click()

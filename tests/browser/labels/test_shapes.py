@@ -56,10 +56,10 @@ def test_a_hand_in_the_3d_view_moves_it_in_every_view(hand: Hand, labels: Labels
       const { set } = await import("/js/core/store.js");
       set("dragged", { track, frame, cuboid, ended });
     }"""
-    plan, picture = pixels(page, "#bev"), pixels(page, "#camera")
+    plan, image = pixels(page, "#bev"), pixels(page, "#camera")
     page.evaluate(dragged, [made, START, cuboid, False])
     assert repainted(page, "#bev", plan)
-    assert repainted(page, "#camera", picture)
+    assert repainted(page, "#camera", image)
     assert labels.cuboid(made, START) != cuboid, "the hand still holds it"
     hand.keys("f")
     is_at(page, START + 1)
@@ -113,17 +113,17 @@ def test_a_box_follows_its_cuboid_until_it_is_set_and_again_when_freed(hand: Han
     expect(facts).not_to_contain_text("box set by hand")
 
 
-def test_what_the_picture_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, site: Site):
+def test_what_the_image_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, site: Site):
     page = hand.page
     tick = site.engine.snapshot.processed
     assert tick is not None
-    assert tick.frame.picture is not None
-    height, width = tick.frame.picture.bgr.shape[:2]
+    assert tick.frame.image is not None
+    height, width = tick.frame.image.bgr.shape[:2]
     lead = next(each for each in tick.result.objects if each.id == tick.result.cipv.id)
     assert lead.bbox is not None
     u, v = (lead.bbox[0] + lead.bbox[2]) / 2, (lead.bbox[1] + lead.bbox[3]) / 2
     hand.keys("g")
-    hand.press(hand.picture(u, v, width, height))
+    hand.press(hand.image(u, v, width, height))
     labels.wait_for(lambda now: len(now.tracks) == 1)
     (made,) = labels.tracks
     lifted = labels.cuboid(made, START)
@@ -135,16 +135,16 @@ def test_what_the_picture_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, 
     box = labels.sighting(made, START)["bbox"] or list(lead.bbox)
     hand.keys("Shift+G")
     corners = (
-        hand.picture(box[0] - 20, box[1] - 10, width, height),
-        hand.picture(box[2] + 10, box[3] + 10, width, height),
+        hand.image(box[0] - 20, box[1] - 10, width, height),
+        hand.image(box[2] + 10, box[3] + 10, width, height),
     )
     hand.drag(*corners)
     wanted = [box[0] - 20, box[1] - 10, box[2] + 10, box[3] + 10]
     labels.wait_for(lambda now: now.sighting(made, START)["bbox"] == pytest.approx(wanted, abs=6))
     drawn = labels.sighting(made, START)["bbox"]
     hand.drag(
-        hand.picture(drawn[0], (drawn[1] + drawn[3]) / 2, width, height),
-        hand.picture(drawn[0] + 15, (drawn[1] + drawn[3]) / 2, width, height),
+        hand.image(drawn[0], (drawn[1] + drawn[3]) / 2, width, height),
+        hand.image(drawn[0] + 15, (drawn[1] + drawn[3]) / 2, width, height),
     )
     labels.wait_for(lambda now: now.sighting(made, START)["bbox"][0] == pytest.approx(drawn[0] + 15, abs=6))
     assert labels.sighting(made, START)["bbox"][1:] == pytest.approx(drawn[1:], abs=0.01), "one side moved"
@@ -158,11 +158,11 @@ def foot_of(labels: Labels, cuboid: dict[str, Any]) -> tuple[float, float]:
     return sum(u for u, _ in corners) / 4, sum(v for _, v in corners) / 4
 
 
-def test_a_cuboid_is_dragged_over_the_road_in_the_picture(hand: Hand, labels: Labels, site: Site):
+def test_a_cuboid_is_dragged_over_the_road_in_the_image(hand: Hand, labels: Labels, site: Site):
     page, tick = hand.page, site.engine.snapshot.processed
     assert tick is not None
-    assert tick.frame.picture is not None
-    height, width = tick.frame.picture.bgr.shape[:2]
+    assert tick.frame.image is not None
+    height, width = tick.frame.image.bgr.shape[:2]
     made = draw(hand, labels)
     is_saved(page)
     before = labels.cuboid(made, START)
@@ -175,7 +175,7 @@ def test_a_cuboid_is_dragged_over_the_road_in_the_picture(hand: Hand, labels: La
         arg=[made, START],
     )
     plan = pixels(page, "#bev")
-    hand.drag(hand.picture(u, v - 3, width, height), hand.picture(u + 30, v + 5, width, height), steps=6)
+    hand.drag(hand.image(u, v - 3, width, height), hand.image(u + 30, v + 5, width, height), steps=6)
     labels.wait_for(lambda now: now.cuboid(made, START) != before)
     assert repainted(page, "#bev", plan)
     after = labels.cuboid(made, START)
@@ -334,6 +334,6 @@ def test_a_track_is_carried_on_by_one_key_and_taken_back_by_one(hand: Hand, labe
     hand.keys("Shift+C")
     labels.wait_for(lambda now: now.tracks[made]["last"] - now.tracks[made]["first"] > 10)
     assert labels.tracks[made]["keyframes"] == [START], "nobody has placed the others"
-    expect(page.locator(".said")).to_contain_text(f"carried #{made} on over")
+    expect(page.locator(".said")).to_contain_text(f"extended #{made} by")
     page.keyboard.press("Control+z")
     labels.wait_for(lambda now: (now.tracks[made]["first"], now.tracks[made]["last"]) == (START, START))

@@ -84,10 +84,10 @@ def _lead_errors(recording: Recording, frames: tuple[int, int], params: Params) 
     for index in (k for k, name in enumerate(recording.names) if _within(name, frames)):
         frame = recording.source.frame(index)
         alignment = resolve(params.alignment, frame.camera)
-        assert frame.picture is not None
+        assert frame.image is not None
         assert frame.camera is not None
         assert alignment is not None
-        detections = nms.select(recording.detector.detect(frame.picture.bgr), params.detection)
+        detections = nms.select(recording.detector.detect(frame.image.bgr), params.detection)
         measured = distance.measure(detections, alignment, frame.camera, params.distance)
         dt_s = (frame.t_ns - before_ns) / 1e9 if before_ns is not None else None
         state, tracks = tracking.track(state, measured, dt_s, params.vision_tracking)

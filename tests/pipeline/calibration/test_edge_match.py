@@ -21,8 +21,8 @@ def looked_at(uri: str, frames: Sequence[int]) -> list[Seen]:
     for index in frames:
         frame = source.frame(index)
         assert frame.sweep is not None
-        assert frame.picture is not None
-        found.append((edge_scene(frame.sweep, frame.picture.bgr), frame.camera))
+        assert frame.image is not None
+        found.append((edge_scene(frame.sweep, frame.image.bgr), frame.camera))
     return found
 
 
@@ -103,20 +103,20 @@ def patchwork(like: EdgeScene) -> EdgeScene:
 
 def another_moment(drive: list[Seen]) -> list[Seen]:
     half = len(drive) // 2
-    pictures = [scene for scene, _ in (*drive[half:], *drive[:half])]
+    images = [scene for scene, _ in (*drive[half:], *drive[:half])]
     return [
-        (EdgeScene(scene.points, picture.strength, picture.usual), camera)
-        for (scene, camera), picture in zip(drive, pictures, strict=True)
+        (EdgeScene(scene.points, image.strength, image.usual), camera)
+        for (scene, camera), image in zip(drive, images, strict=True)
     ]
 
 
 def elsewhere(drive: list[Seen]) -> list[Seen]:
-    picture = patchwork(drive[0][0])
-    return [(EdgeScene(scene.points, picture.strength, picture.usual), camera) for scene, camera in drive]
+    image = patchwork(drive[0][0])
+    return [(EdgeScene(scene.points, image.strength, image.usual), camera) for scene, camera in drive]
 
 
 @pytest.mark.parametrize("made", [another_moment, elsewhere])
-def test_pictures_of_something_else_have_no_score(drive: list[Seen], made: Callable[[list[Seen]], list[Seen]]):
+def test_images_of_something_else_have_no_score(drive: list[Seen], made: Callable[[list[Seen]], list[Seen]]):
     """Edges are everywhere, and what lies on one lies there by chance."""
     found = edge_score(made(drive), with_mount())
     assert found.score is None

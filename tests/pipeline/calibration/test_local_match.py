@@ -28,11 +28,11 @@ def poles(seed: int, borders: int = 400) -> Seen:
     points = np.array([(x[k], y[k], low[k] + 0.3 * i) for k in range(len(x)) for i in range(5)])
     aligned = resolve(AlignmentParams(), CAMERA)
     assert aligned is not None
-    picture = np.full((SIZE[1], SIZE[0], 3), 90, np.uint8)
+    image = np.full((SIZE[1], SIZE[0], 3), 90, np.uint8)
     uv = aligned.project(points)
     for column, row in uv[np.isfinite(uv[:, 0])].astype(int).tolist():
-        picture[max(row - 5, 0) : max(row + 6, 0), max(column, 0) : max(column + 8, 0)] = 240
-    strength = upright_edges(picture)
+        image[max(row - 5, 0) : max(row + 6, 0), max(column, 0) : max(column + 8, 0)] = 240
+    strength = upright_edges(image)
     return EdgeScene(points, strength, strength.mean(axis=1, dtype=np.float32)), CAMERA
 
 

@@ -39,7 +39,7 @@ def test_one_speed_and_a_short_drive_tell_nothing():
         speed_delay(pairs(100.0, accel=0.0))
     with pytest.raises(NoDelay, match="too short"):
         speed_delay(pairs(100.0, seconds=4.5))
-    with pytest.raises(NoDelay, match="too little"):
+    with pytest.raises(NoDelay, match="too few"):
         speed_delay([])
 
 

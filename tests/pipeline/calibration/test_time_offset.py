@@ -31,8 +31,8 @@ def drive(later_ms: float) -> Callable[[int], Frame]:
         t_s = index / scene.rate_hz
         now, then = (world_state.at(scene, t_s + ms / 1e3) for ms in (0.0, later_ms))
         t_ns = round(1e9 * t_s)
-        picture = sensors.frame(then, index, t_ns).picture
-        return evolve(sensors.frame(now, index, t_ns, picture=False), picture=picture)
+        image = sensors.frame(then, index, t_ns).image
+        return evolve(sensors.frame(now, index, t_ns, image=False), image=image)
 
     return frame
 
@@ -57,9 +57,9 @@ def test_a_camera_whose_images_are_later_than_they_say_is_found(late: list[Frame
 
 def test_times_that_say_so_leave_nothing_to_correct(late: list[Frame]):
     def stamped(index: int) -> Frame:
-        picture = late[index].picture
-        assert picture is not None
-        return replace(late[index], picture=replace(picture, t_ns=late[index].t_ns + int(LATER_MS * 1e6)))
+        image = late[index].image
+        assert image is not None
+        return replace(late[index], image=replace(image, t_ns=late[index].t_ns + int(LATER_MS * 1e6)))
 
     assert time_offset(watch(stamped, FRAMES, Params())[0]).camera_offset_ms == pytest.approx(0.0, abs=5.0)
 
@@ -78,7 +78,7 @@ def test_a_standing_car_and_images_of_other_frames_tell_nothing(late: list[Frame
         time_offset(scenes)
     with pytest.raises(NoOffset, match=r"while the car drives.*ego speed"):
         times_of(scenes, speeds)
-    mixed = [replace(frame, picture=late[(k * 7 + 23) % FRAMES].picture) for k, frame in enumerate(late)]
+    mixed = [replace(frame, image=late[(k * 7 + 23) % FRAMES].image) for k, frame in enumerate(late)]
     with pytest.raises(NoOffset, match="clearly best"):
         time_offset(watch(mixed.__getitem__, FRAMES, Params())[0])
 
@@ -89,10 +89,10 @@ def test_real_images_of_the_next_frame_are_one_frame_late(data_dir: Path):
 
     def shifted(by: int) -> float:
         def frame(index: int) -> Frame:
-            own, other = frames[index + 1], frames[index + 1 + by].picture
-            assert own.picture is not None
+            own, other = frames[index + 1], frames[index + 1 + by].image
+            assert own.image is not None
             assert other is not None
-            return replace(own, picture=replace(other, t_ns=own.picture.t_ns))
+            return replace(own, image=replace(other, t_ns=own.image.t_ns))
 
         return time_offset(watch(frame, len(frames) - 2, Params())[0]).camera_offset_ms
 

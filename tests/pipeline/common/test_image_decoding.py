@@ -1,4 +1,4 @@
-"""Pictures beyond the budget are refused before a decoder sees them."""
+"""Images beyond the budget are refused before a decoder sees them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def jpeg_of(width: int, height: int) -> bytes:
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])
-def test_pictures_of_cameras_are_decoded(suffix: str):
+def test_images_of_cameras_are_decoded(suffix: str):
     whole = cv2.imencode(suffix, GREY)[1].tobytes()
     decoded = decode_within_budget(whole)
     assert decoded is not None
@@ -52,7 +52,7 @@ HUGE = {
 
 
 @pytest.mark.parametrize("name", HUGE)
-def test_what_would_take_more_than_a_camera_picture_may_is_refused_unseen(name: str):
+def test_what_would_take_more_than_a_camera_image_may_is_refused_unseen(name: str):
     data, why = HUGE[name]
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with pytest.raises(TooMuch, match=why):
@@ -60,7 +60,7 @@ def test_what_would_take_more_than_a_camera_picture_may_is_refused_unseen(name: 
     assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MOST_PIXELS
 
 
-def test_every_decoder_of_pictures_is_behind_it():
+def test_every_decoder_of_images_is_behind_it():
     """A decoder that somebody calls elsewhere has no budget."""
     from pathlib import Path
 

@@ -84,7 +84,7 @@ def test_a_store_that_goes_on_failing_is_overloaded_and_says_nothing_of_the_file
     def work() -> str:
         raise OSError("slow down")
 
-    with pytest.raises(Overloaded, match="s3://x: the store fails: slow down"):
+    with pytest.raises(Overloaded, match="s3://x: store error: slow down"):
         patiently(work, "s3://x")
 
 

@@ -116,4 +116,4 @@ def test_a_lack_of_descriptors_says_nothing_of_a_frame(tmp_path: Path, monkeypat
         with pytest.raises(Overloaded, match="Too many open files"):
             source.frame(1)
     after = source.frame(1)
-    assert (after.notes, after.sweep is None, after.picture is None) == (before.notes, False, False)
+    assert (after.notes, after.sweep is None, after.image is None) == (before.notes, False, False)

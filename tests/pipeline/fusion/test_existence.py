@@ -205,7 +205,7 @@ def test_an_empty_place_is_forgotten_where_the_lidar_cannot_tell_any_more() -> N
 
 
 EMPTY = RawBoxes("net", np.zeros((0, 4), np.float32), np.zeros(0, np.float32), ())
-IMAGE = Frame(0, "0", 0, picture=CameraImage(None, np.zeros((720, 1280, 3), np.uint8)), raw_boxes=EMPTY)
+IMAGE = Frame(0, "0", 0, image=CameraImage(None, np.zeros((720, 1280, 3), np.uint8)), raw_boxes=EMPTY)
 
 
 def unseen(followed: int, images: int, frame: Frame = IMAGE, *others: FusedObject, u: float = 600.0) -> float:

@@ -196,7 +196,7 @@ def test_optimal_assignment_beats_first_come_first_served() -> None:
     assert sorted(item.source for item in optimal.objects) == ["VL", "VL"]
 
 
-def test_without_a_picture_every_track_keeps_its_row() -> None:
+def test_without_an_image_every_track_keeps_its_row() -> None:
     _, result = fuse(FusionState(), (lidar_track(1, 20.0),), (vision_track(1, (0, 0, 9, 9)),), ALIGNMENT, None, OPTIMAL)
     assert sorted(item.source for item in result.objects) == ["L", "V"]
 

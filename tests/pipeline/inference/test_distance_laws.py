@@ -59,12 +59,12 @@ def test_a_law_that_cannot_be_meant_is_not_used_and_the_detector_says_why(networ
 
 
 def test_boxes_carry_their_detectors_law_and_a_new_law_is_a_new_detector_for_caches(network: Path) -> None:
-    picture = np.zeros((64, 64, 3), np.uint8)
+    image = np.zeros((64, 64, 3), np.uint8)
     before = open_detector(str(network), None)
-    assert before.detect(picture).law == REAL_VEHICLES
+    assert before.detect(image).law == REAL_VEHICLES
     keep_law(network, LAW, {})
     after = open_detector(str(network), None)
-    assert after.detect(picture).law == LAW
+    assert after.detect(image).law == LAW
     assert after.name != before.name
     assert not after.notes
 

@@ -1,4 +1,4 @@
-"""Picture boxes that follow their cuboids, and those that somebody set."""
+"""Image boxes that follow their cuboids, and those that somebody set."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.pipeline.labels.formats.sets import camera, drive
 BY = Origin("person", "Ada", 1)
 CAR = Cuboid((20.0, 0.0, 0.5), (4.0, 1.8, 1.5), 0.1)
 BESIDE = Cuboid((4.5, 3.0, 0.5), (4.0, 1.8, 1.5), 0.0)
-"""Near, and cut by the left side of the picture."""
+"""Near, and cut by the left side of the image."""
 
 
 def sighting(cuboid: Cuboid | None, **more: object) -> Sighting:
@@ -26,7 +26,7 @@ def sighting(cuboid: Cuboid | None, **more: object) -> Sighting:
 
 
 def around(cuboid: Cuboid) -> tuple[float, ...] | None:
-    """The box around the corners, by hand; None outside the picture."""
+    """The box around the corners, by hand; None outside the image."""
     eye = camera()
     seen = eye.T_camera_ego @ np.column_stack([cuboid.corners(), np.ones(8)]).T
     u, v = (eye.K @ seen[:3])[:2] / seen[2]
@@ -36,7 +36,7 @@ def around(cuboid: Cuboid) -> tuple[float, ...] | None:
 
 
 def test_a_detectors_box_gives_way_to_the_cuboids_projection() -> None:
-    """Of 200 cuboids all round, those in the picture have the box around their corners, cut at its edges."""
+    """Of 200 cuboids all round, those in the image have the box around their corners, cut at its edges."""
     rng = np.random.default_rng(3)
     cuboids = [
         Cuboid((float(x), float(y), 0.5), (4.0, 1.8, 1.5), float(yaw))
@@ -47,13 +47,13 @@ def test_a_detectors_box_gives_way_to_the_cuboids_projection() -> None:
     assert len(seen) > 100
     overlaps = [iou_matrix(np.array([one]), np.array([other]))[0, 0] for one, other in seen]
     assert np.mean(np.array(overlaps) >= 0.9) >= 0.95
-    assert all(one is None for one, other in pairs if other is None), "outside the picture nothing has a box"
+    assert all(one is None for one, other in pairs if other is None), "outside the image nothing has a box"
 
 
 def test_a_box_that_was_set_stays() -> None:
     box = (500.0, 300.0, 700.0, 420.0)
     assert sighting(CAR, bbox=box, box_set=True).bbox == box
-    assert sighting(None, bbox=box).bbox == box, "what the picture alone shows has nothing to follow"
+    assert sighting(None, bbox=box).bbox == box, "what the image alone shows has nothing to follow"
 
 
 def test_how_much_is_cut_off_is_computed_unless_it_was_read() -> None:

@@ -32,12 +32,12 @@ def test_points_beside_a_cuboid_are_a_misfit_and_those_of_the_road_are_not() -> 
     assert fit_of(points[:0], CAR).share_beside is None
 
 
-def test_four_views_show_picture_and_points_on_their_side() -> None:
+def test_four_views_show_image_and_points_on_their_side() -> None:
     """What is at the rear is left in the views from above and from the side; what is on the left, from behind."""
     eye = camera()
-    picture = CameraImage(0, np.full((eye.height, eye.width, 3), 77, dtype=np.uint8), b"")
+    image = CameraImage(0, np.full((eye.height, eye.width, 3), 77, dtype=np.uint8), b"")
     sweep = Sweep(0, cloud((-2.0, 0.8, 0.5)), np.zeros(1, np.uint8), 16)
-    frame = Frame(0, "0", 0, sweep=sweep, picture=picture, camera=eye)
+    frame = Frame(0, "0", 0, sweep=sweep, image=image, camera=eye)
     drawn = close_up(frame, Sighting(0, CAR), Pinhole(eye.K, eye.distortion, eye.T_camera_ego))
     assert drawn.shape == (2 * HEIGHT_PX, 2 * WIDTH_PX, 3)
     seen, top = drawn[:HEIGHT_PX, :WIDTH_PX], drawn[:HEIGHT_PX, WIDTH_PX:]

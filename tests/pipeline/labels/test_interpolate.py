@@ -101,7 +101,7 @@ def test_a_keyframe_where_it_was_not_seen_is_joined_to_where_it_was() -> None:
     assert [frame for frame, each in found.items() if each.keyframe] == [14]
 
 
-def test_a_keyframe_of_the_picture_alone_ends_what_is_followed() -> None:
+def test_a_keyframe_of_the_image_alone_ends_what_is_followed() -> None:
     boxed = Sighting(5, None, (1.0, 1.0, 9.0, 9.0))
     found = put_keyframe({**SEEN, 5: boxed, 0: at(0, 99.0)}, at(9, 50.0), T_NS)
     assert xs(found)[3] == 23.0

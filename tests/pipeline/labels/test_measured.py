@@ -37,7 +37,7 @@ def sweep_of(car: Cuboid, *, faces: str = "both") -> F32:
     return np.column_stack([xyz, np.full(len(xyz), 10.0)]).astype(np.float32)
 
 
-def box_in_picture(frame: Frame, cuboid: Cuboid) -> Box | None:
+def box_in_image(frame: Frame, cuboid: Cuboid) -> Box | None:
     """Where a cuboid is in the image; null outside it."""
     assert frame.camera is not None
     alignment = resolve(Params().alignment, frame.camera)
@@ -122,7 +122,7 @@ def test_a_click_takes_the_detection_it_is_in_or_the_points_it_is_on(frame: Fram
 def test_without_points_it_is_as_far_as_it_looks(frame: Frame) -> None:
     blind = replace(frame, sweep=None)
     car = standing(40.0, 0.0)
-    bbox = box_in_picture(frame, car)
+    bbox = box_in_image(frame, car)
     assert bbox is not None
     found = lift(blind, Params(), "car", bbox=bbox)
     assert found.points == 0
@@ -151,7 +151,7 @@ def test_real_cars_are_found_where_the_labels_have_them(data_dir: Path) -> None:
         assert frame.sweep is not None
         assert frame.camera is not None
         for item in source.truth(index) or ():
-            box = box_in_picture(frame, item.cuboid)
+            box = box_in_image(frame, item.cuboid)
             if item.label.lower() != "car" or box is None or _points_in(frame, item.cuboid) < 10:
                 continue
             x, y, z = item.cuboid.center

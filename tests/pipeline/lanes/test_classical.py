@@ -71,9 +71,9 @@ NOTHING = {
 }
 
 
-@pytest.mark.parametrize("picture", NOTHING)
-def test_where_there_is_nothing_no_lane_is_believed(picture: str) -> None:
-    lane = lane_in(NOTHING[picture])
+@pytest.mark.parametrize("image", NOTHING)
+def test_where_there_is_nothing_no_lane_is_believed(image: str) -> None:
+    lane = lane_in(NOTHING[image])
     assert lane.left is None or lane.left.quality < 0.5
     assert lane.right is None or lane.right.quality < 0.5
     assert lane.left is None or lane.right is None
@@ -98,7 +98,7 @@ def test_its_name_says_for_which_camera_it_is() -> None:
     assert open_classical(None).notes
 
 
-def test_points_lie_in_the_picture() -> None:
+def test_points_lie_in_the_image() -> None:
     raw = open_classical(camera()).detect(road(noise=20.0))
     assert raw.points.dtype == np.float32
     assert np.all((raw.points >= 0) & (raw.points < (WIDTH, HEIGHT)))

@@ -29,7 +29,7 @@ def _own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv(variable, str(tmp_path / variable))
 
 
-def picture(**bars: tuple[int, int]) -> U8:
+def image(**bars: tuple[int, int]) -> U8:
     """Black, with upright bars: ``red=(left, right)`` columns."""
     bgr = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     for name, (left, right) in bars.items():
@@ -47,14 +47,14 @@ MASKS = {
 }
 
 
-def test_curves_lie_in_the_picture_whose_sky_was_cut_off_at_the_cameras_horizon(tmp_path: Path) -> None:
+def test_curves_lie_in_the_image_whose_sky_was_cut_off_at_the_cameras_horizon(tmp_path: Path) -> None:
     """The curve begins in the middle of the input: 0.33 of it lie above the horizon, and 17 % down to that."""
     K = np.array([[1000.0, 0.0, 640.0], [0.0, 1000.0, 0.57 * HEIGHT], [0.0, 0.0, 1.0]])
     level = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
     camera = CameraCalibration(K, np.zeros(0), level, WIDTH, HEIGHT)
     network = open_lane_network(str(lane_networks.lstr(tmp_path / "lstr.onnx")), camera=camera)
     assert network.head.name == "LSTR"
-    raw = network.detect(picture())
+    raw = network.detect(image())
     assert set(raw.line.tolist()) == {0}
     assert raw.points[:, 0] == pytest.approx(639.5, abs=1.0)
     sky = (0.57 - 0.33) / (1.0 - 0.33)
@@ -63,11 +63,11 @@ def test_curves_lie_in_the_picture_whose_sky_was_cut_off_at_the_cameras_horizon(
 
 
 @pytest.mark.parametrize("kind", MASKS)
-def test_a_line_is_found_where_it_is_in_the_picture(tmp_path: Path, kind: str) -> None:
+def test_a_line_is_found_where_it_is_in_the_image(tmp_path: Path, kind: str) -> None:
     make, size, head = MASKS[kind]
     network = open_lane_network(str(make(tmp_path / "tiny.onnx", size)))
     assert network.head.name == head
-    raw = network.detect(picture(red=(600, 640)))
+    raw = network.detect(image(red=(600, 640)))
     assert np.abs(raw.points[:, 0] - 619.5).max() < 6.0
     assert raw.points[:, 1].max() > 0.97 * HEIGHT
     top = HEIGHT - WIDTH * 52 / 244 if "lower" in kind else 0.03 * HEIGHT
@@ -78,7 +78,7 @@ def test_a_line_is_found_where_it_is_in_the_picture(tmp_path: Path, kind: str) -
 
 
 def test_classes_are_lines_and_one_that_is_not_there_is_dropped(tmp_path: Path) -> None:
-    bgr = picture(red=(300, 340), green=(900, 940))
+    bgr = image(red=(300, 340), green=(900, 940))
     both = open_lane_network(str(lane_networks.classes(tmp_path / "both.onnx"))).detect(bgr)
     assert both.points[both.line == 1, 0].mean() == pytest.approx(319.5, abs=6.0)
     assert both.points[both.line == 2, 0].mean() == pytest.approx(919.5, abs=6.0)
@@ -89,7 +89,7 @@ def test_classes_are_lines_and_one_that_is_not_there_is_dropped(tmp_path: Path) 
 @pytest.mark.parametrize(("anchors", "cells", "first_row"), [(56, 100, 160 / 720), (18, 200, 121 / 288)])
 def test_a_row_grid_gives_a_place_in_each_row(tmp_path: Path, anchors: int, cells: int, first_row: float) -> None:
     network = open_lane_network(str(lane_networks.rows(tmp_path / "ufld.onnx", anchors, cells, cells // 4)))
-    raw = network.detect(picture())
+    raw = network.detect(image())
     assert raw.points.shape == (anchors, 2)
     assert raw.points[:, 0] == pytest.approx(np.full(anchors, WIDTH * (cells // 4) / (cells - 1)), abs=1.5)
     assert raw.points[0, 1] == pytest.approx(HEIGHT * first_row, abs=1.5)
@@ -100,8 +100,8 @@ def test_a_row_grid_gives_a_place_in_each_row(tmp_path: Path, anchors: int, cell
 
 def test_what_is_too_wide_for_a_line_is_none(tmp_path: Path) -> None:
     network = open_lane_network(str(lane_networks.twin(tmp_path / "tiny.onnx")))
-    assert len(network.detect(picture(red=(200, 700))).points) == 0
-    assert len(network.detect(picture()).points) == 0
+    assert len(network.detect(image(red=(200, 700))).points) == 0
+    assert len(network.detect(image()).points) == 0
 
 
 def test_equal_files_have_equal_names(tmp_path: Path) -> None:

@@ -240,7 +240,7 @@ def test_before_a_detector_has_looked_there_is_no_lane_and_afterwards_its_age_co
     assert float(later.left.sigma_m(20.0)) > float(lane.left.sigma_m(20.0))
 
 
-def test_the_same_picture_gives_the_same_lane() -> None:
+def test_the_same_image_gives_the_same_lane() -> None:
     one, other = (seen(paint(noise_px=0.5, clutter=50)) for _ in range(2))
     assert one.left is not None
     assert other.left is not None

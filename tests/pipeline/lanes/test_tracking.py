@@ -92,7 +92,7 @@ def test_an_unseen_line_grows_unsure_fades_and_ends() -> None:
     assert lane_of(tracks).age_s > 1.0
 
 
-def test_a_line_that_pictures_no_longer_show_ends_sooner() -> None:
+def test_a_line_that_images_no_longer_show_ends_sooner() -> None:
     tracks = update(tracked(found(1.75), found(-1.75)), "test", (found(1.75),), PARAMS)
     seen = 0
     while lane_of(tracks).right is not None:

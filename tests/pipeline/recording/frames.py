@@ -38,7 +38,7 @@ def sweep(index: int = 0, points: int = 40, t_ns: int | None = None) -> Sweep:
     return Sweep(PERIOD_NS * (1 + index) if t_ns is None else t_ns, xyzi, ring, 16)
 
 
-def picture(index: int = 0, kind: str = ".jpg", t_ns: int | None = None) -> CameraImage:
+def image(index: int = 0, kind: str = ".jpg", t_ns: int | None = None) -> CameraImage:
     """Noise, the same for the same index; only a JPEG has its encoded form."""
     bgr = np.random.default_rng(index).integers(0, 255, (24, 32, 3)).astype(np.uint8)
     if kind != ".jpg":
@@ -55,7 +55,7 @@ def full(index: int) -> Frame:
         f"{index:06d}",
         t_ns,
         sweep=replace(sweep(index), time_s=np.linspace(-0.05, 0.05, 40).astype(np.float32)),
-        picture=picture(index, t_ns=t_ns - 7_000_001),
+        image=image(index, t_ns=t_ns - 7_000_001),
         camera=CAMERA,
         ego=EgoState(t_ns - 3, 20.0 + index / 3.0, -0.01),
         notes=("gnss silent for 1.0 s (antenna?)",),

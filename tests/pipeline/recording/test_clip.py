@@ -17,7 +17,7 @@ from pipeline.recording.session.source import SessionSource
 from pipeline.recording.session.writer import SessionWriter
 from pipeline.sources import open_source
 from pipeline.types import Frame
-from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, TRUTH, full, picture, same
+from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, TRUTH, full, image, same
 
 FRAMES = 12
 CHANGED = with_changes(Params(), {"cluster.z_weight": 0.35})
@@ -25,10 +25,10 @@ CHANGED = with_changes(Params(), {"cluster.z_weight": 0.35})
 
 def frame_of(index: int) -> Frame:
     """The camera gives every other frame an image of its own."""
-    return replace(full(index), picture=PICTURES[index // 2])
+    return replace(full(index), image=IMAGES[index // 2])
 
 
-PICTURES = [picture(number, t_ns=number) for number in range(FRAMES)]
+IMAGES = [image(number, t_ns=number) for number in range(FRAMES)]
 
 
 @pytest.fixture

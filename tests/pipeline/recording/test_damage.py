@@ -108,7 +108,7 @@ def test_one_flipped_bit_costs_one_part_of_the_drive(whole: bytes, tmp_path: Pat
     hurt = [frame for frame in frames if frame.sweep is None]
     assert 0 < len(hurt) < FRAMES / 2
     assert all(any("lacks a message" in note for note in frame.notes) for frame in hurt)
-    assert all(same(frame.picture, full(frame.index).picture) for frame in frames if frame not in hurt)
+    assert all(same(frame.image, full(frame.index).image) for frame in frames if frame not in hurt)
 
 
 def test_recovering_a_cut_file_keeps_every_complete_chunk(whole: bytes, tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_recovering_a_cut_file_keeps_every_complete_chunk(whole: bytes, tmp_path
         session = SessionSource("a", str(out))
         assert session.file.directory.problem is None
         assert len(session) == saved.frames == read_all(path)
-        assert same(session.frame(len(session) - 1).picture, full(len(session) - 1).picture)
+        assert same(session.frame(len(session) - 1).image, full(len(session) - 1).image)
 
 
 def test_recovering_a_whole_file_loses_nothing(whole: bytes, tmp_path: Path) -> None:

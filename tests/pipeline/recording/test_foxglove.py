@@ -23,7 +23,7 @@ from pipeline.recording.topics import protobuf_class
 from pipeline.step import State, step
 from pipeline.types.camera_shot import Shot
 from pipeline.types.result_json import to_json
-from tests.pipeline.recording.frames import ABOUT, full, picture
+from tests.pipeline.recording.frames import ABOUT, full, image
 
 FRAMES = 12
 Row = tuple[Schema | None, Channel, Message]
@@ -52,7 +52,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
         state, result = step(state, frame, Params())
         assert frame.ego is not None
         assert frame.gnss is not None
-        recorder.picture(Shot(encoded=picture(50 + index).encoded), frame.t_ns - 40_000_000, frame.t_ns - 3)
+        recorder.image(Shot(encoded=image(50 + index).encoded), frame.t_ns - 40_000_000, frame.t_ns - 3)
         recorder.ego(frame.ego, frame.t_ns - 2)
         recorder.fix(frame.gnss, frame.t_ns - 1)
         recorder.put_packets([(frame.t_ns, bytes(1206))])
@@ -137,15 +137,15 @@ def test_clouds_lie_as_their_fields_say(rows: list[Row]) -> None:
         assert {field.name for field in cloud.fields} >= {"x", "y", "z", "intensity", "ring"}
 
 
-def test_pictures_can_be_decoded_by_what_their_format_says(rows: list[Row]) -> None:
-    pictures = parsed(rows, "/camera/image")
-    assert len(pictures) == 2 * FRAMES
+def test_images_can_be_decoded_by_what_their_format_says(rows: list[Row]) -> None:
+    images = parsed(rows, "/camera/image")
+    assert len(images) == 2 * FRAMES
     magic = {"jpeg": b"\xff\xd8\xff", "png": b"\x89PNG"}
-    for image, message in pictures:
-        assert image.frame_id == "camera"
-        assert image.timestamp.seconds * 10**9 + image.timestamp.nanos == message.publish_time
-        assert image.data.startswith(magic[image.format])
-        assert cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_COLOR).shape == (24, 32, 3)
+    for shown, message in images:
+        assert shown.frame_id == "camera"
+        assert shown.timestamp.seconds * 10**9 + shown.timestamp.nanos == message.publish_time
+        assert shown.data.startswith(magic[shown.format])
+        assert cv2.imdecode(np.frombuffer(shown.data, np.uint8), cv2.IMREAD_COLOR).shape == (24, 32, 3)
 
 
 def test_the_camera_and_where_it_sits(rows: list[Row]) -> None:

@@ -28,7 +28,7 @@ from pipeline.recording.session.source import Mark, SessionSource
 from pipeline.recording.session.velodyne_scan import RawLidar
 from pipeline.types.camera_shot import Shot
 from tests.conftest import ROOT
-from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, picture, same, sweep
+from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, image, same, sweep
 
 
 def test_what_is_put_can_be_opened_afterwards(tmp_path: Path) -> None:
@@ -101,26 +101,26 @@ def test_what_comes_between_frames_is_recorded_when_it_came(tmp_path: Path) -> N
     recorder = Recorder(tmp_path / "a.mcap", ABOUT)
     began_ns, frames = 10**18, [full(index) for index in range(4)]
     for index, frame in enumerate(frames):
-        shown, ego, fix = frame.picture, frame.ego, frame.gnss
+        shown, ego, fix = frame.image, frame.ego, frame.gnss
         assert shown is not None
         assert ego is not None
         assert fix is not None
         t_ns, at_ns = frame.t_ns - 60_000_000, began_ns + index * PERIOD_NS
-        other = picture(100 + index).encoded
+        other = image(100 + index).encoded
         for step, shot in enumerate((Shot(encoded=other), Shot(encoded=shown.encoded), Shot(pixels=shown.bgr))):
-            recorder.picture(shot, t_ns + step * 33_000_000, at_ns + step)
+            recorder.image(shot, t_ns + step * 33_000_000, at_ns + step)
         recorder.ego(replace(ego, t_ns=ego.t_ns - 1), at_ns + 5)
         recorder.ego(ego, at_ns + 6)
         recorder.fix(fix, at_ns + 7)
         moved = replace(shown, t_ns=t_ns + 37_000_000)
-        recorder.put(replace(frame, picture=moved), received_ns=at_ns + 10)
+        recorder.put(replace(frame, image=moved), received_ns=at_ns + 10)
     state = recorder.stop()
     assert (state.frames, state.dropped, state.error) == (4, 0, None)
     session = SessionSource("a", str(tmp_path / "a.mcap"))
     for index, frame in enumerate(frames):
-        assert frame.picture is not None
-        expected = replace(frame.picture, t_ns=frame.t_ns - 23_000_000)
-        assert same(session.frame(index), replace(frame, picture=expected))
+        assert frame.image is not None
+        expected = replace(frame.image, t_ns=frame.t_ns - 23_000_000)
+        assert same(session.frame(index), replace(frame, image=expected))
     stored = {topic: list(session.file.messages((topic,))) for topic in ("/camera/image", "/ego", "/gnss")}
     assert [len(messages) for messages in stored.values()] == [12, 8, 4]
     steps_ns = [each.publish_time_ns - frames[0].t_ns + 60_000_000 for each in stored["/camera/image"]]
@@ -162,7 +162,7 @@ def test_where_packets_are_recorded_they_hold_the_sweeps(tmp_path: Path) -> None
 def test_what_a_slow_disk_leaves_no_room_for_is_counted_by_kind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shot = Shot(encoded=picture(0).encoded)
+    shot = Shot(encoded=image(0).encoded)
     assert shot.encoded is not None
     monkeypatch.setattr(recorder_module, "_QUEUED_BYTES", 3 * len(shot.encoded))
     with slow_disk(monkeypatch) as may_write:
@@ -170,7 +170,7 @@ def test_what_a_slow_disk_leaves_no_room_for_is_counted_by_kind(
         while recorder.put(full(0)):  # until there is no room for frames
             pass
         for index in range(5):
-            recorder.picture(shot, index, index)
+            recorder.image(shot, index, index)
         assert recorder.state.dropped == 3
         may_write.set()
         state = recorder.stop()
@@ -180,14 +180,14 @@ def test_what_a_slow_disk_leaves_no_room_for_is_counted_by_kind(
     assert len(list(session.file.messages(("/camera/image",)))) == state.frames + 3
 
 
-def test_a_new_file_holds_the_picture_and_the_sweep_of_its_first_frame(tmp_path: Path) -> None:
+def test_a_new_file_holds_the_image_and_the_sweep_of_its_first_frame(tmp_path: Path) -> None:
     parts = Segments(tmp_path / "a.mcap", ABOUT, FileRotation(max_s=0.2))
     frames = [full(index) for index in range(8)]
     for frame in frames:
-        assert frame.picture is not None
+        assert frame.image is not None
         assert frame.sweep is not None
         parts.write_sweep(frame.sweep, frame.t_ns - 2)
-        parts.write_picture(Shot(encoded=frame.picture.encoded), frame.t_ns - 7_000_001, frame.t_ns - 1)
+        parts.write_image(Shot(encoded=frame.image.encoded), frame.t_ns - 7_000_001, frame.t_ns - 1)
         parts.write(frame, received_ns=frame.t_ns)
     parts.close()
     assert len(parts.files) == 3

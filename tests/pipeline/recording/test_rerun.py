@@ -42,9 +42,9 @@ def test_points_are_drawn_in_the_ego_frame(columns: dict[str, list[pa.Array]]) -
     assert _values(columns["/lidar/points CoordinateFrame:frame"]) == {"ego"}
 
 
-def test_pictures_are_the_cameras_own_bytes(columns: dict[str, list[pa.Array]]) -> None:
+def test_images_are_the_cameras_own_bytes(columns: dict[str, list[pa.Array]]) -> None:
     blobs = [bytes(blob[0]) for piece in columns["/camera/image EncodedImage:blob"] for blob in piece.to_pylist()]
-    assert blobs == [full(index).picture.encoded for index in range(FRAMES)]  # type: ignore[union-attr]
+    assert blobs == [full(index).image.encoded for index in range(FRAMES)]  # type: ignore[union-attr]
 
 
 def test_a_transform_leads_from_the_points_to_the_camera(columns: dict[str, list[pa.Array]]) -> None:

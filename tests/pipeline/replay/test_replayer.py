@@ -33,13 +33,13 @@ class Notebook:
         pass
 
 
-def pictures(count: int) -> list[Message]:
+def images(count: int) -> list[Message]:
     return [Message(k * 10 * MS, "camera", bytes([k % 256])) for k in range(count)]
 
 
 def test_everything_is_sent_in_order_and_not_early() -> None:
     camera = Notebook()
-    sent = replay(pictures(20), {"camera": camera})
+    sent = replay(images(20), {"camera": camera})
     assert [payload[0] for _, payload in camera.sent] == list(range(20))
     assert sent.events == {"camera": 20}
     assert min(late for late, _ in camera.sent) >= 0
@@ -47,7 +47,7 @@ def test_everything_is_sent_in_order_and_not_early() -> None:
 
 def test_a_machine_that_is_too_slow_puts_off_instead_of_lagging_behind() -> None:
     slow = Notebook(takes_s=0.05)
-    sent = replay(pictures(60), {"camera": slow})
+    sent = replay(images(60), {"camera": slow})
     assert sent.slips > 3
     assert sent.events["camera"] == 60
     assert max(late for late, _ in slow.sent) < 1000 * MS, "without that it would be 2.4 s in the end"
@@ -56,25 +56,25 @@ def test_a_machine_that_is_too_slow_puts_off_instead_of_lagging_behind() -> None
 def test_a_plug_is_pulled_and_put_back() -> None:
     camera = Notebook()
     fault = Fault(sensor="camera", kind="disconnect", from_s=0.15, to_s=0.25)
-    replay(pictures(40), {"camera": camera}, faults=[fault])
+    replay(images(40), {"camera": camera}, faults=[fault])
     assert camera.plugs == [False, True]
     assert len(camera.sent) < 40
 
 
 def test_a_sensor_nobody_listens_to_is_left_out_and_nothing_is_nothing() -> None:
-    assert replay(pictures(3), {}).events == {}
+    assert replay(images(3), {}).events == {}
     assert replay([], {"camera": Notebook()}).events == {}
 
 
 def test_it_ends_when_it_is_stopped() -> None:
     camera = Notebook()
-    sent = replay(pictures(10_000), {"camera": camera}, stopped=lambda: len(camera.sent) >= 3)
+    sent = replay(images(10_000), {"camera": camera}, stopped=lambda: len(camera.sent) >= 3)
     assert sent.events["camera"] == 3
 
 
 def test_what_goes_wrong_while_making_messages_is_raised() -> None:
     def broken():
-        yield from pictures(2)
+        yield from images(2)
         raise ValueError("no more frames")
 
     camera = Notebook()

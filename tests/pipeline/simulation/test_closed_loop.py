@@ -58,7 +58,7 @@ def test_sensors_left_out_see_nothing(sensors: str, sources: set[str]) -> None:
     assert seen <= sources
 
 
-def test_a_network_gets_the_drawn_picture() -> None:
+def test_a_network_gets_the_drawn_image() -> None:
     class Counting:
         name = "counting"
 
@@ -73,4 +73,4 @@ def test_a_network_gets_the_drawn_picture() -> None:
     scene = short(SLOWER, 0.3)
     drove = list(drive(scene, Setup(eyes=NetworkEyes(counting))))  # type: ignore[arg-type]
     assert counting.shapes == [(720, 1280, 3)] * 3
-    assert all(tick.frame.picture is not None for tick in drove)
+    assert all(tick.frame.image is not None for tick in drove)

@@ -57,7 +57,7 @@ def test_a_kept_drive_gives_the_very_frames_and_results_of_the_loop(
     assert source.notes
     given = Detectors(Unwanted(), Unwanted())
     for index, (tick, (frame, result)) in enumerate(zip(ticks, run(source, Params(), given), strict=True)):
-        assert frame.picture is not None
+        assert frame.image is not None
         if tick.frame.sweep is None:
             assert frame.sweep is None
         else:

@@ -77,12 +77,12 @@ camera:
 """
 
 
-def write_video(path: Path, pictures: int, rate: int = 25, codec: str = "mjpeg", step: int = 20) -> None:
-    """Pictures whose grey is ``step`` times their number, 80×48."""
+def write_video(path: Path, images: int, rate: int = 25, codec: str = "mjpeg", step: int = 20) -> None:
+    """Images whose grey is ``step`` times their number, 80×48."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream(codec, rate=rate)
         stream.width, stream.height, stream.pix_fmt = 80, 48, "yuvj420p" if codec == "mjpeg" else "yuv420p"
-        for number in range(pictures):
+        for number in range(images):
             grey = np.full((48, 80, 3), step * number, dtype=np.uint8)
             container.mux(stream.encode(av.VideoFrame.from_ndarray(grey, format="bgr24")))
         container.mux(stream.encode())

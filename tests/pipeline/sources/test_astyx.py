@@ -42,8 +42,8 @@ def test_a_frame_holds_both_sensors_in_the_ego_frame(astyx: Path) -> None:
     assert frame.sweep.ring.tolist() == [0, 8, 1, 15], "laser 0 is −15°, 1 is +1°, 2 is −13°, 15 is +15°"
     assert frame.sweep.points.dtype == np.float32
     assert frame.sweep.points.flags.c_contiguous
-    assert frame.picture is not None
-    assert frame.picture.encoded == (astyx / "camera_front" / "000002.jpg").read_bytes()
+    assert frame.image is not None
+    assert frame.image.encoded == (astyx / "camera_front" / "000002.jpg").read_bytes()
     assert frame.ego is None
 
 
@@ -99,7 +99,7 @@ def test_a_damaged_frame_says_so_and_keeps_the_rest(astyx: Path, damage: object,
     assert len(source) == 2
     frame = source.frame(1)
     assert note in " ".join(frame.notes)
-    assert frame.sweep is not None or frame.picture is not None
+    assert frame.sweep is not None or frame.image is not None
     assert frame.camera is not None
     assert source.frame(0).notes == ()
     assert source.t_ns(1) > source.t_ns(0)
@@ -115,13 +115,13 @@ def test_bad_rows_are_left_out_and_counted(astyx: Path) -> None:
     assert frame.notes == ("000001.txt: 6 unreadable rows skipped",)
 
 
-def test_a_picture_of_another_size_is_left_out(astyx: Path) -> None:
+def test_an_image_of_another_size_is_left_out(astyx: Path) -> None:
     other = (astyx / "camera_front/000001.jpg").read_bytes()
     cv2.imwrite(str(astyx / "camera_front/000002.jpg"), np.zeros((30, 30, 3), dtype=np.uint8))
     frame = opened(astyx).frame(1)
-    assert frame.picture is None
+    assert frame.image is None
     assert "30×30, the others are 160×60" in frame.notes[0]
-    assert opened(astyx).frame(0).picture.encoded == other  # type: ignore[union-attr]
+    assert opened(astyx).frame(0).image.encoded == other  # type: ignore[union-attr]
 
 
 def _scale_rotation(sensors: list[dict]) -> None:

@@ -1,4 +1,4 @@
-"""Pictures without a LiDAR."""
+"""Images without a LiDAR."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def video(tmp_path: Path) -> Path:
         stream = container.add_stream("mpeg4", rate=30)
         stream.width, stream.height = 320, 180
         for k in range(60):
-            picture = np.full((180, 320, 3), 4 * k, np.uint8)
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
+            image = np.full((180, 320, 3), 4 * k, np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24")))
         container.mux(stream.encode())
     return file
 
@@ -44,8 +44,8 @@ def test_a_bare_video_is_a_recording_of_ten_frames_a_second(video: Path) -> None
     source = open_source(str(video))
     assert (len(source), source.rate_hz) == (20, pytest.approx(10.0, abs=0.1))
     frame = source.frame(7)
-    assert frame.picture is not None
-    assert frame.picture.bgr.mean() == pytest.approx(4 * 21, abs=6), "the image of its time"
+    assert frame.image is not None
+    assert frame.image.bgr.mean() == pytest.approx(4 * 21, abs=6), "the image of its time"
     assert frame.t_ns - source.t_ns(0) == pytest.approx(0.7e9, abs=2e6)
     assert frame.camera is not None
     assert frame.camera.K[0, 0] == pytest.approx(226.7, abs=0.1), "78° over the diagonal of 367 px"
@@ -79,16 +79,16 @@ def test_options_give_the_rate_and_the_camera(video: Path) -> None:
         open_source(f"{video}?hfov_deg=200")
 
 
-def test_a_folder_of_pictures(tmp_path: Path) -> None:
+def test_a_folder_of_images(tmp_path: Path) -> None:
     for k in range(3):
         cv2.imwrite(
             str(tmp_path / f"{1_700_000_000_000_000_000 + k * 200_000_000}.png"), np.full((40, 60, 3), k, np.uint8)
         )
     source = open_source(str(tmp_path))
     assert (len(source), source.rate_hz) == (3, 5.0)
-    picture = source.frame(2).picture
-    assert picture is not None
-    assert picture.bgr[0, 0, 0] == 2
+    image = source.frame(2).image
+    assert image is not None
+    assert image.bgr[0, 0, 0] == 2
     (tmp_path / "1700000000900000000.png").write_bytes(b"\x89PNG cut")
     assert open_source(str(tmp_path)).frame(3).notes == ("1700000000900000000.png: the image is truncated",)
 

@@ -86,8 +86,8 @@ def test_another_recording_has_another_key() -> None:
 
         def frame(self, index: int) -> Frame:
             frame = super().frame(index)
-            assert frame.picture is not None
-            return frame if index else replace(frame, picture=CameraImage(frame.t_ns, frame.picture.bgr // 2))
+            assert frame.image is not None
+            return frame if index else replace(frame, image=CameraImage(frame.t_ns, frame.image.bgr // 2))
 
     class Later(Recording):
         """The same at another time."""
@@ -121,7 +121,7 @@ def test_neither_a_mount_nor_a_video_beside_it_makes_it_another(tmp_path: Path) 
 
     class Blind(Sensed):
         def frame(self, index: int) -> Frame:
-            return replace(super().frame(index), picture=None)
+            return replace(super().frame(index), image=None)
 
     class Elsewhere(Sensed):
         """Other things are seen there, at the same times."""
@@ -135,9 +135,9 @@ def test_neither_a_mount_nor_a_video_beside_it_makes_it_another(tmp_path: Path) 
     assert key(Elsewhere(count=5)) != key(same[0])  # type: ignore[arg-type]
 
 
-def test_without_pictures_the_points_tell_recordings_apart() -> None:
+def test_without_images_the_points_tell_recordings_apart() -> None:
     def blind(index: int) -> Frame:
-        return replace(Recording().frame(index), picture=None)
+        return replace(Recording().frame(index), image=None)
 
     assert content_key([1, 2], blind) != content_key([1, 2], lambda index: blind(index + 3))
     assert content_key([], blind) == content_key([], blind)

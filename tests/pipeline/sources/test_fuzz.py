@@ -98,7 +98,7 @@ def test_damage(what: str, tmp_path: Path) -> None:
             return
         for index in range(len(source)):
             frame = source.frame(index)
-            for branch in (frame.sweep, frame.picture):
+            for branch in (frame.sweep, frame.image):
                 assert branch is not None or frame.notes, "a missing branch says why"
             if frame.sweep is not None:
                 assert bool((abs(frame.sweep.points) < 1e7).all())

@@ -42,7 +42,7 @@ def test_a_frame_in_parts_is_the_frame(source: Source) -> None:
     for index in (0, len(source) - 1):
         whole, outline, sweep = source.frame(index), outlines[index], source.sweep(index)
         assert _small(outline) == _small(whole)
-        assert (outline.sweep, outline.picture, outline.route) == (None, None, None)
+        assert (outline.sweep, outline.image, outline.route) == (None, None, None)
         assert whole.sweep is not None
         assert sweep is not None
         np.testing.assert_array_equal(sweep.points, whole.sweep.points)

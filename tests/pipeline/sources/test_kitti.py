@@ -27,8 +27,8 @@ def test_object_layout(kitti: Path) -> None:
     assert frame.ego is None
     assert frame.sweep is not None
     assert frame.sweep.points[0, 3] == pytest.approx(127.5), "intensity is 0–255"
-    assert frame.picture is not None
-    assert frame.picture.encoded is None
+    assert frame.image is not None
+    assert frame.image.encoded is None
     assert source.truth(2) is None
     assert len(source.truth(1) or ()) == 1
 
@@ -69,8 +69,8 @@ def test_raw_layout(kitti_raw: Path) -> None:
     gap = source.frame(2)
     assert gap.sweep is None
     assert gap.notes == ("no LiDAR file for this frame",)
-    assert gap.picture is not None
-    assert gap.picture.t_ns - gap.t_ns == 3488, "the camera's own stamp"
+    assert gap.image is not None
+    assert gap.image.t_ns - gap.t_ns == 3488, "the camera's own stamp"
     assert gap.ego is not None
     assert (gap.ego.speed_mps, gap.ego.yaw_rate_radps) == (15.5, 0.02)
 
@@ -137,7 +137,7 @@ def test_a_damaged_sweep_says_so(kitti: Path, content: bytes, note: str) -> None
     (kitti / "velodyne/0000000002.bin").write_bytes(content)
     frame = open_source(f"kitti:{kitti}").frame(2)
     assert note in " ".join(frame.notes)
-    assert frame.picture is not None
+    assert frame.image is not None
 
 
 @pytest.mark.parametrize("rings", [16, 64])
@@ -164,11 +164,11 @@ def test_the_place_of_the_sensor_is_no_return(kitti: Path) -> None:
     np.testing.assert_array_equal(ended.sweep.points, whole.sweep.points)
 
 
-def test_a_cut_picture_says_so(kitti: Path) -> None:
+def test_a_cut_image_says_so(kitti: Path) -> None:
     path = kitti / "image_02/0000000002.png"
     path.write_bytes(path.read_bytes()[:-20])
     frame = open_source(f"kitti:{kitti}").frame(2)
-    assert frame.picture is None
+    assert frame.image is None
     assert frame.notes == ("0000000002.png: the image is truncated",)
 
 

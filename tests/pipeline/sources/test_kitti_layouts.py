@@ -54,7 +54,7 @@ def test_a_sequence_opens_by_its_bare_path_with_own_motion_from_its_poses(sequen
     assert frame.ego.yaw_rate_radps == pytest.approx(0.2, abs=1e-3)
     assert frame.ego.source == "ins"
     assert frame.sweep is not None
-    assert frame.picture is not None
+    assert frame.image is not None
     assert frame.camera is not None
     assert frame.camera.K[0, 0] == pytest.approx(721.5, abs=0.1)
     assert source.t_ns(4) - source.t_ns(0) == 400_000_000

@@ -85,8 +85,8 @@ def test_a_folder(encoding: str, tmp_path: Path) -> None:
         assert frame.sweep is not None
         assert np.median(np.linalg.norm(frame.sweep.points[:, :3], axis=1)) == pytest.approx(10.0 - index, abs=1e-3)
         assert frame.sweep.time_s is not None
-        assert frame.picture is not None
-        assert np.median(frame.picture.bgr) == 50 + index
+        assert frame.image is not None
+        assert np.median(frame.image.bgr) == 50 + index
         assert source.truth(index) is None
     with pytest.raises(IndexError):
         source.frame(2)

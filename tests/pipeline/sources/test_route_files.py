@@ -160,7 +160,7 @@ def test_of_an_earlier_session_the_fixes_alone_are_read(tmp_path: Path, monkeypa
         writer.write(replace(frame, gnss=replace(fix, lat_deg=fix.lat_deg + 1e-4 * frame.index)))
     writer.write(replace(full(3), gnss=None))
     writer.close()
-    for decoder in ("sweep_from", "picture_from"):
+    for decoder in ("sweep_from", "image_from"):
         monkeypatch.setattr(f"pipeline.recording.session.source.{decoder}", lambda *of: pytest.fail("decoded"))
     route = load_route(str(tmp_path / "earlier.mcap"))
     first = frames[0].gnss

@@ -35,12 +35,12 @@ def test_a_frame_is_whole(frames: dict[int, Frame]) -> None:
     assert frame.sweep.points.dtype == np.float32
     assert frame.sweep.points.flags.c_contiguous
     assert np.all(np.isfinite(frame.sweep.points))
-    assert frame.picture is not None
-    assert frame.picture.bgr.shape == (720, 1280, 3)
-    assert frame.picture.encoded is None
+    assert frame.image is not None
+    assert frame.image.bgr.shape == (720, 1280, 3)
+    assert frame.image.encoded is None
     assert frame.ego is not None
     assert frame.ego.speed_mps == pytest.approx(15.4, abs=0.1)
-    assert frame.t_ns == frame.sweep.t_ns == frame.picture.t_ns == frame.ego.t_ns
+    assert frame.t_ns == frame.sweep.t_ns == frame.image.t_ns == frame.ego.t_ns
 
 
 def test_any_order_gives_the_same_bytes(frames: dict[int, Frame]) -> None:
@@ -48,14 +48,14 @@ def test_any_order_gives_the_same_bytes(frames: dict[int, Frame]) -> None:
     first = frames[80]
     assert first.sweep is not None
     assert again.sweep is not None
-    assert first.picture is not None
-    assert again.picture is not None
+    assert first.image is not None
+    assert again.image is not None
     assert again.sweep.points.tobytes() == first.sweep.points.tobytes()
-    assert again.picture.bgr.tobytes() == first.picture.bgr.tobytes()
+    assert again.image.bgr.tobytes() == first.image.bgr.tobytes()
     assert first.sweep.points.tobytes() != frames[100].sweep.points.tobytes()  # type: ignore[union-attr]
 
 
-def test_truth_picture_and_sweep_agree_on_the_lead(frames: dict[int, Frame]) -> None:
+def test_truth_image_and_sweep_agree_on_the_lead(frames: dict[int, Frame]) -> None:
     """The lead's cuboid holds LiDAR points, and its box in the image is mostly its red paint and lights."""
     frame = frames[100]
     truth = open_source("sim:straight").truth(100)
@@ -63,7 +63,7 @@ def test_truth_picture_and_sweep_agree_on_the_lead(frames: dict[int, Frame]) -> 
     lead = next(item for item in truth if item.id == 1)
     assert lead.label == "car"
     assert frame.sweep is not None
-    assert frame.picture is not None
+    assert frame.image is not None
     away = np.abs(frame.sweep.points[:, :3] - np.array(lead.cuboid.center))
     assert np.count_nonzero(np.all(away < np.array(lead.cuboid.size) / 2 + 0.1, axis=1)) >= 10
     alignment = resolve(AlignmentParams(), frame.camera)
@@ -71,8 +71,8 @@ def test_truth_picture_and_sweep_agree_on_the_lead(frames: dict[int, Frame]) -> 
     box = project_cuboid(alignment, lead.cuboid.corners(), 1280, 720)
     assert box is not None
     x1, y1, x2, y2 = (round(value) for value in box)
-    inside = frame.picture.bgr[y1:y2, x1:x2].reshape(-1, 3).astype(int)
-    beside = frame.picture.bgr[y1:y2, x1 - 30 : x1 - 8].reshape(-1, 3).astype(int)
+    inside = frame.image.bgr[y1:y2, x1:x2].reshape(-1, 3).astype(int)
+    beside = frame.image.bgr[y1:y2, x1 - 30 : x1 - 8].reshape(-1, 3).astype(int)
     assert np.mean(inside[:, 2] > inside[:, 1] + 60) > 0.3
     assert np.mean(beside[:, 2] > beside[:, 1] + 60) < 0.02
 

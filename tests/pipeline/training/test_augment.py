@@ -10,12 +10,12 @@ SIZE = (192, 320)
 
 
 def test_the_box_still_surrounds_its_vehicle_in_every_view() -> None:
-    picture = np.full((360, 640, 3), 40, np.uint8)
-    picture[150:190, 200:260] = 220
+    image = np.full((360, 640, 3), 40, np.uint8)
+    image[150:190, 200:260] = 220
     rows = np.array([[0, 1, 200, 150, 260, 190, 1.0, 30.0]], dtype=np.float32)
     rng, seen = np.random.default_rng(0), 0
     for _ in range(60):
-        window, cut = view(rng, picture, rows, SIZE)
+        window, cut = view(rng, image, rows, SIZE)
         assert window.shape == (*SIZE, 3)
         x1, y1, x2, y2 = cut[0, 2:6]
         bright = np.nonzero(window.mean(axis=2) > (window.max() / 2 + window.min() / 2))
@@ -29,16 +29,16 @@ def test_the_box_still_surrounds_its_vehicle_in_every_view() -> None:
 
 
 def test_a_vehicle_outside_the_window_is_not_visible() -> None:
-    picture = np.zeros((360, 640, 3), np.uint8)
+    image = np.zeros((360, 640, 3), np.uint8)
     rows = np.array([[0, 0, 0, 0, 20, 20, 1.0, 5.0], [0, 0, 620, 340, 640, 360, 0.5, 5.0]], dtype=np.float32)
     rng = np.random.default_rng(1)
-    shares = np.array([view(rng, picture, rows, SIZE)[1][:, 6] for _ in range(40)])
+    shares = np.array([view(rng, image, rows, SIZE)[1][:, 6] for _ in range(40)])
     assert np.all(shares.min(axis=1) == 0.0)
     assert shares[:, 1].max() <= 0.5
 
 
 def test_light_differs_from_view_to_view_and_follows_the_seed() -> None:
-    picture = np.full((32, 32, 3), 128, np.uint8)
-    levels = [other_light(np.random.default_rng(seed), picture).mean() for seed in (1, 1, 2, 3)]
+    image = np.full((32, 32, 3), 128, np.uint8)
+    levels = [other_light(np.random.default_rng(seed), image).mean() for seed in (1, 1, 2, 3)]
     assert levels[0] == levels[1]
     assert len(set(levels)) == 3

@@ -44,15 +44,15 @@ def test_the_height_of_a_box_is_the_pinhole_camera_s(ahead_m: float) -> None:
 
 def test_the_box_is_where_the_vehicle_is_drawn() -> None:
     """Two images that differ in the car's paint alone differ inside its box and up to its edges."""
-    pictures, found = [], None
+    images, found = [], None
     for colour in ("#ff0000", "#0000ff"):
         now = world_state.at(_scenario({"ahead_m": 5.0, "lane": -2, "colour": colour}), 0.0)
         scenario = _scenario()
         camera = DrawnCamera(scenario.road, Roadside.build(scenario.road, 1, 0.0, 700.0), 1)
-        pictures.append(camera.picture(now).astype(int))
+        images.append(camera.image(now).astype(int))
         (found,) = labels(now, calibration())
     assert found is not None
-    rows, columns = np.nonzero(np.abs(pictures[0] - pictures[1]).sum(axis=2) > 60)
+    rows, columns = np.nonzero(np.abs(images[0] - images[1]).sum(axis=2) > 60)
     x1, y1, x2, y2 = found.box
     assert (columns.min(), columns.max()) == (pytest.approx(x1, abs=4), pytest.approx(x2, abs=4))
     assert rows.min() == pytest.approx(y1, abs=4)
@@ -67,7 +67,7 @@ def test_a_nearer_vehicle_hides_a_farther_one() -> None:
 
 
 @pytest.mark.parametrize(("ahead_m", "there"), [(-20.0, False), (-3.0, False), (3.0, True)])
-def test_who_is_beside_the_car_is_cut_by_the_picture(ahead_m: float, there: bool) -> None:
+def test_who_is_beside_the_car_is_cut_by_the_image(ahead_m: float, there: bool) -> None:
     found = _labels({"ahead_m": ahead_m, "lane": -2, "kind": "bus"})
     assert bool(found) == there
     for label in found.values():

@@ -21,8 +21,8 @@ from pipeline.training.scenes import (
 )
 
 
-def test_equal_seeds_give_equal_pictures_and_others_do_not() -> None:
-    first, again, other = ([moment.picture.tobytes() for moment in moments(seed, 2)] for seed in (5, 5, 6))
+def test_equal_seeds_give_equal_images_and_others_do_not() -> None:
+    first, again, other = ([moment.image.tobytes() for moment in moments(seed, 2)] for seed in (5, 5, 6))
     assert first == again
     assert not set(first) & set(other)
 
@@ -45,7 +45,7 @@ def test_traffic_holds_every_kind_near_and_far_and_nobody_overlaps() -> None:
     assert max(distances) > 100.0
 
 
-def test_no_picture_is_drawn_from_inside_of_a_vehicle() -> None:
+def test_no_image_is_drawn_from_inside_of_a_vehicle() -> None:
     """Seed 202's image 16 was: a truck with its rear 1.6 m behind our bumper, its label as large as the image."""
     now = next(drive("straight", 10.0)).world
     one = now.actors[-1]
@@ -60,7 +60,7 @@ def test_no_picture_is_drawn_from_inside_of_a_vehicle() -> None:
     assert centred(3.9) == centred(-5.0) == everyone[:-1]
 
 
-def test_pictures_are_labelled_with_all_classes() -> None:
+def test_images_are_labelled_with_all_classes() -> None:
     found = {label.label for moment in moments(4, 12) for label in labels(moment.world, calibration())}
     assert found == set(range(len(CLASSES)))
     assert MOMENTS_A_ROAD >= 2
@@ -69,6 +69,6 @@ def test_pictures_are_labelled_with_all_classes() -> None:
 def test_a_drive_follows_its_scenario() -> None:
     first, second = list(drive("straight", 10.0))
     assert (first.world.t_s, second.world.t_s) == (0.0, 10.0)
-    assert first.picture.tobytes() != second.picture.tobytes()
+    assert first.image.tobytes() != second.image.tobytes()
     truth = np.array([label.box for label in labels(first.world, calibration())])
     assert np.array_equal(np.diag(iou_matrix(truth, truth)), np.ones(len(truth)))

@@ -23,13 +23,13 @@ def _no_installed_models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
 def _road(height: int, width: int, lamp: tuple[int, int]) -> np.ndarray:
     """A black image with one bright patch of 16×16 pixels, its upper left corner at ``lamp`` x, y."""
-    picture = np.zeros((height, width, 3), np.uint8)
-    picture[lamp[1] : lamp[1] + 16, lamp[0] : lamp[0] + 16] = 255
-    return picture
+    image = np.zeros((height, width, 3), np.uint8)
+    image[lamp[1] : lamp[1] + 16, lamp[0] : lamp[0] + 16] = 255
+    return image
 
 
 @pytest.mark.parametrize(
-    ("picture", "own", "expected"),
+    ("image", "own", "expected"),
     [
         ((2048, 618), (416, 416), (256, 832)),
         ((1242, 375), (416, 416), (256, 832)),
@@ -39,10 +39,10 @@ def _road(height: int, width: int, lamp: tuple[int, int]) -> np.ndarray:
         ((720, 1280), None, (640, 352)),
     ],
 )
-def test_input_size_follows_the_picture(
-    picture: tuple[int, int], own: tuple[int, int] | None, expected: tuple[int, int]
+def test_input_size_follows_the_image(
+    image: tuple[int, int], own: tuple[int, int] | None, expected: tuple[int, int]
 ) -> None:
-    assert fitting_size(picture, own) == expected
+    assert fitting_size(image, own) == expected
 
 
 @pytest.mark.parametrize("size", [(64, 64), ("height", "width")], ids=["fixed", "free"])
@@ -60,7 +60,7 @@ def test_a_bright_patch_is_found_where_it_is(tmp_path: Path, size: tuple[int | s
     assert raw.scores.min() >= FLOOR_SCORE
 
 
-def test_boxes_are_scaled_back_to_the_picture(tmp_path: Path) -> None:
+def test_boxes_are_scaled_back_to_the_image(tmp_path: Path) -> None:
     path = str(networks.yolox(tmp_path / "tiny.onnx"))
     raw = open_detector(path, None, input_size=(64, 128)).detect(_road(256, 512, (256, 128)))
     centre = (raw.boxes[0, :2] + raw.boxes[0, 2:]) / 2
@@ -98,7 +98,7 @@ def test_v8_gets_rgb_between_0_and_1_and_names_its_classes(tmp_path: Path) -> No
     assert len(detector.detect(red[..., ::-1].copy()).scores) == 0
 
 
-def test_a_detr_gives_boxes_in_the_pictures_pixels(tmp_path: Path) -> None:
+def test_a_detr_gives_boxes_in_the_images_pixels(tmp_path: Path) -> None:
     detector = open_detector(str(networks.detr(tmp_path / "detr.onnx")), None)
     assert (detector.head, detector.input_size) == ("DETR", (64, 64))
     red = np.zeros((256, 256, 3), np.uint8)
@@ -124,9 +124,9 @@ def test_equal_files_and_sizes_have_equal_names(tmp_path: Path) -> None:
     assert len(names) == 3
 
 
-def test_the_same_picture_gives_the_same_bytes(tmp_path: Path) -> None:
-    path, picture = str(networks.yolox(tmp_path / "tiny.onnx")), _road(128, 512, (320, 64))
-    first, second = (open_detector(path, (512, 128)).detect(picture) for _ in range(2))
+def test_the_same_image_gives_the_same_bytes(tmp_path: Path) -> None:
+    path, image = str(networks.yolox(tmp_path / "tiny.onnx")), _road(128, 512, (320, 64))
+    first, second = (open_detector(path, (512, 128)).detect(image) for _ in range(2))
     assert first.boxes.tobytes() == second.boxes.tobytes()
     assert first.scores.tobytes() == second.scores.tobytes()
 
@@ -171,22 +171,22 @@ def test_an_impossible_input_size_is_refused(tmp_path: Path, size: tuple[int, in
 
 
 @pytest.mark.parametrize(
-    "picture",
+    "image",
     [np.zeros((4, 4), np.uint8), np.zeros((4, 4, 3), np.float32), np.zeros((0, 4, 3), np.uint8)],
     ids=["grey", "float", "empty"],
 )
-def test_what_is_no_picture_is_refused(tmp_path: Path, picture: np.ndarray) -> None:
+def test_what_is_no_image_is_refused(tmp_path: Path, image: np.ndarray) -> None:
     detector = open_detector(str(networks.yolox(tmp_path / "tiny.onnx")), None)
     with pytest.raises(DetectorError, match="expected an image"):
-        detector.detect(picture)
+        detector.detect(image)
 
 
 def test_the_real_network_finds_the_real_lead(data_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CIPV_DATA", str(data_dir))
-    picture = cv2.imread(str(data_dir / "kitti_0052" / "image_02" / "0000000007.png"))
-    detector = open_detector(None, (picture.shape[1], picture.shape[0]))
+    image = cv2.imread(str(data_dir / "kitti_0052" / "image_02" / "0000000007.png"))
+    detector = open_detector(None, (image.shape[1], image.shape[0]))
     assert detector.input_size == (256, 832)
     assert detector.notes == ()
-    best = select(detector.detect(picture), DetectionParams())[0]
+    best = select(detector.detect(image), DetectionParams())[0]
     assert best.label == "car"
     np.testing.assert_allclose(best.bbox, (556, 185, 714, 335), atol=8)  # the recording's own label

@@ -46,7 +46,7 @@ def test_the_window_is_where_the_road_goes(case: str, of: Frame | None, expected
     assert window_of(of, WIDE) == expected, case
 
 
-def test_a_picture_smaller_than_the_window_is_seen_whole() -> None:
+def test_an_image_smaller_than_the_window_is_seen_whole() -> None:
     assert window_of(None, (300, 200)) == (0, 0, 300, 200)
 
 
@@ -59,13 +59,13 @@ def far(tmp_path_factory: pytest.TempPathFactory) -> FarView:
 
 
 def bright_at(*patches: tuple[int, int]) -> np.ndarray:
-    picture = np.zeros((WIDE[1], WIDE[0], 3), np.uint8)
+    image = np.zeros((WIDE[1], WIDE[0], 3), np.uint8)
     for u, v in patches:
-        picture[v : v + 16, u : u + 16] = 255
-    return picture
+        image[v : v + 16, u : u + 16] = 255
+    return image
 
 
-def test_a_patch_too_small_for_the_whole_picture_is_found_where_it_is(far: FarView) -> None:
+def test_a_patch_too_small_for_the_whole_image_is_found_where_it_is(far: FarView) -> None:
     seen = far.of(None).detect(bright_at((1000, 300)))
     assert seen.scores[0] == pytest.approx(1.0, abs=0.01)
     centre = (seen.boxes[0, :2] + seen.boxes[0, 2:]) / 2
@@ -74,7 +74,7 @@ def test_a_patch_too_small_for_the_whole_picture_is_found_where_it_is(far: FarVi
     assert seen.far_count == len(seen.boxes)
 
 
-def test_what_the_window_cuts_off_is_left_to_the_whole_picture(far: FarView) -> None:
+def test_what_the_window_cuts_off_is_left_to_the_whole_image(far: FarView) -> None:
     x1, y1, _, _ = window_of(None, WIDE, 256)
     seen = far.of(None).detect(bright_at((x1 - 8, y1 + 100)))
     assert not len(seen.boxes) or seen.boxes[:, 0].min() >= x1 + 3
@@ -112,7 +112,7 @@ class Answers:
 def test_both_looks_at_one_car_are_one_detection_and_the_parameter_takes_one_back() -> None:
     whole = Answers("whole", raw([[900, 250, 1000, 330], [100, 300, 300, 500]], [0.5, 0.9]))
     native = Answers("native", raw([[85, 155, 184, 233], [200, 190, 220, 206]], [0.8, 0.7]))
-    taken = Frame(0, "0", 0, picture=CameraImage(0, bright_at()))
+    taken = Frame(0, "0", 0, image=CameraImage(0, bright_at()))
     seen = detect(taken, Detectors(whole, far=FarView(native)))
     assert seen.raw_boxes is not None
     found = select(seen.raw_boxes, DetectionParams())
@@ -127,14 +127,14 @@ def test_both_looks_at_one_car_are_one_detection_and_the_parameter_takes_one_bac
 def test_every_nth_frame_by_its_index() -> None:
     native = Answers("native", raw([[85, 155, 184, 233]], [0.8]))
     asked = Detectors(Answers("whole", raw([[1, 1, 2, 2]], [0.1])), far=FarView(native), far_every=2)
-    picture = CameraImage(0, bright_at())
-    seen = [detect(Frame(k, str(k), k, picture=picture), asked).raw_boxes for k in range(4)]
+    image = CameraImage(0, bright_at())
+    seen = [detect(Frame(k, str(k), k, image=image), asked).raw_boxes for k in range(4)]
     assert [boxes is not None and boxes.far is not None for boxes in seen] == [True, False, True, False]
 
 
 def test_where_ticks_are_dropped_the_far_view_sits_out_every_other_one() -> None:
     asked = LiveDetectors(Detectors(far=FarView(Answers("native", raw([[1, 1, 2, 2]], [0.1])))))
-    tick = Frame(0, "0", 0, picture=CameraImage(0, bright_at()))
+    tick = Frame(0, "0", 0, image=CameraImage(0, bright_at()))
     looked = [asked.of(replace(tick, index=index)).far is not None for index in (0, 1, 2, 4, 5, 6, 7, 9, 10)]
     assert looked == [True, True, True, False, True, False, True, False, True]
     calm = [asked.of(replace(tick, index=index)).far is not None for index in range(11, 11 + 2 * CALM_TICKS)]

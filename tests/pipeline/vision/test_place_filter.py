@@ -31,10 +31,10 @@ def seen(range_m: float, u: float = 600.0, height_px: float | None = None) -> Vi
     return VisionMeasurement(Detection(box, "car", 0.8), range_m, 0.1 * range_m, (range_m, side_m), 2.0 / tall)
 
 
-def follow(pictures: list[list[VisionMeasurement]], ego_mps: float | None = 10.0) -> list[tuple[VisionTrack, ...]]:
+def follow(images: list[list[VisionMeasurement]], ego_mps: float | None = 10.0) -> list[tuple[VisionTrack, ...]]:
     """Every image's tracks, ten images a second."""
     state, shown = VisionTrackerState(), []
-    for k, boxes in enumerate(pictures):
+    for k, boxes in enumerate(images):
         state, tracks = track(state, tuple(boxes), 0.1 if k else None, PARAMS, ego_mps)
         shown.append(tracks)
     return shown

@@ -29,11 +29,11 @@ def _blind(box: Box, label: str = "car") -> VisionMeasurement:
 
 
 def _drive(
-    pictures: list[tuple[VisionMeasurement, ...] | None], params: VisionTrackingParams, dt_s: float = 0.1
+    images: list[tuple[VisionMeasurement, ...] | None], params: VisionTrackingParams, dt_s: float = 0.1
 ) -> list[tuple[VisionTrack, ...]]:
     state, shown = VisionTrackerState(), []
-    for index, picture in enumerate(pictures):
-        state, tracks = track(state, picture, dt_s if index else None, params)
+    for index, image in enumerate(images):
+        state, tracks = track(state, image, dt_s if index else None, params)
         shown.append(tracks)
     return shown
 
@@ -42,11 +42,11 @@ def _drive(
 @pytest.mark.parametrize("dt_s", [0.1, 0.3])
 def test_two_cars_keep_their_numbers(params: VisionTrackingParams, dt_s: float) -> None:
     """The lead closes in while the neighbour falls back; detections come in falling score, in turns."""
-    pictures = []
+    images = []
     for step in range(12):
         lead, beside = _car(32.0 - 2.7 * dt_s * step), _car(20.0 + 3.0 * dt_s * step, 3.5)
-        pictures.append((lead, beside) if step % 2 else (beside, lead))
-    for tracks in _drive(pictures, params, dt_s):
+        images.append((lead, beside) if step % 2 else (beside, lead))
+    for tracks in _drive(images, params, dt_s):
         assert [(t.id, round(t.position[1] / 3.5)) for t in tracks if t.position] == [(1, 1), (2, 0)]
 
 
@@ -140,7 +140,7 @@ def test_kalman_carries_the_place_and_the_box_along() -> None:
     assert after.sigma_m > before.sigma_m
 
 
-def test_kalman_follows_a_box_that_crosses_the_picture() -> None:
+def test_kalman_follows_a_box_that_crosses_the_image() -> None:
     shown = _drive([(_car(20.0, 8.0 - 0.6 * step),) for step in range(12)] + [()] * 3, KALMAN)
     assert all(len(tracks) == 1 for tracks in shown)
     u = (shown[-1][0].bbox[0] + shown[-1][0].bbox[2]) / 2
@@ -158,9 +158,9 @@ def test_one_absurd_distance_hardly_moves_the_track() -> None:
 
 
 def test_one_wrong_name_does_not_rename_the_object() -> None:
-    pictures = [(_car(24.0),)] * 4 + [(_car(24.0, label="bus", score=0.6),)]
-    assert _drive(pictures, KALMAN)[-1][0].label == "car"
-    assert _drive(pictures, QUEUE)[-1][0].label == "bus"
+    images = [(_car(24.0),)] * 4 + [(_car(24.0, label="bus", score=0.6),)]
+    assert _drive(images, KALMAN)[-1][0].label == "car"
+    assert _drive(images, QUEUE)[-1][0].label == "bus"
 
 
 def test_sigma_never_falls_below_one_sightings() -> None:
@@ -199,25 +199,25 @@ def test_noise_lies_along_the_ray() -> None:
 
 
 _boxes = st.tuples(st.floats(5.0, 80.0), st.floats(-12.0, 12.0), st.sampled_from(["car", "truck", "person"]))
-_pictures = st.lists(st.one_of(st.none(), st.lists(_boxes, max_size=6)), max_size=12)
+_images = st.lists(st.one_of(st.none(), st.lists(_boxes, max_size=6)), max_size=12)
 
 
 @BOTH
-@given(_pictures, st.floats(0.02, 1.4))
+@given(_images, st.floats(0.02, 1.4))
 def test_every_detection_is_in_one_track_and_tracks_are_bounded(
-    params: VisionTrackingParams, pictures: list[list[tuple[float, float, str]] | None], dt_s: float
+    params: VisionTrackingParams, images: list[list[tuple[float, float, str]] | None], dt_s: float
 ) -> None:
-    measured = [None if p is None else tuple(_car(x, y, label) for x, y, label in p) for p in pictures]
+    measured = [None if p is None else tuple(_car(x, y, label) for x, y, label in p) for p in images]
     born = 0
-    for picture, tracks in zip(measured, _drive(measured, params, dt_s), strict=True):
+    for image, tracks in zip(measured, _drive(measured, params, dt_s), strict=True):
         seen = [t for t in tracks if not t.carried]
         assert len({t.id for t in tracks}) == len(tracks)
-        assert sorted(t.bbox for t in seen) == sorted(m.detection.bbox for m in picture or ())
+        assert sorted(t.bbox for t in seen) == sorted(m.detection.bbox for m in image or ())
         assert all(t.missed < params.queue_frames for t in tracks)
         assert all(t.velocity_mps is None for t in tracks if t.hits < 2)
         assert all(np.isfinite(t.bbox).all() for t in tracks)
         born = max([born, *(t.id for t in tracks)])
-    assert born <= sum(len(p or ()) for p in pictures)
+    assert born <= sum(len(p or ()) for p in images)
 
 
 def test_a_standing_car_ahead_of_a_fast_ego_car_is_soon_known_to_stand() -> None:

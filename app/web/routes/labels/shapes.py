@@ -6,7 +6,7 @@ from typing import Literal
 
 from app.labels.service.filmstrip import Why
 from app.labels.store.values import ItemKind
-from app.web.routes.shapes.common import ApiModel, CuboidJson, Point
+from app.web.routes.shapes.common import ApiModel, Point
 from pipeline.labels.model import Heading, State
 
 
@@ -60,37 +60,6 @@ class AttributeJson(ApiModel):
     """As in the class list."""
     value: str
     """One of the attribute's values."""
-
-
-class ClassJson(ApiModel):
-    """A class of road users."""
-
-    name: str
-    """What labels call it."""
-    of: str | None
-    """The class that it is a kind of; null at the top."""
-    size: tuple[float, float, float] | None
-    """Usual length, width and height in metres; null for that of its parent."""
-    exports: dict[str, str]
-    """What label formats call it, by format."""
-
-
-class AttributeKindJson(ApiModel):
-    """An attribute that tracks can have."""
-
-    name: str
-    """What labels call it."""
-    values: list[str]
-    """What it can be."""
-
-
-class ClassListJson(ApiModel):
-    """The classes and attributes of the project."""
-
-    classes: list[ClassJson]
-    """In the order in which people choose."""
-    attributes: list[AttributeKindJson]
-    """In the order in which they are shown."""
 
 
 class TrackHead(StatedItem):
@@ -213,55 +182,6 @@ class LabelsOfPerson(LabelChanges):
     """Of the person who asks."""
     can_redo: bool
     """Of the person who asks."""
-
-
-class PlacedJson(ApiModel):
-    """Where a vehicle is in a frame."""
-
-    cuboid: CuboidJson | None
-    """Ego frame; null where it is only seen in the image."""
-    bbox: tuple[float, float, float, float] | None
-    """x1 y1 x2 y2 in pixels of the raw image; null where it is outside."""
-    keyframe: bool
-    """A person or a file put it there; else it follows those that are."""
-    box_set: bool
-    """Somebody set the box; else it is where the cuboid is in the image."""
-
-
-class PlacedTrack(PlacedJson):
-    """A track in the frame."""
-
-    track: int
-    """Its id."""
-
-
-class PlacedFrame(PlacedJson):
-    """A frame of the track."""
-
-    frame: int
-    """Of the drive, from 0."""
-
-
-class Window(ApiModel):
-    """All sightings in a window of frames."""
-
-    revision: int
-    """Of the labels."""
-    sightings: dict[int, list[PlacedTrack]]
-    """Of the frames that were asked for."""
-
-
-class WholeTrack(StatedItem):
-    """A track with every sighting."""
-
-    label: str
-    """Class of the vehicle."""
-    confidence: float | None
-    """As of ``TrackHead``."""
-    heading: Heading
-    """As of ``TrackHead``."""
-    sightings: list[PlacedFrame]
-    """By frame."""
 
 
 class ProblemJson(ApiModel):

@@ -189,7 +189,7 @@ class ResultJson(Exact):
     version: int
     """Of the contract."""
     frame: str
-    """The recording's own name of the frame."""
+    """The frame's name in the recording."""
     t_ns: int
     """The tick, nanoseconds on the recording's timeline."""
     sensors: dict[str, dict[str, Any]]

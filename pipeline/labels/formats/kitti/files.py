@@ -122,7 +122,7 @@ def read_tracking(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
         number = _whole(id_text, _LARGEST_ID, what)
         row = kitti_rows.from_fields(fields, T_rect_ego, camera, what)
         label, sightings = found.setdefault(number, (row.label, {}))
-        if label == UNLABELLED:  # a track may begin where the picture alone shows it
+        if label == UNLABELLED:  # a track may begin where the image alone shows it
             label = row.label
             found[number] = label, sightings
         if frame in sightings or row.label not in (label, UNLABELLED):

@@ -41,7 +41,7 @@ def is_kept(label: str) -> bool:
 
 
 def to_line(label: str, sighting: Sighting, T_rect_ego: F64, camera: CameraCalibration) -> str:
-    """One line without frame and track. What the picture alone shows is a region of which nothing is said: a trainer
+    """One line without frame and track. What the image alone shows is a region of which nothing is said: a trainer
     would take an object without a place for one at −1000 m."""
     place = cuboid_to_label(sighting.cuboid, T_rect_ego) if sighting.cuboid is not None else NO_CUBOID
     box = straightened(sighting.bbox, camera) if sighting.bbox is not None else NO_BOX

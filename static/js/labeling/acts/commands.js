@@ -187,7 +187,7 @@ export const notHere = () =>
   );
 
 /**
- * Classes chosen and not yet answered, by track: a quick second press goes on from the first.
+ * Classes chosen and not yet confirmed by the server, by track: a quick second press continues from the first.
  * @type {Map<number, string>}
  */
 const askedClass = new Map();

@@ -2,7 +2,7 @@
 import { request } from "../../core/api.js";
 import { el } from "../../core/dom.js";
 import { num } from "../../core/format.js";
-import { fromAbove, inPicture, range } from "./conflict_picture.js";
+import { fromAbove, inImage, range } from "./conflict_image.js";
 import { open } from "../panels/dialogs.js";
 import { based } from "./revisions.js";
 
@@ -28,9 +28,9 @@ export async function choose(act, sentence, item, theirs, revision) {
     el(
       "div",
       { class: "conflict" },
-      side("Yours", act, ...pictures(act, mine, other)),
+      side("Yours", act, ...images(act, mine, other)),
       theirs
-        ? side("Theirs", { ...theirs, cuboid: place?.cuboid, bbox: place?.bbox }, ...pictures(theirs, other, mine))
+        ? side("Theirs", { ...theirs, cuboid: place?.cuboid, bbox: place?.bbox }, ...images(theirs, other, mine))
         : el("div", {}, el("h3", { textContent: "Theirs: removed" })),
     ),
   );
@@ -65,7 +65,7 @@ async function placeOf(track, frame) {
 /**
  * Both shapes with their cuboids in pixels of the image.
  * @param {any[]} shapes
- * @returns {Promise<import("./conflict_picture.js").Shape[]>}
+ * @returns {Promise<import("./conflict_image.js").Shape[]>}
  */
 async function inPixels(shapes) {
   const cuboids = shapes.flatMap(({ cuboid }) => (cuboid ? [cuboid] : []));
@@ -81,16 +81,16 @@ async function inPixels(shapes) {
 }
 
 /**
- * Pictures of one person's version beside the other's.
+ * Images of one person's version beside the other's.
  * @param {any} item
- * @param {import("./conflict_picture.js").Shape} own
- * @param {import("./conflict_picture.js").Shape} other
+ * @param {import("./conflict_image.js").Shape} own
+ * @param {import("./conflict_image.js").Shape} other
  * @returns {Node[]}
  */
-const pictures = (item, own, other) =>
+const images = (item, own, other) =>
   [
     fromAbove(own.cuboid, other.cuboid),
-    inPicture(own, other),
+    inImage(own, other),
     typeof item.first === "number" && typeof item.last === "number" ? range(item.first, item.last) : null,
   ].filter((each) => each !== null);
 
@@ -120,14 +120,14 @@ const FRAMES = ["frame", "first", "last"];
 const ACTS = {
   set_sighting: "position",
   drop_keyframe: "no keyframe",
-  drop_sightings: "not here",
+  drop_sightings: "removed here",
   size_along: "size",
   refit: "fit to points",
   relabel: "class",
   trim_lead: "range end",
 };
 
-/** @param {string} title @param {Record<string, any>} item @param {...Node} shown pictures */
+/** @param {string} title @param {Record<string, any>} item @param {...Node} shown images */
 function side(title, item, ...shown) {
   const rows = Object.entries(item).filter(
     ([key, value]) => !HIDDEN.includes(key) && value !== null && value !== undefined && value !== "",

@@ -8,7 +8,7 @@ import { chosen, shown } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
 import { newLabel } from "../state/new_class.js";
 import { sides } from "../views/path.js";
-import { boxOf } from "../views/picture_drawing.js";
+import { boxOf } from "../views/image_drawing.js";
 
 /** @typedef {import("../../core/types.js").Point2} Point2 */
 /** @typedef {import("../state/types.js").Box} Box */
@@ -80,18 +80,18 @@ export function boxAround() {
 }
 
 /** @returns {number|null} width of the full camera image, pixels */
-function pictureWidth() {
-  const picture = get("frame")?.picture;
-  return picture ? picture.width / picture.scale : null;
+function imageWidth() {
+  const image = get("frame")?.image;
+  return image ? image.width / image.scale : null;
 }
 
 /** @returns {Box|null} */
 function middleBox() {
-  const picture = get("frame")?.picture,
-    width = pictureWidth();
-  if (!picture || !width) return null;
+  const image = get("frame")?.image,
+    width = imageWidth();
+  if (!image || !width) return null;
   const u = width / 2,
-    v = picture.height / picture.scale / 2,
+    v = image.height / image.scale / 2,
     half = (width * BOX_SHARE) / 2;
   return [u - half, v - half, u + half, v + half];
 }
@@ -104,7 +104,7 @@ function middleBox() {
  */
 export function changeBox(du, dv, isSize) {
   const track = chosen(),
-    step = (pictureWidth() ?? 0) * STEP_SHARE;
+    step = (imageWidth() ?? 0) * STEP_SHARE;
   const box = track && (boxOf(track.id) ?? boxAround());
   if (!track || !box) return;
   const [x1, y1, x2, y2] = box,

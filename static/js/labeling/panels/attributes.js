@@ -1,4 +1,4 @@
-/** What is said of the selected label besides its class: in the marked frames, else in all frames that it is in. */
+/** Attributes of the selected track: in the marked frames, or in all frames of the track. */
 import { el } from "../../core/dom.js";
 import { get, on, paint } from "../../core/store.js";
 import { act } from "../acts/queue.js";
@@ -7,7 +7,7 @@ import { presentOf } from "../state/draft.js";
 import { chosen, shown } from "../state/labels.js";
 import { span } from "../state/marked_frames.js";
 
-/** Those that are said of each frame's sighting. */
+/** Those that belong to each frame's sighting. */
 const OF_SIGHTINGS = ["occlusion", "truncation"];
 const NOTHING = "";
 
@@ -26,7 +26,7 @@ function build() {
     ...attributes().map(({ name, values }) => {
       const list = el(
         "select",
-        { aria: { label: name }, title: `${name}: in the marked frames (I, O), or wherever the label is` },
+        { aria: { label: name }, title: `${name}: in the marked frames (I, O), or in all frames of the track` },
         ...[NOTHING, ...values].map((value) => el("option", { value, textContent: value || "–" })),
       );
       list.addEventListener("change", () => {

@@ -37,8 +37,8 @@ export function setUp(parent) {
 
 /** @param {number} count */
 function words(count) {
-  if (!count) return "Nothing suspicious: no jumps, overlaps, empty cuboids, boxes apart or leads without a track.";
-  return count > MOST ? `${count} to look at, the first ${MOST}:` : `${count} to look at:`;
+  if (!count) return "No problems found: no jumps, overlaps, empty cuboids, misplaced boxes or leads without a track.";
+  return count > MOST ? `${count} to check, the first ${MOST}:` : `${count} to check:`;
 }
 
 /** @param {Problem} problem */

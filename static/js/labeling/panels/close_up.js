@@ -1,4 +1,4 @@
-/** A track from close by: its picture and its points from above, the side and behind; in review, as a filmstrip. */
+/** A track from close by: its image and its points from above, the side and behind; in review, as a filmstrip. */
 import { newestOnly, request } from "../../core/api.js";
 import { el, text } from "../../core/dom.js";
 import { seekTo } from "../../drive/seek.js";

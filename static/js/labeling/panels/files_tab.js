@@ -92,7 +92,7 @@ async function tellProblems(node) {
   const found = await request("api/labels/checks").catch(() => null);
   if (!found?.problems.length) return;
   node.hidden = false;
-  text(node, `⚠ ${found.problems.length} to look at first`);
+  text(node, `⚠ ${found.problems.length} to check first`);
 }
 
 /** Ask the server which formats it reads and writes; without an answer the next look asks again. */

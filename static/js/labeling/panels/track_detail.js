@@ -5,7 +5,7 @@ import { on, paint } from "../../core/store.js";
 import * as commands from "../acts/commands.js";
 import { classNames, fill } from "../state/classes.js";
 import { presentOf } from "../state/draft.js";
-import { boxOf, isFollowing } from "../views/picture_drawing.js";
+import { boxOf, isFollowing } from "../views/image_drawing.js";
 import { chosen, nameOf } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
 import { Past } from "./history_list.js";
@@ -50,18 +50,18 @@ export function setUp(parent) {
       button("Send back", "H", "Send back with a comment", review.sendBack),
       button("Reviewed", "Shift H", "Approve as a second annotator", review.reviewOk),
       button("Snap", "S", "Fit the cuboid to the points", commands.snap),
-      button("Carry on", "Shift C", "Carry the track on before and after, as far as it is found", () =>
+      button("Extend", "Shift C", "Extend the track to earlier and later frames, as far as it is found", () =>
         commands.propagate("both"),
       ),
-      button("Turn round", "Shift X", "Front and rear are swapped: turn the whole track round", commands.flip),
-      button("Size along", "W", "Apply this size to the whole track", commands.sizeAlong),
+      button("Reverse", "Shift X", "Swap front and rear of the whole track", commands.flip),
+      button("Apply size", "W", "Apply this size to the whole track", commands.sizeAlong),
       button("Keyframe", "K", "Set a keyframe in this frame", commands.keyframe),
-      button("Box follows", "Shift S", "The image box follows the cuboid again", commands.boxFollows),
+      button("Reset box", "Shift S", "Make the image box follow the cuboid again", commands.boxFollows),
       button("Draw", "Shift G", "Draw the shape in this frame", () => setTool("shape")),
-      button("Not here", "Del", "Remove from this frame or the marked frames", commands.notHere),
+      button("Remove", "Del", "Remove from this frame or the marked frames", commands.notHere),
       button("Split", "X", "Split the track from this frame on", commands.splitHere),
       button("Merge", "M", "Merge with another label: click it, or select it with . and press Enter", commands.merge),
-      button("Remove", "Shift Del", "Delete the track", commands.removeTrack),
+      button("Delete", "Shift Del", "Delete the track", commands.removeTrack),
     ),
     numbers.node,
     closeUp.node,
@@ -93,7 +93,7 @@ const HEADINGS = {
   "": "",
   motion: "heading from its motion",
   lane: "heading assumed from the lane",
-  unknown: "front and rear unclear: turn it round (Shift X), or accept it as it is",
+  unknown: "front and rear unclear: reverse it (Shift X), or accept it as is",
 };
 
 function show() {

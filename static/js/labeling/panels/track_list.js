@@ -64,7 +64,7 @@ export function setUp(parent) {
     el(
       "div",
       { class: "list-bar" },
-      el("div", { class: "joined", aria: { role: "group", label: "Which tracks" } }, ...buttons),
+      el("div", { class: "joined", aria: { role: "group", label: "Tracks to list" } }, ...buttons),
       el("span", { class: "spacer" }),
       count,
     ),

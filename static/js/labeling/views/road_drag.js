@@ -6,9 +6,9 @@ import { get } from "../../core/store.js";
 import { groundAt, seenOn } from "./cuboid.js";
 import { hold, presentOf, release } from "../state/draft.js";
 import { shown } from "../state/labels.js";
-import { boundsOf } from "./picture_drawing.js";
+import { boundsOf } from "./image_drawing.js";
 
-/** @typedef {import("./picture_pointer.js").Pixel} Pixel */
+/** @typedef {import("./image_pointer.js").Pixel} Pixel */
 /** @typedef {import("../state/types.js").Cuboid} Cuboid */
 
 /**

@@ -1,5 +1,5 @@
 /** Drawing style of a label: colour by role, line style by state. */
-import { color, onPicture, ui } from "../../core/colors.js";
+import { color, onImage, ui } from "../../core/colors.js";
 import { get } from "../../core/store.js";
 import { leadAt, shown, trackOf } from "../state/labels.js";
 import { isSure } from "../state/threshold.js";
@@ -10,13 +10,13 @@ import { isSure } from "../state/threshold.js";
  *   isFacing: front and rear are told apart; role: of its colour
  */
 
-/** @param {number} id @param {boolean} isOnPicture @returns {Look|null} null if hidden */
-export function lookOf(id, isOnPicture) {
+/** @param {number} id @param {boolean} isOnImage @returns {Look|null} null if hidden */
+export function lookOf(id, isOnImage) {
   const track = trackOf(id),
     isChosen = id === get("track");
   if (!track || (!isChosen && (track.state === "rejected" || !isSure(track)))) return null;
   const isLead = leadAt(shown())?.lead === id;
-  const shade = (/** @type {string} */ role) => (isOnPicture ? onPicture(role) : color(role));
+  const shade = (/** @type {string} */ role) => (isOnImage ? onImage(role) : color(role));
   const role =
     track.state === "rejected" ? "warning" : isLead ? "cipv" : track.state === "proposed" ? "path" : "fused";
   return {

@@ -34,7 +34,7 @@ export function failedWords(item) {
  * @param {CanvasRenderingContext2D} ctx @param {Frame} frame @param {FusedObject} item @param {Labels} labels
  * @param {(u: number) => number} X @param {(v: number) => number} Y
  */
-export function drawInPicture(ctx, { display }, item, labels, X, Y) {
+export function drawInImage(ctx, { display }, item, labels, X, Y) {
   const vision = display.vision_boxes[item.id],
     lidar = display.lidar_boxes[item.id],
     iou = gateOf(item, "iou");

@@ -52,7 +52,7 @@ def test_occlusion_and_truncation_are_of_each_frame(labels: DriveLabels) -> None
 def test_what_the_list_has_not_is_refused(labels: DriveLabels) -> None:
     with pytest.raises(BadAct, match="no attribute 'colour'"):
         put(labels, "colour", "red", 10, 12)
-    with pytest.raises(BadAct, match="motion is one of moving, stopped, parked, not 'flying'"):
+    with pytest.raises(BadAct, match="motion must be one of moving, stopped, parked, not 'flying'"):
         put(labels, "motion", "flying", 10, 12)
 
 

@@ -30,7 +30,7 @@ def test_points_that_are_no_vehicle_are_said(size: tuple[float, float, float], m
         measured.lifted(frame, Params(), act)
 
 
-def test_what_only_the_picture_shows_is_laid_on_points_but_not_put_where_its_height_says(
+def test_what_only_the_image_shows_is_laid_on_points_but_not_put_where_its_height_says(
     sqlite_database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     labels, box = DriveLabels(sqlite_database, fresh(), "here"), (10.0, 10.0, 40.0, 30.0)

@@ -10,7 +10,7 @@ from app.engine.engine import Engine
 from tests.app.labels.site import COUNT, act, labels, proposed
 
 
-def test_keyframes_ends_and_the_worst_fitting_frames_are_shown_with_their_pictures(
+def test_keyframes_ends_and_the_worst_fitting_frames_are_shown_with_their_images(
     engine: Engine, client: httpx.Client
 ) -> None:
     track = proposed(engine, client)

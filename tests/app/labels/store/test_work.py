@@ -49,7 +49,7 @@ def test_what_is_least_sure_comes_first_and_what_is_done_last(database: Database
     put(database, unsure, "Bob", person="Ada")
     assert (of(database, unsure).state, of(database, unsure).person) == ("labeling", "Ada")
     put(database, unsure, "Ada", state="review")
-    with pytest.raises(ActRefused, match="a second person must say that it is done"):
+    with pytest.raises(ActRefused, match="a second person must mark it as done"):
         put(database, unsure, "Ada", state="done")
     put(database, unsure, "Bob", state="done")
     done = of(database, unsure)

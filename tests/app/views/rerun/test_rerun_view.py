@@ -91,7 +91,7 @@ def test_cuboids_are_magenta_the_cipv_green_and_named(tmp_path: Path, frames: Ti
     assert rows(path, "/world/labels", "Points3D:labels")[0][1] == ["#7 car 19.9 m"]
 
 
-def test_boxes_in_the_picture_are_where_the_result_has_them(tmp_path: Path, frames: Ticks) -> None:
+def test_boxes_in_the_image_are_where_the_result_has_them(tmp_path: Path, frames: Ticks) -> None:
     path = write(tmp_path / "a.rrd", frames[:1])
     overlay = "/world/camera/overlay"
     assert rows(path, f"{overlay}/vision_boxes", "Boxes2D:centers")[0][1] == [[161.0, 71.5], [305.0, 55.0]]
@@ -99,7 +99,7 @@ def test_boxes_in_the_picture_are_where_the_result_has_them(tmp_path: Path, fram
     assert rows(path, f"{overlay}/cipv", "Boxes2D:half_sizes")[0][1] == [[21.0, 16.5]]
 
 
-def test_projected_points_lie_in_the_picture(tmp_path: Path, frames: Ticks) -> None:
+def test_projected_points_lie_in_the_image(tmp_path: Path, frames: Ticks) -> None:
     path = write(tmp_path / "a.rrd", frames[:1])
     pixels = np.array(rows(path, "/world/camera/overlay/points", "Points2D:positions")[0][1])
     assert 0 < len(pixels) < len(frames[0][1].layers.points)
@@ -107,14 +107,14 @@ def test_projected_points_lie_in_the_picture(tmp_path: Path, frames: Ticks) -> N
     assert (pixels < [320, 120]).all()
 
 
-def test_the_cameras_own_jpeg_goes_in_untouched_and_a_raw_picture_is_encoded(tmp_path: Path, frames: Ticks) -> None:
+def test_the_cameras_own_jpeg_goes_in_untouched_and_a_raw_image_is_encoded(tmp_path: Path, frames: Ticks) -> None:
     (first, result), (second, _) = frames[:2]
-    assert first.picture is not None
-    assert second.picture is not None
-    raw = dataclasses.replace(second, picture=dataclasses.replace(second.picture, encoded=None))
+    assert first.image is not None
+    assert second.image is not None
+    raw = dataclasses.replace(second, image=dataclasses.replace(second.image, encoded=None))
     path = write(tmp_path / "a.rrd", [(first, result), (raw, result)])
     (_, kept), (_, encoded) = rows(path, "/world/camera/image", "EncodedImage:blob")
-    assert bytes(kept[0]) == first.picture.encoded
+    assert bytes(kept[0]) == first.image.encoded
     assert bytes(encoded[0])[:2] == b"\xff\xd8"
 
 
@@ -122,7 +122,7 @@ def test_what_ends_is_cleared_and_a_null_breaks_the_curve(tmp_path: Path, frames
     (first, full), (second, _) = frames[:2]
     nothing = Layers(np.zeros((0, 4), np.float32), np.zeros(0, np.int32))
     empty = dataclasses.replace(full, objects=(), cipv=None, acc=None, rejected=(), layers=nothing)
-    blind = dataclasses.replace(second, picture=None, camera=None)
+    blind = dataclasses.replace(second, image=None, camera=None)
     path = write(tmp_path / "a.rrd", [(first, full), (blind, empty)])
     for entity, component in {
         "/curves/distance/cipv": "Scalars:scalars",

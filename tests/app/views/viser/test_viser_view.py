@@ -23,7 +23,7 @@ Ticks = list[tuple[Frame, Result]]
 Changes = queue.Queue[tuple[str, Any]]
 PARTS = (
     *("/points", "/cuboids", "/footprints", "/rays", "/velocities", "/cipv", "/path/ribbon", "/path/lines", "/grid"),
-    *("/ego", "/camera/picture", "/camera/edges", "/labels/0"),
+    *("/ego", "/camera/image", "/camera/edges", "/labels/0"),
 )
 
 
@@ -39,9 +39,7 @@ def view(changes: Changes) -> Iterator[ViserView]:
     view.close()
 
 
-def test_who_joins_late_gets_the_present_picture(
-    view: ViserView, frame: Frame, result: Result, open_scene: Any
-) -> None:
+def test_who_joins_late_gets_the_present_image(view: ViserView, frame: Frame, result: Result, open_scene: Any) -> None:
     view.show(frame, result)
     client = open_scene(view.port)
     client.read_present_state()
@@ -65,7 +63,7 @@ def test_what_vanishes_is_hidden(view: ViserView, frame: Frame, result: Result, 
     view.show(frame, result)
     nothing = Layers(np.zeros((0, 4), np.float32), np.zeros(0, np.int32))
     view.show(
-        dataclasses.replace(frame, sweep=None, picture=None),
+        dataclasses.replace(frame, sweep=None, image=None),
         dataclasses.replace(result, objects=(), cipv=None, layers=nothing),
     )
     client = open_scene(view.port)
@@ -261,7 +259,7 @@ def test_display_choices_redraw_the_frame_that_is_shown(
     client.read_until(lambda each: each.get("name") == "/labels/2" and "props" in each)
     assert client.texts() == ["#7 car 19.9 m", "#8 obstacle 15.9 m", "#9 truck 45.0 m carried"]
     client.move(client.inputs("Camera image")[0]["uuid"], False)
-    client.read_until(lambda each: each.get("name") == "/camera/picture" and each.get("visible") is False)
+    client.read_until(lambda each: each.get("name") == "/camera/image" and each.get("visible") is False)
 
 
 def test_it_listens_on_loopback_only_and_a_taken_port_becomes_another(view: ViserView) -> None:

@@ -12,9 +12,9 @@ from pipeline.calibration.local_match import NO_MATCH
 @pytest.mark.parametrize(
     ("found", "brief", "told"),
     [
-        (EdgeScore(None, None, 40), "too few borders", "Too few LiDAR depth borders"),
+        (EdgeScore(None, None, 40), "too few edges", "Too few LiDAR depth edges"),
         (EdgeScore(None, 3.1, 900), "no clear best", "No mount rotation within 3°"),
-        (EdgeScore(0.97, 6.0, 900), "97 %", "clearly better than the current one (900 borders in 20 frames)"),
+        (EdgeScore(0.97, 6.0, 900), "97 %", "clearly better than the current one (900 depth edges in 20 frames)"),
         (
             EdgeScore(0.12, 6.0, 900, {"yaw_deg": -2.0, "pitch_deg": 0.5}),
             "12 % · better yaw -2°, pitch +0.5°",
@@ -32,7 +32,7 @@ def test_a_score_in_words(found: EdgeScore, brief: str, told: str):
     assert said.better == dict(found.better)
 
 
-def test_without_a_picture_there_is_nothing_to_match():
+def test_without_an_image_there_is_nothing_to_match():
     said = _json(EdgeScore(None, None, 0), NO_MATCH, 0)
     assert (said.score, said.brief) == (None, "nothing to match")
     assert "both an image and LiDAR points" in said.text

@@ -41,7 +41,7 @@ def test_corners_lie_where_the_line_sees_them(engine: Engine, client: httpx.Clie
         np.testing.assert_allclose(pixels, aligned.project(cuboid.corners()), atol=0.006)
 
 
-def test_what_lies_behind_the_camera_is_nowhere_in_its_picture(client: httpx.Client):
+def test_what_lies_behind_the_camera_is_nowhere_in_its_image(client: httpx.Client):
     behind = AHEAD | {"center": [-20.0, 0.0, 0.8]}
     assert client.post("/api/project", json={"cuboids": [behind]}).json() == {"pixels": [[None] * 8]}
 

@@ -89,7 +89,7 @@ def test_without_a_calibration_there_is_no_pinhole_model():
 
 
 @pytest.mark.parametrize("are_undistorted", [True, False])
-def test_undistorted_pictures_with_the_distortion_of_raw_ones_are_noticed(are_undistorted: bool):
+def test_undistorted_images_with_the_distortion_of_raw_ones_are_noticed(are_undistorted: bool):
     bent = replace(CAMERA, distortion=np.array([-0.35, 0.15, 0.0, 0.0]))
     seen = resolve(AlignmentParams(), CAMERA if are_undistorted else bent)
     assert seen is not None
@@ -120,12 +120,12 @@ def test_two_seconds_of_real_traffic_undo_a_wrong_calibration(data_dir: Path):
     scenes = []
     for index in range(len(source)):
         frame = source.frame(index)
-        assert frame.picture is not None
+        assert frame.image is not None
         assert frame.camera is not None
         turn = np.eye(4)
         turn[:3, :3] = rotation(*np.radians([0.0, 3.0, -4.0]))
         wrong = replace(frame.camera, T_camera_ego=frame.camera.T_camera_ego @ turn)
-        seen = replace(frame, camera=wrong, raw_boxes=detector.detect(frame.picture.bgr))
+        seen = replace(frame, camera=wrong, raw_boxes=detector.detect(frame.image.bgr))
         scene = fit_scene(seen, Params())
         assert scene is not None
         scenes.append(scene)

@@ -42,7 +42,7 @@ def test_a_roof_between_two_rings_is_off_by_nothing_and_beyond_them_by_the_rest(
         assert boxed.residuals(ALIGNED)[0, 1] * down[0] == pytest.approx(expected_px, abs=1e-6)
 
 
-def test_an_edge_of_the_picture_says_nothing():
+def test_an_edge_of_the_image_says_nothing():
     found = table(frames=1, cars=1, walls=0)
     cut = replace(found, whole=np.array([[False, True, True, True]]), boxes=found.boxes - [300.0, 0.0, 0.0, 0.0])
     assert cut.residuals(ALIGNED)[0, 0] == 0.0

@@ -32,7 +32,7 @@ def frame(width_m: float = 1.8, height_m: float = 1.5, ahead_m: float = 15.0) ->
     boxes = np.array([[100, 60, 200, 120], [10, 10, 50, 50], [0, 60, 90, 179]], np.float32)
     raw = RawBoxes("made", boxes, np.array([0.9, 0.2, 0.6], np.float32), ("car", "car", "truck"))
     like = Recording().frame(0)
-    return Frame(0, "0", 0, sweep, like.picture, like.camera, raw_boxes=raw)
+    return Frame(0, "0", 0, sweep, like.image, like.camera, raw_boxes=raw)
 
 
 def test_a_car_ends_between_its_last_beam_and_the_next_one():

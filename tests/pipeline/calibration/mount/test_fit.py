@@ -66,7 +66,7 @@ def test_some_wrong_pieces_do_not_matter_and_noise_is_said():
     assert fit.values["yaw_deg"] == pytest.approx(1.4, abs=0.3)
     vague = fit_mount(record(noise_m=0.5))
     assert vague.sigmas["yaw_deg"] > 0.3
-    assert any(each.startswith("yaw is known to ±") for each in vague.warnings)
+    assert any(each.startswith("yaw is known only to ±") for each in vague.warnings)
 
 
 def test_the_rig_turns_as_a_whole():

@@ -23,7 +23,7 @@ FRAMES = 70
 @pytest.fixture(scope="module")
 def drive() -> list[Frame]:
     source = open_source("sim:curve_125")
-    return [replace(frame, picture=None) for frame in (source.frame(index) for index in range(FRAMES))]
+    return [replace(frame, image=None) for frame in (source.frame(index) for index in range(FRAMES))]
 
 
 def seen(frame: Frame, turn: F64) -> Frame:

@@ -89,7 +89,7 @@ def test_what_claims_to_be_a_vehicle() -> None:
     assert [item.id for item in claims(believed(0, objects, None), wanted, 2.0)] == [1, 3]
 
 
-def test_a_vehicle_of_which_only_the_picture_is_labelled_is_not_claimed_falsely() -> None:
+def test_a_vehicle_of_which_only_the_image_is_labelled_is_not_claimed_falsely() -> None:
     """Nobody knows how far off it is. One whose place is labelled counts, whatever boxes overlap."""
     wanted = vehicles([labelled(1, *A)])
     seen, elsewhere = (0.0, 0.0, 10.0, 10.0), (50.0, 0.0, 60.0, 10.0)

@@ -98,7 +98,7 @@ def test_labelled_leads(ranges: tuple[LeadRange, ...], expected: list[int | str 
         pytest.param([replace(fused(7, 20.0), bbox=None)], "wrong", id="seen by the LiDAR alone"),
     ],
 )
-def test_a_lead_that_only_the_picture_shows(objects: list[FusedObject], verdict: str) -> None:
+def test_a_lead_that_only_the_image_shows(objects: list[FusedObject], verdict: str) -> None:
     only_box = LabelTrack(4, "car", (Sighting(0, None, (0.0, 0.0, 10.0, 9.0)),), "accepted", PERSON)
     known = of_labels(labels(only_box, leads=(led(0, 0, 4),)), RULE)
     result = believed(0, objects, 7 if objects else None, "warn")

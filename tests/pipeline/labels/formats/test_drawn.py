@@ -50,7 +50,7 @@ def test_each_frame_shows_its_cuboids_and_the_one_after_the_last_shows_none() ->
     assert (entity.timestamp.seconds, entity.timestamp.nanos) == divmod(t_ns, 10**9)
 
 
-def test_boxes_are_drawn_in_the_picture() -> None:
+def test_boxes_are_drawn_in_the_image() -> None:
     images = shown(topics.LABEL_IMAGE)
     (follows,), both = images[1].points, images[2].points
     xs = [each.x for each in follows.points]

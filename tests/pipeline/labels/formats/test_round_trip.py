@@ -95,7 +95,7 @@ def _apart(leads: tuple[LeadRange, ...]) -> tuple[LeadRange, ...]:
 
 
 @pytest.mark.parametrize("distortion", [(-0.3, 0.1, 0.001, 0.001), (-0.25, 0.08, 0.0, 0.0, 0.01)])
-def test_kitti_boxes_are_of_the_undistorted_picture(distortion: tuple[float, ...], tmp_path: Path) -> None:
+def test_kitti_boxes_are_of_the_undistorted_image(distortion: tuple[float, ...], tmp_path: Path) -> None:
     here = drive(camera(distortion))
     box = (100.0, 120.0, 300.0, 260.0)
     labels = replace(here.empty(), tracks=(LabelTrack(1, "car", (Sighting(0, None, box),), "accepted", IMPORT),))

@@ -17,14 +17,14 @@ from pipeline.recording.mcap import output as mcap_output
 from pipeline.recording.mcap.chunk import unpack
 from pipeline.recording.mcap.reader import McapFile
 from pipeline.recording.session.writer import SessionWriter
-from tests.pipeline.recording.frames import ABOUT, full, picture, sweep, write
+from tests.pipeline.recording.frames import ABOUT, full, image, sweep, write
 
 
 def test_a_full_frame_is_one_chunk(tmp_path: Path) -> None:
     """A seek then reads nothing that is not its frame's."""
     jpeg = b"\xff\xd8" + bytes(np.random.default_rng(0).integers(0, 255, 400_000, dtype=np.uint8))
     frames = [
-        replace(full(index), sweep=sweep(index, points=28_000), picture=replace(picture(index), encoded=jpeg[:-index]))
+        replace(full(index), sweep=sweep(index, points=28_000), image=replace(image(index), encoded=jpeg[:-index]))
         for index in range(1, 6)
     ]
     with McapFile(write(tmp_path / "a.mcap", frames)) as file:

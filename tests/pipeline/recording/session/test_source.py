@@ -31,7 +31,7 @@ from pipeline.types import (
     Sweep,
 )
 from pipeline.types.source import is_simulated
-from tests.pipeline.recording.frames import ABOUT, CAMERA, PERIOD_NS, TRUTH, full, picture, same, sweep, write
+from tests.pipeline.recording.frames import ABOUT, CAMERA, PERIOD_NS, TRUTH, full, image, same, sweep, write
 
 
 def with_camera(distortion: int) -> Frame:
@@ -49,9 +49,9 @@ FRAMES: dict[str, Frame] = {
     "everything": full(0),
     "nothing": Frame(0, "empty", 0),
     "no LiDAR": replace(full(0), sweep=None),
-    "no camera": replace(full(0), picture=None, camera=None),
-    "an image that is no JPEG": replace(full(0), picture=picture(3, ".png", t_ns=5)),
-    "a camera without stamps": replace(full(0), picture=picture(3)),
+    "no camera": replace(full(0), image=None, camera=None),
+    "an image that is no JPEG": replace(full(0), image=image(3, ".png", t_ns=5)),
+    "a camera without stamps": replace(full(0), image=image(3)),
     "a sweep without times of points": replace(full(0), sweep=sweep(1)),
     "an empty sweep": replace(full(0), sweep=sweep(1, points=0)),
     "times before 1970": replace(full(0), t_ns=-5 * PERIOD_NS, sweep=sweep(1, t_ns=-5 * PERIOD_NS)),
@@ -91,7 +91,7 @@ def test_a_frame_comes_back_to_the_last_bit(frame: Frame, tmp_path: Path) -> Non
 def test_every_field_is_written() -> None:
     """A field that someone adds must be written too; then this list grows."""
     known = {
-        Frame: "index name t_ns sweep picture camera ego raw_boxes notes gnss raw_lanes route streams timing_ms "
+        Frame: "index name t_ns sweep image camera ego raw_boxes notes gnss raw_lanes route streams timing_ms "
         "detections_given",
         Sweep: "t_ns points ring channels time_s origin",
         CameraImage: "t_ns bgr encoded",
@@ -196,12 +196,12 @@ def test_drives_whose_times_jump_back_keep_their_order(tmp_path: Path) -> None:
     assert [same(session.frame(index), frames[index]) for index in range(7)] == [True] * 7
 
 
-def test_a_picture_shown_twice_is_stored_once(tmp_path: Path) -> None:
-    shown = picture(1, t_ns=PERIOD_NS)
-    frames = [replace(full(index), picture=shown) for index in range(3)]
+def test_an_image_shown_twice_is_stored_once(tmp_path: Path) -> None:
+    shown = image(1, t_ns=PERIOD_NS)
+    frames = [replace(full(index), image=shown) for index in range(3)]
     session = SessionSource("a", str(write(tmp_path / "a.mcap", frames)))
     assert sum(1 for _ in session.file.messages(("/camera/image",))) == 1
-    assert session.frame(0).picture is session.frame(1).picture
+    assert session.frame(0).image is session.frame(1).image
     assert same(session.frame(2), frames[2])
 
 

@@ -95,7 +95,7 @@ def test_packets_that_are_missing_cost_their_sweep_and_are_said(tmp_path: Path) 
     frame = SessionSource("a", str(tmp_path / "a.mcap")).frame(0)
     assert frame.sweep is None
     assert "lacks the packets" in frame.notes[-1]
-    assert frame.picture is not None
+    assert frame.image is not None
 
 
 def test_packets_are_kept_as_they_came(tmp_path: Path) -> None:

@@ -26,8 +26,8 @@ GREY = np.full((720, 1280, 3), 100, dtype=np.uint8)
 
 
 def test_a_perfect_camera_changes_nothing() -> None:
-    picture = np.random.default_rng(1).integers(0, 256, (720, 1280, 3), dtype=np.uint8)
-    np.testing.assert_array_equal(lens().expose(picture, 3.0), picture)
+    image = np.random.default_rng(1).integers(0, 256, (720, 1280, 3), dtype=np.uint8)
+    np.testing.assert_array_equal(lens().expose(image, 3.0), image)
 
 
 LENSES = [(-0.08, 0.012), (0.05, 0.0), (-0.2, 0.05), (0.0, 0.0)]
@@ -44,7 +44,7 @@ def test_distortion_is_opencvs_and_can_be_undone(k1: float, k2: float) -> None:
     np.testing.assert_allclose(undistorted(bent, model.distortion), flat, atol=1e-6)
 
 
-def test_nothing_far_outside_folds_back_into_the_picture() -> None:
+def test_nothing_far_outside_folds_back_into_the_image() -> None:
     outward = np.column_stack([np.linspace(0.0, 50.0, 5000), np.zeros(5000)])
     assert np.all(np.diff(distorted(outward, calibration().distortion)[:, 0]) > 0.0)
 
@@ -53,8 +53,8 @@ def test_nothing_far_outside_folds_back_into_the_picture() -> None:
 def test_long_straight_edges_are_drawn_bent(k1: float, k2: float) -> None:
     """A bar across the upper part of the image, of one polygon with four corners: its middle line against OpenCV."""
     model = calibration(CameraModel(**{**PERFECT, "k1": k1, "k2": k2}))
-    picture = np.zeros((720, 1280, 3), dtype=np.uint8)
-    canvas = Canvas(picture, model)
+    image = np.zeros((720, 1280, 3), dtype=np.uint8)
+    canvas = Canvas(image, model)
     T_ego_camera = inverse(model.T_camera_ego)
     corners = np.array([[-7.0, -3.1, 10.0], [7.0, -3.1, 10.0], [7.0, -2.9, 10.0], [-7.0, -2.9, 10.0]])
     canvas.add(transform(T_ego_camera, corners), np.array([4]), np.array([[255.0, 255.0, 255.0]]))
@@ -62,7 +62,7 @@ def test_long_straight_edges_are_drawn_bent(k1: float, k2: float) -> None:
     along = np.array([[x, -3.0, 10.0] for x in np.linspace(-6.0, 6.0, 25)])
     uv = cv2.projectPoints(along, np.zeros(3), np.zeros(3), model.K, model.distortion)[0].reshape(-1, 2)
     for u, v in uv[(uv[:, 0] > 5) & (uv[:, 0] < 1275)]:
-        rows = np.flatnonzero(picture[:, round(float(u)), 0] > 127)
+        rows = np.flatnonzero(image[:, round(float(u)), 0] > 127)
         assert rows.mean() == pytest.approx(v, abs=0.8)
 
 
@@ -85,9 +85,9 @@ def test_exposure_wanders_within_its_stops() -> None:
 
 def test_blur_softens_an_edge() -> None:
     def width(sigma: float) -> int:
-        picture = np.zeros((720, 1280, 3), dtype=np.uint8)
-        picture[:, 640:] = 200
-        row = lens(blur_px=sigma).expose(picture, 0.0)[300, :, 0]
+        image = np.zeros((720, 1280, 3), dtype=np.uint8)
+        image[:, 640:] = 200
+        row = lens(blur_px=sigma).expose(image, 0.0)[300, :, 0]
         return int(np.count_nonzero((row > 10) & (row < 190)))
 
     assert width(0.0) == 0

@@ -21,12 +21,12 @@ from tests.pipeline.simulation.worlds import with_actors
 def draw(scene: Scenario, t_s: float = 0.0) -> tuple[U8, world_state.World]:
     roadside = Roadside.build(scene.road, scene.seed, 0.0, 600.0)
     now = world_state.at(scene, t_s)
-    return camera.DrawnCamera(scene.road, roadside, scene.seed).picture(now), now
+    return camera.DrawnCamera(scene.road, roadside, scene.seed).image(now), now
 
 
-def is_colour(picture: U8, strong: tuple[int, ...], weak: tuple[int, ...], by: int) -> npt.NDArray[np.bool_]:
+def is_colour(image: U8, strong: tuple[int, ...], weak: tuple[int, ...], by: int) -> npt.NDArray[np.bool_]:
     """Pixels whose strong channels (0 blue, 1 green, 2 red) exceed the weak ones by more than ``by``."""
-    signed = picture.astype(int)
+    signed = image.astype(int)
     return signed[..., list(strong)].min(axis=-1) > signed[..., list(weak)].max(axis=-1) + by
 
 
@@ -47,50 +47,50 @@ def test_the_calibration_is_a_78_degree_720p_camera() -> None:
 @pytest.mark.parametrize("segments", ["{length_m: 2000}", "{length_m: 2000, curvature_per_m: 0.004}"])
 def test_lane_lines_are_where_the_road_has_them(segments: str) -> None:
     scene = with_actors(segments=segments)
-    picture, now = draw(scene)
+    image, now = draw(scene)
     edge_d = scene.road.edges_m()[0][0] + 0.25
     s = now.s_m + np.arange(12.0, 30.0, 2.0)
     for offset, bright in ((0.0, True), (0.7, False), (-0.7, False)):
         flat = now.to_ego(scene.road.to_world(s, edge_d + offset))
         uv = np.round(pixels(np.column_stack([flat, np.full(len(flat), -0.5)]))).astype(int)
         inside = (uv[:, 0] >= 0) & (uv[:, 0] < 1280) & (uv[:, 1] < 720)
-        values = picture[uv[inside, 1], uv[inside, 0]].mean(axis=1)
+        values = image[uv[inside, 1], uv[inside, 0]].mean(axis=1)
         assert np.count_nonzero(inside) >= 4
         assert np.all(values > 170) if bright else np.all(values < 150)
 
 
 def test_a_car_is_drawn_inside_its_cuboids_outline() -> None:
     scene = with_actors("{id: 1, kind: car, lane: -2, colour: '#ff00ff', ahead_m: 15, speed_mps: {0: 20}}")
-    picture, now = draw(scene)
+    image, now = draw(scene)
     without, _ = draw(with_actors())
     car = now.actors[0].cuboid
     uv = pixels(car.corners())
-    differs = np.abs(picture.astype(int) - without.astype(int)).sum(axis=2) > 60
+    differs = np.abs(image.astype(int) - without.astype(int)).sum(axis=2) > 60
     rows, columns = np.nonzero(differs)
     top, bottom, left, right = rows.min(), rows.max(), columns.min(), columns.max()
     assert top == pytest.approx(uv[:, 1].min(), abs=4)
     assert bottom == pytest.approx(uv[:, 1].max(), abs=12), "the shadow reaches a little further"
     assert left == pytest.approx(uv[:, 0].min(), abs=12)
     assert right == pytest.approx(uv[:, 0].max(), abs=12)
-    magenta = is_colour(picture, (0, 2), (1,), 80)
+    magenta = is_colour(image, (0, 2), (1,), 80)
     assert np.mean(magenta[top:bottom, left:right]) > 0.35
 
 
 def test_a_nearer_car_covers_a_farther_one() -> None:
     red = "{id: 1, kind: van, lane: -2, colour: '#ff0000', ahead_m: 10, speed_mps: {0: 20}}"
     green = "{id: 2, kind: car, lane: -2, colour: '#00ff00', ahead_m: 25, speed_mps: {0: 20}}"
-    picture, _ = draw(with_actors(f"{green}, {red}"))
-    assert not np.any(is_colour(picture, (1,), (0, 2), 120))
+    image, _ = draw(with_actors(f"{green}, {red}"))
+    assert not np.any(is_colour(image, (1,), (0, 2), 120))
     alone, _ = draw(with_actors(green))
     assert np.any(is_colour(alone, (1,), (0, 2), 120))
 
 
 def test_brake_lights_light_up() -> None:
     def reds(speeds: str) -> int:
-        picture, _ = draw(
+        image, _ = draw(
             with_actors(f"{{id: 1, kind: car, lane: -2, colour: '#808080', ahead_m: 15, speed_mps: {speeds}}}")
         )
-        return int(np.count_nonzero(is_colour(picture, (2,), (1,), 130)))
+        return int(np.count_nonzero(is_colour(image, (2,), (1,), 130)))
 
     assert reds("{0: 20, 5: 10}") > reds("{0: 20}") + 50
 
@@ -102,9 +102,9 @@ def test_any_kind_beside_and_ahead_is_drawn(kind: str, ahead_m: float, t_s: floa
     scene = with_actors(
         f"{{id: 1, kind: {kind}, lane: -1, colour: '#ff00ff', ahead_m: {ahead_m}, speed_mps: {{0: 24}}}}"
     )
-    picture, _ = draw(scene, t_s)
+    image, _ = draw(scene, t_s)
     without, _ = draw(with_actors(), t_s)
-    changed = np.any(picture != without, axis=2)
+    changed = np.any(image != without, axis=2)
     assert np.any(changed)
     assert not np.any(changed[:, 700:]), "it is on the left"
 
@@ -133,9 +133,9 @@ def test_a_crossing_road_is_painted_with_its_lines() -> None:
     crossed, now = draw(with_actors(segments=TOWN, lane=-1))
     plain, _ = draw(with_actors(segments=TOWN.replace("{s_m: 125, lanes_each_way: 1}", ""), lane=-1))
 
-    def at(picture: U8, x: float, s_y: float) -> npt.NDArray[np.int64]:
+    def at(image: U8, x: float, s_y: float) -> npt.NDArray[np.int64]:
         u, v = np.round(pixels(np.array([[x, s_y - now.d_m, -0.5]]))[0]).astype(int)
-        return picture[v, u].astype(np.int64)
+        return image[v, u].astype(np.int64)
 
     right_edge = -3.6 + 0.25
     assert at(plain, 25.0, right_edge).min() > 170, "the edge line of a road without a crossing"

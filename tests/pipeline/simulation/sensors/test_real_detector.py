@@ -12,7 +12,7 @@ from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.camera import calibration
 from pipeline.simulation.sensors.measured_noise import FalseBoxes, measured
 from pipeline.simulation.sensors.real_detector import RealDetector
-from pipeline.simulation.sensors.truth_boxes import in_picture
+from pipeline.simulation.sensors.truth_boxes import in_image
 from pipeline.simulation.world import world_state
 
 CAMERA = calibration()
@@ -52,7 +52,7 @@ def test_boxes_are_off_by_what_was_measured_and_the_same_in_any_order() -> None:
     scene = road(20.0)
     noise = measured().model_copy(update={"false_boxes": NO_FALSE, "doubled": 0.0})
     detector, now = RealDetector(scene, noise), world_state.at(scene, 1.0)
-    (seen,) = in_picture(now, CAMERA)
+    (seen,) = in_image(now, CAMERA)
     height = seen.bbox[3] - seen.bbox[1]
     boxes = [detector.boxes(now, CAMERA, index).boxes for index in range(0, scene.frame_count(), 7)]
     off = np.vstack([box for box in boxes if len(box)]) - np.array(seen.bbox)

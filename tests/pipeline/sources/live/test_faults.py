@@ -47,20 +47,18 @@ def after(taken: list[Taken]) -> list[Taken]:
 def assert_well(taken: list[Taken]) -> None:
     """Sweep with image and own motion, ten times a second."""
     assert len(taken) >= 4
-    assert all(each.frame.sweep is not None and each.frame.picture is not None for each in taken)
+    assert all(each.frame.sweep is not None and each.frame.image is not None for each in taken)
     assert all(each.frame.ego is not None and each.frame.gnss is not None for each in taken)
     np.testing.assert_allclose(np.diff([each.frame.t_ns for each in taken]) / 1e9, 0.1, atol=0.002)
     assert all(each.frame.notes == () for each in taken)
 
 
-def test_without_trouble_every_sweep_comes_once_with_its_picture() -> None:
+def test_without_trouble_every_sweep_comes_once_with_its_image() -> None:
     taken, bench = driven()
     whole = [each for each in taken if each.frame.sweep is not None]
     assert len(whole) >= 38
     assert_well(whole[5:])
-    skews = [
-        abs(f.frame.picture.t_ns - f.frame.t_ns) / 1e6 for f in whole[5:] if f.frame.picture and f.frame.picture.t_ns
-    ]
+    skews = [abs(f.frame.image.t_ns - f.frame.t_ns) / 1e6 for f in whole[5:] if f.frame.image and f.frame.image.t_ns]
     assert max(skews) < 17.0
     assert bench.source.dropped <= 1
     assert {each.lost for each in bench.source.health()} == {0}
@@ -70,7 +68,7 @@ def test_without_trouble_every_sweep_comes_once_with_its_picture() -> None:
 def test_camera_of_60_hz_against_lidar_of_10_hz() -> None:
     taken, _ = driven(camera_hz=60.0)
     whole = [each.frame for each in taken if each.frame.sweep is not None][5:]
-    skews = [abs(frame.picture.t_ns - frame.t_ns) / 1e6 for frame in whole if frame.picture and frame.picture.t_ns]
+    skews = [abs(frame.image.t_ns - frame.t_ns) / 1e6 for frame in whole if frame.image and frame.image.t_ns]
     assert len(skews) == len(whole)
     assert max(skews) < 8.5
 
@@ -78,7 +76,7 @@ def test_camera_of_60_hz_against_lidar_of_10_hz() -> None:
 def test_lidar_falls_silent_and_the_camera_ticks() -> None:
     taken, _ = driven(fault("lidar", "silence"))
     assert len(during(taken)) >= 15, "30 Hz"
-    assert all(each.frame.sweep is None and each.frame.picture is not None for each in during(taken))
+    assert all(each.frame.sweep is None and each.frame.image is not None for each in during(taken))
     assert all(any("lidar" in note for note in each.frame.notes) for each in during(taken))
     first = next(each for each in taken if each.at_s > TO_S and each.frame.sweep is not None)
     assert first.at_s - TO_S < 0.35
@@ -88,7 +86,7 @@ def test_lidar_falls_silent_and_the_camera_ticks() -> None:
 def test_the_camera_falls_silent_and_lidar_goes_on() -> None:
     taken, _ = driven(fault("camera", "silence"))
     assert len(during(taken)) >= 6
-    assert all(each.frame.sweep is not None and each.frame.picture is None for each in during(taken))
+    assert all(each.frame.sweep is not None and each.frame.image is None for each in during(taken))
     assert any("camera silent" in note for each in during(taken) for note in each.frame.notes)
     assert_well(after(taken))
 
@@ -139,7 +137,7 @@ def test_a_clock_that_is_set_is_followed_within_a_second_there_and_back(sensor: 
     assert there
     for each in [*there, *after(taken)]:
         assert each.frame.sweep is not None
-        assert each.frame.picture is not None
+        assert each.frame.image is not None
         assert each.frame.ego is not None
         assert each.age_s < 0.15
     assert_well(after(taken))
@@ -152,17 +150,17 @@ def test_packets_lost_on_the_way_are_counted() -> None:
     assert len([each for each in taken if each.frame.sweep is not None]) >= 38
 
 
-def test_a_picture_that_is_damaged_inside_is_said() -> None:
+def test_an_image_that_is_damaged_inside_is_said() -> None:
     bench = Bench()
     events = list(sent([]))
     broken = b"\xff\xd8" + bytes(300) + b"\xff\xd9"
     events = [event._replace(payload=broken) if event.sensor == "camera" else event for event in events]
     taken = bench.drive(iter(events))
-    assert all(each.frame.picture is None for each in taken)
+    assert all(each.frame.image is None for each in taken)
     assert "the image is damaged" in taken[-1].frame.notes
 
 
-def test_a_picture_of_another_size_than_calibrated_is_not_projected_into() -> None:
+def test_an_image_of_another_size_than_calibrated_is_not_projected_into() -> None:
     calibration = {"fx_px": 900, "fy_px": 900, "cx_px": 640, "cy_px": 360, "width_px": 1280, "height_px": 720}
     bench = Bench(
         {"lidar": {"position_port": None}, "camera": {"url": "http://127.0.0.1:9/", "calibration": calibration}}
@@ -176,8 +174,8 @@ def test_a_picture_of_another_size_than_calibrated_is_not_projected_into() -> No
 def test_offsets_are_turned_while_it_runs() -> None:
     taken, _ = driven(params=SyncParams(camera_offset_ms=-15.0))
     plain, _ = driven()
-    moved = {f.frame.t_ns: f.frame.picture.t_ns for f in taken[10:] if f.frame.picture and f.frame.picture.t_ns}
-    stood = {f.frame.t_ns: f.frame.picture.t_ns for f in plain[10:] if f.frame.picture and f.frame.picture.t_ns}
+    moved = {f.frame.t_ns: f.frame.image.t_ns for f in taken[10:] if f.frame.image and f.frame.image.t_ns}
+    stood = {f.frame.t_ns: f.frame.image.t_ns for f in plain[10:] if f.frame.image and f.frame.image.t_ns}
     both = sorted(moved.keys() & stood.keys())
     assert len(both) > 20
     steps = {round((moved[t] - stood[t]) / 1e6) for t in both}
@@ -284,6 +282,6 @@ def test_a_second_lidar_with_the_same_address_is_said_and_spoils_no_sweep() -> N
 def test_messages_measured_at_an_impossible_time_are_refused_and_said() -> None:
     late = {"camera": {"url": "http://127.0.0.1:9/", "time_offset_ms": -2000.0}}
     bench = Bench({**CONFIG, **late})
-    assert all(each.frame.picture is None for each in bench.drive(sent([], seconds=1.0)))
+    assert all(each.frame.image is None for each in bench.drive(sent([], seconds=1.0)))
     camera = next(each for each in bench.source.health() if each.sensor == "camera")
     assert re.fullmatch(r"\d+ refused: impossible time stamp", camera.note)

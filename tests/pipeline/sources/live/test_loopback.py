@@ -23,7 +23,7 @@ from tests.pipeline.sources.live.rig import Replaying, frames_until, free_port, 
 
 
 def is_whole(frame: Frame) -> bool:
-    return None not in (frame.sweep, frame.picture, frame.ego, frame.gnss)
+    return None not in (frame.sweep, frame.image, frame.ego, frame.gnss)
 
 
 def leads(frames: list[Frame], params: Params, detectors: Detectors) -> list[Result]:
@@ -55,10 +55,10 @@ def test_a_drive_over_the_network_has_the_lead_of_the_recording(sensors: list[Li
     assert over_network is not None
     assert over_network.distance_m == pytest.approx(direct.distance_m, abs=0.3)
     for frame in whole[2:]:
-        assert frame.picture is not None
-        assert frame.picture.t_ns is not None
-        assert abs(frame.picture.t_ns - frame.t_ns) < 60 * MS
-        assert frame.picture.encoded is not None, "the JPEG as it came"
+        assert frame.image is not None
+        assert frame.image.t_ns is not None
+        assert abs(frame.image.t_ns - frame.t_ns) < 60 * MS
+        assert frame.image.encoded is not None, "the JPEG as it came"
 
 
 def test_sensors_missing_at_the_start_are_there_when_they_are_plugged_in(sensors: list[LiveSensors]) -> None:
@@ -79,10 +79,10 @@ def test_a_camera_that_is_pulled_out_and_put_back_is_back(sensors: list[LiveSens
     source = opened(config, sensors)
     for _ in range(2):
         with Replaying(config, endless()):
-            frames_until(source, lambda frame: frame.sweep is not None and frame.picture is not None)
+            frames_until(source, lambda frame: frame.sweep is not None and frame.image is not None)
         lidar_only = loopback_config(camera=None, gnss=None, ego=None, lidar=config.lidar)
         with Replaying(lidar_only, endless()):
-            alone = frames_until(source, lambda frame: frame.sweep is not None and frame.picture is None)
+            alone = frames_until(source, lambda frame: frame.sweep is not None and frame.image is None)
             assert any("camera" in note for note in alone.notes)
 
 

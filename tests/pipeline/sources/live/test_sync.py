@@ -33,7 +33,7 @@ class Bench:
 
     def camera(self, t_ms: float, arrived_ms: float | None = None) -> None:
         arrived_ms = t_ms if arrived_ms is None else arrived_ms
-        self.sync.pictures.add(START + round(t_ms * MS), f"at {t_ms:g}", START + round(arrived_ms * MS))
+        self.sync.images.add(START + round(t_ms * MS), f"at {t_ms:g}", START + round(arrived_ms * MS))
 
     def tick(self, now_ms: float) -> Together[str] | None:
         return self.sync.tick(START + round(now_ms * MS), self.params)
@@ -43,7 +43,7 @@ def at_ms(together: Together[str] | None) -> float | None:
     return None if together is None else (together.t_ns - START) / MS
 
 
-def test_a_sweep_ticks_with_the_picture_nearest_to_it() -> None:
+def test_a_sweep_ticks_with_the_image_nearest_to_it() -> None:
     bench = Bench()
     for t in (0, 33, 66, 100, 133):
         bench.camera(t)
@@ -51,19 +51,19 @@ def test_a_sweep_ticks_with_the_picture_nearest_to_it() -> None:
     together = bench.tick(135)
     assert together is not None
     assert at_ms(together) == 70
-    assert together.picture is not None
-    assert together.picture.value == "at 66"
+    assert together.image is not None
+    assert together.image.value == "at 66"
     assert together.skew_ns == -4 * MS
     assert bench.tick(136) is None, "a tick is given once"
 
 
-def test_60_hz_camera_against_10_hz_lidar_is_never_more_than_half_a_picture_off() -> None:
+def test_60_hz_camera_against_10_hz_lidar_is_never_more_than_half_an_image_off() -> None:
     bench, skews = Bench(), []
-    pictures = [5.0 + k * 1000 / 60 for k in range(180)]
+    images = [5.0 + k * 1000 / 60 for k in range(180)]
     for k in range(1, 25):
         arrives = 100.0 * k + 51.0
-        while pictures and pictures[0] <= arrives:
-            bench.camera(pictures.pop(0))
+        while images and images[0] <= arrives:
+            bench.camera(images.pop(0))
         bench.lidar(100.0 * k, arrives)
         together = bench.tick(arrives)
         assert together is not None
@@ -73,25 +73,25 @@ def test_60_hz_camera_against_10_hz_lidar_is_never_more_than_half_a_picture_off(
 
 
 @pytest.mark.parametrize(
-    ("case", "picture_ms", "max_skew_ms", "kept"),
+    ("case", "image_ms", "max_skew_ms", "kept"),
     [
         ("inside the bound", 140.0, 60.0, True),
         ("outside the bound", 30.0, 60.0, False),
         ("bound widened", 30.0, 80.0, True),
     ],
 )
-def test_the_skew_is_bounded_and_said(case: str, picture_ms: float, max_skew_ms: float, kept: bool) -> None:
+def test_the_skew_is_bounded_and_said(case: str, image_ms: float, max_skew_ms: float, kept: bool) -> None:
     bench = Bench(params=SyncParams(max_skew_ms=max_skew_ms, wait_ms=0.0))
-    bench.camera(picture_ms)
+    bench.camera(image_ms)
     bench.lidar(100, 151)
     together = bench.tick(151)
     assert together is not None
-    assert (together.picture is not None) == kept
+    assert (together.image is not None) == kept
     assert (together.skew_ns is not None) == kept
     assert any("the nearest is -70 ms off" in note for note in together.notes) == (not kept)
 
 
-def test_the_cameras_offset_moves_its_pictures_while_it_runs() -> None:
+def test_the_cameras_offset_moves_its_images_while_it_runs() -> None:
     bench = Bench()
     for t in (60, 93, 126, 160):
         bench.camera(t)
@@ -99,12 +99,12 @@ def test_the_cameras_offset_moves_its_pictures_while_it_runs() -> None:
     bench.params = SyncParams(camera_offset_ms=-30.0)
     together = bench.tick(160)
     assert together is not None
-    assert together.picture is not None
-    assert together.picture.value == "at 126", "it was taken 30 ms before its stamp: at 96"
+    assert together.image is not None
+    assert together.image.value == "at 126", "it was taken 30 ms before its stamp: at 96"
     assert together.skew_ns == -4 * MS
 
 
-def test_a_sweep_waits_shortly_for_a_picture_that_is_on_its_way() -> None:
+def test_a_sweep_waits_shortly_for_an_image_that_is_on_its_way() -> None:
     bench = Bench()
     bench.camera(70, 100)
     bench.lidar(105, 156)
@@ -114,8 +114,8 @@ def test_a_sweep_waits_shortly_for_a_picture_that_is_on_its_way() -> None:
     bench.camera(136, 166)
     together = bench.tick(166)
     assert together is not None
-    assert together.picture is not None
-    assert together.picture.value == "at 103"
+    assert together.image is not None
+    assert together.image.value == "at 103"
 
 
 def test_a_sweep_does_not_wait_longer_than_it_may() -> None:
@@ -125,7 +125,7 @@ def test_a_sweep_does_not_wait_longer_than_it_may() -> None:
     assert bench.tick(156 + 24) is None
     together = bench.tick(156 + 26)
     assert together is not None
-    assert together.picture is not None
+    assert together.image is not None
 
 
 def test_without_a_camera_lidar_goes_on() -> None:
@@ -134,7 +134,7 @@ def test_without_a_camera_lidar_goes_on() -> None:
     together = bench.tick(151)
     assert together is not None
     assert together.sweep is not None
-    assert together.picture is None
+    assert together.image is None
 
 
 def test_without_lidar_the_camera_ticks() -> None:

@@ -38,10 +38,10 @@ def test_everything_beside_is_found(tmp_path: Path) -> None:
         assert np.median(np.linalg.norm(frame.sweep.points[:, :3] - [0, 0, 1], axis=1)) == pytest.approx(
             10 - index / 10, 1e-3
         )
-        assert frame.picture is not None
-        assert frame.picture.t_ns is not None
-        assert abs(frame.picture.t_ns - frame.t_ns) <= 20_000_000
-        assert np.median(frame.picture.bgr) == pytest.approx(grey, abs=3)
+        assert frame.image is not None
+        assert frame.image.t_ns is not None
+        assert abs(frame.image.t_ns - frame.t_ns) <= 20_000_000
+        assert np.median(frame.image.bgr) == pytest.approx(grey, abs=3)
         assert frame.camera is not None
         assert frame.camera.T_camera_ego[1, 3] == pytest.approx(1.2)
         assert frame.gnss is not None
@@ -59,7 +59,7 @@ def test_frames_in_any_order_are_the_same(tmp_path: Path) -> None:
         frame = source.frame(index)
         assert frame.sweep is not None
         assert frame.sweep.points.tobytes() == forward[index].sweep.points.tobytes()  # type: ignore[union-attr]
-        assert np.array_equal(frame.picture.bgr, forward[index].picture.bgr)  # type: ignore[union-attr]
+        assert np.array_equal(frame.image.bgr, forward[index].image.bgr)  # type: ignore[union-attr]
 
 
 def test_a_lidar_on_the_second_interface(tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_the_line_runs_on_it(tmp_path: Path) -> None:
 def test_nothing_beside(tmp_path: Path) -> None:
     source = opened(tmp_path, pcapng(lidar(2)))
     frame = source.frame(1)
-    assert (frame.picture, frame.camera, frame.gnss, frame.ego, frame.notes) == (None, None, None, None, ())
+    assert (frame.image, frame.camera, frame.gnss, frame.ego, frame.notes) == (None, None, None, None, ())
     assert source.notes[-1] == "no ego speed recorded"
     assert "not synchronised to GPS" in source.notes[0]
 
@@ -88,8 +88,8 @@ def test_options_name_other_files_and_shift_the_video(tmp_path: Path) -> None:
     (tmp_path / "rig.yml").write_text(RIG, encoding="utf-8")
     options = "?video=front.mp4&video_offset_s=0.1&nmea=gps.txt&rig=rig.yml"
     frame = opened(tmp_path, pcap(lidar(3)), options).frame(1)
-    assert frame.picture is not None
-    assert np.median(frame.picture.bgr) == pytest.approx(20, abs=4)
+    assert frame.image is not None
+    assert np.median(frame.image.bgr) == pytest.approx(20, abs=4)
     assert frame.gnss is not None
     assert frame.camera is not None
 

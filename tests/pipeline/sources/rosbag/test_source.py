@@ -59,10 +59,10 @@ def test_every_sensor_of_a_bag(kind: Kind, tmp_path: Path) -> None:
         assert np.array_equal(frame.sweep.points[:, 3], wall.points[:, 3])
         assert frame.sweep.time_s is not None
         assert frame.sweep.time_s[0] == pytest.approx(-0.05)
-        assert frame.picture is not None
-        assert frame.picture.t_ns == frame.t_ns + 20_000_000
-        assert frame.picture.encoded is not None
-        assert np.median(frame.picture.bgr) == pytest.approx(60 + 40 * index, abs=2)
+        assert frame.image is not None
+        assert frame.image.t_ns == frame.t_ns + 20_000_000
+        assert frame.image.encoded is not None
+        assert np.median(frame.image.bgr) == pytest.approx(60 + 40 * index, abs=2)
         assert frame.camera is not None
         ahead_below_camera = frame.camera.T_camera_ego @ [10.0, 0.0, 0.0, 1.0]
         assert np.allclose(ahead_below_camera[:3], [0.0, 0.3, 10.0], atol=1e-9)
@@ -115,9 +115,9 @@ def test_topics_can_be_chosen_and_left_out(tmp_path: Path) -> None:
     assert distance_m(f"rosbag:{tmp_path / 'drive'}?lidar=/rear/points") == pytest.approx(5.0, abs=0.01)
     alone = open_source(f"rosbag:{tmp_path / 'drive'}?lidar=none").frame(1)
     assert alone.sweep is None
-    assert alone.picture is not None
+    assert alone.image is not None
     assert alone.t_ns == HEADER_NS + STEP_NS
-    assert open_source(f"rosbag:{tmp_path / 'drive'}?camera=none").frame(1).picture is None
+    assert open_source(f"rosbag:{tmp_path / 'drive'}?camera=none").frame(1).image is None
 
 
 def distance_m(uri: str) -> float:
@@ -141,15 +141,15 @@ def test_a_message_without_a_time_is_taken_when_it_was_recorded(tmp_path: Path) 
     ("encoding", "convert"),
     [("bgr8", None), ("rgb8", cv2.COLOR_BGR2RGB), ("bgra8", cv2.COLOR_BGR2BGRA), ("mono8", cv2.COLOR_BGR2GRAY)],
 )
-def test_raw_pictures(encoding: str, convert: int | None, tmp_path: Path) -> None:
+def test_raw_images(encoding: str, convert: int | None, tmp_path: Path) -> None:
     pixels = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     pixels[:, : WIDTH // 2] = (200, 100, 50) if encoding != "mono8" else (120, 120, 120)
     with BagWriter(tmp_path / "drive", "db3") as bag:
         sent = pixels if convert is None else cv2.cvtColor(pixels, convert)
         bag.write("/image_raw", bag.image(HEADER_NS, sent, encoding), HEADER_NS)
-    picture = open_source(f"rosbag:{tmp_path / 'drive'}").frame(0).picture
-    assert picture is not None
-    assert np.array_equal(picture.bgr, pixels)
+    image = open_source(f"rosbag:{tmp_path / 'drive'}").frame(0).image
+    assert image is not None
+    assert np.array_equal(image.bgr, pixels)
 
 
 def test_clouds_without_rings_and_times(tmp_path: Path) -> None:
@@ -267,7 +267,7 @@ def test_a_sensor_lost_to_damaged_metadata_is_said_in_each_frame(kind: Kind, wha
     assert len(source) == 3
     for index in range(3):
         frame = source.frame(index)
-        assert (frame.sweep is None, frame.picture is None) == ("LiDAR" in what, "camera" in what)
+        assert (frame.sweep is None, frame.image is None) == ("LiDAR" in what, "camera" in what)
         assert says in frame.notes
 
 
@@ -326,4 +326,4 @@ def test_frames_from_several_threads(kind: Kind, tmp_path: Path) -> None:
     with ThreadPoolExecutor(4) as pool:
         frames = list(pool.map(source.frame, [0, 1, 2] * 4))
     assert [frame.index for frame in frames] == [0, 1, 2] * 4
-    assert all(frame.sweep is not None and frame.picture is not None for frame in frames)
+    assert all(frame.sweep is not None and frame.image is not None for frame in frames)

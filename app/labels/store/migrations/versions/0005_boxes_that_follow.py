@@ -1,4 +1,4 @@
-"""A picture box follows its cuboid unless it was set; truncation and occlusion have a place."""
+"""An image box follows its cuboid unless it was set; truncation and occlusion have a place."""
 
 from __future__ import annotations
 

@@ -70,12 +70,10 @@ def part(jpeg: bytes, *headers: str) -> bytes:
         ("length that is none", lambda j: ("Content-Length: -3",), None),
     ],
 )  # fmt: skip
-def test_pictures_come_as_they_are(
-    case: str, headers: Callable[[bytes], tuple[str, ...]], stamp_us: int | None
-) -> None:
-    pictures = [small_jpeg(shade) for shade in (10, 128, 250)]
-    found, error = received(MULTIPART + b"".join(part(each, *headers(each)) for each in pictures))
-    assert [data for data, _ in found] == pictures
+def test_images_come_as_they_are(case: str, headers: Callable[[bytes], tuple[str, ...]], stamp_us: int | None) -> None:
+    images = [small_jpeg(shade) for shade in (10, 128, 250)]
+    found, error = received(MULTIPART + b"".join(part(each, *headers(each)) for each in images))
+    assert [data for data, _ in found] == images
     assert {stamp for _, stamp in found} == {stamp_us}
     assert isinstance(error, DeviceLost), "then the camera closed"
 

@@ -53,12 +53,12 @@ def test_a_camera_that_speaks_rtsp(codec: str) -> None:
         for _ in range(2):
             with camera(codec, port):
                 for _ in range(20):
-                    picture = frames_until(source, lambda frame: frame.picture is not None).picture
-                    assert picture is not None
-                    assert picture.bgr.shape == (360, 640, 3)
-                    assert np.median(picture.bgr[:, :90]) > 220, "the white bar"
-                    assert np.median(picture.bgr[:, 110:]) == pytest.approx(80, abs=12)
-                    assert (picture.encoded is not None) == (codec == "mjpeg"), "a JPEG stays as it came"
+                    image = frames_until(source, lambda frame: frame.image is not None).image
+                    assert image is not None
+                    assert image.bgr.shape == (360, 640, 3)
+                    assert np.median(image.bgr[:, :90]) > 220, "the white bar"
+                    assert np.median(image.bgr[:, 110:]) == pytest.approx(80, abs=12)
+                    assert (image.encoded is not None) == (codec == "mjpeg"), "a JPEG stays as it came"
                 (health,) = source.health()
                 assert (health.sensor, health.note != "") == ("camera", True), "its images have no times of their own"
     finally:

@@ -44,7 +44,7 @@ def test_a_video_file_is_a_camera(sensors: list[LiveSensors], tmp_path: Path) ->
     source = opened(config, sensors)
     seen: list[Frame] = []
     frames_until(source, lambda frame: len(seen) > 7, seen)
-    shades = {round(float(each.picture.bgr.mean()) / 60) for each in seen if each.picture is not None}
+    shades = {round(float(each.image.bgr.mean()) / 60) for each in seen if each.image is not None}
     assert len(shades) >= 3, "it plays, and begins again at its end"
     assert "images are stamped on arrival" in seen[-1].streams[0].note
 
@@ -68,13 +68,13 @@ def test_video_over_http_is_a_camera_too(sensors: list[LiveSensors], tmp_path: P
         try:
             url = f"http://127.0.0.1:{server.server_address[1]}/drive.mp4"
             source = opened(LiveConfig.model_validate({"camera": {"url": url}}), sensors)
-            frame = frames_until(source, lambda frame: frame.picture is not None)
+            frame = frames_until(source, lambda frame: frame.image is not None)
             source.close()
         finally:
             server.shutdown()
             thread.join()
-    assert frame.picture is not None
-    assert frame.picture.bgr.shape == (48, 64, 3)
+    assert frame.image is not None
+    assert frame.image.bgr.shape == (48, 64, 3)
 
 
 def test_a_camera_that_is_not_plugged_in_is_said(sensors: list[LiveSensors]) -> None:

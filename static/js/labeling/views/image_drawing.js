@@ -1,5 +1,5 @@
 /** Labels in the camera image: cuboid edges, boxes and names. */
-import { drawBox, drawCuboid } from "../../views/drawing/picture.js";
+import { drawBox, drawCuboid } from "../../views/drawing/image.js";
 import { get } from "../../core/store.js";
 import { presentOf, present } from "../state/draft.js";
 import { shown } from "../state/labels.js";
@@ -17,16 +17,16 @@ const NEW_TINT = "#fff";
 const FOLLOWING = [2, 3];
 
 /** @param {CanvasRenderingContext2D} ctx @param {import("../../core/types.js").Frame} frame @param {Place} place */
-export function drawInPicture(ctx, frame, place) {
-  const picture = frame.picture,
+export function drawInImage(ctx, frame, place) {
+  const image = frame.image,
     projected = get("projected");
-  if (!isOn() || !picture) return;
-  const scale = place.scale * picture.scale;
+  if (!isOn() || !image) return;
+  const scale = place.scale * image.scale;
   const X = (/** @type {number} */ u) => place.x + u * scale,
     Y = (/** @type {number} */ v) => place.y + v * scale;
   const isProjected = projected?.frame === frame.state.index,
     pixels = isProjected ? projected.pixels : new Map();
-  const tags = new Labels(ctx, place.x + picture.width * place.scale, place.y, place.y + picture.height * place.scale);
+  const tags = new Labels(ctx, place.x + image.width * place.scale, place.y, place.y + image.height * place.scale);
   for (const { track } of present()) {
     const box = lookOf(track, true) && boxOf(track);
     if (box) tags.keepFree(X(box[0]), Y(box[1]), (box[2] - box[0]) * scale, (box[3] - box[1]) * scale);
@@ -35,14 +35,14 @@ export function drawInPicture(ctx, frame, place) {
     const look = lookOf(each.track, true),
       corners = pixels.get(each.track);
     if (!look) continue;
-    const bbox = boxIn(each, corners, picture, isProjected);
+    const bbox = boxIn(each, corners, image, isProjected);
     ctx.setLineDash(look.dash);
     if (corners) drawCuboid(ctx, corners, look.tint, look.width, X, Y);
     ctx.setLineDash(isFollowing(each) ? FOLLOWING : look.dash);
     if (bbox && (look.isChosen || !corners)) drawBox(ctx, bbox, look.isChosen ? NEW_TINT : look.tint, 1.5, X, Y);
     ctx.setLineDash([]);
     const at = corners ? boundsOf(corners) : bbox;
-    if (at && isIn(at, picture))
+    if (at && isIn(at, image))
       tags.put(
         look.name,
         X(at[0]),
@@ -57,7 +57,7 @@ export function drawInPicture(ctx, frame, place) {
   if (draft?.track === null && draft.bbox) drawBox(ctx, draft.bbox, NEW_TINT, 2, X, Y);
 }
 
-/** @param {Box} box @param {import("../../core/types.js").Picture} picture */
+/** @param {Box} box @param {import("../../core/types.js").SentImage} image */
 const isIn = ([x1, y1, x2, y2], { width, height, scale }) =>
   x1 * scale < width && y1 * scale < height && x2 > 0 && y2 > 0;
 
@@ -80,17 +80,17 @@ export const isFollowing = ({ cuboid, box_set }) => cuboid !== null && !box_set;
 /** Image box of a label. @param {number} track @returns {Box|null} */
 export function boxOf(track) {
   const label = presentOf(track),
-    picture = get("frame")?.picture;
+    image = get("frame")?.image;
   const projected = get("projected"),
     isProjected = projected?.frame === shown();
-  if (!label || !picture) return null;
-  return boxIn(label, isProjected ? projected?.pixels.get(track) : undefined, picture, isProjected);
+  if (!label || !image) return null;
+  return boxIn(label, isProjected ? projected?.pixels.get(track) : undefined, image, isProjected);
 }
 
 /**
  * @param {LabelSighting} label
  * @param {import("../../core/types.js").Pixels|undefined} corners
- * @param {import("../../core/types.js").Picture} picture
+ * @param {import("../../core/types.js").SentImage} image
  * @param {boolean} isProjected whether the projection of this frame is known; until then the stored box stands in
  * @returns {Box|null} null outside the image
  */

@@ -2,9 +2,9 @@
 import { el } from "../../core/dom.js";
 import { ui } from "../../core/colors.js";
 import { get } from "../../core/store.js";
-import { drawBox, drawCuboid } from "../../views/drawing/picture.js";
+import { drawBox, drawCuboid } from "../../views/drawing/image.js";
 import { footprint, nose } from "../views/cuboid.js";
-import { boundsOf } from "../views/picture_drawing.js";
+import { boundsOf } from "../views/image_drawing.js";
 import { shown } from "../state/labels.js";
 
 /** @typedef {import("../state/types.js").Cuboid} Cuboid */
@@ -23,7 +23,7 @@ const WIDTH_PX = 230,
 /** @param {string} name @param {(ctx: CanvasRenderingContext2D) => void} draw */
 function drawing(name, draw) {
   const sharp = devicePixelRatio || 1;
-  const canvas = el("canvas", { class: "conflict-picture", aria: { role: "img", label: name } });
+  const canvas = el("canvas", { class: "conflict-image", aria: { role: "img", label: name } });
   canvas.width = WIDTH_PX * sharp;
   canvas.height = HEIGHT_PX * sharp;
   const ctx = canvas.getContext("2d");
@@ -35,7 +35,7 @@ function drawing(name, draw) {
 }
 
 /**
- * One person's cuboid from above, ahead is up; the other's is dashed. Both persons' pictures show the same place.
+ * One person's cuboid from above, ahead is up; the other's is dashed. Both persons' images show the same place.
  * @param {Cuboid|null|undefined} own
  * @param {Cuboid|null|undefined} other
  */
@@ -79,12 +79,12 @@ export function fromAbove(own, other) {
  * @param {Shape} own
  * @param {Shape} other
  */
-export function inPicture(own, other) {
+export function inImage(own, other) {
   const frame = get("frame"),
-    picture = frame?.picture,
+    image = frame?.image,
     bitmap = frame?.bitmap;
   const boxes = [own, other].flatMap(({ bbox, pixels }) => [bbox, pixels ? boundsOf(pixels) : null].filter((b) => !!b));
-  if (!picture || !bitmap || !boxes.length || (!own.bbox && !own.pixels)) return null;
+  if (!image || !bitmap || !boxes.length || (!own.bbox && !own.pixels)) return null;
   const all = /** @type {Box[]} */ (boxes);
   const [x1, y1] = [Math.min(...all.map((b) => b[0])), Math.min(...all.map((b) => b[1]))],
     [x2, y2] = [Math.max(...all.map((b) => b[2])), Math.max(...all.map((b) => b[3]))];
@@ -92,8 +92,8 @@ export function inPicture(own, other) {
   const X = (/** @type {number} */ x) => WIDTH_PX / 2 + (x - (x1 + x2) / 2) * scale,
     Y = (/** @type {number} */ y) => HEIGHT_PX / 2 + (y - (y1 + y2) / 2) * scale;
   return drawing("in the image", (ctx) => {
-    const wide = bitmap.width / picture.scale,
-      tall = bitmap.height / picture.scale;
+    const wide = bitmap.width / image.scale,
+      tall = bitmap.height / image.scale;
     ctx.drawImage(bitmap, X(0), Y(0), wide * scale, tall * scale);
     if (own.pixels) drawCuboid(ctx, own.pixels, ui("accent"), 1.5, X, Y);
     if (own.bbox) drawBox(ctx, own.bbox, "#fff", 1.5, X, Y);

@@ -27,14 +27,14 @@ _ROWS_BEYOND = 2
 UNSURE = LaneParams(mount_height_m=EYE_HEIGHT_M, pitch_sigma_deg=1.5, min_width_m=2.0, max_width_m=5.5)
 """The pitch and the scale of a guessed camera may be well off."""
 Marks = Mapping[str, Mapping[int, tuple[float | None, float | None]]]
-"""Picture → row v → u of the left and of the right line; null where there is no paint to mark."""
+"""Image → row v → u of the left and of the right line; null where there is no paint to mark."""
 
 
 @dataclass(frozen=True)
 class Miss:
     """One mark against what was found: pixels to the right of the mark, null where no line was believed."""
 
-    picture: str
+    image: str
     row: int
     side: str
     error_px: float | None
@@ -90,10 +90,10 @@ def summary(lane: EgoLane | None) -> str:
     return f"{lane.source[:24]}: {' '.join(sides) or 'no line'}{width} pitch {np.degrees(lane.pitch_rad):+.2f} deg"
 
 
-def tiles(pictures: Sequence[U8], columns: int = 3, width: int = 640) -> U8:
+def tiles(images: Sequence[U8], columns: int = 3, width: int = 640) -> U8:
     """Many images in one, each ``width`` wide and 16:9."""
     size = (width, width * 9 // 16)
-    small = [cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in pictures]
+    small = [cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in images]
     small += [np.zeros_like(small[0])] * (-len(small) % columns)
     return np.vstack([np.hstack(small[i : i + columns]) for i in range(0, len(small), columns)]).astype(np.uint8)
 

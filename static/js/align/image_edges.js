@@ -18,14 +18,14 @@ let known = "";
  * @param {{x: number, y: number, scale: number}} place
  */
 export function drawEdges(target, frame, place) {
-  const { bitmap, picture, state } = frame;
-  if (!bitmap || !picture) return;
+  const { bitmap, image, state } = frame;
+  if (!bitmap || !image) return;
   const key = `${state.uri} ${state.index}`;
   if (key !== known) {
     known = key;
     find(bitmap);
   }
-  target.drawImage(canvas, place.x, place.y, picture.width * place.scale, picture.height * place.scale);
+  target.drawImage(canvas, place.x, place.y, image.width * place.scale, image.height * place.scale);
 }
 
 /** Draw the edges onto the offscreen canvas. @param {ImageBitmap} bitmap */

@@ -1,7 +1,7 @@
 /** Camera overlay: path corridor, and boxes, cuboid and name of each object. */
-import { onPicture, roleOf } from "../../core/colors.js";
+import { onImage, roleOf } from "../../core/colors.js";
 import { num } from "../../core/format.js";
-import { isPictured } from "../../core/object_sources.js";
+import { isImaged } from "../../core/object_sources.js";
 import { get } from "../../core/store.js";
 
 /** @typedef {import("../../core/types.js").Frame} Frame */
@@ -39,7 +39,7 @@ export function drawPath(ctx, path, X, Y) {
   };
   trace([...left, ...[...right].reverse()]);
   ctx.closePath();
-  ctx.fillStyle = ctx.strokeStyle = onPicture("path");
+  ctx.fillStyle = ctx.strokeStyle = onImage("path");
   ctx.globalAlpha = 0.16;
   ctx.fill();
   ctx.globalAlpha = 0.9;
@@ -62,16 +62,16 @@ export function drawObjects(ctx, { result, display }, layers, labels, X, Y) {
   const farFirst = [...result.objects].sort((a, b) => (b.distance_m ?? 1e9) - (a.distance_m ?? 1e9));
   for (const item of farFirst) {
     const strong = item.id === lead || item.id === chosen;
-    const tint = onPicture(roleOf(item, lead));
+    const tint = onImage(roleOf(item, lead));
     const vision = display.vision_boxes[item.id],
       lidar = display.lidar_boxes[item.id],
       corners = display.cuboids[item.id];
     ctx.globalAlpha = item.carried ? 0.5 : 1;
     ctx.setLineDash(item.carried ? [4, 3] : []);
     if (layers.cuboids && corners)
-      drawCuboid(ctx, corners, strong ? tint : onPicture("lidar"), strong ? 2.5 : 1.2, X, Y);
-    if (layers.lidarBoxes && lidar) drawBox(ctx, lidar, onPicture("lidar"), 1, X, Y);
-    if (layers.visionBoxes && vision) drawBox(ctx, vision, strong ? tint : onPicture("vision"), strong ? 3 : 1.5, X, Y);
+      drawCuboid(ctx, corners, strong ? tint : onImage("lidar"), strong ? 2.5 : 1.2, X, Y);
+    if (layers.lidarBoxes && lidar) drawBox(ctx, lidar, onImage("lidar"), 1, X, Y);
+    if (layers.visionBoxes && vision) drawBox(ctx, vision, strong ? tint : onImage("vision"), strong ? 3 : 1.5, X, Y);
     if (strong && !vision && lidar) drawBox(ctx, lidar, tint, 2.5, X, Y);
     ctx.setLineDash([]);
     if (item.id === chosen && (vision ?? lidar)) drawHalo(ctx, vision ?? lidar, X, Y);
@@ -91,14 +91,14 @@ export function drawObjects(ctx, { result, display }, layers, labels, X, Y) {
       words,
       X(anchor[0]),
       Y(anchor[1]),
-      onPicture(roleOf(item, lead)),
+      onImage(roleOf(item, lead)),
       isLead ? "strong" : isNext || item.id === chosen ? "must" : "weak",
     );
   }
 }
 
 /** No tags for roadside returns and carried objects: they would clutter the image. @param {FusedObject} item */
-const deservesTag = (item) => !item.carried && (isPictured(item) || item.in_path);
+const deservesTag = (item) => !item.carried && (isImaged(item) || item.in_path);
 
 /**
  * @param {CanvasRenderingContext2D} ctx
@@ -121,7 +121,7 @@ export function drawBox(ctx, [x1, y1, x2, y2], tint, width, X, Y) {
 export function drawWindow(ctx, window, X, Y) {
   ctx.globalAlpha = 0.45;
   ctx.setLineDash([2, 4]);
-  drawBox(ctx, window, onPicture("vision"), 1, X, Y);
+  drawBox(ctx, window, onImage("vision"), 1, X, Y);
   ctx.setLineDash([]);
   ctx.globalAlpha = 1;
 }

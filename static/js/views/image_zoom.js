@@ -137,4 +137,4 @@ function show(factor, u, v) {
   changed();
 }
 
-const imageSize = () => get("frame")?.picture ?? null;
+const imageSize = () => get("frame")?.image ?? null;

@@ -11,8 +11,8 @@ import { chosen, shown } from "../state/labels.js";
 import { lookOf } from "./style.js";
 import { isOn, setTool } from "../state/mode.js";
 import { newLabel } from "../state/new_class.js";
-import { boxOf, isFollowing } from "./picture_drawing.js";
-import { isZoomed, pan, zoom } from "../../views/picture_zoom.js";
+import { boxOf, isFollowing } from "./image_drawing.js";
+import { isZoomed, pan, zoom } from "../../views/image_zoom.js";
 import * as road from "./road_drag.js";
 
 /** @typedef {import("../state/types.js").Box} Box */
@@ -62,7 +62,7 @@ export function zoomBy(by) {
 }
 
 /** Camera pixels per canvas pixel. */
-const perPane = () => 1 / (place().scale * (get("frame")?.picture?.scale ?? 1));
+const perPane = () => 1 / (place().scale * (get("frame")?.image?.scale ?? 1));
 
 /** @param {PointerEvent} event @returns {Pixel} */
 function pixelAt({ offsetX, offsetY }) {
