@@ -29,6 +29,8 @@ class SourceKind:
     """A folder with a file that matches one of these patterns is of this kind."""
     suffixes: tuple[str, ...] = ()
     """A file whose name ends so is of this kind."""
+    begins: tuple[tuple[int, bytes], ...] = ()
+    """A file with one of these at its offset is of this kind, whatever its name."""
     bare_suffixes: tuple[str, ...] = ()
     """A path that ends so is opened without a scheme."""
     is_live: bool = False
@@ -46,9 +48,25 @@ class SourceKind:
 
 
 KINDS: tuple[SourceKind, ...] = (
-    SourceKind("mcap", "session.mcap", "pipeline.recording.session.source:open_recording", bare_suffixes=(".mcap",)),
     SourceKind(
-        "pcap", "pcap:<file>", "pipeline.sources.pcap.source:open_recording", suffixes=(".pcap", ".pcapng", ".cap")
+        "mcap",
+        "session.mcap",
+        "pipeline.recording.session.source:open_recording",
+        begins=((0, b"\x89MCAP0\r\n"),),
+        bare_suffixes=(".mcap",),
+    ),
+    SourceKind(
+        "pcap",
+        "pcap:<file>",
+        "pipeline.sources.pcap.source:open_recording",
+        suffixes=(".pcap", ".pcapng", ".cap"),
+        begins=(
+            (0, b"\xa1\xb2\xc3\xd4"),
+            (0, b"\xd4\xc3\xb2\xa1"),
+            (0, b"\xa1\xb2\x3c\x4d"),
+            (0, b"\x4d\x3c\xb2\xa1"),
+            (0, b"\x0a\x0d\x0d\x0a"),
+        ),
     ),
     SourceKind(
         "rosbag",
@@ -72,7 +90,8 @@ KINDS: tuple[SourceKind, ...] = (
         "video",
         "video:<file>",
         "pipeline.sources.camera_alone:open_video",
-        suffixes=(".mp4", ".avi", ".mkv", ".mov", ".mjpeg"),
+        suffixes=(".mp4", ".m4v", ".avi", ".mkv", ".webm", ".mov", ".mjpeg", ".ts", ".mpg"),
+        begins=((4, b"ftyp"), (8, b"AVI "), (0, b"\x1aE\xdf\xa3")),
     ),
     SourceKind(
         "pictures",
@@ -131,6 +150,14 @@ def looks_like(path: Path) -> str | None:
             if any(any(path.glob(pattern)) for pattern in kind.files):
                 return kind.scheme
     return next((kind.scheme for kind in KINDS if path.suffix.lower() in kind.suffixes), None)
+
+
+def kind_by_first_bytes(begin: bytes) -> SourceKind | None:
+    """The kind of a file that begins so."""
+    for kind in KINDS:
+        if any(begin[at:].startswith(magic) for at, magic in kind.begins):
+            return kind
+    return None
 
 
 def _imported(name: str) -> Any:

@@ -53,6 +53,8 @@ class VideoFile:
         try:
             with open_video(path) as container:
                 stamps, tick_ns = _stamps(container, progress)
+        except av.InvalidDataError:
+            raise SourceError(f"{path.name}: not a readable video: cut off, or something else") from None
         except (av.FFmpegError, OSError, ValueError) as error:
             raise SourceError(f"{path.name}: not a readable video: {reason_of(error)}") from None
         if not len(stamps):

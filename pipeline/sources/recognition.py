@@ -1,0 +1,191 @@
+"""What a path without a scheme is: the recording that it names, or what it looks like and what is missing."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+from pipeline.common.user_file_errors import reason_of
+from pipeline.common.user_files import Overloaded, check_allowed, open_regular
+from pipeline.source_kinds import KINDS, SourceKind, kind_by_first_bytes, kind_named, kind_of_bare, looks_like, usages
+
+_FIRST_BYTES = 64
+_DEEPEST = 3
+"""Folders within folders that are searched for a recording: ``data/2011_09_26/2011_09_26_drive_0009_sync``."""
+_MOST_ENTRIES = 2000
+"""Of a folder that are looked at: a folder of anything else may have millions."""
+_PROBLEMS = (OSError, RuntimeError, ValueError, Overloaded)
+"""What a path may make the system say: no such user's home, a null byte, a link to itself."""
+
+_FILES: tuple[tuple[tuple[str, ...], str], ...] = (
+    ((".jpg", ".jpeg", ".png"), "one image; open its folder, which is played in order of name"),
+    ((".pcd",), "one point cloud; open its folder, which is played in order of name"),
+    ((".bin",), "raw points or packets; open the folder of the recording that it belongs to"),
+    ((".gpx", ".nmea", ".nma"), "a GNSS track; open the video or recording that it belongs to, or use it as --route"),
+    ((".yaml", ".yml"), "a settings file; use live:{path} for sensors, sim:{path} for a scenario"),
+    (
+        (".zip", ".tar", ".gz", ".tgz", ".bz2", ".xz", ".zst", ".7z", ".rar"),
+        "an archive; unpack it and open the folder",
+    ),
+    ((".csv", ".ply", ".las", ".laz", ".xyz", ".e57"), "a point cloud or table; convert sweeps to PCD, one file each"),
+    (
+        (".h5", ".hdf5", ".npy", ".npz", ".parquet", ".tfrecord"),
+        "a data format that is not read; convert it to a ROS bag",
+    ),
+    ((".osf",), "an Ouster recording; convert it to a ROS bag of PointCloud2 or to PCD files"),
+    ((".rrd",), "an export for the rerun viewer; open the recording that it was made of"),
+    ((".blf", ".asc", ".mf4", ".dbc"), "a log or definition of a vehicle bus, without LiDAR and images"),
+)
+"""Files that people have, by suffix: what they are, and what to do."""
+_BEGINS: tuple[tuple[bytes, str], ...] = (
+    (b"\x89PNG", _FILES[0][1]),
+    (b"\xff\xd8\xff", _FILES[0][1]),
+    (b"# .PCD", _FILES[1][1]),
+    (b"PK\x03\x04", _FILES[5][1]),
+    (b"\x1f\x8b", _FILES[5][1]),
+    (b"#ROSBAG V", "a ROS 1 bag; rename it so that it ends in .bag"),
+    (
+        b"SQLite format 3",
+        "a database; if it is of a ROS 2 bag, open the bag's folder or rename it so that it ends in .db3",
+    ),
+)
+"""The same by how a file begins."""
+
+
+def recording_at(uri: str) -> tuple[SourceKind, str] | None:
+    """What opens a path without a scheme, and what to give it; options may follow a question mark.
+
+    A folder with a single recording in it stands for that one. Files of one name are one recording: a capture and the
+    video beside it. None when there is nothing of a known kind.
+    """
+    bare = kind_of_bare(uri)
+    if bare is not None:
+        return bare, uri
+    path, mark, options = uri.partition("?")
+    try:
+        found = _recording(Path(path).expanduser(), _DEEPEST) if path else None
+    except _PROBLEMS:
+        return None
+    if found is None:
+        return None
+    kind, place = found
+    return kind, uri if place is None else f"{place}{mark}{options}"
+
+
+def about_path(uri: str, live: bool) -> str:
+    """What a path that is of no known kind looks like, and what to do; begins with a colon or a semicolon. live:
+    whether live sensors are offered."""
+    path = uri.partition("?")[0]
+    otherwise = f"; use one of {usages(live=live)}"
+    try:
+        place = Path(path).expanduser()
+        if not path or not os.path.lexists(place):
+            return f": no such file or folder{otherwise}" if os.sep in path else otherwise
+        check_allowed(place)
+        if place.is_dir() or place.is_file():
+            found = _about_folder(place) if place.is_dir() else _about_file(place)
+            return f": {found}" if ";" in found else f": {found}{otherwise}"
+        return f": {'a link that leads nowhere' if place.is_symlink() else 'not a file or folder'}{otherwise}"
+    except _PROBLEMS as error:
+        return f": cannot be read: {reason_of(error)}"
+
+
+def _recording(place: Path, deepest: int) -> tuple[SourceKind, Path | None] | None:
+    """The kind of a path, and the path inside that is meant where it is not the path itself."""
+    kind = _kind_of(place)
+    if kind is not None and not _holds_one_of_its_own(place, kind):
+        return kind, None
+    if deepest == 0 or not place.is_dir():
+        return (kind, None) if kind is not None else None
+    inside = [(found, each) for each in _entries(place) if (found := _kind_of(each)) is not None]
+    if len({each.stem for _, each in inside}) == 1:
+        first, path = min(inside, key=lambda pair: KINDS.index(pair[0]))
+        deeper = _recording(path, deepest - 1)
+        return (deeper[0], deeper[1] or path) if deeper is not None else (first, path)
+    if kind is not None or inside:
+        return (kind, None) if kind is not None else None
+    folders = [each for each in _entries(place) if each.is_dir() and not each.is_symlink()]
+    if len(folders) != 1:
+        return None
+    deeper = _recording(folders[0], deepest - 1)
+    return (deeper[0], deeper[1] or folders[0]) if deeper is not None else None
+
+
+def _holds_one_of_its_own(place: Path, kind: SourceKind) -> bool:
+    """Whether a folder was recognised by recordings in it, as KITTI's of a day is."""
+    return (
+        place.is_dir()
+        and not any((place / name).is_dir() for name in kind.folders)
+        and any(
+            each.is_dir() and looks_like(each) == kind.scheme for pattern in kind.files for each in place.glob(pattern)
+        )
+    )
+
+
+def _kind_of(place: Path) -> SourceKind | None:
+    """By what lies in a folder, by a file's name, else by how it begins."""
+    bare = kind_of_bare(place.name)
+    if bare is not None and place.is_file():
+        return bare
+    scheme = looks_like(place)
+    if scheme is not None:
+        return kind_named(scheme)
+    return kind_by_first_bytes(_first_bytes(place)) if place.is_file() else None
+
+
+def _entries(folder: Path) -> list[Path]:
+    """What lies in a folder, sorted; hidden files and, of very many, the rest are passed over."""
+    with os.scandir(folder) as found:
+        names = islice((each.name for each in found if not each.name.startswith(".")), _MOST_ENTRIES)
+        return [folder / name for name in sorted(names)]
+
+
+def _first_bytes(path: Path) -> bytes:
+    with open_regular(path) as file:
+        return file.read(_FIRST_BYTES)
+
+
+def _about_file(path: Path) -> str:
+    begin = _first_bytes(path)
+    if not begin:
+        return "an empty file"
+    for suffixes, what in _FILES:
+        if path.suffix.lower() in suffixes:
+            return what.format(path=path)
+    for magic, what in _BEGINS:
+        if begin.startswith(magic):
+            return what
+    is_text = all(byte >= 32 or byte in b"\t\r\n" for byte in begin)
+    of = f" ({path.suffix})" if path.suffix else ""
+    return f"a text file{of}" if is_text else f"a file of unknown content{of}"
+
+
+def _about_folder(folder: Path) -> str:
+    inside = _entries(folder)
+    if not inside:
+        return "the folder is empty"
+    example = next(_recordings_below(folder, _DEEPEST), None)
+    if example is not None:
+        return f"it holds recordings; open one of them, for example {example}"
+    folders = [each.name for each in inside if each.is_dir()]
+    suffixes = Counter(each.suffix or "unnamed" for each in inside if not each.is_dir())
+    parts = [f"{count} {suffix} files" for suffix, count in suffixes.most_common(3)]
+    parts += [f"folders {', '.join(folders[:4])}"] if folders else []
+    several = "at least " if len(inside) == _MOST_ENTRIES else ""
+    return f"it holds {several}{' and '.join(parts)}"
+
+
+def _recordings_below(folder: Path, deepest: int) -> Iterator[Path]:
+    """The nearest first. What cannot be read is passed over."""
+    try:
+        inside = _entries(folder)
+        yield from [each for each in inside if _kind_of(each) is not None]
+    except _PROBLEMS:
+        return
+    if deepest > 1:
+        for each in inside:
+            if each.is_dir() and not each.is_symlink():
+                yield from _recordings_below(each, deepest - 1)
