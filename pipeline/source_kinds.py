@@ -87,6 +87,12 @@ KINDS: tuple[SourceKind, ...] = (
         files=("*_drive_*",),
     ),
     SourceKind(
+        "nuscenes",
+        "nuscenes:<dir>",
+        "pipeline.sources.nuscenes:open_recording",
+        files=("v1.0-*/sample_data.json",),
+    ),
+    SourceKind(
         "video",
         "video:<file>",
         "pipeline.sources.camera_alone:open_video",

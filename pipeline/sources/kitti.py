@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.formats.file_reading import picture_of, picture_size, read_bytes, recording_folder
+from pipeline.formats.float_points import parse_points
 from pipeline.formats.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
 from pipeline.formats.kitti_records import parse_labels, parse_oxts
 from pipeline.sources.hdl64_rings import (
@@ -211,21 +212,10 @@ class KittiSource:
 
 
 def parse_velodyne(data: bytes, file: str, notes: list[str]) -> F32:
-    """(N, 4) float32 ``x y z intensity`` (0–255) of a Velodyne file. Points that are not finite or farther than a
-    kilometre are left out and counted in ``notes``, as is a cut last point; a point at the sensor itself is no return
-    and says nothing. SourceError when none is left."""
-    whole = len(data) // 16
-    if len(data) % 16:
-        notes.append(f"{file}: truncated in the middle of a point")
-    raw = np.frombuffer(data, dtype="<f4", count=whole * 4).reshape(-1, 4)
-    with np.errstate(invalid="ignore"):  # comparing a signalling NaN of a damaged file
-        good = np.all(np.abs(raw[:, :3]) < 1000.0, axis=1) & (raw[:, 3] >= 0.0) & (raw[:, 3] <= 1.0)
-    kept = raw[good & np.any(raw[:, :3] != 0.0, axis=1)]
-    if not len(kept):
-        raise SourceError(f"{file}: no LiDAR points")
-    if not np.all(good):
-        notes.append(f"{file}: {len(raw) - np.count_nonzero(good)} unreadable points skipped")
-    return np.ascontiguousarray(kept * np.array([1.0, 1.0, 1.0, 255.0]), dtype=np.float32)
+    """(N, 4) float32 ``x y z intensity`` (0–255) of a Velodyne file, as ``parse_points`` reads it."""
+    points = parse_points(data, file, 4, 1.0, notes)
+    points[:, 3] *= 255.0
+    return points
 
 
 def _ticks(names: list[str], files: Files) -> list[int]:

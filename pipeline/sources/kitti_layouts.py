@@ -14,10 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.ego_motion.from_poses import motion_along
 from pipeline.formats.file_reading import files_by_name, in_order, read_bytes
 from pipeline.formats.kitti_calibration import KittiCalibration, parse_odometry_calibration
 from pipeline.formats.kitti_records import parse_timestamps
-from pipeline.types import F64, EgoState
+from pipeline.types import EgoState
 from pipeline.types.source import SourceError
 
 _PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -98,7 +99,7 @@ def _sequence(folder: Path) -> Files:
     )
 
 
-def motion_of(files: Files, calibration: KittiCalibration) -> list[EgoState]:
+def motion_of(files: Files, calibration: KittiCalibration) -> list[EgoState | None]:
     """Own motion in each frame of a sequence from its poses, over the frames before and after it; empty without any.
     SourceError for poses that are none."""
     if files.poses is None or len(files.lidar_stamps) < 2:
@@ -110,19 +111,8 @@ def motion_of(files: Files, calibration: KittiCalibration) -> list[EgoState]:
     except ValueError:
         raise SourceError(f"{files.poses.name}: not poses of 12 numbers a line") from None
     T = T_start_camera @ calibration.T_rect_ego
-    last = min(len(T), len(files.lidar_stamps)) - 1
-    return [
-        _between(T[max(k - 1, 0)], T[min(k + 1, last)], files, max(k - 1, 0), min(k + 1, last), k)
-        for k in range(last + 1)
-    ]
-
-
-def _between(before: F64, after: F64, files: Files, first: int, last: int, now: int) -> EgoState:
-    seconds = max((files.lidar_stamps[last] - files.lidar_stamps[first]) / 1e9, 1e-3)
-    step = np.linalg.inv(before) @ after
-    turned = float(np.arctan2(step[1, 0], step[0, 0]))
-    moved = float(step[0, 3] * np.cos(turned / 2) + step[1, 3] * np.sin(turned / 2))
-    return EgoState(files.lidar_stamps[now], moved / seconds, turned / seconds, source="ins")
+    count = min(len(T), len(files.lidar_stamps))
+    return motion_along(files.lidar_stamps[:count], list(T[:count]))
 
 
 def sequence_calibration(path: Path, size: tuple[int, int]) -> KittiCalibration:
