@@ -20,7 +20,7 @@ from pipeline.common.image_decoding import TooMuch, decode_within_budget
 from pipeline.common.user_file_errors import parse_yaml
 from pipeline.formats.kitti_records import parse_timestamps
 from pipeline.formats.nmea import NmeaReader
-from pipeline.formats.velodyne.decoder import Vlp16Decoder
+from pipeline.formats.velodyne.decoder import VelodyneDecoder
 from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import LabelSet
 from pipeline.recording.errors import Damaged
@@ -64,7 +64,7 @@ def _sentences(data: bytes) -> None:
 
 
 def _packets(data: bytes) -> None:
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     for at in range(0, len(data), 1206):
         decoder.push(data[at : at + 1206], None)
 
