@@ -83,7 +83,7 @@ KINDS: tuple[SourceKind, ...] = (
         "kitti",
         "kitti:<dir>",
         "pipeline.sources.kitti:open_recording",
-        folders=("velodyne", "velodyne_points"),
+        folders=("velodyne", "velodyne_points", "data_3d_raw", "data_2d_raw", "image_00/data_rect"),
         files=("*_drive_*",),
     ),
     SourceKind(

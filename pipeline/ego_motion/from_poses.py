@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pipeline.common.geometry import inverse
 from pipeline.types import F64, EgoState
 
 _REACH_NS = 110_000_000
@@ -31,14 +32,16 @@ def motion_along(t_ns: Sequence[int], T_map_ego: Sequence[F64]) -> list[EgoState
     alone = first == last
     first, last = np.where(alone, np.maximum(first - 1, 0), first), np.where(alone, last + 1, last)
     last = np.minimum(last, len(times) - 1)
-    return [_between(times, T_map_ego, *each) for each in zip(first.tolist(), last.tolist(), t_ns, strict=True)]
+    pairs = zip(first.tolist(), last.tolist(), t_ns, strict=True)
+    return [motion_between([int(times[a]), int(times[b])], [T_map_ego[a], T_map_ego[b]], at) for a, b, at in pairs]
 
 
-def _between(times: np.ndarray, T_map_ego: Sequence[F64], first: int, last: int, t_ns: int) -> EgoState | None:
-    seconds = float(times[last] - times[first]) / 1e9
+def motion_between(times_ns: Sequence[int], T_map_ego: Sequence[F64], t_ns: int) -> EgoState | None:
+    """Own motion at ``t_ns`` from two poses and their times; None where these are one time."""
+    seconds = (times_ns[1] - times_ns[0]) / 1e9
     if seconds <= 0.0:
         return None
-    step = np.linalg.inv(T_map_ego[first]) @ T_map_ego[last]
+    step = inverse(T_map_ego[0]) @ T_map_ego[1]
     turned = float(np.arctan2(step[1, 0], step[0, 0]))
     # the chord of an arc points half way between its two headings
     moved = float(step[0, 3] * np.cos(turned / 2) + step[1, 3] * np.sin(turned / 2))

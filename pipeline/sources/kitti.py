@@ -1,5 +1,5 @@
 """KITTI: HDL-64 and colour camera 2 (Geiger et al. 2013), as raw drives, folders in the object benchmark's form and
-odometry sequences.
+odometry sequences; and KITTI-360, with its camera 0.
 
 ``pipeline.sources.kitti_layouts`` knows where each layout keeps what.
 
@@ -15,7 +15,12 @@ import numpy as np
 
 from pipeline.formats.file_reading import picture_of, picture_size, read_bytes, recording_folder
 from pipeline.formats.float_points import parse_points
-from pipeline.formats.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
+from pipeline.formats.kitti_calibration import (
+    KittiCalibration,
+    parse_360_calibration,
+    parse_object_calibration,
+    parse_raw_calibration,
+)
 from pipeline.formats.kitti_records import parse_labels, parse_oxts
 from pipeline.sources.hdl64_rings import (
     NOMINAL_ELEVATIONS_DEG,
@@ -28,7 +33,9 @@ from pipeline.sources.hdl64_rings import (
     rings_by_elevation,
     turns,
 )
-from pipeline.sources.kitti_layouts import Files, files_of, motion_of, sequence_calibration
+from pipeline.sources.kitti360_layout import drives_in
+from pipeline.sources.kitti_files import Files
+from pipeline.sources.kitti_layouts import files_of, motion_of, sequence_calibration
 from pipeline.types import F32, F64, EgoState, Frame, GnssFix, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
@@ -176,6 +183,10 @@ class KittiSource:
             cameras, velodyne = self._files.raw_calibration
             names = (cameras.name, velodyne.name)
             return parse_raw_calibration(read_bytes(cameras), read_bytes(velodyne), names, self._size)
+        if self._files.calibration_360 is not None:
+            velodyne, cameras = self._files.calibration_360
+            names = (velodyne.name, cameras.name)
+            return parse_360_calibration(read_bytes(velodyne), read_bytes(cameras), names, self._size)
         if self._files.sequence_calibration is not None:
             return sequence_calibration(self._files.sequence_calibration, self._size)
         if not self._files.calibrations:
@@ -234,7 +245,8 @@ def _stamp(stamps: tuple[int, ...], name: str) -> int | None:
 
 
 def _what_it_holds(folder: Path) -> str:
-    drives = sorted(path.name for path in folder.glob("*_drive_*") if path.is_dir())
+    drives = sorted(path for path in folder.glob("*_drive_*") if path.is_dir())
+    drives = drives or [folder / "data_3d_raw" / name for name in drives_in(folder)]
     if drives:
-        return f"it holds drives; open one of them, for example kitti:{folder / drives[0]}"
+        return f"it holds drives; open one of them, for example kitti:{drives[0]}"
     return "neither velodyne/*.bin nor velodyne_points/data/*.bin nor images in it"

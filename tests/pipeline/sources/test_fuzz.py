@@ -15,6 +15,7 @@ from tests.pipeline.sources.captures import write_capture
 from tests.pipeline.sources.clouds_on_disk import STAMPS_NS, write_clouds
 from tests.pipeline.sources.conftest import write_astyx, write_kitti, write_kitti_raw
 from tests.pipeline.sources.nuscenes_on_disk import START_US, write_nuscenes
+from tests.pipeline.sources.test_kitti360 import DRIVE, write_kitti360
 
 
 def small_bag(folder: Path, kind: Kind = "db3") -> Path:
@@ -41,6 +42,9 @@ FILES = {
     "kitti stamps": (write_kitti_raw, "kitti:{folder}", "velodyne_points/timestamps.txt"),
     "kitti raw cameras": (write_kitti_raw, "kitti:{folder}", "../calib_cam_to_cam.txt"),
     "kitti raw velodyne": (write_kitti_raw, "kitti:{folder}", "../calib_velo_to_cam.txt"),
+    "kitti-360 poses": (write_kitti360, "kitti:{folder}", f"data_poses/{DRIVE}/cam0_to_world.txt"),
+    "kitti-360 velodyne": (write_kitti360, "kitti:{folder}", "calibration/calib_cam_to_velo.txt"),
+    "kitti-360 cameras": (write_kitti360, "kitti:{folder}", "calibration/perspective.txt"),
     "pcap": (write_capture, "pcap:{folder}/drive.pcap", "drive.pcap"),
     "video": (write_capture, "pcap:{folder}/drive.pcap", "drive.avi"),
     "sentences": (write_capture, "pcap:{folder}/drive.pcap", "drive.nmea"),
