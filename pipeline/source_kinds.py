@@ -92,6 +92,7 @@ KINDS: tuple[SourceKind, ...] = (
         "pipeline.sources.nuscenes:open_recording",
         files=("v1.0-*/sample_data.json",),
     ),
+    SourceKind("radiate", "radiate:<dir>", "pipeline.sources.radiate:open_recording", folders=("velo_lidar",)),
     SourceKind(
         "video",
         "video:<file>",

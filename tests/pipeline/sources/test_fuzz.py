@@ -16,6 +16,7 @@ from tests.pipeline.sources.clouds_on_disk import STAMPS_NS, write_clouds
 from tests.pipeline.sources.conftest import write_astyx, write_kitti, write_kitti_raw
 from tests.pipeline.sources.nuscenes_on_disk import START_US, write_nuscenes
 from tests.pipeline.sources.test_kitti360 import DRIVE, write_kitti360
+from tests.pipeline.sources.test_radiate import write_radiate
 
 
 def small_bag(folder: Path, kind: Kind = "db3") -> Path:
@@ -63,6 +64,9 @@ FILES = {
     "nuscenes sensors": (two_of_nuscenes, "nuscenes:{folder}", "v1.0-mini/calibrated_sensor.json"),
     "nuscenes poses": (two_of_nuscenes, "nuscenes:{folder}", "v1.0-mini/ego_pose.json"),
     "nuscenes boxes": (two_of_nuscenes, "nuscenes:{folder}", "v1.0-mini/sample_annotation.json"),
+    "radiate sweep": (write_radiate, "radiate:{folder}", "velo_lidar/000002.csv"),
+    "radiate times": (write_radiate, "radiate:{folder}", "velo_lidar.txt"),
+    "radiate state": (write_radiate, "radiate:{folder}", "GPS_IMU_Twist/000002.txt"),
     "rosbag 1": (partial(small_bag, kind="ros1"), "rosbag:{folder}/drive.bag", "drive.bag"),
 }
 
