@@ -74,6 +74,7 @@ KINDS: tuple[SourceKind, ...] = (
         "pipeline.sources.rosbag.source:open_recording",
         files=("metadata.yaml",),
         suffixes=(".bag", ".db3"),
+        begins=((21, b"ros2"), (21, b"ros1")),  # the profile of an MCAP file
     ),
     SourceKind("pcd", "pcd:<dir>", "pipeline.sources.pcd:open_recording", files=("*.pcd",)),
     SourceKind(
@@ -83,7 +84,7 @@ KINDS: tuple[SourceKind, ...] = (
         "kitti",
         "kitti:<dir>",
         "pipeline.sources.kitti:open_recording",
-        folders=("velodyne", "velodyne_points", "data_3d_raw", "data_2d_raw", "image_00/data_rect"),
+        folders=("velodyne", "velodyne_points", "data_3d_raw", "data_2d_raw", "image_00/data_rect", "image_02/data"),
         files=("*_drive_*",),
     ),
     SourceKind(
@@ -160,11 +161,9 @@ def looks_like(path: Path) -> str | None:
 
 
 def kind_by_first_bytes(begin: bytes) -> SourceKind | None:
-    """The kind of a file that begins so."""
-    for kind in KINDS:
-        if any(begin[at:].startswith(magic) for at, magic in kind.begins):
-            return kind
-    return None
+    """The kind of a file that begins so; of several the one that says most of it."""
+    found = [(at, kind) for kind in KINDS for at, magic in kind.begins if begin[at:].startswith(magic)]
+    return max(found, key=lambda each: each[0])[1] if found else None
 
 
 def _imported(name: str) -> Any:

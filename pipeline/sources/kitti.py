@@ -213,7 +213,9 @@ class KittiSource:
 
     def _about(self) -> tuple[str, ...]:
         notes = []
-        if self._channels:
+        if not self._files.sweeps:
+            notes.append("no LiDAR: distances come from the camera alone")
+        elif self._channels:
             notes.append(f"{len(self._channels)} of a VLP-16's 16 rings remain: the HDL-64 reaches only about +3°")
         if not self._files.lidar_stamps and not self._files.camera_stamps:
             notes.append("no time stamps: 10 Hz assumed")

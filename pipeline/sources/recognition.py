@@ -40,6 +40,13 @@ _FILES: tuple[tuple[tuple[str, ...], str], ...] = (
     ((".blf", ".asc", ".mf4", ".dbc"), "a log or definition of a vehicle bus, without LiDAR and images"),
 )
 """Files that people have, by suffix: what they are, and what to do."""
+_FOLDERS: tuple[tuple[str, str], ...] = (
+    ("samples/LIDAR_TOP", "files of nuScenes without their tables; the folder v1.0-mini or v1.0-trainval is missing"),
+    ("sensors/lidar", "a log of Argoverse 2; it is not read, convert it to a ROS bag or to PCD files, one a sweep"),
+    ("LIDAR_CONCAT", "a data set of TIER IV; it is not read, convert it to a ROS bag or to PCD files, one a sweep"),
+    ("poses", "poses of KITTI's odometry sequences; the folders with velodyne and calib.txt are missing"),
+)
+"""The same of folders, by a folder inside."""
 _BEGINS: tuple[tuple[bytes, str], ...] = (
     (b"\x89PNG", _FILES[0][1]),
     (b"\xff\xd8\xff", _FILES[0][1]),
@@ -63,7 +70,7 @@ def recording_at(uri: str) -> tuple[SourceKind, str] | None:
     """
     bare = kind_of_bare(uri)
     if bare is not None:
-        return bare, uri
+        return _by_content(Path(uri)) or bare, uri
     path, mark, options = uri.partition("?")
     try:
         found = _recording(Path(path).expanduser(), _DEEPEST) if path else None
@@ -82,7 +89,7 @@ def about_path(uri: str, live: bool) -> str:
     otherwise = f"; use one of {usages(live=live)}"
     try:
         place = Path(path).expanduser()
-        if not path or not os.path.lexists(place):
+        if not path or not _is_there(place):
             return f": no such file or folder{otherwise}" if os.sep in path else otherwise
         check_allowed(place)
         if place.is_dir() or place.is_file():
@@ -129,11 +136,28 @@ def _kind_of(place: Path) -> SourceKind | None:
     """By what lies in a folder, by a file's name, else by how it begins."""
     bare = kind_of_bare(place.name)
     if bare is not None and place.is_file():
-        return bare
+        return _by_content(place) or bare
     scheme = looks_like(place)
     if scheme is not None:
         return kind_named(scheme)
-    return kind_by_first_bytes(_first_bytes(place)) if place.is_file() else None
+    return _by_content(place)
+
+
+def _is_there(place: Path) -> bool:
+    """Whether there is anything, a link that leads nowhere included. OSError where that must not be known."""
+    try:
+        os.lstat(place)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
+
+
+def _by_content(path: Path) -> SourceKind | None:
+    """By how a file begins; None where it says nothing, and where there is none that can be read."""
+    try:
+        return kind_by_first_bytes(_first_bytes(path.expanduser())) if path.expanduser().is_file() else None
+    except _PROBLEMS:
+        return None
 
 
 def _entries(folder: Path) -> list[Path]:
@@ -167,6 +191,9 @@ def _about_folder(folder: Path) -> str:
     inside = _entries(folder)
     if not inside:
         return "the folder is empty"
+    for name, what in _FOLDERS:
+        if (folder / name).is_dir() and not (folder / "sequences").is_dir():
+            return what
     example = next(_recordings_below(folder, _DEEPEST), None)
     if example is not None:
         return f"it holds recordings; open one of them, for example {example}"

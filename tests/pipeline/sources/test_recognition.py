@@ -53,6 +53,17 @@ def images(folder: Path) -> Path:
     return folder
 
 
+def ros2_mcap(folder: Path) -> Path:
+    (file,) = write_bag(folder, "mcap", sweeps=2).glob("*.mcap")
+    return file.rename(folder.parent / "alone.mcap")
+
+
+def without_lidar(folder: Path) -> Path:
+    drive = write_kitti_raw(folder)
+    shutil.rmtree(drive / "velodyne_points")
+    return drive
+
+
 def session(folder: Path) -> Path:
     folder.mkdir()
     return write(folder / "drive.mcap", [full(0)]).rename(folder / "drive")
@@ -83,6 +94,8 @@ RECORDINGS: dict[str, tuple[Write, str]] = {
     "video, by its folder": (lambda folder: video(folder / "Fahrt – Zürich").parent, "CameraAlone"),
     "ROS 1 bag": (ros1, "RosbagSource"),
     "session of no suffix": (session, "SessionSource"),
+    "MCAP file of ROS 2": (ros2_mcap, "RosbagSource"),
+    "drive of KITTI without a LiDAR": (without_lidar, "KittiSource"),
     "ROS 2 bag": (lambda folder: write_bag(folder, "db3", sweeps=2), "RosbagSource"),
     "images": (images, "CameraAlone"),
     "images two folders down": (lambda folder: images_below(folder), "CameraAlone"),
@@ -108,6 +121,14 @@ def some_file(name: str, data: bytes) -> Write:
         folder.mkdir()
         (folder / name).write_bytes(data)
         return folder / name
+
+    return written
+
+
+def holding(name: str) -> Write:
+    def written(folder: Path) -> Path:
+        (folder / name).mkdir(parents=True)
+        return folder
 
     return written
 
@@ -165,6 +186,12 @@ OTHERS: dict[str, tuple[Write, str]] = {
     "an Ouster recording": (some_file("a.osf", b"\0"), "an Ouster recording; convert it to a ROS bag"),
     "a ROS 1 bag of no suffix": (without_suffix(ros1), "a ROS 1 bag; rename it so that it ends in .bag"),
     "a log of the bus": (some_file("a.blf", b"LOGG"), "without LiDAR and images"),
+    "nuScenes without tables": (
+        holding("samples/LIDAR_TOP"),
+        "nuScenes without their tables; .* v1.0-mini or .* missing",
+    ),
+    "Argoverse 2": (holding("sensors/lidar"), "a log of Argoverse 2; it is not read, convert it"),
+    "poses alone": (holding("poses"), "poses of KITTI's odometry sequences; the folders with .* are missing"),
     "unrelated files": (unrelated, r"it holds 1 \.csv files and folders radar; use one of"),
     "thousands of files": (thousands, r"it holds at least 2000 \.doc files; use one of"),
     "two recordings": (copies(write_astyx), r"it holds recordings; open one of them, for example .*/one$"),
