@@ -232,3 +232,12 @@ def test_what_must_not_be_read_is_refused_and_not_described(tmp_path: Path, monk
     monkeypatch.setenv("CIPV_FOLDERS", str(tmp_path / "allowed"))
     with pytest.raises(SourceError, match=r"secret\.txt: not a source: cannot be read: outside the allowed folders"):
         open_source(str(tmp_path / "secret.txt"))
+
+
+def test_a_folder_that_may_not_be_listed_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def denied(path: object) -> object:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr("pipeline.sources.recognition.os.scandir", denied)
+    with pytest.raises(SourceError, match="not a source: cannot be read: Permission denied$"):
+        open_source(str(empty_folder(tmp_path / "closed")))
