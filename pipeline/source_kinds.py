@@ -83,7 +83,7 @@ KINDS: tuple[SourceKind, ...] = (
     SourceKind(
         "kitti",
         "kitti:<dir>",
-        "pipeline.sources.kitti:open_recording",
+        "pipeline.sources.kitti.source:open_recording",
         folders=("velodyne", "velodyne_points", "data_3d_raw", "data_2d_raw", "image_00/data_rect", "image_02/data"),
         files=("*_drive_*",),
     ),

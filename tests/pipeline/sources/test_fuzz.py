@@ -14,8 +14,8 @@ from tests.pipeline.sources.bags import Kind, write_bag
 from tests.pipeline.sources.captures import write_capture
 from tests.pipeline.sources.clouds_on_disk import STAMPS_NS, write_clouds
 from tests.pipeline.sources.conftest import write_astyx, write_kitti, write_kitti_raw
+from tests.pipeline.sources.kitti.test_kitti360 import DRIVE, write_kitti360
 from tests.pipeline.sources.nuscenes_on_disk import START_US, write_nuscenes
-from tests.pipeline.sources.test_kitti360 import DRIVE, write_kitti360
 from tests.pipeline.sources.test_radiate import write_radiate
 
 

@@ -239,5 +239,5 @@ def test_a_folder_that_may_not_be_listed_says_so(tmp_path: Path, monkeypatch: py
         raise PermissionError(13, "Permission denied", str(path))
 
     monkeypatch.setattr("pipeline.sources.recognition.os.scandir", denied)
-    with pytest.raises(SourceError, match="not a source: cannot be read: Permission denied$"):
+    with pytest.raises(SourceError, match=r"not a source: cannot be read: Permission denied$"):
         open_source(str(empty_folder(tmp_path / "closed")))

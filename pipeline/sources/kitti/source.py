@@ -1,7 +1,7 @@
 """KITTI: HDL-64 and colour camera 2 (Geiger et al. 2013), as raw drives, folders in the object benchmark's form and
 odometry sequences; and KITTI-360, with its camera 0.
 
-``pipeline.sources.kitti_layouts`` knows where each layout keeps what.
+``pipeline.sources.kitti.layouts`` knows where each layout keeps what.
 
 The ego frame is the Velodyne's axes. Intensity, 0–1 in the files, is 0–255 here, as a VLP-16's reflectivity.
 """
@@ -22,7 +22,8 @@ from pipeline.formats.kitti_calibration import (
     parse_raw_calibration,
 )
 from pipeline.formats.kitti_records import parse_labels, parse_oxts
-from pipeline.sources.hdl64_rings import (
+from pipeline.sources.kitti.files import Files
+from pipeline.sources.kitti.hdl64_rings import (
     NOMINAL_ELEVATIONS_DEG,
     RINGS,
     Turns,
@@ -33,9 +34,8 @@ from pipeline.sources.hdl64_rings import (
     rings_by_elevation,
     turns,
 )
-from pipeline.sources.kitti360_layout import drives_in
-from pipeline.sources.kitti_files import Files
-from pipeline.sources.kitti_layouts import files_of, motion_of, sequence_calibration
+from pipeline.sources.kitti.kitti360 import drives_in
+from pipeline.sources.kitti.layouts import files_of, motion_of, sequence_calibration
 from pipeline.types import F32, F64, EgoState, Frame, GnssFix, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 

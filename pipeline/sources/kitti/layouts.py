@@ -1,5 +1,5 @@
 """Where KITTI's layouts keep what: raw drives, the object benchmark's folders, the odometry benchmark's sequences, and
-KITTI-360 (``kitti360_layout``).
+KITTI-360 (``kitti360``).
 
 Raw: ``<date>_drive_NNNN_sync/{image_02,velodyne_points,oxts}/data`` with ``timestamps.txt`` beside each ``data`` and
 ``calib_cam_to_cam.txt``, ``calib_velo_to_cam.txt`` one folder up. Object form: ``image_02`` (or ``image_2``),
@@ -16,8 +16,8 @@ import numpy as np
 from pipeline.ego_motion.from_poses import motion_along
 from pipeline.formats.file_reading import files_by_name, read_bytes
 from pipeline.formats.kitti_calibration import KittiCalibration, parse_odometry_calibration
-from pipeline.sources import kitti360_layout
-from pipeline.sources.kitti_files import PICTURE_SUFFIXES, Files, read_stamps
+from pipeline.sources.kitti import kitti360
+from pipeline.sources.kitti.files import PICTURE_SUFFIXES, Files, read_stamps
 from pipeline.types import EgoState
 from pipeline.types.source import SourceError
 
@@ -27,10 +27,10 @@ _BEGIN_NS = 1_000_000_000
 
 def files_of(folder: Path) -> Files:
     """What lies in a recording's folder."""
-    named = kitti360_layout.root_of(folder)
+    named = kitti360.root_of(folder)
     if named is not None:
         root, drive = named
-        return kitti360_layout.files_of_drive(root, drive) if drive is not None else Files({}, {})
+        return kitti360.files_of_drive(root, drive) if drive is not None else Files({}, {})
     if any((folder / sensor / "data").is_dir() for sensor in ("velodyne_points", "image_02")):
         return _raw(folder)
     return _sequence(folder) if (folder / "calib.txt").is_file() else _object(folder)
@@ -75,7 +75,7 @@ def motion_of(files: Files, calibration: KittiCalibration) -> list[EgoState | No
     """Own motion in each frame of a sequence from its poses, over the frames before and after it; empty without any.
     SourceError for poses that are none."""
     if files.camera_poses is not None and len(files.lidar_stamps) > 1:
-        return kitti360_layout.motion_of_camera(files.camera_poses, files.lidar_stamps, calibration.T_rect_ego)
+        return kitti360.motion_of_camera(files.camera_poses, files.lidar_stamps, calibration.T_rect_ego)
     if files.poses is None or len(files.lidar_stamps) < 2:
         return []
     try:
