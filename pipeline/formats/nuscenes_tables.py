@@ -36,7 +36,7 @@ _LABELS = (
 """Categories by their beginning, and the class that detectors know."""
 
 
-class Scene(msgspec.Struct, gc=False):
+class SceneRow(msgspec.Struct, gc=False):
     """Some twenty seconds of a drive."""
 
     token: str
@@ -45,7 +45,7 @@ class Scene(msgspec.Struct, gc=False):
     """For people: ``scene-0061``."""
 
 
-class Sample(msgspec.Struct, gc=False):
+class SampleRow(msgspec.Struct, gc=False):
     """A labelled moment."""
 
     token: str
@@ -54,7 +54,7 @@ class Sample(msgspec.Struct, gc=False):
     """The scene it is of."""
 
 
-class SampleData(msgspec.Struct, gc=False):
+class SampleDataRow(msgspec.Struct, gc=False):
     """One file of one sensor."""
 
     sample_token: str
@@ -71,7 +71,7 @@ class SampleData(msgspec.Struct, gc=False):
     """Whether it is of the labelled moment itself."""
 
 
-class CalibratedSensor(msgspec.Struct, gc=False):
+class CalibratedSensorRow(msgspec.Struct, gc=False):
     """A sensor on one car."""
 
     token: str
@@ -97,7 +97,7 @@ class SensorRow(msgspec.Struct, gc=False):
     """``lidar``, ``camera`` or ``radar``."""
 
 
-class EgoPose(msgspec.Struct, gc=False):
+class EgoPoseRow(msgspec.Struct, gc=False):
     """Where the car was."""
 
     token: str
@@ -108,7 +108,7 @@ class EgoPose(msgspec.Struct, gc=False):
     """From the car's axes to the map's."""
 
 
-class Annotation(msgspec.Struct, gc=False):
+class AnnotationRow(msgspec.Struct, gc=False):
     """A labelled box."""
 
     sample_token: str
@@ -123,7 +123,7 @@ class Annotation(msgspec.Struct, gc=False):
     """From the box's axes to the map's."""
 
 
-class Instance(msgspec.Struct, gc=False):
+class InstanceRow(msgspec.Struct, gc=False):
     """One object of a scene."""
 
     token: str
@@ -132,7 +132,7 @@ class Instance(msgspec.Struct, gc=False):
     """What it is."""
 
 
-class Category(msgspec.Struct, gc=False):
+class CategoryRow(msgspec.Struct, gc=False):
     """A class of objects."""
 
     token: str
@@ -141,7 +141,18 @@ class Category(msgspec.Struct, gc=False):
     """``vehicle.car``."""
 
 
-Row = TypeVar("Row", Scene, Sample, SampleData, CalibratedSensor, SensorRow, EgoPose, Annotation, Instance, Category)
+Row = TypeVar(
+    "Row",
+    SceneRow,
+    SampleRow,
+    SampleDataRow,
+    CalibratedSensorRow,
+    SensorRow,
+    EgoPoseRow,
+    AnnotationRow,
+    InstanceRow,
+    CategoryRow,
+)
 
 
 def read_table(folder: Path, name: str, kind: type[Row]) -> list[Row]:
@@ -182,13 +193,13 @@ def pose_of(translation: list[float], rotation: list[float], what: str) -> F64:
     return T
 
 
-def intrinsic_of(sensor: CalibratedSensor, what: str) -> F64:
+def intrinsic_of(sensor: CalibratedSensorRow, what: str) -> F64:
     """(3, 3) of a camera. SourceError when it is none."""
     rows = sensor.camera_intrinsic
     return camera_matrix(rows if len({len(row) for row in rows}) == 1 else [], f"{what}: camera_intrinsic")
 
 
-def truth_object(each: Annotation, category: str, id: int, T_map_ego: F64) -> TruthObject | None:
+def truth_object(each: AnnotationRow, category: str, id: int, T_map_ego: F64) -> TruthObject | None:
     """A labelled box in the ego frame; None when its numbers are none of a box."""
     try:
         T = inverse(T_map_ego) @ pose_of(each.translation, each.rotation, "annotation")

@@ -19,14 +19,14 @@ from pipeline.ego_motion.from_poses import motion_along
 from pipeline.formats.file_reading import check_looks_ahead, decode_picture, picture_size, read_bytes, recording_folder
 from pipeline.formats.float_points import parse_points
 from pipeline.formats.nuscenes_tables import (
-    Annotation,
-    CalibratedSensor,
-    Category,
-    EgoPose,
-    Instance,
-    Sample,
-    SampleData,
-    Scene,
+    AnnotationRow,
+    CalibratedSensorRow,
+    CategoryRow,
+    EgoPoseRow,
+    InstanceRow,
+    SampleDataRow,
+    SampleRow,
+    SceneRow,
     SensorRow,
     intrinsic_of,
     pose_of,
@@ -58,8 +58,8 @@ class NuscenesSource:
         folder = recording_folder(path)
         tables = _tables(folder, path, options.get("version"))
         scene, others = _scene(tables, options.get("scene"))
-        samples = {row.token for row in read_table(tables, "sample", Sample) if row.scene_token == scene.token}
-        rows = [row for row in read_table(tables, "sample_data", SampleData) if row.sample_token in samples]
+        samples = {row.token for row in read_table(tables, "sample", SampleRow) if row.scene_token == scene.token}
+        rows = [row for row in read_table(tables, "sample_data", SampleDataRow) if row.sample_token in samples]
         sensors = _sensors(tables)
         self._lidar = _rows_of(rows, _LIDAR, sensors, folder)
         self._images = _rows_of(rows, _CAMERA, sensors, folder)
@@ -146,7 +146,7 @@ class NuscenesSource:
             return None
         return CameraImage(int(self._image_times[at]), bgr, encoded)
 
-    def _calibration(self, sensors: dict[str, tuple[CalibratedSensor, str]]) -> CameraCalibration:
+    def _calibration(self, sensors: dict[str, tuple[CalibratedSensorRow, str]]) -> CameraCalibration:
         sensor, _ = sensors[self._images[0].calibrated_sensor_token]
         T_camera_ego = inverse(_pose_of_sensor(sensor)) @ self._T_car_ego
         road_z_m = -float(self._T_car_ego[2, 3])
@@ -158,7 +158,7 @@ class NuscenesSource:
     def _poses(self, tables: Path) -> list[F64]:
         """(4, 4) of every frame, takes ego points to the map."""
         wanted = {row.ego_pose_token for row in self._lidar}
-        poses = {row.token: row for row in read_table(tables, "ego_pose", EgoPose) if row.token in wanted}
+        poses = {row.token: row for row in read_table(tables, "ego_pose", EgoPoseRow) if row.token in wanted}
         if len(poses) < len(wanted):
             raise SourceError(f"{tables.name}/ego_pose.json: {len(wanted) - len(poses)} poses are missing")
         found = (poses[row.ego_pose_token] for row in self._lidar)
@@ -189,9 +189,9 @@ def _tables(folder: Path, path: str, version: str | None) -> Path:
     return found[0]
 
 
-def _scene(tables: Path, name: str | None) -> tuple[Scene, list[str]]:
+def _scene(tables: Path, name: str | None) -> tuple[SceneRow, list[str]]:
     """The scene of a name, else the first one, and the names of the others."""
-    scenes = sorted(read_table(tables, "scene", Scene), key=lambda scene: scene.name)
+    scenes = sorted(read_table(tables, "scene", SceneRow), key=lambda scene: scene.name)
     if not scenes:
         raise SourceError(f"{tables.name}/scene.json: no scenes in it")
     names = [scene.name for scene in scenes]
@@ -201,34 +201,36 @@ def _scene(tables: Path, name: str | None) -> tuple[Scene, list[str]]:
     return chosen, [each for each in names if each != chosen.name]
 
 
-def _sensors(tables: Path) -> dict[str, tuple[CalibratedSensor, str]]:
+def _sensors(tables: Path) -> dict[str, tuple[CalibratedSensorRow, str]]:
     """Calibration and channel of every sensor."""
     channels = {row.token: row.channel for row in read_table(tables, "sensor", SensorRow)}
-    rows = read_table(tables, "calibrated_sensor", CalibratedSensor)
+    rows = read_table(tables, "calibrated_sensor", CalibratedSensorRow)
     return {row.token: (row, channels.get(row.sensor_token, "")) for row in rows}
 
 
 def _rows_of(
-    rows: list[SampleData], channel: str, sensors: dict[str, tuple[CalibratedSensor, str]], folder: Path
-) -> list[SampleData]:
+    rows: list[SampleDataRow], channel: str, sensors: dict[str, tuple[CalibratedSensorRow, str]], folder: Path
+) -> list[SampleDataRow]:
     """The files of a sensor that are there, in order of time."""
     of_channel = {token for token, (_, name) in sensors.items() if name == channel}
     found = [row for row in rows if row.calibrated_sensor_token in of_channel and (folder / row.filename).is_file()]
     return sorted(found, key=lambda row: row.timestamp)
 
 
-def _pose_of_sensor(sensor: CalibratedSensor) -> F64:
+def _pose_of_sensor(sensor: CalibratedSensorRow) -> F64:
     return pose_of(sensor.translation, sensor.rotation, "calibrated_sensor.json")
 
 
-def _labels(tables: Path, samples: set[str]) -> tuple[dict[str, list[Annotation]], dict[str, tuple[str, int]] | None]:
+def _labels(
+    tables: Path, samples: set[str]
+) -> tuple[dict[str, list[AnnotationRow]], dict[str, tuple[str, int]] | None]:
     """Boxes by sample, and category and number by instance; None where the tables have no labels."""
     if not (tables / "sample_annotation.json").is_file():
         return {}, None
-    boxes: dict[str, list[Annotation]] = {}
-    for each in read_table(tables, "sample_annotation", Annotation):
+    boxes: dict[str, list[AnnotationRow]] = {}
+    for each in read_table(tables, "sample_annotation", AnnotationRow):
         if each.sample_token in samples:
             boxes.setdefault(each.sample_token, []).append(each)
-    names = {row.token: row.name for row in read_table(tables, "category", Category)}
-    instances = read_table(tables, "instance", Instance)
+    names = {row.token: row.name for row in read_table(tables, "category", CategoryRow)}
+    instances = read_table(tables, "instance", InstanceRow)
     return boxes, {row.token: (names.get(row.category_token, "object"), k) for k, row in enumerate(instances)}
