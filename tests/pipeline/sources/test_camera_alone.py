@@ -13,6 +13,7 @@ import pytest
 from pipeline.params import Params
 from pipeline.sources import SourceError, open_source
 from pipeline.step import State, step
+from tests.pipeline.sources.captures import sentences
 
 GPX = """<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/1" version="1.1" creator="test"><trk><trkseg>
 {}</trkseg></trk></gpx>"""
@@ -68,6 +69,12 @@ def test_a_track_beside_a_video_gives_own_motion(video: Path) -> None:
     assert result.own_motion is not None
     assert result.own_motion.speed.source == "gnss"
     assert result.acc is not None
+
+
+@pytest.mark.parametrize("suffix", [".nmea", ".nma", ".ubx.txt"])
+def test_sentences_beside_a_video_are_found_by_its_name(suffix: str, video: Path) -> None:
+    video.with_suffix(suffix).write_text("".join(sentences(range(4))), encoding="ascii")
+    assert f"4 GNSS fixes from drive{suffix}, by the receiver's own time" in open_source(str(video)).notes
 
 
 @pytest.mark.parametrize(("others", "is_used"), [((), True), (("other.mp4",), False), (("other.gpx",), False)])
