@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
+from app.commands.serve import Serve
 from pipeline.sources import SourceError, open_source
 from tests.pipeline.recording.frames import full, write
 from tests.pipeline.sources.bags import write_bag
@@ -114,6 +115,13 @@ def test_a_recording_opens_by_its_path_alone(what: str, tmp_path: Path) -> None:
     source = open_source(str(make(tmp_path / "recording")))
     assert type(source).__name__ == kind
     assert len(source) > 0
+
+
+def test_the_page_is_served_of_a_path_without_a_prefix(tmp_path: Path) -> None:
+    engine = Serve(str(images_below(tmp_path / "recording"))).engine()
+    assert engine is not None
+    with pytest.raises(SourceError, match="the folder is empty"):
+        Serve(str(empty_folder(tmp_path / "nothing"))).engine()
 
 
 def some_file(name: str, data: bytes) -> Write:
