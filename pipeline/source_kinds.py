@@ -7,10 +7,15 @@ help is quick.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from importlib import import_module
+from itertools import islice
 from pathlib import Path
 from typing import Any
+
+_MOST_ENTRIES = 20_000
 
 
 @dataclass(frozen=True)
@@ -154,10 +159,27 @@ def looks_like(path: Path) -> str | None:
         if any((path / inside).is_dir() for inside in kind.folders):
             return kind.scheme
     if path.is_dir():
+        names = _names(path)
         for kind in KINDS:
-            if any(any(path.glob(pattern)) for pattern in kind.files):
+            if any(_holds(path, names, pattern) for pattern in kind.files):
                 return kind.scheme
     return next((kind.scheme for kind in KINDS if path.suffix.lower() in kind.suffixes), None)
+
+
+def _names(folder: Path) -> list[str]:
+    """What lies in a folder; of very many the first ones, which tell what it is of. Empty where it may not be read."""
+    try:
+        with os.scandir(folder) as found:
+            return [each.name for each in islice(found, _MOST_ENTRIES)]
+    except OSError:
+        return []
+
+
+def _holds(folder: Path, names: list[str], pattern: str) -> bool:
+    """Whether one of these names is of a pattern, capitals or not; what follows a slash must lie in it."""
+    first, _, rest = pattern.partition("/")
+    of_pattern = (name for name in names if fnmatchcase(name.lower(), first))
+    return any(not rest or (folder / name / rest).exists() for name in of_pattern)
 
 
 def kind_by_first_bytes(begin: bytes) -> SourceKind | None:

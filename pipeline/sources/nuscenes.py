@@ -16,7 +16,7 @@ import numpy as np
 from pipeline.common.geometry import inverse
 from pipeline.common.nearest_in_time import nearest
 from pipeline.ego_motion.from_poses import motion_along
-from pipeline.formats.file_reading import check_looks_ahead, decode_picture, picture_size, read_bytes, recording_folder
+from pipeline.formats.file_reading import check_looks_ahead, picture_of, picture_size, read_bytes, recording_folder
 from pipeline.formats.float_points import parse_points
 from pipeline.formats.nuscenes_tables import (
     AnnotationRow,
@@ -132,19 +132,8 @@ class NuscenesSource:
 
     def _picture(self, t_ns: int, notes: list[str]) -> CameraImage | None:
         at = nearest(self._image_times, t_ns, _PICTURE_WITHIN_NS)
-        if at is None:
-            notes.append("no image within 0.06 s")
-            return None
-        path = self._folder / self._images[at].filename
-        try:
-            bgr, encoded = decode_picture(path)
-        except SourceError as error:
-            notes.append(str(error))
-            return None
-        if (bgr.shape[1], bgr.shape[0]) != self._size:
-            notes.append(f"{path.name}: {bgr.shape[1]}×{bgr.shape[0]}, the others are {self._size[0]}×{self._size[1]}")
-            return None
-        return CameraImage(int(self._image_times[at]), bgr, encoded)
+        path = self._folder / self._images[at].filename if at is not None else None
+        return picture_of(path, int(self._image_times[at]) if at is not None else None, self._size, notes)
 
     def _calibration(self, sensors: dict[str, tuple[CalibratedSensorRow, str]]) -> CameraCalibration:
         sensor, _ = sensors[self._images[0].calibrated_sensor_token]
@@ -211,10 +200,18 @@ def _sensors(tables: Path) -> dict[str, tuple[CalibratedSensorRow, str]]:
 def _rows_of(
     rows: list[SampleDataRow], channel: str, sensors: dict[str, tuple[CalibratedSensorRow, str]], folder: Path
 ) -> list[SampleDataRow]:
-    """The files of a sensor that are there, in order of time."""
+    """The files of a sensor that are there, below the data set's folder, in order of time."""
     of_channel = {token for token, (_, name) in sensors.items() if name == channel}
-    found = [row for row in rows if row.calibrated_sensor_token in of_channel and (folder / row.filename).is_file()]
+    found = [row for row in rows if row.calibrated_sensor_token in of_channel and _is_below(folder, row.filename)]
     return sorted(found, key=lambda row: row.timestamp)
+
+
+def _is_below(folder: Path, filename: str) -> bool:
+    """Whether a file is there, and where a data set's own files are: a table may name any."""
+    try:
+        return ".." not in Path(filename).parts and not Path(filename).is_absolute() and (folder / filename).is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def _pose_of_sensor(sensor: CalibratedSensorRow) -> F64:

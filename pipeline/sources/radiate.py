@@ -73,7 +73,7 @@ class RadiateSource:
         self._size = picture_size(self._images.paths[:3]) or _SIZE
         rig_file = rig_files.rig_in_folder(folder, options)
         rig = rig_files.load_rig(rig_file) if rig_file is not None else rig_files.Rig()
-        self._camera = rig.camera_calibration() or default_camera(self._size)
+        self._camera = rig.camera_calibration() or default_camera()
         steps = np.diff(self._ticks)
         self.rate_hz = round(1e9 / float(np.median(steps)), 1) if len(steps) and np.median(steps) > 0 else 10.0
         self.notes = self._about(rig_file)
@@ -183,7 +183,7 @@ def parse_state(data: bytes, file: str, t_ns: int) -> tuple[EgoState, GnssFix]:
     return ego, fix
 
 
-def default_camera(size: tuple[int, int] = _SIZE) -> CameraCalibration:
+def default_camera() -> CameraCalibration:
     """The left camera of ``default-calib.yaml``; images are as the camera took them, not rectified."""
     x, y, z = np.radians(_TURNS_DEG)
     Rx = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])

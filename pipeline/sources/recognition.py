@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
@@ -15,21 +16,23 @@ from pipeline.source_kinds import KINDS, SourceKind, kind_by_first_bytes, kind_n
 _FIRST_BYTES = 64
 _DEEPEST = 3
 """Folders within folders that are searched for a recording: ``data/2011_09_26/2011_09_26_drive_0009_sync``."""
-_MOST_ENTRIES = 2000
+_MOST_ENTRIES = 1000
 """Of a folder that are looked at: a folder of anything else may have millions."""
+_MOST_LOOKED_AT = 3000
+"""In all folders inside one, to name a recording in it."""
 _PROBLEMS = (OSError, RuntimeError, ValueError, Overloaded)
 """What a path may make the system say: no such user's home, a null byte, a link to itself."""
 
+_IMAGE = "one image; open its folder, which is played in order of name"
+_CLOUD = "one point cloud; open its folder, which is played in order of name"
+_ARCHIVE = "an archive; unpack it and open the folder"
 _FILES: tuple[tuple[tuple[str, ...], str], ...] = (
-    ((".jpg", ".jpeg", ".png"), "one image; open its folder, which is played in order of name"),
-    ((".pcd",), "one point cloud; open its folder, which is played in order of name"),
+    ((".jpg", ".jpeg", ".png"), _IMAGE),
+    ((".pcd",), _CLOUD),
     ((".bin",), "raw points or packets; open the folder of the recording that it belongs to"),
     ((".gpx", ".nmea", ".nma"), "a GNSS track; open the video or recording that it belongs to, or use it as --route"),
     ((".yaml", ".yml"), "a settings file; use live:{path} for sensors, sim:{path} for a scenario"),
-    (
-        (".zip", ".tar", ".gz", ".tgz", ".bz2", ".xz", ".zst", ".7z", ".rar"),
-        "an archive; unpack it and open the folder",
-    ),
+    ((".zip", ".tar", ".gz", ".tgz", ".bz2", ".xz", ".zst", ".7z", ".rar"), _ARCHIVE),
     ((".csv", ".ply", ".las", ".laz", ".xyz", ".e57"), "a point cloud or table; convert sweeps to PCD, one file each"),
     (
         (".h5", ".hdf5", ".npy", ".npz", ".parquet", ".tfrecord"),
@@ -48,11 +51,11 @@ _FOLDERS: tuple[tuple[str, str], ...] = (
 )
 """The same of folders, by a folder inside."""
 _BEGINS: tuple[tuple[bytes, str], ...] = (
-    (b"\x89PNG", _FILES[0][1]),
-    (b"\xff\xd8\xff", _FILES[0][1]),
-    (b"# .PCD", _FILES[1][1]),
-    (b"PK\x03\x04", _FILES[5][1]),
-    (b"\x1f\x8b", _FILES[5][1]),
+    (b"\x89PNG", _IMAGE),
+    (b"\xff\xd8\xff", _IMAGE),
+    (b"# .PCD", _CLOUD),
+    (b"PK\x03\x04", _ARCHIVE),
+    (b"\x1f\x8b", _ARCHIVE),
     (b"#ROSBAG V", "a ROS 1 bag; rename it so that it ends in .bag"),
     (
         b"SQLite format 3",
@@ -114,7 +117,7 @@ def _recording(place: Path, deepest: int) -> tuple[SourceKind, Path | None] | No
         return (deeper[0], deeper[1] or path) if deeper is not None else (first, path)
     if kind is not None or inside:
         return (kind, None) if kind is not None else None
-    folders = [each for each in _entries(place) if each.is_dir() and not each.is_symlink()]
+    folders = [each for each in _entries(place) if _is_folder(each)]
     if len(folders) != 1:
         return None
     deeper = _recording(folders[0], deepest - 1)
@@ -126,9 +129,7 @@ def _holds_one_of_its_own(place: Path, kind: SourceKind) -> bool:
     return (
         place.is_dir()
         and not any((place / name).is_dir() for name in kind.folders)
-        and any(
-            each.is_dir() and looks_like(each) == kind.scheme for pattern in kind.files for each in place.glob(pattern)
-        )
+        and any(each.is_dir() and looks_like(each) == kind.scheme for each in _entries(place))
     )
 
 
@@ -167,6 +168,11 @@ def _entries(folder: Path) -> list[Path]:
         return [folder / name for name in sorted(names)]
 
 
+def _is_folder(path: Path) -> bool:
+    """Whether a path is a folder itself, not a link to one, and may be looked at."""
+    return os.path.isdir(path) and not os.path.islink(path)
+
+
 def _first_bytes(path: Path) -> bytes:
     with open_regular(path) as file:
         return file.read(_FIRST_BYTES)
@@ -194,25 +200,32 @@ def _about_folder(folder: Path) -> str:
     for name, what in _FOLDERS:
         if (folder / name).is_dir() and not (folder / "sequences").is_dir():
             return what
-    example = next(_recordings_below(folder, _DEEPEST), None)
+    example = next(_recordings_below(folder), None)
     if example is not None:
         return f"it holds recordings; open one of them, for example {example}"
-    folders = [each.name for each in inside if each.is_dir()]
-    suffixes = Counter(each.suffix or "unnamed" for each in inside if not each.is_dir())
+    folders = [each.name for each in inside if os.path.isdir(each)]
+    suffixes = Counter(each.suffix or "unnamed" for each in inside if not os.path.isdir(each))
     parts = [f"{count} {suffix} files" for suffix, count in suffixes.most_common(3)]
     parts += [f"folders {', '.join(folders[:4])}"] if folders else []
     several = "at least " if len(inside) == _MOST_ENTRIES else ""
     return f"it holds {several}{' and '.join(parts)}"
 
 
-def _recordings_below(folder: Path, deepest: int) -> Iterator[Path]:
-    """The nearest first. What cannot be read is passed over."""
-    try:
-        inside = _entries(folder)
-        yield from [each for each in inside if _kind_of(each) is not None]
-    except _PROBLEMS:
-        return
-    if deepest > 1:
+def _recordings_below(folder: Path) -> Iterator[Path]:
+    """The nearest first. What cannot be read is passed over, and so is the rest where there is too much."""
+    level, looked_at = [folder], 0
+    for _ in range(_DEEPEST):
+        inside: list[Path] = []
+        for each in level:
+            with suppress(*_PROBLEMS):
+                inside += _entries(each)
+            if looked_at + len(inside) > _MOST_LOOKED_AT:
+                break
+        looked_at += len(inside)
         for each in inside:
-            if each.is_dir() and not each.is_symlink():
-                yield from _recordings_below(each, deepest - 1)
+            with suppress(*_PROBLEMS):
+                if _kind_of(each) is not None:
+                    yield each
+        level = [each for each in inside if _is_folder(each)]
+        if looked_at > _MOST_LOOKED_AT:
+            return

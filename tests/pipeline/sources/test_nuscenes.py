@@ -140,6 +140,19 @@ def test_a_damaged_sweep_and_image_leave_their_branch_empty(mini: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("elsewhere", ["{outside}", "../secret.bin", "samples/../../secret.bin", "a\0b"])
+def test_a_table_names_no_files_elsewhere(elsewhere: str, mini: Path) -> None:
+    outside = mini.parent / "secret.bin"
+    outside.write_bytes((mini / "samples" / "LIDAR_TOP" / f"n015__LIDAR_TOP__{START_US}.pcd.bin").read_bytes())
+    table = mini / TABLES / "sample_data.json"
+    rows = json.loads(table.read_text())
+    for row in rows:
+        row["filename"] = elsewhere.format(outside=outside) if "LIDAR" in row["filename"] else row["filename"]
+    table.write_text(json.dumps(rows))
+    with pytest.raises(SourceError, match="has no LIDAR_TOP files"):
+        open_source(str(mini))
+
+
 def test_a_pose_that_is_none_is_said(mini: Path) -> None:
     table = mini / TABLES / "calibrated_sensor.json"
     rows = json.loads(table.read_text())

@@ -54,6 +54,12 @@ def images(folder: Path) -> Path:
     return folder
 
 
+def capitals(folder: Path) -> Path:
+    for path in images(folder).iterdir():
+        path.rename(folder / f"IMG_{path.stem}.PNG")
+    return folder
+
+
 def ros2_mcap(folder: Path) -> Path:
     (file,) = write_bag(folder, "mcap", sweeps=2).glob("*.mcap")
     return file.rename(folder.parent / "alone.mcap")
@@ -99,6 +105,7 @@ RECORDINGS: dict[str, tuple[Write, str]] = {
     "drive of KITTI without a LiDAR": (without_lidar, "KittiSource"),
     "ROS 2 bag": (lambda folder: write_bag(folder, "db3", sweeps=2), "RosbagSource"),
     "images": (images, "CameraAlone"),
+    "images of a camera that writes capitals": (capitals, "CameraAlone"),
     "images two folders down": (lambda folder: images_below(folder), "CameraAlone"),
 }
 
@@ -165,7 +172,7 @@ def unrelated(folder: Path) -> Path:
 
 def thousands(folder: Path) -> Path:
     folder.mkdir()
-    for k in range(2100):
+    for k in range(1100):
         (folder / f"{k}.doc").touch()
     return folder
 
@@ -201,7 +208,7 @@ OTHERS: dict[str, tuple[Write, str]] = {
     "Argoverse 2": (holding("sensors/lidar"), "a log of Argoverse 2; it is not read, convert it"),
     "poses alone": (holding("poses"), "poses of KITTI's odometry sequences; the folders with .* are missing"),
     "unrelated files": (unrelated, r"it holds 1 \.csv files and folders radar; use one of"),
-    "thousands of files": (thousands, r"it holds at least 2000 \.doc files; use one of"),
+    "thousands of files": (thousands, r"it holds at least 1000 \.doc files; use one of"),
     "two recordings": (copies(write_astyx), r"it holds recordings; open one of them, for example .*/one$"),
     "recordings two folders down": (
         lambda folder: copies(write_astyx)(folder / "a" / "b").parent,
