@@ -157,8 +157,10 @@ Row = TypeVar(
 
 def read_table(folder: Path, name: str, kind: type[Row]) -> list[Row]:
     """The rows of ``NAME.json``. SourceError names the table and what is wrong."""
+    path = folder / f"{name}.json"
     try:
-        data = read_regular(folder / f"{name}.json", _LARGEST_TABLE_BYTES)
+        # as much memory as the file has bytes, not as the largest may have
+        data = read_regular(path, min(path.stat().st_size, _LARGEST_TABLE_BYTES))
     except FileNotFoundError:
         raise SourceError(f"{folder.name}/{name}.json is missing") from None
     except OSError as error:
