@@ -40,6 +40,8 @@ from pipeline.types.source import Opening, SourceError, TruthObject
 _LIDAR, _CAMERA = "LIDAR_TOP", "CAM_FRONT"
 _CHANNELS = 32
 _NOMINAL_SIZE = (1600, 900)
+_LATEST_US = 9_000_000_000_000_000
+"""Later times, which are no camera's, do not fit into 64 bits of nanoseconds."""
 _PICTURE_WITHIN_NS = 60_000_000
 """Of a camera at 12 Hz, the nearest image is at most 42 ms away."""
 
@@ -202,7 +204,8 @@ def _rows_of(
 ) -> list[SampleDataRow]:
     """The files of a sensor that are there, below the data set's folder, in order of time."""
     of_channel = {token for token, (_, name) in sensors.items() if name == channel}
-    found = [row for row in rows if row.calibrated_sensor_token in of_channel and _is_below(folder, row.filename)]
+    of_sensor = [row for row in rows if row.calibrated_sensor_token in of_channel and 0 < row.timestamp < _LATEST_US]
+    found = [row for row in of_sensor if _is_below(folder, row.filename)]
     return sorted(found, key=lambda row: row.timestamp)
 
 

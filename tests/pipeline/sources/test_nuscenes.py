@@ -153,6 +153,12 @@ def test_a_table_names_no_files_elsewhere(elsewhere: str, mini: Path) -> None:
         open_source(str(mini))
 
 
+def test_a_file_of_an_impossible_time_is_left_out(mini: Path) -> None:
+    table = mini / TABLES / "sample_data.json"
+    table.write_text(table.read_text().replace(f'"timestamp": {START_US},', f'"timestamp": {START_US}0000000,'))
+    assert len(open_source(str(mini))) == 11
+
+
 def test_a_pose_that_is_none_is_said(mini: Path) -> None:
     table = mini / TABLES / "calibrated_sensor.json"
     rows = json.loads(table.read_text())
