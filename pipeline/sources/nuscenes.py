@@ -80,7 +80,7 @@ class NuscenesSource:
         self._own = motion_along(self._ticks, self._T_map_ego)
         self._boxes, self._categories = _labels(tables, samples)
         steps = np.diff(self._ticks)
-        self.rate_hz = round(1e9 / float(np.median(steps)), 1) if len(steps) else 2.0
+        self.rate_hz = round(1e9 / float(np.median(steps)), 1) if len(steps) and np.median(steps) > 0 else 2.0
         about = [f"{1 + len(others)} scenes; ?scene= opens another: {', '.join(others[:9])}"] if others else []
         self.notes = (*about, *([] if self._images else ["no images: no CAM_FRONT files"]))
 

@@ -153,6 +153,14 @@ def test_a_table_names_no_files_elsewhere(elsewhere: str, mini: Path) -> None:
         open_source(str(mini))
 
 
+def test_sweeps_of_one_time_are_a_recording_without_own_motion(mini: Path) -> None:
+    table = mini / TABLES / "sample_data.json"
+    rows = json.loads(table.read_text())
+    table.write_text(json.dumps([row | {"timestamp": START_US} for row in rows]))
+    source = open_source(str(mini))
+    assert (len(source), source.frame(1).ego) == (12, None)
+
+
 def test_a_file_of_an_impossible_time_is_left_out(mini: Path) -> None:
     table = mini / TABLES / "sample_data.json"
     table.write_text(table.read_text().replace(f'"timestamp": {START_US},', f'"timestamp": {START_US}0000000,'))
