@@ -7,10 +7,15 @@ help is quick.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from importlib import import_module
+from itertools import islice
 from pathlib import Path
 from typing import Any
+
+_MOST_ENTRIES = 20_000
 
 
 @dataclass(frozen=True)
@@ -29,6 +34,8 @@ class SourceKind:
     """A folder with a file that matches one of these patterns is of this kind."""
     suffixes: tuple[str, ...] = ()
     """A file whose name ends so is of this kind."""
+    begins: tuple[tuple[int, bytes], ...] = ()
+    """A file with one of these at its offset is of this kind, whatever its name."""
     bare_suffixes: tuple[str, ...] = ()
     """A path that ends so is opened without a scheme."""
     is_live: bool = False
@@ -46,9 +53,25 @@ class SourceKind:
 
 
 KINDS: tuple[SourceKind, ...] = (
-    SourceKind("mcap", "session.mcap", "pipeline.recording.session.source:open_recording", bare_suffixes=(".mcap",)),
     SourceKind(
-        "pcap", "pcap:<file>", "pipeline.sources.pcap.source:open_recording", suffixes=(".pcap", ".pcapng", ".cap")
+        "mcap",
+        "session.mcap",
+        "pipeline.recording.session.source:open_recording",
+        begins=((0, b"\x89MCAP0\r\n"),),
+        bare_suffixes=(".mcap",),
+    ),
+    SourceKind(
+        "pcap",
+        "pcap:<file>",
+        "pipeline.sources.pcap.source:open_recording",
+        suffixes=(".pcap", ".pcapng", ".cap"),
+        begins=(
+            (0, b"\xa1\xb2\xc3\xd4"),
+            (0, b"\xd4\xc3\xb2\xa1"),
+            (0, b"\xa1\xb2\x3c\x4d"),
+            (0, b"\x4d\x3c\xb2\xa1"),
+            (0, b"\x0a\x0d\x0d\x0a"),
+        ),
     ),
     SourceKind(
         "rosbag",
@@ -56,6 +79,7 @@ KINDS: tuple[SourceKind, ...] = (
         "pipeline.sources.rosbag.source:open_recording",
         files=("metadata.yaml",),
         suffixes=(".bag", ".db3"),
+        begins=((21, b"ros2"), (21, b"ros1")),  # the profile of an MCAP file
     ),
     SourceKind("pcd", "pcd:<dir>", "pipeline.sources.pcd:open_recording", files=("*.pcd",)),
     SourceKind(
@@ -64,15 +88,23 @@ KINDS: tuple[SourceKind, ...] = (
     SourceKind(
         "kitti",
         "kitti:<dir>",
-        "pipeline.sources.kitti:open_recording",
-        folders=("velodyne", "velodyne_points"),
+        "pipeline.sources.kitti.source:open_recording",
+        folders=("velodyne", "velodyne_points", "data_3d_raw", "data_2d_raw", "image_00/data_rect", "image_02/data"),
         files=("*_drive_*",),
     ),
+    SourceKind(
+        "nuscenes",
+        "nuscenes:<dir>",
+        "pipeline.sources.nuscenes:open_recording",
+        files=("v1.0-*/sample_data.json",),
+    ),
+    SourceKind("radiate", "radiate:<dir>", "pipeline.sources.radiate:open_recording", folders=("velo_lidar",)),
     SourceKind(
         "video",
         "video:<file>",
         "pipeline.sources.camera_alone:open_video",
-        suffixes=(".mp4", ".avi", ".mkv", ".mov", ".mjpeg"),
+        suffixes=(".mp4", ".m4v", ".avi", ".mkv", ".webm", ".mov", ".mjpeg", ".ts", ".mpg"),
+        begins=((4, b"ftyp"), (8, b"AVI "), (0, b"\x1aE\xdf\xa3")),
     ),
     SourceKind(
         "pictures",
@@ -127,10 +159,33 @@ def looks_like(path: Path) -> str | None:
         if any((path / inside).is_dir() for inside in kind.folders):
             return kind.scheme
     if path.is_dir():
+        names = _names(path)
         for kind in KINDS:
-            if any(any(path.glob(pattern)) for pattern in kind.files):
+            if any(_holds(path, names, pattern) for pattern in kind.files):
                 return kind.scheme
     return next((kind.scheme for kind in KINDS if path.suffix.lower() in kind.suffixes), None)
+
+
+def _names(folder: Path) -> list[str]:
+    """What lies in a folder; of very many the first ones, which tell what it is of. Empty where it may not be read."""
+    try:
+        with os.scandir(folder) as found:
+            return [each.name for each in islice(found, _MOST_ENTRIES)]
+    except OSError:
+        return []
+
+
+def _holds(folder: Path, names: list[str], pattern: str) -> bool:
+    """Whether one of these names is of a pattern, capitals or not; what follows a slash must lie in it."""
+    first, _, rest = pattern.partition("/")
+    of_pattern = (name for name in names if fnmatchcase(name.lower(), first))
+    return any(not rest or (folder / name / rest).exists() for name in of_pattern)
+
+
+def kind_by_first_bytes(begin: bytes) -> SourceKind | None:
+    """The kind of a file that begins so; of several the one that says most of it."""
+    found = [(at, kind) for kind in KINDS for at, magic in kind.begins if begin[at:].startswith(magic)]
+    return max(found, key=lambda each: each[0])[1] if found else None
 
 
 def _imported(name: str) -> Any:

@@ -14,7 +14,7 @@ from velodyne_decoder import Config, Model, StreamDecoder
 
 from app.bench.timing import figures, interleaved
 from pipeline.common.data_dir import data_dir
-from pipeline.formats.velodyne import PACKET_BYTES, RotationCutter, SensorClock, Vlp16Decoder
+from pipeline.formats.velodyne import PACKET_BYTES, RotationCutter, SensorClock, VelodyneDecoder
 from pipeline.formats.velodyne.encode import packets_of
 from pipeline.formats.velodyne.packet import BLOCK_US
 from pipeline.sources import open_source
@@ -98,13 +98,13 @@ def _rotations(packets: list[bytes]) -> Rotations:
 
 def _ours(rotations: Rotations) -> Callable[[], object]:
     """Push the packets of one rotation; the first one completes the previous sweep."""
-    turn, decoder = cycle(enumerate(rotations)), Vlp16Decoder()
+    turn, decoder = cycle(enumerate(rotations)), VelodyneDecoder()
 
     def run() -> object:
         nonlocal decoder
         index, packets = next(turn)
         if index == 0:
-            decoder = Vlp16Decoder()
+            decoder = VelodyneDecoder()
         sweeps = [decoder.push(packet, None) for packet in packets]
         return decoder.flush() if index == len(rotations) - 1 else sweeps
 

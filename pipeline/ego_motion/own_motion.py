@@ -27,6 +27,8 @@ from pipeline.types import (
 
 _CONTRADICT_SIGMAS, _CONTRADICT_MPS = 5.0, 1.0
 """Speeds that differ by more than both contradict each other."""
+_CONTRADICT_RADPS = 3.0 * pi / 180.0
+"""The same of yaw rates."""
 _VAGUE_MPS, _VAGUE_RADPS = 1.0, 2.0 * pi / 180.0
 """Less sure own motion is not used: 1 m/s no longer tells a standing car from one that creeps, and 2°/s at 10 m/s
 put the path at 30 m off by 1.6 m, half a lane."""
@@ -109,13 +111,13 @@ def measure(
     if recorded is not None and received is not None and params.source == "auto":
         trusted = [each for each in trusted if each.source != "gnss"]  # as good as the car's own, but later
     if not trusted:
-        return Measured(state, None, None, notes)
+        return Measured(state, None, None, (*notes, *_nothing_of(params.source, sources)))
     # Of speed and yaw rate, each comes from the source that is surest of it
     speed = min(trusted, key=lambda each: each.speed_sigma_mps)
     turns = [each for each in trusted if each.yaw_rate_sigma_radps is not None]
     turning = min(turns, key=lambda each: each.yaw_rate_sigma_radps or 0.0) if turns else None
     own = OwnMotion(speed, turning, tuple(sources), placed.pose if placed is not None else None)
-    return Measured(state, _as_ego(own, frame, recorded), own, (*notes, *_contradictions(speed, sources)))
+    return Measured(state, _as_ego(own, frame, recorded), own, (*notes, *_contradictions(own)))
 
 
 def _asks_the_lidar(params: MotionParams, given: list[EgoState]) -> bool:
@@ -176,10 +178,18 @@ def _beyond_usual(turning: MotionEstimate) -> float | None:
     return turning.yaw_rate_sigma_radps if turning.source == "lidar" else None
 
 
-def _contradictions(chosen: MotionEstimate, sources: list[MotionEstimate]) -> tuple[str, ...]:
-    """A sentence for each source whose speed the chosen one contradicts."""
-    found = []
-    for each in sources:
+def _nothing_of(wanted: str, sources: list[MotionEstimate]) -> tuple[str, ...]:
+    """A sentence where the source that was asked for has nothing and others have."""
+    others = [_NAMES[each.source] for each in sources]
+    if wanted not in ("can", "gnss") or not others:
+        return ()
+    return (f"ego motion: nothing from {_NAMES[wanted]}; there is {' and '.join(others)}, not used",)
+
+
+def _contradictions(own: OwnMotion) -> tuple[str, ...]:
+    """A sentence for each source whose speed or yaw rate the chosen one contradicts."""
+    found, chosen = list[str](), own.speed
+    for each in own.sources:
         apart = abs(each.speed_mps - chosen.speed_mps)
         allowed = max(_CONTRADICT_SIGMAS * hypot(each.speed_sigma_mps, chosen.speed_sigma_mps), _CONTRADICT_MPS)
         if each is not chosen and apart > allowed:
@@ -187,7 +197,23 @@ def _contradictions(chosen: MotionEstimate, sources: list[MotionEstimate]) -> tu
                 f"ego speed: {_NAMES[chosen.source]} {chosen.speed_mps * 3.6:.0f} km/h, "
                 f"{_NAMES[each.source]} {each.speed_mps * 3.6:.0f} km/h"
             )
+        found += _turns_otherwise(own.turning, each)
     return tuple(found)
 
 
-_NAMES: dict[MotionSource, str] = {"can": "CAN", "ins": "IMU", "gnss": "GNSS", "lidar": "LiDAR"}
+def _turns_otherwise(chosen: MotionEstimate | None, each: MotionEstimate) -> list[str]:
+    """A sentence where the yaw rate of another source contradicts the chosen one; a receiver lags, and never does."""
+    if chosen is None or chosen.yaw_rate_radps is None or each.yaw_rate_radps is None:
+        return []
+    if "gnss" in (chosen.source, each.source):
+        return []
+    sigma_radps = hypot(chosen.yaw_rate_sigma_radps or 0.0, each.yaw_rate_sigma_radps or 0.0)
+    if abs(each.yaw_rate_radps - chosen.yaw_rate_radps) <= max(_CONTRADICT_SIGMAS * sigma_radps, _CONTRADICT_RADPS):
+        return []
+    return [
+        f"yaw rate: {_NAMES[chosen.source]} {chosen.yaw_rate_radps * 180.0 / pi:+.0f}°/s, "
+        f"{_NAMES[each.source]} {each.yaw_rate_radps * 180.0 / pi:+.0f}°/s"
+    ]
+
+
+_NAMES: dict[str, str] = {"can": "CAN", "ins": "IMU", "gnss": "GNSS", "lidar": "LiDAR"}

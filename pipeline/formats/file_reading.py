@@ -60,9 +60,14 @@ def recording_file(path: str) -> Path:
 
 
 def files_by_name(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:
-    """Files of a folder by their name without suffix, ``in_order``; empty when there is no such folder."""
+    """Files of a folder by their name without suffix, which may have two parts (``.ubx.txt``), ``in_order``; empty when
+    there is no such folder."""
+    found: dict[str, Path] = {}
     try:
-        found = {path.stem: path for path in sorted(folder.iterdir()) if path.suffix.lower() in suffixes}
+        for path in sorted(folder.iterdir()):
+            suffix = next((each for each in suffixes if path.name.lower().endswith(each)), path.name)
+            if len(suffix) < len(path.name):
+                found[path.name[: -len(suffix)]] = path
     except OSError:
         return {}
     return {name: found[name] for name in in_order(found)}

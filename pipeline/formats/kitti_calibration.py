@@ -1,4 +1,4 @@
-"""KITTI's calibration files, both kinds: one file a frame (object benchmark) and two a day (raw data).
+"""KITTI's calibration files: one file a frame (object benchmark), two a day (raw data), or of all (KITTI-360).
 
 Geiger et al. 2013, "Vision meets Robotics: The KITTI Dataset", section 3 and Eq. 3–6: a Velodyne point goes to the
 rectified camera 0 by R0_rect · Tr_velo_to_cam, and to the image of camera 2 by P2, whose last column carries the
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.common.geometry import inverse
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
@@ -26,7 +27,7 @@ class KittiCalibration:
     T_rect_ego: F64
     """(4, 4), takes Velodyne points to the rectified camera 0, where labels are."""
     camera: CameraCalibration
-    """Camera 2, the left colour camera."""
+    """Camera 2, the left colour camera; of KITTI-360 camera 0, the left one."""
 
 
 def parse_object_calibration(data: bytes, file: str, size: tuple[int, int]) -> KittiCalibration:
@@ -57,6 +58,21 @@ def parse_raw_calibration(
     return _calibration(projection, rectify, to_camera, files[1], size)
 
 
+def parse_360_calibration(
+    cam_to_velo: bytes, perspective: bytes, files: tuple[str, str], size: tuple[int, int]
+) -> KittiCalibration:
+    """KITTI-360's ``calib_cam_to_velo.txt`` (12 numbers, from camera 0 to the Velodyne) and ``perspective.txt``
+    (P_rect_00, R_rect_00); ``files`` are their names. SourceError names the file and what is wrong."""
+    numbers = parse_number_lines(cam_to_velo, 12)
+    if len(numbers) != 1:
+        raise SourceError(f"calibration {files[0]}: not one line of 12 numbers")
+    T_ego_cam = rigid_transform(numbers.reshape(3, 4), f"calibration {files[0]}: camera to Velodyne")
+    table = parse_key_values(perspective)
+    projection = _values(table, "P_rect_00", (3, 4), files[1])
+    rectify = _values(table, "R_rect_00", (3, 3), files[1])
+    return _calibration(projection, rectify, inverse(T_ego_cam)[:3], files[1], size)
+
+
 def parse_key_values(data: bytes) -> dict[str, list[float]]:
     """Lines ``name: number number …``; lines of anything else (dates, text) are passed over."""
     table: dict[str, list[float]] = {}
@@ -71,6 +87,19 @@ def parse_key_values(data: bytes) -> dict[str, list[float]]:
     return table
 
 
+def parse_number_lines(data: bytes, columns: int) -> F64:
+    """(N, columns) float64 of the lines that are exactly so many finite numbers, of any number of digits."""
+    rows = []
+    for line in data.decode("utf-8", "replace").splitlines():
+        try:
+            numbers = [float(word) for word in line.split()]
+        except ValueError:
+            continue
+        if len(numbers) == columns and np.isfinite(numbers).all():
+            rows.append(numbers)
+    return np.array(rows, dtype=np.float64).reshape(-1, columns)
+
+
 def _values(table: dict[str, list[float]], name: str, shape: tuple[int, int], file: str) -> F64:
     numbers = table.get(name)
     if numbers is None or len(numbers) != shape[0] * shape[1]:
@@ -79,11 +108,11 @@ def _values(table: dict[str, list[float]], name: str, shape: tuple[int, int], fi
 
 
 def _calibration(projection: F64, rectify: F64, velo_to_cam: F64, file: str, size: tuple[int, int]) -> KittiCalibration:
-    K = camera_matrix(projection[:, :3], f"calibration {file}: the projection of camera 2")
+    K = camera_matrix(projection[:, :3], f"calibration {file}: the projection of the camera")
     T_rect_cam = rigid_transform(np.hstack([rectify, np.zeros((3, 1))]), f"calibration {file}: the rectification")
     T_cam_ego = rigid_transform(velo_to_cam, f"calibration {file}: Velodyne to camera")
     baseline = np.hstack([np.eye(3), np.linalg.solve(K, projection[:, 3:])])
-    T_camera2_rect = rigid_transform(baseline, f"calibration {file}: the baseline of camera 2")
+    T_camera2_rect = rigid_transform(baseline, f"calibration {file}: the baseline of the camera")
     T_rect_ego = T_rect_cam @ T_cam_ego
     camera = CameraCalibration(K, np.empty(0), T_camera2_rect @ T_rect_ego, *size, road_z_m=-_VELODYNE_HEIGHT_M)
     check_looks_ahead(camera, f"calibration {file}")

@@ -53,6 +53,8 @@ class VideoFile:
         try:
             with open_video(path) as container:
                 stamps, tick_ns = _stamps(container, progress)
+        except av.InvalidDataError:
+            raise SourceError(f"{path.name}: not a readable video: cut off, or something else") from None
         except (av.FFmpegError, OSError, ValueError) as error:
             raise SourceError(f"{path.name}: not a readable video: {reason_of(error)}") from None
         if not len(stamps):
@@ -63,7 +65,8 @@ class VideoFile:
         self._places = [_Place(path, first, tick_ns) for _ in range(_PLACES)]  # the one used last stands last
 
     def image(self, index: int) -> U8:
-        """(H, W, 3) uint8 blue green red of one of ``times_ns``. SourceError when it cannot be decoded."""
+        """(H, W, 3) uint8 blue green red of one of ``times_ns``, upright where a telephone was held on its side.
+        SourceError when it cannot be decoded."""
         wanted_ns = int(self.times_ns[index])
         with self._lock:
             place = next((each for each in self._places if each.is_near(wanted_ns)), self._places[0])
@@ -111,7 +114,8 @@ class _Place:
             self._at_ns = round((frame.pts - self._first_stamp) * self._tick_ns)
             if self._at_ns >= wanted_ns - half_tick_ns:
                 check_pixels(frame.width, frame.height)
-                return np.ascontiguousarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8)
+                upright = np.rot90(frame.to_ndarray(format="bgr24"), round(frame.rotation / 90))
+                return np.ascontiguousarray(upright, dtype=np.uint8)
         raise ValueError("the video ends before it")
 
     def _seek(self, wanted_ns: int) -> None:

@@ -8,7 +8,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from pipeline.formats.velodyne.encode import PACKETS_A_ROTATION, packets_of
-from pipeline.formats.velodyne.packet import BLOCK_US, PACKET_BYTES
+from pipeline.formats.velodyne.models import PACKET_BYTES
+from pipeline.formats.velodyne.packet import BLOCK_US
 from pipeline.replay.messages import Message
 from pipeline.sources.live.health import Sensor
 from pipeline.types import F64, Sweep

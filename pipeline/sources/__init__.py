@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 from typing import cast
 
 from pipeline.common.progress import Progress, silent
 from pipeline.common.remote_files import is_remote
 from pipeline.source_kinds import SourceKind, is_live, kind_named, kind_of_bare, looks_like, usages
+from pipeline.sources.recognition import about_path, recording_at
 from pipeline.types.source import AnySource, LiveSource, Opening, Source, SourceError, TruthObject
 
 __all__ = [
@@ -69,48 +69,21 @@ def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
             raise SourceError(f"{uri}: of a store only sessions are read in place, {_IN_STORE}")
         return in_store, uri
     scheme, colon, rest = uri.partition(":")
-    is_drive_letter = len(scheme) == 1
-    if not colon or is_drive_letter or not scheme.isalnum():
-        bare = kind_of_bare(uri) or _recognised(uri)
-        if bare is None:
-            raise SourceError(_about_bare_path(uri, live))
-        return bare, uri
     kind = kind_named(scheme)
+    is_drive_letter = len(scheme) == 1
+    if not colon or is_drive_letter or not scheme.isalnum() or (kind is None and _exists(uri)):
+        found = recording_at(uri)
+        if found is None:
+            raise SourceError(f"{uri}: not a source{about_path(uri, live)}")
+        return found
     if kind is None:
         raise SourceError(f"{uri}: unknown kind of source {scheme!r}; use one of {usages(live=live)}")
     return kind, rest
 
 
-def _recognised(uri: str) -> SourceKind | None:
-    """The kind of a path without a scheme, by what is in it; options may follow a question mark."""
+def _exists(uri: str) -> bool:
+    """Whether it is a path with a colon in its name."""
     try:
-        scheme = looks_like(Path(uri.partition("?")[0]).expanduser()) if uri else None
-    except (OSError, RuntimeError, ValueError):
-        scheme = None
-    return kind_named(scheme) if scheme is not None else None
-
-
-def _about_bare_path(uri: str, live: bool) -> str:
-    """What a path without a scheme that is of no known kind holds, and what to type instead."""
-    return f"{uri}: not a source{_holding(uri.partition('?')[0])}; use one of {usages(live=live)}"
-
-
-def _holding(path: str) -> str:
-    """What lies there, in words; empty where nothing does."""
-    try:
-        place = Path(path).expanduser()
-        if not path or not place.exists():
-            return ""
-        if place.is_file():
-            return f": a {place.suffix} file" if place.suffix else ": unknown file type"
-        inside = sorted(place.iterdir())
-        recordings = [each for each in inside if looks_like(each) is not None]
-    except (OSError, RuntimeError, ValueError):
-        return ""
-    if recordings:
-        return f": it holds recordings, for example {recordings[0]}"
-    folders = [each.name for each in inside if each.is_dir()]
-    kinds = Counter(each.suffix or "unnamed" for each in inside if each.is_file())
-    parts = [f"{count} {suffix} files" for suffix, count in kinds.most_common(3)]
-    parts += [f"folders {', '.join(folders[:4])}"] if folders else []
-    return f": it holds {' and '.join(parts) or 'nothing'}"
+        return Path(uri).exists()
+    except (OSError, ValueError):
+        return False

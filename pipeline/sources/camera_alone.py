@@ -18,7 +18,7 @@ from pipeline.common.user_file_errors import reason_of
 from pipeline.ego_motion.from_gnss import MotionFromGnss
 from pipeline.formats.file_reading import files_by_name, read_image, recording_file, recording_folder
 from pipeline.formats.gpx_file import parse_gpx
-from pipeline.formats.video_file import VideoFile
+from pipeline.formats.video_file import SUFFIXES, VideoFile
 from pipeline.sources import rig as rig_files
 from pipeline.sources.live.config import CalibrationConfig
 from pipeline.sources.sidecar_files import FIX_WITHIN_NS, NMEA_SUFFIXES, fixes_of, named
@@ -171,7 +171,7 @@ _NO_SPEED = "no ego speed recorded"
 
 def _track(path: Path, options: dict[str, str], near_ns: int, notes: list[str]) -> list[GnssFix]:
     """The fixes of a file beside the recording, in order of time; none without one."""
-    gpx = named(path, options, "gpx", (".gpx",))
+    gpx = named(path, options, "gpx", (".gpx",)) or _the_only_one(path, options, (".gpx",))
     if gpx is not None:
         try:
             fixes = parse_gpx(gpx.read_text(encoding="utf-8", errors="replace"), gpx.name)
@@ -179,8 +179,18 @@ def _track(path: Path, options: dict[str, str], near_ns: int, notes: list[str]) 
             raise SourceError(f"{gpx.name}: cannot be read: {reason_of(error)}") from None
         notes.append(f"{len(fixes)} GNSS fixes from {gpx.name}")
         return fixes
-    nmea = named(path, options, "nmea", NMEA_SUFFIXES)
+    nmea = named(path, options, "nmea", NMEA_SUFFIXES) or _the_only_one(path, options, NMEA_SUFFIXES)
     return sorted(fixes_of(nmea, near_ns, notes), key=lambda fix: fix.t_ns) if nmea is not None else []
+
+
+def _the_only_one(path: Path, options: dict[str, str], suffixes: tuple[str, ...]) -> Path | None:
+    """The track in a folder of images, or beside the only video of a folder, whatever its name; None of several, and
+    where an option names one."""
+    folder = path if path.is_dir() else path.parent
+    if "gpx" in options or "nmea" in options or (path.is_file() and len(files_by_name(folder, SUFFIXES)) > 1):
+        return None
+    found = [each for each in files_by_name(folder, suffixes).values()]
+    return found[0] if len(found) == 1 else None
 
 
 def _positive(options: dict[str, str], name: str, otherwise: float) -> float:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
@@ -47,7 +46,8 @@ class PcdSource:
         self._names = list(self._sweeps)
         self._images = next((found for name in _IMAGES if (found := files_by_name(folder / name, _IMAGE_SUFFIXES))), {})
         self._size = image_size(self._images.values()) or (0, 0)
-        rig = _rig(folder, options)
+        rig_file = rig_files.rig_in_folder(folder, options)
+        rig = rig_files.load_rig(rig_file) if rig_file is not None else rig_files.Rig()
         self.T_ego_lidar, self._camera = rig.lidar.mount.T_ego_sensor(), rig.camera_calibration()
         stamps = [_stamp_ns(name) for name in self._names]
         known = [stamp for stamp in stamps if stamp is not None]
@@ -99,15 +99,6 @@ class PcdSource:
         if self._images and self._camera is None:
             notes.append("the camera has no calibration: LiDAR and camera are not fused")
         return (*notes, "no ego speed recorded")
-
-
-def _rig(folder: Path, options: dict[str, str]) -> rig_files.Rig:
-    path = folder / options.get("rig", "rig.yaml")
-    if path.is_file():
-        return rig_files.load_rig(path)
-    if "rig" in options:
-        raise SourceError(f"rig={options['rig']}: no such file")
-    return rig_files.Rig()
 
 
 def _stamp_ns(name: str) -> int | None:

@@ -66,6 +66,17 @@ def load_rig(path: Path) -> Rig:
     return rig
 
 
+def rig_in_folder(folder: Path, options: dict[str, str]) -> Path | None:
+    """The file of a recording that is a folder: the option ``rig`` names it, else it is ``rig.yaml``; None without one.
+    SourceError when the named one is missing."""
+    path = folder / options.get("rig", "rig.yaml")
+    if path.is_file():
+        return path
+    if "rig" in options:
+        raise SourceError(f"rig={options['rig']}: no such file")
+    return None
+
+
 def calibration_for(
     camera: CameraCalibration | None, image: CameraImage | None, notes: list[str]
 ) -> CameraCalibration | None:

@@ -20,7 +20,8 @@ from pipeline.common.image_decoding import TooMuch, decode_within_budget
 from pipeline.common.user_file_errors import parse_yaml
 from pipeline.formats.kitti_records import parse_timestamps
 from pipeline.formats.nmea import NmeaReader
-from pipeline.formats.velodyne.decoder import Vlp16Decoder
+from pipeline.formats.velodyne.decoder import VelodyneDecoder
+from pipeline.formats.velodyne.models import HDL32E, VLP16, VLP32C, VelodyneModel
 from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import LabelSet
 from pipeline.recording.errors import Damaged
@@ -35,6 +36,7 @@ from pipeline.sources.live import config
 from pipeline.sources.live.devices.can import load_dbc
 from pipeline.sources.route_files import load_route
 from tests.pipeline.formats.velodyne.streams import drive
+from tests.pipeline.formats.velodyne.test_models import stream
 from tests.pipeline.recording.frames import ABOUT, TRUTH, full, write
 from tests.pipeline.sources.bags import Kind, write_bag, write_packet_bag
 from tests.pipeline.sources.live.devices.test_wires import DBC
@@ -63,8 +65,8 @@ def _sentences(data: bytes) -> None:
     reader.flush(1_700_000_000_000_000_000)
 
 
-def _packets(data: bytes) -> None:
-    decoder = Vlp16Decoder()
+def _packets(data: bytes, model: VelodyneModel = VLP16) -> None:
+    decoder = VelodyneDecoder(model=model)
     for at in range(0, len(data), 1206):
         decoder.push(data[at : at + 1206], None)
 
@@ -149,6 +151,12 @@ def targets(folder: Path) -> dict[str, Target]:
         "image": Target(images, decode_within_budget),
         "nmea": Target(((GGA + RMC).encode(),), _sentences),
         "velodyne": Target((b"".join(packet for packet, _ in drive(1)[:8]),), _packets),
+        **{
+            f"velodyne {model.name}": Target(
+                (b"".join(packet for packet, _ in stream(model, 1)[:8]),), partial(_packets, model=model)
+            )
+            for model in (HDL32E, VLP32C)
+        },
         "yaml": Target((b"a: &a [1, 2]\nb: {c: *a, d: 2026-01-01}\n", *built_in), _text(parse_yaml)),
         "scenario": Target(built_in, _text(scenario.parse)),
         "labels": Target((to_json(LabelSet("a", ("1", "2"), (0, 1))),), lambda data: from_json(data, "x")),

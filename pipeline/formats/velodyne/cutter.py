@@ -1,4 +1,4 @@
-"""VLP-16 packets → rotations, packet by packet: each is checked and put in its place; rotations are cut behind the car.
+"""Velodyne packets → rotations, packet by packet: each is checked and put in its place; the cut is behind the car.
 
 So what is ahead is never in two, and its tick is the moment the head looks straight ahead. Where a packet belongs
 follows from its time and its azimuth together: the two must agree with the packets before it, so one spoiled packet
@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.formats.velodyne.clock import SensorClock
+from pipeline.formats.velodyne.models import VLP16, VelodyneModel
 from pipeline.formats.velodyne.packet import HOUR_US, ROTATION_CDEG, BadPacket, Packet, read_packet
 from pipeline.types import F64
 
@@ -111,9 +112,12 @@ _HERE, _NEXT, _AFTER_GAP, _ANEW = _Place  # looking a member up in its class tak
 
 class RotationCutter:
     """One sensor's stream. T_ego_lidar: (4, 4), where the sensor sits, which says where behind is. keeps_partial: give
-    rotations seen in part too."""
+    rotations seen in part too. model: whose packets; those of others are refused."""
 
-    def __init__(self, T_ego_lidar: F64, clock: SensorClock, keeps_partial: bool = False) -> None:
+    def __init__(
+        self, T_ego_lidar: F64, clock: SensorClock, keeps_partial: bool = False, model: VelodyneModel = VLP16
+    ) -> None:
+        self.model = model
         self.counts = DecoderCounts()
         self.clock = clock
         ahead = T_ego_lidar[:3, :3].T @ np.array([1.0, 0.0, 0.0])  # ego forward in the sensor's axes
@@ -132,7 +136,7 @@ class RotationCutter:
         """Take one data packet; the rotation that it completes, if it is the first of the next. Never raises."""
         self.counts.packets += 1
         try:
-            placed = self._placed(read_packet(data), t_host_ns, origin)
+            placed = self._placed(read_packet(data, self.model), t_host_ns, origin)
             place = self._accept(placed)
         except BadPacket as bad:
             self.counts.refused[bad.reason] += 1

@@ -1,4 +1,4 @@
-"""VLP-16 packets → sweeps: checked and cut into rotations by ``cutter``, decoded by velodyne-decoder."""
+"""Velodyne packets → sweeps: checked and cut into rotations by ``cutter``, decoded by velodyne-decoder."""
 
 from __future__ import annotations
 
@@ -8,30 +8,38 @@ import numpy as np
 from pipeline.formats.velodyne import packet
 from pipeline.formats.velodyne.clock import SensorClock
 from pipeline.formats.velodyne.cutter import DecoderCounts, Rotation, RotationCutter
+from pipeline.formats.velodyne.models import VLP16, VelodyneModel
 from pipeline.formats.velodyne.packet import HOUR_US
 from pipeline.types import F32, F64, U8, Sweep
 
-CHANNELS = 16
 MIN_RANGE_M, MAX_RANGE_M = 0.1, 200.0
 _X, _TIME, _RING = 0, 4, 6
 
 
-class Vlp16Decoder:
-    """One sensor's stream. T_ego_lidar: (4, 4), where the sensor sits; by default the ego frame is the sensor's own."""
+class VelodyneDecoder:
+    """One sensor's stream. T_ego_lidar: (4, 4), where the sensor sits; by default the ego frame is the sensor's own.
+    model: which sensor; packets of others are refused."""
 
     def __init__(
-        self, T_ego_lidar: F64 | None = None, clock: SensorClock | None = None, keeps_partial: bool = False
+        self,
+        T_ego_lidar: F64 | None = None,
+        clock: SensorClock | None = None,
+        keeps_partial: bool = False,
+        model: VelodyneModel = VLP16,
     ) -> None:
         T = np.eye(4) if T_ego_lidar is None else np.asarray(T_ego_lidar, dtype=np.float64)
         self.clock = clock or SensorClock()
-        self._cutter = RotationCutter(T, self.clock, keeps_partial)
+        self._cutter = RotationCutter(T, self.clock, keeps_partial, model)
         self._R, self._origin = T[:3, :3].astype(np.float32), T[:3, 3].astype(np.float32)
         self._mount: tuple[float, float, float] = (float(T[0, 3]), float(T[1, 3]), float(T[2, 3]))
         self._is_moved = not np.array_equal(T, np.eye(4))
         _warm_up()
         from velodyne_decoder import Config, Model, ScanDecoder  # 0.1 s to import: only who has packets pays
 
-        self._library = ScanDecoder(Config(model=Model.VLP16, min_range=MIN_RANGE_M, max_range=MAX_RANGE_M))
+        self._channels = model.channels
+        self._library = ScanDecoder(
+            Config(model=getattr(Model, model.library), min_range=MIN_RANGE_M, max_range=MAX_RANGE_M)
+        )
 
     @property
     def counts(self) -> DecoderCounts:
@@ -41,7 +49,7 @@ class Vlp16Decoder:
         """Take one data packet; the sweep that it completes, if it is the first of the next rotation.
 
         t_host_ns: when it was received (or, in a file, captured); None where nobody knows. Never raises: what is no
-        packet of a VLP-16 is refused and counted by reason.
+        packet of the sensor is refused and counted by reason.
         """
         rotation = self._cutter.push(data, t_host_ns)
         return self._decode(rotation) if rotation is not None else None
@@ -65,7 +73,7 @@ class Vlp16Decoder:
         self.counts.sweeps += 1
         if self._is_moved:
             points[:, :3] = points[:, :3] @ self._R.T + self._origin
-        return Sweep(rotation.t_ns, points, ring, CHANNELS, time_s, self._mount)
+        return Sweep(rotation.t_ns, points, ring, self._channels, time_s, self._mount)
 
 
 def _warm_up() -> None:

@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.common.geometry import inverse, transform
-from pipeline.formats.velodyne.packet import BLOCK_US, HOUR_US, PACKET_BYTES
+from pipeline.formats.velodyne.models import PACKET_BYTES
+from pipeline.formats.velodyne.packet import BLOCK_US, HOUR_US
 from pipeline.types import F64, Sweep
 
 PACKETS_A_ROTATION = 75

@@ -1,12 +1,13 @@
-"""One data packet of a VLP-16, looked at before anything is decoded (Velodyne manual 63-9243, section 9.3).
+"""One data packet of a Velodyne, looked at before anything is decoded (manual of the VLP-16, 63-9243, section 9.3; the
+other models of ``models`` send the same frame).
 
 1206 bytes: twelve blocks of a flag FF EE, an azimuth and 32 returns, then the sensor's time (µs past the hour), the
 return mode and the product. In dual return mode two blocks in a row hold the last and the strongest returns of the
 same firings.
 
 The decoding library takes what it is given: an all-zero packet, or one whose last azimuth is spoiled, makes it cut the
-sweep in the middle. So a packet that is not what a VLP-16 sends is refused here, with the reason. A sensor set to send
-a part of the circle only makes one packet a rotation that reaches over the gap; that one is refused too, for its
+sweep in the middle. So a packet that is not what the sensor sends is refused here, with the reason. A sensor set to
+send a part of the circle only makes one packet a rotation that reaches over the gap; that one is refused too, for its
 azimuths do not advance evenly.
 """
 
@@ -16,19 +17,19 @@ from typing import NamedTuple
 
 import numba
 
-PACKET_BYTES = 1206
-BLOCK_US = 110.592
-"""Two rounds of the 16 lasers, 55.296 µs each."""
+from pipeline.formats.velodyne.models import MODELS, PACKET_BYTES, VLP16, VelodyneModel
+
+BLOCK_US = VLP16.block_us
+"""Of a VLP-16: two rounds of the 16 lasers, 55.296 µs each."""
 ROTATION_CDEG = 36_000
 HOUR_US = 3_600_000_000
 
-_VLP16 = 0x22
-_OTHER_MODELS = {0x21: "HDL-32E", 0x24: "Puck Hi-Res", 0x28: "VLP-32C", 0x31: "Velarray", 0xA1: "VLS-128 (Alpha Prime)"}
+_NAMES = {each.product: each.name for each in MODELS} | {0x31: "Velarray", 0xA1: "VLS-128 (Alpha Prime)"}
 _STRONGEST, _LAST, _DUAL = 0x37, 0x38, 0x39
 _LOWER_BLOCK_OF_HDL64 = b"\xff\xdd"
 _MIN_STEP_CDEG, _MAX_STEP_CDEG = 8.0, 100.0  # between blocks: 120 to 1500 rpm; the VLP-16 turns at 300 to 1200
 _STEP_JITTER_CDEG = 12.0  # real packets: 3
-_SPAN_US = (12 * BLOCK_US, 6 * BLOCK_US)  # single, dual
+_BLOCKS_A_PACKET = (12, 6)  # single, dual
 
 _NO_FLAG, _OTHER_PRODUCT, _OTHER_MODE, _BEYOND_HOUR, _BEYOND_CIRCLE, _UNEVEN = range(1, 7)
 _FAULTS = {
@@ -40,7 +41,7 @@ _FAULTS = {
 
 
 class BadPacket(Exception):
-    """Not a packet of a VLP-16. The text is the reason, the same words for the same reason, so it can be counted.
+    """Not a packet of the sensor. The text is the reason, the same words for the same reason, so it can be counted.
     model: the other Velodyne that it comes from, where it names one."""
 
     def __init__(self, reason: str, model: str | None = None) -> None:
@@ -65,26 +66,26 @@ class Packet(NamedTuple):
     """All 1206 bytes."""
 
 
-def read_packet(data: bytes) -> Packet:
-    """What the packet says about itself. BadPacket with the reason when it is not a whole, plausible one of a VLP-16.
+def read_packet(data: bytes, model: VelodyneModel = VLP16) -> Packet:
+    """What the packet says about itself. BadPacket with the reason when it is not a whole, plausible one of the model.
 
     A mutated range or reflectivity cannot be told from a true one; UDP's checksum guards those.
     """
     if len(data) != PACKET_BYTES:
         raise BadPacket(f"not {PACKET_BYTES} bytes")
-    fault, time_us, azimuth_cdeg, rate_cdeg_us, dual = _inspect(data)
+    fault, time_us, azimuth_cdeg, rate_cdeg_us, dual = _inspect(data, model.product, model.block_us)
     if fault:
-        raise _bad_packet(fault, data)
-    return Packet(time_us, azimuth_cdeg, rate_cdeg_us, _SPAN_US[dual], dual, data)
+        raise _bad_packet(fault, data, model)
+    return Packet(time_us, azimuth_cdeg, rate_cdeg_us, _BLOCKS_A_PACKET[dual] * model.block_us, dual, data)
 
 
 def warm_up() -> None:
     """Compile what looks at packets."""
-    _inspect(bytes(PACKET_BYTES))
+    _inspect(bytes(PACKET_BYTES), VLP16.product, VLP16.block_us)
 
 
 @numba.njit(cache=True, nogil=True)
-def _inspect(data):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _inspect(data, product, block_us):  # type: ignore[no-untyped-def]  # pragma: no cover
     """(fault, time_us, azimuth_cdeg, rate_cdeg_us, dual) of 1206 bytes; fault 0 for none. Compiled: 150 packets of a
     sweep in dual return mode would take Python as long as decoding them."""
     nothing = 0, 0, 0.0, False
@@ -92,7 +93,7 @@ def _inspect(data):  # type: ignore[no-untyped-def]  # pragma: no cover
         if data[block * 100] != 0xFF or data[block * 100 + 1] != 0xEE:
             return _NO_FLAG, *nothing
     mode = data[1204]
-    if data[1205] != _VLP16:
+    if data[1205] != product:
         return _OTHER_PRODUCT, *nothing
     if mode != _STRONGEST and mode != _LAST and mode != _DUAL:
         return _OTHER_MODE, *nothing
@@ -121,22 +122,22 @@ def _inspect(data):  # type: ignore[no-untyped-def]  # pragma: no cover
         if not mean - _STEP_JITTER_CDEG <= (azimuth - before) % ROTATION_CDEG <= mean + _STEP_JITTER_CDEG:
             return _UNEVEN, *nothing
         before = azimuth
-    return 0, time_us, first, mean / BLOCK_US, dual
+    return 0, time_us, first, mean / block_us, dual
 
 
-def _bad_packet(fault: int, data: bytes) -> BadPacket:
+def _bad_packet(fault: int, data: bytes, model: VelodyneModel) -> BadPacket:
     """A fault in words."""
     if fault == _NO_FLAG:
-        return _bad_flags(data)
+        return _bad_flags(data, model)
     if fault == _OTHER_PRODUCT:
-        model = _OTHER_MODELS.get(data[1205])
-        return BadPacket(f"not a VLP-16 but {model or 'another product'}", model)
+        other = _NAMES.get(data[1205])
+        return BadPacket(f"not a {model.name} but {other or 'another product'}", other)
     return BadPacket(_FAULTS[fault])
 
 
-def _bad_flags(data: bytes) -> BadPacket:
+def _bad_flags(data: bytes, model: VelodyneModel) -> BadPacket:
     if not any(data):
         return BadPacket("all zero")
     if any(data[at : at + 2] == _LOWER_BLOCK_OF_HDL64 for at in range(0, 1200, 100)):
-        return BadPacket("not a VLP-16 but HDL-64E", "HDL-64E")
+        return BadPacket(f"not a {model.name} but HDL-64E", "HDL-64E")
     return BadPacket("block without its flag FF EE")

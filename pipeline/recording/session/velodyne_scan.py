@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.formats.file_reading import rigid_transform
-from pipeline.formats.velodyne import PACKET_BYTES, Vlp16Decoder
+from pipeline.formats.velodyne import PACKET_BYTES, VelodyneDecoder, model_of
 from pipeline.formats.velodyne.ros import PACKET, SCAN, typestore
 from pipeline.recording.errors import Damaged
 from pipeline.recording.mcap.reader import McapFile
@@ -47,23 +47,24 @@ def sweep_of_packets(ref: PacketsRef, at_ns: int, file: McapFile) -> Sweep:
         raise Damaged("the LiDAR's mount cannot be read") from None
     wanted_ns = ref.t_ns - ref.offset_ns
     for before_ns in (_USUALLY_BEFORE_NS, PACKETS_BEFORE_NS):
-        sweeps = _sweeps(Vlp16Decoder(mount), file, at_ns - before_ns, at_ns + _PACKETS_AFTER_NS)
+        sweeps = _sweeps(mount, file, at_ns - before_ns, at_ns + _PACKETS_AFTER_NS)
         near = [each for each in sweeps if abs(each.t_ns - wanted_ns) < _SAME_SWEEP_NS]
         if near:
             return replace(min(near, key=lambda each: abs(each.t_ns - wanted_ns)), t_ns=ref.t_ns)
     raise Damaged("the session lacks the packets of this sweep")
 
 
-def _sweeps(decoder: Vlp16Decoder, file: McapFile, from_ns: int, to_ns: int) -> list[Sweep]:
-    """What the packets stored between two log times make."""
+def _sweeps(mount: F64, file: McapFile, from_ns: int, to_ns: int) -> list[Sweep]:
+    """What the packets stored between two log times make. mount: T_ego_lidar."""
     scans = file.messages((PACKETS,), from_ns, to_ns)
     packets = [packet for stored in scans for packet in packets_from(stored.data)]
+    decoder = VelodyneDecoder(mount, model=model_of(payload for _, payload in packets))
     sweeps = [decoder.push(payload, t_ns) for t_ns, payload in packets] + [decoder.flush()]
     return [each for each in sweeps if each is not None]
 
 
 def scan_message(packets: list[tuple[int, bytes]]) -> bytes:
-    """CDR of (when received in ns, payload) each, oldest first. Payloads of another length than a VLP-16's are left
+    """CDR of (when received in ns, payload) each, oldest first. Payloads of another length than a Velodyne's are left
     out: the message has no room for them."""
     types = typestore().types
     stamp, header, packet = types[_TIME], types[_HEADER], types[PACKET]

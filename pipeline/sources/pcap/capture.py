@@ -95,6 +95,19 @@ class Capture:
                 if found is not None:
                     yield Datagram(origin, t_ns, *found)
 
+    def beginnings(self) -> Iterator[tuple[int, int, bytes]]:
+        """(destination port, length, beginning of the payload) of every UDP datagram, also of those that came in parts.
+
+        SourceError when the file cannot be read any more.
+        """
+        with self._open() as file:
+            records = self._classic(file, 0) if self._magic in _CLASSIC else self._pcapng(file, 0)
+            for _, _, link, data in records:
+                found = _udp_header(data, link)
+                if found is not None:
+                    port, length = struct.unpack_from(">HH", data, found[0] + 2)
+                    yield port, length - 8, data[found[0] + 8 :]
+
     @contextmanager
     def _open(self) -> Iterator[BinaryIO]:
         try:
@@ -184,25 +197,34 @@ def _resolution_ns(options: bytes, order: str) -> float | int:
 
 def _udp(data: bytes, link: int) -> tuple[int, bytes] | None:
     """(destination port, payload) of a frame that holds one whole UDP datagram; None when it does not."""
+    found = _udp_header(data, link)
+    if found is None or found[1]:
+        return None
+    at, _ = found
+    length = int.from_bytes(data[at + 4 : at + 6], "big")
+    if length < 8 or at + length > len(data):
+        return None
+    return int.from_bytes(data[at + 2 : at + 4], "big"), data[at + 8 : at + length]
+
+
+def _udp_header(data: bytes, link: int) -> tuple[int, bool] | None:
+    """Where the header of a UDP datagram begins in a frame, and whether more frames hold the rest of it; None of a
+    frame without one."""
     at = _LINK_BYTES.get(link)
     if at is None or len(data) < at + 28:
         return None
     if link == _ETHERNET:
         while int.from_bytes(data[at - 2 : at], "big") in _VLAN and at + 4 + 28 <= len(data):
             at += 4
-    version = data[at] >> 4
+    version, is_part = data[at] >> 4, False
     if version == 4:
         fragment = int.from_bytes(data[at + 6 : at + 8], "big")
-        if data[at + 9] != _UDP or fragment & 0x3FFF:
+        if data[at + 9] != _UDP or fragment & 0x1FFF:
             return None
+        is_part = bool(fragment & 0x2000)
         at += (data[at] & 0x0F) * 4
     elif version == 6 and data[at + 6] == _UDP:
         at += 40
     else:
         return None
-    if at + 8 > len(data):
-        return None
-    length = int.from_bytes(data[at + 4 : at + 6], "big")
-    if length < 8 or at + length > len(data):
-        return None
-    return int.from_bytes(data[at + 2 : at + 4], "big"), data[at + 8 : at + length]
+    return (at, is_part) if at + 8 <= len(data) else None

@@ -1,4 +1,4 @@
-"""A capture of a VLP-16's packets as a recording: one pass over the file finds its sweeps, each is decoded when asked.
+"""A capture of a Velodyne's packets as a recording: one pass over the file finds its sweeps, each is decoded on demand.
 
 What is kept of a sweep is where its first and last packet lie in the file and its time, so the length of a recording
 costs no memory to speak of. GNSS comes from a file of sentences beside it, else from the sensor's own position packets.
@@ -9,6 +9,7 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 
@@ -16,14 +17,19 @@ from pipeline.common.fast_replace import evolve
 from pipeline.common.progress import Progress, silent
 from pipeline.formats.file_reading import recording_file
 from pipeline.formats.nmea import NmeaReader
+from pipeline.formats.other_lidars import about_maker, maker_of
 from pipeline.formats.velodyne import (
     PACKET_BYTES,
     POSITION_BYTES,
+    VLP16,
     BadPacket,
     Rotation,
     RotationCutter,
     SensorClock,
-    Vlp16Decoder,
+    VelodyneDecoder,
+    VelodyneModel,
+    about_other_models,
+    model_of,
     read_position,
 )
 from pipeline.sources.pcap.capture import Capture, Datagram
@@ -56,7 +62,8 @@ class PcapSource:
         rig = rig_of(file, options)
         self.T_ego_lidar = rig.lidar.mount.T_ego_sensor()
         self._port = int(number_option(options, "port", 0)) or _lidar_port(self._capture)
-        self._index = _Index(self._capture, self._port, self.T_ego_lidar, progress)
+        self._model = model_of(each.payload for each in self._capture.datagrams() if each.port == self._port)
+        self._index = _Index(self._capture, self._port, self.T_ego_lidar, self._model, progress)
         if not len(self._index):
             raise SourceError(f"{file.name}: {self._index.about_nothing(self._port)}")
         self._beside = Beside(file, options, rig, self._index.begin_ns, self._index.fixes, progress)
@@ -96,7 +103,8 @@ class PcapSource:
 
     def _sweep(self, index: int, notes: list[str]) -> Sweep | None:
         """Decoded anew from its stretch of the file, in which the ends of its neighbours may lie too."""
-        decoder, found = Vlp16Decoder(self.T_ego_lidar, keeps_partial=True), list[Sweep | None]()
+        decoder = VelodyneDecoder(self.T_ego_lidar, keeps_partial=True, model=self._model)
+        found = list[Sweep | None]()
         try:
             for datagram in self._capture.datagrams(self._index.first[index], self._index.last[index]):
                 if datagram.port == self._port:
@@ -119,12 +127,12 @@ class _Index:
     """Where every whole sweep lies. first, last: of each, where the records of its packets begin. fixes: what the
     position packets say."""
 
-    def __init__(self, capture: Capture, port: int, T_ego_lidar: F64, progress: Progress) -> None:
+    def __init__(self, capture: Capture, port: int, T_ego_lidar: F64, model: VelodyneModel, progress: Progress) -> None:
         self.first, self.last, self.times_ns = array("q"), array("q"), array("q")
         self.fixes: list[GnssFix] = []
         self.begin_ns = 0
         self._clock, self._sentences = SensorClock(), NmeaReader()
-        self._cutter = RotationCutter(T_ego_lidar, self._clock)
+        self._cutter = RotationCutter(T_ego_lidar, self._clock, model=model)
         self._said = b""
         self._capture = capture
         told = 0
@@ -155,7 +163,8 @@ class _Index:
             "host": "LiDAR times count from the host's capture time; the sensor is not synchronised to GPS",
             "sensor": "LiDAR times count from the full hour of the sensor's own clock",
         }
-        notes = [says[self._clock.reference]]
+        notes = [] if self._cutter.model is VLP16 else [f"LiDAR: Velodyne {self._cutter.model.name}"]
+        notes += [says[self._clock.reference]]
         notes += [counts.about_refused()] if counts.refused else []
         notes += [f"{counts.lost} packets lost"] if counts.lost else []
         notes += [f"the file is {self._capture.damage}"] if self._capture.damage else []
@@ -165,9 +174,15 @@ class _Index:
         """Why there is no sweep in it."""
         counts = self._cutter.counts
         if counts.models:
-            return f"packets of a Velodyne {counts.models.most_common(1)[0][0]}; only the VLP-16 is supported"
+            return about_other_models(counts.models)
+        others = Counter(
+            maker_of(begin, to, length) for to, length, begin in islice(self._capture.beginnings(), _LOOK_AT)
+        )
+        maker = next((maker for maker, _ in others.most_common() if maker is not None), None)
+        if maker is not None:
+            return about_maker(maker)
         says = [f"no complete sweep in {counts.packets} packets to port {port}"] if counts.packets else []
-        says = says or [f"no packets of a VLP-16 to port {port} in it"]
+        says = says or [f"no packets of a Velodyne to port {port} in it"]
         says += [counts.about_refused()] if counts.refused else []
         says += [f"the file is {self._capture.damage}"] if self._capture.damage else []
         return "; ".join(says)

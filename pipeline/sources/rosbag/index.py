@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.common.nearest_in_time import Times
 from pipeline.common.progress import Progress, silent
-from pipeline.formats.velodyne import DecoderCounts, Rotation, RotationCutter, SensorClock
+from pipeline.formats.velodyne import VLP16, DecoderCounts, Rotation, RotationCutter, SensorClock, model_of
 from pipeline.sources.rosbag import messages
 from pipeline.sources.rosbag.bag import Bag, BagError
 from pipeline.sources.rosbag.rig import TF_STATIC, TransformTree
@@ -60,6 +60,7 @@ class BagIndex:
         self.fixes: list[GnssFix] = []
         self.own: list[EgoState] = []
         self.counts: DecoderCounts | None = None
+        self.model = VLP16
         self._topics = topics
         self._read_rig(bag)
         self.is_packets = self.lidar is not None and bag.topics[self.lidar.topic].kind == "VelodyneScan"
@@ -112,7 +113,9 @@ class BagIndex:
         assert self.lidar is not None
         if self._cutter is None:
             self.lidar.frame_id = str(message.header.frame_id)
-            self._cutter = RotationCutter(self.tree.T_ego_lidar(self.lidar.frame_id), SensorClock())
+            self.model = model_of(data for data, _ in messages.packets(message))
+            mount = self.tree.T_ego_lidar(self.lidar.frame_id)
+            self._cutter = RotationCutter(mount, SensorClock(), model=self.model)
             self.counts = self._cutter.counts
         for data, received_ns in messages.packets(message):
             self._add_rotation(self._cutter.push(data, received_ns or recorded_ns, recorded_ns))

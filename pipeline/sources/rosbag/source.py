@@ -14,7 +14,7 @@ from pipeline.common.fast_replace import evolve
 from pipeline.common.nearest_in_time import Timeline, nearest
 from pipeline.common.progress import Progress, silent
 from pipeline.ego_motion.from_gnss import MotionFromGnss
-from pipeline.formats.velodyne import Vlp16Decoder
+from pipeline.formats.velodyne import VelodyneDecoder, about_other_models
 from pipeline.sources import rig as rig_files
 from pipeline.sources.rosbag import messages
 from pipeline.sources.rosbag.bag import Bag, BagError, bag_path
@@ -106,8 +106,7 @@ class RosbagSource:
                 return stream
         counts = self._index.counts
         if counts is not None and counts.models:
-            model = counts.models.most_common(1)[0][0]
-            raise SourceError(f"{path}: packets of a Velodyne {model}; only the VLP-16 is supported")
+            raise SourceError(f"{path}: {about_other_models(counts.models)}")
         why = self._index.damage or (counts.about_refused() if counts is not None else "")
         raise SourceError(f"{path}: no complete sweep or image{'; ' + why if why else ''}")
 
@@ -176,7 +175,7 @@ class RosbagSource:
         """The sweep of the packets in the message that holds its first, and in those after it."""
         lidar = self._index.lidar
         assert lidar is not None
-        decoder, found = Vlp16Decoder(self.T_ego_lidar, keeps_partial=True), list[Sweep]()
+        decoder, found = VelodyneDecoder(self.T_ego_lidar, keeps_partial=True, model=self._index.model), list[Sweep]()
         with self._lock, closing(self._bag.messages([lidar.topic], recorded_ns, onward=True)) as read:
             scans = list(islice(read, _MESSAGES_A_SWEEP))
         for _, at_ns, message in scans:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.bench import packets
-from pipeline.formats.velodyne import Vlp16Decoder
+from pipeline.formats.velodyne import VelodyneDecoder
 from pipeline.formats.velodyne.encode import PACKETS_A_ROTATION
 from tests.pipeline.formats.velodyne.streams import drive
 
@@ -28,7 +28,7 @@ def test_decode_has_its_figures_also_without_recordings(monkeypatch: pytest.Monk
 
 def test_two_returns_are_every_point_twice() -> None:
     sent = [packet for packet, _ in drive(3)]
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     sweeps = [sweep for packet in packets._with_two_returns(sent) if (sweep := decoder.push(packet)) is not None]
     assert [len(sweep.points) for sweep in sweeps] == [2 * 14_400] * 2
 

@@ -78,3 +78,27 @@ def test_a_bus_that_counts_in_miles_is_contradicted() -> None:
     assert note.endswith("km/h, CAN 27 km/h")
     assert driven("auto", CAN, gnss_mps=20.0).notes == ("ego speed: CAN 43 km/h, GNSS 72 km/h",)
     assert driven("lidar", CAN).notes == ()
+
+
+def test_a_yaw_rate_of_the_wrong_sign_is_contradicted_and_a_late_receiver_is_not() -> None:
+    (note,) = driven("lidar", EgoState(0, 12.0, 0.2, source="ins")).notes
+    assert note.startswith("yaw rate: LiDAR ")
+    assert note.endswith("°/s, IMU +11°/s")
+    assert driven("lidar", EgoState(0, 12.0, 0.2, source="gnss")).notes == ()
+
+
+@pytest.mark.parametrize(
+    ("source", "recorded", "gnss_mps", "says"),
+    [
+        ("can", None, 12.0, "ego motion: nothing from CAN; there is GNSS, not used"),
+        ("gnss", CAN, None, "ego motion: nothing from GNSS; there is CAN, not used"),
+        ("gnss", None, None, None),
+        ("off", CAN, 12.0, None),
+    ],
+)
+def test_a_source_that_is_asked_for_and_not_there_is_said(
+    source: str, recorded: EgoState | None, gnss_mps: float | None, says: str | None
+) -> None:
+    last = driven(source, recorded, gnss_mps)
+    assert last.ego is None
+    assert last.notes == ((says,) if says else ())

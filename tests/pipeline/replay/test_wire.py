@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.common.errors import BadInput
-from pipeline.formats.velodyne import Vlp16Decoder
+from pipeline.formats.velodyne import VelodyneDecoder
 from pipeline.replay.faults import Fault, disconnected, disturb, load
 from pipeline.replay.messages import Message, of_recording
 from pipeline.replay.wire import ROTATION_NS, WireEvent, to_wire
@@ -28,7 +28,7 @@ def lidar(*t_ms: float) -> list[Message]:
 
 
 def decoded(events: list[WireEvent]) -> list[Sweep]:
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     found = []
     for event in events:
         stamp = (event.stamp_ns // 1000 % 3_600_000_000).to_bytes(4, "little")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import av
@@ -12,6 +13,7 @@ import pytest
 from pipeline.params import Params
 from pipeline.sources import SourceError, open_source
 from pipeline.step import State, step
+from tests.pipeline.sources.captures import sentences
 
 GPX = """<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/1" version="1.1" creator="test"><trk><trkseg>
 {}</trkseg></trk></gpx>"""
@@ -67,6 +69,55 @@ def test_a_track_beside_a_video_gives_own_motion(video: Path) -> None:
     assert result.own_motion is not None
     assert result.own_motion.speed.source == "gnss"
     assert result.acc is not None
+
+
+@pytest.mark.parametrize("suffix", [".nmea", ".nma", ".ubx.txt"])
+def test_sentences_beside_a_video_are_found_by_its_name(suffix: str, video: Path) -> None:
+    video.with_suffix(suffix).write_text("".join(sentences(range(4))), encoding="ascii")
+    assert f"4 GNSS fixes from drive{suffix}, by the receiver's own time" in open_source(str(video)).notes
+
+
+@pytest.mark.parametrize(("others", "is_used"), [((), True), (("other.mp4",), False), (("other.gpx",), False)])
+def test_a_track_of_another_name_is_taken_where_it_can_only_be_the_videos(
+    others: tuple[str, ...], is_used: bool, video: Path
+) -> None:
+    for name in ("ride.gpx", *others):
+        (video.parent / name).write_text(track(5))
+    notes = open_source(str(video)).notes
+    assert ("5 GNSS fixes from ride.gpx" in notes) == is_used
+
+
+def test_a_track_in_a_folder_of_images_is_taken(tmp_path: Path) -> None:
+    for k in range(3):
+        cv2.imwrite(str(tmp_path / f"{k}.png"), np.zeros((40, 60, 3), np.uint8))
+    (tmp_path / "ride.gpx").write_text(track(5))
+    ego = open_source(str(tmp_path)).frame(2).ego
+    assert ego is not None
+    assert ego.speed_mps == pytest.approx(10.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("degrees", "corner"), [(0, (0, 0)), (90, (0, -1)), (180, (-1, -1)), (270, (-1, 0))])
+def test_a_video_of_a_telephone_on_its_side_stands_upright(degrees: int, corner: tuple[int, int], video: Path) -> None:
+    """The matrix in the file's track header says how far to turn clockwise."""
+    image = np.zeros((180, 320, 3), np.uint8)
+    image[:60, :60] = 255
+    with av.open(str(video), "w") as container:
+        stream = container.add_stream("mpeg4", rate=10)
+        stream.width, stream.height = 320, 180
+        container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24")))
+        container.mux(stream.encode())
+    data = video.read_bytes()
+    at = data.index(b"tkhd") + 44
+    c, s = {0: (1, 0), 90: (0, 1), 180: (-1, 0), 270: (0, -1)}[degrees]
+    turned = struct.pack(">9i", c << 16, s << 16, 0, -s << 16, c << 16, 0, 0, 0, 1 << 30)
+    video.write_bytes(data[:at] + turned + data[at + 36 :])
+    frame = open_source(str(video)).frame(0)
+    assert frame.image is not None
+    assert frame.image.bgr.shape == ((180, 320, 3) if degrees % 180 == 0 else (320, 180, 3))
+    rows, columns = ([slice(0, 20), slice(-20, None)][each] for each in corner)
+    assert frame.image.bgr[rows, columns].mean() > 230
+    assert frame.camera is not None
+    assert (frame.camera.width, frame.camera.height) == frame.image.bgr.shape[1::-1]
 
 
 def test_options_give_the_rate_and_the_camera(video: Path) -> None:

@@ -14,6 +14,9 @@ from tests.pipeline.sources.bags import Kind, write_bag
 from tests.pipeline.sources.captures import write_capture
 from tests.pipeline.sources.clouds_on_disk import STAMPS_NS, write_clouds
 from tests.pipeline.sources.conftest import write_astyx, write_kitti, write_kitti_raw
+from tests.pipeline.sources.kitti.test_kitti360 import DRIVE, write_kitti360
+from tests.pipeline.sources.nuscenes_on_disk import START_US, write_nuscenes
+from tests.pipeline.sources.test_radiate import write_radiate
 
 
 def small_bag(folder: Path, kind: Kind = "db3") -> Path:
@@ -25,6 +28,7 @@ def small_bag(folder: Path, kind: Kind = "db3") -> Path:
     return write_bag(folder, kind, sweeps=2)
 
 
+two_of_nuscenes = partial(write_nuscenes, frames=2)
 FILES = {
     "astyx lidar": (write_astyx, "astyx:{folder}", "lidar_vlp16/000002.txt"),
     "astyx image": (write_astyx, "astyx:{folder}", "camera_front/000002.jpg"),
@@ -39,6 +43,9 @@ FILES = {
     "kitti stamps": (write_kitti_raw, "kitti:{folder}", "velodyne_points/timestamps.txt"),
     "kitti raw cameras": (write_kitti_raw, "kitti:{folder}", "../calib_cam_to_cam.txt"),
     "kitti raw velodyne": (write_kitti_raw, "kitti:{folder}", "../calib_velo_to_cam.txt"),
+    "kitti-360 poses": (write_kitti360, "kitti:{folder}", f"data_poses/{DRIVE}/cam0_to_world.txt"),
+    "kitti-360 velodyne": (write_kitti360, "kitti:{folder}", "calibration/calib_cam_to_velo.txt"),
+    "kitti-360 cameras": (write_kitti360, "kitti:{folder}", "calibration/perspective.txt"),
     "pcap": (write_capture, "pcap:{folder}/drive.pcap", "drive.pcap"),
     "video": (write_capture, "pcap:{folder}/drive.pcap", "drive.avi"),
     "sentences": (write_capture, "pcap:{folder}/drive.pcap", "drive.nmea"),
@@ -48,6 +55,18 @@ FILES = {
     "rosbag": (small_bag, "rosbag:{folder}", "recording.db3"),
     "rosbag mcap": (partial(small_bag, kind="mcap"), "rosbag:{folder}", "recording.mcap"),
     "rosbag metadata": (small_bag, "rosbag:{folder}", "metadata.yaml"),
+    "nuscenes sweep": (
+        two_of_nuscenes,
+        "nuscenes:{folder}",
+        f"samples/LIDAR_TOP/n015__LIDAR_TOP__{START_US}.pcd.bin",
+    ),
+    "nuscenes files": (two_of_nuscenes, "nuscenes:{folder}", "v1.0-mini/sample_data.json"),
+    "nuscenes sensors": (two_of_nuscenes, "nuscenes:{folder}", "v1.0-mini/calibrated_sensor.json"),
+    "nuscenes poses": (two_of_nuscenes, "nuscenes:{folder}", "v1.0-mini/ego_pose.json"),
+    "nuscenes boxes": (two_of_nuscenes, "nuscenes:{folder}", "v1.0-mini/sample_annotation.json"),
+    "radiate sweep": (write_radiate, "radiate:{folder}", "velo_lidar/000002.csv"),
+    "radiate times": (write_radiate, "radiate:{folder}", "velo_lidar.txt"),
+    "radiate state": (write_radiate, "radiate:{folder}", "GPS_IMU_Twist/000002.txt"),
     "rosbag 1": (partial(small_bag, kind="ros1"), "rosbag:{folder}/drive.bag", "drive.bag"),
 }
 

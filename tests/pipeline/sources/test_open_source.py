@@ -68,18 +68,6 @@ def test_a_bare_path_is_recognised_by_what_is_in_it(astyx: Path, kitti: Path) ->
     assert type(open_source(str(kitti))) is type(open_source(f"kitti:{kitti}"))
 
 
-def test_a_path_of_no_known_kind_is_answered_with_what_it_holds(astyx: Path, tmp_path: Path) -> None:
-    odd = tmp_path / "odd"
-    (odd / "radar").mkdir(parents=True)
-    (odd / "a.csv").write_text("x")
-    with pytest.raises(SourceError, match=r"it holds 1 \.csv files and folders radar; use one of"):
-        open_source(str(odd))
-    with pytest.raises(SourceError, match=r"not a source: a \.csv file; use one of session"):
-        open_source(str(odd / "a.csv"))
-    with pytest.raises(SourceError, match=f"it holds recordings, for example {astyx}"):
-        open_source(str(astyx.parent))
-
-
 def test_relative_paths_and_home_work(astyx: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(astyx.parent)
     monkeypatch.setenv("HOME", str(astyx.parent))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from pipeline.formats.velodyne import OUT_OF_ORDER, BadPacket, Vlp16Decoder, read_packet, read_position
+from pipeline.formats.velodyne import OUT_OF_ORDER, BadPacket, VelodyneDecoder, read_packet, read_position
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import LidarConfig
 from pipeline.sources.live.devices.device_reader import ReadDevice, Reader
@@ -36,7 +36,7 @@ class LidarInput:
         self.offset_ns = round(config.time_offset_ms * 1e6)
         self.T_ego_lidar = config.mount.T_ego_sensor()
         self.on_packet: Callable[[bytes, int], object] | None = None
-        self._decoder = Vlp16Decoder(self.T_ego_lidar)
+        self._decoder = VelodyneDecoder(self.T_ego_lidar)
         self.stats.refused = self._decoder.counts.refused  # by the decoder; those of the position port are added
         self._pin = SenderPin("LiDAR", config.sender, _is_data, self.stats.refused, by_port=True, silent_s=_SILENT_S)
         self._looked, self._misfits, self._mixed = 0, 0, False

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.formats.velodyne import Vlp16Decoder
+from pipeline.formats.velodyne import VelodyneDecoder
 from pipeline.types import Sweep
 from tests.pipeline.formats.velodyne.streams import drive, spoil, time_us
 
@@ -42,8 +42,8 @@ def survives(packets: int, share: float, seed: int) -> Report:
     return Report(sent, spoiled, refused, sweeps)
 
 
-def _decoded(stream: list[tuple[bytes, bool]]) -> tuple[list[Sweep], Vlp16Decoder]:
-    decoder = Vlp16Decoder()
+def _decoded(stream: list[tuple[bytes, bool]]) -> tuple[list[Sweep], VelodyneDecoder]:
+    decoder = VelodyneDecoder()
     sweeps = [decoder.push(packet, None) for packet, _ in stream]
     return [sweep for sweep in (*sweeps, decoder.flush()) if sweep is not None], decoder
 

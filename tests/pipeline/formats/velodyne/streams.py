@@ -9,7 +9,7 @@ from pathlib import Path
 import dpkt
 import numpy as np
 
-from pipeline.formats.velodyne import PACKET_BYTES, Vlp16Decoder
+from pipeline.formats.velodyne import PACKET_BYTES, VelodyneDecoder
 from pipeline.formats.velodyne.encode import PACKETS_A_ROTATION, packets_of
 from pipeline.types import Sweep
 
@@ -40,7 +40,7 @@ def drive(sweeps: int) -> list[tuple[bytes, int]]:
     return stream
 
 
-def decoded(decoder: Vlp16Decoder, stream: list[tuple[bytes, int | None]] | list[tuple[bytes, int]]) -> list[Sweep]:
+def decoded(decoder: VelodyneDecoder, stream: list[tuple[bytes, int | None]] | list[tuple[bytes, int]]) -> list[Sweep]:
     """Every sweep of a stream, with the one under way at its end."""
     sweeps = [decoder.push(packet, t_host_ns) for packet, t_host_ns in stream]
     return [sweep for sweep in (*sweeps, decoder.flush()) if sweep is not None]

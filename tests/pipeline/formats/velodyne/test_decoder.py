@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.common.geometry import inverse, rotation, transform
-from pipeline.formats.velodyne import SensorClock, Vlp16Decoder
+from pipeline.formats.velodyne import SensorClock, VelodyneDecoder
 from pipeline.formats.velodyne.encode import PACKETS_A_ROTATION, packets_of
 from pipeline.types import Sweep
 from tests.pipeline.formats.velodyne.streams import (
@@ -30,7 +30,7 @@ def ranges(sweep: Sweep) -> float:
 
 
 def test_sweeps_come_back_as_they_were() -> None:
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     sweeps = decoded(decoder, STREAM)
     assert [round(ranges(sweep), 2) for sweep in sweeps] == [10.0, 9.9, 9.8, 9.7]
     for index, sweep in enumerate(sweeps):
@@ -48,7 +48,7 @@ def test_sweeps_come_back_as_they_were() -> None:
 
 
 def test_each_point_has_its_time() -> None:
-    sweep = decoded(Vlp16Decoder(), STREAM)[1]
+    sweep = decoded(VelodyneDecoder(), STREAM)[1]
     assert sweep.time_s is not None
     assert sweep.time_s.dtype == np.float32
     azimuth = np.arctan2(-sweep.points[:, 1], sweep.points[:, 0])
@@ -63,7 +63,7 @@ def test_cut_behind_the_mount_ahead() -> None:
     stream = [
         (packet, None) for i in range(3) for packet in packets_of(ring_wall(i * STEP_NS), None, 10**6 + i * 10**5)
     ]
-    sweep = decoded(Vlp16Decoder(T), stream)[0]
+    sweep = decoded(VelodyneDecoder(T), stream)[0]
     own = transform(inverse(T), sweep.points[:, :3].astype(np.float64))
     assert np.linalg.norm(own, axis=1) == pytest.approx(10.0, abs=0.01)
     assert sweep.time_s is not None
@@ -87,7 +87,7 @@ SPOILED = {
 @pytest.mark.parametrize("name", SPOILED)
 @pytest.mark.parametrize("at", [0, 1, 74, 75, 76, 100, 101, 299, 300])
 def test_a_bad_packet_between_good_ones_changes_nothing(name: str, at: int) -> None:
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     stream = [*STREAM[:at], (SPOILED[name], STREAM[min(at, 299)][1]), *STREAM[at:]]
     sweeps = decoded(decoder, stream)
     assert sum(decoder.counts.refused.values()) >= 1
@@ -101,10 +101,10 @@ def test_packets_out_of_order_and_doubled() -> None:
     for at in (3, 40, 90, 200):
         order[at : at + 4] = order[at : at + 4][::-1]
     order[120:120] = [119, 118]
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     sweeps = decoded(decoder, [STREAM[i] for i in order])
     assert dict(decoder.counts.refused) == {"doubled": 2}
-    for sweep, whole in zip(sweeps, decoded(Vlp16Decoder(), STREAM), strict=True):
+    for sweep, whole in zip(sweeps, decoded(VelodyneDecoder(), STREAM), strict=True):
         assert np.array_equal(sweep.points, whole.points)
         assert sweep.time_s is not None
         assert whole.time_s is not None
@@ -113,7 +113,7 @@ def test_packets_out_of_order_and_doubled() -> None:
 
 def test_a_packet_of_the_sweep_before_is_late() -> None:
     stream = [*STREAM[:74], *STREAM[75:80], STREAM[74], *STREAM[80:]]
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     sweeps = decoded(decoder, stream)
     assert dict(decoder.counts.refused) == {"late": 1}
     assert len(sweeps) == 4
@@ -121,7 +121,7 @@ def test_a_packet_of_the_sweep_before_is_late() -> None:
 
 
 def test_lost_packets_are_counted() -> None:
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     sweeps = decoded(decoder, [it for i, it in enumerate(STREAM) if i not in (90, 91, 92, 130)])
     assert decoder.counts.lost == 4
     assert [len(sweep.points) < POINTS for sweep in sweeps] == [False, True, False, False]
@@ -129,12 +129,12 @@ def test_lost_packets_are_counted() -> None:
 
 def test_lost_rotation_joins_no_two_sweeps() -> None:
     """From the middle of a rotation to the middle of the next but one: azimuth alone would not show it."""
-    sweeps = decoded(Vlp16Decoder(), [*STREAM[:40], *STREAM[40 + 75 :]])
+    sweeps = decoded(VelodyneDecoder(), [*STREAM[:40], *STREAM[40 + 75 :]])
     assert [round(ranges(sweep), 2) for sweep in sweeps] == [9.8, 9.7]
 
 
 def test_begins_and_ends_anywhere() -> None:
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     sweeps = decoded(decoder, STREAM[30:-30])
     assert [round(ranges(sweep), 2) for sweep in sweeps] == [9.9, 9.8]
     assert decoder.counts.partial == 2
@@ -144,7 +144,7 @@ def test_begins_and_ends_anywhere() -> None:
 def test_a_sensor_set_to_send_the_front_half_only(with_host: bool) -> None:
     """The first rotation could be one seen in part; from the second on it is known to be all there is."""
     front = [(packet, t if with_host else None) for i, (packet, t) in enumerate(STREAM) if 19 <= i % 75 < 56]
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     sweeps = decoded(decoder, front)
     assert [round(ranges(sweep), 2) for sweep in sweeps] == [9.9, 9.8, 9.7]
     assert not decoder.counts.refused
@@ -160,7 +160,7 @@ def test_silence(with_host: bool) -> None:
     stream = [(packet, t) for packet, t in STREAM[:190]]
     stream += [(stamped(packet, time_us(packet) + 10_000_000), t + 10_000_000_000) for packet, t in later]
     stream = [(packet, t if with_host else None) for packet, t in stream]
-    sweeps = decoded(Vlp16Decoder(), stream)
+    sweeps = decoded(VelodyneDecoder(), stream)
     assert [round(ranges(sweep), 2) for sweep in sweeps] == [10.0, 9.9, 10.0, 9.9]
 
 
@@ -168,7 +168,7 @@ def test_sensor_that_starts_anew_keeps_the_hosts_time() -> None:
     """Switched off and on, it counts from zero: from its second packet on all is well."""
     start = time_us(STREAM[0][0])
     again = [(stamped(packet, time_us(packet) - start), t + 2_000_000_000) for packet, t in STREAM]
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     sweeps = decoded(decoder, STREAM + again)
     assert len(sweeps) == 8
     assert sweeps[-1].t_ns == pytest.approx(sweeps[3].t_ns + 2_000_000_000, abs=2_000)
@@ -178,7 +178,7 @@ def test_sensor_that_starts_anew_keeps_the_hosts_time() -> None:
 def test_hour_ends_within_a_sweep() -> None:
     start = time_us(STREAM[0][0])
     shifted = [(stamped(packet, (time_us(packet) - start + 3_599_850_000) % 3_600_000_000), t) for packet, t in STREAM]
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     sweeps = decoded(decoder, shifted)
     assert np.diff([sweep.t_ns for sweep in sweeps]) == pytest.approx(STEP_NS, abs=2_000)
     assert len(sweeps) == 4
@@ -189,32 +189,32 @@ def test_hour_ends_within_a_sweep() -> None:
 
 
 def test_same_stream_same_bytes() -> None:
-    for one, other in zip(decoded(Vlp16Decoder(), STREAM), decoded(Vlp16Decoder(), STREAM), strict=True):
+    for one, other in zip(decoded(VelodyneDecoder(), STREAM), decoded(VelodyneDecoder(), STREAM), strict=True):
         assert one.points.tobytes() == other.points.tobytes()
         assert one.t_ns == other.t_ns
 
 
 def test_no_host_time() -> None:
-    decoder = Vlp16Decoder(clock=SensorClock())
+    decoder = VelodyneDecoder(clock=SensorClock())
     sweeps = decoded(decoder, [(packet, None) for packet, _ in STREAM])
     assert decoder.clock.reference == "sensor"
     assert sweeps[0].t_ns == pytest.approx(START_NS % 3_600_000_000_000, abs=2_000)
 
 
 def test_counts_in_words() -> None:
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     decoder.push(bytes(1206), None)
     decoder.push(bytes(1206), None)
     decoder.push(b"", None)
     assert decoder.counts.about_refused() == "3 packets refused: 2 all zero, 1 not 1206 bytes"
-    assert Vlp16Decoder().counts.about_refused() == ""
+    assert VelodyneDecoder().counts.about_refused() == ""
 
 
 def test_dual_return_gives_both_returns_once() -> None:
     """Two blocks in a row hold the two returns of the same firings: of a wall behind a fence both are kept, of a wall
     alone, where the two are the same, one."""
     packets = [packet for index in range(3) for packet in dual_packets(index)]
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     sweeps = decoded(decoder, [(packet, None) for packet in packets])
     assert len(sweeps) == 3
     assert not decoder.counts.refused
@@ -249,6 +249,6 @@ def test_nothing_returned() -> None:
     """A sensor in an empty field, or covered: no sweep without a point."""
     blank = Sweep(0, np.zeros((0, 4), np.float32), np.zeros(0, np.uint8), 16)
     assert (
-        decoded(Vlp16Decoder(), [(packet, None) for i in range(2) for packet in packets_of(blank, None, i * 10**5)])
+        decoded(VelodyneDecoder(), [(packet, None) for i in range(2) for packet in packets_of(blank, None, i * 10**5)])
         == []
     )

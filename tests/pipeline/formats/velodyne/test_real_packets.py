@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial import cKDTree
 
-from pipeline.formats.velodyne import SensorClock, Vlp16Decoder, read_position
+from pipeline.formats.velodyne import SensorClock, VelodyneDecoder, read_position
 from tests.pipeline.formats.velodyne.streams import decoded, einride, mrpt
 
 SCAN = "velodyne_msgs/msg/VelodyneScan"
@@ -25,7 +25,7 @@ Cloud = npt.NDArray[np.float64]
 
 def test_einride(data_dir: Path) -> None:
     """1000 raw payloads without any time of reception: 13 rotations, two more in part."""
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     sweeps = decoded(decoder, [(packet, None) for packet in einride(data_dir)])
     assert (decoder.counts.sweeps, decoder.counts.partial, decoder.counts.lost) == (13, 2, 0)
     assert not decoder.counts.refused
@@ -36,7 +36,7 @@ def test_einride(data_dir: Path) -> None:
 
 def test_mrpt_follows_gps(data_dir: Path) -> None:
     """The pcap's host clock is 0.37 s ahead; position packets say that the sensor follows GPS: its time is UTC."""
-    decoder = Vlp16Decoder()
+    decoder = VelodyneDecoder()
     sweeps = []
     for payload, t_host_ns, port in mrpt(data_dir):
         if port == 8308:
@@ -78,7 +78,7 @@ def _decoded(packets: list[bytes]) -> Cloud:
     rotation before, so that one's last milliseconds are here too.
     """
     T = np.diag([-1.0, -1.0, 1.0, 1.0])
-    before, last = decoded(Vlp16Decoder(T, SensorClock()), [(packet, None) for packet in packets])[-2:]
+    before, last = decoded(VelodyneDecoder(T, SensorClock()), [(packet, None) for packet in packets])[-2:]
     assert before.time_s is not None
     at_the_cut = before.time_s > before.time_s.max() - 0.001
     xyz = np.vstack([before.points[at_the_cut, :3], last.points[:, :3]]).astype(np.float64) * [-1.0, -1.0, 1.0]

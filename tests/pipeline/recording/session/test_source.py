@@ -282,6 +282,6 @@ def test_a_file_that_is_no_session_is_named_with_the_reason(
     path = tmp_path / "a.mcap"
     make(path)
     with pytest.raises(SourceError, match=complaint) as raised:
-        open_source(str(path))
+        open_source(f"mcap:{path}")
     assert str(path) in str(raised.value)
     assert "\n" not in str(raised.value)

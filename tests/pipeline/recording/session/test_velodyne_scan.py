@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.common.geometry import rotation
-from pipeline.formats.velodyne import Vlp16Decoder
+from pipeline.formats.velodyne import VelodyneDecoder
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.rewrite import recover
 from pipeline.recording.save import save
@@ -32,7 +32,7 @@ def mounted() -> RawLidar:
 
 def record(recorder: Segments, lidar: RawLidar, behind: int = 0) -> list[Frame]:
     """Packets as they come, and a frame for each sweep that they complete, when so many more sweeps have come."""
-    decoder, batch, frames = Vlp16Decoder(lidar.T_ego_lidar), [], []
+    decoder, batch, frames = VelodyneDecoder(lidar.T_ego_lidar), [], []
     for packet, t_ns in drive(SWEEPS):
         sweep = decoder.push(packet, t_ns)
         batch.append((t_ns, packet))

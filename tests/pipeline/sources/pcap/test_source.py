@@ -98,7 +98,7 @@ def test_another_port(tmp_path: Path) -> None:
     other = lidar(3, port=2369)
     assert len(opened(tmp_path, pcap(other))) == 3
     assert len(opened(tmp_path, pcap(other), "?port=2369")) == 3
-    with pytest.raises(SourceError, match="no packets of a VLP-16"):
+    with pytest.raises(SourceError, match="no packets of a Velodyne"):
         opened(tmp_path, pcap(other), "?port=2368")
 
 
@@ -149,8 +149,10 @@ def test_a_disc_that_fails_is_named() -> None:
 
 
 def test_another_velodyne_is_named(tmp_path: Path) -> None:
-    others = [(t_ns, port, with_byte(packet, PRODUCT, 0x21)) for t_ns, port, packet in lidar(2)]
-    with pytest.raises(SourceError, match=r"drive.pcap: packets of a Velodyne HDL-32E; only the VLP-16 is supported"):
+    others = [(t_ns, port, with_byte(packet, PRODUCT, 0xA1)) for t_ns, port, packet in lidar(2)]
+    with pytest.raises(
+        SourceError, match=r"drive.pcap: packets of a Velodyne VLS-128 \(Alpha Prime\); only VLP-16, .* VLP-32C are"
+    ):
         opened(tmp_path, pcap(others))
 
 

@@ -285,8 +285,8 @@ def test_another_velodyne_is_named(tmp_path: Path) -> None:
     from tests.pipeline.formats.velodyne.streams import drive
 
     with BagWriter(tmp_path / "drive", "db3") as bag:
-        bag.write("/velodyne_packets", bag.scan([(with_byte(p, PRODUCT, 0x28), t) for p, t in drive(1)]), HEADER_NS)
-    with pytest.raises(SourceError, match=r"packets of a Velodyne VLP-32C; only the VLP-16 is supported"):
+        bag.write("/velodyne_packets", bag.scan([(with_byte(p, PRODUCT, 0xA1), t) for p, t in drive(1)]), HEADER_NS)
+    with pytest.raises(SourceError, match=r"packets of a Velodyne VLS-128 \(Alpha Prime\); only VLP-16"):
         open_source(f"rosbag:{tmp_path / 'drive'}")
 
 

@@ -12,7 +12,7 @@ from pipeline.common.geometry import iou_matrix
 from pipeline.formats.kitti_records import parse_labels, parse_oxts, parse_timestamps
 from pipeline.params import AlignmentParams
 from pipeline.sources import SourceError, open_source
-from pipeline.sources.hdl64_rings import ring_elevations_deg, rings_by_elevation
+from pipeline.sources.kitti.hdl64_rings import ring_elevations_deg, rings_by_elevation
 from tests.pipeline.sources.conftest import KITTI_BASELINE_M, KITTI_LABEL, T_ego_rect, object_calibration, rings_file
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.sources.hdl64_rings import keep_rings, match_vlp16, ring_elevations_deg, turns
+from pipeline.sources.kitti.hdl64_rings import keep_rings, match_vlp16, ring_elevations_deg, turns
 from tests.pipeline.sources.conftest import rings_file
 
 

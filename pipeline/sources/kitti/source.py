@@ -1,7 +1,7 @@
 """KITTI: HDL-64 and colour camera 2 (Geiger et al. 2013), as raw drives, folders in the object benchmark's form and
-odometry sequences.
+odometry sequences; and KITTI-360, with its camera 0.
 
-``pipeline.sources.kitti_layouts`` knows where each layout keeps what.
+``pipeline.sources.kitti.layouts`` knows where each layout keeps what.
 
 The ego frame is the Velodyne's axes. Intensity, 0–1 in the files, is 0–255 here, as a VLP-16's reflectivity.
 """
@@ -14,9 +14,16 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.formats.file_reading import image_of, image_size, read_bytes, recording_folder
-from pipeline.formats.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
+from pipeline.formats.float_points import parse_points
+from pipeline.formats.kitti_calibration import (
+    KittiCalibration,
+    parse_360_calibration,
+    parse_object_calibration,
+    parse_raw_calibration,
+)
 from pipeline.formats.kitti_records import parse_labels, parse_oxts
-from pipeline.sources.hdl64_rings import (
+from pipeline.sources.kitti.files import Files
+from pipeline.sources.kitti.hdl64_rings import (
     NOMINAL_ELEVATIONS_DEG,
     RINGS,
     Turns,
@@ -27,7 +34,8 @@ from pipeline.sources.hdl64_rings import (
     rings_by_elevation,
     turns,
 )
-from pipeline.sources.kitti_layouts import Files, files_of, motion_of, sequence_calibration
+from pipeline.sources.kitti.kitti360 import drives_in
+from pipeline.sources.kitti.layouts import files_of, motion_of, sequence_calibration
 from pipeline.types import F32, F64, EgoState, Frame, GnssFix, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
@@ -175,6 +183,10 @@ class KittiSource:
             cameras, velodyne = self._files.raw_calibration
             names = (cameras.name, velodyne.name)
             return parse_raw_calibration(read_bytes(cameras), read_bytes(velodyne), names, self._size)
+        if self._files.calibration_360 is not None:
+            velodyne, cameras = self._files.calibration_360
+            names = (velodyne.name, cameras.name)
+            return parse_360_calibration(read_bytes(velodyne), read_bytes(cameras), names, self._size)
         if self._files.sequence_calibration is not None:
             return sequence_calibration(self._files.sequence_calibration, self._size)
         if not self._files.calibrations:
@@ -201,7 +213,9 @@ class KittiSource:
 
     def _about(self) -> tuple[str, ...]:
         notes = []
-        if self._channels:
+        if not self._files.sweeps:
+            notes.append("no LiDAR: distances come from the camera alone")
+        elif self._channels:
             notes.append(f"{len(self._channels)} of a VLP-16's 16 rings remain: the HDL-64 reaches only about +3°")
         if not self._files.lidar_stamps and not self._files.camera_stamps:
             notes.append("no time stamps: 10 Hz assumed")
@@ -211,21 +225,10 @@ class KittiSource:
 
 
 def parse_velodyne(data: bytes, file: str, notes: list[str]) -> F32:
-    """(N, 4) float32 ``x y z intensity`` (0–255) of a Velodyne file. Points that are not finite or farther than a
-    kilometre are left out and counted in ``notes``, as is a cut last point; a point at the sensor itself is no return
-    and says nothing. SourceError when none is left."""
-    whole = len(data) // 16
-    if len(data) % 16:
-        notes.append(f"{file}: truncated in the middle of a point")
-    raw = np.frombuffer(data, dtype="<f4", count=whole * 4).reshape(-1, 4)
-    with np.errstate(invalid="ignore"):  # comparing a signalling NaN of a damaged file
-        good = np.all(np.abs(raw[:, :3]) < 1000.0, axis=1) & (raw[:, 3] >= 0.0) & (raw[:, 3] <= 1.0)
-    kept = raw[good & np.any(raw[:, :3] != 0.0, axis=1)]
-    if not len(kept):
-        raise SourceError(f"{file}: no LiDAR points")
-    if not np.all(good):
-        notes.append(f"{file}: {len(raw) - np.count_nonzero(good)} unreadable points skipped")
-    return np.ascontiguousarray(kept * np.array([1.0, 1.0, 1.0, 255.0]), dtype=np.float32)
+    """(N, 4) float32 ``x y z intensity`` (0–255) of a Velodyne file, as ``parse_points`` reads it."""
+    points = parse_points(data, file, 4, 1.0, notes)
+    points[:, 3] *= 255.0
+    return points
 
 
 def _ticks(names: list[str], files: Files) -> list[int]:
@@ -244,7 +247,8 @@ def _stamp(stamps: tuple[int, ...], name: str) -> int | None:
 
 
 def _what_it_holds(folder: Path) -> str:
-    drives = sorted(path.name for path in folder.glob("*_drive_*") if path.is_dir())
+    drives = sorted(path for path in folder.glob("*_drive_*") if path.is_dir())
+    drives = drives or [folder / "data_3d_raw" / name for name in drives_in(folder)]
     if drives:
-        return f"it holds drives; open one of them, for example kitti:{folder / drives[0]}"
+        return f"it holds drives; open one of them, for example kitti:{drives[0]}"
     return "neither velodyne/*.bin nor velodyne_points/data/*.bin nor images in it"

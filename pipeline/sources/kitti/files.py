@@ -1,0 +1,54 @@
+"""What a recording in one of KITTI's layouts consists of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pipeline.formats.file_reading import in_order
+from pipeline.formats.kitti_records import parse_timestamps
+
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+
+@dataclass(frozen=True)
+class Files:
+    """Where a recording keeps what; files by frame name, stamps by frame number."""
+
+    images: dict[str, Path]
+    """Images by frame name."""
+    sweeps: dict[str, Path]
+    """Point clouds by frame name."""
+    lidar_stamps: tuple[int, ...] = ()
+    """Nanoseconds; empty where the layout has none."""
+    camera_stamps: tuple[int, ...] = ()
+    """Nanoseconds; empty where the layout has none."""
+    oxts: dict[str, Path] = field(default_factory=dict)
+    """Records of the inertial unit, by frame name."""
+    labels: dict[str, Path] = field(default_factory=dict)
+    """Object benchmark: by frame name."""
+    calibrations: dict[str, Path] = field(default_factory=dict)
+    """Object benchmark: by frame name."""
+    raw_calibration: tuple[Path, Path] | None = None
+    """Raw drives: of the cameras, and of the Velodyne."""
+    sequence_calibration: Path | None = None
+    """Odometry sequences: one file for all."""
+    poses: Path | None = None
+    """Odometry sequences: where the left camera was, a line a frame."""
+    calibration_360: tuple[Path, Path] | None = None
+    """KITTI-360: of the Velodyne, and of the cameras."""
+    camera_poses: Path | None = None
+    """KITTI-360: where the left camera was, by frame number."""
+
+    @property
+    def names(self) -> list[str]:
+        """Of every frame, in order."""
+        return in_order(self.sweeps.keys() | self.images.keys())
+
+
+def read_stamps(path: Path) -> tuple[int, ...]:
+    """Nanoseconds of each line of ``timestamps.txt``; empty when there is no such file."""
+    try:
+        return parse_timestamps(path.read_bytes())
+    except OSError:
+        return ()
