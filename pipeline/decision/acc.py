@@ -194,7 +194,7 @@ def _on_course(situation: Situation, params: AccParams) -> list[FusedObject]:
         and item.ttc_s < params.ttc_limit_s
         and (closing_speed_mps(item) or 0.0) > STANDSTILL_MPS
         and is_dependable(item)
-        and enters_corridor(item, situation.path)
+        and enters_corridor(item, situation.path, situation.lead)
     ]
 
 

@@ -81,7 +81,9 @@ def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
         if closing is None or closing <= STANDSTILL_MPS or not item.distance_m or item.ttc_s is None:
             continue
         is_lead = situation.lead is not None and item.id == situation.lead.id
-        if (is_lead and not item.carried) or (is_dependable(item) and enters_corridor(item, situation.path)):
+        if (is_lead and not item.carried) or (
+            is_dependable(item) and enters_corridor(item, situation.path, situation.lead)
+        ):
             required = required_decel_mps2(item.distance_m, closing, params)
             found.append(Threat(item.id, item.ttc_s, required, _justified(item, required)))
     return tuple(found)

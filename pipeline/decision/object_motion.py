@@ -19,7 +19,7 @@ SMALLEST_CLOSING_MPS = 0.1
 """A gap that shrinks more slowly than this does not shrink measurably, and has no TTC."""
 _SMALLEST_GAP_M = 0.1
 _ONCOMING_MPS = 3.0
-"""What comes nearer by its own motion at walking pace may be a crossing vehicle, or an error of its speed."""
+"""Slower, it may be an error of its speed."""
 
 
 def closing_speed_mps(item: FusedObject) -> float | None:
@@ -57,11 +57,11 @@ def _described(item: FusedObject, ego: EgoState | None, params: MotionParams) ->
     x, y, _ = item.closest_point
     vx = item.velocity_mps[0] + ego.speed_mps - yaw_rate * y
     vy = item.velocity_mps[1] + yaw_rate * x
-    speed, towards_mps = hypot(vx, vy), -(x * vx + y * vy) / max(hypot(x, y), _SMALLEST_GAP_M)
+    speed = hypot(vx, vy)
     return evolve(
         item,
         ttc_s=ttc,
         speed_over_ground_mps=speed,
         moving=speed > params.moving_mps,
-        oncoming=towards_mps > _ONCOMING_MPS,
+        oncoming=-vx > max(_ONCOMING_MPS, abs(vy)),
     )

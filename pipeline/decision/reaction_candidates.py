@@ -8,29 +8,51 @@ from __future__ import annotations
 
 from pipeline.decision.gates import ABREAST_M, is_solid
 from pipeline.decision.path_position import believed_mps
-from pipeline.types import FusedObject, Path
+from pipeline.path.estimates import STEP_M
+from pipeline.types import Cipv, FusedObject, Path
 
 _VELOCITY_HITS = 3
-"""After two sightings the LiDAR's velocity is the difference of two noisy positions, which may point across the road.
-That the camera has followed the object for longer does not help."""
+"""After two sightings the LiDAR's velocity is the difference of two noisy positions, which may point across the road,
+and so it is after a sighting that lay elsewhere than expected. That the camera has followed the object for longer does
+not help."""
+
+_SURE_SIGMAS = 2.0
 
 
 def is_dependable(item: FusedObject) -> bool:
     """Seen now, with a measured range, and every condition of a lead met but class and place. A box height alone says
     too little about speed to brake for what is not even the lead."""
-    has_velocity = item.ranged and (not item.imaged or item.lidar_hits >= _VELOCITY_HITS)
+    has_velocity = item.ranged and (not item.imaged or item.lidar_steady >= _VELOCITY_HITS)
     return has_velocity and not item.carried and is_solid(item)
 
 
-def enters_corridor(item: FusedObject, path: Path) -> bool:
+def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None) -> bool:
     """Whether the object is in the corridor, or its sideways motion takes it there before the car reaches it. What
-    stands still beside the road stays there: its sideways speed is noise."""
+    stands still beside the road stays there: its sideways speed is noise.
+
+    Where the path is known less well than it is wide no course leads into it: in a bend other traffic follows the road,
+    as the car will. Oncoming traffic, which keeps to its lane, must be surely in ours. Behind the lead neither it nor
+    what crosses there can be reached.
+    """
     if item.path_offset_m is None or item.velocity_mps is None or item.ttc_s is None:
         return False
-    if item.in_path or item.moving is False:
+    distance_m, oncoming = item.distance_m or 0.0, bool(item.oncoming)
+    sigma_m = _sigma_m(path, distance_m)
+    if oncoming or not item.in_path:
+        is_hidden = lead is not None and distance_m > lead.distance_m
+        if is_hidden or sigma_m > path.half_width_m:
+            return False
+    if item.moving is False or (item.in_path and not oncoming):
         return item.in_path
     if item.closest_point is None or item.closest_point[0] < ABREAST_M:
         return False  # beside the car already: braking would not avoid it
     sideways = believed_mps(item.lateral_mps, item)
     toward = -sideways if item.path_offset_m > 0 else sideways
-    return abs(item.path_offset_m) - max(toward, 0.0) * item.ttc_s <= path.half_width_m
+    aside_m = abs(item.path_offset_m) - max(toward, 0.0) * item.ttc_s
+    return aside_m + (_SURE_SIGMAS * sigma_m if oncoming else 0.0) <= path.half_width_m
+
+
+def _sigma_m(path: Path, ahead_m: float) -> float:
+    """Standard deviation of the path so far ahead."""
+    profile = path.profile_m
+    return float(profile[min(int(ahead_m / STEP_M), len(profile) - 1)]) if len(profile) else 0.0

@@ -66,6 +66,7 @@ def hit_row(
         lidar_points=hit.obstacle.points,
         lidar_track=hit.id,
         lidar_hits=hit.hits,
+        lidar_steady=hit.steady,
         rigid_mps=hit.rigid_mps,
         gates=gates,
     )

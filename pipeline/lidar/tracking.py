@@ -32,6 +32,9 @@ MIN_GATE_POINTS = 10
 """Counts and densities below this many points are noise: one ring more or less doubles them."""
 _SIDES_FRAMES = 10
 """Sightings over which the sides of a footprint are compared: a second at 10 Hz."""
+_JUMP_M = 1.0
+"""A cluster that lies farther from where its object was expected is another part of it: several times its noise, and
+ten times what braking at 1 g does within a tenth of a second. Its velocity is wrong for a while."""
 THINNEST_M = 0.5
 """Thinnest footprint for comparing densities. A rear alone is as thin as the LiDAR's noise; with some flank the same
 car has twenty times the area."""
@@ -89,6 +92,7 @@ def track(
     seen = looks(sweep)
     filters = kalman.predict(state.filters, dt_s, params.accel_sigma_mps2)
     partner = associate(state, filters, seen, dt_s, params)
+    jumped = _jumped(filters, seen, partner)
     filters = _correct(filters, seen.place, partner, params)
     where = np.concatenate([seen.place, seen.sides], axis=1)
     history = recorded(state.history, partner, where, clock_s, max(params.trajectory_frames, _SIDES_FRAMES))
@@ -104,7 +108,8 @@ def track(
     for i, (last, j, speed) in enumerate(zip(state.tracks, partner.tolist(), velocity.tolist(), strict=True)):
         if j >= 0:
             known = (speed[0], speed[1]) if speed[0] == speed[0] else None
-            tracks.append(LidarTrack(last.id, sweep[j], known, last.hits + 1, 0, False, 0.0, sideways[i]))
+            steady = 0 if jumped[i] and last.hits > 1 else last.steady + 1
+            tracks.append(LidarTrack(last.id, sweep[j], known, last.hits + 1, 0, False, 0.0, sideways[i], steady))
         elif _lives_on(last, last.unseen_s + dt_s, has_sweep, params):
             tracks.append(_carried(last, dt_s))
         else:
@@ -225,6 +230,14 @@ def _extrapolated(state: LidarTrackerState, dt_s: float) -> F64:
     return np.asarray(state.history[:, -1, 1:3] + velocity * since_s)
 
 
+def _jumped(filters: kalman.CvState, seen: Looks, partner: I64) -> list[bool]:
+    """Whether each track's obstacle lies elsewhere than expected. filters: predicted to now."""
+    if not len(seen.place):
+        return [False] * len(partner)
+    away = seen.place[partner] - filters.mean[:, :2]
+    return [far and j >= 0 for far, j in zip((np.hypot(*away.T) > _JUMP_M).tolist(), partner.tolist(), strict=True)]
+
+
 def _correct(filters: kalman.CvState, place: F64, partner: I64, params: LidarTrackingParams) -> kalman.CvState:
     """The filters after their measurements; as predicted where there is none."""
     rows = np.flatnonzero(partner >= 0)
@@ -254,7 +267,9 @@ def _carried(last: LidarTrack, dt_s: float) -> LidarTrack:
     there = Cuboid(_moved(cuboid.center, vx * dt_s, vy * dt_s), cuboid.size, cuboid.yaw_rad)
     moved = Obstacle(-1, there, _moved(closest, vx * dt_s, vy * dt_s), points, density, spread)
     unseen_s = last.unseen_s + dt_s
-    return LidarTrack(last.id, moved, last.velocity_mps, last.hits, last.missed + 1, True, unseen_s, last.rigid_mps)
+    return LidarTrack(
+        last.id, moved, last.velocity_mps, last.hits, last.missed + 1, True, unseen_s, last.rigid_mps, last.steady
+    )
 
 
 def _moved(point: Point3, dx: float, dy: float) -> Point3:

@@ -125,6 +125,8 @@ class LidarTrack(NamedTuple):
     """Time since it was last seen."""
     rigid_mps: float | None = None
     """How fast both sides of it surely move together along ego y, relative to ego; None where that is not asked."""
+    steady: int = 1
+    """Sightings in a row, with the first one, that lay where the track was expected."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +216,7 @@ class FusedObject:
     speed_over_ground_mps: float | None = None
     """None where own speed is not known."""
     oncoming: bool | None = None
-    """Whether it drives towards the ego vehicle; None while its own speed is not known."""
+    """Whether it drives against our direction, within 45°; None where own speed is not known."""
     moving: bool | None = None
     """Whether it moves over the ground; None where own speed is not known."""
     ttc_s: float | None = None
@@ -234,6 +236,8 @@ class FusedObject:
     neither."""
     lidar_hits: int = 0
     """Sightings of its LiDAR track."""
+    lidar_steady: int = 0
+    """Of these, the last ones in a row that lay where the track was expected."""
     justifies: Braking = Braking.FULL
     """The hardest braking that what is known of it can justify."""
     camera_ranges: int = 0

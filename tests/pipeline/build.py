@@ -69,5 +69,6 @@ def fused(
         lidar_track=None,
         vision_track=None,
         lidar_hits=0 if source == "V" else hits,
+        lidar_steady=0 if source == "V" else hits,
         camera_ranges=0 if source == "L" else hits,
     )

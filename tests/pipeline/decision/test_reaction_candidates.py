@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from pipeline.decision.cipv import CipvState, choose
@@ -11,7 +12,7 @@ from pipeline.decision.object_motion import describe
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
 from pipeline.params import CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
-from pipeline.types import EgoState, FusedObject
+from pipeline.types import Cipv, EgoState, FusedObject
 from tests.pipeline.build import fused, moment
 
 PATH = corridor(None, PathParams(half_width_m=1.5))
@@ -33,9 +34,14 @@ def judged(item: FusedObject, ego_mps: float | None = 20.0) -> FusedObject:
         pytest.param(fused(1, 15.0, 3.0, source="V"), False, id="camera alone: its speed comes from a box height"),
         pytest.param(fused(1, 15.0, 3.0, source="L", hits=2), False, id="a blob seen twice"),
         pytest.param(
-            dataclasses.replace(fused(1, 15.0, 3.0, hits=40), lidar_hits=2),
+            dataclasses.replace(fused(1, 15.0, 3.0, hits=40), lidar_steady=2),
             False,
             id="followed by the camera for long, by the LiDAR only since the sweep before",
+        ),
+        pytest.param(
+            dataclasses.replace(fused(1, 15.0, 3.0, hits=40), lidar_steady=0),
+            False,
+            id="followed for long, but another part of it was seen",
         ),
         pytest.param(fused(1, 15.0, 3.0, source="L", height=0.1), False, id="a kerb"),
         pytest.param(dataclasses.replace(fused(1, 15.0, 3.0), seen_by=""), False, id="not seen now"),
@@ -67,4 +73,35 @@ def test_nothing_is_dependable_before_it_was_judged() -> None:
     ],
 )
 def test_enters_corridor(item: FusedObject, ego_mps: float | None, enters: bool) -> None:
-    assert enters_corridor(judged(item, ego_mps), PATH) is enters
+    assert enters_corridor(judged(item, ego_mps), PATH, None) is enters
+
+
+OVER_THERE = fused(1, 30.0, -8.0, velocity=(-20.0, 6.0))
+"""Crosses, and will be in the corridor."""
+IN_OUR_LANE = fused(1, 30.0, 0.2, velocity=(-35.0, 0.0))
+"""Comes towards us."""
+STANDS = fused(1, 30.0, 0.2, velocity=(-20.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("item", "path_sigma_m", "lead_m", "enters"),
+    [
+        pytest.param(OVER_THERE, 0.3, None, True, id="crosses"),
+        pytest.param(OVER_THERE, 2.5, None, False, id="crosses, on a path that may bend that way"),
+        pytest.param(OVER_THERE, 0.3, 12.0, False, id="crosses behind the lead"),
+        pytest.param(OVER_THERE, 0.3, 60.0, True, id="crosses before the lead"),
+        pytest.param(IN_OUR_LANE, 0.3, None, True, id="oncoming, in our lane"),
+        pytest.param(IN_OUR_LANE, 2.5, None, False, id="oncoming, before a bend"),
+        pytest.param(IN_OUR_LANE, 1.0, None, False, id="oncoming, in our lane, more likely than not"),
+        pytest.param(IN_OUR_LANE, 0.3, 12.0, False, id="oncoming, behind the lead"),
+        pytest.param(STANDS, 2.5, None, True, id="stands in the way, wherever that leads"),
+        pytest.param(STANDS, 0.3, 12.0, True, id="stands before the lead, which may swerve"),
+    ],
+)
+def test_where_a_course_says_nothing(
+    item: FusedObject, path_sigma_m: float, lead_m: float | None, enters: bool
+) -> None:
+    path = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), path_sigma_m))
+    lead = Cipv(9, lead_m, 0.0, None, "") if lead_m is not None else None
+    known = judged(item, 20.0)
+    assert enters_corridor(known, path, lead) is enters
