@@ -15,8 +15,8 @@ _VELOCITY_HITS = 3
 """After two sightings the LiDAR's velocity is the difference of two noisy positions, which may point across the road,
 and so it is after a sighting that lay elsewhere than expected. That the camera has followed the object for longer does
 not help."""
-
 _SURE_SIGMAS = 2.0
+"""Of the path's uncertainty, by which oncoming traffic must be inside the corridor."""
 
 
 def is_dependable(item: FusedObject) -> bool:
