@@ -45,7 +45,7 @@ NEAREST_M, FARTHEST_M = 3.0, 30.0
 MOST = 500
 """Borders of one frame that are looked at."""
 _DESKEW = DeskewParams(enabled=True)
-_NOT_CLEAR = "no lag between camera and LiDAR matches the edges clearly best; drive past parked cars"
+_NOT_CLEAR = "no lag between camera and LiDAR stands out as the best match; drive past parked cars"
 
 
 class NoOffset(BadInput):

@@ -56,9 +56,7 @@ def tracks_of(
 
 def renamed(kinds: Iterable[tuple[str, str]]) -> list[str]:
     """A sentence for each word of labels that is another class here. kinds: that word and the class, of each object."""
-    return [
-        f"{count:,} {kind} are taken for class {label!r}" for (kind, label), count in sorted(Counter(kinds).items())
-    ]
+    return [f"{count:,} {kind} are read as class {label!r}" for (kind, label), count in sorted(Counter(kinds).items())]
 
 
 def _has_id(each: TruthObject) -> bool:

@@ -125,7 +125,7 @@ class KittiSource:
             return Sweep(tick, points, (RINGS - 1 - turn).astype(np.uint8), RINGS)
         kept, ring = keep_rings(points, turn, own_channels if own_channels is not None else self._channels)
         if not len(kept):
-            notes.append(f"{path.name}: none of its rings lies where a VLP-16 has one")
+            notes.append(f"{path.name}: none of its rings matches the elevation of a VLP-16 ring")
             return None
         return Sweep(tick, kept, ring, 16)
 

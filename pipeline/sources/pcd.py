@@ -43,7 +43,7 @@ class PcdSource:
         self.uri, self.title = uri, folder.resolve().name
         self._sweeps = next((found for name in _CLOUDS if (found := files_by_name(folder / name, (".pcd",)))), {})
         if not self._sweeps:
-            raise SourceError(f"{path}: no PCD files in it")
+            raise SourceError(f"{path}: contains no PCD files")
         self._names = list(self._sweeps)
         self._images = next((found for name in _IMAGES if (found := files_by_name(folder / name, _IMAGE_SUFFIXES))), {})
         self._size = image_size(self._images.values()) or (0, 0)

@@ -1,5 +1,5 @@
-"""The tables of a batch: each column declared once, with its unit and meaning. docs/reference/fleet-tables.md is made
-from this."""
+"""The tables of a batch: each column is declared once, with its unit and meaning. docs/reference/fleet-tables.md is
+generated from these declarations."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def errors_section(run: Drives) -> ReportSection:
                 "Distance errors within the σ given with them, %",
                 SIGMA_COLUMNS,
                 sigma_rows(run),
-                caption="Normal errors: 68, 95 and 99.7 %. A smaller share: the pipeline claims more than it knows.",
+                caption="Normal errors: 68, 95 and 99.7 %. A smaller share means that the pipeline is overconfident.",
                 decimals=0,
             ),
         ),

@@ -167,7 +167,7 @@ class _Index:
         if counts.models:
             return f"packets of a Velodyne {counts.models.most_common(1)[0][0]}; only the VLP-16 is supported"
         says = [f"no complete sweep in {counts.packets} packets to port {port}"] if counts.packets else []
-        says = says or [f"no packets of a VLP-16 to port {port} in it"]
+        says = says or [f"no VLP-16 packets to port {port}"]
         says += [counts.about_refused()] if counts.refused else []
         says += [f"the file is {self._capture.damage}"] if self._capture.damage else []
         return "; ".join(says)

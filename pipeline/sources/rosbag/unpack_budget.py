@@ -69,7 +69,7 @@ class _BoundedFile:
         data: bytes = self._file.read(size)
         self._left -= len(data)
         if self._left < 0:
-            raise TooLarge("a file that unpacks to more than it may")
+            raise TooLarge("a file that unpacks to more than the limit")
         return data
 
 
