@@ -1,4 +1,4 @@
-"""/api/alignment: how well LiDAR and images lie on each other with the present parameters."""
+"""/api/alignment: how well LiDAR and images match with the current parameters."""
 
 from __future__ import annotations
 
