@@ -11,8 +11,9 @@ image sent to all clients is as wide as the widest of them needs. ``{"own": 12}`
 that frame; ``{"own": null}`` makes it follow the shared playhead again.
 
 The other messages concern the page's 3D view, which the server draws (``scene_requests``):
-``{"page_3d": "<its name>"}``, ``{"selected": 7}``, ``{"hides_3d": true}``, ``{"labels_3d": {"labels": […], "alone": true}}``, and
-``{"held": {"track": 7, "cuboid": …}}``, a label that may be dragged there, or None. The server reports a drag as
+``{"page_3d": "<its name>"}``, ``{"selected": 7}``, ``{"hides_3d": true}``,
+``{"labels_3d": {"labels": […], "alone": true}}``, and ``{"held": {"track": 7, "cuboid": …}}``, a label that may be
+dragged there, or None. The server reports a drag as
 ``{"type": "held", "track": 7, "cuboid": …, "ended": true}``, and a picked object as ``{"type": "selected", "id": 7}``.
 """
 

@@ -1,8 +1,8 @@
 """rerun's own web viewer, served by this program.
 
 The wheel installs a ``rerun`` program that contains the viewer and serves it on every interface. It is therefore
-started once, on loopback; its two files are copied, and it is stopped. It runs with a temporary home folder and in
-non-interactive mode, so it sends no usage data and leaves the user's settings unchanged.
+started once, on loopback; its two files are copied, and it is stopped. It runs with a temporary home folder and
+``CI=true``, so it sends no usage data and leaves the user's settings unchanged.
 """
 
 from __future__ import annotations
