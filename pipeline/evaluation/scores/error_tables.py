@@ -1,5 +1,5 @@
-"""Position and speed errors by range and by sensor, in the form of the paper's Table 4: smallest, largest, mean. And
-how honest the sigmas are that the pipeline gives with its distances."""
+"""Position and speed errors by range and by sensor, in the form of the paper's Table 4 (smallest, largest, mean), and
+the calibration of the sigmas that the pipeline gives with its distances."""
 
 from __future__ import annotations
 
