@@ -1,6 +1,5 @@
-"""A cuboid for a vehicle that a person points at in the image: from the points there or, if there are too few, from
-its height in the image.
-"""
+"""Creates a cuboid for a vehicle at an image pixel: from the points there or, if there are too few, from its height in
+the image."""
 
 from __future__ import annotations
 

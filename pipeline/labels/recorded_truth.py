@@ -1,4 +1,4 @@
-"""The truth that comes with a recording, as labels: Astyx and KITTI folders, the simulator, sessions made of them."""
+"""The ground truth of a recording as labels: Astyx and KITTI folders, the simulator, and sessions made from them."""
 
 from __future__ import annotations
 

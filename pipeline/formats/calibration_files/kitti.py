@@ -1,5 +1,5 @@
-"""KITTI's ``calib.txt`` of the object benchmark: P2, R0_rect, Tr_velo_to_cam. Its images are undistorted, and it says
-no size."""
+"""KITTI's ``calib.txt`` of the object benchmark: P2, R0_rect, Tr_velo_to_cam. It is for undistorted images and does not
+store their size."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""VLP-16 packets as a Velodyne sends them over UDP: guarded, put in order, cut into sweeps and decoded."""
+"""VLP-16 packets as a Velodyne sends them over UDP: validated, ordered, cut into sweeps and decoded."""
 
 from __future__ import annotations
 
