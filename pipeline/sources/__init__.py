@@ -1,4 +1,4 @@
-"""Recordings, devices and the simulator behind one door: ``open_source("astyx:~/data/astyx")``.
+"""Opens recordings, devices and the simulator with one function: ``open_source("astyx:~/data/astyx")``.
 
 ``pipeline/source_kinds.py`` lists the kinds of source."""
 

@@ -1,7 +1,7 @@
 """Images without a LiDAR: a video file, or a folder of images, with a GNSS track beside it if there is one.
 
-Without a calibration the camera is taken for a dash cam: looking straight ahead, with a diagonal field of view of 78°,
-1.3 m above the road. The notes say so; ``NAME.yaml`` beside the recording, or ``hfov_deg``, gives the real one."""
+Without a calibration, the camera is assumed to be a dash cam: looking straight ahead, with a diagonal field of view of
+78°, 1.3 m above the road. The notes say so; ``NAME.yaml`` beside the recording, or ``hfov_deg``, overrides this."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """KITTI: HDL-64 and colour camera 2 (Geiger et al. 2013), as raw drives, folders in the object benchmark's form and
 odometry sequences.
 
-``pipeline.sources.kitti_layouts`` knows where each layout keeps what.
+``pipeline.sources.kitti_layouts`` describes the folders of each layout.
 
-The ego frame is the Velodyne's axes. Intensity, 0–1 in the files, is 0–255 here, as a VLP-16's reflectivity.
+The ego frame is the Velodyne's axes. Intensity, 0–1 in the files, is 0–255 here, like a VLP-16's reflectivity.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The commented file that `cipv live init` writes: every key there is, with what it means."""
+"""The commented file that `cipv live init` writes: every key and its meaning."""
 
 from __future__ import annotations
 

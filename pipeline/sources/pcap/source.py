@@ -1,7 +1,8 @@
-"""A capture of a VLP-16's packets as a recording: one pass over the file finds its sweeps, each is decoded when asked.
+"""A capture of a VLP-16's packets as a recording: one pass over the file finds its sweeps; each is decoded on demand.
 
-What is kept of a sweep is where its first and last packet lie in the file and its time, so the length of a recording
-costs no memory to speak of. GNSS comes from a file of sentences beside it, else from the sensor's own position packets.
+Only a sweep's time and the positions of its first and last packet in the file are kept, so memory use hardly depends on
+the length of a recording. GNSS comes from a file of sentences beside it, or else from the sensor's own position
+packets.
 """
 
 from __future__ import annotations
