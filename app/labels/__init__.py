@@ -1,8 +1,9 @@
 """Labels of recordings, kept in a database together with a log of every change.
 
-service/ the labels of the open recording: progress, scores, what to label next acts/ requests to change labels, and
-their effect on the labels, through store/draft.py store/ storage in SQLite or PostgreSQL, the log of acts, undo,
-invariants, migrations transfer/ import and export of label files
+service/   the labels of the open recording: progress, scores, what to label next
+acts/      requests to change labels, and their effect on the labels, through store/draft.py
+store/     storage in SQLite or PostgreSQL, the log of acts, undo, invariants, migrations
+transfer/  import and export of label files
 """
 
 URL_VARIABLE = "CIPV_LABELS_URL"

@@ -1,7 +1,7 @@
-"""A folder of PCD files as a recording, in order of name, with images of the same names beside them.
+"""A folder of PCD files as a recording, ordered by name, with images of the same names.
 
-A name that is a number of nanoseconds, microseconds or seconds since 1970 is the sweep's time; else sweeps are taken as
-10 Hz. Images lie in the same folder, or in one named ``images``, ``image``, ``camera`` or ``image_02``.
+A name that is a number of nanoseconds, microseconds or seconds since 1970 is the sweep's time; otherwise, 10 Hz is
+assumed. Images are in the same folder, or in one named ``images``, ``image``, ``camera`` or ``image_02``.
 """
 
 from __future__ import annotations
