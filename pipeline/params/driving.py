@@ -8,7 +8,7 @@ from pipeline.params.declare import Section, choice, slider
 
 
 class MotionParams(Section):
-    """When an object counts as moving, and how long ego motion is trusted after its last measurement."""
+    """Source of ego motion, how long it is used after its last measurement, and when an object counts as moving."""
 
     source: Literal["auto", "can", "gnss", "lidar", "off"] = choice(
         "auto",

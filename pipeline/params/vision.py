@@ -24,7 +24,7 @@ class DetectionParams(Section):
 
 class DistanceParams(Section):
     """Power law d = a·h^b from the box height in pixels (paper, Distance Estimation with Regression). Unset values come
-    from the law of the detector that drew the boxes (``pipeline.types.DistanceLaw``). The preset ``paper`` has the
+    from the law of the detector that drew the boxes (``pipeline.types.DistanceLaw``). The preset ``paper`` uses the
     printed law."""
 
     coefficient: float | None = slider(
