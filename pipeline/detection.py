@@ -1,5 +1,5 @@
-"""Which detectors look at the images of a source, and when. Networks run here, before ``step``, and nowhere else:
-their answers are part of the frame and can be cached, so that changing a parameter never waits for a network."""
+"""Runs the detectors on the images of a source. Networks run here, before ``step``, and nowhere else: their outputs are
+part of the frame and can be cached, so changing a parameter never waits for a network."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Every kind of source, declared once.
 
-A new kind is one file with a function ``open_recording(uri, rest, how)``, and one entry in ``KINDS``. Error texts, the
-help of commands and the page's list of recordings come from here. This module imports none of what it names, so that
-help is quick.
+A new kind is one file with a function ``open_recording(uri, rest, how)``, and one entry in ``KINDS``. Error messages,
+the help of commands and the page's list of recordings use this list. This module does not import the modules it names,
+so that help is quick.
 """
 
 from __future__ import annotations

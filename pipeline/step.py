@@ -4,9 +4,9 @@
     camera: (raw boxes) → select → distance → tracks ─────────────────┼→ fuse → motion → path → CIPV → ACC, AEB
     ego ──────────────────────────────────────────────────────────────┘
 
-No stage keeps anything to itself: what the next frame needs is in ``State``. So a frame can be run again from the same
-state with other parameters, and the same inputs give the same bytes. A branch whose sensor is missing from the frame
-predicts, and its results say so.
+Stages have no hidden state: everything that the next frame needs is in ``State``. A frame can therefore be run again
+from the same state with other parameters, and the same inputs give the same bytes. If a sensor is missing from the
+frame, its branch predicts, and its results say so.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
     python -m app.bench.broadcast [--deflate]
 
-streams frames of ``sim:straight`` at 10 Hz through the product's own stream, compressed or not. It prints its port, and
-then its CPU time in seconds for each line that it reads. It exits when its input ends.
+This streams frames of ``sim:straight`` at 10 Hz through the product's own stream, compressed or not. It prints its
+port, and then its CPU time in seconds for each line that it reads. It exits at the end of its input.
 """
 
 from __future__ import annotations

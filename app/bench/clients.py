@@ -1,5 +1,5 @@
-"""What each client of the stream costs the server, compared with uvicorn's default compressed WebSocket; and whether
-any client's lag grows while another client does not read at all."""
+"""Benchmarks stream clients: what each costs the server compared with uvicorn's default compressed WebSocket, and
+whether a client that never reads makes others lag."""
 
 from __future__ import annotations
 

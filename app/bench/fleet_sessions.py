@@ -1,5 +1,5 @@
-"""A fleet of short sessions for trials of batches and scores: random traffic of the simulator with sensor faults, truth
-inside. No image is drawn: the detections, with a detector's errors, come with the session."""
+"""Generates a fleet of short sessions for tests of batches and scores: random simulated traffic with sensor faults and
+ground truth. No images are rendered; the sessions contain detections with a detector's errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long questions to a fleet's tables take: tables of many made-up drives, of the size that real ones have."""
+"""Benchmarks queries on a fleet's tables: tables of many synthetic drives, as large as real ones."""
 
 from __future__ import annotations
 

@@ -1,6 +1,5 @@
-"""The page with very many labels, timed in a real browser: from a seek until the frame, its labels in the bird's-eye
-view and their edges in the camera image are painted.
-"""
+"""Benchmarks the page with many labels in a real browser: the time from a seek until the frame, its labels in the
+bird's-eye view and their edges in the camera image are painted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether something else used the machine while figures were taken: its own processes, or other guests of its host."""
+"""Detects whether something else used the machine during a benchmark: other processes, or other guests of its host."""
 
 from __future__ import annotations
 

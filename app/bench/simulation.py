@@ -1,4 +1,4 @@
-"""The closed-loop simulator compared with real time: with LiDAR and true boxes, and with camera and network."""
+"""Compares the closed-loop simulator with real time: with LiDAR and true boxes, and with camera and network."""
 
 from __future__ import annotations
 

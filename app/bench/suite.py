@@ -1,4 +1,4 @@
-"""Everything that `cipv bench` measures, on real sweeps where available and otherwise on simulated ones."""
+"""All benchmarks of `cipv bench`, on real sweeps where available and otherwise on simulated ones."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The step without networks, the step next to a busy network, and the whole pipeline as the command line runs it:
-reading, decoding, both networks, step."""
+"""Benchmarks the step without networks, the step next to a busy network, and the whole pipeline as the command line
+runs it: reading, decoding, both networks, step."""
 
 from __future__ import annotations
 

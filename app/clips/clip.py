@@ -1,6 +1,6 @@
-"""A part of a drive, and its frames with the results of the run over the whole drive.
+"""A clip of a drive: its frames, with the results of the run over the whole drive.
 
-This is the one way to run a clip. The dashboard's exports and ``cipv export`` both use it, so that object numbers,
+All clips are run here. The dashboard's exports and ``cipv export`` both use this module, so object numbers,
 confirmations and histories are those of ``cipv run``, wherever the clip begins.
 """
 

@@ -1,4 +1,4 @@
-"""A clip as a table (CSV): a row for each object of each frame."""
+"""Exports a clip as a CSV table with a row for each object in each frame."""
 
 from __future__ import annotations
 

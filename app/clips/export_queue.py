@@ -1,4 +1,4 @@
-"""Exports in the background: each ends in a file to download; one runs at a time."""
+"""Runs exports in the background, one at a time. Each ends in a file to download."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The kinds of file that a clip can be exported as.
+"""The export formats of a clip.
 
-To add a kind, write one module in this folder with ``write(clip, path, progress)`` and register it in ``EXPORTERS``.
+To add a format, write a module in this folder with ``write(clip, path, progress)`` and register it in ``EXPORTERS``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A clip as one HTML file: what happened, curves, images of the moments that matter, and what it was made with."""
+"""Exports a clip as one HTML file: events, curves, images of the key moments, and the parameters and networks used."""
 
 from __future__ import annotations
 

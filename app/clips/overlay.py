@@ -1,4 +1,4 @@
-"""The camera image with the pipeline's result drawn over it, for films and reports."""
+"""The camera image with the pipeline's result drawn over it, for videos and reports."""
 
 from __future__ import annotations
 

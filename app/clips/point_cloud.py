@@ -1,6 +1,6 @@
-"""A clip's LiDAR points as one PLY file, for CloudCompare or MeshLab: ICP lays every sweep over the first one.
+"""Exports a clip's LiDAR points as one PLY file for CloudCompare or MeshLab. ICP aligns every sweep with the first one.
 
-Open3D registers and writes; it is imported when a cloud is asked for, because slim systems lack libraries it needs.
+Open3D does the registration and writes the file. It is imported on use, because slim systems lack libraries it needs.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A clip as a recording for the rerun viewer."""
+"""Exports a clip as a rerun recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A clip as a session (MCAP): the recording's own data, without the pipeline."""
+"""Exports a clip as a session (MCAP) with the recording's own data, without running the pipeline."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""A clip as a film: the camera with the overlay, H.264 in an MP4 that every player and browser plays."""
+"""Exports a clip as a video: the camera image with the overlay, as H.264 in an MP4 that every player and browser
+supports."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`cipv bench`: how fast each stage is, compared in the same run with the libraries one would use instead."""
+"""`cipv bench`: measures the speed of each stage, compared with common libraries in the same run."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""`cipv calibrate distance` fits the paper's regression from box height to distance for another camera, `cipv calibrate
-alignment` where LiDAR points are in the image, `cipv calibrate mount` how the LiDAR sits in the car, `cipv
-calibrate time` when the sensors really measured."""
+"""`cipv calibrate distance` fits the law from box height to distance for another camera, `cipv calibrate alignment` the
+projection of LiDAR points into the image, `cipv calibrate mount` the mount of the LiDAR in the car, and `cipv calibrate
+time` the time offsets of the sensors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`cipv compare`: two runs of `cipv batch` over the same drives."""
+"""`cipv compare`: compare two runs of `cipv batch` over the same drives."""
 
 from __future__ import annotations
 

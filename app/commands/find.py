@@ -1,4 +1,4 @@
-"""`cipv find`: moments, frames, objects or drives of a batch that fulfil a condition."""
+"""`cipv find`: find moments, frames, objects or drives of a batch that meet a condition."""
 
 from __future__ import annotations
 

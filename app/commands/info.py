@@ -1,4 +1,4 @@
-"""`cipv info`: what a recording contains."""
+"""`cipv info`: show what a recording contains."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`cipv params`: every parameter with its value, unit and meaning."""
+"""`cipv params`: list every parameter with its value, unit and meaning."""
 
 from __future__ import annotations
 

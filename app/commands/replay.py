@@ -1,4 +1,5 @@
-"""`cipv replay`: send a recording as real sensor packets, to any program that listens with the same live config."""
+"""`cipv replay`: send a recording as real sensor packets to any program that listens with the same live
+configuration."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`cipv run`: run the pipeline on a recording, with results as JSON lines and as a rerun recording."""
+"""`cipv run`: run the pipeline on a recording and write results as JSON lines or a rerun recording."""
 
 from __future__ import annotations
 

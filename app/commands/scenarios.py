@@ -1,4 +1,4 @@
-"""`cipv scenarios run`: the experiments of the paper, Euro NCAP and ISO 15622 in the simulator."""
+"""`cipv scenarios run`: run the experiments of the paper, Euro NCAP and ISO 15622 in the simulator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`cipv scores`: what a batch's tables say of its runs, with and without labels."""
+"""`cipv scores`: print the scores of a batch's runs, with and without labels."""
 
 from __future__ import annotations
 

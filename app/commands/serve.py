@@ -1,4 +1,4 @@
-"""`cipv serve` and `cipv demo`: the dashboard."""
+"""`cipv serve` and `cipv demo`: open the dashboard."""
 
 from __future__ import annotations
 

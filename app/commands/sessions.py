@@ -1,4 +1,4 @@
-"""`cipv import`, `export` and `recover`: make, cut and repair sessions."""
+"""`cipv import`, `export` and `recover`: convert, cut and repair sessions."""
 
 from __future__ import annotations
 

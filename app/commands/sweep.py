@@ -1,4 +1,4 @@
-"""`cipv sweep`: a space of parameters over the drives of a fleet."""
+"""`cipv sweep`: run many sets of parameters over the drives of a fleet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who a connection belongs to. The role is set once, where access is checked, and read wherever it matters."""
+"""The role of a connection: set once, where access is checked, and read wherever it matters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What clients want of the engine. There is no queue: a newer request replaces an older one that was not served yet."""
+"""Requests of clients to the engine. There is no queue: a newer request replaces an older one that is still pending."""
 
 from __future__ import annotations
 

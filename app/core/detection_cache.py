@@ -1,4 +1,4 @@
-"""What detectors found, kept so that no network looks at the same image twice."""
+"""Caches detections, so that no network processes the same image twice."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Work that takes longer than an answer may: one job with progress, cancellation, and a result or an error.
+"""Jobs that take longer than a request may: progress, cancellation, and a result or an error.
 
-A job decides neither where it runs nor what comes after it: exports wait in a queue, label tasks get a thread of their
-own, and opening a recording runs on the engine's worker.
+A job does not decide where it runs or what comes after it: exports wait in a queue, label tasks have their own thread,
+and opening a recording runs on the engine's worker.
 """
 
 from __future__ import annotations

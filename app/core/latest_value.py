@@ -1,4 +1,4 @@
-"""One place for the newest of something, between whoever makes it and one thread that is slower."""
+"""Holds only the latest value, passed from a producer to one slower consumer thread."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bounded cache: the least recently used entries leave first."""
+"""A bounded cache that evicts the least recently used entries first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Real-time playback: which frame is due now. Pure arithmetic; the engine brings the clock."""
+"""Computes which frame is due in real-time playback. The engine supplies the time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shapes as a page sends them: nothing passes that a label could not be."""
+"""Validated shapes in requests of a page: values that no label could have are rejected."""
 
 from __future__ import annotations
 

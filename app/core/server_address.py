@@ -1,4 +1,4 @@
-"""Where the server listens, and how a person writes that."""
+"""The address that the server listens on, and its form as a URL."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where this machine keeps what it records: sessions, marks and the local label database."""
+"""The folder in which this machine stores sessions, marks and the local label database."""
 
 from __future__ import annotations
 

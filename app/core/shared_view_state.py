@@ -1,5 +1,5 @@
-"""What people at the pages look at, for the views that the server draws: each page's selection, its labels and the
-cuboid that it edits; and what is picked in those views, for the page that it was picked for."""
+"""View state shared between pages and the views that the server draws: each page's selection, its labels and the cuboid
+that it edits, and what was picked in those views, with the page that it was picked for."""
 
 from __future__ import annotations
 

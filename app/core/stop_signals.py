@@ -1,5 +1,5 @@
-"""The one way in which a person or a system asks the program to end: Ctrl-C, SIGTERM (systemd, docker) or SIGHUP (a
-terminal or an SSH connection that has gone)."""
+"""Handles the signals that end the program: Ctrl-C, SIGTERM (systemd, docker) and SIGHUP (a closed terminal or SSH
+connection)."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""Notices worker threads that hang: in a network, in a decoder, in a file system that does not answer.
+"""Detects worker threads that hang: in a network, in a decoder, or in a file system that does not respond.
 
-Each worker says what it begins (``at_work``) and so, by ending it, how long that takes. What takes ``PATIENCE_S``
-longer than it ever has is taken to hang; the time in which the machine did not let its thread run does not count. A
-thread that hangs in native code cannot be killed: it is retired, that is left to itself, and ends by ``Retired`` should
-it ever come back; whoever owns the worker starts a fresh one. Code that hangs while it holds Python's own lock stops
-this watch, too; a supervisor that asks ``/healthz`` notices that.
+Each worker marks the start and end of a piece of work (``at_work``). Work counts as hung when it takes ``PATIENCE_S``
+longer than it ever has; time in which the machine did not run the thread does not count. A thread that hangs in native
+code cannot be killed. It is retired, that is left alone, and ends with ``Retired`` if it ever returns; the owner of the
+worker starts a new one. Code that hangs while it holds the GIL stops the watchdog too; a supervisor that polls
+``/healthz`` notices that.
 """
 
 from __future__ import annotations

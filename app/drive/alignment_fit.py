@@ -1,4 +1,4 @@
-"""Fitting the alignment to the open recording, in the background: one fit at a time."""
+"""Fits the alignment to the open recording in the background, one fit at a time."""
 
 from __future__ import annotations
 

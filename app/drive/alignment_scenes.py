@@ -1,4 +1,4 @@
-"""The frames by which an alignment is scored: some of the whole recording, or the last shown ones of live sensors."""
+"""The frames used to score an alignment: a selection of the whole recording, or the last ones shown of live sensors."""
 
 from __future__ import annotations
 

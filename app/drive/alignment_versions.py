@@ -1,4 +1,4 @@
-"""Alignments that a person kept: with date, drive, score and note, so that an earlier one is one press away."""
+"""Saved alignments, each with date, drive, score and note, so that an earlier one can be restored."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Two runs of one drive side by side: in which frames they differ, and what that is worth.
+"""Compares two runs of one drive: in which frames they differ, and how their scores differ.
 
-Numbers of objects mean nothing across runs; two leads are one when they are in the same place.
+Object numbers cannot be compared across runs; two leads are the same if they are in the same place.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Shares the processor: interactive requests take priority, runs over whole drives get the rest.
+"""Shares the processor: interactive requests take priority, and runs over whole drives get the rest.
 
-All share the processor with the page that is drawn, and Python. So the background asks here before each piece of work
-(one frame: some 5 ms, with networks 200). It waits while the foreground is at work, and while a hand moves: who asked
-for a frame a moment ago asks for the next one soon. What it has begun then is stopped where it can be. While a drive
-plays it gets a share of the time, right after a shown frame, when the next one is farthest.
+All threads share the processor, and Python, with page rendering. Background work therefore asks here before each piece
+(one frame: about 5 ms, with networks 200). It waits while the foreground is busy and while a user is interacting, since
+one request for a frame is usually followed by another; work that has started is stopped where possible. During playback
+the background gets a share of the time, right after a frame was shown, when the next one is farthest away.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What whole drives are computed from again and again: their frames without the images' pixels.
+"""The inputs for repeated runs over a drive: its frames without image pixels.
 
-The networks have looked at an image before the pipeline runs (``pipeline.detection.detect``), and no stage needs its
-pixels. So a frame of 300 KB is all that another run with other parameters asks for, and no network, disk or simulator.
+The networks process an image before the pipeline runs (``pipeline.detection.detect``), and no stage needs its pixels. A
+run with other parameters therefore needs only about 300 KB per frame, and no network, disk or simulator.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""One frame of a drive as a row of plain values, and one object in it as a record: what timelines and events need.
+"""One frame of a drive as a row of plain values, and each object in it as a record, for timelines and events.
 
-A row is some 200 bytes and an object 130, so that a whole drive fits where its results would not. None in a row, NaN
-and 0 in a record (``source``) stand for what is not known.
+A row takes about 200 bytes and an object 130, so a whole drive fits in memory where its results would not. Unknown
+values are None in a row, and NaN or 0 (``source``) in a record.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""One pass over a whole drive with one set of parameters, exactly as ``cipv run`` makes it.
+"""One run over a whole drive with one set of parameters, identical to ``cipv run``.
 
-Frames come in order with continuous state from frame 0. The state before every k-th frame is kept, so that any frame
-can be run again as in the pass: from the nearest kept state, a few steps on.
+Frames are processed in order, with continuous state from frame 0. The state before every k-th frame is stored, so any
+frame can be computed again exactly, with a few steps from the nearest stored state.
 """
 
 from __future__ import annotations

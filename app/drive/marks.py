@@ -1,4 +1,4 @@
-"""Moments that a person marked, kept beside the recordings so that they are still there tomorrow."""
+"""Moments that a person marked, stored next to the recordings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The runs of one recording: the present one, the base of comparison, and the saved ones."""
+"""The runs of one recording: the current one, the baseline for comparison, and the saved ones."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What was kept of a run as results again, as far as labels and scores need them.
+"""Restores the stored results of a run, as far as labels and scores need them.
 
-Numbers were kept in 32 bits, which is some micrometres; the path, gates, health and pedals were not kept.
+Numbers are stored in 32 bits, which is accurate to micrometres. The path, gates, health and pedals are not stored.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Columns of the timeline that nothing on the server reads: for the dashboard's rows alone.
+"""Columns of the timeline that only the dashboard reads, not the server.
 
-To add one, write a function of a frame and its result in a module of its own and register it in ``EXTRA_COLUMNS``. Its
-name becomes a key of ``columns`` in ``GET /api/drive``.
+To add one, write a function of a frame and its result in its own module and register it in ``EXTRA_COLUMNS``. Its name
+becomes a key of ``columns`` in ``GET /api/drive``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""The detectors for a source's images: opened once for each kind of image, and what there is to say about them.
+"""The detectors for a source's images, opened once for each kind of image, and their notes.
 
-Lane detectors are opened anew for each source, because the classical one knows the camera; that takes a moment only."""
+Lane detectors are opened again for each source, because the classical one depends on the camera; that takes only a
+moment."""
 
 from __future__ import annotations
 

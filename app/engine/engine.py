@@ -1,7 +1,7 @@
-"""The engine's worker thread: it owns the open source, and publishes a ``Snapshot`` after each thing it does.
+"""The engine's worker thread: it owns the open source, and publishes a ``Snapshot`` after each action.
 
-Callers say what they want through ``control``; the newest wish wins. What a wish makes of a recording or of sensors is
-its player's (``app/engine/player.py``).
+Callers make requests through ``control``; the newest request wins. The player (``app/engine/player.py``) carries out
+requests on a recording or on live sensors.
 """
 
 from __future__ import annotations

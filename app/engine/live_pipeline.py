@@ -1,7 +1,7 @@
-"""The pipeline on live sensors: each tick runs at most once, and only the newest.
+"""The pipeline on live sensors: each tick is processed at most once, and only the newest.
 
-There is no way back. Ticks that were not taken in time are dropped, so that what is shown is as recent as the sensors
-and the pipeline allow. For one thread.
+Seeking is not possible. Ticks that are not processed in time are dropped, so the shown data is as recent as the sensors
+and the pipeline allow. Not thread-safe.
 """
 
 from __future__ import annotations

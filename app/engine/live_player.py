@@ -1,4 +1,4 @@
-"""Live sensors in the dashboard: the pipeline runs whether or not anybody looks."""
+"""Live sensors in the dashboard: the pipeline runs whether or not a page is open."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Single frames for pages that have a playhead of their own: whoever labels is not moved by others, nor moves them."""
+"""Single frames for pages with their own playhead, such as labeling pages, independent of other pages."""
 
 from __future__ import annotations
 

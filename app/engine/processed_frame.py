@@ -1,4 +1,4 @@
-"""One frame after the pipeline has run on it, with all that is needed to run it again."""
+"""A frame after the pipeline has processed it, with everything needed to run it again."""
 
 from __future__ import annotations
 

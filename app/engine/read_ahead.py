@@ -1,7 +1,7 @@
-"""Prepare the next frame of a playing recording before it is due: read it and run the networks on it.
+"""Prepares the next frame of a playing recording before it is due: reads it and runs the networks on it.
 
-Reading, and a network, take longer than everything else. In a thread of their own they keep nobody waiting: a parameter
-that is changed meanwhile is answered at once.
+Reading and networks take longer than everything else. On their own thread they block nothing, so a parameter that is
+changed meanwhile takes effect at once.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Playback of a recording: in real time, by steps and by seeking.
 
-Nothing is queued: late frames are skipped, and a seek that is overtaken by another is dropped on the way.
+Nothing is queued: late frames are skipped, and a seek is abandoned when a newer one arrives.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The pipeline on one open recording: seek, advance, and run the shown frame again with other parameters.
+"""The pipeline on one open recording: seeks, advances, and runs the shown frame again with other parameters.
 
-No thread and no clock in here. Every answer is a ``ProcessedFrame``, which holds the state before its frame.
+It uses neither threads nor a clock. It returns ``ProcessedFrame``, which holds the state before its frame.
 """
 
 from __future__ import annotations

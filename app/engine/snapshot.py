@@ -1,4 +1,4 @@
-"""What the engine shows: an immutable snapshot of everything that a view may need."""
+"""An immutable snapshot of everything that a view may need to show the engine's current frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the worker puts what is shown, and where everybody else reads it or listens for it."""
+"""The worker publishes snapshots here; others read the latest one or listen for new ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The engine's thread, and the fresh one that takes its place when it hangs."""
+"""The engine's thread, and the new thread that replaces it when it hangs."""
 
 from __future__ import annotations
 

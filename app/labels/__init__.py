@@ -1,9 +1,9 @@
-"""What people say is true of recordings: kept in a database, with every act on it.
+"""Labels of recordings, kept in a database together with a log of every change.
 
-service/   the labels of what is open, for whoever asks: progress, scores, what to do next
-acts/      what may come in, and what each act does to the labels, through store/draft.py
-store/     where they lie: SQLite or PostgreSQL, the log of acts, undo, invariants, migrations
-transfer/  labels as files, in and out
+service/   the labels of the open recording: progress, scores, what to label next
+acts/      requests to change labels, and their effect on the labels, through store/draft.py
+store/     storage in SQLite or PostgreSQL, the log of acts, undo, invariants, migrations
+transfer/  import and export of label files
 """
 
 URL_VARIABLE = "CIPV_LABELS_URL"

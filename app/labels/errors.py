@@ -1,4 +1,4 @@
-"""Why an act on labels is not done, or they are not there."""
+"""Errors of label access: why an act is refused, or labels are not available."""
 
 from __future__ import annotations
 

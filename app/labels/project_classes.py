@@ -1,4 +1,4 @@
-"""The class list of this machine's project."""
+"""The class list of the project on this machine."""
 
 from __future__ import annotations
 

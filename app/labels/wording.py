@@ -1,5 +1,5 @@
-"""What people read of labels. Frames are counted from 1, as the page and its timeline show them; numbers in requests,
-answers and files count from 0."""
+"""Texts about labels for people. Frames are counted from 1, as on the page and its timeline; numbers in requests,
+responses and files count from 0."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The drives behind an experiment's figures, kept so that they can be seen again: for each a scenario file with the ego
-vehicle as driven, the parameters it drove with, and a page with its curves; and a page that lists them all. No file
-knows where it lies, so the folder can be moved with its report."""
+"""Saves the drives behind an experiment's figures so that they can be opened again: for each drive a scenario file with
+the ego motion as driven, the parameters, and a page with its curves, and an index page. Files use relative paths only,
+so the folder can be moved together with its report."""
 
 from __future__ import annotations
 

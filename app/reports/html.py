@@ -1,5 +1,5 @@
 """A report of experiments or scores as one HTML file: scenes, tables and charts, in the reader's light or dark theme.
-It loads nothing."""
+It loads nothing from elsewhere."""
 
 from __future__ import annotations
 

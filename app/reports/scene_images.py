@@ -1,4 +1,4 @@
-"""What a simulated scene looks like, for a report: a plan from above with everybody's way, and the camera's image."""
+"""Images of a simulated scene for a report: a plan from above with all trajectories, and the camera image."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The frames of one page that has a playhead of its own, made on a thread beside the shared stream."""
+"""The frames of one page with its own playhead, computed on a thread beside the shared stream."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every object of a frame, best candidate for the CIPV first, with the test that excluded it."""
+"""Ranks the objects of a frame, best candidate for the CIPV first, each with the test that excluded it."""
 
 from __future__ import annotations
 

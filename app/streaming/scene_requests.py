@@ -1,4 +1,4 @@
-"""What a page says of its own 3D view: its name, what it selects, the labels it draws and the one it edits."""
+"""Messages of a page about its 3D view: its name, its selection, the labels to draw and the label being edited."""
 
 from __future__ import annotations
 

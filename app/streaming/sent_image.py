@@ -1,4 +1,4 @@
-"""The camera image that pages receive: a JPEG, no larger than they show it, encoded once for all of them."""
+"""The camera image sent to pages: a JPEG no larger than they display, encoded once for all of them."""
 
 from __future__ import annotations
 

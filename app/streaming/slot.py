@@ -1,4 +1,4 @@
-"""The newest unsent messages of one client: a slow one skips frames, and gets none that is outdated."""
+"""The newest unsent messages of one client: a slow client skips frames and never gets an outdated one."""
 
 from __future__ import annotations
 

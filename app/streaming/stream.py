@@ -4,17 +4,17 @@ Each client has one slot for a frame and one for a state. A newer message replac
 skips frames without affecting others, and a client that joins late gets the current frame at once. A frame includes the
 state, so the state is sent separately only when it is newer than the newest frame.
 
-Buffers of the system between here and a page hold many frames, which would be a queue after all. A page therefore asks
-for ``?paced=1`` and says ``{"painted": true}`` once for each frame it got; no more than ``FRAMES_UNDER_WAY`` are sent
-ahead of that. With ``{"picture_px": 833}`` it says how wide it shows the image: the one that all get is
-as wide as the widest of them needs. It may come with ``?picture_px=833`` too.
-``{"own": 12}`` is a page with a playhead of its own, at that frame; ``{"own": null}`` follows the others again.
+System buffers between the server and a page can hold many frames, which would act as a queue. A page therefore requests
+``?paced=1`` and sends ``{"painted": true}`` once for each frame it received; at most ``FRAMES_UNDER_WAY`` frames are
+sent ahead of that. With ``{"picture_px": 833}``, or ``?picture_px=833``, it reports how wide it shows the image; the
+image sent to all clients is as wide as the widest of them needs. ``{"own": 12}`` gives the page its own playhead, at
+that frame; ``{"own": null}`` makes it follow the shared playhead again.
 
-The rest is for the page's own 3D view, which the server draws (``scene_requests``): ``{"page_3d": "<its name>"}``,
-``{"selected": 7}``, ``{"hides_3d": true}``, ``{"labels_3d": {"labels": […], "alone": true}}``, and
-``{"held": {"track": 7, "cuboid": …}}``, a label that may be dragged there, or None. The page hears of the drag as
-``{"type": "held", "track": 7, "cuboid": …, "ended": true}``, and of what was picked as ``{"type": "selected",
-"id": 7}``.
+The other messages concern the page's 3D view, which the server draws (``scene_requests``):
+``{"page_3d": "<its name>"}``, ``{"selected": 7}``, ``{"hides_3d": true}``,
+``{"labels_3d": {"labels": […], "alone": true}}``, and ``{"held": {"track": 7, "cuboid": …}}``, a label that may be
+dragged there, or None. The server reports a drag as
+``{"type": "held", "track": 7, "cuboid": …, "ended": true}``, and a picked object as ``{"type": "selected", "id": 7}``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""The one palette of every view: what a colour means, and its two shades for dark and light backgrounds.
+"""The colour palette of every view: the meaning of each colour, and its shades for dark and light backgrounds.
 
-LiDAR is magenta and vision cyan, as in the paper's figures; both together violet; the closest in-path vehicle green.
+LiDAR is magenta and vision cyan, as in the paper's figures; both together are violet, and the closest in-path vehicle
+is green.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The 3D view, started when somebody first looks at it: viser takes half a second to import."""
+"""Starts the 3D view when a page first opens it, since viser takes half a second to import."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which object a ray through the scene meets first."""
+"""Finds the first object that a ray through the scene hits."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What the 3D views share: colours, texts and outlines of one ``Result``. Nothing here computes perception.
+"""What the 3D views share: colours, texts and outlines of a ``Result``. Nothing here computes perception.
 
-Ego frame, metres. Colours are 0–255. Each function reads a result and returns arrays that a view hands to its library.
+Ego frame, metres. Colours are 0–255. Each function reads a result and returns arrays that a view passes to its library.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""Who may talk to the server, and what its pages may do.
+"""Access rules of the server, and restrictions on its pages.
 
-The server listens on loopback, but every web page that a person visits can send requests there too. So the Host header
-must name this machine (a rebound DNS name does not), and what changes anything, and every WebSocket, must come from a
-page of the same origin. Nor may another page have us work: browsers say for whom they ask (Sec-Fetch-Site), and the API
-answers them only for our own pages and for a person who typed the address. Programs send neither and are let through.
+The server listens on loopback, but any website that a person visits can send requests there too. The Host header must
+therefore name this machine (a rebound DNS name does not), and every change and every WebSocket must come from a page of
+the same origin. Browsers also report the origin of other requests (Sec-Fetch-Site): the API accepts only those from its
+own pages and from typed addresses. Programs send neither header and are accepted.
 
-Where other machines can reach the server, all that does not help: there everybody, from loopback too, needs a token.
+These rules do not help when other machines can reach the server. Every client then needs a token, on loopback too.
 """
 
 from __future__ import annotations

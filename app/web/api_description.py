@@ -1,4 +1,4 @@
-"""The OpenAPI description: a summary for each route, and how requests are refused."""
+"""The OpenAPI description: a summary for each route, and the errors that requests can return."""
 
 from __future__ import annotations
 

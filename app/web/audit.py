@@ -1,6 +1,6 @@
-"""Who changed, opened or exported what, and when: one JSON object a line, for whoever has to find out later.
+"""Audit log: who changed, opened or exported what, and when, as one JSON object per line.
 
-Reading is not in it, but for files that leave the server. A token never is.
+Reads are not logged, except for files that leave the server. Tokens are never logged.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""How long a client may take to say what it wants, and how many may try at once.
+"""Limits how long a client may take to send a request, and how many connections may be waiting.
 
-uvicorn waits for a request's header for as long as the client likes, and each wait holds a descriptor: a thousand of
-them, and no file can be opened any more.
+uvicorn waits for a request's header indefinitely, and each wait holds a descriptor: with a thousand of them, no file
+can be opened any more.
 """
 
 from __future__ import annotations

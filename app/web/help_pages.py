@@ -1,6 +1,6 @@
-"""The documentation in ``docs/`` as HTML pages: the same files that are read in the repository.
+"""The documentation in ``docs/`` as HTML pages, rendered from the same files as in the repository.
 
-The list of pages, with its headings and order, is the one in ``docs/README.md``: it becomes the sidebar.
+``docs/README.md`` lists the pages with their headings and order; this list becomes the sidebar.
 """
 
 from __future__ import annotations

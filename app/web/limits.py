@@ -1,4 +1,4 @@
-"""How much a request may carry: a set of parameters, and a file of labels where one is asked for."""
+"""Size limits of requests: for a set of parameters, and for a label file where one is expected."""
 
 from __future__ import annotations
 

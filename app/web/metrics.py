@@ -1,4 +1,4 @@
-"""Figures for Prometheus: how many frames, how fast, how late, for whom, and how recording does."""
+"""Metrics for Prometheus: number of frames, rates, latency, clients, and the state of the recording."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""How much of the server one role may have at a time, and work that ends when nobody waits for it any more.
+"""Limits how many requests a role may have at a time, and cancels work when nobody waits for it any more.
 
-Requests are answered on forty threads that all share. Whoever may only look could hold every one of them with long
-requests; so displays together may have a few, and people the rest. What says that the server lives, and the stream of
-frames, take none of them.
+Forty threads answer all requests. Without a limit, a display with view access only could occupy all of them with long
+requests, so displays together may have a few threads and people the rest. Health checks and the stream of frames do not
+count.
 """
 
 from __future__ import annotations

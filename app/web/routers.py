@@ -1,4 +1,4 @@
-"""Every part of the API, in the order in which OpenAPI lists them.
+"""All parts of the API, in the order in which OpenAPI lists them.
 
 To add one, write a module in ``app/web/routes`` with a function that makes its router, and register it in ``ROUTERS``.
 """

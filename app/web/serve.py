@@ -1,7 +1,7 @@
-"""The server and the engine as one program, until it is asked to end.
+"""Runs the server and the engine as one program, until it is asked to stop.
 
-The engine starts before FastAPI is imported, which takes half a second: it opens the recording and makes the first
-image meanwhile.
+The engine starts before FastAPI is imported, which takes half a second: meanwhile it opens the recording and produces
+the first image.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The one web server: page, API, stream and 3D view on one port."""
+"""The web server: page, API, stream and 3D view on one port."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Recordings that the page can offer without a path being typed: the simulator's scenarios, sessions and known data
-folders."""
+"""Recordings listed in the page's source menu: the simulator's scenarios, sessions and known data folders."""
 
 from __future__ import annotations
 

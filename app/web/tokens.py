@@ -1,7 +1,7 @@
-"""Who somebody is, where the server can be reached from other machines: a person, or the in-vehicle display.
+"""Identifies clients where other machines can reach the server: as a person or as the in-vehicle display.
 
-A token is a capability: whoever has it is let in. It comes by link once, stays in a cookie that scripts cannot read,
-and is only ever compared in constant time.
+A token is a capability: any client that has it is accepted. It arrives once, in a link, is stored in a cookie that
+scripts cannot read, and is always compared in constant time.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Where the LiDAR sees something end, and how strongly the image changes there.
+"""Depth edges of the LiDAR, and the strength of image gradients at them.
 
-Where a car ends and the road behind it begins, both sensors see a border (Levinson and Thrun 2013, "Automatic Online
-Calibration of Cameras and Lasers"). As there, edges of the image are spread with an inverse distance transform, so
-that a border a little off still meets some of one. Unlike there, only changes from left to right count, since a border
-along a ring is an upright one, and each is taken relative to how busy the image is around it: a fence or a tree is no
-better a match than the side of a car.
+Where a car ends and the road behind it begins, both sensors see an edge (Levinson and Thrun 2013, "Automatic Online
+Calibration of Cameras and Lasers"). As in that paper, image edges are spread with an inverse distance transform, so
+that a depth edge slightly off an image edge still matches it. Unlike there, only changes from left to right count,
+because a depth edge along a ring is upright, and each is normalised by how busy the image is around it: a fence or a
+tree is no better a match than the side of a car.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Fitting the distance law to another camera: the paper's regression, repeated on any labelled recording.
+"""Fits the distance law to another camera: the paper's regression, on any labelled recording.
 
-A pair is one detected box and the true depth of its object. Truth comes from labelled cuboids, or from the LiDAR, whose
-boxes say how far an object is wherever they and a detection overlap in the image.
+A pair is one detected box and the true depth of its object. Ground truth comes from labelled cuboids, or from LiDAR
+boxes wherever they overlap a detection in the image.
 """
 
 from __future__ import annotations

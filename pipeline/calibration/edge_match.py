@@ -1,9 +1,10 @@
-"""How well LiDAR and images match: do depth edges fall on image edges, more than with the mount turned a little?
+"""Measures how well LiDAR and images match: whether depth edges coincide with image edges more than with a turned
+mount.
 
-How strong the edges under the borders are says little by itself: it differs from road to road more than from a right
-mount to a wrong one. So the same is asked of the mount turned to all sides, as Levinson and Thrun (2013) do to judge
-whether a calibration still holds, and the score says where between usual and best of these the present one stands.
-Where none of them stands out from the rest, there is nothing to score against, and none is given.
+The image gradient under the depth edges says little by itself, because it varies more between roads than between a
+right and a wrong mount. As in Levinson and Thrun (2013), the same is therefore measured with the mount turned to all
+sides, and the score is the position of the current mount between the usual and the best of these. If none of them
+stands out, there is no score.
 """
 
 from __future__ import annotations

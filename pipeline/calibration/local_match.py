@@ -1,9 +1,9 @@
-"""Where LiDAR and images mismatch: by image region and by distance, over several frames at once.
+"""Shows where LiDAR and images mismatch: by image region and by distance, over several frames at once.
 
-The borders in depth that fall into a region are shifted over the images by some pixels to all sides. Where they meet
-edges clearly better after one shift than after most, that shift is the region's arrow; where no shift stands out, the
-region cannot tell. Rotations move all regions alike, a wrong roll turns the arrows about the middle, a wrong lens makes
-them grow outwards, and a wrong place of the camera moves near borders more than far ones.
+The depth edges in a region are shifted over the images by some pixels in all directions. If they match clearly better
+after one shift than after most others, that shift is the region's arrow; if no shift stands out, the region gives none.
+Yaw and pitch errors move all regions alike, a wrong roll turns the arrows about the centre, a wrong lens makes them
+grow outwards, and a wrong camera position moves near edges more than far ones.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The delay of the car's own speed relative to LiDAR odometry, visible while the car accelerates or brakes."""
+"""Estimates the delay of ego speed relative to LiDAR odometry while the car accelerates or brakes."""
 
 from __future__ import annotations
 

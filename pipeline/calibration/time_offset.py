@@ -1,13 +1,14 @@
-"""The time offset between camera and LiDAR, from ego motion: at which lag do objects beside the road match their edges?
+"""Estimates the time offset between camera and LiDAR from ego motion: the lag at which depth edges match image edges
+best.
 
-An image that shows the world later than its time says shows everything nearer: what stands to the left has moved on to
-the left, what stands to the right to the right, and in a bend everything to one side. So the borders in depth are moved
-as own motion moves a standing world, for one lag after another, and the lag at which they meet the images' edges best
-is the time offset. A small yaw is fitted beside it, since it moves both sides alike. What drives itself is seen too,
-but most borders in depth stand.
+If an image was taken later than its timestamp says, everything in it appears nearer: objects to the left have moved
+further left, objects to the right further right, and in a bend everything has moved to one side. The depth edges are
+therefore moved as ego motion moves a static world, for one lag after another, and the lag with the best match is the
+time offset. A small yaw is fitted at the same time, since it moves both sides alike. Moving objects are included, but
+most depth edges are static.
 
-Not told apart: a camera that sits farther ahead than its calibration says looks as if it were late, by 1 ms for each
-centimetre at 10 m/s, unless the drive has several speeds.
+A camera that is farther ahead than its calibration says looks late, by 1 ms per centimetre at 10 m/s, unless the drive
+has several speeds.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ NEAREST_M, FARTHEST_M = 3.0, 30.0
 MOST = 500
 """Borders of one frame that are looked at."""
 _DESKEW = DeskewParams(enabled=True)
-_NOT_CLEAR = "no lag between camera and LiDAR matches the edges clearly best; drive past parked cars"
+_NOT_CLEAR = "no lag between camera and LiDAR stands out as the best match; drive past parked cars"
 
 
 class NoOffset(BadInput):

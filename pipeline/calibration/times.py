@@ -1,4 +1,4 @@
-"""Both time offsets that a drive can determine: the camera's, and that of ego speed."""
+"""Estimates both time offsets that a drive can determine: the camera's, and that of ego speed."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Where one drive ends and the next begins in a recording of several clips: the one place that says so.
+"""Splits recordings of several clips: the only definition of where one clip ends and the next begins.
 
-The next clip begins after a gap longer than ``longest_gap_s``, and where time stands still or runs back. Nothing that
-was followed before can be known after it, so nothing is carried, compared or counted across it.
+A new clip begins after a gap longer than ``longest_gap_s``, and where time stands still or runs backwards. Nothing
+tracked before is known after it, so nothing is carried, compared or counted across it.
 """
 
 from __future__ import annotations

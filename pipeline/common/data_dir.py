@@ -1,4 +1,4 @@
-"""Where recordings and networks that do not ship with the program are kept."""
+"""The folder with recordings and networks that do not ship with the program."""
 
 from __future__ import annotations
 

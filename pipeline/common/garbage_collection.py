@@ -1,7 +1,7 @@
-"""Keeps Python's cyclic garbage collector out of the way.
+"""Pauses Python's cyclic garbage collector.
 
-A frame and a file import both make a great many plain values that hold no cycles. The collector looks at all of them
-again and again, which can take as long as the work itself, and finds nothing.
+A frame and a file import both create very many plain values without cycles. The collector examines all of them again
+and again, which can take as long as the work itself, and finds nothing.
 """
 
 from __future__ import annotations

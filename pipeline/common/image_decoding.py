@@ -1,7 +1,7 @@
-"""The one place where a compressed image becomes pixels: of a file, a bag, a session or a stream.
+"""Decodes compressed images of files, bags, sessions and streams. No other module decodes images.
 
-A decoder takes a header at its word: a PNG of 130 kB may ask for 6 GB, a JPEG for a thousand passes over its pixels. So
-the header is read first, and what would take more than a camera's image may is never given to the decoder.
+A decoder trusts the header: a PNG of 130 kB may request 6 GB, a JPEG a thousand passes over its pixels. The header is
+therefore checked first, and images larger than a camera's are never decoded.
 """
 
 from __future__ import annotations

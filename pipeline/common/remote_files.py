@@ -1,5 +1,5 @@
-"""Files of a store that is reached by address (``s3://…``, ``gs://…``, ``az://…``, ``http://…``), read in place by
-range requests. fsspec and the store's own package come with the extra ``fleet``, and are imported on use."""
+"""Files in a store, addressed as ``s3://…``, ``gs://…``, ``az://…`` or ``http://…`` and read in place by range
+requests. fsspec and the store's own package come with the extra ``fleet``, and are imported on use."""
 
 from __future__ import annotations
 

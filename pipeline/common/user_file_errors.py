@@ -1,4 +1,4 @@
-"""What is wrong with a file that the user wrote, in one sentence."""
+"""Describes an error in a user's file in one sentence."""
 
 from __future__ import annotations
 

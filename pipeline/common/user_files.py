@@ -1,7 +1,7 @@
-"""Files that somebody named: only regular ones, below a size, in the folders that may be read.
+"""Opens files that a user named: only regular files, below a size limit, in the allowed folders.
 
-A device or a pipe never ends or never begins; what is too large fills the memory before anything can be said of it. All
-of these are OSErrors whose ``strerror`` is a reason in words, as for any other file that cannot be read.
+Devices and pipes may never end, and files that are too large would fill the memory. All errors are OSErrors whose
+``strerror`` is a reason in words, as for any other file that cannot be read.
 """
 
 from __future__ import annotations

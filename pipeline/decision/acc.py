@@ -1,9 +1,9 @@
 """Adaptive cruise control: a desired speed from the lead's distance, and pedals from a PID (paper, section ACC).
 
-The printed Algorithm 3 applies the gap law where d ≤ d_min, where it is negative; keeps v_current for ever once the
-lead is gone; and lets the last object of its loop win. Implemented here is what it means: the law applies where d ≤
-d_desired, clipped to [0, set speed]; with nothing ahead the car returns to the set speed; the smallest demand wins.
-Where the path is not known well enough to tell the lead, ACC does not accelerate."""
+The printed Algorithm 3 applies the gap law where d ≤ d_min, where it is negative; keeps v_current indefinitely once the
+lead is gone; and lets the last object of its loop win. This module implements the intended algorithm: the law applies
+where d ≤ d_desired, clipped to [0, set speed]; with nothing ahead, the car returns to the set speed; the smallest
+demand wins. Where the path is too uncertain to tell the lead, ACC does not accelerate."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""How hard an object may make the car brake, by what is known of it.
+"""Limits how hard the car may brake for an object, by the evidence for it.
 
-A wrong full braking is a rear-end collision from behind, so what a sensor merely believes must not cause one. Slowing
-down comfortably costs little and may be done for any lead. Braking in an emergency takes either the LiDAR, which
-measures range and closing speed, or a camera that has followed the object for long enough to know its closing speed,
-and only while it is surely in the path: an oncoming car in a bend is ahead of us until the road turns.
+Full braking without a cause risks a rear-end collision from behind, so uncertain evidence must not cause it.
+Comfortable deceleration costs little and is allowed for any lead. Emergency braking needs either the LiDAR, which
+measures range and closing speed, or a camera that has tracked the object long enough to know its closing speed, and
+only while the object is almost certainly in the path: an oncoming car in a bend is straight ahead until the road turns.
 """
 
 from __future__ import annotations

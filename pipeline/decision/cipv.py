@@ -1,10 +1,10 @@
-"""Which vehicle ahead is the closest one in the path, why this one, and why not each other (paper, section CIPV).
+"""Chooses the closest in-path vehicle, and gives reasons for it and against every other object (paper, section CIPV).
 
 The rule: of all objects that meet the conditions of a lead (``pipeline.decision.gates``), the nearest. The first
 condition that an object fails is the reason given.
 
 Whether an object is in the path is decided over time: each sighting gives log-odds and their running mean decides, so
-that neither a swaying distance nor one bad box makes the lead flicker. The next lead is predicted as well.
+neither a noisy distance nor one bad box makes the lead flicker. The next lead is predicted as well.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""Which objects may be a lead at all: one function for each condition, and the judgement of an object by all of them.
+"""The conditions that an object must meet to be a lead: one function for each condition, and the judgement by all of
+them.
 
-Each condition gives a yes or no with the number and the limit behind it. The answers become ``Eligibility``, which
-decisions read, and gates, which people read; a gate's name means nothing to the pipeline."""
+Each condition returns yes or no with the value and the limit behind it. The results become ``Eligibility``, which
+decisions read, and gates, which people read; the pipeline never uses a gate's name."""
 
 from __future__ import annotations
 

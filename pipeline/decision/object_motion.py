@@ -1,8 +1,8 @@
-"""How objects move relative to the car and over the ground: closing speed, time to collision, required deceleration,
-moving or not.
+"""The motion of objects relative to the car and over the ground: closing speed, time to collision, required
+deceleration, moving or not.
 
-Signs, in words: a lead that is slower than ego closes the gap, its closing speed is positive and its TTC finite; a lead
-that pulls away has a negative closing speed and no TTC.
+A lead that is slower than ego closes the gap: its closing speed is positive and its TTC finite. A lead that pulls away
+has a negative closing speed and no TTC.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""Where each object is across the path: its extent, how surely it is in the path, and when it will cross the edge.
+"""The lateral position of each object relative to the path: its extent, its probability of being in the path, and when
+it will cross the edge.
 
-An object is in the path when enough of its width lies between the two edges: as much as stops a car, or half of a
-narrower object. For a car that is the paper's rule, the middle of its rear between the lines; a wide truck whose middle
-is outside but which leaves no room is in the path too.
+An object is in the path when enough of its width is between the two edges: as much as stops a car, or half of a
+narrower object. For a car that is the paper's rule, the middle of its rear between the lines. A wide truck whose middle
+is outside but which leaves no room to pass is in the path too.
 """
 
 from __future__ import annotations

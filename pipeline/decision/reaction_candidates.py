@@ -1,6 +1,6 @@
-"""Which objects other than the CIPV ACC's TTC rule and emergency braking react to.
+"""Selects the objects other than the CIPV that ACC's TTC rule and emergency braking react to.
 
-Braking for nothing is dangerous too, so an object must be dependable (ranged in this frame, confirmed, not a kerb or
+Braking for nothing is dangerous too, so an object must be reliable (ranged in this frame, confirmed, not a kerb or
 post), and its course must lead into the corridor.
 """
 

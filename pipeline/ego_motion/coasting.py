@@ -1,9 +1,9 @@
-"""Own motion while it is not measured: the last speed and yaw rate, with growing uncertainty.
+"""Ego motion while it is not measured: the last speed and yaw rate, with growing uncertainty.
 
-Where speed comes from GNSS, a lost fix takes away position and speed at once. The last values are useful for some
-seconds: the speed may change by ``coast_accel_mps2`` and the yaw rate by ``coast_turn_radps2``, so their errors grow
-with age, and those of the distance driven and the heading with its square. Each consumer adds what a tick adds. The
-path goes on until its own sigma ends it; ACC and emergency braking use the motion for at most ``coast_s``."""
+If speed comes from GNSS, a lost fix removes position and speed at once. The last values remain useful for some seconds:
+the speed may change by ``coast_accel_mps2`` and the yaw rate by ``coast_turn_radps2``, so their errors grow with age,
+and those of the distance driven and the heading with its square. Each consumer adds the growth per tick. The path
+continues until its own sigma ends it; ACC and emergency braking use the motion for at most ``coast_s``."""
 
 from __future__ import annotations
 

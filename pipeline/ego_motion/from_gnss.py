@@ -1,4 +1,5 @@
-"""Own speed and yaw rate from a GNSS receiver: it measures speed and course, and the course turns as the car does."""
+"""Ego speed and yaw rate from a GNSS receiver, which measures speed and course; the yaw rate is the change of
+course."""
 
 from __future__ import annotations
 

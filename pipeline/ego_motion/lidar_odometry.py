@@ -1,9 +1,11 @@
-"""Own motion from the LiDAR: each sweep is placed among the last ones, and two filters make rates of the displacements.
+"""Ego motion from the LiDAR: each sweep is registered to the previous ones, and two filters turn displacements into
+rates.
 
-    structure of the sweep → placed on the last sweeps' → displacement, turn → filters → speed, yaw rate, pose
+    structure of the sweep → registered to the last sweeps' → displacement, turn → filters → speed, yaw rate, pose
 
-It is believed once the sweeps agree with each other, and while enough structure fixes it: few points, a tunnel, or
-nothing but vehicles around end it, and it says so. Measured on KITTI at 16 rings: ``docs/reference/accuracy.md``."""
+The result is used once the sweeps agree with each other, and while enough structure constrains it. Few points, a
+tunnel, or nothing but vehicles nearby end it, with a note. Accuracy on KITTI at 16 rings:
+``docs/reference/accuracy.md``."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Own motion from whatever measures it: the surest source of the speed, and of the yaw rate.
+"""Selects the sources of ego motion: the most certain one for speed, and for yaw rate.
 
-The car's bus and an inertial unit are surest, and cost nothing. A GNSS receiver has a good speed, and a yaw rate that
-lags. The LiDAR has both at some ten milliseconds a sweep; it is asked where speed or yaw rate are missing, or come from
-GNSS. Sources that contradict each other are named."""
+The vehicle bus and an inertial unit are most certain and cost no computing time. A GNSS receiver gives a good speed,
+and a yaw rate that lags. The LiDAR gives both in about ten milliseconds per sweep; it is used where speed or yaw rate
+is missing or comes from GNSS. Contradictions between sources are reported."""
 
 from __future__ import annotations
 

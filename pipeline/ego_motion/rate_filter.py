@@ -1,7 +1,7 @@
-"""A rate from noisy displacements: Kalman filter of two states, the rate and how fast it changes.
+"""Estimates a rate from noisy displacements: a Kalman filter with two states, the rate and its derivative.
 
-Between two sweeps the car moves by d = v·Δt − a·Δt²/2, with v and a those at the end: a displacement is the mean rate
-of the interval, and would lag by half of it. The same holds of heading and yaw rate."""
+Between two sweeps the car moves by d = v·Δt − a·Δt²/2, with v and a at the end of the interval: a displacement is the
+mean rate of the interval, which would lag by half of it. The same applies to heading and yaw rate."""
 
 from __future__ import annotations
 

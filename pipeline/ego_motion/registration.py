@@ -1,7 +1,7 @@
-"""Places a cloud on a map of earlier ones: KISS-ICP's registration and voxel map (Vizzo et al., RA-L 2023).
+"""Registers a point cloud to a map of earlier ones: KISS-ICP's registration and voxel map (Vizzo et al., RA-L 2023).
 
-The library's own odometry keeps its map to itself. Here a map is built from the last few clouds on every call, so that
-own motion is a function of what it is given, can be asked again for any frame, and gives the same bytes."""
+The library's own odometry keeps its map internally. Here, a map is built from the last few clouds on every call, so ego
+motion is a pure function of its inputs, can be computed again for any frame, and gives the same bytes."""
 
 from __future__ import annotations
 

@@ -1,9 +1,10 @@
-"""What of a sweep can carry odometry: what stands on the road and is no vehicle, and how well it fixes own motion.
+"""Selects the points of a sweep that can support odometry: upright objects other than vehicles, and how well they
+constrain ego motion.
 
-The road looks the same a metre further on, and its rings travel with the sensor, so that it pulls towards standing
-still. Vehicles may drive: on an empty motorway the lead is all that stands up, and says that the car does not move.
-What remains (poles, trees, walls, houses) is counted by how well it fixes motion along x and along y: a wall beside the
-road fixes only y, a pole fixes both. In a tunnel nothing fixes x."""
+The road looks the same a metre further on, and its rings travel with the sensor, so it biases the result towards
+standstill. Vehicles may move: on an empty motorway the lead is the only upright object, and suggests that the car
+stands. The remaining points (poles, trees, walls, houses) count by how well they constrain motion along x and y: a wall
+beside the road constrains only y, a pole constrains both. In a tunnel, nothing constrains x."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reports as plain values: text, tables and charts, for a page or a script to show."""
+"""Reports as plain values (text, tables and charts) that a page or a script can show."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An experiment: its cases, how one is run, how the outcomes are reported, and the drive behind each outcome."""
+"""Defines an experiment: its cases, how to run one, how to report the outcomes, and the drive behind each outcome."""
 
 from __future__ import annotations
 

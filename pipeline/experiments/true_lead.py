@@ -1,4 +1,4 @@
-"""The vehicle that the car will really meet first, by the simulator's truth: the reference for the CIPV."""
+"""The vehicle that the car will really meet first, from the simulator's ground truth: the reference for the CIPV."""
 
 from __future__ import annotations
 

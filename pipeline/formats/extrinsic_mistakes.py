@@ -1,5 +1,5 @@
-"""What is probably wrong with a calibration whose camera does not look ahead: each usual mistake is undone, and the one
-that makes the camera look ahead, upright, is named."""
+"""Finds the likely mistake in a calibration whose camera does not look ahead: each common mistake is undone, and the
+one that makes the camera look ahead and upright is reported."""
 
 from __future__ import annotations
 

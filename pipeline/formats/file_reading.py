@@ -1,4 +1,4 @@
-"""What every recording kept as a folder of files needs: listing, reading, decoding and calibration checks."""
+"""Shared functions for recordings stored as folders of files: listing, reading, decoding and calibration checks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A GPX track as GNSS fixes: places with times, from which speed and course follow."""
+"""A GPX track as GNSS fixes: positions with times, from which speed and course are computed."""
 
 from __future__ import annotations
 

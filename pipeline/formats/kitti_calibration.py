@@ -1,8 +1,8 @@
-"""KITTI's calibration files: one file a frame (object benchmark), two a day (raw data), or of all (KITTI-360).
+"""KITTI's calibration files: one per frame (object benchmark), two per day (raw data), or one set for all (KITTI-360).
 
-Geiger et al. 2013, "Vision meets Robotics: The KITTI Dataset", section 3 and Eq. 3–6: a Velodyne point goes to the
-rectified camera 0 by R0_rect · Tr_velo_to_cam, and to the image of camera 2 by P2, whose last column carries the
-baseline from camera 0 to camera 2.
+Geiger et al. 2013, "Vision meets Robotics: The KITTI Dataset", section 3 and Eq. 3–6: R0_rect · Tr_velo_to_cam takes a
+Velodyne point to the rectified camera 0, and P2, whose last column contains the baseline from camera 0 to camera 2,
+takes it to the image of camera 2.
 """
 
 from __future__ import annotations

@@ -94,7 +94,7 @@ def truth_of(row: LabelRow, cuboid: Cuboid) -> TruthObject:
 def parse_row(fields: Sequence[str], T_ego_rect: F64) -> LabelRow:
     """One line that was split at its blanks. SourceError when it is none."""
     if len(fields) not in (_LABEL_FIELDS, _LABEL_FIELDS + 1):  # the last one is a detector's score
-        raise SourceError(f"{len(fields)} fields in a KITTI label of {_LABEL_FIELDS}")
+        raise SourceError(f"a KITTI label with {len(fields)} fields instead of {_LABEL_FIELDS}")
     try:
         truncated, occluded, _, x1, y1, x2, y2, *place = (float(field) for field in fields[1:_LABEL_FIELDS])
     except ValueError:

@@ -1,5 +1,5 @@
-"""NMEA 0183 sentences of a GNSS receiver → fixes. GGA says where and how good, RMC when, how fast and which way, GST
-how sure (IEC 61162-1)."""
+"""NMEA 0183 sentences of a GNSS receiver → fixes. GGA gives position and quality, RMC time, speed and course, GST the
+accuracy (IEC 61162-1)."""
 
 from __future__ import annotations
 

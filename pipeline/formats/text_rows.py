@@ -1,4 +1,4 @@
-"""Rows of numbers in a text file, read fast and forgivingly: a row that is not all numbers is counted, not fatal."""
+"""Rows of numbers in a text file, read fast and tolerantly: a row that is not all numbers is counted, not fatal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A video file whose images can be had by their time, anywhere, without keeping any."""
+"""A video file with random access to its images by time; no image is kept in memory."""
 
 from __future__ import annotations
 

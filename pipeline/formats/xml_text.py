@@ -1,4 +1,4 @@
-"""XML that a user names, read without what XML can do harm with: document types and entities."""
+"""Reads XML files that a user named, without the dangerous parts of XML: document types and entities."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
-"""Do camera and LiDAR see the same world? If they disagree for long, one of them is not where it is taken to be.
+"""Checks whether camera and LiDAR agree. If they disagree for long, one of them is not mounted where the calibration
+says.
 
-A wrong mount or a wrong calibration shows in no single object: each is a plausible car. It shows in pairs: a car that
-the camera alone has, and beside it, as far away, a cluster as wide as a car that only the LiDAR has. How many of the
-vehicles near enough for both come apart so, against those that they share, is averaged over time.
+A wrong mount or calibration does not show in a single object, since each is a plausible car. It shows in pairs: a car
+seen by the camera alone, and beside it, at the same distance, a cluster as wide as a car seen by the LiDAR alone. The
+share of such pairs among the vehicles near enough for both sensors is averaged over time.
 """
 
 from __future__ import annotations

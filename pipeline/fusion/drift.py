@@ -1,12 +1,13 @@
-"""Has the camera or the LiDAR been knocked? What both see of the same vehicles tells by which angle.
+"""Detects whether camera or LiDAR has been turned, and by which angle, from vehicles that both sensors see.
 
-A vehicle's cuboid, projected, should lie on its box. Where it lies beside it, the two mounts are not turned to each
-other as the calibration says. Single boxes are off by much, and by the same in every frame: a detector that draws one
-car too wide goes on doing so. So each vehicle counts once, by the mean over its frames, with the deviation that such
-means have; and angles are told only when the vehicles of the last seconds together leave little doubt.
+A vehicle's projected cuboid should coincide with its box. If it does not, the mounts are turned relative to the
+calibration. Errors of single boxes are large and the same in every frame: a detector that draws one car too wide
+continues to do so. Each vehicle therefore counts once, by the mean over its frames, with the standard deviation of such
+means; and angles are reported only when the vehicles of the last seconds together leave little doubt.
 
-Not told by it: a wrong distance law, which moves no box, and a road that bends, which moves both. A wrong time between
-the sensors moves each vehicle by how fast its bearing changes, which is fitted beside the angle and held near zero.
+It does not detect a wrong distance law, which moves no box, or a bend in the road, which moves both. A time offset
+between the sensors moves each vehicle by the rate of its bearing; it is fitted together with the angle and held near
+zero.
 """
 
 from __future__ import annotations

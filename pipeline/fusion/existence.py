@@ -1,14 +1,14 @@
-"""Is an object really where it is said to be? What each sensor says for it and against it, as log-odds of existence.
+"""Estimates whether an object exists: the evidence of each sensor for and against it, as log-odds of existence.
 
-For: a camera's box is worth what boxes of its score turned out to be worth; a LiDAR cluster is worth a great deal.
-Against: rays of the LiDAR that passed through the place at the height of a car's body (``free_road``). A working LiDAR
-that looks through a place says that nothing stands there, however sure a box is.
+For: a camera box counts according to how often boxes with its score were correct; a LiDAR cluster counts a lot.
+Against: LiDAR rays that passed through the position at the height of a car's body (``free_road``). If a working LiDAR
+looks through a position, nothing stands there, however certain a box is.
 
-A sensor that could not know says nothing: no ray came that way at that height, or something nearer stopped it. Nothing
-is multiplied up either: ten boxes in a row drawn by one network on one wall are hardly more than one, so the camera's
-log-odds are those of its running mean score; only the LiDAR's sum up, between bounds. A box that is missing where it
-should be counts as a score of zero, the more the shorter the object has been followed: a burst of false boxes ends as
-suddenly as it began.
+A sensor that could not observe the object gives no evidence: no ray passed at that height, or something nearer stopped
+it. Evidence is not accumulated without limit either: ten consecutive boxes of one network on one wall count hardly more
+than one, so the camera's log-odds are those of its running mean score; only the LiDAR's are summed, between bounds. A
+missing box counts as a score of zero, the more so the shorter the object has been tracked: a burst of false boxes ends
+as suddenly as it began.
 """
 
 from __future__ import annotations

@@ -1,14 +1,15 @@
-"""How the LiDAR's rays towards a place ended: at it, beyond it, before it, or nowhere.
+"""Determines how the LiDAR's rays towards a position ended: at it, beyond it, before it, or without a return.
 
-A place is a sector of the road ahead: as wide as most of a vehicle's body, and as deep as its distance is uncertain. It
-is looked at in slices of two metres, each between the heights where every vehicle is solid. Only where rays crossed
-every slice at such a height is anything known of the whole place.
+A position is a sector of the road ahead: as wide as most of a vehicle's body, and as deep as its distance is uncertain.
+It is examined in slices of two metres, each between the heights where every vehicle is solid. Only if rays crossed
+every slice at such a height is anything known about the whole position.
 
-A ray that came back from behind a slice passed through it. One that came back from nowhere passed through it as well,
-if its sensor works: its ring has returns elsewhere, other rings have some in this very sector, and nothing stands
-before the place or right behind it. Wet black paint swallows some rays, so silence is told apart from passage.
+A ray that returned from behind a slice passed through it. A ray without a return passed through it as well, if its
+sensor works: its ring has returns elsewhere, other rings have some in this sector, and nothing stands before the
+position or right behind it. Wet black paint absorbs some rays, so missing returns are counted separately.
 
-A return in a cluster is of what that cluster is: the object asked about has none, so the return is not its own.
+A return in a cluster belongs to the object of that cluster. The object in question has none, so the return is not its
+own.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""LiDAR and vision tracks become one list of objects: V, VL, L (paper, Algorithm 2 and Table 3).
+"""Merges LiDAR and vision tracks into one list of objects: V, VL, L (paper, Algorithm 2 and Table 3).
 
-The printed algorithm swaps its indices and emits an "only LiDAR" row for every pair that is not the maximum. Built here
-is what it means: every LiDAR track and every vision track lands in exactly one row, a claimed pair in one row together,
-so V + VL = vision tracks and L + VL = LiDAR tracks, always.
+The printed algorithm swaps its indices and emits an "only LiDAR" row for every pair that is not the maximum. This
+module implements the intended algorithm: every LiDAR track and every vision track appears in exactly one row, matched
+pairs in a common row, so V + VL = vision tracks and L + VL = LiDAR tracks, always.
 """
 
 from __future__ import annotations

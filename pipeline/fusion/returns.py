@@ -1,14 +1,16 @@
-"""One return is a range: the few LiDAR points inside the box of a vehicle that is too far away for a cluster.
+"""Ranges far vehicles by single returns: the few LiDAR points inside the box of a vehicle that is too far for a
+cluster.
 
-Beyond 35 m a VLP-16 puts one to four points on a car: too few for a cluster, exact all the same. Where the camera says
-that a vehicle is, and about how far, such a point tells how far exactly, if it is the vehicle's. Four tests say so:
+Beyond 35 m, a VLP-16 puts one to four points on a car: too few for a cluster, but accurate. Where the camera gives a
+vehicle's direction and approximate distance, such a point gives the exact distance, if it belongs to the vehicle. Four
+tests decide that:
 
-- it lies inside the box, off its edges, above the road, and below what a vehicle reaches up to;
-- its range agrees with the camera's, within what heights of vehicles differ by;
-- what it belongs to ends with the vehicle: a wall, a hedge or the road behind goes on to both sides at the same range;
+- it is inside the box, away from its edges, above the road, and no higher than a vehicle;
+- its range agrees with the camera's, within the variation of vehicle heights;
+- its surface ends with the vehicle: a wall, a hedge or the road behind continues on both sides at the same range;
 - no second group of points fits the box about as well.
 
-What a cluster claims is left to fusion, so no object is doubled.
+Points of a cluster are left to fusion, so no object is duplicated.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A row of Table 3: what is known of one object, from the tracks that it is made of (paper, Table 3)."""
+"""Builds the row of an object from the tracks that it consists of (paper, Table 3)."""
 
 from __future__ import annotations
 

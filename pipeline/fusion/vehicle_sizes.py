@@ -1,4 +1,4 @@
-"""How large vehicles and people are: mostly, for the sides of them that nobody has measured, and at most."""
+"""Sizes of vehicles and people: typical ones, for the sides that were not measured, and largest ones."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""Numbers too small for float32's full precision, which some processors compute a hundred times slower than others.
+"""Flushes denormal numbers to zero: they are too small for float32's full precision, and slow on some processors.
 
-A network trained with weight decay may hold thousands of such weights (11 % of TwinLiteNet's), and they make more of
-them in its activations. Zero in their place changes no output by more than 1e-38 per term.
+A network trained with weight decay may have thousands of such weights (11 % of TwinLiteNet's), which produce more of
+them in its activations. Some processors compute with them a hundred times slower. Replacing them by zero changes no
+output by more than 1e-38 per term.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Distance laws that were measured for a network, in a file beside it: ``best.onnx`` has ``best.law.json``.
+"""Distance laws fitted for a network, in a file next to it: ``best.onnx`` has ``best.law.json``.
 
-The file names the network's SHA-256, so that a law never outlives the weights it was fitted to.
+The file contains the network's SHA-256, so a law is never used with other weights than those it was fitted to.
 """
 
 from __future__ import annotations

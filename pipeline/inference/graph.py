@@ -1,8 +1,8 @@
-"""Giving a detector's ONNX graph another input size than the one it was exported with.
+"""Changes the input size of a detector's ONNX graph.
 
-A fully convolutional network works at any size that its strides divide. Exports fix one all the same, usually a square,
-in which a wide image of the road is mostly padding. Rewriting the declared shapes in memory lets the same weights see
-the image at its own aspect.
+A fully convolutional network works at any size that its strides divide. Exports nevertheless fix one, usually a square,
+in which a wide image of the road is mostly padding. Rewriting the declared shapes in memory lets the same weights
+process the image in its own aspect ratio.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The networks that are known by name, with where to download or export each."""
+"""The networks known by name, and where to download or export each of them."""
 
 from __future__ import annotations
 

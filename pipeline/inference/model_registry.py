@@ -1,8 +1,8 @@
-"""Networks by name: which ones are known, where to download them, and the folder that keeps them.
+"""Networks by name: the known ones, their download addresses, and the folder where they are stored.
 
-The folder is ``~/.cache/cipv/models`` (``CIPV_HOME`` replaces ``~/.cache/cipv``). A network is chosen by name or path;
-without either it is the registered default, then the first known one found in the folder or in ``$CIPV_DATA/models``,
-then the embedded one, which is built in and was trained on simulated vehicles only.
+The folder is ``~/.cache/cipv/models`` (``CIPV_HOME`` replaces ``~/.cache/cipv``). A network is chosen by name or path.
+Without either, it is the registered default, then the first known one found in the folder or in ``$CIPV_DATA/models``,
+then the embedded one, which was trained on simulated vehicles only.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Running an ONNX graph: which provider, how many threads, and one clear error for whatever goes wrong."""
+"""Runs an ONNX graph: the choice of provider and number of threads, and clear errors."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Which way of running a network is fastest on this machine: tried once, kept beside the networks.
+"""Finds the fastest way to run a network on this machine, and stores it next to the networks.
 
-What is kept belongs to a file, a processor and a version of onnxruntime; with another of these the network runs as
-untuned. A way that changes the network's outputs is never kept.
+A stored setting belongs to a file, a processor and a version of onnxruntime; with any other, the network runs untuned.
+A setting that changes the network's outputs is never stored.
 """
 
 from __future__ import annotations

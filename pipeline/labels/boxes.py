@@ -1,4 +1,4 @@
-"""Image boxes that follow their cuboids: around the projection, clipped to the image, unless somebody set them."""
+"""Image boxes that follow their cuboids: drawn around the projection and clipped to the image, unless set by hand."""
 
 from __future__ import annotations
 

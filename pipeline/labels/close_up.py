@@ -1,6 +1,6 @@
 """A close-up of a label: the image around it, and its points from above, from the side and from behind.
 
-Also how well a cuboid fits its points, by which the frames to look at first are found.
+It also measures how well a cuboid fits its points, which determines the frames to review first.
 """
 
 from __future__ import annotations

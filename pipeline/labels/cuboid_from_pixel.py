@@ -1,6 +1,5 @@
-"""A cuboid for a vehicle that a person points at in the image: from the points there or, if there are too few, from
-its height in the image.
-"""
+"""Creates a cuboid for a vehicle at an image pixel: from the points there or, if there are too few, from its height in
+the image."""
 
 from __future__ import annotations
 
@@ -71,8 +70,8 @@ def lift(
         raise NothingThere("no points and no detection there: draw a box around it")
     law = _by_height(frame, params, alignment, label, bbox)
     if law.distance_m is None or law.sigma_m is None:
-        raise NothingThere(f"no points there, and a {label}'s box like this gives no distance")
-    how = f"no points there: about {law.distance_m:.0f} ± {law.sigma_m:.0f} m by its height in the image"
+        raise NothingThere(f"no points there, and such a box of a {label} gives no distance")
+    how = f"no points there: about {law.distance_m:.0f} ± {law.sigma_m:.0f} m judging by its height in the image"
     return Lifted(_at_height(alignment, label, bbox, law, ground), bbox, 0, how)
 
 

@@ -1,9 +1,10 @@
-"""Which end of a proposed vehicle is its front.
+"""Determines which end of a proposed vehicle is its front.
 
-A box around points is the same after half a turn, and a LiDAR of 16 beams does not tell a bonnet from a boot. How a
-vehicle moves over the ground does: it drives forwards. One that stands in our lane faces the way the lane goes. What
-stands elsewhere along the road is turned as its side of the road drives, which is a guess, and is marked as unknown:
-parked cars face either way (of those KITTI's drive 0009 and Astyx label left of us, 77 % and 62 % face us).
+A box around points is the same after half a turn, and a LiDAR of 16 beams cannot tell a bonnet from a boot. A vehicle's
+motion over the ground can, because it drives forwards. A vehicle that stands in the ego lane faces in the direction of
+the lane. One that stands elsewhere along the road is assumed to face in the direction of traffic on its side; this is a
+guess and is marked as unknown: parked cars face either way (of the labelled ones to the left on KITTI drive 0009 and
+Astyx, 77 % and 62 % face the ego vehicle).
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""A track between and beyond its keyframes, after a person put one.
+"""Interpolates a track between its keyframes and extends it beyond them, after a person has set one.
 
 Between keyframes a vehicle is rigid and moves smoothly: its size is that of the keyframe nearest in time, its yaw turns
-the short way, its middle follows a monotone cubic (Fritsch and Carlson, *Monotone Piecewise Cubic Interpolation*, 1980)
-through the keyframes in time, which never swings beyond them. Beyond the outermost keyframes nobody has said how it
-moves: what was there is kept, and shifted as the keyframe was.
+the short way, and its centre follows a monotone cubic (Fritsch and Carlson, *Monotone Piecewise Cubic Interpolation*,
+1980) through the keyframes in time, which never overshoots. Beyond the outermost keyframes its motion is unknown:
+existing positions are kept, and shifted as the keyframe was.
 
-An image box is corrected by itself: a detector's own boxes are right in most frames, and a person who turns a cuboid
-has said nothing of them.
+An image box is corrected separately: a detector's boxes are right in most frames, and turning a cuboid does not change
+them.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Who is who over time, where labels do not say it: each object is the one of its class that was nearest to where it
-should be by its own speed.
+"""Links objects over time where labels have no identities: each object is matched with the nearest one of its class to
+its predicted position.
 
-One to one, at least total distance. Of one whose speed is known it is at most 2 m from there, and what 10 m/s add; one
-that was seen once may have come up to 50 m/s along its own axis, as an oncoming car does, and little to its side. None
-goes across a gap in which the pipeline's trackers start anew.
+Matches are one-to-one, with the least total distance. If the object's speed is known, the match is at most 2 m from the
+prediction, plus what 10 m/s add. An object seen only once may have moved at up to 50 m/s along its own axis, as an
+oncoming car does, and little to its side. No match crosses a gap in which the pipeline's trackers are reset.
 """
 
 from __future__ import annotations

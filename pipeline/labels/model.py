@@ -1,8 +1,8 @@
-"""What people say is true of a drive: tracks of vehicles, who the lead is in each frame, path, events and tags.
+"""The label model: tracks of vehicles, the lead in each frame, path, events and tags.
 
-One ``LabelSet`` belongs to one recording. It is a plain value: the database stores it act by act, formats write and
-read it whole, scores compare it with results. Frames are counted from 0 as the source counts them; ego frame, metres,
-radians: x forward, y left, z up.
+A ``LabelSet`` belongs to one recording. It is a plain value: the database stores it act by act, formats write and read
+all of it, and scores compare it with results. Frames are counted from 0 as in the source; ego frame, metres, radians: x
+forward, y left, z up.
 """
 
 from __future__ import annotations

@@ -137,4 +137,4 @@ def _leads(labels: LabelSet) -> Iterator[Problem]:
         cuboids = [(frame, there[frame].cuboid) for frame in range(lead.first, lead.last + 1) if frame in there]
         behind = next((frame for frame, cuboid in cuboids if cuboid is not None and cuboid.center[0] < 0.0), None)
         if behind is not None:
-            yield Problem(behind, track.id, f"the lead is #{track.id}, which is behind us")
+            yield Problem(behind, track.id, f"the lead is #{track.id}, which is behind the ego vehicle")

@@ -1,18 +1,19 @@
-"""Turns what the pipeline saw in a drive into label proposals.
+"""Turns the pipeline's results for a drive into label proposals.
 
-Not everything it follows is worth a look: roadside returns are half of it. Proposed is what the camera has called a
-road user, and what surely drove over the ground and is as large as a vehicle; each with how sure that is. A track ends
-where it was last seen, not where it was last predicted to be; between two sightings a prediction stands in. A cluster
-larger than any of its class is a vehicle and what stands beside it, or none at all: where it lies tells nothing, and
-its box alone is kept. So it is with what was seen in one frame only: one cluster under a box is as often a pole.
+Half of the objects are roadside returns and not worth a look. Proposed are objects that the camera classifies as road
+users, and objects that certainly drove over the ground and are as large as a vehicle, each with a confidence. A track
+ends at its last sighting, not at its last prediction; between two sightings, predictions are used. A cluster larger
+than any vehicle of its class is a vehicle with something beside it, or no vehicle: its position is meaningless, and
+only its box is kept. The same applies to objects seen in only one frame, because a cluster under a box is then just as
+often a pole.
 
-Who leads is proposed where the pipeline has chosen somebody who is proposed. Where it has not, ``none`` is proposed
-only if a vehicle in the path would have been noticed as far as ``FARTHEST_LEAD_M``; else one can't tell.
+The lead is proposed where the pipeline chose an object that is proposed. Otherwise, ``none`` is proposed only if a
+vehicle in the path would have been detected up to ``FARTHEST_LEAD_M``; else the lead is unclear.
 
-What the camera alone sees is proposed as a box in the image, without a cuboid. One from how tall it looks, as
-``pipeline.labels.cuboid_from_pixel`` makes where somebody points, was tried: on Astyx its middle was 14 m off (median
-of 55 that have truth, at 68 m), two in three did not even touch the vehicle; and a distance that nobody measured must
-not become the truth by which distances are scored.
+Objects that only the camera sees are proposed as a box in the image, without a cuboid. A cuboid from the height of the
+box, as ``pipeline.labels.cuboid_from_pixel`` creates, was tried: on Astyx its centre was 14 m off (median of 55 with
+ground truth, at 68 m), and two in three did not even touch the vehicle; and a distance that nobody measured must not
+become the ground truth for scoring distances.
 """
 
 from __future__ import annotations

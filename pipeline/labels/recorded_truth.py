@@ -1,4 +1,4 @@
-"""The truth that comes with a recording, as labels: Astyx and KITTI folders, the simulator, sessions made of them."""
+"""The ground truth of a recording as labels: Astyx and KITTI folders, the simulator, and sessions made from them."""
 
 from __future__ import annotations
 
@@ -56,9 +56,7 @@ def tracks_of(
 
 def renamed(kinds: Iterable[tuple[str, str]]) -> list[str]:
     """A sentence for each word of labels that is another class here. kinds: that word and the class, of each object."""
-    return [
-        f"{count:,} {kind} are taken for class {label!r}" for (kind, label), count in sorted(Counter(kinds).items())
-    ]
+    return [f"{count:,} {kind} are read as class {label!r}" for (kind, label), count in sorted(Counter(kinds).items())]
 
 
 def _has_id(each: TruthObject) -> bool:

@@ -66,7 +66,7 @@ def _check_track(track: LabelTrack, count: int) -> None:
     _require(frames == sorted(set(frames)), f"track {track.id}: sightings are not in frame order")
     for said in track.attributes:
         _require(
-            0 <= said.first <= said.last < count, f"track {track.id}: {said.name!r} is of frames that do not exist"
+            0 <= said.first <= said.last < count, f"track {track.id}: {said.name!r} refers to frames that do not exist"
         )
     sure = track.confidence
     _require(sure is None or 0.0 <= sure <= 1.0, f"track {track.id}: a confidence must be between 0 and 1")

@@ -1,8 +1,8 @@
-"""Lane lines without a network: paint is brighter or yellower than the road on both of its sides.
+"""Lane lines without a network: paint is brighter or yellower than the road on both sides of it.
 
-Bertozzi and Broggi, "GOLD" (IEEE Trans. Image Processing 7(1), 1998): in a row of the image a marking is a bright
-band of the width that perspective gives it there, darker to the left and to the right. What is no line among the
-answers (a car's edge, a kerb) is left to the robust fit in ground coordinates (``pipeline.lanes.line_fit``).
+Bertozzi and Broggi, "GOLD" (IEEE Trans. Image Processing 7(1), 1998): in an image row, a marking is a bright band of
+the width that perspective gives it there, darker to the left and to the right. False candidates (a car's edge, a kerb)
+are left to the robust fit in ground coordinates (``pipeline.lanes.line_fit``).
 """
 
 from __future__ import annotations

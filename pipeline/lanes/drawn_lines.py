@@ -1,4 +1,4 @@
-"""The ego lane's lines as views draw them: polylines on the road, and pixels of the image."""
+"""The lines of the ego lane for views: polylines on the road, and pixels of the image."""
 
 from __future__ import annotations
 

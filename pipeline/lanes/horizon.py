@@ -1,4 +1,4 @@
-"""Where a camera sees the horizon."""
+"""Computes where a camera sees the horizon."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
-"""Points on the ground to lines, robustly: first the one heading and bend that all lines of a road share, then each
-line for itself.
+"""Fits lines to points on the ground, robustly: first the common heading and curvature of all lines of a road, then
+each line separately.
 
-A point is kept as its bearing and its inverse distance from the camera, because that is what an image measures:
+A point is stored as its bearing and its inverse distance from the camera, because that is what an image measures:
 
     slope = y/x      inverse = 1/x      (x, y metres on flat ground from the foot of the camera)
 
 A pitch error p of a camera at height h moves every point to 1/x + p/h at the same slope, so a hypothesis about the
-pitch costs an addition (Stein, Mano, Shashua, IV 2003, give the same geometry for distance).
+pitch costs one addition (Stein, Mano, Shashua, IV 2003, use the same geometry for distance).
 """
 
 from __future__ import annotations

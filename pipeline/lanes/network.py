@@ -1,6 +1,6 @@
 """A lane network in an ONNX file as one function: image in, points on painted lines out.
 
-The paper takes ENet-SAD; any network whose outputs ``pipeline.lanes.heads`` knows will do.
+The paper uses ENet-SAD; any network whose outputs ``pipeline.lanes.heads`` supports will do.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The choice of the lane detector: a network where one is named or installed, else the classical one."""
+"""Chooses the lane detector: a network if one is named or installed, otherwise the classical one."""
 
 from __future__ import annotations
 

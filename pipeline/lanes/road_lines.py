@@ -1,11 +1,11 @@
-"""What a lane detector saw in the image, as lines on the road in metres.
+"""Converts a lane detector's points in the image to lines on the road in metres.
 
 ``measure``  points of one image → ground → lines, with the pitch that makes them parallel
-``follow``   the same, and the lines tracked from frame to frame: the stage that ``step`` runs
+``follow``   the same, with the lines tracked from frame to frame: the stage that ``step`` runs
 
-The road is a plane: the one that the LiDAR's ground points show, else as far below the ego origin as the calibration
-or the parameter says. Lines of a road are parallel, so the pitch of the camera against its calibration shows in how
-their distance seems to change with range, and is tracked as a slow state.
+The road is a plane: the one fitted to the LiDAR's ground points, or else as far below the ego origin as the calibration
+or the parameter says. Lines of a road are parallel, so an error of the camera's pitch shows as a change of their
+distance with range. The error is tracked as a slow state.
 """
 
 from __future__ import annotations

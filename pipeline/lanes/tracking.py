@@ -1,8 +1,8 @@
-"""Lane lines from frame to frame: a Kalman filter on each line's polynomial, moved by the car's own motion.
+"""Tracks lane lines from frame to frame: a Kalman filter on each line's polynomial, moved by ego motion.
 
 A line y(x) seen from a car that has driven Δs and turned by Δψ is y(x + Δs) − x·Δψ − Δs·Δψ/2: linear in the
 coefficients, so prediction is exact for small turns. Every line near the car is tracked, not only the two of the ego
-lane, so that in a lane change the lines pass through and the ego lane is simply another pair of them.
+lane, so in a lane change the lines pass through and the ego lane is simply another pair of them.
 """
 
 from __future__ import annotations

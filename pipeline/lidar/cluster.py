@@ -1,14 +1,14 @@
 """Exact Euclidean clustering with a weight on height (paper, Point Cloud Segmentation: "Euclidean clustering …").
 
 Two points are joined when √(Δx² + Δy² + (z_weight·Δz)²) ≤ tolerance; a cluster is a connected component of that
-relation. The weight is the paper's own low-channel trick: a car seen by two rings 2° apart (0.7 m at 20 m) stays one
-object. The paper walks a KD-tree; here a grid gives the same partition (tests compare the two). Its cells have a
-diagonal of one tolerance, so that what shares a cell is joined unseen, and a union-find skips every pair of cells that
-is joined already: near walls, where each point has hundreds of neighbours, cost almost nothing.
+relation. The weight is the paper's adaptation to few channels: a car seen by two rings 2° apart (0.7 m at 20 m) stays
+one object. The paper uses a KD-tree; here, a grid gives the same partition (tests compare the two). The diagonal of its
+cells equals the tolerance, so points in the same cell are joined without a test, and a union-find skips every pair of
+cells that is joined already: near walls, where each point has hundreds of neighbours, cost almost nothing.
 
-A tolerance that holds the bonnet and the roof of a far car together also joins a queue with the row parked beside it,
-0.8 m away. What is wider across the line of sight than any vehicle is therefore divided where it has a smaller gap.
-Along a ring the returns of one surface lie centimetres apart, so a vehicle that stands broadside stays whole.
+A tolerance that holds the bonnet and the roof of a far car together also joins a queue with the parked row 0.8 m beside
+it. A cluster that is wider across the line of sight than any vehicle is therefore divided at smaller gaps. Along a
+ring, the returns of one surface are centimetres apart, so a vehicle seen from the side stays whole.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
-"""Clusters that cover two tracked vehicles, divided by where the tracks expect each of them.
+"""Divides clusters that cover two tracked vehicles, using the tracks' predictions.
 
-A cluster sees one moment. A lead that stands or passes 0.7 m beside a parked car becomes one with it, since returns of
-one car lie as far apart. The tracks know better: both were followed while they were apart. They are two where they move
-apart, for the parts of a rigid body share its velocity; and where together they are wider than any vehicle and leave a
-gap that no surface has.
+A cluster shows only one moment. A lead that stands or passes 0.7 m beside a parked car merges with it, because returns
+of a single car can be as far apart. The tracks, which were followed while the vehicles were apart, can tell. Two tracks
+are two vehicles if they move apart, because the parts of a rigid body share its velocity, or if together they are wider
+than any vehicle and leave a gap that no surface has.
 
-Returns within an expected footprint are its seeds. Every other return of the cluster joins whom it is linked with by
-the shortest steps (a minimum spanning forest, as a watershed): a flank that comes into view follows its rear, from
-which returns lead to it at centimetres, whatever lies beside it.
+Returns within an expected footprint are its seeds. Every other return of the cluster joins the seeds that it is linked
+with by the shortest steps (a minimum spanning forest, like a watershed): a side that comes into view joins its rear,
+which it is connected to by returns centimetres apart, whatever is beside it.
 """
 
 from __future__ import annotations

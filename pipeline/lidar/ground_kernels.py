@@ -1,4 +1,4 @@
-"""Compiled loops of ground fitting; ``pipeline.lidar.ground`` says what they are for and why."""
+"""Compiled loops of ground fitting, explained in ``pipeline.lidar.ground``."""
 
 from __future__ import annotations
 

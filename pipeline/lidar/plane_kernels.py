@@ -1,4 +1,4 @@
-"""Compiled loops that fit one plane to the low points of one segment; ``pipeline.lidar.ground`` says why so."""
+"""Compiled loops that fit one plane to the low points of one segment, explained in ``pipeline.lidar.ground``."""
 
 from __future__ import annotations
 

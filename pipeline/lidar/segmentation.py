@@ -1,5 +1,5 @@
-"""One sweep as obstacles on the ground: deskew → down-sample → ground → cluster → divide → boxes (paper, Point Cloud
-Segmentation)."""
+"""Segments one sweep into obstacles on the ground: deskew → down-sample → ground → cluster → divide → boxes (paper,
+Point Cloud Segmentation)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where tracks have been over the last sightings, and what motion that proves."""
+"""Positions of tracks over the last sightings, and the motion that they prove."""
 
 from __future__ import annotations
 

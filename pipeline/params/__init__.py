@@ -1,7 +1,7 @@
 """Every parameter of the pipeline, declared once: default, bounds, step, unit and help.
 
-From this one place come the sliders of the page, ``--set`` and ``--params`` of the command line, the API's schema and
-the preset files. People read and type degrees; the stages turn them into radians where they use them.
+The sliders of the page, ``--set`` and ``--params`` of the command line, the API's schema and the preset files all use
+this declaration. Angles are in degrees here; the stages convert them to radians.
 """
 
 from __future__ import annotations
@@ -83,39 +83,39 @@ class Params(Section):
     """All parameters of the pipeline, by stage."""
 
     deskew: DeskewParams = DeskewParams()
-    """LiDAR, before all else: ego motion taken out of a sweep."""
+    """LiDAR: correcting a sweep for ego motion."""
     downsample: DownsampleParams = DownsampleParams()
-    """LiDAR: fewer points, the same for each channel."""
+    """LiDAR: thinning out points, channel by channel."""
     ground: GroundParams = GroundParams()
-    """LiDAR: what is road and what stands on it."""
+    """LiDAR: separating the road from what stands on it."""
     cluster: ClusterParams = ClusterParams()
-    """LiDAR: which points belong together."""
+    """LiDAR: grouping points into clusters."""
     box: BoxParams = BoxParams()
     """LiDAR: the cuboid around a cluster."""
     lidar_tracking: LidarTrackingParams = LidarTrackingParams()
-    """LiDAR: clusters from sweep to sweep."""
+    """LiDAR: tracking clusters from sweep to sweep."""
     detection: DetectionParams = DetectionParams()
-    """Camera: which boxes of the detector count."""
+    """Camera: which of the detector's boxes are kept."""
     distance: DistanceParams = DistanceParams()
-    """Camera: how far a box is by its height."""
+    """Camera: the distance of a box, from its height."""
     vision_tracking: VisionTrackingParams = VisionTrackingParams()
-    """Camera: boxes from image to image."""
+    """Camera: tracking boxes from image to image."""
     alignment: AlignmentParams = AlignmentParams()
     """How points are projected into the image."""
     fusion: FusionParams = FusionParams()
     """Which LiDAR track and which camera track are one object."""
     existence: ExistenceParams = ExistenceParams()
-    """What each sensor says for and against an object."""
+    """Evidence of each sensor for and against an object."""
     motion: MotionParams = MotionParams()
     """Where ego motion comes from, and what counts as moving."""
     lanes: LaneParams = LaneParams()
-    """Lane lines, found and tracked."""
+    """Detecting and tracking lane lines."""
     path: PathParams = PathParams()
-    """Where the car is going."""
+    """The predicted path of the car."""
     cipv: CipvParams = CipvParams()
     """Who can be the lead, and who is."""
     acc: AccParams = AccParams()
-    """Following the lead."""
+    """Adaptive cruise control: following the lead."""
     aeb: AebParams = AebParams()
     """Warning and emergency braking."""
     time: TimeParams = TimeParams()
@@ -167,7 +167,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "aeb": {"enabled": False},
     },
 }
-"""What a preset changes against the declared defaults."""
+"""The values of each preset that differ from the declared defaults."""
 
 
 def preset(name: str) -> Params:

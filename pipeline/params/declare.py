@@ -1,4 +1,4 @@
-"""How a parameter is declared, once: its default, bounds, step, unit and what it does."""
+"""Declaring a parameter: its default, bounds, step, unit and description."""
 
 from __future__ import annotations
 
@@ -18,6 +18,6 @@ def choice(default: Any, text: str) -> Any:
 
 
 class Section(BaseModel):
-    """The parameters of one stage. Frozen; unknown names and numbers that are not finite are refused."""
+    """The parameters of one stage. Frozen; unknown names and numbers that are not finite are rejected."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -8,7 +8,7 @@ from pipeline.params.declare import Section, choice, slider
 
 
 class MotionParams(Section):
-    """When an object counts as moving, and how long ego motion is trusted after its last measurement."""
+    """Source of ego motion, how long it is used after its last measurement, and when an object counts as moving."""
 
     source: Literal["auto", "can", "gnss", "lidar", "off"] = choice(
         "auto",
@@ -31,15 +31,15 @@ class PathParams(Section):
 
     half_width_m: float = slider(1.5, 0.5, 4.0, 0.05, "m", "Half the width of the corridor without lane lines")
     length_m: float = slider(100.0, 20.0, 200.0, 5.0, "m", "Length of the corridor")
-    use_lanes: bool = choice(True, "Put the corridor between the lane lines where they are visible")
-    use_gnss: bool = choice(True, "Put the corridor along the planned route where GNSS locates the car on it")
-    use_yaw_rate: bool = choice(True, "Bend the corridor by the yaw rate")
+    use_lanes: bool = choice(True, "Align the corridor with the lane lines where they are visible")
+    use_gnss: bool = choice(True, "Align the corridor with the planned route where GNSS locates the car on it")
+    use_yaw_rate: bool = choice(True, "Curve the corridor according to the yaw rate")
     use_edges: bool = choice(
-        False, "Put the corridor along what runs beside the road: kerbs, hedges, walls, rails, parked cars"
+        False, "Align the corridor with the edges of the road: kerbs, hedges, walls, rails, parked cars"
     )
     use_traffic: bool = choice(
         True,
-        "Put the corridor along the headings of vehicles that drive on the road, where no line or route shows it",
+        "Align the corridor with the headings of other vehicles where no lane lines or route show the road",
     )
     min_speed_mps: float = slider(2.0, 0.0, 10.0, 0.5, "m/s", "Yaw rate and GNSS course are ignored below this speed")
     yaw_rate_sigma_radps: float = slider(
@@ -49,12 +49,17 @@ class PathParams(Section):
         0.8, 0.05, 3.0, 0.05, "m/s³", "Largest lateral jerk of a road: limits how far ahead an arc is valid"
     )
     lateral_accel_mps2: float = slider(
-        1.5, 0.1, 6.0, 0.1, "m/s²", "Lateral acceleration assumed possible when the path is guessed straight"
+        1.5,
+        0.1,
+        6.0,
+        0.1,
+        "m/s²",
+        "Lateral acceleration that a road may cause while the path is assumed to be straight",
     )
     lane_keeping_sigma_m: float = slider(0.2, 0.0, 1.0, 0.05, "m", "Usual distance from the lane's centre")
     lane_keeping_sigma_mps: float = slider(0.1, 0.0, 1.0, 0.05, "m/s", "Usual lateral speed within the lane")
     route_reach_m: float = slider(
-        8.0, 1.0, 50.0, 1.0, "m", "Farther from the route than this, the car counts as off it"
+        8.0, 1.0, 50.0, 1.0, "m", "The car counts as off the route beyond this distance from it"
     )
     gnss_gate_sigmas: float = slider(3.7, 1.0, 10.0, 0.1, "σ", "Fixes farther from the predicted position are rejected")
     gnss_restart_s: float = slider(
@@ -62,7 +67,7 @@ class PathParams(Section):
     )
     outlier_sigmas: float = slider(3.0, 1.0, 10.0, 0.1, "σ", "Sources that deviate from the others by more are ignored")
     smoothing_s: float = slider(
-        0.2, 0.0, 2.0, 0.05, "s", "Time constant with which the corridor follows its sources; 0: immediately"
+        0.2, 0.0, 2.0, 0.05, "s", "Time constant with which the corridor follows its sources; 0: no smoothing"
     )
     good_sigma_m: float = slider(
         1.0, 0.1, 3.0, 0.1, "m", "The path is usable as far ahead as its sigma stays below this"
@@ -109,7 +114,7 @@ class CipvParams(Section):
     decide_s: float = slider(
         0.3, 0.0, 2.0, 0.05, "s", "In path: time over which detections are averaged; 0: this frame only"
     )
-    max_sigma_m: float = slider(4.0, 0.5, 20.0, 0.1, "m", "Largest lateral uncertainty of a lead")
+    max_sigma_m: float = slider(4.0, 0.5, 20.0, 0.1, "m", "Largest standard deviation of a lead's lateral position")
     cut_in_s: float = slider(3.0, 0.5, 6.0, 0.1, "s", "Cut-ins and cut-outs are predicted this far ahead")
     min_width_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "LiDAR-only objects: smallest width")
     min_height_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "LiDAR-only objects: smallest height")
@@ -133,7 +138,7 @@ class CipvParams(Section):
         0.95,
         0.01,
         "",
-        "The same for a vehicle that stands: far more of them are parked beside the path than stopped in it",
+        "The same for a standing vehicle: far more of them are parked beside the path than stopped in it",
     )
     become_oncoming: float = slider(
         0.9,
@@ -141,7 +146,7 @@ class CipvParams(Section):
         0.95,
         0.01,
         "",
-        "The same for oncoming traffic: it keeps to its lane, and a bend whose path is not known makes it seem in ours",
+        "The same for oncoming traffic: it keeps to its lane, but before an unknown bend it may appear to be in ours",
     )
     stay_probability: float = slider(
         0.4, 0.0, 0.95, 0.05, "", "The lead is kept while both probabilities are at least this"
@@ -151,7 +156,7 @@ class CipvParams(Section):
 class AccParams(Section):
     """Adaptive cruise control (paper, Algorithm 3 and Eq. 6, with their errors corrected)."""
 
-    set_speed_kmh: float = slider(100.0, 10.0, 200.0, 5.0, "km/h", "Speed with nothing ahead")
+    set_speed_kmh: float = slider(100.0, 10.0, 200.0, 5.0, "km/h", "Target speed with nothing ahead")
     min_gap_m: float = slider(5.0, 1.0, 20.0, 0.5, "m", "d_min: gap at standstill")
     time_gap_s: float = slider(1.8, 0.8, 4.0, 0.1, "s", "d_desired = d_min + time gap × speed")
     ttc_limit_s: float = slider(2.5, 0.5, 10.0, 0.1, "s", "Slow down for any object with a shorter TTC")
@@ -169,7 +174,7 @@ class AccParams(Section):
         10.0,
         0.1,
         "m/s²",
-        "Hardest ACC braking unless a collision takes more to avoid, and evidence is strong (ISO 15622: 3.5 at speed)",
+        "Hardest ACC braking, unless avoiding a collision takes more and evidence is strong (ISO 15622: 3.5 at speed)",
     )
     comfort_jerk_mps3: float = slider(
         2.5,
@@ -177,8 +182,8 @@ class AccParams(Section):
         20.0,
         0.1,
         "m/s³",
-        "Deceleration grows by no more than this above 20 m/s, twice this below 5 m/s (ISO 15622), unless a collision "
-        "takes more to avoid; 0: no limit",
+        "Deceleration grows at most this fast above 20 m/s, and twice as fast below 5 m/s (ISO 15622), unless avoiding "
+        "a collision takes more; 0: no limit",
     )
     approach_decel_mps2: float = slider(
         2.5,
@@ -186,7 +191,7 @@ class AccParams(Section):
         10.0,
         0.1,
         "m/s²",
-        "Slow down for a lead beyond the desired gap once it takes this much; 0: only at the gap, as in the paper",
+        "Slow down for a lead beyond the desired gap once this deceleration is needed; 0: only at the gap (paper)",
     )
     brake_limit_mps2: float = slider(
         8.0,
@@ -214,10 +219,8 @@ class AebParams(Section):
     build_up_s: float = slider(
         0.3, 0.0, 1.0, 0.05, "s", "Delay from brake command to full pressure, counted as unbraked"
     )
-    margin_m: float = slider(1.0, 0.0, 5.0, 0.1, "m", "Gap left after braking")
-    confirm_frames: int = slider(
-        2, 1, 10, 1, "frames", "Consecutive frames that must call for a stage before it starts"
-    )
+    margin_m: float = slider(1.0, 0.0, 5.0, 0.1, "m", "Remaining gap after braking")
+    confirm_frames: int = slider(2, 1, 10, 1, "frames", "Consecutive frames that must request a stage before it starts")
     release_ttc_s: float = slider(6.0, 1.0, 20.0, 0.5, "s", "Keep braking below this time to collision")
     release_s: float = slider(0.3, 0.0, 3.0, 0.1, "s", "Braking ends this long after the danger has passed")
     standstill_s: float = slider(2.0, 0.0, 10.0, 0.5, "s", "Hold the brakes for this long at standstill")
@@ -245,4 +248,4 @@ class SyncParams(Section):
     max_skew_ms: float = slider(
         60.0, 5.0, 200.0, 1.0, "ms", "Images farther than this from the sweep in time are ignored"
     )
-    wait_ms: float = slider(25.0, 0.0, 100.0, 1.0, "ms", "Longest wait of a sweep for an image taken after it")
+    wait_ms: float = slider(25.0, 0.0, 100.0, 1.0, "ms", "Longest time that a sweep waits for an image taken after it")

@@ -16,7 +16,9 @@ class DeskewParams(Section):
 class DownsampleParams(Section):
     """Per-channel down-sampling (paper: "down-sampling … points of each channel")."""
 
-    blind_range_m: float = slider(1.0, 0.0, 5.0, 0.1, "m", "Nearer returns come from the ego vehicle and are dropped")
+    blind_range_m: float = slider(
+        1.0, 0.0, 5.0, 0.1, "m", "Returns nearer than this come from the ego vehicle and are dropped"
+    )
     keep_every: int = slider(1, 1, 10, 1, "points", "Keep every n-th point of each channel; 1 keeps all")
 
 
@@ -34,14 +36,18 @@ class GroundParams(Section):
     distance_m: float = slider(
         0.25, 0.02, 1.0, 0.01, "m", "Th_dist: points within this distance of the plane are ground"
     )
-    max_slope_deg: float = slider(10.0, 1.0, 30.0, 0.5, "°", "A steeper plane is replaced by that of its neighbour")
+    max_slope_deg: float = slider(
+        10.0, 1.0, 30.0, 0.5, "°", "A steeper plane is replaced by that of the neighbouring segment"
+    )
     fit_range_m: float = slider(
         50.0, 10.0, 100.0, 5.0, "m", "Planes are fitted to points within this distance ahead and behind"
     )
     fit_half_width_m: float = slider(
         10.0, 2.0, 30.0, 0.5, "m", "Planes are fitted to points within this distance to either side"
     )
-    min_range_m: float = slider(2.0, 0.0, 5.0, 0.1, "m", "Nearer returns come from the ego vehicle and are not fitted")
+    min_range_m: float = slider(
+        2.0, 0.0, 5.0, 0.1, "m", "Returns nearer than this come from the ego vehicle and are not used for the fit"
+    )
 
 
 class ClusterParams(Section):
@@ -49,13 +55,13 @@ class ClusterParams(Section):
 
     tolerance_m: float = slider(0.9, 0.1, 3.0, 0.05, "m", "Points closer together than this belong to one cluster")
     divide_m: float = slider(
-        0.7, 0.1, 3.0, 0.05, "m", "The same inside a cluster wider than any vehicle; equal to the tolerance: off"
+        0.7, 0.1, 3.0, 0.05, "m", "Tolerance within a cluster that is wider than any vehicle; equal to tolerance_m: off"
     )
-    divide_tracked: bool = choice(True, "Divide a cluster that covers two tracked objects which move apart")
+    divide_tracked: bool = choice(True, "Divide a cluster that covers two tracked objects that move apart")
     z_weight: float = slider(0.4, 0.05, 1.0, 0.05, "", "Weight on height: below 1 joins rings that are 2° apart")
-    min_points: int = slider(4, 1, 50, 1, "points", "Smaller clusters are dropped")
-    max_points: int = slider(20000, 100, 50000, 100, "points", "Larger clusters are dropped")
-    max_range_m: float = slider(70.0, 10.0, 120.0, 1.0, "m", "Points beyond this are not clustered")
+    min_points: int = slider(4, 1, 50, 1, "points", "Clusters with fewer points are dropped")
+    max_points: int = slider(20000, 100, 50000, 100, "points", "Clusters with more points are dropped")
+    max_range_m: float = slider(70.0, 10.0, 120.0, 1.0, "m", "Points beyond this distance are not clustered")
     max_height_m: float = slider(3.0, 0.5, 6.0, 0.1, "m", "Points higher than this above the ground are ignored")
     front_only: bool = choice(True, "Use only the front 180° (the sensor is mounted in the bumper)")
 
@@ -66,7 +72,7 @@ class BoxParams(Section):
     method: Literal["axis_aligned", "l_shape"] = choice(
         "l_shape", "axis_aligned: sides along ego x and y; l_shape: the yaw whose sides are closest to the points"
     )
-    yaw_step_deg: float = slider(2.0, 0.5, 10.0, 0.5, "°", "Step of the search for the best yaw")
+    yaw_step_deg: float = slider(2.0, 0.5, 10.0, 0.5, "°", "Step size of the search for the best yaw")
     ground_gap_m: float = slider(
         1.2, 0.0, 3.0, 0.1, "m", "A cluster that ends this close above the ground is extended down to it"
     )
@@ -95,5 +101,5 @@ class LidarTrackingParams(Section):
         5, 2, 20, 1, "frames", "trajectory: number of positions that the velocity is fitted to"
     )
     rigid_sideways: bool = choice(
-        True, "An object moves sideways only as far as both its sides do; off: a growing footprint counts as motion"
+        True, "An object moves sideways only as far as both of its sides do; off: a growing footprint counts as motion"
     )

@@ -24,7 +24,7 @@ class DetectionParams(Section):
 
 class DistanceParams(Section):
     """Power law d = a·h^b from the box height in pixels (paper, Distance Estimation with Regression). Unset values come
-    from the law of the detector that drew the boxes (``pipeline.types.DistanceLaw``). The preset ``paper`` has the
+    from the law of the detector that drew the boxes (``pipeline.types.DistanceLaw``). The preset ``paper`` uses the
     printed law."""
 
     coefficient: float | None = slider(
@@ -59,15 +59,17 @@ class DistanceParams(Section):
     )
     binning: bool = choice(False, "Round estimates to bins of 10 m between 5 and 60 m, as in the paper")
     max_m: float = slider(120.0, 20.0, 200.0, 1.0, "m", "Estimates beyond this are discarded (paper: 60)")
-    height_sigma_px: float = slider(2.0, 0.2, 20.0, 0.1, "px", "Noise of a box's height; sets the distance's sigma")
+    height_sigma_px: float = slider(
+        2.0, 0.2, 20.0, 0.1, "px", "Noise of a box's height; determines the sigma of the distance"
+    )
     size_spread: float = slider(
         0.2,
         0.0,
         0.5,
         0.01,
         "",
-        "Relative spread of heights within a class and of how tightly a network boxes them. Measured in four labelled "
-        "drives: 0.10 to 0.18, around a median off by up to 0.11",
+        "Relative spread of heights within a class, and of how tightly a network's boxes fit. Measured on four "
+        "labelled drives: 0.10 to 0.18, around a median that is off by up to 0.11",
     )
 
 
@@ -115,17 +117,19 @@ class AlignmentParams(Section):
     model: Literal["angular", "pinhole"] = choice("pinhole", "angular: h_res and v_res (paper); pinhole: calibration")
     h_res_deg: float | None = slider(None, 0.005, 0.3, 0.0001, "°/px", "angular: degrees per pixel across")
     v_res_deg: float | None = slider(None, 0.005, 0.3, 0.0001, "°/px", "angular: degrees per pixel down")
-    cx_px: float | None = slider(None, -2000.0, 8000.0, 1.0, "px", "angular: column that looks straight ahead")
-    cy_px: float | None = slider(None, -2000.0, 8000.0, 1.0, "px", "angular: row at the LiDAR's height")
-    yaw_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount to the left")
-    pitch_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount downwards")
-    roll_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount clockwise")
-    left_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: shift of the camera position to the left")
-    up_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: shift of the camera position upwards")
+    cx_px: float | None = slider(
+        None, -2000.0, 8000.0, 1.0, "px", "angular: image column of the direction straight ahead"
+    )
+    cy_px: float | None = slider(None, -2000.0, 8000.0, 1.0, "px", "angular: image row at the LiDAR's height")
+    yaw_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: turns the mount to the left")
+    pitch_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: turns the mount downwards")
+    roll_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: turns the mount clockwise")
+    left_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: shifts the camera to the left")
+    up_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: shifts the camera upwards")
 
 
 class ExistenceParams(Section):
-    """Whether an object is really there: evidence from both sensors for and against it."""
+    """Whether an object exists: evidence from both sensors for and against it."""
 
     enabled: bool = choice(True, "Weigh the evidence for and against each object; off: every object exists")
     min_braking: float = slider(
@@ -134,8 +138,8 @@ class ExistenceParams(Section):
         0.99,
         0.01,
         "",
-        "An object that is less likely to exist causes gentle deceleration only, no hard braking; so does one seen by "
-        "the camera alone that is less likely to be in the path",
+        "An object that is less likely to exist causes only gentle deceleration, no hard braking; so does an object "
+        "seen by the camera alone that is less likely to be in the path",
     )
     camera_ranges: int = slider(
         8,
@@ -153,7 +157,7 @@ class FusionParams(Section):
     assignment: Literal["greedy", "optimal"] = choice(
         "optimal", "greedy: each box takes its best free cluster (paper); optimal: best total overlap, one-to-one"
     )
-    min_iou: float = slider(0.1, 0.0, 0.9, 0.01, "", "Boxes that overlap less are separate objects")
+    min_iou: float = slider(0.1, 0.0, 0.9, 0.01, "", "Boxes that overlap by less are separate objects")
     ring_gap_deg: float = slider(
         2.0, 0.0, 4.0, 0.1, "°", "Angle between rings: an object is assumed to reach half a gap beyond its last ring"
     )
@@ -164,7 +168,7 @@ class FusionParams(Section):
         1.0,
         0.05,
         "",
-        "Boxes that overlap more skip the range gate: a car 1.8 times as far away cannot overlap this much",
+        "Boxes that overlap by more skip the range gate: a car 1.8 times as far away cannot overlap this much",
     )
     range_gate_sigmas: float = slider(
         1.5,
@@ -191,5 +195,10 @@ class FusionParams(Section):
     )
     disagree_s: float = slider(2.0, 0.2, 10.0, 0.1, "s", "Time over which disagreement of camera and LiDAR is averaged")
     disagree_share: float = slider(
-        0.25, 0.05, 1.0, 0.05, "", "ACC will not accelerate if camera and LiDAR disagree about a larger share of cars"
+        0.25,
+        0.05,
+        1.0,
+        0.05,
+        "",
+        "ACC will not accelerate if camera and LiDAR disagree about more than this share of cars",
     )

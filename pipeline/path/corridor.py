@@ -7,9 +7,9 @@
     other vehicles ───────┤
     (else straight ahead) ┘
 
-The paper uses lane centres on straights and a GPS path in curves, chosen by hand. Here every source gives its sigma at
-each distance, and the sigmas decide. The path of the frame before is moved by own motion and takes part, so that
-nothing jumps when a source comes or goes."""
+The paper uses lane centres on straights and a GPS path in curves, chosen by hand. Here, every source gives its sigma at
+each distance, and the sigmas decide. The previous frame's path, moved by ego motion, is one of the inputs, so the path
+does not jump when a source appears or disappears."""
 
 from __future__ import annotations
 

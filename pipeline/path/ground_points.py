@@ -1,4 +1,4 @@
-"""What was seen of the road in earlier frames, kept where it is now."""
+"""Points on the road seen in earlier frames, moved to their current position."""
 
 from __future__ import annotations
 

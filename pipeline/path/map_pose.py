@@ -1,11 +1,11 @@
-"""Where the car is on the map: a filter over fixes, courses, ego speed and yaw rate (extended Kalman, three states).
+"""The pose of the car on the map: a filter over fixes, courses, ego speed and yaw rate (extended Kalman, three states).
 
-State [x, y, heading] in UTM metres and radians counter-clockwise from grid east. Its covariance is that against the
-receiver's own estimate of the world: a receiver's place is off by its ``sigma_m`` for minutes on end, while from fix to
-fix it scatters little, so that a jump shows at once. Measured on 60 s of a real drive (comma2k19, u-blox): 0.02 m
-sideways from fix to fix with a reported sigma of metres, course 0.31° at 17 m/s, which is 0.09 m/s sideways.
+State [x, y, heading] in UTM metres and radians counter-clockwise from grid east. Its covariance is relative to the
+receiver's own estimate of the world: a receiver's position is off by its ``sigma_m`` for minutes, while it scatters
+little from fix to fix, so a jump shows at once. Measured on 60 s of a real drive (comma2k19, u-blox): 0.02 m sideways
+from fix to fix with a reported sigma of metres, course 0.31° at 17 m/s, which is 0.09 m/s sideways.
 
-Without a fix the pose goes on by speed and yaw rate (dead reckoning). Its errors grow as stated in ``_Growth``.
+Without a fix, the pose continues by speed and yaw rate (dead reckoning). Its errors grow as stated in ``_Growth``.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""The shape of a road from what runs beside it, as a line with a sigma at each distance.
+"""The shape of a road from the objects beside it, as a line with a sigma at each distance.
 
-Kerbs, hedges, walls, rails and rows of parked cars are parallel to the road, each at its own distance. So of all shapes
-that the road may have, the true one is that from which the cells beside it lie at the fewest distances: the
-log-likelihood of their distances under their own histogram is highest (least entropy). Nothing has to be told apart as
-left or right, kerb or car, and gaps in a row do no harm. Weighed with what roads can be (a prior of curvature), all
-shapes together give the mean and its sigma at each distance: with little beside the road the sigma is the prior's.
+Kerbs, hedges, walls, rails and rows of parked cars are parallel to the road, each at its own distance. Of all possible
+road shapes, the true one therefore places the cells beside it at the fewest distances: the log-likelihood of their
+distances under their own histogram is highest (least entropy). The cells need not be classified as left or right, kerb
+or car, and gaps in a row do no harm. Weighted with a prior of curvature, all shapes together give the mean and its
+sigma at each distance; with little beside the road, the sigma is the prior's.
 
-The line keeps to the distance from the edges that the car has now."""
+The line keeps the current distance of the car from the edges."""
 
 from __future__ import annotations
 

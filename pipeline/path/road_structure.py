@@ -1,7 +1,7 @@
-"""What stands beside the road, as cells on the ground: kerbs, hedges, walls, rails, and parked cars as a row.
+"""Structure beside the road, as cells on the ground: kerbs, hedges, walls, rails, and parked cars as a row.
 
-One sweep of 16 rings shows little of an edge: a kerb on two rings, of the row of parked cars the nearest corners. Cells
-of earlier sweeps, moved by own motion, complete it."""
+One sweep of 16 rings shows little of an edge: a kerb on two rings, or the nearest corners of a row of parked cars.
+Cells of earlier sweeps, moved by ego motion, complete it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The path along a route: GNSS locates the car on it, and the route ahead is transformed to the ego frame.
 
 Its sigma at distance s combines those of the route, of the fix (which averaging does not reduce, since its error lasts
-for minutes), of dead reckoning since the fix, of the heading times s, and the doubt after a jump. In doubt the route
-still shows how the road bends, but no longer in which lane the car is.
+for minutes), of dead reckoning since the fix, of the heading times s, and the uncertainty after a jump. After a jump,
+the route still gives the curvature of the road, but no longer the car's lane.
 """
 
 from __future__ import annotations

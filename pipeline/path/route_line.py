@@ -1,4 +1,4 @@
-"""A route laid out for driving: WGS 84 to UTM once, even steps, the scatter of recorded fixes smoothed away."""
+"""A route prepared for driving: converted from WGS 84 to UTM once, resampled evenly, and smoothed."""
 
 from __future__ import annotations
 

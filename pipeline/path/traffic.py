@@ -1,12 +1,12 @@
-"""The path that other vehicles show: what drives along a road points where the road goes there.
+"""The path shown by other vehicles: their headings show where the road goes.
 
-A car that drives straight on 25 m ahead says that the road is straight there, whichever lane it is in and whichever way
-it goes. Where it drove before, it said the same of the road in between. On a road without lines, without a route, and
-for the next bend, which the own yaw rate cannot tell, nothing else the sensors see says as much.
+A car that drives straight on 25 m ahead shows that the road is straight there, whichever its lane and direction. Its
+earlier positions show the same for the road in between. On a road without lines or a route, and for the next bend,
+which the ego yaw rate cannot predict, no other source gives as much information.
 
-Headings are kept where they were seen, moved on by own motion, and joined by a Kalman smoother along the road (Rauch,
-Tung and Striebel 1965): the curvature of a road wanders, its heading is the integral of that, its place the integral of
-its heading. The own lane begins where the car is, along where it points.
+Headings are stored at the positions where they were seen, moved by ego motion, and combined by a Kalman smoother along
+the road (Rauch, Tung and Striebel 1965): the curvature of a road is a random walk, its heading the integral of the
+curvature, and its position the integral of the heading. The ego lane begins at the car, in its direction.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What viewers show of labels: messages beside a session's own file of labels, by frame."""
+"""The labels that viewers show: messages per frame, next to a session's own label file."""
 
 from __future__ import annotations
 

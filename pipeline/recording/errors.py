@@ -1,4 +1,4 @@
-"""What can be wrong with a recorded message."""
+"""Errors in recorded messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a recording holds, for a person: topics, rates, gaps, duration."""
+"""Describes the contents of a recording: topics, rates, gaps, duration."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Recording beside the pipeline: a thread of its own writes, and nothing ever waits for the disk.
+"""Records beside the pipeline: a separate thread writes, and nothing ever waits for the disk.
 
-What is put, and what sensors send in between, goes into a bounded queue. When the disk is too slow, what does not fit
-is dropped, counted by kind, logged, and noted in the session itself. A chunk goes to the system when it is full and at
-least every ``FLUSH_S``, and is forced to the disk every ``SYNC_S``: death of the process costs a second at most, loss
-of power ``SYNC_S``.
+Frames, and messages that sensors send in between, go into a bounded queue. When the disk is too slow, data that does
+not fit is dropped, counted by kind, logged, and noted in the session itself. A chunk is written when it is full and at
+least every ``FLUSH_S``, and is synced to disk every ``SYNC_S``: a crash of the process costs at most a second, a power
+failure ``SYNC_S``.
 """
 
 from __future__ import annotations

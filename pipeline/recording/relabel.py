@@ -1,5 +1,5 @@
-"""A session with other labels. All that lies before its labels is copied as bytes, and no chunk of it is unpacked: a
-drive of gigabytes takes as long as the disk."""
+"""Rewrites a session with other labels. Everything before its labels is copied as bytes without decompressing a chunk,
+so a drive of gigabytes takes only as long as the disk needs."""
 
 from __future__ import annotations
 

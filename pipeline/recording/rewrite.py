@@ -1,4 +1,4 @@
-"""One MCAP file from another: a clip of it, or what a cut file still holds. Messages are copied as they are."""
+"""Makes one MCAP file from another: a clip, or the readable part of a truncated file. Messages are copied unchanged."""
 
 from __future__ import annotations
 

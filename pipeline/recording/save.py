@@ -1,4 +1,4 @@
-"""Any recording, or a part of it, as a session."""
+"""Converts any recording, or a part of it, to a session."""
 
 from __future__ import annotations
 

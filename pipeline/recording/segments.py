@@ -1,4 +1,4 @@
-"""A recording over one file or, by size and time, several in a row; each is a session that can be read alone."""
+"""A recording in one file or, split by size and time, in several; each is a complete session."""
 
 from __future__ import annotations
 

@@ -1,2 +1,2 @@
-"""Plays a recording back as the car's sensors would send it, at true timing, so that the live path is tested for real:
-VLP-16 packets over UDP, MJPEG over HTTP, NMEA over UDP or TCP, CAN frames."""
+"""Replays a recording as the car's sensors would send it, in real time, to test the live path end to end: VLP-16
+packets over UDP, MJPEG over HTTP, NMEA over UDP or TCP, CAN frames."""

@@ -1,4 +1,4 @@
-"""A camera on the network: MJPEG over HTTP, each image with its stamp, as mjpg-streamer sends it."""
+"""A network camera: MJPEG over HTTP, each image with its time stamp, as mjpg-streamer sends it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What goes wrong with sensors in a car, put on the wire at chosen moments: for tests of whatever listens."""
+"""Injects sensor faults at chosen moments, to test programs that receive the data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What each sensor measured and when, in order of time: a recording taken apart."""
+"""Splits a recording into the measurements of each sensor, in order of time."""
 
 from __future__ import annotations
 

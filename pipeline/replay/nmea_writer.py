@@ -1,4 +1,4 @@
-"""A fix as a receiver says it: GGA, RMC and GST."""
+"""Writes a fix as the NMEA sentences of a receiver: GGA, RMC and GST."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Sends what is due when it is due. Everything is made a little ahead in a thread of its own, so that making a frame
-holds up no packet."""
+"""Sends messages when they are due. They are prepared a little ahead on a separate thread, so preparing a frame delays
+no packet."""
 
 from __future__ import annotations
 

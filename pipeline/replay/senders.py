@@ -1,4 +1,4 @@
-"""Where each sensor's messages go: what the live config listens to, this sends to."""
+"""Sends each sensor's messages to the addresses that the live configuration listens on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Messages → what goes over the wire and when: a sweep becomes 75 packets, each sent when its last laser has fired."""
+"""Converts messages to network data with send times: a sweep becomes 75 packets, each sent when its last laser has
+fired."""
 
 from __future__ import annotations
 

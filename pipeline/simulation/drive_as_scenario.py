@@ -1,8 +1,8 @@
-"""A closed-loop drive saved as a scenario file: the same road and actors, with the ego vehicle's actual motion.
+"""Saves a closed-loop drive as a scenario file: the same road and actors, with the ego vehicle's actual motion.
 
-What the sensors saw is not stored; it follows from the scenario, the motion and the seed, bit for bit. So a drive takes
-a few kilobytes, opens as ``sim:<file>`` wherever a scenario does, with truth, and has images even if the loop
-rendered none.
+Sensor data is not stored, because it follows from the scenario, the motion and the seed, bit for bit. A drive therefore
+takes only a few kilobytes, opens as ``sim:<file>`` wherever a scenario does, with ground truth, and has images even if
+the loop rendered none.
 """
 
 from __future__ import annotations

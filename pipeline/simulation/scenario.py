@@ -161,7 +161,7 @@ def load(name_or_path: str) -> Scenario:
     path = given_path(name_or_path, ScenarioError) if name_or_path.endswith((".yaml", ".yml")) else None
     if path is None:
         if Path(name_or_path).suffix or Path(name_or_path).name != name_or_path:
-            raise ScenarioError(f"{name_or_path}: not a scenario file: its name has to end in .yaml")
+            raise ScenarioError(f"{name_or_path}: not a scenario file: its name must end in .yaml")
         if name_or_path not in names():
             raise ScenarioError(f"no scenario named {name_or_path!r}; there are {', '.join(names())}")
         path = FOLDER / f"{name_or_path}.yaml"

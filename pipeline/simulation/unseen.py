@@ -1,4 +1,4 @@
-"""A scenario as the pipeline senses it, without an image being drawn: for suites that drive very many kilometres."""
+"""Runs the sensors of a scenario without rendering images, for suites that drive very many kilometres."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recordings, devices and the simulator behind one door: ``open_source("astyx:~/data/astyx")``.
+"""Opens recordings, devices and the simulator with one function: ``open_source("astyx:~/data/astyx")``.
 
 ``pipeline/source_kinds.py`` lists the kinds of source."""
 
@@ -27,7 +27,7 @@ __all__ = [
     "usages",
 ]
 
-_IN_STORE = "files ending in .mcap; `cipv import` makes one of any recording"
+_IN_STORE = "files ending in .mcap; `cipv import` converts any recording to one"
 
 
 def open_source(uri: str, *, rings: int = 16, progress: Progress = silent) -> Source:
@@ -66,7 +66,7 @@ def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
     if is_remote(uri):
         in_store = kind_of_bare(uri)
         if in_store is None:
-            raise SourceError(f"{uri}: of a store only sessions are read in place, {_IN_STORE}")
+            raise SourceError(f"{uri}: only sessions can be opened in a store: {_IN_STORE}")
         return in_store, uri
     scheme, colon, rest = uri.partition(":")
     kind = kind_named(scheme)

@@ -1,4 +1,4 @@
-"""A source whose frames know the route that is being driven."""
+"""A source whose frames include the planned route."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 """Astyx HiRes2019: a real VLP-16 and a front camera, with boxes (Meyer and Kuschk 2019, "Automotive Radar Dataset").
 
-Layout: ``lidar_vlp16/*.txt``, ``camera_front/*.jpg``, ``calibration/*.json``, ``groundtruth_obj3d/*.json``, one file a
-frame each. The ego frame is the radar's reference frame: every sensor's ``T_to_ref_COS`` takes it there, so the
-camera's is the inverse of ``T_camera_ego``.
+Layout: ``lidar_vlp16/*.txt``, ``camera_front/*.jpg``, ``calibration/*.json``, ``groundtruth_obj3d/*.json``, with one
+file per frame each. The ego frame is the radar's reference frame: every sensor's ``T_to_ref_COS`` transforms to it, so
+the camera's is the inverse of ``T_camera_ego``.
 
-Times are the LiDAR's: a sweep starts behind the car and looks ahead half a rotation later, and that middle is the
-frame's tick. The camera has no stamps of its own and is taken at the tick.
+Times are the LiDAR's: a sweep starts behind the car and looks ahead half a rotation later, and that moment is the
+frame's tick. The camera has no time stamps and is assumed to be at the tick.
 """
 
 from __future__ import annotations

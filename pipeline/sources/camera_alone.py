@@ -1,7 +1,7 @@
 """Images without a LiDAR: a video file, or a folder of images, with a GNSS track beside it if there is one.
 
-Without a calibration the camera is taken for a dash cam: looking straight ahead, with a diagonal field of view of 78°,
-1.3 m above the road. The notes say so; ``NAME.yaml`` beside the recording, or ``hfov_deg``, gives the real one."""
+Without a calibration, the camera is assumed to be a dash cam: looking straight ahead, with a diagonal field of view of
+78°, 1.3 m above the road. The notes say so; ``NAME.yaml`` beside the recording, or ``hfov_deg``, overrides this."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def open_video(uri: str, rest: str, how: Opening) -> CameraAlone:
     recorded_hz = 1e9 / float(np.median(steps)) if len(steps) else wanted_hz
     every = max(1, round(recorded_hz / wanted_hz))
     taken = range(0, len(video.times_ns), every)
-    notes = [f"{recorded_hz:.0f} images a second; every {_ordinal(every)} is used"] if every > 1 else []
+    notes = [f"{recorded_hz:.0f} images per second; every {_ordinal(every)} is used"] if every > 1 else []
     return CameraAlone(
         uri, file, options, video.times_ns[::every].tolist(), lambda index: (video.image(taken[index]), None), notes
     )
@@ -60,13 +60,13 @@ def open_images(uri: str, rest: str, how: Opening) -> CameraAlone:
     folder = recording_folder(path)
     files = files_by_name(folder, IMAGE_SUFFIXES)
     if not files:
-        raise SourceError(f"{path}: no images in it; they are .jpg, .jpeg or .png")
+        raise SourceError(f"{path}: contains no .jpg, .jpeg or .png images")
     names, paths = list(files), list(files.values())
     times = [_stamp_ns(name) for name in names]
     stamped = all(times) and bool(np.all(np.diff(times) > 0))
     step_ns = round(1e9 / _positive(options, "rate_hz", _RATE_HZ))
     ticks = times if stamped else [index * step_ns for index in range(len(names))]
-    notes = [] if stamped else [f"no time stamps in the names: {1e9 / step_ns:g} Hz assumed; ?rate_hz= gives another"]
+    notes = [] if stamped else [f"no time stamps in the names: {1e9 / step_ns:g} Hz assumed; ?rate_hz= overrides it"]
     return CameraAlone(uri, folder, options, ticks, lambda index: read_image(paths[index]), notes, names)
 
 
@@ -158,7 +158,7 @@ class CameraAlone:
             focal = 0.5 * hypot(width, height) / tan(radians(_DIAGONAL_DEG) / 2.0)
             notes.append(
                 f"no calibration: a dash cam with a diagonal field of view of {_DIAGONAL_DEG:.0f}°, looking straight "
-                "ahead, is assumed; ?hfov_deg=, or a .yaml file beside it, gives the real one"
+                "ahead, is assumed; set the real one with ?hfov_deg= or a .yaml file beside it"
             )
         pinhole = CalibrationConfig(
             fx_px=focal, fy_px=focal, cx_px=width / 2, cy_px=height / 2, width_px=width, height_px=height

@@ -1,4 +1,4 @@
-"""Whether a recording is still the one that was opened before under the same name, and whether two are the same."""
+"""Determines whether a recording is unchanged since it was last opened, and whether two recordings are the same."""
 
 from __future__ import annotations
 

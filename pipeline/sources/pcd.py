@@ -1,7 +1,7 @@
-"""A folder of PCD files as a recording, in order of name, with images of the same names beside them.
+"""A folder of PCD files as a recording, ordered by name, with images of the same names.
 
-A name that is a number of nanoseconds, microseconds or seconds since 1970 is the sweep's time; else sweeps are taken as
-10 Hz. Images lie in the same folder, or in one named ``images``, ``image``, ``camera`` or ``image_02``.
+A name that is a number of nanoseconds, microseconds or seconds since 1970 is the sweep's time; otherwise, 10 Hz is
+assumed. Images are in the same folder, or in one named ``images``, ``image``, ``camera`` or ``image_02``.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class PcdSource:
         self.uri, self.title = uri, folder.resolve().name
         self._sweeps = next((found for name in _CLOUDS if (found := files_by_name(folder / name, (".pcd",)))), {})
         if not self._sweeps:
-            raise SourceError(f"{path}: no PCD files in it")
+            raise SourceError(f"{path}: contains no PCD files")
         self._names = list(self._sweeps)
         self._images = next((found for name in _IMAGES if (found := files_by_name(folder / name, _IMAGE_SUFFIXES))), {})
         self._size = image_size(self._images.values()) or (0, 0)

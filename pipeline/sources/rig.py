@@ -1,5 +1,5 @@
-"""What a recording of bare sensors does not say: where they sit, the camera's calibration, and how their clocks differ.
-A small YAML file beside the recording, with the same words as the live configuration."""
+"""The rig file: a small YAML file next to a recording of bare sensors, with the same keys as the live configuration. It
+gives the mounts of the sensors, the camera's calibration, and the offsets of their clocks."""
 
 from __future__ import annotations
 

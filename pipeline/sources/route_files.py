@@ -1,10 +1,9 @@
-"""Routes from files: CSV, GPX, a receiver's NMEA log, or an earlier session.
+"""Reads routes from files: CSV, GPX, a receiver's NMEA log, or an earlier session.
 
-CSV: a column of latitudes and one of longitudes in degrees, found by their names, or the first two where there are
-none; or easting and northing in metres of one UTM zone, which a third column names (``zone`` 32N, ``epsg`` 32632) or
-the name of the file is given with: ``route.csv?epsg=32632``. GPX 1.0 and 1.1: the points of the first track, else of
-the first route. NMEA 0183: GGA sentences, whose quality says how good each place is, else RMC. A session: the fixes in
-it.
+CSV: one column of latitudes and one of longitudes in degrees, found by their names, or the first two if there are no
+names; or easting and northing in metres of one UTM zone, given in a third column (``zone`` 32N, ``epsg`` 32632) or with
+the file name: ``route.csv?epsg=32632``. GPX 1.0 and 1.1: the points of the first track, else of the first route. NMEA
+0183: GGA sentences, whose quality says how good each position is, else RMC. A session: the fixes in it.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""What lies beside a recording of a LiDAR: a video, a GNSS receiver's sentences, and a file that says where sensors
-sit. Found by the recording's own name, or named by options."""
+"""Sidecar files of a LiDAR recording: a video, a GNSS receiver's sentences, and a rig file. They are found by the
+recording's name, or named by options."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""``sim:<scenario>``: a drive through the simulator as a source, every frame made when asked for.
+"""``sim:<scenario>``: a simulated drive as a source, each frame computed on demand.
 
-The ego frame's origin is the LiDAR, level in the front bumper 0.5 m above the road. A frame depends on the scenario
-and its index alone, so the same index gives the same bytes in any order.
+The ego frame's origin is the LiDAR, level in the front bumper 0.5 m above the road. A frame depends only on the
+scenario and its index, so the same index gives the same bytes in any order.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""``path?name=value&name=value``: what a person adds to a source's path."""
+"""Options in a source's URI: ``path?name=value&name=value``."""
 
 from __future__ import annotations
 

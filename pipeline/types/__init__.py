@@ -1,8 +1,8 @@
-"""What flows through the pipeline: one ``Frame`` in, one ``Result`` out, and what one stage hands to the next.
+"""The data types of the pipeline: one ``Frame`` in, one ``Result`` out, and the data passed between stages.
 
-Frames of reference: the *ego frame* is x forward, y left, z up, metres, origin named by the source. The image is
-u right, v down, pixels. Times are nanoseconds of the sensors' own clock. Every class is frozen; arrays inside are
-treated as read-only. Values that a frame makes by the hundred are named tuples, which cost a fraction of a dataclass.
+Frames of reference: the *ego frame* is x forward, y left, z up, metres, with an origin defined by the source. The image
+is u right, v down, pixels. Times are nanoseconds of the sensors' own clock. Every class is frozen; arrays inside are
+treated as read-only. Types with hundreds of values per frame are named tuples, which cost a fraction of a dataclass.
 """
 
 from pipeline.types.arrays import (

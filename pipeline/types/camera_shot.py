@@ -1,4 +1,4 @@
-"""An image as the camera sent it, decoded only when it is needed: of a 60 Hz camera five in six are not."""
+"""An image as the camera sent it, decoded only on demand: with a 60 Hz camera, five of six images are never decoded."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What an object is judged by: the conditions that a lead must meet, the gates that show them, and how hard an object
-may make the car brake."""
+"""How an object is judged: the conditions that a lead must meet, the gates that show them, and how hard the car may
+brake for an object."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the networks saw in an image, before any geometry, and the law that gives a box its distance."""
+"""The output of the networks for an image, before any geometry, and the law that gives the distance of a box."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What sensors deliver: one ``Frame`` a tick."""
+"""Sensor data: one ``Frame`` per tick."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The ego lane as its two painted lines, in the ego frame on flat ground: what lane tracking hands to the corridor and
-to the views. No other module of the pipeline is imported here, so that ``pipeline.types`` can hold these values."""
+"""The ego lane as its two painted lines, in the ego frame on flat ground, as lane tracking passes it to the corridor
+and the views. This module imports no other module of the pipeline, so that ``pipeline.types`` can use it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What one stage hands to the next: from detections and clusters to fused objects."""
+"""The data passed between stages, from detections and clusters to fused objects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the pipeline concludes at one tick."""
+"""The output of the pipeline for one tick."""
 
 from __future__ import annotations
 

@@ -2,9 +2,9 @@
 
 ``docs/reference/results.md`` defines every field.
 
-Metres, metres per second, radians and pixels rounded to four decimals; nanoseconds are whole. What is unknown is
-null: a number that is not finite is unknown too, so NaN and infinity never reach a file. Keys come in a fixed order,
-so the same result gives the same bytes.
+Metres, metres per second, radians and pixels are rounded to four decimals; nanoseconds are whole. Unknown values are
+null, and so are numbers that are not finite, so NaN and infinity never reach a file. Keys have a fixed order, so the
+same result gives the same bytes.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Which sensors have an object, as results say it: one letter for each sensor, and what can be asked of the letters.
+"""Which sensors see an object, as in results: one letter for each sensor, and the capabilities behind the letters.
 
-Stages ask an object for what its sensors can do (``FusedObject.ranged``); only what reads stored rows asks here.
+Stages ask an object for its capabilities (``FusedObject.ranged``); only code that reads stored rows uses this module.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What many stages are told alike: the moment, and, for those that drive, the situation the car is in."""
+"""Arguments shared by many stages: the moment and, for stages that control the car, its situation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The protocols of every recording and of live sensors: a source gives frames, in the ego frame."""
+"""The protocols of recordings and live sensors: a source provides frames, in the ego frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Which followed object each box of an image is (paper, Algorithm 1): one-to-one, the least unlike of all choices."""
+"""Assigns the boxes of an image to tracked objects (paper, Algorithm 1): one-to-one, with the least total
+dissimilarity."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Class names of detectors in COCO's spelling, by which the pipeline tells vehicles from the rest."""
+"""Class names of detectors in COCO's spelling, by which the pipeline distinguishes vehicles from other objects."""
 
 from __future__ import annotations
 

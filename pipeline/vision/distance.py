@@ -1,11 +1,11 @@
-"""How far a detected box is, from its height alone (paper, Distance Estimation with Regression).
+"""The distance of a detected box, from its height alone (paper, Distance Estimation with Regression).
 
-The paper fits d = 1829.1·h^−1.093 to one 720p camera and one car. A box's height is the object's height over its depth
-along the optical axis, so the same law serves another camera when heights are scaled by the focal lengths, another
-class when they are scaled by the objects' heights, and the range follows from the depth by the bearing. The print does
-none of the three (it applies the law to class "car" only, and takes the depth for the range, 22 % short at 35° off
-axis); each is a parameter here. The law is the detector's own (``pipeline.types.DistanceLaw``), number by number unless
-a parameter says otherwise.
+The paper fits d = 1829.1·h^−1.093 to one 720p camera and one car. A box's height is proportional to the object's height
+divided by its depth along the optical axis. The same law therefore serves another camera when heights are scaled by the
+focal lengths, and another class when they are scaled by the objects' heights; the range follows from the depth and the
+bearing. The paper does none of the three (it applies the law to class "car" only, and uses the depth as the range, 22 %
+short at 35° off axis); each is a parameter here. The law is the detector's own (``pipeline.types.DistanceLaw``), number
+by number unless a parameter overrides it.
 """
 
 from __future__ import annotations

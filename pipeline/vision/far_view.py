@@ -1,10 +1,10 @@
-"""A second look at what is far: the part of the image around the road's vanishing point at the image's own
+"""A second detector pass for distant vehicles: the part of the image around the road's vanishing point, at native
 resolution.
 
-A detector sees a wide image scaled down: a car at 80 m, 40 px wide in an image of 2048 px, is 16 px wide in its
-input. In a window of native pixels the same network finds it. The window is the smallest that holds the road ahead: a
-square around where the car is heading, moved sideways with the bend that own motion tells of. It depends on the frame
-alone, never on tracks, so boxes can be cached and computed ahead, and a wrong track cannot turn the view away.
+A detector receives a wide image scaled down: a car at 80 m, 40 px wide in an image of 2048 px, is 16 px wide in its
+input. In a window of native pixels, the same network detects it. The window is the smallest that contains the road
+ahead: a square around the car's heading, shifted sideways with the curve that ego motion implies. It depends on the
+frame alone, never on tracks, so boxes can be cached and computed ahead, and a wrong track cannot move the window away.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Where one followed object is: its place filtered, refused or begun anew, and its height learned (paper, Distance
-Estimation with Regression; the print has neither)."""
+"""The position of one tracked object: filtered, rejected or reinitialised, and its learned height (paper, Distance
+Estimation with Regression; the paper has neither)."""
 
 from __future__ import annotations
 

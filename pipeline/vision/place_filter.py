@@ -1,13 +1,14 @@
-"""The place of a boxed object on the road, filtered where a box's error is even: in the logarithm of its range.
+"""Filters the position of an object with a box on the road, in the logarithm of its range, where a box's error is
+uniform.
 
-A box tells range by its height and direction by its centre. A height that is off by some pixels puts the range off by a
-*share* of itself, so the error is even in ln r and lopsided in metres: at 55 m a box of 14 ± 2 px means 48 to 64 m. The
-state stays ``x y vx vy`` in metres, in which objects move evenly; only the measurement is (ln r, bearing), taken in by
-an iterated extended Kalman filter (Bar-Shalom, Li, Kirubarajan 2001, sections 10.3 and 10.5.2). A growing box is a
-shrinking range, so the change of scale gives the closing speed without a measurement of its own.
+A box gives range by its height and direction by its centre. A height error of some pixels changes the range by a
+*share* of itself, so the error is uniform in ln r and skewed in metres: at 55 m, a box of 14 ± 2 px means 48 to 64 m.
+The state remains ``x y vx vy`` in metres, in which objects move uniformly; only the measurement is (ln r, bearing),
+processed by an iterated extended Kalman filter (Bar-Shalom, Li, Kirubarajan 2001, sections 10.3 and 10.5.2). A growing
+box means a shrinking range, so the change of scale gives the closing speed without a separate measurement.
 
-Every update says how surprising its measurement was (the normalised innovation squared, NIS). The tracker refuses what
-is too surprising and starts anew when that goes on: a filter that weighs surprises down instead is never called back.
+Every update returns the normalised innovation squared (NIS) of its measurement. The tracker rejects measurements with a
+large NIS and reinitialises when that continues; a filter that only gives outliers less weight would never recover.
 """
 
 from __future__ import annotations

@@ -1,11 +1,13 @@
-"""Boxes followed from image to image (paper, Algorithm 1), as a pure function: state in, state out.
+"""Tracks boxes from image to image (paper, Algorithm 1), as a pure function: state in, state out.
 
 The printed algorithm measures half widths where it means centres, takes the first candidate under the threshold and
-gives a new number for every one that fails. Here a box goes to its nearest candidate, one-to-one, and a new object is
-numbered once. An object not seen is carried, says so, and ends after ``queue_frames`` images or ``max_missed_s``.
+gives a new number to every one that fails. Here, a box goes to its nearest candidate, one-to-one, and a new object is
+numbered once. An object that is not seen is carried, marked as such, and dropped after ``queue_frames`` images or
+``max_missed_s``.
 
-Two filters. ``queue`` is the paper's: the newest box of each object stands for it, its distance is the last one
-measured, and it has no velocity. ``kalman`` predicts both the box and the place, each with a constant-velocity filter.
+There are two filters. ``queue`` is the paper's: the newest box of each object represents it, its distance is the last
+one measured, and it has no velocity. ``kalman`` predicts both the box and the position, each with a constant-velocity
+filter.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""How tall one vehicle is for its class, learned while a LiDAR ranges it and kept afterwards.
+"""The height of one vehicle relative to its class, learned while a LiDAR ranges it and kept afterwards.
 
-A law turns the height of a box into a distance as if all cars were equally tall; most of its error is that they are
-not, and stays the same from image to image. Where the LiDAR has the vehicle's range, the ratio of that to the law's
-distance is the vehicle's own: a scalar Kalman filter in ln(ratio), whose prior is the spread of heights within the
-class. A lead that leaves the LiDAR's reach keeps a camera distance that is as good as its box.
+A law turns the height of a box into a distance as if all cars were equally tall. Most of its error comes from the
+differences, and is constant from image to image. While the LiDAR ranges the vehicle, the ratio of that range to the
+law's distance is a property of the vehicle: a scalar Kalman filter in ln(ratio), whose prior is the spread of heights
+within the class. A lead that moves out of LiDAR range keeps a camera distance as good as its box.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""Writes what the documentation takes from the code: parameters, command line, layers. ``make docs`` runs it.
+"""Writes the parts of the documentation that are generated from the code: parameters, command line, layers.
+``make docs`` runs it.
 
 It stands here and not in the program: it reads the whole command line, which only the top layer may import.
 """
@@ -22,7 +23,7 @@ from tests.docs.fleet_tables_page import tables_page
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-_MADE = "*This page is made from the code by `make docs`; change the declarations, not the page.*"
+_MADE = "*This page is generated from the code by `make docs`; change the declarations, not the page.*"
 
 
 def main() -> None:
@@ -71,16 +72,15 @@ def _parameter_lines() -> Iterator[str]:
         "",
         _MADE,
         "",
-        "Every tunable of the pipeline is declared once, in `pipeline/params/`. The sliders of the dashboard, `--set`,",
-        "`--params` and the API all come from that declaration. A value out of its range is refused, and so is a name",
-        "that does not exist.",
+        "Every parameter of the pipeline is declared once, in `pipeline/params/`. The sliders of the dashboard,",
+        "`--set`, `--params` and the API all use that declaration. Values out of range and unknown names are rejected.",
         "",
         "    cipv run sim:straight --set cluster.z_weight=0.3 --set cipv.confirm_hits=2",
         "    cipv params --preset paper --yaml > mine.yaml",
         "    cipv run sim:straight --params mine.yaml",
         "",
         "`auto` (`null` in a YAML or JSON file) takes the value from the recording's calibration or from the detector.",
-        "The column *paper* gives the value of `--preset paper` where it is another one.",
+        "The column *paper* gives the value of `--preset paper` where it differs from the default.",
     )
     for section_name, field in Params.model_fields.items():
         section = field.default
@@ -137,9 +137,9 @@ def _cli_lines() -> Iterator[str]:
         "",
         "`cipv COMMAND --help` prints the same. `make install` puts the program at `.venv/bin/cipv`.",
         "",
-        "Exit status: 0 done, 1 the work failed, 2 bad usage or bad input. An error is one line on standard error; set",
-        "`CIPV_DEBUG=1` for the traceback of an unexpected one. Results go to standard output, everything else to",
-        "standard error, so output can be piped.",
+        "The exit status is 0 for success, 1 for failure, and 2 for bad usage or bad input. An error is one line on",
+        "standard error; set `CIPV_DEBUG=1` for the traceback of an unexpected one. Results go to standard output,",
+        "everything else to standard error, so output can be piped.",
         "",
         "## Environment",
         "",

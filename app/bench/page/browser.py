@@ -1,7 +1,6 @@
-"""The dashboard timed in a real browser: what is painted, how soon, and at what cost. All times are measured by the
-page: from a navigation, the creation of a frame or a user action to the message that follows the paint of the frame
-that shows it.
-"""
+"""Measures the dashboard in a real browser: what is painted, how soon, and at what cost. The page itself measures all
+times, from a navigation, the creation of a frame or a user action to the message that follows the paint of the
+frame."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Headless Chromium, driven by its DevTools protocol (https://chromedevtools.github.io/devtools-protocol).
 
-It only runs scripts in pages. Browser test tools also watch all requests, so that every message of the stream is
-encoded again for the tool. That costs 10 ms and more per frame on two cores, which no real user pays.
+This module only runs scripts in pages. Browser test tools also intercept all requests, so every message of the stream
+is encoded again for the tool. That costs 10 ms or more per frame on two cores, a cost that real users do not have.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Page latency in a real browser: from the creation of a result to the painted frame, the cost of painting, and how
-soon a changed parameter shows in the stream during playback."""
+"""Measures page latency in a real browser: from the creation of a result to the painted frame, the cost of painting,
+and how soon a changed parameter appears in the stream during playback."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`cipv labels export` and `import`: labels of recordings as files of other tools, and back."""
+"""`cipv labels export` and `import`: convert labels of recordings to and from the files of other tools."""
 
 from __future__ import annotations
 

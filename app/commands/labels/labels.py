@@ -1,5 +1,5 @@
-"""`cipv labels`: labels of recordings in the database, as files of other tools, and back. The line and the database are
-imported by who uses them: they take two seconds."""
+"""`cipv labels`: labels of recordings, in the database and as files of other tools. The pipeline and the database are
+imported on use, because that takes two seconds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""`cipv labels queue`, `agreement` and `effort`: who labels what, how far people agree, and how much they have done."""
+"""`cipv labels queue`, `agreement` and `effort`: assign recordings, compare two labelers, and show each person's
+work."""
 
 from __future__ import annotations
 

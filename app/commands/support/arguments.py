@@ -1,4 +1,4 @@
-"""How options and arguments are shown in a command's help."""
+"""Defines how options and arguments appear in a command's help."""
 
 from __future__ import annotations
 

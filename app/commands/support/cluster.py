@@ -1,4 +1,4 @@
-"""Options of commands that run many drives, and the running with its progress bar."""
+"""Options of commands that run many drives, and running these with a progress bar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compile numba kernels and Python bytecode once, in ``make install``, so that the first start need not."""
+"""Compiles numba kernels and Python bytecode once, during ``make install``, to make the first start fast."""
 
 from __future__ import annotations
 

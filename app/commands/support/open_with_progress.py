@@ -1,4 +1,4 @@
-"""Open a source, with a progress bar for as long as that takes."""
+"""Opens a source and shows a progress bar meanwhile."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Options that several commands share, and how they become parameters, a source and detectors. Imports happen on use:
-they take a second, and ``--help`` and ``cipv params`` need none of them."""
+"""Options that several commands share, and their conversion to parameters, a source and detectors. Heavy modules are
+imported on use: they take a second, and ``--help`` and ``cipv params`` do not need them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which live sensors deliver no data yet, on standard error."""
+"""Reports on standard error which live sensors have not delivered data yet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What happened on a drive, found in its rows and objects by pure functions.
+"""The events of a drive, found in its frame rows and objects by pure functions.
 
 To add a kind of event, write one module in this folder with an ``EventFinder`` and register it in ``FINDERS``.
 """

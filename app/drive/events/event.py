@@ -1,4 +1,4 @@
-"""One event of a drive, and what events are found in."""
+"""An event of a drive, and the data in which events are found."""
 
 from __future__ import annotations
 

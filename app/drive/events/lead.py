@@ -1,4 +1,4 @@
-"""Events about who leads: acquired, switched, lost, cut in, cut out."""
+"""Events of the lead: acquired, switched, lost, cut in, cut out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Marks as events: those that are part of the recording, and those that people made."""
+"""Marks as events: those in the recording, and those that people added."""
 
 from __future__ import annotations
 

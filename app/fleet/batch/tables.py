@@ -1,5 +1,5 @@
-"""The tables of a batch: each column declared once, with its unit and meaning. docs/reference/fleet-tables.md is made
-from this."""
+"""The tables of a batch: each column is declared once, with its unit and meaning. docs/reference/fleet-tables.md is
+generated from these declarations."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class TableShape:
     """In the order of the file; packs have ``drive`` before them."""
 
     def schema(self) -> pa.Schema:
-        """Of pyarrow."""
+        """Type name in pyarrow."""
         import pyarrow as pa
 
         return pa.schema([pa.field(each.name, pa.type_for_alias(each.kind)) for each in self.columns])
@@ -64,19 +64,19 @@ FRAMES = TableShape(
         ("cipv_id", "int32", "", "The closest in-path vehicle"),
         ("source", "string", "", "Sensors that track the CIPV: `V`, `L` or `VL`"),
         ("carried", "bool", "", "Whether the CIPV is a prediction, not seen in this frame"),
-        ("distance_m", "float32", "m", "Of the CIPV"),
+        ("distance_m", "float32", "m", "Distance of the CIPV"),
         ("distance_sigma_m", "float32", "m", "Standard deviation of the CIPV's distance"),
         ("closing_speed_mps", "float32", "m/s", "How fast the gap to the CIPV shrinks"),
         ("ttc_s", "float32", "s", "Time to collision with the CIPV"),
-        ("path_offset_m", "float32", "m", "Of the CIPV from the path's centre, positive to the left"),
+        ("path_offset_m", "float32", "m", "Offset of the CIPV from the path's centre, positive to the left"),
         ("vl_gap_m", "float32", "m", "Camera's minus LiDAR's distance of the CIPV"),
         ("vl_gap_sigmas", "float32", "", "The size of that gap in standard deviations of both sensors"),
         ("speed_mps", "float32", "m/s", "Ego speed"),
         ("yaw_rate_radps", "float32", "rad/s", "Ego yaw rate, positive to the left"),
-        ("desired_speed_mps", "float32", "m/s", "Of ACC"),
+        ("desired_speed_mps", "float32", "m/s", "Speed given by the speed law of ACC"),
         ("accel_mps2", "float32", "m/s²", "Acceleration requested by ACC or emergency braking"),
         ("brake", "float32", "", "Pedal, 0–1"),
-        ("acc_state", "string", "", "Of ACC and emergency braking"),
+        ("acc_state", "string", "", "State of ACC and emergency braking"),
         ("gaps", "string", "", "Sensors without data in this frame, joined by commas"),
         ("reach_m", "float32", "m", "How far ahead a vehicle in the path would be detected"),
         ("path_source", "string", "", "Source of the path"),
@@ -95,7 +95,7 @@ OBJECTS = TableShape(
         ("seen_by", "string", "", "Sensors that saw it in this frame; empty: it is carried"),
         ("type", "string", "", "Its class by the camera"),
         ("type_score", "float32", "", "The detector's score for that class, 0–1"),
-        ("distance_m", "float32", "m", "To its nearest point"),
+        ("distance_m", "float32", "m", "Distance to its nearest point"),
         ("distance_sigma_m", "float32", "m", "Standard deviation of the distance"),
         ("distance_from", "string", "", "Source of the distance: `cluster`, `returns` or `box`"),
         ("closing_speed_mps", "float32", "m/s", "How fast the gap shrinks"),
@@ -116,10 +116,10 @@ OBJECTS = TableShape(
         ("bbox_y1", "float32", "px", "Upper edge of its image box"),
         ("bbox_x2", "float32", "px", "Right edge of its image box"),
         ("bbox_y2", "float32", "px", "Lower edge of its image box"),
-        ("length_m", "float32", "m", "Of its cuboid"),
-        ("width_m", "float32", "m", "Of its cuboid"),
-        ("height_m", "float32", "m", "Of its cuboid"),
-        ("yaw_rad", "float32", "rad", "Of its cuboid"),
+        ("length_m", "float32", "m", "Length of its cuboid"),
+        ("width_m", "float32", "m", "Width of its cuboid"),
+        ("height_m", "float32", "m", "Height of its cuboid"),
+        ("yaw_rad", "float32", "rad", "Yaw of its cuboid"),
         ("hits", "int32", "", "Sightings so far"),
         ("lidar_points", "int32", "", "Points of its last cluster"),
     ),
@@ -136,9 +136,9 @@ EVENTS = TableShape(
         ("id", "int32", "", "The object it is about"),
         ("other_id", "int32", "", "The second object it is about"),
         ("source", "string", "", "Sensors that track the CIPV"),
-        ("distance_m", "float32", "m", "Of the CIPV"),
-        ("closing_speed_mps", "float32", "m/s", "Of the CIPV"),
-        ("ttc_s", "float32", "s", "Of the CIPV at the event"),
+        ("distance_m", "float32", "m", "Distance of the CIPV"),
+        ("closing_speed_mps", "float32", "m/s", "Closing speed of the CIPV"),
+        ("ttc_s", "float32", "s", "Time to collision with the CIPV at the event"),
         ("min_ttc_s", "float32", "s", "Shortest time to collision within 3 s after the event"),
         ("max_gap_m", "float32", "m", "Largest gap between camera's and LiDAR's distance of the CIPV within 2 s"),
         ("max_gap_sigmas", "float32", "", "Largest such gap in standard deviations within 2 s"),
@@ -162,7 +162,7 @@ TIMINGS = TableShape(
     "One row per frame and stage. The only table that differs from run to run.",
     _columns(
         ("index", "int32", "", "Number of the frame"),
-        ("stage", "string", "", "Of the pipeline; `total` is the whole step"),
+        ("stage", "string", "", "Stage of the pipeline; `total` is the whole step"),
         ("ms", "float32", "ms", "How long it took"),
     ),
 )
@@ -171,7 +171,7 @@ DRIVES = TableShape(
     "One row per drive.",
     _columns(
         ("address", "string", "", "What `cipv serve` and `cipv run` open"),
-        ("title", "string", "", "Of the recording"),
+        ("title", "string", "", "Title of the recording"),
         ("mark", "string", "", "Changes when the recording's files change"),
         ("frames", "int32", "", "Number of frames"),
         ("duration_s", "float64", "s", "From the first frame to the last"),

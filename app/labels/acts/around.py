@@ -1,4 +1,4 @@
-"""What the frames around one show of a vehicle: sweeps and own motion of an open recording."""
+"""The frames around an observation of a vehicle: sweeps and ego motion of the open recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said of a track besides its class: occlusion and truncation of its frames, and the rest of ranges of them."""
+"""Acts on a track's attributes: occlusion and truncation per frame, and others over ranges of frames."""
 
 from __future__ import annotations
 

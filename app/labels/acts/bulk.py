@@ -1,4 +1,4 @@
-"""Acts that go through a whole drive: proposals of the present run, and labels from elsewhere."""
+"""Acts that affect a whole drive: proposals of the current run, and imported labels."""
 
 from __future__ import annotations
 

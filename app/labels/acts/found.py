@@ -1,4 +1,4 @@
-"""What acts come to whose numbers are found in the sensors' data. Clients do not send these."""
+"""Acts whose numbers are computed from sensor data. Clients cannot send them."""
 
 from __future__ import annotations
 

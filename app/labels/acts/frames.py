@@ -1,4 +1,4 @@
-"""What is said of single frames: the ego path and events."""
+"""Acts on single frames: the ego path and events."""
 
 from __future__ import annotations
 

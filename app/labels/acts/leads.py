@@ -1,4 +1,4 @@
-"""Who the lead is, painted over frames."""
+"""Acts that set the lead over ranges of frames."""
 
 from __future__ import annotations
 

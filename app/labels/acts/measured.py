@@ -1,4 +1,4 @@
-"""Acts whose numbers come from the sensors' data instead of from a hand."""
+"""Acts whose numbers are measured in sensor data instead of given by a person."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Whether an act over frames would undo what somebody else said there meanwhile, or cut what was reviewed.
+"""Detects whether an act on frames would overwrite someone else's newer labels, or cut reviewed ones.
 
-Tracks have a number, and an act on one carries the revision it is based on. Ranges of the lead, tags, paths and events
-are acted on by frame: such an act carries the revision of the labels that the person saw.
+An act on a track carries the track's number and the revision it is based on. Ranges of the lead, tags, paths and events
+are changed by frame: such an act carries the revision of the labels that the person saw.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What each act does to the labels of a drive, by its kind."""
+"""The effect of each kind of act on the labels of a drive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What requests about labels are made of: numbers, names and words as a person gives them, checked and cleaned."""
+"""Fields of label requests: numbers, names and words from users, validated and cleaned."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a person may do to labels, as it comes in. Numbers are checked here; whether it can be done, in ``acts``."""
+"""Requests to change labels. Values are validated here; ``acts`` decides whether the change is possible."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Saying of labels that they are so, are not so, or are to be looked at again."""
+"""Acts that accept or reject labels, or send them back for another review."""
 
 from __future__ import annotations
 

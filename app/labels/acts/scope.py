@@ -1,4 +1,4 @@
-"""What every act must know besides the labels themselves."""
+"""The context that every act needs besides the labels."""
 
 from __future__ import annotations
 

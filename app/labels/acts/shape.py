@@ -1,4 +1,4 @@
-"""Where a track is: keyframes, sizes, frames in which it is not."""
+"""Acts on the geometry of a track: keyframes, sizes, and frames without it."""
 
 from __future__ import annotations
 

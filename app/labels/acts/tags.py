@@ -1,4 +1,4 @@
-"""Words about frames, painted over them."""
+"""Acts that set tags on ranges of frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which vehicles there are: adding, naming, splitting and merging tracks."""
+"""Acts on tracks: adding, naming, splitting and merging them."""
 
 from __future__ import annotations
 

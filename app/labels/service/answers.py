@@ -1,4 +1,5 @@
-"""Labels as the API answers them. A cuboid is an object as in results; everything else is as in the native file."""
+"""Labels in the form that the API returns. A cuboid looks like an object in results; everything else as in the native
+file."""
 
 from __future__ import annotations
 

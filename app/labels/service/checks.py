@@ -1,4 +1,4 @@
-"""The checks of a drive's labels, kept until somebody changes them."""
+"""The plausibility checks of a drive's labels, cached until a label changes."""
 
 from __future__ import annotations
 

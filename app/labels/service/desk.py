@@ -1,6 +1,6 @@
-"""The labels of what is open: acts on them, how far they are, and what others do to them meanwhile.
+"""The labels of the open recording: acts on them, progress, and changes by others.
 
-Whatever speaks with a database is imported when labels are first asked for: SQLAlchemy takes most of a second, and the
+Database modules are imported when labels are first requested: SQLAlchemy takes most of a second to import, and the
 first image does not wait for it.
 """
 

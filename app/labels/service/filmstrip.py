@@ -1,4 +1,4 @@
-"""A track at a glance: its keyframes, and the frames in which it fits its points worst."""
+"""An overview of a track: its keyframes, and the frames in which it fits its points worst."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Where there is something to do: the next frame without a lead, with a proposal, sent back, not reviewed, or judged
-otherwise."""
+"""Finds the next frame to work on: without a lead, with a proposal, sent back, not reviewed, or judged differently."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is open, and its labels in the database, which is opened when somebody first asks for any."""
+"""The open recording and its labels in the database, which is opened on first use."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Changes of parameters on their way into the log: nobody who drives waits for a database that is held elsewhere."""
+"""Queues parameter changes for the log, so that moving a slider never waits for a locked database."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The runs of a drive against what people labelled in it: the figures of ``cipv evaluate``, at once."""
+"""Scores runs of a drive against its labels, with the figures of ``cipv evaluate``, after every change."""
 
 from __future__ import annotations
 

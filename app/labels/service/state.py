@@ -1,4 +1,4 @@
-"""What everybody is told of the labels of what is open."""
+"""The state of the labels of the open recording, sent to every client."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Label work that takes longer than an answer may: one task at a time, which reports progress and how it ended."""
+"""Label tasks that take longer than a request may: one at a time, with progress and an outcome."""
 
 from __future__ import annotations
 

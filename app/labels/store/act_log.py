@@ -1,8 +1,8 @@
-"""The acts on one drive: each is one transaction and one row, and can be taken back and done again.
+"""The log of acts on a drive: each act is one transaction and one row, and can be undone and redone.
 
-A person takes back what that person did, newest first, and no other's: not even when both changed the same label, where
-it is refused instead. Parameters belong to the server they were changed on (``station``); who changes them without
-a name there does it for everybody there. An act may come with an id of who sends it: sent again, it is not done again.
+People undo their own acts, newest first, and never another person's; an undo is refused where both changed the same
+label. Parameters belong to the server that they were changed on (``station``); a change without a person's name counts
+as everyone's there. An act may carry an id chosen by its sender: sent a second time, it is not applied again.
 """
 
 from __future__ import annotations

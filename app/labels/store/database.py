@@ -1,8 +1,7 @@
-"""The database that labels are kept in: SQLite in a file of this machine, or a team's PostgreSQL.
+"""The label database: SQLite in a local file, or a team's PostgreSQL.
 
-What a transaction has committed is on disk: SQLite writes its log through to it (``synchronous=FULL``), and so does
-PostgreSQL as it comes. Writers come one after the other: SQLite takes its one lock at the beginning, PostgreSQL
-locks the drive that an act is on.
+A committed transaction is on disk: SQLite syncs its log (``synchronous=FULL``), and PostgreSQL does so by default.
+Writers take turns: SQLite takes its single lock at the start, PostgreSQL locks the drive that an act changes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One act while it is being made: labels read and changed inside its transaction, and written at its end."""
+"""An act in progress: labels are read and changed within its transaction, and written at the end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The labels of one recording in a database: as a whole, in parts, and frozen under names."""
+"""The labels of one recording in a database: all of them, parts of them, and frozen versions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who has done how much on each recording: acts, and the time between them."""
+"""How much each person has done on each recording: acts and active time."""
 
 from __future__ import annotations
 

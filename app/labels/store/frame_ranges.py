@@ -1,4 +1,4 @@
-"""Ranges of frames, both ends included, beside others."""
+"""Ranges of frames, both ends included, and how new ranges cut existing ones."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What holds for all labels of a drive together, whoever made which: a frame has one lead, one path and each tag once,
-and who is named is there."""
+"""Invariants of a drive's labels, whoever made them: each frame has one lead, one path and each tag once, and every
+track referred to exists."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Labels of one drive read from the database."""
+"""Reads labels of one drive from the database."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""How labels lie in a database: drives, the acts on them, what each act changed, and how everything is now.
+"""The database tables of labels: drives, acts, the changes of each act, and the current labels.
 
-``item`` and ``sighting`` are the labels as they stand. ``act`` is the log, one row an act; ``change`` holds each item
-that an act changed, before and after it, so that every act can be taken back and every item has a history.
+``item`` and ``sighting`` are the current labels. ``act`` is the log, with one row per act; ``change`` holds every item
+that an act changed, before and after, so that every act can be undone and every item has a history.
 """
 
 from __future__ import annotations

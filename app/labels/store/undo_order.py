@@ -1,4 +1,4 @@
-"""Whose acts of a drive are whose: what a person takes back or does again next, and what stands in the way."""
+"""The order of undo: which act a person undoes or redoes next, and what prevents it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Labels as the database holds them, and back: items as JSON, sightings as rows, changes as compressed JSON."""
+"""Converts labels to and from database values: items as JSON, sightings as rows, changes as compressed JSON."""
 
 from __future__ import annotations
 

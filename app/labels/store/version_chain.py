@@ -1,7 +1,7 @@
-"""Frozen versions chained by hash: each holds the SHA-256 of what it says and of the version before it.
+"""Frozen versions chained by hash: each holds the SHA-256 of its content and of the version before it.
 
-So one that is changed in the database, or taken out from under another, is refused when it is read. It is no signature:
-whoever may write the database can make the chain anew.
+A version that was changed in the database, or whose predecessor was removed, is rejected when it is read. This is not a
+signature: anyone who can write the database can build the chain again.
 """
 
 from __future__ import annotations

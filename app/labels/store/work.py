@@ -1,4 +1,4 @@
-"""Work over many recordings: whose each is, how far it is, and which is worth most to label next."""
+"""The queue of recordings to label: their assignee, state and worth."""
 
 from __future__ import annotations
 

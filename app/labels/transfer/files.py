@@ -1,4 +1,4 @@
-"""Labels of a drive as files of other tools, made for a download and taken from an upload."""
+"""Labels of a drive as files of other tools, for downloads and uploads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""How a rerun recording opens: camera top left, the world beside it, plan and reasons below, curves at the bottom."""
+"""The layout of a rerun recording: camera top left, the world beside it, plan and reasons below, curves at the
+bottom."""
 
 from __future__ import annotations
 

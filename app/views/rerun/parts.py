@@ -1,4 +1,4 @@
-"""What a rerun recording holds: objects, boxes, lines and images as rerun's own types, None when there are none."""
+"""Converts objects, boxes, lines and images to rerun's types; None when there are none."""
 
 from __future__ import annotations
 

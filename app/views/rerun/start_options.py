@@ -1,4 +1,4 @@
-"""How rerun opens a replay; apart from what needs rerun, which takes half a second to import."""
+"""Start options of rerun, kept apart from modules that import rerun, which takes half a second."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """A recording for the rerun viewer: every frame with its result, in one ``.rrd`` file or stream.
 
-The viewer reads files of its own and the previous minor version only: this is an export, recordings are the archive.
+The viewer reads only files of its own and of the previous minor version, so this is an export; sessions are the
+archive.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """rerun's own web viewer, served by this program.
 
-The viewer is inside the ``rerun`` program that the wheel installs, which serves it on every interface by itself. So the
-program is started once, on loopback, its two files are taken over, and it is ended. It runs with a home of its own and
-told that nobody sits before it: then it sends no usage data, and a person's own settings stay as they are.
+The wheel installs a ``rerun`` program that contains the viewer and serves it on every interface. It is therefore
+started once, on loopback; its two files are copied, and it is stopped. It runs with a temporary home folder and
+``CI=true``, so it sends no usage data and leaves the user's settings unchanged.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""What one browser alone sees of the 3D view: its page's selection, its labels, and the cuboid that it edits."""
+"""The parts of the 3D view that belong to one browser: its page's selection, its labels, and the cuboid being
+edited."""
 
 from __future__ import annotations
 

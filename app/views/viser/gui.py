@@ -1,4 +1,4 @@
-"""Sliders, switches and choices for every parameter in the 3D view, built from the parameters' schema."""
+"""Sliders, switches and choices for every parameter in the 3D view, generated from the parameter schema."""
 
 from __future__ import annotations
 

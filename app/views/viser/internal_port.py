@@ -1,8 +1,9 @@
-"""viser's port on loopback answers nobody but our own proxy.
+"""Restricts viser's loopback port to this program's own proxy.
 
-viser knows neither tokens nor origins, and every program and every web page of this machine can reach loopback. So each
-request and each WebSocket must bring a secret of this process in a header, which the proxy adds and a page cannot set.
-viser offers no place for that check: the ``serve`` of the websockets library that it calls gets one while it starts.
+viser supports neither tokens nor origin checks, and every program and web page on this machine can reach loopback. Each
+request and each WebSocket must therefore carry a secret of this process in a header, which the proxy adds and a page
+cannot set. viser offers no hook for this check, but the ``serve`` function of the websockets library that it calls gets
+one during startup.
 """
 
 from __future__ import annotations

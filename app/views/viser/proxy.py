@@ -1,10 +1,9 @@
-"""The 3D view under ``/viser/`` of the one web port: its page over HTTP and its scene over a WebSocket.
+"""Serves the 3D view under ``/viser/`` on the web port: its page over HTTP and its scene over a WebSocket.
 
-viser's own server has no idea of origins or tokens, so it listens on loopback only, answers nobody but this proxy
-(``internal_port``), and people reach it through here.
-Its client opens ``ws://host/viser`` from a page at ``http://host/viser/`` (it drops the trailing slash) and asks for
-the subprotocol ``viser-v<version>``, which its server refuses to do without: both go through as they are. A page of the
-dashboard opens ``/viser/of/<its name>/``, so that the 3D view shows it its own labels and selection.
+viser's own server has no origin checks or tokens, so it listens on loopback only and answers only this proxy
+(``internal_port``). Its client opens ``ws://host/viser`` from a page at ``http://host/viser/`` (it drops the trailing
+slash) and asks for the subprotocol ``viser-v<version>``, which its server requires: both are passed through unchanged.
+A page of the dashboard opens ``/viser/of/<its name>/``, so that the 3D view shows that page's labels and selection.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""/api/alignment/fit: fit the alignment to the open recording. Nothing is changed: who asked applies the result."""
+"""/api/alignment/fit: fit the alignment to the open recording. The fit changes nothing; the client applies the
+result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""/api/alignment/versions: kept alignments. Restoring one is a change of parameters, as one step to undo."""
+"""/api/alignment/versions: saved alignments. Restoring one changes parameters and can be undone in one step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names of a registry as an API type: OpenAPI lists them, and others are refused."""
+"""The names in a registry as an API type: OpenAPI lists them, and other names are rejected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How what cannot be done becomes an HTTP answer of one sentence."""
+"""Turns errors into HTTP responses of one sentence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""/api/runs: what other parameters would have made of the drive. Save, name, compare, use, delete."""
+"""/api/runs: runs of the drive with other parameters. Save, name, compare, use, delete."""
 
 from __future__ import annotations
 

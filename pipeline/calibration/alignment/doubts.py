@@ -1,4 +1,4 @@
-"""What a drive cannot determine, as sentences: too few cars, all of them in one place, uncertain values."""
+"""Describes in sentences what a drive cannot determine: too few cars, all of them in one place, uncertain values."""
 
 from __future__ import annotations
 

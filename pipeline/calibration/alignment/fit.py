@@ -1,11 +1,11 @@
-"""The alignment of LiDAR and camera from an ordinary drive: no target, no picked points, no start.
+"""Fits the alignment of LiDAR and camera to an ordinary drive, without a target, picked points or an initial guess.
 
-1. **Coarse.** Every mount (and lens, for the angular model) of a grid is asked how many of the detector's boxes have a
-   cluster where it puts one. What is right in many frames at once stands out.
-2. **Fine.** From the best few of them: pair each box with its cluster, move the projected edges onto the box's edges
-   with a robust loss, pair again more strictly, until both settle.
-3. **Doubt.** The same is fitted to frames drawn anew from blocks of the drive (bootstrap): their spread is the
-   uncertainty. Frames set aside before say how good the result is; the drive itself, whether it could tell.
+1. **Coarse.** For every mount (and lens, for the angular model) of a grid, count how many of the detector's boxes have
+   a cluster where that mount predicts one. The correct one stands out over many frames.
+2. **Fine.** From the best few mounts: pair each box with its cluster, move the projected edges onto the box's edges
+   with a robust loss, and pair again more strictly, until both converge.
+3. **Uncertainty.** The fit is repeated on frames resampled from blocks of the drive (bootstrap); the spread is the
+   uncertainty. Held-out frames show how good the result is, and the drive itself whether it could determine it.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def fit_alignment(
     spread = _bootstrap(table, model, vector, blocks, progress)
     warnings = warnings_of(table, model, found, model.spread(spread))
     if looks_undistorted(table, model, vector, blocks):
-        warnings += ("the boxes lie better without the lens distortion: are the images undistorted already?",)
+        warnings += ("the boxes fit better without the lens distortion: are the images undistorted already?",)
     judged = PairTable.of([scenes[k] for k in held]) if held else table
     start = model.vector(present)
     after, *before = _overlaps(judged, model, [vector, *([start] if start is not None else [])])

@@ -1,4 +1,4 @@
-"""The two models as numbers to be fitted: what is searched, how far, and which parameters come of it.
+"""The two models as numbers to fit: search ranges, and the parameters that result.
 
 A pinhole model keeps the lens of the recording's calibration. The angular model has no mount, so its origin stands for
 yaw and pitch, and its two resolutions for the lens.

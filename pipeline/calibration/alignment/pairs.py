@@ -1,7 +1,7 @@
-"""Which cluster belongs to which box under an alignment, and how far apart their edges are.
+"""Pairs clusters with boxes under an alignment, and measures the distances between their edges.
 
-Edges are compared in standard deviations of what a detector's box is off by, which grows with the box. A roof that lies
-between two rings is off by nothing as long as the box ends between them too.
+Distances are in standard deviations of a detector's box error, which grows with the box. A roof between two rings has
+no error as long as the box also ends between them.
 """
 
 from __future__ import annotations

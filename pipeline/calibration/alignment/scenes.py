@@ -1,8 +1,8 @@
-"""What of one frame no alignment changes: the boxes that a detector drew, and the outlines of what the LiDAR saw.
+"""The data of a frame that does not depend on the alignment: the detector's boxes, and the outlines of LiDAR clusters.
 
-A box is four edges; an outline is the points whose projections bound a cluster in the image. Both sensors are coarse
-in their own way, and an outline says so: a car's side lies between the last beam that hit it and the next one that did
-not, its roof between two rings, and its foot, where the box ends below, on the road, which the beams may have missed.
+A box has four edges; an outline consists of the points whose projections bound a cluster in the image. Both sensors are
+coarse, each in its own way, and an outline reflects this: a car's side is between the last beam that hit it and the
+next that did not, its roof is between two rings, and its lower edge is on the road, where the beams may have missed it.
 """
 
 from __future__ import annotations

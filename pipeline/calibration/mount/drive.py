@@ -1,6 +1,6 @@
-"""From a drive to the LiDAR's mount. A drive with a turned mount is looked at twice: odometry begins every sweep by
-going straight along x, which pulls the direction of travel there by up to a fifth; turned by what was found first,
-it is pulled to where it is."""
+"""Determines the LiDAR's mount from a drive. A drive with a turned mount is processed twice: odometry starts every
+sweep with straight motion along x, which biases the direction of travel by up to a fifth. The second pass starts from
+the result of the first, which removes this bias."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""How the LiDAR sits in the car, from driving: yaw against the direction of travel, pitch and roll against the road,
-its height above the road, and where the drive bends enough, how far it is from the rear axle.
+"""Fits the mount of the LiDAR to a drive: yaw relative to the direction of travel, pitch and roll relative to the road,
+the height above the road and, if the drive has enough bends, the distance from the rear axle.
 
-A car's rear axle moves straight ahead. So what a LiDAR at a distance L ahead of it moves sideways is L times what the
-car turns, and the rest is its yaw: ``left = −yaw·forward + L·turn``. The same along the car, where the car's own speed
-is known: ``forward = scale·driven − B·turn`` for a LiDAR B to the left of the axle's middle.
+A car's rear axle moves straight ahead. The sideways motion of a LiDAR at a distance L ahead of it is therefore L times
+the car's turn, and the rest is due to yaw: ``left = −yaw·forward + L·turn``. Along the car, where the car's own speed
+is known: ``forward = scale·driven − B·turn`` for a LiDAR B to the left of the axle's centre.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What a drive shows of the LiDAR's mount: the road below it in every frame, and its own motion.
+"""Collects what a drive shows of the LiDAR's mount: the road in every frame, and the LiDAR's motion.
 
-The way is that of the LiDAR's odometry, the road the plane through its returns in the own lane, where a road is
-flattest. Nothing of the camera is needed.
+Motion comes from LiDAR odometry, and the road is the plane through the returns in the ego lane, where a road is
+flattest. No camera is needed.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Scores of a drive without labels, from what became known of its objects later."""
+"""Scores of a drive without labels, based on what later frames reveal about its objects."""

@@ -1,8 +1,8 @@
-"""A backward look at one object's distance: from later ranged measurements to what it must have been before.
+"""Estimates an object's earlier distances from later ranged measurements.
 
-A Kalman filter of the distance and its rate is run against time, with white noise of the acceleration. Until the LiDAR
-has measured the object twice it says nothing; the farther it goes back from the last measurement, the less sure it is,
-and what is no longer sure is not judged."""
+A Kalman filter of the distance and its rate runs backwards in time, with white acceleration noise. It starts once the
+LiDAR has measured the object twice. Its uncertainty grows with the time before the last measurement, and estimates that
+are too uncertain are not used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What scores without labels need of a drive: numbers only, some 20 bytes an object and frame."""
+"""The data of a drive that scores without labels need: numbers only, about 20 bytes per object and frame."""
 
 from __future__ import annotations
 

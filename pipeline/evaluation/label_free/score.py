@@ -1,6 +1,6 @@
-"""The scores of a drive that need no labels. Each is a sum over a count, so that drives add up.
+"""The scores of a drive that need no labels. Each is a sum divided by a count, so scores of drives can be combined.
 
-Which of them say something was measured against labels: docs/reference/fleet-scores.md.
+docs/reference/fleet-scores.md shows how well each of them agrees with labels.
 """
 
 from __future__ import annotations

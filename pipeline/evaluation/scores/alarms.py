@@ -1,4 +1,4 @@
-"""Warnings and braking, compared with when the labels say that they are due.
+"""Compares warnings and braking with when the labels say that they are due.
 
 They are due when the true lead's range and closing speed exceed the emergency brake's own limits. Only drives with
 known ego speed are scored.

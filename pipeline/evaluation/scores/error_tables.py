@@ -1,5 +1,5 @@
-"""Position and speed errors by range and by sensor, in the form of the paper's Table 4: smallest, largest, mean. And
-how honest the sigmas are that the pipeline gives with its distances."""
+"""Position and speed errors by range and by sensor, in the form of the paper's Table 4 (smallest, largest, mean), and
+the calibration of the sigmas that the pipeline gives with its distances."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def errors_section(run: Drives) -> ReportSection:
                 "Distance errors within the σ given with them, %",
                 SIGMA_COLUMNS,
                 sigma_rows(run),
-                caption="Normal errors: 68, 95 and 99.7 %. A smaller share: the pipeline claims more than it knows.",
+                caption="Normal errors: 68, 95 and 99.7 %. A smaller share means that the pipeline is overconfident.",
                 decimals=0,
             ),
         ),

@@ -1,4 +1,4 @@
-"""Reading a ``results.jsonl`` file back, as far as scores need it."""
+"""Reads a ``results.jsonl`` file back, as far as scores need it."""
 
 from __future__ import annotations
 

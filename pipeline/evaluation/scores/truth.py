@@ -1,8 +1,8 @@
-"""The truth of a drive in the form that scores need: the lead in each frame, and every labelled vehicle with its
+"""The ground truth of a drive in the form that scores need: the lead in each frame, and every labelled vehicle with its
 velocity.
 
-A frame is labelled *whole* when every vehicle in it is labelled; only there does an object without a label count as
-false. A recording's own truth is always whole. A frame labelled by people is whole when no vehicle in it is only
+A frame is *whole* when every vehicle in it is labelled; only there does an object without a label count as false. A
+recording's own ground truth is always whole. A frame labelled by people is whole when no vehicle in it is only
 proposed, and something confirms that all were labelled: accepted proposals there, imported truth, or a person's tag.
 """
 

@@ -1,9 +1,9 @@
 """Velocities of labelled vehicles, from their positions in the neighbouring labelled frames.
 
 A parabola is fitted to a vehicle's positions within 0.3 s of each frame, always including the frames right before and
-after (Savitzky and Golay 1964, for uneven times): a label is off by centimetres to decimetres, and two labels 0.2 s
-apart would give a speed that is off by metres per second. With fewer than four positions it is a line. Where positions
-deviate from it by more than the error of labels, the track jumps, for example because the pipeline confused two
+after (Savitzky and Golay 1964, for uneven times): labels are off by centimetres to decimetres, so the speed between two
+labels 0.2 s apart would be off by metres per second. With fewer than four positions, a line is fitted. Where positions
+deviate from the fit by more than the error of labels, the track jumps, for example because the pipeline confused two
 vehicles; no speed is given there.
 """
 

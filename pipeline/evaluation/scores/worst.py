@@ -1,4 +1,4 @@
-"""The frames that a person should look at first."""
+"""Selects the worst frames, which a person should look at first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a detector does wrong, as numbers of ``MeasuredNoise``: from labelled vehicles with what was found of them."""
+"""Computes a detector's errors, as ``MeasuredNoise``, from labelled vehicles and their detections."""
 
 from __future__ import annotations
 

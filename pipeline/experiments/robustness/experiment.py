@@ -1,7 +1,8 @@
-"""Experiment: how often the pipeline fails in random traffic, by the thousand kilometres.
+"""Experiment: how often the pipeline fails in random traffic, per thousand kilometres.
 
-Each case is a kilometre of its own (``traffic``). Boxes are the truth with the errors measured of a real detector, the
-LiDAR is cast, no image is drawn. The rates have exact Poisson bounds, so a short run says how little it knows.
+Each case is an independent kilometre (``traffic``). Boxes are ground truth with the errors measured on a real detector,
+the LiDAR is ray-cast, and no image is rendered. The rates have exact Poisson bounds, so a short run shows how uncertain
+it is.
 """
 
 from __future__ import annotations

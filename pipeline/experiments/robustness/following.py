@@ -1,5 +1,5 @@
-"""Cars that follow each other, as the Intelligent Driver Model does (Treiber, Hennecke and Helbing 2000): the speeds of
-a script that runs into nobody."""
+"""Cars that follow each other according to the Intelligent Driver Model (Treiber, Hennecke and Helbing 2000): the
+speeds of a script without collisions."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""One drive's results against the truth: phantom leads, phantom braking, leads missed, switches of the lead.
+"""Judges one drive's results against ground truth: phantom leads, phantom braking, missed leads, switches of the lead.
 
-A phantom is believed where no vehicle is that the car could meet. What is in the driven path, or so near to its edge
-that either answer is right, is none, and neither is what comes into it within three seconds.
+A phantom is a lead or braking where the car could not meet any vehicle. Vehicles in the driven path, vehicles so near
+to its edge that either answer is right, and vehicles that enter it within three seconds are no phantoms.
 """
 
 from __future__ import annotations

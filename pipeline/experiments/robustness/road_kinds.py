@@ -1,4 +1,4 @@
-"""What kinds of road the robustness suite drives on, and what a drive on them has, by its number."""
+"""The kinds of road in the robustness suite, and the properties of each drive, by its number."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Random traffic for the robustness suite: a kilometre of street, country road or motorway, by its number.
 
-Parked rows, crossings, bends, crests, roadworks, leads that wander and stop, cars that cut in and out, and each drive
-with sensor faults of its own. The ego vehicle follows a script that runs into nobody, so what the pipeline would brake
-for is judged, not what would come of it.
+Each drive has parked rows, crossings, bends, crests, roadworks, leads that wander and stop, cars that cut in and out,
+and its own sensor faults. The ego vehicle follows a script without collisions, so the suite judges what the pipeline
+would brake for, not the consequences.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Camera calibrations as files of others: what each format is called, how it is read and written.
+"""Camera calibrations in the formats of other tools: the name of each format, its reader and its writer.
 
-Every reader returns a ``CameraCalibration`` whose ego frame is the LiDAR's own, and raises SourceError, in one
-sentence, for what cannot be meant.
+Every reader returns a ``CameraCalibration`` whose ego frame is the LiDAR's own. It raises SourceError, with one
+sentence, for values that cannot be valid.
 """
 
 from __future__ import annotations

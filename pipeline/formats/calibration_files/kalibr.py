@@ -37,9 +37,11 @@ def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
     if model != "pinhole":
         raise SourceError(f"{CHAIN}: camera_model {model} is not supported; calibrate as pinhole")
     if np.any(distortion) and (distortion_model != "radtan" or distortion.shape != (4,)):
-        raise SourceError(f"{CHAIN}: {distortion.size} numbers of {distortion_model} distortion; radtan with 4 is read")
+        raise SourceError(
+            f"{CHAIN}: {distortion.size} numbers of {distortion_model} distortion; only radtan with 4 is supported"
+        )
     if not np.all(np.isfinite(distortion)) or min(width, height) < 16:
-        raise SourceError(f"{CHAIN}: distortion_coeffs or resolution make no sense")
+        raise SourceError(f"{CHAIN}: invalid distortion_coeffs or resolution")
     K = camera_matrix([[fu, 0.0, pu], [0.0, fv, pv], [0.0, 0.0, 1.0]], f"{CHAIN}: intrinsics")
     lens = distortion if np.any(distortion) else np.zeros(0)
     found = CameraCalibration(K, lens, _transform(path, camera), width, height)

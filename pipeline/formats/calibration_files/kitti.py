@@ -1,5 +1,5 @@
-"""KITTI's ``calib.txt`` of the object benchmark: P2, R0_rect, Tr_velo_to_cam. Its images are undistorted, and it says
-no size."""
+"""KITTI's ``calib.txt`` of the object benchmark: P2, R0_rect, Tr_velo_to_cam. It is for undistorted images and does not
+store their size."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from pipeline.types.source import SourceError
 
 def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
     if size is None:
-        raise SourceError(f"{path.name}: KITTI's calibration does not store the image size; give it")
+        raise SourceError(f"{path.name}: KITTI's calibration does not store the image size; specify it")
     return parse_object_calibration(read_bytes(path), path.name, size).camera
 
 
 def write(path: Path, camera: CameraCalibration) -> None:
     """SourceError for a lens with distortion, which the format cannot say."""
     if np.any(camera.distortion):
-        raise SourceError("KITTI's calibration is of undistorted images; this camera has distortion")
+        raise SourceError("KITTI's calibration is for undistorted images; this camera has distortion")
     projection = np.hstack([camera.K, np.zeros((3, 1))])
     rows = {f"P{number}": projection for number in range(4)}
     rows |= {"R0_rect": np.eye(3), "Tr_velo_to_cam": camera.T_camera_ego[:3]}

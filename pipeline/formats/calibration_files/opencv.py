@@ -20,7 +20,7 @@ def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
     try:
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
     except cv2.error:
-        raise SourceError(f"{path.name}: not a file of OpenCV's FileStorage") from None
+        raise SourceError(f"{path.name}: not an OpenCV FileStorage file") from None
     try:
         K = camera_matrix(_matrix(storage, "camera_matrix", path), f"{path.name}: camera_matrix")
         T = rigid_transform(_matrix(storage, "T_camera_lidar", path), f"{path.name}: T_camera_lidar")

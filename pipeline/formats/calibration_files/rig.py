@@ -1,5 +1,5 @@
-"""The rig file of recordings of bare sensors, which says the mount as places and angles. It is read by
-``pipeline.sources.rig``."""
+"""The rig file of recordings of bare sensors, which gives mounts as positions and angles. ``pipeline.sources.rig``
+reads it."""
 
 from __future__ import annotations
 

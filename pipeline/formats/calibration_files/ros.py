@@ -1,6 +1,6 @@
 """ROS: a folder with ``camera_info.yaml``, as ``camera_calibration`` writes it, and ``static_transform.yaml``, a
-``geometry_msgs/TransformStamped``. Which way the transform goes is told by its frames: the camera's is the header of
-the camera info, optical (REP 103)."""
+``geometry_msgs/TransformStamped``. Its frames give the direction of the transform: the camera's frame is that in the
+header of the camera info, optical (REP 103)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Packets as a Velodyne sends them over UDP: guarded, put in order, cut into sweeps and decoded."""
+"""Packets as a Velodyne sends them over UDP: validated, ordered, cut into sweeps and decoded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Full time from a Velodyne's own: it counts microseconds past the hour, and nobody tells it which hour."""
+"""Full timestamps from a Velodyne's clock, which counts microseconds past the hour without stating the hour."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Velodyne packets → rotations, packet by packet: each is checked and put in its place; the cut is behind the car.
+"""Velodyne packets → rotations, packet by packet: each is validated and put in order; the cut is behind the car.
 
-So what is ahead is never in two, and its tick is the moment the head looks straight ahead. Where a packet belongs
-follows from its time and its azimuth together: the two must agree with the packets before it, so one spoiled packet
-cannot cut a rotation short or move its time.
+The view ahead is therefore never split, and the tick of a rotation is the moment when the head looks straight ahead. A
+packet's position follows from its time and azimuth together: both must agree with the packets before it, so one corrupt
+packet cannot cut a rotation short or shift its time.
 """
 
 from __future__ import annotations

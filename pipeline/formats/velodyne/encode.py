@@ -1,5 +1,5 @@
-"""A sweep back into the packets that a VLP-16 would have sent: for tests of the decoder, for the benchmark where no
-real packets are at hand, and to replay a recording of clouds over the network."""
+"""Encodes a sweep as the packets that a VLP-16 would have sent: for tests of the decoder, for the benchmark when no
+real packets are available, and to replay a recording of point clouds over the network."""
 
 from __future__ import annotations
 

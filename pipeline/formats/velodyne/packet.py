@@ -1,13 +1,13 @@
-"""One data packet of a Velodyne, looked at before anything is decoded (manual of the VLP-16, 63-9243, section 9.3; the
-other models of ``models`` send the same frame).
+"""Validates one data packet of a Velodyne before it is decoded (manual of the VLP-16, 63-9243, section 9.3; the other
+models of ``models`` send the same frame).
 
 1206 bytes: twelve blocks of a flag FF EE, an azimuth and 32 returns, then the sensor's time (µs past the hour), the
-return mode and the product. In dual return mode two blocks in a row hold the last and the strongest returns of the
+return mode and the product. In dual return mode, two consecutive blocks hold the last and the strongest returns of the
 same firings.
 
-The decoding library takes what it is given: an all-zero packet, or one whose last azimuth is spoiled, makes it cut the
-sweep in the middle. So a packet that is not what the sensor sends is refused here, with the reason. A sensor set to
-send a part of the circle only makes one packet a rotation that reaches over the gap; that one is refused too, for its
+The decoding library trusts its input: an all-zero packet, or one with a corrupt last azimuth, makes it cut the sweep in
+the middle. Packets that the sensor would not send are therefore rejected here, with a reason. A sensor that is set to
+send only part of the circle produces one packet per rotation that spans the gap; it is rejected too, because its
 azimuths do not advance evenly.
 """
 

@@ -1,5 +1,5 @@
-"""The position packet that a VLP-16 sends beside its data (port 8308; Velodyne manual 63-9243, section 9.4): whether it
-follows a GPS receiver, and the receiver's last sentence."""
+"""The position packet that a VLP-16 sends besides its data (port 8308; Velodyne manual 63-9243, section 9.4): whether
+it is synchronised to a GPS receiver, and the receiver's last sentence."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""ROS's messages of Velodyne packets (package velodyne_msgs), which neither ROS's own definitions nor the library that
-reads bags hold. Sessions have them among their schemas: that library is imported when a message is read or written."""
+"""ROS messages of Velodyne packets (package velodyne_msgs), which neither ROS's own definitions nor the library that
+reads bags include. Sessions use them among their schemas; the library is imported when a message is read or written."""
 
 from __future__ import annotations
 

@@ -1,9 +1,10 @@
 """Overlays a vehicle's points of several sweeps in the ego frame of one of them.
 
-Sixteen beams show a few dozen points of a car in a sweep; a dozen sweeps show its outline. A standing vehicle's points
-are carried along by own motion, a moving one's by its own track: which of both holds them together better is tried, as
-nobody has to have said whether it stands. Each sweep is then registered to those that are laid already (Open3D's
-point-to-point ICP, Besl and McKay 1992, seen from above: beams pass over a body at other heights in each sweep).
+Sixteen beams show a few dozen points of a car in one sweep; a dozen sweeps show its outline. A standing vehicle's
+points are moved by ego motion, those of a moving one by its own track. Both are tried, and the one that aligns the
+points better is used, so nobody has to say whether the vehicle stands. Each sweep is then registered to those already
+overlaid (Open3D's point-to-point ICP, Besl and McKay 1992, seen from above, because beams hit a body at different
+heights in each sweep).
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""How far a vehicle's points reach along the sides of a cuboid, which of these sides we saw, and how well one fits."""
+"""Measures how far a vehicle's points extend along the sides of a cuboid, which sides were seen, and how well one
+fits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which points of a sweep are of the vehicle in, or near, a cuboid."""
+"""Selects the points of a sweep that belong to the vehicle in, or near, a cuboid."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Extends a track beyond its first and last frame, sweep by sweep.
 
-From the frame at an end, where a person or the pipeline has put it, the vehicle is predicted over the ground (constant
-velocity; a single frame is tried both standing and driving along with us), and laid on the points that are found there.
-It keeps its size, and lies on its points as it did at the end: what a hand has seen besides them stays. Where no points
-are, the prediction stands in, but for no longer than ``_BLIND_S``: there the track ends.
+From the frame at an end, set by a person or the pipeline, the vehicle is predicted over the ground (constant velocity;
+a single frame is tried both standing and moving with the ego vehicle), and fitted to the points found there. It keeps
+its size and its position relative to its points at the end, so what a person added beyond the points is preserved.
+Where there are no points, the prediction is used, for at most ``_BLIND_S``; then the track ends.
 """
 
 from __future__ import annotations

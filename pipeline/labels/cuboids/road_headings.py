@@ -1,8 +1,8 @@
 """Aligns proposed vehicles with the road if their shape nearly is.
 
-A box around a few points of a car is turned by 3° to 5° at random. A road is not: a vehicle that drives or is parked
-along it faces as the car with the sensors did, or will, at the nearest place of its own way. On KITTI's drive 0009 that
-is within 0.7° of the labels (median), the boxes' own yaw within 3.6°; on Astyx 1.8° and 2.5°.
+The yaw of a box around a few points of a car has a random error of 3° to 5°. The road does not: a vehicle that drives
+or is parked along it has the heading of the ego vehicle at the nearest point of its own trajectory. On KITTI drive 0009
+that is within 0.7° of the labels (median), the boxes' own yaw within 3.6°; on Astyx 1.8° and 2.5°.
 """
 
 from __future__ import annotations

@@ -1,16 +1,16 @@
 """Snaps a cuboid that a person placed near a vehicle to the vehicle's points.
 
-The points in and near it that are not ground are clustered; the cluster with most points in it (else near it) is the
-vehicle. Several placements are tried: the sides that were turned to us laid on the points, the turn kept or taken from
-them. The best one is taken only if it fits the points of this sweep and those of the sweeps around it clearly better
-than the hand's. Else the cuboid is left as it is: a dozen points beyond 35 m are no better than an eye on the image. A
-vehicle is never seen whole, so the size only grows to hold what is seen; where both ends of it were seen, in one sweep
-or over several, it is what was seen. It stands on the ground.
+The non-ground points in and near it are clustered; the cluster with most points in it (or else near it) is the vehicle.
+Several placements are tried: the visible sides fitted to the points, with the yaw kept or taken from the points. The
+best one is used only if it fits the points of this sweep and of the sweeps around it clearly better than the original.
+Otherwise the cuboid is left unchanged: a dozen points beyond 35 m are no better than a person's judgement of the image.
+A vehicle is never seen completely, so the size only grows to contain its points; where both of its ends were seen, in
+one sweep or over several, the measured size is used. The cuboid stands on the ground.
 
 The yaw comes from the closeness fit of the pipeline (``pipeline.lidar.boxes``). Open3D's minimal oriented box, which
-fits all three axes or, on flattened points, the smallest area, is further off on every real recording at hand: the
-median error of the yaw of 65 labelled cars of Astyx is 3° to 5° (flattened 2.5°) against 1.6°, of 20 of KITTI 3.5°
-(3.2°) against 0.6°."""
+fits all three axes or, on flattened points, the smallest area, is less accurate on every real recording available: the
+median error of the yaw of 65 labelled cars of Astyx is 3° to 5° (flattened 2.5°) compared with 1.6°, of 20 of KITTI
+3.5° (3.2°) compared with 0.6°."""
 
 from __future__ import annotations
 

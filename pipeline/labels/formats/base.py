@@ -1,4 +1,4 @@
-"""What a label format is, and what it needs to know of the recording that the labels belong to."""
+"""Defines a label format, and what it needs to know about the recording that the labels belong to."""
 
 from __future__ import annotations
 

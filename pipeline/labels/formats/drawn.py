@@ -1,6 +1,7 @@
-"""Labels as viewers draw them: ``foxglove.SceneUpdate`` and ``foxglove.ImageAnnotations``, a message of each a frame.
+"""Labels as viewers draw them: ``foxglove.SceneUpdate`` and ``foxglove.ImageAnnotations``, one message of each per
+frame.
 
-For viewers only: what they cannot hold is in the file of labels beside them.
+They are for viewers only; the label file next to them holds what they cannot express.
 """
 
 from __future__ import annotations

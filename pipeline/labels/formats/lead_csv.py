@@ -1,8 +1,9 @@
-"""The lead of each frame as a table, for spreadsheets: one row a frame, also where nobody has said who leads.
+"""The lead of each frame as a table for spreadsheets, with one row per frame, including frames whose lead is not
+labelled.
 
-``lead`` is a track's number, ``none`` or ``unknown``, and empty where nobody has said. ``label``, ``distance_m`` (from
-the ego origin to the cuboid's nearest point, horizontally) and ``x_m y_m`` (of its middle, ego frame) are for the eye:
-they are not read back. Ranges side by side that say the same become one.
+``lead`` is a track's number, ``none`` or ``unknown``, and empty where it is not labelled. ``label``, ``distance_m``
+(from the ego origin to the cuboid's nearest point, horizontally) and ``x_m y_m`` (its centre, ego frame) are for
+readers and are not imported. Adjacent ranges with the same lead become one.
 """
 
 from __future__ import annotations

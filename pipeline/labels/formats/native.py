@@ -1,9 +1,8 @@
-"""Our own file, ``cipv-labels`` version 5: JSON with every field of ``LabelSet`` under its own name; nothing is lost.
+"""The native format, ``cipv-labels`` version 5: JSON with every field of ``LabelSet`` under its own name, without loss.
 
-A reader of this version takes what it does not know for a mistake, and a newer version for one it cannot read. In
-version 1 a tag was of one frame; up to version 2 tracks had neither confidence nor heading;
-up to version 3 nothing told boxes that were set, nor truncation and occlusion; up to version 4 tracks had no
-attributes.
+Unknown fields are an error, and newer versions are rejected. In version 1, a tag belonged to one frame; up to version
+2, tracks had neither confidence nor heading; up to version 3, nothing marked boxes set by hand, and there was no
+truncation or occlusion; up to version 4, tracks had no attributes.
 """
 
 from __future__ import annotations

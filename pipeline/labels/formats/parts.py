@@ -1,4 +1,4 @@
-"""What a label set is made of, and in words what of it a format has no place for. One rule for all formats."""
+"""Counts the parts of a label set and describes those that a format cannot express. All formats use it."""
 
 from __future__ import annotations
 

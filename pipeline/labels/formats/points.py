@@ -1,4 +1,4 @@
-"""How many LiDAR points are in each labelled cuboid of a drive."""
+"""Counts the LiDAR points in each labelled cuboid of a drive."""
 
 from __future__ import annotations
 

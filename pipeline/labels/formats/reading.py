@@ -1,4 +1,4 @@
-"""Reads files of unknown content: one clear error, whatever is in them."""
+"""Reads files of unknown content, with one clear error whatever they contain."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Every label format, declared once, and how labels are exported and imported with one.
+"""Every label format, declared once, and the export and import of labels with one.
 
-A new format is one file with ``write`` and ``read``, and one entry in ``FORMATS``: the commands' ``--format``, the API
-and the page list what is here. Nothing of a format is imported before it is used.
+A new format is one file with ``write`` and ``read``, and one entry in ``FORMATS``; the commands' ``--format``, the API
+and the page list the formats here. A format's modules are imported on use.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Labels inside an MCAP session: our own JSON as a message of ``/labels``, beside everything that the drive is; and
-those of each frame as Foxglove draws them."""
+"""Labels inside an MCAP session: the native JSON as a message of ``/labels``, next to the data of the drive, and the
+labels of each frame as Foxglove draws them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What lane networks put out, as points in the image: one file a head, and the choice between them.
+"""Outputs of lane networks as points in the image: one file per head, and the choice between them.
 
 To add a head, write a file like ``row_grid.py`` that ends in a ``recognise``, and list it in ``HEADS``.
 """

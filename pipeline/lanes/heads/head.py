@@ -1,4 +1,4 @@
-"""What all heads share: how a network takes its image, which of its outputs holds the lines, and their points."""
+"""Shared by all heads: how a network takes its image, which of its outputs contains the lines, and their points."""
 
 from __future__ import annotations
 

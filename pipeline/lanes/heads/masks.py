@@ -1,4 +1,4 @@
-"""Points from masks that say of each pixel what it is."""
+"""Extracts points from masks that classify each pixel."""
 
 from __future__ import annotations
 

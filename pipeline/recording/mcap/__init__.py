@@ -1,1 +1,1 @@
-"""MCAP files: a directory of what lies where, chunks read by need, and files that are whole at any time."""
+"""MCAP files: an index of their contents, chunks read on demand, and files that are always readable."""

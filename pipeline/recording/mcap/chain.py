@@ -1,9 +1,9 @@
-"""A file whose parts are chained by hash: after each chunk a metadata record holds the SHA-256 of all bytes since the
-record before, and of that record's own hash.
+"""A file whose parts are chained by hash: after each chunk, a metadata record holds the SHA-256 of all bytes since the
+previous record, and of that record's own hash.
 
-So a byte that is changed, a part that is taken out and a part that is put in are found, and where. Whoever changes the
-file with this program, or makes the whole chain anew, leaves no trace: a chain shows damage and careless changes, it is
-no signature. Other programs ignore these records; they are not in the file's index.
+This detects and locates changed bytes and removed or inserted parts. Changes made with this program, or a rebuilt
+chain, leave no trace: the chain detects damage and careless changes and is not a signature. Other programs ignore these
+records; they are not in the file's index.
 """
 
 from __future__ import annotations

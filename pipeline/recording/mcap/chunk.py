@@ -1,5 +1,5 @@
-"""One chunk of an MCAP file, unpacked. Its messages stay where they are until somebody wants one: a frame's tick is a
-thousandth of what lies beside it."""
+"""One decompressed chunk of an MCAP file. Messages are extracted only on demand: a frame's tick is a thousandth of the
+data next to it."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What an MCAP file holds and where, without reading its data.
+"""The contents of an MCAP file and their positions, without reading its data.
 
-The list of chunks comes from the file's summary. A file without one (the recorder was killed, the disk was full) is
-walked through from its start, from record to record, by their heads.
+The list of chunks comes from the file's summary. A file without one (the recorder was killed, or the disk was full) is
+scanned from its start by record headers.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""An MCAP file being written so that what is on disk is whole at any moment, but for its last chunk."""
+"""Writes an MCAP file that is readable at any time, except for its last chunk."""
 
 from __future__ import annotations
 

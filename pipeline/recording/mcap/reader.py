@@ -1,4 +1,4 @@
-"""An MCAP file read by chunk: what is kept in memory grows with the number of chunks, never with their contents."""
+"""Reads an MCAP file by chunk: memory use grows with the number of chunks, never with their contents."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was written when it came, so that a frame that shows it refers to it."""
+"""The messages written so far, so that frames can refer to them."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What a session holds, as messages, and how it is read and written."""
+"""The content of a session as messages, with its reader and writer."""

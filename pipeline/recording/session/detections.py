@@ -1,5 +1,5 @@
-"""What a recording brings of detections, inside a tick. Networks' own are not kept: they are made anew, by whichever
-network looks at the session. Those of a drive that gives them belong to it, number for number."""
+"""Detections that come with a recording, stored in its ticks. Detections of networks are not stored: any network can
+process the session's images again. Detections that are part of a drive are stored number for number."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The list of a session's frames at its end: where each is, and all of its tick that is small. Who asks for every frame
-of a drive reads that, and unpacks no chunk."""
+"""The list of a session's frames at the end of its file: the position of each, and the small parts of its tick. A pass
+over all frames of a drive reads only this list and decompresses no chunk."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What one message of ``/frames`` says: everything the pipeline knew in a frame, the bulky parts by reference.
+"""The content of one message of ``/frames``: all data of a frame, the large parts by reference.
 
-Viewers need Foxglove's schemas, which cannot hold all of a ``Frame`` exactly (a rotation becomes a quaternion, a course
-has no place). So a tick keeps the small things itself, number for number, and names the messages of the point cloud,
-the image and the route by their log times, which are unique within a topic.
+Viewers need Foxglove's schemas, which cannot hold all of a ``Frame`` exactly (a rotation becomes a quaternion, and
+there is no field for a course). A tick therefore stores small values itself, number for number, and refers to the
+messages of the point cloud, the image and the route by their log times, which are unique within a topic.
 """
 
 from __future__ import annotations

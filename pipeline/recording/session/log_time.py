@@ -1,4 +1,4 @@
-"""Under which time a message is stored: one that only grows, whatever the sensors' clocks do."""
+"""The log time of each message, which always increases, whatever the sensors' clocks do."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Sensor data to messages in well-known schemas, and back. Nothing is lost on the way: floats keep their bits, a JPEG
-stays the camera's own bytes, any other image becomes a PNG."""
+"""Converts sensor data to and from messages in well-known schemas. Nothing is lost: floats keep their bits, a JPEG
+keeps the camera's own bytes, any other image becomes a PNG."""
 
 from __future__ import annotations
 

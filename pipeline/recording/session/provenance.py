@@ -1,4 +1,4 @@
-"""Where a session came from, as its file says it."""
+"""The origin of a session, as stored in its file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A session as a ``Source``: any frame within a few chunks' reading, whatever the length of the file."""
+"""A session as a ``Source``: reading any frame takes a few chunks, whatever the length of the file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Raw LiDAR packets as ``velodyne_msgs/VelodyneScan``: what ROS's Velodyne driver records, and many programs read."""
+"""Raw LiDAR packets as ``velodyne_msgs/VelodyneScan``, which ROS's Velodyne driver records and many programs read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames and results into one session file."""
+"""Writes frames and results to one session file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is rendered once per scenario: the sky with clouds and far hills, and the texture of the ground."""
+"""Rendered once per scenario: the sky with clouds and far hills, and the texture of the ground."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What distinguishes a real camera from a pinhole: lens distortion, blur, varying exposure, noise."""
+"""The imperfections of a real camera: lens distortion, blur, varying exposure, noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What vehicles look like: lofted bodies with windows, lights, plates and wheels, in metres."""
+"""Meshes of vehicles: lofted bodies with windows, lights, plates and wheels, in metres."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What is wrong with a car's sensors in one drive: the ``faults`` part of a scenario file. None is measured: they are
-what cars of a fleet have, by an order of magnitude, so a pipeline must bear them."""
+"""Sensor faults of a car in one drive: the ``faults`` part of a scenario file. Their sizes are not measured; they are
+the order of magnitude found in a fleet, which a pipeline must tolerate."""
 
 from __future__ import annotations
 

@@ -1,15 +1,15 @@
 """A ray-cast VLP-16: every ray at its own time, with range noise and lost returns.
 
-A return is strong enough to be counted by chance, which falls off with range: a surface that sends back a share ρ of
-the light, met at an angle θ from its normal, gives a power that goes with ρ·cos θ/R², so the range at which it is lost
-goes with √(ρ·cos θ). How far each material reaches is set to what real VLP-16 sweeps show: five points or more on the
-car ahead in 90 % at 20–30 m, 46 % at 30–40 m, 17 % at 40–50 m, hardly any beyond; the road only where it is met
-steeply.
+Whether a return is strong enough to be detected is random, with a probability that falls off with range: a surface of
+reflectance ρ, hit at an angle θ from its normal, returns a power proportional to ρ·cos θ/R², so the range at which it
+is lost is proportional to √(ρ·cos θ). The reach of each material is set to match real VLP-16 sweeps: five points or
+more on the car ahead in 90 % at 20–30 m, 46 % at 30–40 m, 17 % at 40–50 m, hardly any beyond; the road only where it is
+hit steeply.
 
-Against the real sweeps (tests/accuracy/test_lidar_realism.py writes the table) points and rings on a car agree within
-their spread from 10 to 40 m. Nearer, where three sightings of one car are all there is, a simulated car has a sixth
-more points on as many rings. Beyond 40 m it has too few: real cars keep 2 to 9 points on one ring to 70 m, simulated
-ones hardly any, so what the simulator says of the LiDAR's reach is the careful side.
+Compared with the real sweeps (tests/accuracy/test_lidar_realism.py writes the table), points and rings on a car agree
+within their spread from 10 to 40 m. Nearer, where there are only three sightings of one car, a simulated car has a
+sixth more points on as many rings. Beyond 40 m it has too few: real cars keep 2 to 9 points on one ring up to 70 m,
+simulated ones hardly any, so the simulator's figures for LiDAR range are conservative.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""What the simulated LiDAR can hit: upright boxes of known material. A car is a body, a narrower cabin, mostly of
-glass, and a reflective plate."""
+"""The objects that the simulated LiDAR can hit: upright boxes of known material. A car is a body, a narrower cabin,
+mostly of glass, and a reflective plate."""
 
 from __future__ import annotations
 

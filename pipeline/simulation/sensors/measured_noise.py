@@ -1,5 +1,5 @@
-"""What a detector of real images was measured to do wrong: the form of ``measured_noise.json``, which holds every
-number and says what it was measured on. ``python -m pipeline.experiments.robustness.measure`` writes it anew."""
+"""The measured errors of a detector on real images: the type of ``measured_noise.json``, which holds every number and
+the data it was measured on. ``python -m pipeline.experiments.robustness.measure`` writes the file."""
 
 from __future__ import annotations
 

@@ -1,12 +1,14 @@
-"""The boxes that a detector of real images would draw, without images: true vehicles with the errors that
-``measured_noise.json`` holds, and boxes where no vehicle is.
+"""Simulates the boxes of a detector of real images, without images: true vehicles with the errors in
+``measured_noise.json``, and false positives.
 
-Misses come in bursts, edges are off by a part that lasts and one new in each frame, scores fall with range, cars are
-called trucks, and now and then one has two boxes. A false box stands somewhere in the world, so it grows as the car
-comes nearer, as a shop front does. Everything is drawn per vehicle for the whole drive, so any frame can be asked for.
+Misses come in bursts, edges have one error that persists and one that is new in each frame, scores fall with range,
+cars are sometimes classified as trucks, and some vehicles have two boxes. A false box stands at a fixed position in the
+world, so it grows as the car approaches, like a shop front. Everything is drawn per vehicle for the whole drive, so any
+frame can be computed.
 
-Assumed, not measured: what lasts is forgotten over 3 s; what decides a miss is a normal variable whose correlation
-gives the measured one of misses at an even chance; beyond the last measured range recall halves every 15 m.
+Assumed, not measured: persistent errors decay over 3 s; misses are decided by a normal variable whose correlation
+reproduces that of the measured misses at a probability of one half; beyond the last measured range, recall halves every
+15 m.
 """
 
 from __future__ import annotations

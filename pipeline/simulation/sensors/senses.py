@@ -1,7 +1,7 @@
-"""What the pipeline is given of what the sensors see: a scenario's faults, its detections, the sensors in use.
+"""The pipeline's view of the sensors: a scenario's faults, its detections, and the sensors in use.
 
-Recorded scenarios and suites without images go through this one place, so a drive of a suite that is opened again
-gives the same frames.
+Recorded scenarios and suites without images both use this module, so a suite's drive has the same frames when it is
+opened again.
 """
 
 from __future__ import annotations

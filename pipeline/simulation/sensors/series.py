@@ -1,6 +1,6 @@
-"""Random series over the frames of a drive that forget slowly: of what lasts for a while, such as a missed vehicle.
+"""Random series over the frames of a drive that decay slowly, for effects that last, such as a missed vehicle.
 
-Made whole from a seed, so that any frame can be asked for in any order."""
+They are generated completely from a seed, so any frame can be computed in any order."""
 
 from __future__ import annotations
 

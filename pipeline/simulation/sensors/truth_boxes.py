@@ -1,8 +1,7 @@
-"""A detector's boxes without a network: true vehicles projected into the image, with a detector's errors. The fast
-path of the closed loop. The errors of a network are modelled: box edges are off by a share of the height (one part
-constant per vehicle, since a network misjudges the same shape in the same way, and one part new in every frame),
-farther objects are missed more often, and hidden ones are not seen. There are no false positives.
-"""
+"""A detector's boxes without a network: true vehicles projected into the image, with a detector's errors. The fast path
+of the closed loop. The errors of a network are modelled: box edges are off by a share of the height (one part constant
+per vehicle, since a network misjudges the same shape in the same way, and one part new in every frame), farther objects
+are missed more often, and hidden ones are not detected. There are no false positives."""
 
 from __future__ import annotations
 

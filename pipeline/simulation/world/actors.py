@@ -1,7 +1,7 @@
-"""Actors on the road: what they are, and where their script puts them at any time.
+"""Actors on the road, and their scripted positions at any time.
 
-Speed is piecewise linear in time, so the way driven is piecewise quadratic and exact. A lane change is a smooth step
-(quintic, no jump in sideways acceleration) between two lanes' middles.
+Speed is piecewise linear in time, so the distance driven is piecewise quadratic and exact. A lane change is a smooth
+step (quintic, no jump in lateral acceleration) between the centres of two lanes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Ways over an intersection: straight on or around a corner, for vehicles that come from any of its four arms."""
+"""Trajectories across an intersection: straight on or around a corner, for vehicles from any of its four arms."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Lines on the ground made of arcs, one after another without a kink: what a road or a way across it follows.
+"""Lines on the ground that consist of arcs without kinks, for roads and trajectories across them.
 
-A place beside a line is (s, d): metres along it, metres to its left. World: x, y metres, heading counter-clockwise from
-x. Before its start and after its end a line goes on as its first and last arc do.
+A position relative to a line is (s, d): metres along it, metres to its left. World: x, y metres, heading
+counter-clockwise from x. Beyond its ends, a line continues as its first and last arc.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The planned route of a scenario's ego vehicle on the Earth, as a map or an earlier drive would give it."""
+"""The planned route of a scenario's ego vehicle on the Earth, as given by a map or an earlier drive."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Roads: a reference line of straights, arcs and transitions, with lanes beside it, named as ASAM OpenDRIVE names them.
+"""Roads: a reference line of straights, arcs and transitions, with lanes beside it, named as in ASAM OpenDRIVE.
 
-The reference line runs in the middle of the median. Lanes −1, −2, … lie to its right and run along it, −1 the
-innermost; +1, +2, … lie to its left and run against it. A place on the road is (s, d): metres along the reference
+The reference line runs in the middle of the median. Lanes −1, −2, … are to its right and run along it, −1 being the
+innermost; +1, +2, … are to its left and run against it. A position on the road is (s, d): metres along the reference
 line, metres to its left. World: x, y metres, heading counter-clockwise from x; the road is flat.
 """
 

@@ -1,7 +1,6 @@
 """Roadside items: guard rails, delineator posts, trees, buildings and sign gantries, placed by seed, and the strips
 that a scenario names: kerbs, hedges and walls. They are placed in (s, d) once per scenario and looked up by s, so both
-sensors see the same items.
-"""
+sensors see the same items."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Making a 16-ring sweep of KITTI's 64-ring one.
+"""Reduces KITTI's 64-ring sweeps to 16 rings.
 
-KITTI's files hold no ring numbers, but they list ring after ring, the highest first, each counter-clockwise from
-straight ahead: the azimuth wraps from 2π to 0 where a new ring begins. Where a file is not in that order (shuffled,
-cropped, or begun in mid-turn), each point belongs to the laser nearest to its elevation. The HDL-64 reaches only about
-+3°, so of the 16 elevations of a VLP-16 those within 1° of a recorded ring remain, about ten.
+KITTI's files have no ring numbers, but they list ring after ring, the highest first, each counter-clockwise from
+straight ahead: the azimuth wraps from 2π to 0 where a new ring begins. In files with another order (shuffled, cropped,
+or starting mid-turn), each point is assigned to the laser nearest to its elevation. The HDL-64 reaches only about +3°,
+so of the 16 elevations of a VLP-16, those within 1° of a recorded ring remain, about ten.
 """
 
 from __future__ import annotations

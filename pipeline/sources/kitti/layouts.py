@@ -83,7 +83,7 @@ def motion_of(files: Files, calibration: KittiCalibration) -> list[EgoState | No
         T_start_camera = np.tile(np.eye(4), (len(rows), 1, 1))
         T_start_camera[:, :3] = rows.reshape(-1, 3, 4)
     except ValueError:
-        raise SourceError(f"{files.poses.name}: not poses of 12 numbers a line") from None
+        raise SourceError(f"{files.poses.name}: expected poses of 12 numbers per line") from None
     T = T_start_camera @ calibration.T_rect_ego
     count = min(len(T), len(files.lidar_stamps))
     return motion_along(files.lidar_stamps[:count], list(T[:count]))

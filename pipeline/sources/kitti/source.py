@@ -1,9 +1,9 @@
 """KITTI: HDL-64 and colour camera 2 (Geiger et al. 2013), as raw drives, folders in the object benchmark's form and
 odometry sequences; and KITTI-360, with its camera 0.
 
-``pipeline.sources.kitti.layouts`` knows where each layout keeps what.
+``pipeline.sources.kitti.layouts`` describes the folders of each layout.
 
-The ego frame is the Velodyne's axes. Intensity, 0–1 in the files, is 0–255 here, as a VLP-16's reflectivity.
+The ego frame is the Velodyne's axes. Intensity, 0–1 in the files, is 0–255 here, like a VLP-16's reflectivity.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ class KittiSource:
             return Sweep(tick, points, (RINGS - 1 - turn).astype(np.uint8), RINGS)
         kept, ring = keep_rings(points, turn, own_channels if own_channels is not None else self._channels)
         if not len(kept):
-            notes.append(f"{path.name}: none of its rings lies where a VLP-16 has one")
+            notes.append(f"{path.name}: none of its rings matches the elevation of a VLP-16 ring")
             return None
         return Sweep(tick, kept, ring, 16)
 

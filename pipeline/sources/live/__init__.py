@@ -1,1 +1,1 @@
-"""Live sensors: devices read as they deliver, synchronised into ticks."""
+"""Live sensors: devices read as they deliver data, synchronised into ticks."""

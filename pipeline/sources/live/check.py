@@ -1,4 +1,4 @@
-"""Listens to every sensor of a config for a while and says how each does."""
+"""Listens to every sensor of a configuration for a while and reports its health."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""One timeline for all live sensors: the host's clock as it stood at the start, counted on steadily.
+"""One timeline for all live sensors: the host's clock at startup, continued monotonically.
 
-Setting the host's clock moves nothing on it. Where a sensor's own clock lies on it is ``SensorClock``'s to say, from
-when its messages arrive.
+Setting the host's clock does not affect it. ``SensorClock`` maps a sensor's own clock to it, from the arrival times of
+its messages.
 """
 
 from __future__ import annotations

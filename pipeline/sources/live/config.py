@@ -1,4 +1,5 @@
-"""The one file that says which sensors a car has, where they sit and how they are reached. Unknown keys are refused."""
+"""The configuration of live sensors: which sensors a car has, their mounts and connections. Unknown keys are
+rejected."""
 
 from __future__ import annotations
 

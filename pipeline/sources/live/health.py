@@ -1,4 +1,4 @@
-"""How a live sensor does: rate, age, jitter and loss, from what arrived and nothing else."""
+"""The health of a live sensor: rate, age, jitter and loss, computed only from the data that arrived."""
 
 from __future__ import annotations
 

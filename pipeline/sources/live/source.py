@@ -1,7 +1,7 @@
-"""``live:<config.yaml>``: the sensors of one car as a source of ticks, the newest only.
+"""``live:<config.yaml>``: the sensors of one car as a source of ticks, of which only the newest is kept.
 
-Readers' threads put what comes into the synchroniser; whoever wants a frame takes the newest tick out of it. There is
-no queue between them, so what is shown is never older than the sensors and the pipeline make it.
+Reader threads pass their data to the synchroniser; consumers take the newest tick from it. There is no queue between
+them, so the shown data is never older than the sensors and the pipeline make it.
 """
 
 from __future__ import annotations

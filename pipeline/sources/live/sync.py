@@ -1,7 +1,8 @@
-"""Which messages belong together: a tick is a LiDAR sweep with the image and own motion nearest to it in time.
+"""Combines messages into ticks: a tick is a LiDAR sweep with the image and ego motion nearest to it in time.
 
-Without LiDAR the camera ticks, without camera the LiDAR goes on. Nothing is queued: a tick that nobody took is replaced
-by the next. No thread and no clock in here; whoever calls says what time it is, on the host's timeline.
+Without a LiDAR, each image is a tick; without a camera, the LiDAR works alone. Nothing is queued: a tick that nobody
+took is replaced by the next. This module uses neither threads nor a clock; the caller passes the time, on the host's
+timeline.
 """
 
 from __future__ import annotations

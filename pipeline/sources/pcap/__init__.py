@@ -1,4 +1,4 @@
-"""Captures of network traffic (pcap, pcapng) with a VLP-16's packets in them."""
+"""Captures of network traffic (pcap, pcapng) that contain a VLP-16's packets."""
 
 from __future__ import annotations
 

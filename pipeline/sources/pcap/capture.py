@@ -1,8 +1,8 @@
-"""UDP datagrams of a capture file, one at a time, each with the place in the file where it can be read again.
+"""The UDP datagrams of a capture file, one at a time, each with its position in the file so that it can be read again.
 
 Classic pcap (libpcap's savefile format, µs and ns, either byte order) and pcapng (draft-ietf-opsawg-pcapng: section,
-interface, enhanced and simple packet blocks). Read here and not by dpkt, because it takes a damaged length at its word
-and reads gigabytes for one packet, and because its times are floating-point numbers that lose the nanoseconds.
+interface, enhanced and simple packet blocks). This module does not use dpkt, because it trusts a damaged length and
+reads gigabytes for one packet, and because its floating-point times lose the nanoseconds.
 """
 
 from __future__ import annotations

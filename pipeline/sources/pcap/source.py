@@ -1,7 +1,8 @@
-"""A capture of a Velodyne's packets as a recording: one pass over the file finds its sweeps, each is decoded on demand.
+"""A capture of a Velodyne's packets as a recording: one pass over the file finds its sweeps; each is decoded on demand.
 
-What is kept of a sweep is where its first and last packet lie in the file and its time, so the length of a recording
-costs no memory to speak of. GNSS comes from a file of sentences beside it, else from the sensor's own position packets.
+Only a sweep's time and the positions of its first and last packet in the file are kept, so memory use hardly depends on
+the length of a recording. GNSS comes from a file of sentences beside it, or else from the sensor's own position
+packets.
 """
 
 from __future__ import annotations
@@ -182,7 +183,7 @@ class _Index:
         if maker is not None:
             return about_maker(maker)
         says = [f"no complete sweep in {counts.packets} packets to port {port}"] if counts.packets else []
-        says = says or [f"no packets of a Velodyne to port {port} in it"]
+        says = says or [f"no Velodyne packets to port {port}"]
         says += [counts.about_refused()] if counts.refused else []
         says += [f"the file is {self._capture.damage}"] if self._capture.damage else []
         return "; ".join(says)

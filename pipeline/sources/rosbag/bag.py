@@ -1,5 +1,5 @@
-"""One bag: its topics, and their messages by the time they were recorded. Older ROS 2 bags hold no definitions of their
-messages: then ROS's own serve, and those of Velodyne packets."""
+"""One bag: its topics, and their messages by recording time. Older ROS 2 bags contain no message definitions; ROS's own
+definitions, and those of Velodyne packets, are then used."""
 
 from __future__ import annotations
 

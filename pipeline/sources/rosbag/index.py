@@ -1,5 +1,5 @@
-"""One pass over a bag: when every message of the chosen topics was measured, by its header, and where it can be read
-again. 16 bytes a message are kept, whatever the bag's size."""
+"""Indexes a bag in one pass: when every message of the chosen topics was measured, by its header, and where to read it
+again. The index takes 16 bytes per message, whatever the bag's size."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a bag's sensors sit: ``tf_static`` and ``CameraInfo`` (REP 103, REP 105)."""
+"""The mounts of a bag's sensors: ``tf_static`` and ``CameraInfo`` (REP 103, REP 105)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""A ROS bag as a recording: a frame a LiDAR sweep (an image, where there is no LiDAR), times by messages' headers."""
+"""A ROS bag as a recording: one frame per LiDAR sweep (or per image without a LiDAR), with the times of message
+headers."""
 
 from __future__ import annotations
 

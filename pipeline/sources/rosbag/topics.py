@@ -1,4 +1,4 @@
-"""Which topic of a bag is which sensor: guessed by message type, name and number, or said by a person."""
+"""Maps topics of a bag to sensors: guessed from message type, name and number of messages, or chosen by the user."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Budgets for what a bag unpacks to: ``rosbags`` has none, and a few kilobytes can unpack to terabytes.
+"""Limits the decompressed size of a bag: ``rosbags`` has no limit, and a few kilobytes can decompress to terabytes.
 
-The library looks its decompressors up in tables of its modules; bounded ones are put there.
+The library finds its decompressors in tables of its modules; this module replaces them by bounded ones.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class _BoundedFile:
         data: bytes = self._file.read(size)
         self._left -= len(data)
         if self._left < 0:
-            raise TooLarge("a file that unpacks to more than it may")
+            raise TooLarge("a file that unpacks to more than the limit")
         return data
 
 

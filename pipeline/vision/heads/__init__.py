@@ -1,4 +1,4 @@
-"""What the numbers at the end of a YOLO network mean: one file a head, and the choice between them.
+"""Decoding the outputs of YOLO networks: one file per head, and the choice between them.
 
 To add a head, write a file like ``yolov8.py`` that ends in a ``Head``, and list it in ``HEADS``.
 """

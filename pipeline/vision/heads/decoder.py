@@ -1,4 +1,4 @@
-"""What all heads share: the form of a decoder, the grid, and boxes from centres and sizes.
+"""Shared by all heads: the form of a decoder, the grid, and boxes from centres and sizes.
 
 Every decoder takes the network's raw outputs and its input size ``(height, width)`` and gives candidates scored at or
 above a floor: boxes (M, 4) float32 ``x1 y1 x2 y2`` in network-input pixels, scores (M,) float32, class ids (M,) int64.

@@ -158,7 +158,7 @@ def test_the_cuboid_is_laid_on_the_points_and_a_car_lifted_out_of_the_image(
     assert near["center"][0] - near["size"][0] / 2 == pytest.approx(26.0, abs=0.1)
     far = act(client, kind="lift", frame=10, bbox=[20, 85, 40, 97], label="car").json()
     estimated = next(each for each in labels(client)["tracks"] if each["id"] != track["id"])
-    assert "by its height in the image" in estimated["origin"]["how"] == far["note"]
+    assert "judging by its height in the image" in estimated["origin"]["how"] == far["note"]
     act(client, kind="relabel", track=estimated["id"], revision=estimated["revision"], label="truck")
     (estimated,) = (each for each in labels(client)["tracks"] if each["id"] == estimated["id"])
     assert (estimated["state"], estimated["label"], estimated["origin"]["how"]) == ("proposed", "truck", far["note"]), (

@@ -127,7 +127,7 @@ def test_without_points_it_is_as_far_as_it_looks(frame: Frame) -> None:
     found = lift(blind, Params(), "car", bbox=bbox)
     assert found.points == 0
     assert found.how.startswith("no points there: about")
-    assert found.how.endswith("by its height in the image")
+    assert found.how.endswith("judging by its height in the image")
     assert found.cuboid.center[0] == pytest.approx(40.0, rel=0.2)
     assert found.cuboid.center[1] == pytest.approx(0.0, abs=0.5)
 
@@ -135,7 +135,7 @@ def test_without_points_it_is_as_far_as_it_looks(frame: Frame) -> None:
 def test_where_nothing_tells_it_is_said(frame: Frame) -> None:
     with pytest.raises(NothingThere, match="draw a box around it"):
         lift(frame, Params(), "car", pixel=(3.0, 3.0))
-    with pytest.raises(NothingThere, match="a person's box like this gives no distance"):
+    with pytest.raises(NothingThere, match="such a box of a person gives no distance"):
         lift(replace(frame, sweep=None), Params(), "person", bbox=BOX)
     with pytest.raises(NothingThere, match="not calibrated"):
         lift(replace(frame, camera=None), Params(), "car", bbox=BOX)

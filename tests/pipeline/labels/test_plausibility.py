@@ -59,7 +59,7 @@ def test_a_lead_is_there_and_ahead_of_us() -> None:
     lead = LeadRange(0, COUNT - 1, 1, "accepted", BY)
     assert (2, "the lead is #1, which is not in this frame") in found(gone, leads=(lead,))
     away = replace(driven(), sightings=tuple(replace(each, cuboid=behind) for each in driven().sightings))
-    assert found(away, leads=(lead,)) == [(0, "the lead is #1, which is behind us")]
+    assert found(away, leads=(lead,)) == [(0, "the lead is #1, which is behind the ego vehicle")]
     assert found(leads=(lead,)) == [(0, "the lead is #1, which is not labelled")]
 
 

@@ -23,7 +23,7 @@ from pipeline.sources import SourceError, open_any, open_source
         ("astyx:bad\0name", "no such folder"),
         ("astyx:~no_such_user_here/x", "cannot be opened"),
         ("sim:", "no scenario named ''; there are"),
-        ("sim:drive.xosc", "drive.xosc: not a scenario file: its name has to end in .yaml"),
+        ("sim:drive.xosc", "drive.xosc: not a scenario file: its name must end in .yaml"),
         ("sim:folder/nosuch", "folder/nosuch: not a scenario file"),
         ("sim:nosuch", "no scenario named 'nosuch'; there are"),
         ("sim:nosuch.yaml", "nosuch.yaml: cannot be read"),

@@ -147,7 +147,7 @@ def test_a_damaged_file_degrades_its_frame(tmp_path: Path) -> None:
 
 def test_no_clouds(tmp_path: Path) -> None:
     (tmp_path / "x.txt").write_text("x")
-    with pytest.raises(SourceError, match="no PCD files in it"):
+    with pytest.raises(SourceError, match="contains no PCD files"):
         open_source(f"pcd:{tmp_path}")
     (tmp_path / "a.pcd").write_bytes(pcd(ROWS))
     with pytest.raises(SourceError, match=r"rig=other\.yaml: no such file"):

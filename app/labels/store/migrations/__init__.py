@@ -1,4 +1,4 @@
-"""The schema's history: every form that the tables have had."""
+"""The history of the database schema."""
 
 HEAD = "0006"
 """The revision that this program works with."""

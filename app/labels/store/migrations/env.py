@@ -1,4 +1,4 @@
-"""What Alembic asks for: the connection that the database was opened with, and the tables as they should be."""
+"""The environment that Alembic expects: the open database connection, and the target tables."""
 
 from __future__ import annotations
 

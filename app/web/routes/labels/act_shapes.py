@@ -1,4 +1,4 @@
-"""What is sent to change labels, and what is answered, as types."""
+"""Requests to change labels and their responses, as types."""
 
 from __future__ import annotations
 

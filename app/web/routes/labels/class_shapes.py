@@ -1,4 +1,4 @@
-"""What /api/labels answers about the classes of the project, as types."""
+"""Responses of /api/labels about the project's classes, as types."""
 
 from __future__ import annotations
 

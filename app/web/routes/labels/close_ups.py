@@ -1,4 +1,4 @@
-"""/api/labels/tracks/…: a track seen from close by, for review."""
+"""/api/labels/tracks/…: close-ups of a track, for review."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What /api/labels answers about a run that is judged by labels, as types."""
+"""Responses of /api/labels about a run scored against labels, as types."""
 
 from __future__ import annotations
 

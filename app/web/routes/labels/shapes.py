@@ -1,4 +1,4 @@
-"""What /api/labels answers about labels, as types."""
+"""Responses of /api/labels about labels, as types."""
 
 from __future__ import annotations
 

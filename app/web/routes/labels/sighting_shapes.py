@@ -1,4 +1,4 @@
-"""What /api/labels answers about where vehicles are in frames, as types."""
+"""Responses of /api/labels about the positions of vehicles in frames, as types."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What the API answers, as types.
+"""Responses of the API, as types.
 
-Answers are made elsewhere and sent as they are; these say what is in them, to OpenAPI and to who writes a client. A
-test holds each against real answers, key by key.
+The responses are built elsewhere and sent unchanged; these types describe them for OpenAPI and for authors of clients.
+A test compares each type with real responses, key by key.
 """

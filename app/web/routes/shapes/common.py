@@ -1,4 +1,4 @@
-"""What the shapes of all routes share."""
+"""Types shared by the responses of several routes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is open, where playback is, and what goes on in the background, as types."""
+"""The open source, playback and background work, as types."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Lines of KITTI's label files (devkit_object/readme.txt, devkit_tracking/readme.txt).
 
-``type truncated occluded alpha x1 y1 x2 y2 height width length x y z rotation_y``; tracking puts the frame and the
-track in front. Images are rectified there: boxes of a lens that bends are moved to where a straight one would see
-them. What is not known is −1, −1000 for places and −10 for angles, as in ``DontCare`` lines.
+``type truncated occluded alpha x1 y1 x2 y2 height width length x y z rotation_y``; tracking files put the frame and the
+track in front. Images there are rectified: boxes of a distorted lens are moved to where an undistorted one would see
+them. Unknown values are −1, −1000 for positions and −10 for angles, as in ``DontCare`` lines.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The part of ASAM OpenLABEL 1.0's JSON schema that labels are read from; anything else in a file is passed over."""
+"""The part of ASAM OpenLABEL 1.0's JSON schema that labels are read from; everything else in a file is ignored."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""ASAM OpenLABEL 1.0 back to labels, ours and others'."""
+"""Reads labels from ASAM OpenLABEL 1.0 files, our own and others'."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""One module for each kind of device, and what they share: reading in a thread, reconnecting, datagrams."""
+"""One module for each kind of device, and shared code: reading in a thread, reconnecting, datagrams."""

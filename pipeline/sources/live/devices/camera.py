@@ -1,4 +1,4 @@
-"""A camera of any kind as one input: its images, with the time at which each was taken as well as it can be known."""
+"""A camera of any kind as an input: its images, with the best known time at which each was taken."""
 
 from __future__ import annotations
 

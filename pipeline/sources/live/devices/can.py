@@ -1,4 +1,4 @@
-"""Own speed and yaw rate from the car's CAN bus, by a DBC file."""
+"""Ego speed and yaw rate from the car's CAN bus, decoded with a DBC file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A thread that reads one device while it is wanted: opens it, reads it, and opens it again when it is lost."""
+"""A thread that reads one device while it is needed: opens it, reads it, and reopens it when the connection is lost."""
 
 from __future__ import annotations
 

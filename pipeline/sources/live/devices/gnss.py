@@ -1,4 +1,4 @@
-"""A GNSS receiver's sentences, by serial line, TCP or UDP."""
+"""Reads the sentences of a GNSS receiver over a serial line, TCP or UDP."""
 
 from __future__ import annotations
 

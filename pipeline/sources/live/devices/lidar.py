@@ -1,4 +1,4 @@
-"""A VLP-16 on the network: data packets to sweeps, position packets to what its clock follows."""
+"""A VLP-16 on the network: decodes data packets to sweeps, and reads the clock's reference from position packets."""
 
 from __future__ import annotations
 

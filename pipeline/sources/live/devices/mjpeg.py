@@ -1,5 +1,5 @@
-"""MJPEG over HTTP (multipart/x-mixed-replace), read with the standard library: every JPEG stays as the camera made it,
-and the stamp that many cameras send with each is kept, which video libraries drop."""
+"""MJPEG over HTTP (multipart/x-mixed-replace), read with the standard library. Every JPEG is kept unchanged, and so is
+the time stamp that many cameras send with it, which video libraries drop."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""Whose datagrams a UDP port takes. UDP has no connection: whoever reaches the port is heard, so one sender is chosen.
+"""Chooses the sender that a UDP port accepts. UDP has no connections, so anything that reaches the port would be
+accepted.
 
-It is the first one that sends something valid, until it falls silent, or only the address that the config names. What
-others send is refused, counted and named, so that a second LiDAR on the port cannot spoil the sweeps of the first.
+The sender is the first that sends valid data, until it falls silent, or the address given in the configuration. Data of
+other senders is rejected, counted and reported, so a second LiDAR on the port cannot corrupt the sweeps of the first.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the inputs of all kinds of sensors share."""
+"""Shared by the inputs of all kinds of sensors."""
 
 from __future__ import annotations
 

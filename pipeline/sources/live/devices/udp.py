@@ -1,7 +1,7 @@
-"""Datagrams with the moment at which the system received them, however long this program took to look.
+"""Receives datagrams with the time at which the system received them, however late this program reads them.
 
-Once it is known who sends, the system itself turns away nearly all that others send (a socket filter, on Linux): their
-flood neither fills the socket's buffer nor takes this program's time. A few are let through, to be counted and named.
+Once the sender is known, a socket filter (on Linux) makes the system drop nearly all data of other senders, so a flood
+of it neither fills the socket's buffer nor takes this program's time. A few datagrams pass, to be counted and reported.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Cameras that send video: RTSP and HTTP through PyAV (which can give up on a camera that hangs), those plugged in
-through OpenCV (which knows the devices of every system), and a video file played as a camera would."""
+"""Cameras that send video: RTSP and HTTP through PyAV (which can give up on a camera that hangs), local ones through
+OpenCV (which supports the devices of every system), and a video file played as a camera would."""
 
 from __future__ import annotations
 

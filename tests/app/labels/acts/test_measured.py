@@ -40,7 +40,7 @@ def test_what_only_the_image_shows_is_laid_on_points_but_not_put_where_its_heigh
     monkeypatch.setattr(measured, "lift", lambda *asked: found if asked[2:] == ("car", box) else None)
     placed, note = measured.refitted(labels, frame, Params(), snap)
     assert (placed.sighting().cuboid, placed.bbox, note) == (found.cuboid, box, found.how)
-    rough = replace(found, points=0, how="no points there: about 68 ± 8 m by its height in the image")
+    rough = replace(found, points=0, how="no points there: about 68 ± 8 m judging by its height in the image")
     monkeypatch.setattr(measured, "lift", lambda *_: rough)
     with pytest.raises(ActRefused, match=r"#1: no points there: about 68 ± 8 m .* too rough for a label: draw it"):
         measured.refitted(labels, frame, Params(), snap)

@@ -48,7 +48,7 @@ def test_kitti_lines_are_what_they_were(kitti: tuple[Path, LabeledDrive], tmp_pa
     assert (len(found.labels.tracks) - len(regions), len(sightings)) == (8, 24 + len(regions))
     assert len(regions) > 3, "regions of which KITTI says nothing"
     assert None not in [each.bbox for each in sightings]
-    assert "9 Van are taken for class 'car'" in found.notes
+    assert "9 Van are read as class 'car'" in found.notes
     export_labels(found.labels, drive, "kitti", tmp_path / "out")
     for path in sorted((folder / "label_2").iterdir()):
         theirs = [line.split() for line in path.read_text().splitlines()]
@@ -76,7 +76,7 @@ def test_the_truth_of_a_kitti_recording_is_what_its_label_files_say(
     for uri in (f"kitti:{folder}", str(tmp_path / "drive.mcap")):
         labels, notes = truth_labels(open_source(uri), drive.frames, IMPORT)
         assert labels.tracks == tuple(track for track in found.labels.tracks if track.label != "dont care")
-        assert set(notes) & set(found.notes) == {LINKED, "9 Van are taken for class 'car'"}
+        assert set(notes) & set(found.notes) == {LINKED, "9 Van are read as class 'car'"}
     lost = export_labels(labels, drive_of(open_source(uri)), "kitti", tmp_path / "out")
     assert not any("no box" in each for each in lost)
 

@@ -127,7 +127,10 @@ def test_oxts_needs_all_fields() -> None:
         (b"", "no LiDAR points"),
         (b"garbage", "no LiDAR points"),
         (rings_file()[:-7], "truncated in the middle of a point"),
-        (np.array([[10, 1, 9, 0.5]], dtype="<f4").tobytes(), "none of its rings lies where a VLP-16 has one"),
+        (
+            np.array([[10, 1, 9, 0.5]], dtype="<f4").tobytes(),
+            "none of its rings matches the elevation of a VLP-16 ring",
+        ),
         (rings_file(60), "60 rings instead of 64"),
         (rings_file(70), "not in KITTI's order; rings are assigned by elevation"),
         (np.array([[np.nan, 0, 0, 0.5]], dtype="<f4").tobytes() + rings_file(), "1 unreadable points skipped"),
