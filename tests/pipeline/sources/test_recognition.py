@@ -218,7 +218,7 @@ OTHERS: dict[str, tuple[Write, str]] = {
     "a folder in itself": (folder_in_itself, "it holds folders again"),
     "a pipe": (pipe, "not a file or folder"),
     "a video's first bytes": (some_file("a", b"\0\0\0\x20ftypisom"), "a: not a readable video: cut off, or something"),
-    "a capture's first bytes": (some_file("a", b"\xd4\xc3\xb2\xa1"), "a: no packets of a .* the file is cut off"),
+    "a capture's first bytes": (some_file("a", b"\xd4\xc3\xb2\xa1"), "a: no Velodyne packets .* the file is cut off"),
 }
 
 
