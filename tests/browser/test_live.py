@@ -118,7 +118,7 @@ def test_what_live_sensors_cannot_do_is_off_and_says_why(open_page: OpenPage, ca
     for place in (page.locator("#runs"), page.locator("#rerun-body")):
         expect(place.get_by_text("Not available with live sensors")).to_be_visible()
     page.keyboard.press("a")
-    expect(page.locator("#align-bar .score")).to_have_text(re.compile(r"\d+ %|nothing stands out|too few borders"))
+    expect(page.locator("#align-bar .score")).to_have_text(re.compile(r"\d+ %|no clear best|too few edges"))
 
 
 def test_a_lidar_that_falls_silent_is_said_at_the_display_and_covered(open_page: OpenPage, car: tuple[Site, Replaying]):
