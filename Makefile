@@ -75,10 +75,11 @@ soak: install
 	@mkdir -p build
 	@CIPV_CHAOS_SECONDS=$(CHAOS) $(BIN)/python -m pytest -q -m soak tests/soak tests/browser/display/test_all_day.py -s
 
-# Damaged inputs for every parser, `make fuzz SECONDS=3600`. Writes build/fuzz: what was found, and the corpus.
+# Damaged inputs for every parser, `make fuzz SECONDS=3600`, or `make fuzz INPUTS=1000000`, of which each parser gets as
+# many as the others (an hour and more). Writes build/fuzz: what was found, and the corpus.
 SECONDS ?= 300
 fuzz: install
-	@$(BIN)/python -m tests.fuzz.run --seconds $(SECONDS)
+	@$(BIN)/python -m tests.fuzz.run $(if $(INPUTS),--inputs $(INPUTS),--seconds $(SECONDS))
 
 # What the product is made of, with licences and what the wheels bundle: build/sbom.json (CycloneDX), build/licences.md.
 sbom: install

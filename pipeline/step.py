@@ -131,7 +131,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     around = road_edges.Surroundings(
         sweep.points, sweep.kind, ring, sweep.ground, lidar_tracks, objects, sweep.sensor_height_m
     )
-    edge_state, edges = road_edges.follow(state.edges, around, now, params.path)
+    edge_state, edges = road_edges.follow(state.edges, around, now, params.path, state.path.is_shown)
     clock.lap("edges")
     traffic_state, driving = traffic.follow(state.traffic, objects, now, params.path)
     evidence = corridor.Evidence(

@@ -45,7 +45,8 @@ def make_tables(folder: Path, drives: int) -> dict[str, int]:
     import pyarrow as pa
 
     from app.fleet.batch.tables import EQUAL_TABLES
-    from app.fleet.pack import PACK_DRIVES, packed_file, write_pack
+    from app.fleet.pack import PACK_DRIVES, write_pack
+    from app.fleet.pack_index import packed_file
 
     run, rows = "0" * 12, dict.fromkeys((shape.name for shape in EQUAL_TABLES), 0)
     counts = {

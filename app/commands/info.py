@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Annotated
 
 import tyro
 from rich.console import Console
 from rich.table import Table
 
+from app.commands.support.arguments import option
+from pipeline.common.errors import BadInput
+from pipeline.common.signing import expected_key
 from pipeline.common.user_file_errors import given_path
 from pipeline.recording.info import Info, Rhythm, info, info_of_source
 
@@ -33,12 +37,20 @@ class ShowInfo:
     """Print the figures as JSON"""
     quick: bool = False
     """Skip the check for changes since recording, which reads the whole MCAP file"""
+    public_key: Annotated[Path | None, option("FILE")] = None
+    """Public key that the session must be signed with, of `cipv keys new`; exit code 1 if it is not"""
 
     def __call__(self) -> int:
         if self.source.lower().endswith(".mcap"):
-            found = info(given_path(self.source.removeprefix("mcap:")), is_quick=self.quick)
+            if self.quick and self.public_key is not None:
+                raise BadInput("--quick does not check signatures; leave out --quick or --public-key")
+            key = None if self.quick else expected_key(self.public_key)
+            found = info(given_path(self.source.removeprefix("mcap:")), is_quick=self.quick, key=key)
             _print_json(asdict(found)) if self.json else _print_info(found)
-            return 0
+            is_trusted = found.chain is not None and found.chain.is_signed_whole()
+            return 0 if key is None or is_trusted else 1
+        if self.public_key is not None:
+            raise BadInput(f"{self.source}: only sessions, files ending in .mcap, are signed")
         from app.commands.support.open_with_progress import opened_recording
 
         source = opened_recording(self.source)
@@ -65,6 +77,7 @@ def _print_info(found: Info) -> None:
         print(line)
     if found.chain is not None:
         print("; ".join((f"hash chain: {found.chain.state}", *found.chain.changed)))
+        print(f"signature: {found.chain.signature}")
     if found.problem is not None:
         print(f"{found.problem}; run `cipv recover {found.path}` to repair it")
     if found.damaged_chunks:

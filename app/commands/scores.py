@@ -34,7 +34,7 @@ class Scores:
         need_extra()
         from app.fleet.compare.worth import values_of, worths
         from app.fleet.find import FleetTables
-        from app.fleet.pack import packs_of
+        from app.fleet.pack_index import packs_of
         from app.fleet.runs import runs_of
         from app.fleet.store import Store
         from app.reports.terminal_tables import show

@@ -31,6 +31,7 @@ from pipeline.sources.along_route import along_route
 from pipeline.types.source import AnySource
 
 if TYPE_CHECKING:
+    from app.fleet.desk import FleetDesk
     from app.labels.store.database import Database
     from app.views.rerun.feed import RerunFeed
 
@@ -58,6 +59,19 @@ class ServerOptions:
     labels: Annotated[str | None, option("URL")] = None
     """Label database, e.g. postgresql://person@host/cipv; default: $CIPV_LABELS_URL, then sessions/labels.db"""
 
+    fleet: Annotated[str | None, option("DIR")] = None
+    """Folder of `cipv batch` that the Fleet view searches, or its address in a store"""
+
+    def fleet_desk(self) -> FleetDesk | None:
+        """The tables of ``--fleet``. BadInput if there are none."""
+        if self.fleet is None:
+            return None
+        from app.fleet.desk import FleetDesk
+        from app.fleet.extra import need_extra
+
+        need_extra()
+        return FleetDesk(self.fleet)
+
     def label_desk(self) -> LabelDesk:
         """DatabaseError when a database that was named cannot be opened. The local database is opened once the first
         image is shown; an error in it is shown in the dashboard."""
@@ -71,7 +85,7 @@ class ServerOptions:
             raise BadInput("--tls-cert and --tls-key belong together")
         tls = (self.tls_cert, self.tls_key) if self.tls_cert is not None and self.tls_key is not None else None
         on_ready: Callable[[str], None] | None = webbrowser.open if self.browser else None  # type: ignore[assignment]
-        looks = SharedViewState()
+        looks, fleet = SharedViewState(), self.fleet_desk()
         with ExitStack() as stack:
             scene = stack.enter_context(LateScene(engine, looks))
             if self.rerun is not None:
@@ -87,6 +101,8 @@ class ServerOptions:
                 on_ready=on_ready,
                 always_token=self.token,
                 tls=tls,
+                ends_process=True,
+                fleet=fleet,
             )
         return 0
 

@@ -37,10 +37,12 @@ class DetectionCache:
         return CachedLook(self, fingerprint(uri))
 
     def get(self, key: tuple[str, int, str]) -> RawBoxes | RawLanes | None:
+        """An answer by (source and image, frame, detector); None where it is not cached."""
         with self._lock:
             return self._answers.get(key)
 
     def put(self, key: tuple[str, int, str], answer: RawBoxes | RawLanes) -> None:
+        """Keep an answer; the oldest are dropped when memory is full."""
         with self._lock:
             self._answers.put(key, answer)
 

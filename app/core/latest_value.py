@@ -17,6 +17,7 @@ class Newest(Generic[_T]):
         self._ended = False
 
     def put(self, value: _T) -> None:
+        """Replace the value, taken or not."""
         with self._condition:
             self._value = value
             self._condition.notify_all()
@@ -35,6 +36,7 @@ class Newest(Generic[_T]):
             return None if self._ended else value
 
     def end(self) -> None:
+        """Wake whoever waits; from now on ``take`` gives None."""
         with self._condition:
             self._ended = True
             self._condition.notify_all()

@@ -48,6 +48,7 @@ def is_loopback(host: str) -> bool:
 
 
 def is_address(name: str | None) -> bool:
+    """Whether a host is an IP address rather than a name."""
     try:
         ipaddress.ip_address(name or "")
     except ValueError:

@@ -124,9 +124,11 @@ class SharedViewState:
             return len(self._hiding)
 
     def select(self, page: object, number: int | None) -> None:
+        """Mark an object in this page's 3D view; None: no object."""
         self._change(page, selected=number)
 
     def hold(self, held: HeldCuboid) -> None:
+        """A cuboid that a page holds with the mouse, so that all views of that page show it."""
         self._change(held.page, held=held)
 
     def let_go(self, page: object) -> None:

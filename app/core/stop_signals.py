@@ -3,13 +3,18 @@ connection)."""
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Event
 from typing import Any
 
+REST_S = 3.0
+"""With the moment that saving takes less than the 5 s after which impatient supervisors kill."""
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, *((signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()))
 
 
@@ -26,6 +31,23 @@ def asked_to_stop() -> Iterator[Event]:
 
     with _handled(ask):
         yield asked
+
+
+def end_process_once(asked: Event, save: Callable[[], object]) -> None:
+    """Once ``asked``, save what must not be lost and end the process at most ``REST_S`` later, whatever hangs.
+
+    Python waits at its end for every thread of a pool, and a thread on a disk or a database that does not respond
+    never comes back: a supervisor would kill the program, and report a failure.
+    """
+
+    def end() -> None:
+        asked.wait()
+        save()
+        time.sleep(REST_S)
+        print("cipv: ended without waiting for work that hangs; the recording is closed", file=sys.stderr, flush=True)
+        os._exit(0)
+
+    threading.Thread(target=end, name="cipv-shutdown", daemon=True).start()
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import threading
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.common.errors import BadInput
+from pipeline.common.whole_files import replace_text, set_aside
 from pipeline.params import Params, flat, with_changes
 
 MOST = 500
@@ -81,10 +81,7 @@ class AlignmentVersions:
         if self._file is not None:
             text = json.dumps([asdict(each) for each in versions], ensure_ascii=False, indent=1)
             try:
-                self._file.parent.mkdir(parents=True, exist_ok=True)
-                partial = self._file.with_suffix(".part")
-                partial.write_text(text, encoding="utf-8")
-                os.replace(partial, self._file)
+                replace_text(self._file, text)
             except OSError as error:
                 raise VersionRefused(f"{self._file}: the alignment cannot be saved: {error.strerror}") from None
         self._versions = versions
@@ -96,14 +93,19 @@ def alignment_of(params: Params) -> dict[str, Any]:
 
 
 def _read(file: Path | None) -> list[AlignmentVersion]:
-    """What was kept. A file that is missing or damaged holds nothing, nor does an entry that no longer applies."""
+    """What was kept; an entry that no longer applies is left out, and a damaged file is set aside."""
     if file is None:
         return []
     try:
         rows = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except OSError:
         return []
-    return [version for row in rows if (version := _version(row)) is not None] if isinstance(rows, list) else []
+    except (ValueError, RecursionError):
+        rows = None
+    if not isinstance(rows, list):
+        set_aside(file)
+        return []
+    return [version for row in rows if (version := _version(row)) is not None]
 
 
 def _version(row: Any) -> AlignmentVersion | None:
@@ -115,5 +117,5 @@ def _version(row: Any) -> AlignmentVersion | None:
         saved_at, drive, note = texts
         match, iou = scores
         return AlignmentVersion(int(row["id"]), saved_at, drive, note, values, match, iou)
-    except (BadInput, ValueError, KeyError, TypeError, AttributeError):
+    except (BadInput, ValueError, KeyError, TypeError, AttributeError, OverflowError):
         return None

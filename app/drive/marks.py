@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import threading
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from pipeline.common.errors import BadInput
+from pipeline.common.whole_files import replace_text, set_aside
 
 MOST_MARKS = 10_000
 LONGEST_TEXT = 200
@@ -83,10 +83,7 @@ class Marks:
         if file is not None:
             text = json.dumps({"uri": uri, "marks": [asdict(mark) for mark in marks]}, ensure_ascii=False)
             try:
-                file.parent.mkdir(parents=True, exist_ok=True)
-                partial = file.with_suffix(".part")
-                partial.write_text(text, encoding="utf-8")
-                os.replace(partial, file)
+                replace_text(file, text)
             except OSError as error:
                 raise MarkRefused(f"{file}: the mark cannot be saved: {error.strerror}") from None
         self._marks[uri] = marks
@@ -99,13 +96,16 @@ class Marks:
 
 
 def _read(file: Path | None) -> list[SavedMark]:
-    """What was kept; a file that is missing or damaged holds no marks."""
+    """What was kept. A missing file holds no marks, nor does a damaged one, which is set aside."""
     if file is None:
         return []
     try:
         rows = json.loads(file.read_text(encoding="utf-8"))["marks"]
         return [_mark(row) for row in rows]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except OSError:
+        return []
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+        set_aside(file)
         return []
 
 

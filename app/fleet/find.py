@@ -4,6 +4,7 @@ query can read the batch's folder and nothing else."""
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -12,7 +13,7 @@ import duckdb
 
 from app.drive.events import event_kinds
 from app.fleet.batch.tables import EQUAL_TABLES, TableShape
-from app.fleet.pack import packed_file, packs_of
+from app.fleet.pack_index import packed_file, packs_of
 from app.fleet.runs import latest_run, runs_of
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
@@ -52,13 +53,14 @@ class FleetTables:
     Args:
         store: the batch's folder.
         run: name of the run; None: the last batch's.
+        most_s: a question that takes longer is stopped; None for no limit.
 
     Raises:
         BadInput: there is no such run.
     """
 
-    def __init__(self, store: Store, run: str | None = None) -> None:
-        self.store, self.run = store, run or latest_run(store)
+    def __init__(self, store: Store, run: str | None = None, most_s: float | None = None) -> None:
+        self.store, self.run, self._most_s = store, run or latest_run(store), most_s
         if self.run not in runs_of(store):
             raise BadInput(f"{store.address}: no run {self.run!r}; there are {', '.join(runs_of(store)) or 'none'}")
         self._numbers = [each.number for each in packs_of(store, self.run)]
@@ -69,7 +71,15 @@ class FleetTables:
         for shape in EQUAL_TABLES:
             self._make_view(shape)
 
-    def find(self, where: str, of: QueryTable = "events", limit: int = 100, columns: Sequence[str] = ()) -> QueryResult:
+    def find(
+        self,
+        where: str,
+        of: QueryTable = "events",
+        limit: int = 100,
+        columns: Sequence[str] = (),
+        order: str = "",
+        descending: bool = False,
+    ) -> QueryResult:
         """The rows that meet a condition, by drive and time.
 
         Args:
@@ -85,10 +95,12 @@ class FleetTables:
         shown += columns or _SHOWN[of]
         names = ", ".join(_quoted(name) for name in shown)
         condition = where.strip() or "true"
-        order = ", ".join(_quoted(name) for name in shown if name in ("drive", "index"))
+        first = [f"{_quoted(order)} {'DESC' if descending else 'ASC'} NULLS LAST"] if order else []
+        ordered = ", ".join([*first, *(_quoted(name) for name in shown if name in ("drive", "index"))])
         # on a line of its own, so that a comment ends with it
         fulfilled = f"FROM {of} WHERE (\n{condition}\n)"
-        rows = self._ask(f"SELECT {names}, count(*) OVER () AS found {fulfilled} ORDER BY {order} LIMIT {limit}", where)
+        counted = f"SELECT {names}, count(*) OVER () AS found {fulfilled}"
+        rows = self._ask(f"{counted} ORDER BY {ordered} LIMIT {limit}", where)
         total = int(rows[0][-1]) if rows else 0
         return QueryResult(tuple(shown), tuple(tuple(map(_plain, row[:-1])) for row in rows), total)
 
@@ -107,6 +119,10 @@ class FleetTables:
         names = [column[0] for column in found.description or ()]
         return [dict(zip(names, row, strict=True)) for row in found.fetchall()]
 
+    def ask(self, sql: str) -> Any:
+        """The answer to a whole query, which must not come from outside, as a pyarrow table."""
+        return self._duckdb.sql(sql).to_arrow_table()
+
     def arrow(self, table: QueryTable, columns: str) -> Any:
         """Columns of a table, named in SQL, as a pyarrow table."""
         return self._duckdb.sql(f"SELECT {columns} FROM {table}").to_arrow_table()
@@ -124,14 +140,29 @@ class FleetTables:
         counts = dict(self._ask(f"SELECT {place} AS b, count(*) FROM ({values}) GROUP BY b", where))
         return [low + n * width for n in range(bins + 1)], [int(counts.get(n, 0)) for n in range(bins)]
 
+    def counts(self, where: str, of: QueryTable, column: str, most: int = 30) -> list[tuple[str | None, int]]:
+        """(value, rows with it) of a column in rows that meet a condition, the most frequent first. Raises what
+        ``find`` raises."""
+        name, condition = _quoted(column), where.strip() or "true"
+        grouped = f"SELECT {name}::VARCHAR AS v, count(*) AS n FROM {of} WHERE (\n{condition}\n) GROUP BY v"
+        return [(value, int(n)) for value, n in self._ask(f"{grouped} ORDER BY n DESC, v LIMIT {most}", where)]
+
     def _ask(self, sql: str, where: str) -> list[tuple[Any, ...]]:
+        stop = threading.Timer(self._most_s, self._duckdb.interrupt) if self._most_s is not None else None
         try:
+            if stop is not None:
+                stop.start()
             statements = self._duckdb.extract_statements(sql)
             if len(statements) != 1 or statements[0].type != duckdb.StatementType.SELECT:
                 raise BadInput(f"{where!r}: expected one condition")
             return self._duckdb.execute(statements[0]).fetchall()
+        except duckdb.InterruptException:
+            raise BadInput(f"{where!r}: stopped after {self._most_s:g} s") from None
         except duckdb.Error as error:
             raise BadInput(f"{where!r}: {_reason(error)}") from None
+        finally:
+            if stop is not None:
+                stop.cancel()
 
     def _shut_in(self) -> None:
         """Questions may come from a page: they read the batch's folder only."""

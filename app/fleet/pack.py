@@ -6,10 +6,8 @@ name as the first column. They are rebuilt from the parts whenever these change.
 from __future__ import annotations
 
 import io
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,6 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from app.fleet.batch.tables import EQUAL_TABLES, TableShape, file_of
+from app.fleet.pack_index import Pack, keep_index, packed_file, packs_of
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
@@ -27,21 +26,6 @@ _GROUP_ROWS = 100_000
 _READERS = 16
 
 
-@dataclass(frozen=True)
-class Pack:
-    """A few hundred drives."""
-
-    number: int
-    """From 0, in the order of packing; names its files."""
-    marks: Mapping[str, str]
-    """Drive → mark of the recording that its rows are of."""
-
-
-def packed_file(table: str, run: str, number: int) -> str:
-    """The name in the store of one pack of a table."""
-    return f"packed/{table}/run={run}/{number:05d}.parquet"
-
-
 def pack(store: Store, run: str, progress: Progress = silent) -> None:
     """Pack the finished drives of a run. Packs that are up to date are kept. progress: of packs."""
     done = finished(store, run)
@@ -49,7 +33,7 @@ def pack(store: Store, run: str, progress: Progress = silent) -> None:
     for number, fresh in enumerate(wanted):
         _write(store, run, fresh)
         progress(number + 1, len(wanted))
-        _keep_index(store, run, fresh)
+        keep_index(store, run, fresh)
 
 
 def finished(store: Store, run: str) -> dict[str, str]:
@@ -59,13 +43,6 @@ def finished(store: Store, run: str) -> dict[str, str]:
         drive, mark, _ = name.rpartition("/")[2].rsplit(".", 2)
         found.setdefault(drive, []).append(mark)
     return {drive: marks[0] if len(marks) == 1 else _mark_of(store, run, drive) for drive, marks in found.items()}
-
-
-def packs_of(store: Store, run: str) -> list[Pack]:
-    """Every pack of a run, by number."""
-    data = store.read(_index(run))
-    rows = json.loads(data) if data is not None else []
-    return [Pack(number, marks) for number, marks in enumerate(rows)]
 
 
 def _mark_of(store: Store, run: str, drive: str) -> str:
@@ -120,12 +97,3 @@ def _part(store: Store, table: str, run: str, drive: str) -> pa.Table:
     if data is None:
         raise BadInput(f"{store.address}/{name} is missing; remove done/run={run}/{drive}.* and run the batch again")
     return pq.ParquetFile(io.BytesIO(data)).read()
-
-
-def _keep_index(store: Store, run: str, fresh: Pack) -> None:
-    rows = {each.number: dict(each.marks) for each in packs_of(store, run)} | {fresh.number: dict(fresh.marks)}
-    store.write(_index(run), json.dumps([rows[number] for number in sorted(rows)]).encode())
-
-
-def _index(run: str) -> str:
-    return f"packed/run={run}.json"

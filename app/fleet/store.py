@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
-import uuid
-from collections.abc import Iterable
+import shutil
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from pipeline.common.errors import BadInput
 from pipeline.common.remote_files import NotReachable, file_system, is_remote, patiently
+from pipeline.common.whole_files import replacing
+
+_BLOCK_BYTES = 1 << 20
 
 
 class Store:
@@ -62,19 +64,11 @@ class Store:
             patiently(lambda: self.system.pipe_file(self.path(name), data), f"{self.address}/{name}")
             return
         target = self.folder / name
-        part = target.with_name(f".{target.name}.{uuid.uuid4().hex}")
         try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            try:
-                with part.open("wb") as file:
-                    file.write(data)
-                    file.flush()
-                    os.fsync(file.fileno())
-                part.replace(target)
-            finally:
-                part.unlink(missing_ok=True)
+            with replacing(target) as file:
+                file.write(data)
         except OSError as error:
-            raise BadInput(f"{target} cannot be written: {error.strerror or error}") from None
+            raise _not_writable(target, error) from None
 
     def put(self, name: str, file: Path) -> None:
         """The same for a file on this machine, without reading it into memory."""
@@ -83,19 +77,10 @@ class Store:
             return
         target = self.folder / name
         try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            part = target.with_name(f".{target.name}.{uuid.uuid4().hex}")
-            try:
-                with file.open("rb") as source, part.open("wb") as written:
-                    while block := source.read(1 << 20):
-                        written.write(block)
-                    written.flush()
-                    os.fsync(written.fileno())
-                part.replace(target)
-            finally:
-                part.unlink(missing_ok=True)
+            with file.open("rb") as source, replacing(target) as written:
+                shutil.copyfileobj(source, written, _BLOCK_BYTES)
         except OSError as error:
-            raise BadInput(f"{target} cannot be written: {error.strerror or error}") from None
+            raise _not_writable(target, error) from None
 
     def names(self, folder: str) -> list[str]:
         """Every file below a folder, as names of this store, sorted; none where there is no such folder."""
@@ -105,10 +90,26 @@ class Store:
                 str(Path(parent, name).relative_to(self.folder)) for parent, _, names in os.walk(top) for name in names
             ]
             return sorted(name for name in found if not name.rpartition("/")[2].startswith("."))
+        return sorted(self._listed(folder))
+
+    def sizes(self, folder: str) -> dict[str, int]:
+        """The same files, with their sizes in bytes."""
+        if self.folder is not None:
+            return {name: (self.folder / name).stat().st_size for name in self.names(folder)}
+        return {name: int(facts["size"]) for name, facts in self._listed(folder).items()}
+
+    def _listed(self, folder: str) -> dict[str, dict[str, Any]]:
+        """Of a store: what it says of each file below a folder, by name."""
         self.system.invalidate_cache()
         start = self.path("")
         try:
-            listed: Iterable[str] = patiently(lambda: self.system.find(self.path(folder)), f"{self.address}/{folder}")
+            listed: dict[str, dict[str, Any]] = patiently(
+                lambda: self.system.find(self.path(folder), detail=True), f"{self.address}/{folder}"
+            )
         except NotReachable:
-            return []
-        return sorted(name.removeprefix(start) for name in listed)
+            return {}
+        return {name.removeprefix(start): facts for name, facts in listed.items()}
+
+
+def _not_writable(target: Path, error: OSError) -> BadInput:
+    return BadInput(f"{target} cannot be written: {error.strerror or error}")

@@ -20,4 +20,5 @@ def outside_text(first: int, last: int, count: int) -> str:
 
 
 def lead_text(lead: Lead) -> str:
+    """A lead in a sentence: the number of its track, "none" or "can't tell"."""
     return f"#{lead}" if isinstance(lead, int) else {"none": "none", "unknown": "can't tell"}[lead]

@@ -58,6 +58,7 @@ def hear(looks: SharedViewState, page: object, said: Mapping[str, Any]) -> None:
 
 
 def is_id_or_null(value: Any) -> bool:
+    """Whether a JSON value is an id that JavaScript can represent exactly, or null."""
     return value is None or (isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**53)
 
 

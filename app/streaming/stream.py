@@ -23,6 +23,7 @@ import asyncio
 import json
 import threading
 import time
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from app.core.client_role import is_display
+from app.core.client_role import Role, is_display
 from app.core.shared_view_state import HeldCuboid, SharedViewState
 from app.engine.page_frames import PageFrames
 from app.engine.snapshot import Snapshot
@@ -40,8 +41,13 @@ from app.streaming.scene_requests import hear, is_id_or_null
 from app.streaming.sent_image import MAX_WIDTH_PX, width_for
 from app.streaming.slot import FrameCounts, Slot
 
-DISPLAY_MAY_SAY = frozenset({"ping", "picture_px", "painted"})
-"""What changes nothing for others; of a display everything else is ignored, whatever is added."""
+_CHANGES_NOTHING = frozenset({"ping", "picture_px", "painted"})
+MAY_SAY: Mapping[Role, frozenset[str]] = {
+    "display": _CHANGES_NOTHING,
+    "person": _CHANGES_NOTHING | {"own", "page_3d", "selected", "hides_3d", "held", "labels_3d"},
+}
+"""What each role is heard on. Everything else is dropped before anything reads it: a new message works for nobody until
+it is listed here."""
 _LARGEST_PING = 1e15
 """Milliseconds; a page sends its own clock."""
 _WIDEST_PX = 4096
@@ -126,9 +132,8 @@ class Stream:
             message = await socket.receive()
             if message["type"] == "websocket.disconnect":
                 return
-            said = _object(message.get("text"))
-            if is_display(socket):
-                said = {name: value for name, value in said.items() if name in DISPLAY_MAY_SAY}
+            may_say = MAY_SAY["display" if is_display(socket) else "person"]
+            said = {name: value for name, value in _object(message.get("text")).items() if name in may_say}
             if (ping := _number(said.get("ping"), _LARGEST_PING)) is not None:
                 slot.put("pong", _dump({"type": "pong", "ping": ping, "server_unix_ms": time.time() * 1e3}))
             if (wanted := _width(said.get("picture_px"))) is not None:
@@ -226,6 +231,7 @@ class Stream:
 
 
 def state_message(snapshot: Snapshot) -> str:
+    """The JSON message with the whole state of the page."""
     return _dump({"type": "state", "state": snapshot.state_json()})
 
 

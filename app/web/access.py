@@ -152,6 +152,8 @@ def _display_may(scope: Scope) -> bool:
         return path == _DISPLAY_STREAM
     if path == "/viser" or path.startswith("/viser/"):
         return False  # its controls change what all see
+    if path == "/api/fleet" or path.startswith("/api/fleet/"):
+        return False  # drives of other cars
     return scope["method"] in _READING or (scope["method"], path) in _DISPLAY_MAY
 
 

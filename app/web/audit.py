@@ -1,6 +1,7 @@
 """Audit log: who changed, opened or exported what, and when, as one JSON object per line.
 
-Reads are not logged, except for files that leave the server. Tokens are never logged.
+Reads are not logged, except for files that leave the server: whatever a browser saves as a file. The 3D view is
+logged when it is opened, because its controls change parameters. Tokens are never logged.
 """
 
 from __future__ import annotations
@@ -9,21 +10,39 @@ import json
 import logging
 import os
 from datetime import UTC, datetime
+from functools import partial
+from io import BufferedWriter, FileIO, TextIOWrapper
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode
 
+from starlette.datastructures import Headers
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.core.client_role import is_display
 
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
-_FILES = ("/file", ".rrd", "/export")
-"""How the addresses end of what is read and leaves the server as a file."""
+_WITH_CONTROLS = "/viser"
+"""Begins the addresses of the one WebSocket through which parameters are changed."""
 _SHOWN_BYTES = 500
 """Of a request's body: what is opened and changed stands at its beginning; a file of labels is not copied."""
 _LARGEST_BYTES, _KEPT = 5_000_000, 5
+
+
+class _PrivateFile(RotatingFileHandler):
+    """Only its owner may read it, also the fresh one after each rotation. Open only while an entry is written: nothing
+    tells a middleware that its application has ended."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        super().emit(record)
+        if self.stream is not None:
+            self.stream.close()
+            self.stream = None
+
+    def _open(self) -> TextIOWrapper:
+        file = FileIO(self.baseFilename, "ab", opener=partial(os.open, mode=0o600))
+        return TextIOWrapper(BufferedWriter(file), encoding="utf-8")
 
 
 class Audit:
@@ -33,16 +52,21 @@ class Audit:
         self._app = app
         self._log = logging.Logger("cipv.audit")
         file.parent.mkdir(parents=True, exist_ok=True)
-        os.close(os.open(file, os.O_WRONLY | os.O_CREAT, 0o600))
-        handler = RotatingFileHandler(file, maxBytes=_LARGEST_BYTES, backupCount=_KEPT, encoding="utf-8", delay=True)
+        handler = _PrivateFile(file, maxBytes=_LARGEST_BYTES, backupCount=_KEPT, delay=True)
         handler.setFormatter(logging.Formatter("%(message)s"))
         self._log.addHandler(handler)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http" or (scope["method"] in _READING and not scope["path"].endswith(_FILES)):
-            return await self._app(scope, receive, send)
-        body = bytearray()
-        status = 0
+        if scope["type"] == "http":
+            await self._request(scope, receive, send)
+        elif scope["type"] == "websocket" and scope["path"].startswith(_WITH_CONTROLS):
+            await self._controls(scope, receive, send)
+        else:
+            await self._app(scope, receive, send)
+
+    async def _request(self, scope: Scope, receive: Receive, send: Send) -> None:
+        changes = scope["method"] not in _READING
+        body, status, is_file = bytearray(), 0, False
 
         async def receiving() -> Message:
             message = await receive()
@@ -50,23 +74,34 @@ class Audit:
             return message
 
         async def sending(message: Message) -> None:
-            nonlocal status
-            status = message.get("status", status)
+            nonlocal status, is_file
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                is_file = Headers(raw=message["headers"]).get("content-disposition", "").startswith("attachment")
             await send(message)
 
         try:
             await self._app(scope, receiving, sending)
         finally:
-            self._write(HTTPConnection(scope), bytes(body), status)
+            if changes or is_file:
+                self._write(HTTPConnection(scope), scope["method"], status, bytes(body))
 
-    def _write(self, connection: HTTPConnection, body: bytes, status: int) -> None:
+    async def _controls(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def sending(message: Message) -> None:
+            if message["type"] == "websocket.accept":
+                self._write(HTTPConnection(scope), "WEBSOCKET", 101)
+            await send(message)
+
+        await self._app(scope, receive, sending)
+
+    def _write(self, connection: HTTPConnection, method: str, status: int, body: bytes = b"") -> None:
         scope = connection.scope
         query = [(name, value) for name, value in parse_qsl(scope["query_string"].decode("latin-1")) if name != "token"]
         entry = {
             "time": datetime.now(UTC).isoformat(timespec="milliseconds"),
             "role": "display" if is_display(connection) else "person",
             "client": connection.client.host if connection.client else None,
-            "method": scope["method"],
+            "method": method,
             "path": scope["path"] + (f"?{urlencode(query)}" if query else ""),
             "body": body.decode("utf-8", "replace"),
             "status": status,

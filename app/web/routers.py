@@ -16,6 +16,7 @@ from app.drive.alignment_scenes import AlignmentScenes
 from app.drive.alignment_versions import AlignmentVersions
 from app.drive.marks import Marks
 from app.engine.engine import Engine
+from app.fleet.desk import FleetDesk
 from app.streaming.stream import Stream
 from app.views.rerun.web import ViewerFiles
 from app.web.metrics import Metrics
@@ -24,6 +25,7 @@ from app.web.routes.alignment_fit import alignment_fit_router
 from app.web.routes.alignment_versions import alignment_versions_router
 from app.web.routes.clips import clips_router
 from app.web.routes.drive import drive_router
+from app.web.routes.fleet import fleet_router
 from app.web.routes.health import health_router
 from app.web.routes.help import help_router
 from app.web.routes.labels.acts import label_acts_router
@@ -60,6 +62,8 @@ class Services:
     """The frames by which an alignment is scored."""
     fitting: AlignmentFitting
     """The fit that runs."""
+    fleet: FleetDesk | None
+    """The tables of a fleet; None without one."""
 
 
 ROUTERS: list[Callable[[Services], APIRouter]] = [
@@ -78,6 +82,7 @@ ROUTERS: list[Callable[[Services], APIRouter]] = [
     lambda on: alignment_fit_router(on.engine, on.fitting),
     lambda on: alignment_versions_router(on.engine, on.alignments, on.scenes, on.fitting),
     lambda on: project_router(on.engine),
+    lambda on: fleet_router(on.fleet),
     lambda on: rerun_router(on.engine, on.viewer),
     lambda on: help_router(),
 ]

@@ -15,10 +15,11 @@ from pathlib import Path
 from app.core.server_address import DEFAULT_PORT, is_loopback, listen_socket, reachable
 from app.core.session_folder import SESSIONS
 from app.core.shared_view_state import SharedViewState
-from app.core.stop_signals import asked_to_stop
+from app.core.stop_signals import asked_to_stop, end_process_once
 from app.drive.alignment_versions import AlignmentVersions
 from app.drive.marks import Marks
 from app.engine.engine import Engine
+from app.fleet.desk import FleetDesk
 from app.web.tokens import Tokens
 from pipeline.common.garbage_collection import freeze_loaded_objects
 
@@ -35,12 +36,15 @@ def serve(
     on_ready: Callable[[str], None] | None = None,
     always_token: bool = False,
     tls: tuple[Path, Path] | None = None,
+    ends_process: bool = False,
+    fleet: FleetDesk | None = None,
 ) -> None:
     """Serve until Ctrl-C, SIGTERM or SIGHUP. Starts and stops the engine; prints the page's address on a line of its
     own when it answers, and links with tokens where other machines can come.
 
     always_token: also where only this machine can come, whose other users could do everything otherwise. tls: files of
-    a certificate and its key.
+    a certificate and its key. fleet: the tables that the Fleet view searches. ends_process: the process does nothing
+    else, and ends even if some of its work hangs.
 
     PortTaken and BadInput (a weak token, no certificate) before anything is started.
     """
@@ -55,6 +59,8 @@ def serve(
     # FastAPI silences this of its own use of pydantic, which a thread that silences something else at once undoes
     warnings.filterwarnings("ignore", message="The 'alias' attribute with value")
     with asked_to_stop() as asked:
+        if ends_process:
+            end_process_once(asked, engine.desk.stop)
         engine.start()
         try:
             from app.web.server import Server, TlsFiles, create_app
@@ -64,7 +70,7 @@ def serve(
                 files.check()
             marks, audit = Marks(SESSIONS / "marks"), SESSIONS / "audit.jsonl"
             alignments = AlignmentVersions(SESSIONS / "alignments.json")
-            app = create_app(engine, viser_port, (*hosts, host), marks, looks, tokens, audit, alignments)
+            app = create_app(engine, viser_port, (*hosts, host), marks, looks, tokens, audit, alignments, fleet)
             freeze_loaded_objects()
             Server(app, address, on_ready, tokens, asked, files).run(sockets=[bound])
         finally:

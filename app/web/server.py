@@ -27,6 +27,7 @@ from app.drive.alignment_scenes import AlignmentScenes
 from app.drive.alignment_versions import AlignmentVersions
 from app.drive.marks import Marks
 from app.engine.engine import Engine
+from app.fleet.desk import FleetDesk
 from app.streaming.stream import Stream
 from app.views.colors import palette_css
 from app.views.rerun.web import ViewerFiles
@@ -36,6 +37,7 @@ from app.web.api_description import REFUSALS, titled
 from app.web.audit import Audit
 from app.web.connections import LimitedProtocol
 from app.web.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
+from app.web.log_limit import limit_logs
 from app.web.metrics import Metrics
 from app.web.quotas import RoleQuota
 from app.web.routers import ROUTERS, Services
@@ -44,6 +46,8 @@ from app.web.tokens import Tokens
 from pipeline.common.errors import BadInput
 from pipeline.common.user_files import Overloaded
 
+_BACKLOG = 100
+"""Connections that the system holds until they are accepted. Without descriptors Python 3.11 tries as many at once."""
 STATIC = Path(__file__).resolve().parents[2] / "static"
 
 
@@ -56,11 +60,12 @@ def create_app(
     tokens: Tokens | None = None,
     audit: Path | None = None,
     alignments: AlignmentVersions | None = None,
+    fleet: FleetDesk | None = None,
 ) -> FastAPI:
     """The application over a running engine. ``hosts``: names other than loopback it may be called by. ``marks``: where
     marked moments are kept; None forgets them at the end. ``looks``: hears what people look at. ``tokens``: what who
     comes must have; None where only this machine can come. ``audit``: the file of who did what; None keeps none.
-    ``alignments``: the saved ones; None forgets them at the end."""
+    ``alignments``: the saved ones; None forgets them at the end. ``fleet``: the tables that the Fleet view searches."""
     access = Access(hosts)
     stream = Stream(looks, engine.page_frames)
     exports, viewer, metrics = ExportQueue(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
@@ -74,6 +79,7 @@ def create_app(
         alignments or AlignmentVersions(),
         AlignmentScenes(),
         AlignmentFitting(engine.drives),
+        fleet,
     )
 
     @asynccontextmanager
@@ -149,10 +155,12 @@ class Server(uvicorn.Server):
                 ws_per_message_deflate=False,
                 ws_max_size=LARGEST_MESSAGE,
                 timeout_graceful_shutdown=1,
+                backlog=_BACKLOG,
                 ssl_certfile=tls.certificate if tls is not None else None,
                 ssl_keyfile=tls.key if tls is not None else None,
             )
         )
+        limit_logs()
         self._address = address
         self._tokens = tokens
         self._on_ready = on_ready

@@ -6,17 +6,21 @@ from __future__ import annotations
 import errno
 import io
 import os
+import re
 import time
 from collections.abc import Callable
 from typing import Any, BinaryIO, TypeVar
+from urllib.parse import unquote
 
 from pipeline.common.errors import BadInput, first_line
 from pipeline.common.user_files import FOLDERS_VARIABLE, Overloaded
 
 ADDRESSES_VARIABLE = "CIPV_ADDRESSES"
-"""Beginnings of addresses that may be opened where ``CIPV_FOLDERS`` is set, separated by spaces."""
+"""Stores, or folders in them, that may be opened where ``CIPV_FOLDERS`` is set: addresses separated by spaces."""
 BLOCK_BYTES = 256 << 10
 """What is read at least with one request: heads of records lie near one another."""
+_OF_TESTS = "memory"
+_STORES = frozenset({"s3", "gs", "gcs", "az", "abfs", "abfss", "adl", "http", "https", _OF_TESTS})
 _TRIES = 6
 _FIRST_PAUSE_S = 0.1
 _T = TypeVar("_T")
@@ -33,7 +37,15 @@ def is_remote(address: str) -> bool:
 
 
 def file_system(address: str) -> tuple[Any, str]:
-    """fsspec's file system for an address, and the path in it. NotReachable when the package for it is missing."""
+    """fsspec's file system for an address or a path of this machine, and the path in it. NotReachable when it names
+    neither, when the package for it is missing, and when it cannot be an address of its store.
+
+    fsspec knows many more: archives, caches and devices, one inside the other with ``::``. They would be ways around
+    the rules of ``user_files``."""
+    scheme = address.partition("://")[0].lower()
+    if "::" in address or (is_remote(address) and scheme not in _STORES):
+        known = ", ".join(sorted(_STORES - {_OF_TESTS}))
+        raise NotReachable(f"{address}: not the address of a store; use one of {known}")
     try:
         from fsspec.core import url_to_fs
     except ImportError:
@@ -42,7 +54,7 @@ def file_system(address: str) -> tuple[Any, str]:
         ) from None
     try:
         system, path = url_to_fs(address)
-    except (ImportError, ValueError) as error:
+    except Exception as error:  # each store's package has errors of its own, without a common base
         raise NotReachable(f"{address}: {first_line(error)}") from None
     return system, path
 
@@ -95,8 +107,13 @@ def check_allowed_address(address: str) -> None:
     if os.environ.get(FOLDERS_VARIABLE) is None:
         return
     allowed = os.environ.get(ADDRESSES_VARIABLE, "").split()
-    if ".." in address.split("/") or not any(address.startswith(each) for each in allowed):
+    if ".." in re.split(r"[/\\]", unquote(address)) or not any(_is_below(address, each) for each in allowed):
         raise OSError(errno.EACCES, "outside the allowed addresses", address)
+
+
+def _is_below(address: str, beginning: str) -> bool:
+    """Whether an address is one or lies in one: ``s3://cars-2/a`` is not below ``s3://cars``."""
+    return address == beginning or address.startswith(beginning if beginning.endswith("/") else f"{beginning}/")
 
 
 class _Ranges(io.RawIOBase):

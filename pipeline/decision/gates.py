@@ -236,7 +236,7 @@ def _needed_probability(who: Candidate) -> float:
     usual, params = who.params.become_probability, who.params
     if who.item.oncoming:
         return max(usual, params.become_oncoming)
-    return max(usual, params.become_standing) if who.item.moving is False else usual
+    return max(usual, params.become_standing) if who.item.surely_moving is False else usual
 
 
 def _in_path_probability(who: Candidate) -> float:

@@ -18,6 +18,7 @@ from pipeline.types import EgoState, FusedObject
 SMALLEST_CLOSING_MPS = 0.1
 """A gap that shrinks more slowly than this does not shrink measurably, and has no TTC."""
 _SMALLEST_GAP_M = 0.1
+_SURE_SIGMAS = 2.0
 _ONCOMING_MPS = 3.0
 """Slower, it may be an error of its speed."""
 
@@ -63,5 +64,6 @@ def _described(item: FusedObject, ego: EgoState | None, params: MotionParams) ->
         ttc_s=ttc,
         speed_over_ground_mps=speed,
         moving=speed > params.moving_mps,
+        surely_moving=speed - _SURE_SIGMAS * (item.camera_speed_sigma_mps or 0.0) > params.moving_mps,
         oncoming=-vx > max(_ONCOMING_MPS, abs(vy)),
     )

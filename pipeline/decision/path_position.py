@@ -9,17 +9,18 @@ is outside but which leaves no room to pass is in the path too.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, copysign, erf, nan, sqrt
+from math import copysign, erf, nan, sqrt
 from typing import NamedTuple
 
 import numba
 import numpy as np
 
+from pipeline.common.near_face import outlines, without_flank
 from pipeline.params import CipvParams
 from pipeline.path.corridor import nearest
 from pipeline.path.estimates import STEP_M
 from pipeline.path.yaw_rate import usable_rate
-from pipeline.types import EgoState, FusedObject, Path, Point2
+from pipeline.types import EgoState, FusedObject, Path
 
 LIDAR_SIDEWAYS_SIGMA_M = 0.15
 """Lateral uncertainty of a cluster: the width of a beam, and which part of the car was hit."""
@@ -144,6 +145,7 @@ def place(
         path.profile_m if len(path.profile_m) else np.zeros(len(path.center)),
         STEP_M,
         params.min_overlap_m,
+        params.use_flank,
         ego is not None,
         ego.speed_mps if ego is not None else 0.0,
         usable_rate(ego) or 0.0,
@@ -159,16 +161,7 @@ def place(
 def warm_up() -> None:
     """Compile the kernel before the first frame."""
     center = np.column_stack([np.arange(3.0), np.zeros(3)])
-    _against(np.zeros((1, 19)), center, center, center, 1.5, np.zeros(3), STEP_M, 0.9, True, 0.0, 0.0)
-
-
-def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
-    """The middle of the side that faces the ego origin: of the two at the nearest corner the one more square to the
-    line of sight. (Between the two nearest corners lies a short side of what is only a thin slice of a rear.)"""
-    (ax, ay), (bx, by), (cx, cy), (dx, dy) = bev
-    sight = np.array([atan2(ay + by + cy + dy, ax + bx + cx + dx)])
-    x, y = _outlines(np.array([[ax, ay, bx, by, cx, cy, dx, dy]]), sight)[0].tolist()
-    return x, y
+    _against(np.zeros((1, 19)), center, center, center, 1.5, np.zeros(3), STEP_M, 0.9, True, True, 0.0, 0.0)
 
 
 def _numbers(item: FusedObject) -> tuple[float, ...]:
@@ -195,7 +188,7 @@ def _numbers(item: FusedObject) -> tuple[float, ...]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _against(rows, center, left, right, half_width, profile, step, overlap, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]
+def _against(rows, center, left, right, half_width, profile, step, overlap, use_flank, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]
     """(N, 11) of (N, 19) rows as ``_numbers`` gives them: distances from the centre to the left and to the right edge
     there, sideways speed, then the numbers of ``Place`` as far as ``sigma_m``. half_width: of a path that has no edges
     of its own, else 0."""
@@ -203,8 +196,13 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
     for n in range(len(rows)):
         for k in range(2):
             middles[n, k] = 0.25 * (rows[n, k] + rows[n, 2 + k] + rows[n, 4 + k] + rows[n, 6 + k])
-    outlines = _outlines(rows, _headings(center, nearest(center, middles)[1], step))
-    aside, reached = nearest(center, outlines)
+    along_path = _headings(center, nearest(center, middles)[1], step)
+    flanks = np.zeros(len(rows))
+    for n in range(len(rows)):
+        if use_flank and rows[n, 12]:
+            flanks[n] = without_flank(rows[n], along_path[n])
+    corners = outlines(rows, along_path)
+    aside, reached = nearest(center, corners)
     headings = _headings(center, reached[::5], step)
     edges = np.zeros((2 * len(rows), 2))
     for n in range(len(edges)):
@@ -215,7 +213,7 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
     out = np.empty((len(rows), 11))
     for n in range(len(rows)):
         offsets, ahead = aside[5 * n : 5 * n + 5], reached[5 * n]
-        near_x, near_y = outlines[5 * n, 0], outlines[5 * n, 1]
+        near_x, near_y = corners[5 * n, 0], corners[5 * n, 1]
         k = min(max(int(ahead / step), 0), len(center) - 2)
         heading = headings[n]
         cos, sin = np.cos(heading), np.sin(heading)
@@ -239,7 +237,8 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
         out[n, 3], out[n, 4], out[n, 5], out[n, 6] = offsets[0], ahead, low, high
         out[n, 7] = 0.5 * (low + high)
         out[n, 8], out[n, 9] = half_left + spare, half_right + spare
-        out[n, 10] = np.hypot(profile[k], _sigma_m(near_x, near_y, cos, sin, rows[n, 11], rows[n, 12], rows[n, 13]))
+        own = _sigma_m(near_x, near_y, cos, sin, rows[n, 11], rows[n, 12], rows[n, 13])
+        out[n, 10] = np.sqrt(profile[k] ** 2 + own**2 + flanks[n] ** 2)
     return out
 
 
@@ -268,37 +267,6 @@ def _headings(center, along, step):  # type: ignore[no-untyped-def]
         k = min(max(int(along[n] / step), 0), len(center) - 2)
         out[n] = np.arctan2(center[k + 1, 1] - center[k, 1], center[k + 1, 0] - center[k, 0])
     return out
-
-
-@numba.njit(cache=True, nogil=True)
-def _outlines(rows, along):  # type: ignore[no-untyped-def]
-    """(5·N, 2): of each row the middle of the side that faces the ego origin, and the corners in their order around it,
-    those of that side first: of the two at the nearest corner the one more square to the direction ``along`` (N,)."""
-    outlines = np.empty((5 * len(rows), 2))
-    for n in range(len(rows)):
-        near = 0
-        for c in range(1, 4):
-            x, y = rows[n, 2 * c], rows[n, 2 * c + 1]
-            if x * x + y * y < rows[n, 2 * near] ** 2 + rows[n, 2 * near + 1] ** 2:
-                near = c
-        after, before = (
-            _square(rows[n], near, (near + 1) % 4, along[n]),
-            _square(rows[n], near, (near + 3) % 4, along[n]),
-        )
-        way = 1 if after >= before else 3
-        for c in range(4):
-            k = (near + way * c) % 4
-            outlines[5 * n + 1 + c, 0], outlines[5 * n + 1 + c, 1] = rows[n, 2 * k], rows[n, 2 * k + 1]
-        outlines[5 * n, 0] = 0.5 * (outlines[5 * n + 1, 0] + outlines[5 * n + 2, 0])
-        outlines[5 * n, 1] = 0.5 * (outlines[5 * n + 1, 1] + outlines[5 * n + 2, 1])
-    return outlines
-
-
-@numba.njit(cache=True, nogil=True)
-def _square(row, a, b, along):  # type: ignore[no-untyped-def]
-    """How square the side between corners a and b is to a direction: |sin| of the angle between them."""
-    dx, dy = row[2 * b] - row[2 * a], row[2 * b + 1] - row[2 * a + 1]
-    return abs(dy * np.cos(along) - dx * np.sin(along)) / max(np.hypot(dx, dy), 1e-9)
 
 
 @numba.njit(cache=True, nogil=True)

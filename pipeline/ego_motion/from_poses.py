@@ -18,7 +18,7 @@ def motion_along(t_ns: Sequence[int], T_map_ego: Sequence[F64]) -> list[EgoState
     """Own motion in each frame.
 
     Args:
-        t_ns: ascending.
+        t_ns: ascending; where a damaged file steps back, frames around it may get None.
         T_map_ego: (4, 4) of each, takes ego points to any frame that stands still.
 
     Returns:
@@ -31,7 +31,7 @@ def motion_along(t_ns: Sequence[int], T_map_ego: Sequence[F64]) -> list[EgoState
     # of frames that are further apart, the neighbours
     alone = first == last
     first, last = np.where(alone, np.maximum(first - 1, 0), first), np.where(alone, last + 1, last)
-    last = np.minimum(last, len(times) - 1)
+    first, last = np.minimum(first, len(times) - 1), np.clip(last, 0, len(times) - 1)
     pairs = zip(first.tolist(), last.tolist(), t_ns, strict=True)
     return [motion_between([int(times[a]), int(times[b])], [T_map_ego[a], T_map_ego[b]], at) for a, b, at in pairs]
 

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from pipeline.common.geometry import closest_on_polygon, iou_matrix
-from pipeline.decision.path_position import near_face_middle
+from pipeline.common.near_face import near_face_middle
 from pipeline.labels.model import FARTHEST_LEAD_M
 from pipeline.types import VEHICLES, Box, Point2, Result
 from pipeline.types.source import TruthObject

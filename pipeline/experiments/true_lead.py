@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.decision.path_position import near_face_middle
+from pipeline.common.near_face import near_face_middle
 from pipeline.params import CipvParams, PathParams
 from pipeline.path.corridor import nearest_on_path
 from pipeline.simulation.scenario import Scenario
@@ -107,11 +107,13 @@ def _covered(now: World, camera: CameraCalibration) -> frozenset[int]:
 
 
 def near_face(state: ActorState) -> Point2:
+    """Ego x, y of the middle of the face of a true vehicle that is nearest to the car."""
     a, b, c, d = ((float(x), float(y)) for x, y in state.cuboid.footprint())
     return near_face_middle((a, b, c, d))
 
 
 def range_m(state: ActorState) -> float:
+    """Horizontal range from the ego origin to that point."""
     return float(np.hypot(*near_face(state)))
 
 

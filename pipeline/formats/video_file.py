@@ -38,8 +38,11 @@ def open_video(path: Path) -> av.container.InputContainer:
 
 
 def within_budget(container: av.container.InputContainer) -> None:
-    """Have FFmpeg refuse images that are larger than any camera's, also where their size changes on the way."""
+    """Have FFmpeg refuse images that are larger than any camera's, also where their size changes on the way. ValueError
+    for images that no decoder here knows."""
     for stream in container.streams.video:
+        if stream.codec_context is None:
+            raise ValueError("its images are of an unknown kind")
         stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
 
 

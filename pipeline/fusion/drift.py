@@ -219,19 +219,20 @@ def _sigma_deg(each: CuboidOffset) -> float:
 def _common(values: F64, sigmas: F64, rates: F64) -> tuple[float, float, bool]:
     """The angle that all vehicles share beside a common time offset, its standard deviation, and whether most of them
     say so one by one. Robust (Huber): a wrong pair or two do not move it."""
-    design = np.column_stack([np.ones(len(values)), rates])
-    held = np.diag([0.0, TIME_SIGMA_S**-2])
     weight = sigmas**-2
-    solved: F64 = np.zeros(2)
-    inverse: F64 = np.eye(2)
     for _ in range(ROUNDS):
-        inverse = np.asarray(np.linalg.inv(design.T @ (design * weight[:, None]) + held), dtype=np.float64)
-        solved = np.asarray(inverse @ (design.T @ (values * weight)), dtype=np.float64)
-        off = np.abs(values - design @ solved) / sigmas
+        # The normal equations of angle + rate · time are 2 × 2: written out, they take a third less time than a solver
+        w, wr = weight.sum(), weight @ rates
+        wrr = (weight * rates) @ rates + TIME_SIGMA_S**-2
+        right, right_r = weight @ values, (weight * values) @ rates
+        determinant = w * wrr - wr * wr
+        shared, time_s = (wrr * right - wr * right_r) / determinant, (w * right_r - wr * right) / determinant
+        variance = wrr / determinant
+        off = np.abs(values - shared - rates * time_s) / sigmas
         weight = sigmas**-2 * HUBER / np.maximum(off, HUBER)
-    off = np.minimum(np.abs(values - design @ solved) / sigmas, 2.0 * HUBER)
+    off = np.minimum(off, 2.0 * HUBER)
     scatter = float(np.sqrt(np.sum(off**2) / max(len(values) - 1, 1)))
-    angle, sigma = float(solved[0]), float(inverse[0, 0] ** 0.5) * max(scatter, 1.0)
-    alone = values - rates * solved[1]
+    angle, sigma = float(shared), float(variance**0.5) * max(scatter, 1.0)
+    alone = values - rates * time_s
     is_clear = np.count_nonzero(alone * np.sign(angle) > abs(angle) / 2) >= AGREEING_SHARE * len(values)
     return angle, sigma, bool(is_clear)

@@ -107,6 +107,7 @@ def box_row(object_id: int, seen: VisionTrack, gates: tuple[Gate, ...]) -> Fused
         hits=seen.hits,
         vision_track=seen.id,
         camera_ranges=seen.ranges,
+        camera_speed_sigma_mps=seen.speed_sigma_mps,
         returns=seen.returns,
         gates=gates,
     )
@@ -134,5 +135,6 @@ def lidar_sigma_m(track: LidarTrack) -> float:
 
 
 def quad(corners: list[list[float]]) -> Quad:
+    """Four corners as tuples."""
     (ax, ay), (bx, by), (cx, cy), (dx, dy) = corners
     return (ax, ay), (bx, by), (cx, cy), (dx, dy)

@@ -14,6 +14,7 @@ from typing import Any
 
 from pipeline.common.data_dir import file_sha256
 from pipeline.common.errors import BadInput
+from pipeline.common.whole_files import replace_text
 from pipeline.types import DistanceLaw
 
 
@@ -63,10 +64,8 @@ def keep_law(network: Path, law: DistanceLaw, fitted: Mapping[str, Any]) -> Path
         indent=1,
         ensure_ascii=False,
     )
-    part = path.with_suffix(".part")
     try:
-        part.write_text(text + "\n", encoding="utf-8")
-        part.replace(path)
+        replace_text(path, text + "\n")
     except OSError as error:
         raise BadInput(
             f"{path} cannot be written ({error.strerror or error}); register the network, and fit the law to that"

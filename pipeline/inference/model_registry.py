@@ -23,6 +23,7 @@ from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
 from pipeline.common.user_file_errors import given_path
 from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
+from pipeline.common.whole_files import replace_text
 from pipeline.inference.distance_laws import find_law, law_file
 from pipeline.inference.known_networks import KNOWN, KnownModel, Task
 from pipeline.types import DistanceLaw
@@ -270,7 +271,5 @@ def _read_registry() -> _Registry:
 
 
 def _write_registry(registry: _Registry) -> None:
-    path = store() / "registry.json"
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(registry.model_dump(), indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    part.replace(path)
+    text = json.dumps(registry.model_dump(), indent=1, sort_keys=True)
+    replace_text(store() / "registry.json", text + "\n")

@@ -21,6 +21,7 @@ import onnxruntime as ort
 
 from pipeline.common.data_dir import file_sha256
 from pipeline.common.fast_replace import evolve
+from pipeline.common.whole_files import replace_text
 from pipeline.inference.model_registry import store
 from pipeline.types import F32
 
@@ -79,7 +80,7 @@ def kept_way(path: Path, threads: int) -> RunSettings:
         return usual
     try:
         way = RunSettings(tuple(row["providers"]), int(row["threads"]), str(row["optimisation"]), bool(row["arena"]))
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         return usual
     known = hasattr(ort.GraphOptimizationLevel, way.optimisation) and 1 <= way.threads <= 64
     return way if known and set(way.providers) <= set(ort.get_available_providers()) else usual
@@ -88,12 +89,7 @@ def kept_way(path: Path, threads: int) -> RunSettings:
 def keep(path: Path, way: RunSettings) -> None:
     """Run this file's network this way from now on. OSError when the store cannot be written."""
     file = _file()
-    file.parent.mkdir(parents=True, exist_ok=True)
-    part = file.with_suffix(".part")
-    part.write_text(
-        json.dumps(_read(file) | {_key(path): asdict(way)}, indent=1, sort_keys=True) + "\n", encoding="utf-8"
-    )
-    part.replace(file)
+    replace_text(file, json.dumps(_read(file) | {_key(path): asdict(way)}, indent=1, sort_keys=True) + "\n")
 
 
 def tune(run: Callable[[RunSettings], Callable[[], Sequence[F32]]], threads: int) -> Iterator[Trial]:

@@ -10,10 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from pipeline.common.errors import BadInput
-from pipeline.common.user_files import read_regular
+from pipeline.common.user_file_errors import read_yaml
 from pipeline.labels.model import LabelSet
 from pipeline.vision.classes import canonical
 
@@ -22,7 +20,6 @@ FILE = Path(__file__).with_name("classes.yaml")
 EXPORTS = ("kitti", "nuscenes", "coco", "openlabel")
 OF_SIGHTINGS = ("occlusion", "truncation")
 """Attributes that a sighting has a place for."""
-_LARGEST = 1 << 20
 _LONGEST_NAME = 40
 _MOST = 200
 
@@ -75,13 +72,7 @@ def default_classes() -> ClassList:
 def read_classes(path: Path) -> ClassList:
     """A class list from a file. Raises BadInput, in one sentence, if it is invalid."""
     try:
-        body = yaml.safe_load(read_regular(path, _LARGEST))
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
-        raise BadInput(f"{path}: not YAML: {str(error).splitlines()[0]}") from None
-    try:
-        return _parsed(body)
+        return _parsed(read_yaml(path, str(path)))
     except ValueError as error:
         raise BadInput(f"{path}: {error}") from None
 

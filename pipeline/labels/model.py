@@ -104,6 +104,7 @@ class LabelTrack:
     """By name and first frame; those of one name do not overlap."""
 
     def at(self, frame: int) -> Sighting | None:
+        """Its sighting in a frame; None where it is not labelled."""
         return next((each for each in self.sightings if each.frame == frame), None)
 
 
@@ -174,6 +175,8 @@ class EventLabel:
 
 WHOLE_TAG = "all labelled"
 """By this tag a person says that every vehicle of frames is labelled."""
+NEXT_TAG = "label next"
+"""Frames with this tag are in the labeling queue until their lead is labelled."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +188,7 @@ class FrameTag:
     last: int
     """Last frame, included."""
     tag: str
-    """``night``, ``rain``, ``sensor dirty``, or ``WHOLE_TAG``."""
+    """``night``, ``rain``, ``sensor dirty``, ``WHOLE_TAG`` or ``NEXT_TAG``."""
     origin: Origin
     """Who said so."""
 

@@ -152,10 +152,12 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "single_returns": False,
         },
         "existence": {"enabled": False},
+        "path": {"use_edges": False},
         "cipv": {
             "confirm_hits": 1,
             "carried_may_become_lead": True,
             "hysteresis_m": 0.0,
+            "use_flank": False,
             "decide_s": 0.0,
             "become_existence": 0.0,
             "become_probability": 0.0,

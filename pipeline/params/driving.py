@@ -35,7 +35,9 @@ class PathParams(Section):
     use_gnss: bool = choice(True, "Align the corridor with the planned route where GNSS locates the car on it")
     use_yaw_rate: bool = choice(True, "Curve the corridor according to the yaw rate")
     use_edges: bool = choice(
-        False, "Align the corridor with the edges of the road: kerbs, hedges, walls, rails, parked cars"
+        True,
+        "Align the corridor with the edges of the road (kerbs, hedges, walls, rails, parked cars) where no lane lines "
+        "or route show the road",
     )
     use_traffic: bool = choice(
         True,
@@ -111,6 +113,9 @@ class CipvParams(Section):
         "m",
         "In path: at least this much of the object's width is inside the corridor, or half of a narrower object",
     )
+    use_flank: bool = choice(
+        True, "Camera-only vehicles beside the path: locate the rear, not the middle of a box that shows a flank too"
+    )
     decide_s: float = slider(
         0.3, 0.0, 2.0, 0.05, "s", "In path: time over which detections are averaged; 0: this frame only"
     )
@@ -133,12 +138,12 @@ class CipvParams(Section):
         "To become the lead, an object must exist and be in the path with at least this probability",
     )
     become_standing: float = slider(
-        0.67,
+        0.8,
         0.0,
         0.95,
         0.01,
         "",
-        "The same for a standing vehicle: far more of them are parked beside the path than stopped in it",
+        "The same for a vehicle that may be standing: far more are parked beside the path than stopped in it",
     )
     become_oncoming: float = slider(
         0.9,

@@ -95,6 +95,9 @@ class VisionTrackingParams(Section):
     learn_height: bool = choice(
         True, "kalman: learn a vehicle's height while the LiDAR ranges it; off: assume that of its class"
     )
+    use_aspect: bool = choice(
+        True, "kalman: a car whose box is tall for its width is taken for a van; off: assume the height of its class"
+    )
     max_nis: float = slider(
         13.8,
         3.0,

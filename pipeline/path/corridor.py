@@ -52,6 +52,8 @@ class PathState:
     """Where on the route the car is."""
     last: FusedPath | None = None
     """The fused path; None where nothing can be carried over."""
+    is_shown: bool = False
+    """Whether lane lines or a route showed the road."""
 
 
 class Evidence(NamedTuple):
@@ -82,7 +84,8 @@ def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParam
     surest = (between_lines(evidence.lane, params) if params.use_lanes else None, along_route)
     seen = (*surest, yaw_rate.ahead(yaw, ego, params))
     estimates = [each for each in seen if each is not None]
-    if not any(_shows_the_road(each, params) for each in surest):
+    is_shown = any(_shows_the_road(each, params) for each in surest)
+    if not is_shown:
         estimates += [each for each in (evidence.edges, evidence.traffic) if each is not None]
     guess = straight(ego, params)
     if all(each.sigma_m[0] > guess.sigma_m[0] for each in estimates) or _fades(ego, estimates):
@@ -98,7 +101,7 @@ def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParam
         keep = exp(-dt_s / params.smoothing_s) if params.smoothing_s > 0.0 else 0.0
         path = blend_estimates.blend(fresh, expected, keep, _FASTEST_SHIFT_MPS * dt_s)
     notes = (*_about_own_motion(ego), *wrong_fix, *wrong_route, *left_out)
-    return PathState(yaw, placed, path if ego is not None else None), _as_path(path, ego, notes, params)
+    return PathState(yaw, placed, path if ego is not None else None, is_shown), _as_path(path, ego, notes, params)
 
 
 def corridor(ego: EgoState | None, params: PathParams) -> Path:

@@ -34,8 +34,9 @@ _EDGE_M, _EDGE_CELLS, _EDGE_SHARE = 0.5, 5, 0.3
 """An edge is so wide a strip beside the road with so many cells, and with this share of the fullest one's."""
 _CLEAR_M = 0.9
 """Half a car's width."""
-_SOON_PER_M, _LATER_PER_M = 0.01, 0.025
-"""How much a road's curvature over the next 6 and 20 m may differ from that of the way just driven."""
+_CHANGES_OVER_M, _MOST_CHANGE_PER_M = (3.0, 10.0, 30.0), (0.01, 0.025, 0.1)
+"""How much a road's curvature over the next 6, over the next 20 and over the 20 m beyond may differ from that of the
+way just driven: by what its lateral jerk allows to their middles, but by no more than a street corner does."""
 _MODEL_SIGMA_PER_M2 = 0.0004
 """A street is no cubic."""
 
@@ -70,7 +71,11 @@ class Prior(NamedTuple):
     own: float
     """Curvature of the way just driven, 1/m."""
     own_sigma: float
-    """Of the road's next metres against it."""
+    """Of the road's curvature over the next 6 m against it."""
+    later_sigma: float
+    """Of that over the next 20 m."""
+    far_sigma: float
+    """Of that over the 20 m beyond."""
 
 
 class Starts(NamedTuple):
@@ -129,10 +134,14 @@ def fitted(xy: F64, blocks: F64, starts: Starts, ego: EgoState, params: PathPara
     speed = max(ego.speed_mps, params.min_speed_mps)
     heading_sigma = max(params.lane_keeping_sigma_mps / speed, 0.01)
     own = (ego.yaw_rate_radps or 0.0) / speed if ego.speed_mps > params.min_speed_mps else 0.0
-    own_sigma = float(np.hypot(2.0 * params.yaw_rate_sigma_radps / speed, _SOON_PER_M))
-    if ego.yaw_rate_radps is None:
-        own_sigma = 1.0
-    prior = Prior(curvature_sigma, heading_sigma, own, own_sigma)
+    noise = 2.0 * params.yaw_rate_sigma_radps / speed
+    jerk = params.lateral_jerk_mps3 / speed**3
+    changes = (
+        float(np.hypot(noise, min(jerk * over_m, most)))
+        for over_m, most in zip(_CHANGES_OVER_M, _MOST_CHANGE_PER_M, strict=True)
+    )
+    against_own = tuple(changes) if ego.yaw_rate_radps is not None else (1.0, 1.0, 1.0)
+    prior = Prior(curvature_sigma, heading_sigma, own, *against_own)
     begun = [starts.before] if starts.before is not None else []
     if starts.own is not None:
         begun.append(_round(starts.own, xy, blocks, _WIDE, prior, s)[0])
@@ -167,7 +176,7 @@ def _round(line: F64, xy: F64, blocks: F64, grid: Grid, prior: Prior, s: F64) ->
     first, second, turns = (_steps(*each) for each in (grid.first_m, grid.second_m, grid.heading))
     weights, evidence = _weights(
         along[keep], aside[keep], blocks[keep], first, second, turns, grid.bin_m, _BAND_M, _TEMPER,
-        heading, bends, *prior, _CHANCE, _CLEAR_M, _LATER_PER_M, _IMPROBABLE,
+        heading, bends, *prior, _CHANCE, _CLEAR_M, _IMPROBABLE,
     )  # fmt: skip
     mean, sigma = _moments(s, first, second, turns, weights)
     return _shifted(line, mean, s), sigma, evidence
@@ -231,9 +240,10 @@ def _weights(  # type: ignore[no-untyped-def]
     heading_sigma,
     own,
     own_sigma,
+    later_sigma,
+    far_sigma,
     chance,
     clear_m,
-    later,
     improbable,
 ):  # pragma: no cover
     """(H, U, W) probability of each shape."""
@@ -250,7 +260,8 @@ def _weights(  # type: ignore[no-untyped-def]
                 a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
                 prior = ((bends[1] + 2.0 * a + 60.0 * b) / bend_sigma) ** 2
                 prior += ((bends[2] + 2.0 * a + 180.0 * b) / bend_sigma) ** 2
-                prior += ((bends[1] + 2.0 * a + 60.0 * b - own) / later) ** 2
+                prior += ((bends[1] + 2.0 * a + 60.0 * b - own) / later_sigma) ** 2
+                prior += ((bends[2] + 2.0 * a + 180.0 * b - own) / far_sigma) ** 2
                 prior += ((heading0 + heading[i]) / heading_sigma) ** 2
                 prior += ((bends[0] + 2.0 * a + 18.0 * b - own) / own_sigma) ** 2
                 out[i, j, k] = 0.5 * prior

@@ -85,9 +85,9 @@ class Info:
     """Whether it is as it was written; None when nobody looked."""
 
 
-def info(path: Path, *, is_quick: bool = False) -> Info:
+def info(path: Path, *, is_quick: bool = False, key: str | None = None) -> Info:
     """Of any MCAP file; BadInput when it is none. is_quick: reads message indexes, not messages, and leaves ``chain``
-    out, for which all bytes are read."""
+    out, for which all bytes are read. key: the public one that it must be signed with."""
     with McapFile(path) as file:
         times = file.log_times()
         listed = tuple(
@@ -109,7 +109,7 @@ def info(path: Path, *, is_quick: bool = False) -> Info:
             damaged_chunks=len(file.damaged),
             marks=marks,
             problem=file.directory.problem,
-            chain=None if is_quick else verify(path),
+            chain=None if is_quick else verify(path, key=key),
         )
 
 

@@ -18,6 +18,7 @@ from mcap.writer import MCAP0_MAGIC, Writer
 
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
+from pipeline.common.signing import configured_signer
 from pipeline.recording import topics
 from pipeline.recording.mcap.chain import ChainWriter, link_at
 from pipeline.recording.mcap.index import read_summary, summary_start
@@ -33,7 +34,7 @@ class _Chained:
     """What ``mcap.writer`` writes to, which goes on with the chain of the bytes before."""
 
     def __init__(self, file: BinaryIO, previous: str) -> None:
-        self.file, self.chain = file, ChainWriter(file, previous)
+        self.file, self.chain = file, ChainWriter(file, previous, configured_signer())
 
     def write(self, data: bytes) -> int:
         self.chain.wrote(data)

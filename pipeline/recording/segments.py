@@ -58,6 +58,7 @@ class Segments:
 
     @property
     def frames(self) -> int:
+        """Frames given to all files so far."""
         return self._earlier_frames + self._writer.frames
 
     @property
@@ -67,10 +68,12 @@ class Segments:
 
     @property
     def bytes_written(self) -> int:
+        """Size of all files so far."""
         return self._earlier_bytes + self._writer.bytes_written
 
     @property
     def seconds(self) -> float:
+        """Time that the frames in all files span."""
         return self._earlier_s + self._writer.span_s
 
     def write(

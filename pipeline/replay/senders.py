@@ -79,6 +79,8 @@ class LidarSender:
 
 
 class CameraSender:
+    """JPEG images over HTTP (multipart), as a network camera serves them."""
+
     def __init__(self, url: str) -> None:
         parts = urlsplit(url)
         if parts.scheme != "http" or parts.hostname is None:
@@ -99,6 +101,8 @@ class CameraSender:
 
 
 class UdpNmeaSender:
+    """NMEA sentences over UDP, one datagram a fix."""
+
     def __init__(self, host: str, port: int) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._to = (host, port)

@@ -14,9 +14,8 @@ import numpy as np
 
 from pipeline.common.fast_replace import evolve
 from pipeline.common.nearest_in_time import Timeline
-from pipeline.common.user_file_errors import reason_of
 from pipeline.ego_motion.from_gnss import MotionFromGnss
-from pipeline.formats.file_reading import files_by_name, read_image, recording_file, recording_folder
+from pipeline.formats.file_reading import files_by_name, read_bytes, read_image, recording_file, recording_folder
 from pipeline.formats.gpx_file import parse_gpx
 from pipeline.formats.video_file import SUFFIXES, VideoFile
 from pipeline.sources import rig as rig_files
@@ -173,10 +172,7 @@ def _track(path: Path, options: dict[str, str], near_ns: int, notes: list[str]) 
     """The fixes of a file beside the recording, in order of time; none without one."""
     gpx = named(path, options, "gpx", (".gpx",)) or _the_only_one(path, options, (".gpx",))
     if gpx is not None:
-        try:
-            fixes = parse_gpx(gpx.read_text(encoding="utf-8", errors="replace"), gpx.name)
-        except OSError as error:
-            raise SourceError(f"{gpx.name}: cannot be read: {reason_of(error)}") from None
+        fixes = parse_gpx(read_bytes(gpx).decode("utf-8", "replace"), gpx.name)
         notes.append(f"{len(fixes)} GNSS fixes from {gpx.name}")
         return fixes
     nmea = named(path, options, "nmea", NMEA_SUFFIXES) or _the_only_one(path, options, NMEA_SUFFIXES)

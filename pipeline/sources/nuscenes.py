@@ -38,6 +38,7 @@ from pipeline.types import F32, F64, U8, CameraCalibration, CameraImage, Frame, 
 from pipeline.types.source import Opening, SourceError, TruthObject
 
 _LIDAR, _CAMERA = "LIDAR_TOP", "CAM_FRONT"
+_NO_IMAGES = f"no images: no {_CAMERA} files that calibrated_sensor.json knows"
 _CHANNELS = 32
 _NOMINAL_SIZE = (1600, 900)
 _LATEST_US = 9_000_000_000_000_000
@@ -82,7 +83,7 @@ class NuscenesSource:
         steps = np.diff(self._ticks)
         self.rate_hz = round(1e9 / float(np.median(steps)), 1) if len(steps) and np.median(steps) > 0 else 2.0
         about = [f"{1 + len(others)} scenes; ?scene= opens another: {', '.join(others[:9])}"] if others else []
-        self.notes = (*about, *([] if self._images else ["no images: no CAM_FRONT files"]))
+        self.notes = (*about, *([] if self._images else [_NO_IMAGES]))
 
     def __len__(self) -> int:
         return len(self._ticks)
@@ -96,7 +97,7 @@ class NuscenesSource:
         notes = list[str]()
         outline = self._outline(index)
         sweep = self._sweep(index, notes)
-        image = self._image(outline.t_ns, notes) if self._images else None
+        image = self._image(outline.t_ns, notes)
         return Frame(index, outline.name, outline.t_ns, sweep, image, self._camera, outline.ego, notes=tuple(notes))
 
     def outlines(self) -> Iterator[Frame]:
@@ -133,6 +134,9 @@ class NuscenesSource:
         return Sweep(self._ticks[index], points, ring, _CHANNELS)
 
     def _image(self, t_ns: int, notes: list[str]) -> CameraImage | None:
+        if not self._images:
+            notes.append(_NO_IMAGES)
+            return None
         at = nearest(self._image_times, t_ns, _IMAGE_WITHIN_NS)
         path = self._folder / self._images[at].filename if at is not None else None
         return image_of(path, int(self._image_times[at]) if at is not None else None, self._size, notes)

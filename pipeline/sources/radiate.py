@@ -28,6 +28,7 @@ from pipeline.types.source import Opening, SourceError, TruthObject
 
 _CHANNELS = 32
 _COLUMNS = 5  # x y z intensity ring
+_NO_IMAGES = "no images: no zed_left/*.png whose time is in zed_left.txt"
 _IMAGE_WITHIN_NS, _STATE_WITHIN_NS = 100_000_000, 500_000_000
 _STAMP = re.compile(rb"Frame:\s*(\d{1,9})\s+Time:\s*(\d{1,10})\.(\d{1,9})\s*$")
 _ROAD_Z_M = -2.1
@@ -94,6 +95,8 @@ class RadiateSource:
             at = nearest(self._images.times_ns, t_ns, _IMAGE_WITHIN_NS)
             stamp = int(self._images.times_ns[at]) if at is not None else None
             image = image_of(self._images.paths[at] if at is not None else None, stamp, self._size, notes)
+        else:
+            notes.append(_NO_IMAGES)
         camera = rig_files.calibration_for(self._camera, image, notes)
         ego, gnss = self._state(t_ns, notes)
         return Frame(index, self._name(index), t_ns, sweep, image, camera, ego, notes=tuple(notes), gnss=gnss)
@@ -137,7 +140,7 @@ class RadiateSource:
     def _about(self, rig_file: Path | None) -> tuple[str, ...]:
         notes = [] if rig_file is not None else ["mounts and calibration are those of RADIATE's default-calib.yaml"]
         if not self._images.paths:
-            notes.append("no images: no zed_left/*.png whose time is in zed_left.txt")
+            notes.append(_NO_IMAGES)
         if not self._states.paths:
             notes.append("no ego speed recorded")
         return tuple(notes)

@@ -78,6 +78,8 @@ class VisionMeasurement:
     """Standard deviation of ``ranged_m``."""
     returns: int = 0
     """How many returns that is."""
+    aspect: float | None = None
+    """ln(height / width) of the box; None where it may show only part of the object's width."""
     class_factors: Mapping[str, float] = field(default_factory=dict)
     """By class name: how many times as far away the same box would be, were it of that class and not a car's."""
 
@@ -161,6 +163,9 @@ class VisionTrack:
     """Distances in a row that its place took in, since it was last begun."""
     returns: int = 0
     """LiDAR returns inside its box that its distance was measured by in this frame."""
+    speed_sigma_mps: float | None = None
+    """Standard deviation of its velocity along the line of sight, with that of the law's lasting error; None without a
+    velocity."""
 
 
 DistanceFrom = Literal["cluster", "returns", "box"] | None
@@ -219,6 +224,8 @@ class FusedObject:
     """Whether it drives against our direction, within 45°; None where own speed is not known."""
     moving: bool | None = None
     """Whether it moves over the ground; None where own speed is not known."""
+    surely_moving: bool | None = None
+    """Whether it moves by more than the error of its speed explains; None where own speed is not known."""
     ttc_s: float | None = None
     """Time to collision; None while the gap does not shrink."""
     in_path: bool = False
@@ -242,6 +249,8 @@ class FusedObject:
     """The hardest braking that what is known of it can justify."""
     camera_ranges: int = 0
     """Distances in a row that its vision track took in."""
+    camera_speed_sigma_mps: float | None = None
+    """Standard deviation of its velocity along the line of sight where that comes from its image boxes."""
     returns: int = 0
     """LiDAR returns inside its image box that ranged it in this frame, where it has no cluster."""
     existence: float | None = None

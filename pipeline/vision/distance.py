@@ -121,7 +121,7 @@ def measure(
         place = alignment.unproject(_centres(boxes), range_m)[:, :2]
     known = np.isfinite(range_m)
     placed = known & np.isfinite(place).all(axis=1)
-    columns = (range_m, sigma_m, place, known, placed, noise_share)
+    columns = (range_m, sigma_m, place, known, placed, noise_share, _aspects(boxes, camera))
     car = PowerLaw(law.coefficient, law.exponent)
     factors = {name: each.coefficient / car.coefficient for name, each in _by_class(law, params.per_class).items()}
     rows = zip(detections, *(column.tolist() for column in columns), strict=True)
@@ -133,9 +133,10 @@ def measure(
             (x, y) if is_placed else None,
             noise if is_known else None,
             params.size_spread if is_known else None,
+            aspect=aspect if math.isfinite(aspect) else None,
             class_factors=factors,
         )
-        for detection, at_m, sigma, (x, y), is_known, is_placed, noise in rows
+        for detection, at_m, sigma, (x, y), is_known, is_placed, noise, aspect in rows
     )
 
 
@@ -205,6 +206,18 @@ def _depths(
         if law is not None and height_px > 0.0 and not is_cut(detection.bbox, camera):
             depths[row] = law(height_px)
     return depths
+
+
+def _aspects(boxes: F64, camera: CameraCalibration | None) -> F64:
+    """(N,) ln(height / width), NaN where the image's edge or a nearer object may hide part of the width. Of two boxes
+    that overlap, the one that reaches farther down is the nearer object."""
+    x1, y1, x2, y2 = boxes.T
+    beside = (x1[:, None] < x2) & (x1 < x2[:, None]) & (y1[:, None] < y2) & (y1 < y2[:, None]) & (y2[:, None] < y2)
+    cut = x1 <= _BORDER_PX
+    if camera is not None:
+        cut |= x2 >= camera.width - _BORDER_PX
+    aspects = np.log(np.maximum(y2 - y1, 1.0) / np.maximum(x2 - x1, 1.0))
+    return np.where(cut | beside.any(axis=1), np.nan, aspects)
 
 
 def _centres(boxes: F64) -> F64:

@@ -14,7 +14,7 @@ from pipeline.params import VisionTrackingParams
 from pipeline.types import VisionMeasurement, VisionTrack
 from pipeline.vision import place_filter
 from pipeline.vision.place_filter import PlaceMeasurement
-from pipeline.vision.vehicle_height import Height, learn
+from pipeline.vision.vehicle_height import BoxShape, Height, learn
 
 FASTEST_OVER_GROUND_MPS = 70.0
 """250 km/h: nothing on a road is faster, and a filter that says so has run away."""
@@ -46,6 +46,8 @@ class Followed:
     """Distances refused in a row."""
     height: Height = Height()
     """How tall it is for its class."""
+    shape: BoxShape = BoxShape()
+    """Of its boxes; what its height is guessed from until it is learned."""
     seen: VisionMeasurement | None = None
     """This image's sighting with a distance; None without one."""
 
@@ -88,6 +90,7 @@ def take_place(
         if followed.place_filter is not None:
             return evolve(followed, track=with_place(followed.track, followed.place_filter, followed.placed))
         return evolve(followed, track=evolve(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m))
+    followed = _shaped(followed, seen, params)
     # a truck that is called a car in one image is as tall as before
     by_class_m = seen.distance_as(followed.track.label) or seen.distance_m
     share, own_m = seen.sigma_m / seen.distance_m, by_class_m * followed.height.factor
@@ -146,6 +149,21 @@ def learned(followed: Followed, range_m: float, sigma_m: float, params: VisionTr
     return evolve(followed, height=height, place_filter=place)
 
 
+def _shaped(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
+    """The object with the shape of this image's box, and with what that says of its height while nothing better is
+    known. Its place moves with that, so that it is no motion."""
+    if not params.use_aspect:
+        return followed
+    shape = followed.shape.seen(seen.aspect)
+    if followed.height.sigma is not None:
+        return evolve(followed, shape=shape)
+    height = followed.height._replace(mean=shape.height if followed.track.label == "car" else 0.0)
+    place = followed.place_filter
+    if place is not None and height != followed.height:
+        place = place_filter.scaled(place, height.factor / followed.height.factor)
+    return evolve(followed, shape=shape, height=height, place_filter=place)
+
+
 def renamed(followed: Followed, label: str, seen: VisionMeasurement) -> Height:
     """What was learned of its height, for the class that it is taken for now: its metres stay the same."""
     before, now = seen.class_factors.get(followed.track.label), seen.class_factors.get(label)
@@ -178,5 +196,7 @@ def with_place(track: VisionTrack, place: CvState, placed: int, share: float | N
         sigma_m=max(filter_sigma, share * range_m),
         position=(x, y),
         velocity_mps=(vx, vy) if placed >= 2 else None,
+        # what stays wrong with the distance is wrong with its change in the same proportion
+        speed_sigma_mps=math.hypot(place_filter.speed_sigma_mps(place), share * math.hypot(vx, vy)),
         ranges=placed,
     )

@@ -76,6 +76,13 @@ def range_sigma_m(state: CvState) -> float:
     return math.sqrt(max(x * x * xx + 2 * x * y * xy + y * y * yy, 0.0)) / math.hypot(x, y)
 
 
+def speed_sigma_mps(state: CvState) -> float:
+    """Standard deviation of the velocity along the ray."""
+    x, y = state.mean[:2].tolist()
+    (xx, xy), (_, yy) = state.cov[2:, 2:].tolist()
+    return math.sqrt(max(x * x * xx + 2 * x * y * xy + y * y * yy, 0.0)) / math.hypot(x, y)
+
+
 def position(state: CvState) -> Point2:
     """Ego x and y."""
     x, y = state.mean[:2].tolist()

@@ -4,6 +4,10 @@ A law turns the height of a box into a distance as if all cars were equally tall
 differences, and is constant from image to image. While the LiDAR ranges the vehicle, the ratio of that range to the
 law's distance is a property of the vehicle: a scalar Kalman filter in ln(ratio), whose prior is the spread of heights
 within the class. A lead that moves out of LiDAR range keeps a camera distance as good as its box.
+
+Before any range, the shape of the box says something: cars differ less in width than in height, so a box that is tall
+for its width belongs to a van. A box that is low for its width says nothing, because a car that is turned shows part of
+its side.
 """
 
 from __future__ import annotations
@@ -22,13 +26,48 @@ _SETBACK_M = 0.5
 """Standard deviation of how far the roof's edge lies behind the bumper."""
 _MAX_SURPRISE = 10.8
 """Squared innovation beyond which a range is not this vehicle's: 99.9 % of χ² with one degree of freedom."""
+_USUAL_ASPECT = math.log(1.55 / 1.73)
+"""ln(height / width) of the usual car from behind: medians of the labelled cars of Astyx (1.59 m, 1.80 m) and KITTI
+0009 (1.51 m, 1.65 m)."""
+_ASPECT_GAIN = 0.5
+"""By how much of ln(aspect) a car is taller. Regression of ln(height) on the aspect of its box: ln(height) varies by
+0.11 and ln(width) by 0.07 among those cars, with a correlation of 0.5, and a box's aspect by 0.09 around the true one.
+It lowers the mean distance error on the boxes concerned from 11 to 8 % on Astyx, and from 10 to 9 % on KITTI 0009."""
+_TALLEST_ASPECT = 0.25
+"""The tallest vans, 2.1 m by 1.75 m, have 0.18. A narrower box shows half of a vehicle."""
+_ASPECT_SIGHTINGS = 10
+"""An aspect is the mean over so many sightings: long enough to average the noise of single boxes, short enough to
+follow a vehicle that turns."""
+
+
+class BoxShape(NamedTuple):
+    """The shape of a vehicle's boxes, averaged."""
+
+    aspect: float = 0.0
+    """Mean ln(height / width)."""
+    sightings: int = 0
+    """How many boxes it rests on."""
+
+    def seen(self, aspect: float | None) -> BoxShape:
+        """With one more box; None: a box that tells nothing."""
+        if aspect is None:
+            return self
+        count = min(self.sightings + 1, _ASPECT_SIGHTINGS)
+        return BoxShape(self.aspect + (aspect - self.aspect) / count, count)
+
+    @property
+    def height(self) -> float:
+        """ln(own height / height of a usual car)."""
+        if not self.sightings or not _USUAL_ASPECT < self.aspect < _TALLEST_ASPECT:
+            return 0.0
+        return _ASPECT_GAIN * (self.aspect - _USUAL_ASPECT)
 
 
 class Height(NamedTuple):
     """ln(own height / the law's height), as far as it is known."""
 
     mean: float = 0.0
-    """Best estimate; 0: as the law says."""
+    """Best estimate; 0: as the law says. Before anything was learned it follows from the shape of the boxes."""
     sigma: float | None = None
     """Its standard deviation; None while nothing was learned, which is the spread within the class."""
 

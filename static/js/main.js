@@ -12,6 +12,7 @@ import * as ownPlayhead from "./drive/own_playhead.js";
 import * as seek from "./drive/seek.js";
 import * as shuttle from "./drive/shuttle.js";
 import { toEvent } from "./drive/jumps.js";
+import * as fleet from "./fleet/view.js";
 import * as help from "./keys/help.js";
 import * as keyboard from "./keys/keyboard.js";
 import * as labeling from "./labeling/setup.js";
@@ -39,7 +40,7 @@ for (const part of [theme, panes, gutters, layers, trails, three, ownPlayhead, s
   part.setUp();
 // text before canvases: a canvas that measures text forces a layout, and each later change of text another one
 for (const part of [banner, objects, why, transport, notices, vitals, camera, bev, timeline, exporting]) part.setUp();
-for (const part of [params, history, runs, align, labeling, sources, layouts, share, keyboard]) part.setUp();
+for (const part of [params, history, runs, align, labeling, sources, fleet, layouts, share, keyboard]) part.setUp();
 $("#help-button").addEventListener("click", help.show);
 $("#event-back").addEventListener("click", () => toEvent(-1));
 $("#event-next").addEventListener("click", () => toEvent(1));

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -11,8 +12,11 @@ from typing import Any
 
 import httpx
 import pytest
+import yaml
 
+from app.cli import COMMANDS
 from tests.network_watch import cannot_watch, watched
+from tests.pipeline.sources.live.rig import loopback_config
 
 ROOT = Path(__file__).resolve().parents[2]
 WAIT_S = 60.0
@@ -51,6 +55,89 @@ def test_a_run_with_networks_calls_nobody(at_home: dict[str, Any], tmp_path: Pat
         out, _ = program.communicate(timeout=WAIT_S)
     assert program.returncode == 0
     assert out.count('"version"') == 2
+    assert [call for call in calls if call.leaves] == []
+    assert left_behind(tmp_path) == []
+
+
+SCENE = """
+title: a car ahead
+duration_s: 1.0
+rate_hz: 5
+road: {segments: [{length_m: 1000}]}
+ego: {lane: -2, speed_mps: {0: 10}}
+actors:
+  - {id: 1, kind: car, lane: -2, ahead_m: 18, speed_mps: {0: 10}}
+"""
+BATCH = ["--out", "tables", "--workers", "1"]
+SOME_LINES = """
+import json, sys
+from app.cli import main
+if __name__ == "__main__":
+    for typed in json.loads(sys.argv[1]):
+        try:
+            main(typed)
+        except SystemExit as end:
+            print(json.dumps([typed[0], end.code]), file=sys.stderr)
+"""
+"""Several commands in one process: importing them takes longer than most of them do."""
+TYPED: dict[str, list[list[str]]] = {
+    "sessions": [
+        ["record", "sim:scene.yaml", "--out", "a.mcap"],
+        ["import", "a.mcap", "--out", "b.mcap"],
+        ["export", "b.mcap", "--csv", "c.csv", "--rrd", "c.rrd"],
+        ["info", "b.mcap"],
+        ["recover", "b.mcap"],
+        ["keys", "new", "key"],
+        ["params", "--yaml"],
+        ["models", "list"],
+    ],
+    "labels": [
+        ["labels", "propose", "sim:scene.yaml"],
+        ["labels export", "sim:scene.yaml", "--format", "native", "--out", "labels.json"],
+        ["labels import", "sim:scene.yaml", "labels.json", "--format", "native"],
+        ["evaluate", "sim:scene.yaml", "--report", "scores.html"],
+    ],
+    "calibrating": [
+        ["calibrate", "distance", "sim:scene.yaml", "--truth", "lidar"],
+        ["calibration", "sim:scene.yaml", "--out", "rig.yaml"],
+    ],
+    "live sensors": [
+        ["live", "check", "car.yaml", "--seconds", "0.2"],
+        ["replay", "sim:scene.yaml", "--config", "car.yaml"],
+    ],
+    "experiments": [["scenarios", "run", "--suite", "braking", "--short", "--jobs", "1"], ["bench", "--drives", "20"]],
+    "fleets": [
+        ["record", "sim:scene.yaml", "--out", "a.mcap"],
+        ["batch", "a.mcap", *BATCH],
+        ["sweep", "a.mcap", *BATCH, "--over", "cipv.confirm_hits=2,3"],
+        ["find", "true", "--out", "tables"],
+        ["scores", "--out", "tables"],
+        ["mine", "--out", "tables"],
+        ["sync", "copies", "--from", "."],
+        ["compare", "--out", "tables", "--base", "no such run"],
+    ],
+}
+"""What else a person may type, besides ``run`` and ``demo``, which is ``serve`` on the simulator."""
+ENDS = {"live": 1, "compare": 2}
+"""Exit codes that are not 0: no sensor is there, there is no such run."""
+
+
+def test_every_command_is_watched_here():
+    typed = {line[0] for lines in TYPED.values() for line in lines} | {"run", "demo", "serve"}
+    assert typed == set(COMMANDS)
+
+
+@pytest.mark.parametrize("group", TYPED)
+def test_no_command_calls_another_machine(at_home: dict[str, Any], tmp_path: Path, group: str):
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    (tmp_path / "car.yaml").write_text(yaml.safe_dump(loopback_config().model_dump(mode="json", exclude_none=True)))
+    lines = [[*line[0].split(), *line[1:]] for line in TYPED[group]]
+    at_home |= {"cwd": tmp_path, "stderr": subprocess.PIPE}
+    at_home["env"] |= {"CIPV_LABELS_URL": f"sqlite:///{tmp_path}/labels.db"}
+    with watched([sys.executable, "-c", SOME_LINES, json.dumps(lines)], **at_home) as (program, calls):
+        _, said = program.communicate(timeout=10 * WAIT_S)
+    ends = [json.loads(line) for line in said.splitlines() if line.startswith('["')]
+    assert ends == [[line[0], ENDS.get(line[0], 0)] for line in lines], said
     assert [call for call in calls if call.leaves] == []
     assert left_behind(tmp_path) == []
 

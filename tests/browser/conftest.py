@@ -19,6 +19,7 @@ from app.bench.page.devtools import CHROMIUM, FLAGS
 from app.core.server_address import listen_socket
 from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder
+from app.fleet.desk import FleetDesk
 from app.web.server import Server, create_app
 from pipeline.detection import detector_for
 from pipeline.inference.runtime import DetectorMissing
@@ -82,6 +83,7 @@ class Site:
     engine: Engine
     port: int
     detectors: list[CountedDetector] = field(default_factory=list)
+    fleet: FleetDesk | None = None
     _server: Server | None = None
     _thread: threading.Thread | None = None
 
@@ -96,7 +98,7 @@ class Site:
     def start(self) -> None:
         bound, is_ready = listen_socket("127.0.0.1", self.port, strict=True), threading.Event()
         self.port = bound.getsockname()[1]
-        app = create_app(self.engine)
+        app = create_app(self.engine, fleet=self.fleet)
         app.add_middleware(FilesStay)
         server = Server(app, self.address, lambda _: is_ready.set())
         self._server, self._thread = server, threading.Thread(target=lambda: server.run(sockets=[bound]))

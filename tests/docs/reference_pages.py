@@ -148,7 +148,10 @@ def _cli_lines() -> Iterator[str]:
         "| `CIPV_DATA` | folder with this machine's data sets and networks (`models/`) |",
         "| `CIPV_HOME` | folder for downloaded and registered networks and caches; default: `~/.cache/cipv` |",
         "| `CIPV_FOLDERS` | folders that the page and the API may open files from, separated by `:` |",
-        "| `CIPV_ADDRESSES` | prefixes of store addresses that may be opened too when `CIPV_FOLDERS` is set, "
+        "| `CIPV_SIGNING_KEY` | private key, of `cipv keys new`, that sessions and label versions are signed with |",
+        "| `CIPV_PUBLIC_KEY` | public key that `cipv info` and label versions are checked with; versions that it "
+        "did not sign are refused |",
+        "| `CIPV_ADDRESSES` | stores, or folders in them, that may be opened too when `CIPV_FOLDERS` is set, "
         "separated by spaces |",
         "| `CIPV_LABELS_URL` | label database; `--labels` and `--database` override it |",
         "| `CIPV_TOKEN`, `CIPV_DISPLAY_TOKEN` | tokens for the links that other machines use, at least 16 characters |",

@@ -8,17 +8,25 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 
+from app.bench.fleet_sessions import make_sessions
 from app.bench.page.devtools import CHROMIUM, FLAGS
 from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder
+from app.fleet.batch.work import run_drive
+from app.fleet.desk import FleetDesk
+from app.fleet.pack import pack
+from app.fleet.store import Store
 from app.labels.service.desk import LabelDesk
 from app.labels.store.database import Database
 from pipeline.detection import detector_for, lanes_for
 from pipeline.params import Params, with_changes
 from pipeline.sources import open_source
 from pipeline.vision.far_view import WINDOW_PX
+from tests.app.fleet.fleets import begun, plan_of
+from tests.app.fleet.s3 import BUCKET, s3_server
 from tests.browser.conftest import Site
 from tests.browser.labels.hands import begin
 
@@ -30,6 +38,8 @@ QUALITY = 78
 """Of the JPEGs: a whole page stays below 300 kB, and its text can be read."""
 WAIT_MS = 600_000
 """On a busy machine the whole drive takes minutes: networks look at every image."""
+SESSIONS, SECONDS = 40, 5.0
+"""Of the fleet."""
 DESK, DISPLAY = (1440, 900), (1024, 600)
 
 
@@ -69,7 +79,30 @@ def main() -> None:
         painted(page)
         save(page, "drive")
         page.close()
+        with fleet_of(site) as searched:
+            page = opened(browser, searched)
+            page.get_by_role("button", name="Fleet", exact=True).click()
+            expect(page.locator("#fleet-dialog")).to_have_attribute("aria-busy", "false")
+            save(page, "fleet")
         browser.close()
+
+
+@contextmanager
+def fleet_of(site: Site) -> Iterator[Site]:
+    """The same dashboard with a fleet of simulated traffic, whose tables are in an S3 on this machine."""
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch, s3_server(patch, every=0):
+        store = Store(f"s3://{BUCKET}/drives")
+        make_sessions(Path(folder), SESSIONS, SECONDS)
+        work = begun(plan_of(folder), store.address)
+        for job in work.jobs:
+            run_drive(job)
+        pack(store, work.key.name)
+        searched = Site(site.engine, 0, fleet=FleetDesk(store.address))
+        searched.start()
+        try:
+            yield searched
+        finally:
+            searched.stop()
 
 
 @contextmanager

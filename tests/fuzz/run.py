@@ -1,6 +1,10 @@
 """Damaged inputs for every parser, each parser in a process of its own with little memory and time: ``make fuzz``.
 
     python -m tests.fuzz.run --seconds 60 [--only session] [--seed 1]
+    python -m tests.fuzz.run --inputs 1000000
+
+Time is shared out equally, and a fast parser reads a thousand times as many inputs in it as a slow one; with
+``--inputs``, inputs are shared out, however long that takes. Sessions and ROS bags get a larger share.
 
 What raised something else than a refusal, took more than its time or memory, or ended the process is written to
 ``build/fuzz/findings``; copy it to ``tests/fuzz/findings`` and it becomes a test. Inputs that were refused in a way not
@@ -12,19 +16,25 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import math
 import multiprocessing
 import os
 import random
 import resource
 import signal
+import struct
 import sys
+import threading
 import time
 import traceback
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.fuzz.targets import Refused, Target, all_targets
+from app.core.watchdog import waited_s
+from tests.fuzz.target import Refused, Target
+from tests.fuzz.targets import all_targets
 
 BUILD = Path(__file__).resolve().parents[2] / "build" / "fuzz"
 BUDGET_S = 2.0
@@ -32,6 +42,11 @@ BUDGET_S = 2.0
 BUDGET_BYTES = 1 << 30
 """Address space beyond what the process has when it begins."""
 _PATIENCE_S = 60.0
+"""Without another input; native code that hangs is not ended by a signal."""
+_MOST_ENDS = 5
+"""Of a target's process, which is started anew for the rest of its share."""
+_HEAD = struct.Struct("<QI")
+"""Of the memory shared with a target's process: inputs so far, length of the one under way."""
 _LARGEST_INPUT = 1 << 20
 _MOST_KEPT = 200
 _TOKENS = (
@@ -75,10 +90,18 @@ def mutated(data: bytes, other: bytes, chance: random.Random) -> bytes:
 
 @contextmanager
 def within_budget() -> Any:
-    """OverTime after ``BUDGET_S`` of computing, or ten times that of waiting: a busy machine is no finding. An address
-    space that is full raises MemoryError by itself."""
+    """OverTime after ``BUDGET_S`` of computing, or ten times that of waiting for anything but a processor: a busy
+    machine is no finding. An address space that is full raises MemoryError by itself."""
+    thread, began_s = threading.get_native_id(), time.monotonic()
+    starved_s = waited_s(thread) or 0.0
 
-    def late(*_: object) -> None:
+    def late(number: int, _: object) -> None:
+        if number == signal.SIGALRM:
+            starved_now_s = (waited_s(thread) or 0.0) - starved_s
+            left_s = 10 * BUDGET_S - (time.monotonic() - began_s - starved_now_s)
+            if left_s > 0:
+                signal.setitimer(signal.ITIMER_REAL, left_s)
+                return
         raise OverTime
 
     timers = {signal.ITIMER_PROF: (signal.SIGPROF, BUDGET_S), signal.ITIMER_REAL: (signal.SIGALRM, 10 * BUDGET_S)}
@@ -109,24 +132,41 @@ def outcome(target: Target, data: bytes) -> tuple[str, bool]:
     return "read", False
 
 
-def fuzz(name: str, target: Target, seconds: float, seed: int, build: Path, said: Any) -> None:
-    """One target, in a process of its own, whose libraries need not tell what they think of the inputs. said: shared
-    array that the input under way is in, behind its length."""
+@dataclass(frozen=True)
+class Share:
+    """How much a target gets: so many inputs, or so many seconds."""
+
+    inputs: float = math.inf
+    seconds: float = math.inf
+
+    def times(self, part: float) -> Share:
+        return Share(self.inputs * part, self.seconds * part)
+
+    def less(self, inputs: int, seconds: float) -> Share:
+        return Share(self.inputs - inputs, self.seconds - seconds)
+
+    def is_left(self) -> bool:
+        return self.inputs > 0 and self.seconds > 0
+
+
+def fuzz(name: str, target: Target, share: Share, seed: str, build: Path, shared: Any) -> None:
+    """One target, in a process of its own, whose libraries need not tell what they think of the inputs. shared: memory
+    in which the input under way is, behind ``_HEAD``."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
-    chance = random.Random(f"{seed} {name}")
-    corpus = build / "corpus" / name.replace(" ", "_").replace(",", "")
+    chance = random.Random(seed)
+    corpus = build / "corpus" / file_name(name)
     corpus.mkdir(parents=True, exist_ok=True)
     kept = [*target.seeds, *(path.read_bytes() for path in sorted(corpus.iterdir()))]
     size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (size + BUDGET_BYTES, size + BUDGET_BYTES))
     seen: set[str] = set()
     findings: dict[str, bytes] = {}
-    count, ends_s = 0, time.monotonic() + seconds
-    while time.monotonic() < ends_s:
+    count, began_s = 0, time.monotonic()
+    while share.less(count, time.monotonic() - began_s).is_left():
         data = mutated(chance.choice(kept), chance.choice(kept), chance)
-        said[: len(data) + 4] = len(data).to_bytes(4, "little") + data
-        how, is_finding = outcome(target, data)
         count += 1
+        shared[: _HEAD.size + len(data)] = _HEAD.pack(count, len(data)) + data
+        how, is_finding = outcome(target, data)
         if is_finding:
             findings.setdefault(how, data)
         elif how not in seen and len(kept) < _MOST_KEPT:
@@ -136,50 +176,77 @@ def fuzz(name: str, target: Target, seconds: float, seed: int, build: Path, said
     report(build, name, count, findings)
 
 
+def file_name(target: str) -> str:
+    """Of a target's folder and report."""
+    return target.replace(" ", "_").replace(",", "")
+
+
 def report(build: Path, name: str, count: int, findings: dict[str, bytes]) -> None:
-    folder = build / "findings" / name.replace(" ", "_").replace(",", "")
+    """Keep what was found, beside what was found before."""
+    folder = build / "findings" / file_name(name)
     for data in findings.values():
         folder.mkdir(parents=True, exist_ok=True)
         (folder / hashlib.sha256(data).hexdigest()[:16]).write_bytes(data)
     (build / "reports").mkdir(parents=True, exist_ok=True)
-    (build / "reports" / f"{name.replace(' ', '_')}.json").write_text(
+    (build / "reports" / f"{file_name(name)}.json").write_text(
         json.dumps({"target": name, "inputs": count, "findings": sorted(findings)})
     )
 
 
-def run(seconds: float, seed: int = 0, only: str = "", build: Path = BUILD) -> list[dict[str, Any]]:
-    """Fuzz every target for its share of the time. What each did."""
-    found: list[dict[str, Any]] = []
+def run_one(name: str, target: Target, share: Share, seed: int, build: Path) -> dict[str, Any]:
+    """Fuzz a target until its share is used up, in a new process whenever one ended or hung. What it did."""
     context = multiprocessing.get_context("fork")
+    done: dict[str, Any] = {"target": name, "inputs": 0, "findings": []}
+    file = build / "reports" / f"{file_name(name)}.json"
+    for attempt in range(_MOST_ENDS):
+        file.unlink(missing_ok=True)
+        shared = memoryview(context.RawArray("c", _HEAD.size + _LARGEST_INPUT)).cast("B")
+        began_s = time.monotonic()
+        process = context.Process(target=fuzz, args=(name, target, share, f"{seed} {name} {attempt}", build, shared))
+        process.start()
+        before = -1
+        while process.is_alive() and before != (before := _HEAD.unpack(shared[: _HEAD.size])[0]):
+            process.join(_PATIENCE_S)
+        if process.is_alive() or not file.is_file():  # native code that hangs or crashes tells nobody
+            process.kill()
+            process.join()
+            count, length = _HEAD.unpack(shared[: _HEAD.size])
+            data = bytes(shared[_HEAD.size : _HEAD.size + length])
+            report(build, name, count, {f"the process ended or hung ({process.exitcode})": data})
+        told = json.loads(file.read_text())
+        done["inputs"] += told["inputs"]
+        done["findings"] = sorted({*done["findings"], *told["findings"]})
+        share = share.less(told["inputs"], time.monotonic() - began_s)
+        if not share.is_left():
+            break
+    file.write_text(json.dumps(done))
+    return done
+
+
+def run(share: Share, seed: int = 0, only: str = "", build: Path = BUILD) -> list[dict[str, Any]]:
+    """Fuzz every target for its part of all. What each did."""
+    found: list[dict[str, Any]] = []
     with contextmanager(all_targets)() as known:
         chosen = {name: target for name, target in known.items() if only in name}
+        weight = sum(target.weight for target in chosen.values())
         for name, target in chosen.items():
-            file = build / "reports" / f"{name.replace(' ', '_')}.json"
-            file.unlink(missing_ok=True)
-            said = context.RawArray("c", _LARGEST_INPUT + 4)
-            share = seconds / len(chosen)
-            process = context.Process(target=fuzz, args=(name, target, share, seed, build, memoryview(said).cast("B")))
-            process.start()
-            process.join(share + _PATIENCE_S)
-            if process.is_alive() or not file.is_file():  # native code that hangs or crashes tells nobody
-                process.kill()
-                process.join()
-                raw = bytes(memoryview(said).cast("B"))
-                data = raw[4 : 4 + int.from_bytes(raw[:4], "little")]
-                report(build, name, 0, {f"the process ended or hung ({process.exitcode})": data})
-            found.append(json.loads(file.read_text()))
-            print(f"{found[-1]['inputs']:9,}  {name}  {'; '.join(found[-1]['findings'])}", flush=True)
+            began_s = time.monotonic()
+            found.append(run_one(name, target, share.times(target.weight / weight), seed, build))
+            took_s, told = time.monotonic() - began_s, "; ".join(found[-1]["findings"])
+            print(f"{found[-1]['inputs']:9,}  {took_s:6.0f} s  {name}  {told}", flush=True)
     return found
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=300.0)
+    parser.add_argument("--inputs", type=int, help="instead of --seconds")
     parser.add_argument("--seed", type=int, default=int(time.time()))
     parser.add_argument("--only", default="")
     typed = parser.parse_args()
     with suppress(KeyboardInterrupt):
-        done = run(typed.seconds, typed.seed, typed.only)
+        share = Share(seconds=typed.seconds) if typed.inputs is None else Share(inputs=typed.inputs)
+        done = run(share, typed.seed, typed.only)
         inputs, findings = sum(each["inputs"] for each in done), sum(len(each["findings"]) for each in done)
         print(f"{inputs:,} inputs, {findings} findings, seed {typed.seed}; see {BUILD}")
         return 1 if findings else 0

@@ -1,22 +1,21 @@
-"""Every parser of what comes from outside, each with inputs that it reads well.
-
-A target takes any bytes. It may return, or raise ``Refused``; everything else is a finding.
-"""
+"""Every parser of what comes from outside, each with inputs that it reads well. Those of other people's files and of
+this program's own are in ``file_targets.py``."""
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import suppress
-from dataclasses import dataclass
-from functools import partial
+from contextlib import contextmanager, suppress
+from functools import lru_cache, partial
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import patch
 
 import cv2
 import numpy as np
 
-from pipeline.common.errors import BadInput
-from pipeline.common.image_decoding import TooMuch, decode_within_budget
+from pipeline.common import image_decoding
+from pipeline.common.image_decoding import decode_within_budget
 from pipeline.common.user_file_errors import parse_yaml
 from pipeline.formats.kitti_records import parse_timestamps
 from pipeline.formats.nmea import NmeaReader
@@ -24,7 +23,6 @@ from pipeline.formats.velodyne.decoder import VelodyneDecoder
 from pipeline.formats.velodyne.models import HDL32E, VLP16, VLP32C, VelodyneModel
 from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import LabelSet
-from pipeline.recording.errors import Damaged
 from pipeline.recording.info import info
 from pipeline.recording.rewrite import recover
 from pipeline.recording.session.frame_record import frame_record_from
@@ -32,9 +30,13 @@ from pipeline.recording.session.source import SessionSource
 from pipeline.recording.session.writer import SessionWriter
 from pipeline.simulation import scenario
 from pipeline.sources import open_source
+from pipeline.sources.kitti import hdl64_rings
+from pipeline.sources.kitti import source as kitti_source
 from pipeline.sources.live import config
 from pipeline.sources.live.devices.can import load_dbc
 from pipeline.sources.route_files import load_route
+from tests.fuzz.file_targets import by_file, file_targets
+from tests.fuzz.target import Target
 from tests.pipeline.formats.velodyne.streams import drive
 from tests.pipeline.formats.velodyne.test_models import stream
 from tests.pipeline.recording.frames import ABOUT, TRUTH, full, write
@@ -43,19 +45,9 @@ from tests.pipeline.sources.live.devices.test_wires import DBC
 from tests.pipeline.sources.test_fuzz import FILES
 from tests.pipeline.sources.test_route_files import GGA, GPX, POINTS, RMC
 
-Refused = (BadInput, Damaged, TooMuch, ValueError)
-"""ValueError: of the parsers inside, whose callers turn it into a sentence."""
-_MOST_FRAMES = 4
-
-
-@dataclass(frozen=True)
-class Target:
-    """One parser."""
-
-    seeds: tuple[bytes, ...]
-    """Inputs that it reads well."""
-    read: Callable[[bytes], object]
-    """What it does with any."""
+_MOST_FRAMES = 3
+_ABOVE_ALL = 2.0
+"""The weight of sessions and bags, which have most ways to be wrong."""
 
 
 def _sentences(data: bytes) -> None:
@@ -69,16 +61,6 @@ def _packets(data: bytes, model: VelodyneModel = VLP16) -> None:
     decoder = VelodyneDecoder(model=model)
     for at in range(0, len(data), 1206):
         decoder.push(data[at : at + 1206], None)
-
-
-def _by_file(folder: Path, name: str, read: Callable[[str], object]) -> Callable[[bytes], None]:
-    path = folder / name
-
-    def reading(data: bytes) -> None:
-        path.write_bytes(data)
-        read(str(path))
-
-    return reading
 
 
 def _frames_of(uri: str) -> None:
@@ -106,7 +88,7 @@ def _route(place: str) -> bytes:
 
 
 def _bag(folder: Path, kind: Kind) -> bytes:
-    return write_bag(folder / "one.bag", kind, 2).read_bytes()
+    return write_bag(folder / "one.bag", kind, 2, every=50).read_bytes()
 
 
 def _many_chunks(folder: Path) -> bytes:
@@ -162,31 +144,62 @@ def targets(folder: Path) -> dict[str, Target]:
         "labels": Target((to_json(LabelSet("a", ("1", "2"), (0, 1))),), lambda data: from_json(data, "x")),
         "frame record": Target((b'{"index": 1, "name": "a", "t_ns": 5}',), frame_record_from),
         "kitti stamps": Target((b"2011-09-26 13:02:25.964389445\n" * 3,), parse_timestamps),
-        "gpx": Target((_route("trkpt"),), _by_file(folder, "a.gpx", load_route)),
-        "route csv": Target((b"lat,lon\n48.1,11.2\n48.2,11.3\n",), _by_file(folder, "a.csv", load_route)),
-        "dbc": Target((DBC.encode(),), _by_file(folder, "a.dbc", lambda path: load_dbc(Path(path)))),
-        "live config": Target((b"title: a\nlidar: {data_port: 2368}\n",), _by_file(folder, "a.yaml", config.load)),
-        "session": Target((session.read_bytes(),), _by_file(folder, "a.mcap", _frames_of)),
-        "session in chunks": Target((_many_chunks(folder),), _by_file(folder, "b.mcap", _everything_of_session)),
-        "session cut off": Target((_many_chunks(folder)[:40_000],), _by_file(folder, "c.mcap", _recovered)),
-        "ros 1 bag": Target((_bag(folder, "ros1"),), _by_file(folder, "ros.bag", _frames_of_bag)),
+        "gpx": Target((_route("trkpt"),), by_file(folder, "a.gpx", load_route)),
+        "route csv": Target((b"lat,lon\n48.1,11.2\n48.2,11.3\n",), by_file(folder, "a.csv", load_route)),
+        "dbc": Target((DBC.encode(),), by_file(folder, "a.dbc", lambda path: load_dbc(Path(path)))),
+        "live config": Target((b"title: a\nlidar: {data_port: 2368}\n",), by_file(folder, "a.yaml", config.load)),
+        "session": Target((session.read_bytes(),), by_file(folder, "a.mcap", _frames_of), _ABOVE_ALL),
+        "session in chunks": Target(
+            (_many_chunks(folder),), by_file(folder, "b.mcap", _everything_of_session), _ABOVE_ALL
+        ),
+        "session cut off": Target((_many_chunks(folder)[:40_000],), by_file(folder, "c.mcap", _recovered), _ABOVE_ALL),
+        "ros 1 bag": Target((_bag(folder, "ros1"),), by_file(folder, "ros.bag", _frames_of_bag), _ABOVE_ALL),
         "ros 1 bag of packets": Target(
             (write_packet_bag(folder / "packets.bag", "ros1", 2).read_bytes(),),
-            _by_file(folder, "p.bag", _frames_of_bag),
+            by_file(folder, "p.bag", _frames_of_bag),
+            _ABOVE_ALL,
         ),
     }
+    found |= file_targets(folder / "files")
     for name, (make, uri, inside) in FILES.items():
         (folder / name).mkdir()
         recording = make(folder / name / "recording")
         path = recording / inside
-        reading = _by_file(path.parent, path.name, partial(_whole_recording, uri.format(folder=recording)))
-        found[f"file of {name}"] = Target((path.read_bytes(),), reading)
+        reading = by_file(path.parent, path.name, partial(_whole_recording, uri.format(folder=recording)))
+        found[f"file of {name}"] = Target((path.read_bytes(),), reading, _ABOVE_ALL if "rosbag" in name else 1.0)
     return found
 
 
+@contextmanager
+def _undamaged_files_read_once() -> Iterator[None]:
+    """Most of the time of a recording with one damaged file would else go to its other images and sweeps."""
+    decode, elevations = cv2.imdecode, hdl64_rings.ring_elevations_deg
+
+    @lru_cache(maxsize=64)
+    def decoded(data: bytes, flags: int) -> object:
+        return decode(np.frombuffer(data, np.uint8), flags)
+
+    @lru_cache(maxsize=64)
+    def fitted(points: bytes, turn: bytes, count: int) -> object:
+        return elevations(np.frombuffer(points, np.float32).reshape(-1, 4), np.frombuffer(turn, np.int64), count)
+
+    fast = SimpleNamespace(**vars(cv2) | {"imdecode": lambda data, flags: decoded(data.tobytes(), flags)})
+    by_content = lambda points, turn, count: fitted(points.tobytes(), turn.tobytes(), count)  # noqa: E731
+    with (
+        patch.object(image_decoding, "cv2", fast),
+        patch.object(kitti_source, "ring_elevations_deg", by_content),
+    ):
+        yield
+
+
 def all_targets() -> Iterator[dict[str, Target]]:
-    """For a ``with`` of contextlib: the folder goes at the end."""
-    with tempfile.TemporaryDirectory(prefix="cipv-fuzz-") as folder, suppress(KeyboardInterrupt):
+    """For a ``with`` of contextlib: the folder goes at the end. It is in memory where that is possible."""
+    memory = Path("/dev/shm")
+    with (
+        tempfile.TemporaryDirectory(prefix="cipv-fuzz-", dir=memory if memory.is_dir() else None) as folder,
+        _undamaged_files_read_once(),
+        suppress(KeyboardInterrupt),
+    ):
         known = targets(Path(folder))
         for target in known.values():
             target.read(target.seeds[0])  # what is compiled the first time is not the parser's time

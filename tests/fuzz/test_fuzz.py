@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from tests.fuzz import run as fuzzing
-from tests.fuzz.run import outcome, run
-from tests.fuzz.targets import Target, targets
+from tests.fuzz.run import Share, file_name, outcome, run
+from tests.fuzz.target import Target
+from tests.fuzz.targets import targets
 
 FINDINGS = Path(__file__).parent / "findings"
 
@@ -50,10 +51,26 @@ def test_each_kind_of_failure_is_found(tmp_path: Path, monkeypatch: pytest.Monke
         yield {"x": Target((b"abc",), read)}  # type: ignore[arg-type]
 
     monkeypatch.setattr(fuzzing, "all_targets", known)
-    (done,) = run(0.2, build=tmp_path)
+    (done,) = run(Share(seconds=0.2), build=tmp_path)
     assert says in done["findings"][0]
-    (finding,) = (tmp_path / "findings" / "x").iterdir()
-    assert finding.stat().st_size
+    assert all(finding.stat().st_size for finding in (tmp_path / "findings" / "x").iterdir())
+
+
+def test_inputs_are_shared_out_by_weight_and_a_process_that_ended_is_followed_by_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def dies_at_times(data: bytes) -> None:
+        if data[:1] == b"z":
+            os._exit(3)
+
+    def known() -> Iterator[dict[str, Target]]:
+        yield {"a": Target((b"abc",), bytes), "b": Target((b"zabc", b"abc"), dies_at_times, weight=3.0)}
+
+    monkeypatch.setattr(fuzzing, "all_targets", known)
+    monkeypatch.setattr(fuzzing, "_MOST_ENDS", 1000)
+    once, thrice = run(Share(inputs=100), build=tmp_path)
+    assert (once["inputs"], once["findings"]) == (25, [])
+    assert (thrice["inputs"], thrice["findings"]) == (75, ["the process ended or hung (3)"])
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +92,7 @@ def test_every_parser_reads_what_it_is_made_for(known: dict[str, Target]):
 
 
 def test_nothing_that_was_found_comes_back(known: dict[str, Target]):
-    names = {name.replace(" ", "_").replace(",", ""): name for name in known}
+    names = {file_name(name): name for name in known}
     again = {
         str(path): outcome(known[names[path.parent.name]], path.read_bytes())
         for path in FINDINGS.glob("*/*")

@@ -64,6 +64,12 @@ class Figures:
     """Whole drives whose every final frame was compared."""
     clients: int = 0
     """That misbehaved."""
+    live_ticks: int = 0
+    """Of live sensors, that were shown."""
+    live_frames: int = 0
+    """Of these, read back from the recording."""
+    slowest_return_s: float = 0.0
+    """Of driving, from a check to the moment when every live sensor had been seen again."""
     checks: int = 0
     wrong: list[str] = field(default_factory=list)
     resident_mb: list[float] = field(default_factory=list)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import distributions
 from pathlib import Path
 
-from tests.supply.sbom import DEVELOPMENT, RUNTIME, pins, write
+from tests.supply.sbom import DEVELOPMENT, RUNTIME, bundled, pins, write
 
 TOOLS = {"pytest", "mypy", "ruff", "hypothesis", "playwright", "import-linter", "pytest-xdist", "httpx"}
 
@@ -30,3 +31,15 @@ def test_everything_is_accounted_for_with_what_the_wheels_bundle(tmp_path: Path)
     assert [name for name, each in parts.items() if "licenses" not in each] == [], "not installed here"
     assert any("x264" in inside["name"] for inside in parts["av"]["components"])
     assert len((tmp_path / "licences.md").read_text(encoding="utf-8").splitlines()) == len(parts) + 2
+
+
+def test_no_wheel_bundles_an_openssl_without_support():
+    """Of 1.1.1 there are no more corrections since September 2023. Optional and development packages count, too."""
+    found = {
+        (package.name, part["name"]): part.get("version", "not stated")
+        for package in distributions()
+        for part in bundled(package)
+        if part["name"] in ("libssl", "libcrypto")
+    }
+    assert ("psycopg-binary", "libcrypto") in found, "it is found where it is"
+    assert {place: version for place, version in found.items() if version[:1] in "012"} == {}

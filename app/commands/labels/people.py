@@ -134,7 +134,8 @@ class LabelQueue:
         for each in found:
             print(
                 f"{each.title}: {each.state}, {each.person or 'unassigned'}; labelled {_percent(each.labelled)}, "
-                f"reviewed {_percent(each.reviewed)}, proposals {each.proposals:,}, worth {each.worth:.2f}"
+                f"reviewed {_percent(each.reviewed)}, proposals {each.proposals:,}, frames asked for {each.asked:,}, "
+                f"worth {each.worth:.2f}"
             )
         if not found:
             say("no recordings yet: open one and label it, or run `cipv labels propose`")

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.drive.events.event import Event
-from app.drive.frame_rows import Row
 from app.drive.marks import SavedMark
 from pipeline.types import I64
 from pipeline.types.source import Mark
 
 
-def recorded_marks(rows: Sequence[Row], marks: Sequence[Mark]) -> list[Event]:
-    """Marks made while it was recorded, at the frames they were made at; those of frames not run yet are left out."""
-    index_of = {row.t_ns: index for index, row in enumerate(rows)}
+def recorded_marks(t_ns: Sequence[int], marks: Sequence[Mark]) -> list[Event]:
+    """Marks made while it was recorded, at the frames they were made at; those of other frames are left out. t_ns: the
+    frames' ticks."""
+    index_of = {tick: index for index, tick in enumerate(t_ns)}
     return [Event("mark", index_of[mark.t_ns], mark.text) for mark in marks if mark.t_ns in index_of]
 
 

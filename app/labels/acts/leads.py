@@ -16,6 +16,7 @@ from pipeline.labels.model import LeadRange
 
 
 def set_lead(draft: Draft, scope: Scope, act: SetLead) -> str:
+    """Label the lead of a range of frames; it replaces what was labelled there."""
     scope.check(act.first, act.last)
     if isinstance(act.lead, int):
         track_of(draft, act.lead)
@@ -25,6 +26,7 @@ def set_lead(draft: Draft, scope: Scope, act: SetLead) -> str:
 
 
 def clear_lead(draft: Draft, scope: Scope, act: ClearLead) -> str:
+    """Remove the lead from a range of frames. ActRefused where none is labelled."""
     scope.check(act.first, act.last)
     check_seen(draft, "lead", act.first, act.last, act)
     if not clear(draft, act.first, act.last):

@@ -26,6 +26,7 @@ def accept(draft: Draft, scope: Scope, act: Accept) -> str:
 
 
 def reject(draft: Draft, scope: Scope, act: Reject) -> str:
+    """Mark items as wrong; they stay in the store and do not count."""
     done = []
     for ref in act.items:
         value = _answered(stated(draft.get(ref.kind, ref.id, ref.revision)))
@@ -50,6 +51,7 @@ def review_ok(draft: Draft, scope: Scope, act: ReviewOk) -> str:
 
 
 def send_back(draft: Draft, scope: Scope, act: SendBack) -> str:
+    """Make items proposals again, with a comment for whoever works on them next."""
     done = []
     for ref in act.items:
         value = stated(draft.get(ref.kind, ref.id, ref.revision))

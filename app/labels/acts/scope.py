@@ -38,6 +38,7 @@ def by_person(draft: Draft, how: str = "") -> Origin:
 
 
 def track_of(draft: Draft, number: int, revision: int | None = None) -> LabelTrack:
+    """A track by its number. NoSuchLabel without it; with ``revision``, a conflict where it has changed since."""
     return cast("LabelTrack", draft.get("track", number, revision).value)
 
 

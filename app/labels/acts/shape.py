@@ -17,6 +17,7 @@ from pipeline.labels.model import Sighting
 
 
 def set_sighting(draft: Draft, scope: Scope, act: SetSighting) -> str:
+    """Place a track in a frame by hand. The frame becomes a keyframe, and those between keyframes follow."""
     scope.check(act.frame)
     track = track_of(draft, act.track, act.revision)
     old = draft.sightings(track.id)
@@ -30,6 +31,7 @@ def set_sighting(draft: Draft, scope: Scope, act: SetSighting) -> str:
 
 
 def drop_keyframe(draft: Draft, scope: Scope, act: DropKeyframe) -> str:
+    """Interpolate a frame again that was set by hand. ActRefused where it is no keyframe."""
     track = track_of(draft, act.track, act.revision)
     old = draft.sightings(track.id)
     if act.frame not in old or not old[act.frame].keyframe:
@@ -40,6 +42,7 @@ def drop_keyframe(draft: Draft, scope: Scope, act: DropKeyframe) -> str:
 
 
 def drop_sightings(draft: Draft, scope: Scope, act: DropSightings) -> str:
+    """Remove a track from a range of frames. ActRefused where it is not in any of them."""
     scope.check(act.first, act.last)
     track = track_of(draft, act.track, act.revision)
     there = draft.sightings(track.id, act.first, act.last)
@@ -51,6 +54,7 @@ def drop_sightings(draft: Draft, scope: Scope, act: DropSightings) -> str:
 
 
 def size_along(draft: Draft, scope: Scope, act: SizeAlong) -> str:
+    """Give every cuboid of a track the same length, width and height, metres."""
     track = track_of(draft, act.track, act.revision)
     old = draft.sightings(track.id)
     after = {
@@ -78,6 +82,7 @@ def add_sightings(draft: Draft, scope: Scope, act: AddSightings) -> str:
 
 
 def flip(draft: Draft, scope: Scope, act: Flip) -> str:
+    """Reverse the heading of a track in every frame."""
     track = track_of(draft, act.track, act.revision)
     old = draft.sightings(track.id)
     after = {

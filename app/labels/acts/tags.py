@@ -15,6 +15,7 @@ from pipeline.labels.model import FrameTag
 
 
 def tag(draft: Draft, scope: Scope, act: Tag) -> str:
+    """Add a tag to a range of frames, or remove it."""
     scope.check(act.first, act.last)
     frames = frames_text(act.first, act.last)
     check_seen(draft, "tag", act.first, act.last, act, act.tag)

@@ -16,6 +16,7 @@ from pipeline.labels.model import Attribute, EventLabel, LabelTrack, LeadRange
 
 
 def add_track(draft: Draft, scope: Scope, act: AddTrack) -> str:
+    """Begin a track at a cuboid or box drawn by hand."""
     scope.check(act.frame)
     number = draft.next_number("track")
     draft.add("track", LabelTrack(number, scope.classes.named(act.label), (), "corrected", by_person(draft)))
@@ -33,6 +34,7 @@ def add_measured(draft: Draft, scope: Scope, act: AddMeasured) -> str:
 
 
 def relabel(draft: Draft, scope: Scope, act: Relabel) -> str:
+    """Change the class of a track."""
     track, label = track_of(draft, act.track, act.revision), scope.classes.named(act.label)
     corrected(draft, replace(track, label=label))
     return f"changed #{track.id} to {label}"
@@ -59,6 +61,7 @@ def split(draft: Draft, scope: Scope, act: Split) -> str:
 
 
 def merge(draft: Draft, scope: Scope, act: Merge) -> str:
+    """Join two tracks of one vehicle under the first number. Where both have a frame, the first one counts."""
     first, second = (track_of(draft, ref.id, ref.revision) for ref in act.tracks)
     if first.id == second.id:
         raise ActRefused("a track cannot be merged with itself")

@@ -51,10 +51,12 @@ def track_json(item: Item) -> dict[str, Any]:
 
 
 def item_json(item: Item) -> dict[str, Any]:
+    """An item as the API gives it, with its revision."""
     return {"id": item.id, **value_to_json(item.kind, item.value), "revision": item.revision}
 
 
 def placed_json(sighting: Sighting) -> dict[str, Any]:
+    """One frame of a track: cuboid (ego frame, metres), image box (pixels), and what is known of them."""
     cuboid = sighting.cuboid
     return {
         "cuboid": cuboid._asdict() if cuboid is not None else None,
@@ -67,6 +69,7 @@ def placed_json(sighting: Sighting) -> dict[str, Any]:
 
 
 def history_json(entry: HistoryEntry) -> dict[str, Any]:
+    """One act with the items as they were before and after it."""
     return {**vars(entry), "before": _content_json(entry.before), "after": _content_json(entry.after)}
 
 

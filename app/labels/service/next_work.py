@@ -10,17 +10,18 @@ from app.drive.full_run import DriveRun
 from app.labels.store.values import KINDS, Item, ItemKind
 from app.labels.wording import lead_text
 from pipeline.evaluation.lead_verdict import Judged
-from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel
+from pipeline.labels.model import NEXT_TAG, EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel
 
 if TYPE_CHECKING:
     from app.labels.service.scoring import LabelScores
     from app.labels.store.drive_labels import DriveLabels
 
-What = Literal["unlabelled", "disagreement", "proposed", "sent_back", "unreviewed"]
+What = Literal["unlabelled", "asked", "disagreement", "proposed", "sent_back", "unreviewed"]
 LabelKey = tuple[ItemKind, int]
 """TaskKind and number of a label."""
 _NOTHING: dict[What, str] = {
     "unlabelled": "the lead is labelled in every frame there",
+    "asked": "no more frames are asked for there",
     "disagreement": "the pipeline and the accepted labels agree there",
     "proposed": "no proposals there",
     "sent_back": "no labels sent back there",
@@ -83,6 +84,8 @@ def _order(place: WorkPlace) -> tuple[int, int, int]:
 def _places(labels: DriveLabels, scores: LabelScores, run: DriveRun | None, asked: Asked) -> Sequence[WorkPlace]:
     if asked.what == "unlabelled":
         return _unlabelled(labels)
+    if asked.what == "asked":
+        return _asked(labels)
     if asked.what == "disagreement":
         return _disagreements(labels, scores, run)
     if asked.what == "unreviewed":
@@ -101,6 +104,18 @@ def _unlabelled(labels: DriveLabels) -> list[WorkPlace]:
         WorkPlace(index, "lead only proposed" if index in proposed else "lead not labelled")
         for index in range(len(labels.info.t_ns))
         if index not in said
+    ]
+
+
+def _asked(labels: DriveLabels) -> list[WorkPlace]:
+    """Where a range of frames begins that was asked for, and their lead is not labelled."""
+    unlabelled = {place.frame for place in _unlabelled(labels)}
+    tags = sorted((cast("FrameTag", item.value) for item in labels.items("tag").values()), key=lambda tag: tag.first)
+    return [
+        WorkPlace(first, f"asked for: {tag.origin.name}")
+        for tag in tags
+        if tag.tag == NEXT_TAG
+        and (first := next((n for n in range(tag.first, tag.last + 1) if n in unlabelled), None)) is not None
     ]
 
 

@@ -6,7 +6,7 @@ import hashlib
 import time
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, cast
 
 from sqlalchemy import and_, func, select
@@ -78,6 +78,8 @@ class Version:
     """Number of labelled vehicles."""
     frames: int
     """Number of frames that have a label."""
+    signed_by: str = ""
+    """The public key that it is signed with, 64 hexadecimal digits; empty where it is not signed."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +166,7 @@ class DriveLabels:
         """The oldest first."""
         with self._database.reading() as connection:
             found = connection.execute(
-                select(VersionRow.name, VersionRow.person, VersionRow.t_unix_ms, VersionRow.tracks, VersionRow.frames)
+                select(*(getattr(VersionRow, each.name) for each in fields(Version)))
                 .where(VersionRow.drive_id == self._id)
                 .order_by(VersionRow.t_unix_ms, VersionRow.name)
             ).all()
@@ -178,20 +180,21 @@ class DriveLabels:
         labels = replace(self.label_set(), name=name)
         covered = {each.frame for track in labels.tracks for each in track.sightings}
         covered |= {frame for lead in labels.leads for frame in range(lead.first, lead.last + 1)}
-        version = Version(name, person, int(time.time() * 1000), len(labels.tracks), len(covered))
+        frozen_ms = int(time.time() * 1000)
         values = {
             "drive_id": self._id,
             "name": name,
             "person": person,
-            "t_unix_ms": version.t_unix_ms,
-            "tracks": version.tracks,
-            "frames": version.frames,
+            "t_unix_ms": frozen_ms,
+            "tracks": len(labels.tracks),
+            "frames": len(covered),
             "labels": zlib.compress(to_json(labels), 1),
         }
         with self._database.writing() as connection:
-            if not self._database.insert_new(connection, VersionRow, chained(connection, values)):
+            row = chained(connection, values)
+            if not self._database.insert_new(connection, VersionRow, row):
                 raise ActRefused(taken)  # somebody else froze under it at the same moment
-        return version
+        return Version(**{each.name: row[each.name] for each in fields(Version)})
 
     def version_json(self, name: str) -> bytes:
         """The native file of a frozen version. NoSuchLabel when it is not there, ActRefused when it is not as it was

@@ -110,7 +110,8 @@ class ChangeRow(Base):
 
 class VersionRow(Base):
     """A label set that was frozen under a name: the native file, compressed. sha256: of all that and of the version
-    before (``previous``), empty for one from before there was a chain; see ``version_chain``."""
+    before (``previous``), empty for one from before there was a chain; signature: of that by the public key
+    ``signed_by``, both empty for one that is not signed; see ``version_chain``."""
 
     __tablename__ = "version"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
@@ -122,6 +123,8 @@ class VersionRow(Base):
     labels: Mapped[bytes] = mapped_column(LargeBinary)
     previous: Mapped[str] = mapped_column(String(64), server_default="")
     sha256: Mapped[str] = mapped_column(String(64), server_default="")
+    signed_by: Mapped[str] = mapped_column(String(64), server_default="")
+    signature: Mapped[str] = mapped_column(String(128), server_default="")
 
 
 class WorkRow(Base):

@@ -93,6 +93,7 @@ def value_to_json(kind: ItemKind, value: Value) -> dict[str, Any]:
 
 
 def value_from_json(kind: ItemKind, body: Mapping[str, Any]) -> Value:
+    """The value of an item as stored; a track comes without its sightings. ValidationError when malformed."""
     return _ADAPTERS[kind].validate_python({**body, "sightings": ()} if kind == "track" else body)
 
 
@@ -160,8 +161,10 @@ def unpack_pair(kind: ItemKind, here: bytes | None, there: bytes | None) -> tupl
 
 
 def pack(body: Any) -> bytes:
+    """A JSON value, compressed for the database."""
     return zlib.compress(json.dumps(body, separators=(",", ":"), ensure_ascii=False).encode(), _QUICK)
 
 
 def unpack(data: bytes) -> Any:
+    """What ``pack`` compressed."""
     return json.loads(zlib.decompress(data))

@@ -1,7 +1,7 @@
 """Frozen versions chained by hash: each holds the SHA-256 of its content and of the version before it.
 
-A version that was changed in the database, or whose predecessor was removed, is rejected when it is read. This is not a
-signature: anyone who can write the database can build the chain again.
+A version that was changed in the database, or whose predecessor was removed, is rejected when it is read. Anyone who
+can write the database can build the chain again, but not sign it again: see ``pipeline.common.signing``.
 """
 
 from __future__ import annotations
@@ -15,22 +15,32 @@ from sqlalchemy import Connection, select
 
 from app.labels.errors import ActRefused
 from app.labels.store.tables import VersionRow
+from pipeline.common.signing import Signature, check_signature, configured_signer, expected_key
 
 _SAID = ("name", "person", "t_unix_ms", "tracks", "frames")
 
 
 def chained(connection: Connection, values: Mapping[str, Any]) -> dict[str, Any]:
-    """A new version's row, after the last one of its drive."""
+    """A new version's row, after the last one of its drive, signed where a key is configured. BadInput when that key
+    cannot be used."""
     rows = connection.execute(
         select(VersionRow.previous, VersionRow.sha256).where(VersionRow.drive_id == values["drive_id"])
     ).all()
     followed = {row.previous for row in rows}
     previous = max((row.sha256 for row in rows if row.sha256 not in followed), default="")
-    return {**values, "previous": previous, "sha256": _sha256(values, previous)}
+    sha256, signer = _sha256(values, previous), configured_signer()
+    signature = signer.sign(_signed(sha256)) if signer is not None else Signature("", "")
+    return {**values, "previous": previous, "sha256": sha256, "signed_by": signature.key, "signature": signature.value}
 
 
 def check(connection: Connection, row: VersionRow | Any) -> None:
-    """ActRefused when a version is not as it was frozen; one from before there was a chain is taken as it is."""
+    """ActRefused when a version is not as it was frozen, or not signed with the key of ``CIPV_PUBLIC_KEY`` where that
+    is set. Else one from before there was a chain is taken as it is."""
+    expected = expected_key()
+    signature = Signature(row.signed_by, row.signature) if row.signature else None
+    found = check_signature(signature, _signed(row.sha256), expected)
+    if found.state == "does not match" or (expected is not None and found.state == "not signed"):
+        raise ActRefused(f"version {row.name!r}: {found}")
     if not row.sha256:
         return
     if row.sha256 != _sha256({name: getattr(row, name) for name in (*_SAID, "labels")}, row.previous):
@@ -38,6 +48,11 @@ def check(connection: Connection, row: VersionRow | Any) -> None:
     before = select(VersionRow.name).where(VersionRow.drive_id == row.drive_id, VersionRow.sha256 == row.previous)
     if row.previous and connection.execute(before).first() is None:
         raise ActRefused(f"the version before {row.name!r} was changed or removed from the database")
+
+
+def _signed(sha256: str) -> bytes:
+    """What is signed of a version."""
+    return f"cipv-studio label version\0{sha256}".encode()
 
 
 def _sha256(values: Mapping[str, Any], previous: str) -> str:

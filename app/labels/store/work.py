@@ -12,7 +12,7 @@ from app.labels.errors import ActRefused, NoSuchLabel
 from app.labels.store.database import Database
 from app.labels.store.items import read_items
 from app.labels.store.tables import DriveRow, SightingRow, WorkRow
-from pipeline.labels.model import LabelTrack, LeadRange
+from pipeline.labels.model import NEXT_TAG, FrameTag, LabelTrack, LeadRange
 
 State = Literal["open", "labeling", "review", "done"]
 """open: nobody has begun. review: labelled, and a second person looks at it."""
@@ -41,9 +41,11 @@ class Work:
     """Share of its accepted tracks that a second person has reviewed."""
     proposals: int
     """Tracks that nobody has looked at."""
+    asked: int
+    """Frames that `cipv mine` or a person asked to label next, and whose lead nobody has labelled."""
     worth: float
     """What there is to learn from a label, per frame: proposals that may as well be none, weighted by how unsure they
-    are (1 at a confidence of 0.5, 0 at 0 and 1), and frames in which it is unclear who leads."""
+    are (1 at a confidence of 0.5, 0 at 0 and 1), frames in which it is unclear who leads, and ``asked``."""
 
 
 def queue(database: Database) -> list[Work]:
@@ -101,7 +103,11 @@ def _work(connection: Connection, drive: Any, person: str, state: State) -> Work
         if each.confidence is not None
     )
     unclear = sum(each.last + 1 - each.first for each in leads if each.state == "proposed" and each.lead == "unknown")
-    said = sum(each.last + 1 - each.first for each in leads if each.state in ("accepted", "corrected"))
+    spans = [range(each.first, each.last + 1) for each in leads if each.state in ("accepted", "corrected")]
+    said = sum(map(len, spans))
+    tags = [cast("FrameTag", item.value) for item in read_items(connection, drive.id, "tag").values()]
+    asked = {frame for tag in tags if tag.tag == NEXT_TAG for frame in range(tag.first, tag.last + 1)}
+    asked -= {frame for span in spans for frame in span}
     return Work(
         drive.key,
         drive.title,
@@ -112,5 +118,6 @@ def _work(connection: Connection, drive: Any, person: str, state: State) -> Work
         min(said / drive.count, 1.0),
         sum(bool(each.reviewer) for each in accepted) / len(accepted) if accepted else 0.0,
         len(proposed),
-        round((unsure + unclear) / drive.count, 3),
+        len(asked),
+        round((unsure + unclear + len(asked)) / drive.count, 3),
     )

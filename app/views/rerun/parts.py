@@ -29,10 +29,12 @@ def to_bev(points: npt.NDArray[np.floating]) -> F64:
 
 
 def closed(ring: F64) -> F64:
+    """A polygon (N, D) with its first point repeated at the end."""
     return np.vstack([ring, ring[:1]])
 
 
 def cuboids(objects: list[FusedObject], result: Result, fill: rr.components.FillMode) -> rr.Boxes3D | None:
+    """The LiDAR cuboids of the objects, ego frame; None without any."""
     boxes = [each.cuboid for each in objects if each.cuboid is not None]
     if not boxes:
         return None
@@ -49,6 +51,7 @@ def cuboids(objects: list[FusedObject], result: Result, fill: rr.components.Fill
 
 
 def footprints(objects: list[FusedObject], result: Result, ground_m: float) -> rr.LineStrips3D | None:
+    """Outlines of the objects just above the ground at ``ground_m``; None without any."""
     outlines = [scene.flat_outline(each, ground_m + 0.05) for each in objects]
     if not outlines:
         return None
@@ -58,6 +61,7 @@ def footprints(objects: list[FusedObject], result: Result, ground_m: float) -> r
 
 
 def labels(objects: list[FusedObject], result: Result, ground_m: float) -> rr.Points3D | None:
+    """A text above each object, ego frame; None without any."""
     if not objects:
         return None
     return rr.Points3D(
@@ -70,6 +74,7 @@ def labels(objects: list[FusedObject], result: Result, ground_m: float) -> rr.Po
 
 
 def bev_labels(objects: list[FusedObject], result: Result) -> rr.Points2D | None:
+    """A text on each footprint in the view from above; None without any."""
     if not objects:
         return None
     return rr.Points2D(
@@ -84,6 +89,7 @@ def bev_labels(objects: list[FusedObject], result: Result) -> rr.Points2D | None
 def boxes(
     boxes: dict[int, Box], colors: dict[int, tuple[int, int, int]], texts: dict[int, str], radius: Any
 ) -> rr.Boxes2D | None:
+    """Image boxes by number, pixels; None without any."""
     if not boxes:
         return None
     return rr.Boxes2D(

@@ -157,7 +157,7 @@ def drive_router(engine: Engine, drives: BackgroundRuns, marks: Marks) -> APIRou
         marked = [
             Event("mark", mark.index, mark.text or "marked", mark=mark.id) for mark in marks.of(recording.setup.uri)
         ]
-        marked += recorded_marks(run.rows(), recording.marks)
+        marked += recorded_marks([row.t_ns for row in run.rows()], recording.marks)
         marked += marks_by_time(marks.of(LIVE), recording.stamps_ns, round(1e9 / recording.setup.source.rate_hz))
         times = recording.setup.timeline_s
         found = sorted([*known.of(run), *marked], key=lambda event: event.index)

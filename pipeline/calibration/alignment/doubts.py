@@ -24,6 +24,8 @@ AMBIGUOUS = 0.8
 
 @dataclass(frozen=True, eq=False)
 class Found:
+    """Where one search for the alignment ended."""
+
     vector: F64
     """The model's unknowns where a search ended; see ``FitModel``."""
     rows: I64

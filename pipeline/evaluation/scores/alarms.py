@@ -42,6 +42,7 @@ class Alarm:
 
     @property
     def delay_s(self) -> float | None:
+        """Seconds from when it was due until the pipeline acted; None for a missed or a false alarm."""
         if self.due_ns is None or self.acted_ns is None:
             return None
         return (self.acted_ns - self.due_ns) / 1e9

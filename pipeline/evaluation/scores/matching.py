@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from pipeline.common.geometry import F64, iou_matrix
-from pipeline.decision.path_position import near_face_middle
+from pipeline.common.near_face import near_face_middle
 from pipeline.evaluation.lead_verdict import LABELLED_VEHICLES, SAME_BOX_IOU, nearest_face_m
 from pipeline.evaluation.scores.truth import FrameTruth
 from pipeline.params import CipvParams

@@ -12,6 +12,8 @@ import numpy as np
 
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
+from pipeline.common.user_file_errors import reason_of
+from pipeline.common.user_files import open_regular
 from pipeline.types import OBJECT_SOURCES, AccCommand, Cipv, EgoState, FusedObject, Layers, Path, Result, SensorHealth
 from pipeline.types.result_json import VERSION
 
@@ -26,7 +28,10 @@ def read_results(path: FilePath) -> list[Result]:
     judged (path, gates, health, pedals) is not read and stays empty. BadInput names the line that is no result, or the
     frame that has two."""
     try:
-        text = path.read_text(encoding="utf-8")
+        with open_regular(path) as file:
+            text = file.read().decode("utf-8")
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be read: {reason_of(error)}") from None
     except (UnicodeDecodeError, ValueError):
         raise BadInput(f"{path}: not a text file; expected the JSON lines of `cipv run --out`") from None
     results = [_result(line, f"{path}, line {n}") for n, line in enumerate(text.split("\n"), 1) if line.strip()]

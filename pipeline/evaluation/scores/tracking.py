@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.decision.path_position import near_face_middle
+from pipeline.common.near_face import near_face_middle
 from pipeline.evaluation.scores.matching import claims, face_of, vehicles
 from pipeline.evaluation.scores.truth import FrameTruth
 from pipeline.types import I64, Point2, Result

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from pipeline.common.fast_replace import evolve
-from pipeline.decision.path_position import near_face_middle
+from pipeline.common.near_face import near_face_middle
 from pipeline.experiments.true_lead import InSight, ScriptedWay, same_place, true_lead
 from pipeline.params import Params, with_changes
 from pipeline.path.corridor import nearest_on_path
@@ -31,14 +31,16 @@ from pipeline.warm_up import warm_up
 
 LIDAR_ALONE = "LiDAR alone"
 SOURCES: Mapping[str, Mapping[str, bool]] = {
-    "lane lines": {"path.use_gnss": False, "path.use_yaw_rate": False},
-    "GNSS route": {"path.use_lanes": False, "path.use_yaw_rate": False},
-    "yaw rate": {"path.use_lanes": False, "path.use_gnss": False},
-    "lane lines and yaw rate": {"path.use_gnss": False},
+    "lane lines": {"path.use_gnss": False, "path.use_yaw_rate": False, "path.use_edges": False},
+    "GNSS route": {"path.use_lanes": False, "path.use_yaw_rate": False, "path.use_edges": False},
+    "yaw rate": {"path.use_lanes": False, "path.use_gnss": False, "path.use_edges": False},
+    "road edges": {"path.use_lanes": False, "path.use_gnss": False, "path.use_yaw_rate": False},
+    "lane lines and yaw rate": {"path.use_gnss": False, "path.use_edges": False},
     "straight guess": {
         "path.use_lanes": False,
         "path.use_gnss": False,
         "path.use_yaw_rate": False,
+        "path.use_edges": False,
     },
     "fused": {},
     LIDAR_ALONE: {},

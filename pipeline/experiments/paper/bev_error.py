@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.alignment.projection import Pinhole, project_cuboid
 from pipeline.common.geometry import iou_matrix
-from pipeline.decision.path_position import near_face_middle
+from pipeline.common.near_face import near_face_middle
 from pipeline.evaluation.report_sections import Cell, Chart, ReportSection, Series, Table
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.paper import layouts

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from pipeline.decision.path_position import near_face_middle
+from pipeline.common.near_face import near_face_middle
 from pipeline.evaluation.lead_verdict import switches
 from pipeline.evaluation.report_sections import AnyCell, Chart, Driven, ReportSection, Scene, Series, Table
 from pipeline.experiments.experiment import Experiment, ExperimentDrive

@@ -1,33 +1,51 @@
 """Judges one drive's results against ground truth: phantom leads, phantom braking, missed leads, switches of the lead.
 
 A phantom is a lead or braking where the car could not meet any vehicle. Vehicles in the driven path, vehicles so near
-to its edge that either answer is right, and vehicles that enter it within three seconds are no phantoms.
+to its edge that either answer is right, and vehicles that enter it within three seconds are no phantoms. A vehicle is
+recognised by its place, or else by its box in the image: then the lead is not invented but misplaced, a failure of its
+own. Braking for it counts as phantom braking, because the place is what the car brakes for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import ceil, cos, dist, hypot, sin
 from typing import Literal, get_args
 
 from pipeline.common.geometry import closest_on_polygon
 from pipeline.decision.object_motion import required_decel_mps2
-from pipeline.decision.path_position import near_face_middle
-from pipeline.experiments.true_lead import EDGE_M, MAX_M, VISIBLE_SHARE, ScriptedWay, overlap, same_place, true_lead
+from pipeline.experiments.robustness.true_vehicles import (
+    how_misplaced,
+    named,
+    place,
+    seen_by,
+    vehicle_in_box,
+    vehicles_at,
+    what,
+    why_missed,
+)
+from pipeline.experiments.true_lead import (
+    EDGE_M,
+    MAX_M,
+    VISIBLE_SHARE,
+    ScriptedWay,
+    overlap,
+    same_place,
+    true_lead,
+)
 from pipeline.params import AebParams, CipvParams
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.truth_boxes import in_image
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.world_state import ActorState, World
-from pipeline.types import CameraCalibration, FusedObject, Path, Point2, Result
-from pipeline.types.sensors import SENSOR_NAMES, are_several
+from pipeline.types import CameraCalibration, FusedObject, Path, Result
 
 Kind = Literal[
     "phantom full braking",
     "phantom partial braking",
     "phantom comfort braking",
     "phantom lead",
+    "lead misplaced",
     "lead missed",
     "lead late",
     "switch",
@@ -42,7 +60,6 @@ _NO_NEED_MPS2, _NO_NEED_TTC_S = 2.0, 4.0
 _JOINS_S = 0.5
 """Two moments of one failure lie this near to each other."""
 _SEVERITY: tuple[Kind, ...] = ("phantom comfort braking", "phantom partial braking", "phantom full braking")
-_PARKED, _ONCOMING, _BESIDE, _CROSSING = 100, 1000, 2000, 3000
 
 
 @dataclass(frozen=True)
@@ -101,40 +118,48 @@ class Judge:
             return
         lead, doubtful = true_lead(now, path)
         chosen = result.chosen()
-        self._judge_choice(now, path, chosen)
-        self._judge_braking(now, path, result)
+        self._judge_choice(now, path, camera, chosen)
+        self._judge_braking(now, path, camera, result)
         self._judge_lead(now, camera, lead, doubtful, chosen)
 
-    def _judge_choice(self, now: World, path: Path, chosen: FusedObject | None) -> None:
-        where = _place(chosen)
+    def _judge_choice(
+        self, now: World, path: Path, camera: CameraCalibration | None, chosen: FusedObject | None
+    ) -> None:
+        where = place(chosen)
         if chosen is None or where is None or (chosen.distance_m or 0.0) >= MAX_M:
             return
-        met = _there(now, where)
+        met = vehicles_at(now, where)
         if any(_in_path(state, path) for state in met) or self._comes_in(now, met):
             return
-        cause = f"{_what(met)}, by {_seen_by(chosen)}"
-        self._fail("phantom lead", cause, now.t_s, f"#{chosen.id} at {chosen.distance_m:.1f} m")
+        text = f"#{chosen.id} at {chosen.distance_m:.1f} m"
+        boxed = None if met else vehicle_in_box(now, camera, chosen)
+        if boxed is not None and _in_path(boxed, path):
+            self._fail("lead misplaced", how_misplaced(boxed, where), now.t_s, f"{text} is {named(boxed)}")
+            return
+        self._fail("phantom lead", f"{what(met)}, by {seen_by(chosen)}", now.t_s, text)
 
-    def _judge_braking(self, now: World, path: Path, result: Result) -> None:
+    def _judge_braking(self, now: World, path: Path, camera: CameraCalibration | None, result: Result) -> None:
         acc = result.acc
         if acc is None or acc.object_id is None or acc.accel_mps2 > -_BRAKES_MPS2:
             return
         item = next((each for each in result.objects if each.id == acc.object_id), None)
-        where = _place(item)
+        where = place(item)
         if acc.state == "full_brake" or acc.accel_mps2 < -_FULL_MPS2:
             level = 2
         else:
             level = 1 if acc.state == "partial_brake" or acc.accel_mps2 < -_PARTIAL_MPS2 else 0
-        met = _there(now, where) if where is not None else []
+        met = vehicles_at(now, where) if where is not None else []
         due = [state for state in met if _in_path(state, path)] or self._comes_in(now, met)
         if due:
             # ACC's gap law brakes hard for a true lead that the script follows closer than the law would: no phantom
             is_emergency = acc.state in ("partial_brake", "full_brake")
             if not is_emergency or any(self._needs_braking(now, state) for state in due):
                 return
-            cause = f"wrong speed of a true vehicle, by {_seen_by(item)}"
+            cause = f"wrong speed of a true vehicle, by {seen_by(item)}"
+        elif not met and where is not None and (boxed := vehicle_in_box(now, camera, item)) is not None:
+            cause = f"{how_misplaced(boxed, where)}, by {seen_by(item)}"
         else:
-            cause = f"{_what(met)}, by {_seen_by(item)}"
+            cause = f"{what(met)}, by {seen_by(item)}"
         self._fail(_SEVERITY[level], cause, now.t_s, acc.reason)
 
     def _judge_lead(
@@ -151,9 +176,7 @@ class Judge:
         if lead is None or doubtful:
             self.reign.wrong_s, self.reign.chosen = 0.0, None
             return
-        where = _place(chosen)
-        if where is not None and same_place(where, lead):
-            assert chosen is not None
+        if chosen is not None and self._is_it(now, camera, chosen, lead):
             before = self.reign.chosen
             if before is not None and before != chosen.id:
                 self._fail("switch", "", now.t_s, f"#{before} → #{chosen.id}")
@@ -168,7 +191,14 @@ class Judge:
         allowed = MISSED_S if self.reign.was_right else MISSED_S + self._confirm_s
         if self.reign.wrong_s > allowed + 1e-6:
             kind: Kind = "lead missed" if self.reign.was_right else "lead late"
-            self._fail(kind, _why_missed(lead, chosen), now.t_s, f"true lead {lead.actor.kind} {number}")
+            self._fail(kind, why_missed(lead, chosen), now.t_s, f"true lead {lead.actor.kind} {number}")
+
+    def _is_it(self, now: World, camera: CameraCalibration | None, chosen: FusedObject, lead: ActorState) -> bool:
+        """Whether the chosen object is this vehicle, if perhaps misplaced."""
+        where = place(chosen)
+        if where is None or same_place(where, lead):
+            return where is not None
+        return not vehicles_at(now, where) and vehicle_in_box(now, camera, chosen) is lead
 
     def _comes_in(self, now: World, met: Sequence[ActorState]) -> list[ActorState]:
         """Those of these vehicles that will be in the path, or have just been."""
@@ -217,29 +247,6 @@ class Judge:
         self.failures.append(Failure(kind, cause, t_s, t_s, text))
 
 
-def _place(item: FusedObject | None) -> Point2 | None:
-    if item is None:
-        return None
-    if item.bev is not None:
-        return near_face_middle(item.bev)
-    return item.closest_point[:2] if item.closest_point is not None else None
-
-
-def _there(now: World, where: Point2) -> list[ActorState]:
-    """The true vehicles that may be what is believed at a place."""
-    reach_m = 20.0 + 0.25 * hypot(*where)
-    near = [state for state in now.actors if dist(where, state.cuboid.center[:2]) < reach_m]
-    return [state for state in near if same_place(where, state) or _inside(where, state)]
-
-
-def _inside(where: Point2, state: ActorState) -> bool:
-    """Whether a place is on a vehicle, or within a metre of it: of a long one the nearest face is far from its side."""
-    x, y = where[0] - state.cuboid.center[0], where[1] - state.cuboid.center[1]
-    c, s = cos(state.cuboid.yaw_rad), sin(state.cuboid.yaw_rad)
-    length, width, _ = state.cuboid.size
-    return abs(x * c + y * s) < length / 2 + 1.0 and abs(y * c - x * s) < width / 2 + 1.0
-
-
 def _in_path(state: ActorState, path: Path, behind_m: float = 0.0) -> bool:
     """Whether a vehicle is in the path, or so near to its edge that either answer is right."""
     too_little, nearest = overlap(state, path)
@@ -249,28 +256,3 @@ def _in_path(state: ActorState, path: Path, behind_m: float = 0.0) -> bool:
 def _is_hidden(now: World, camera: CameraCalibration, lead: ActorState) -> bool:
     seen = next((each for each in in_image(now, camera) if each.actor.actor.id == lead.actor.id), None)
     return seen is not None and seen.visible < VISIBLE_SHARE
-
-
-def _what(met: Sequence[ActorState]) -> str:
-    if not met:
-        return "nothing there"
-    number = min(state.actor.id for state in met)
-    if number >= _CROSSING:
-        return "crossing vehicle"
-    if number >= _BESIDE:
-        return "vehicle in the next lane"
-    if number >= _ONCOMING:
-        return "oncoming vehicle"
-    return "parked vehicle" if number >= _PARKED else "vehicle in another lane"
-
-
-def _seen_by(item: FusedObject | None) -> str:
-    if item is None:
-        return "nobody"
-    return "both" if are_several(item.source) else SENSOR_NAMES[item.source]
-
-
-def _why_missed(lead: ActorState, chosen: FusedObject | None) -> str:
-    away_m = hypot(*lead.cuboid.center[:2]) - lead.cuboid.size[0] / 2
-    what = "no lead" if chosen is None else "another object leads"
-    return f"{what}, true lead within {20 * ceil(away_m / 20)} m"

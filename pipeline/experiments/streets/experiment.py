@@ -2,8 +2,8 @@
 contribute?
 
 Bends of 30–150 m radius between parked rows, hedges and kerbs; a car drives ahead, or nothing does. Every frame goes
-through the pipeline as it is by default, with the road's edges too, and without either. Detections are given, and the
-truth is that of ``curves``.
+through the pipeline as it is by default, without the road's edges, and without other vehicles either. Detections are
+given, and the truth is that of ``curves``.
 """
 
 from __future__ import annotations

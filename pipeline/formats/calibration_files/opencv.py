@@ -1,36 +1,41 @@
 """OpenCV's YAML (``cv::FileStorage``): camera_matrix, distortion_coefficients, image_width, image_height as its
-calibration sample writes them, and T_camera_lidar (4, 4)."""
+calibration sample writes them, and T_camera_lidar (4, 4).
+
+Read without OpenCV, whose own parser writes beyond its memory on a damaged file (5.0.0, ``free(): invalid next size``).
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 
+from pipeline.common.user_file_errors import parse_yaml
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, read_bytes, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
 _LENGTHS = (0, 4, 5, 8)
+_TAG = "!!opencv-matrix"
+_VERSION = "%YAML:1.0"
+"""What OpenCV begins its files with, which is no directive of YAML."""
+_MOST_NUMBERS = 1000
 
 
 def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
-    text = read_bytes(path).decode("utf-8", "replace")
-    try:
-        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-    except cv2.error:
-        raise SourceError(f"{path.name}: not an OpenCV FileStorage file") from None
-    try:
-        K = camera_matrix(_matrix(storage, "camera_matrix", path), f"{path.name}: camera_matrix")
-        T = rigid_transform(_matrix(storage, "T_camera_lidar", path), f"{path.name}: T_camera_lidar")
-        node = storage.getNode("distortion_coefficients")
-        distortion = np.zeros(0) if node.empty() else np.asarray(node.mat(), dtype=np.float64).ravel()
-        width, height = (int(storage.getNode(f"image_{side}").real()) for side in ("width", "height"))
-    finally:
-        storage.release()
+    text = read_bytes(path).decode("utf-8", "replace").strip().removeprefix(_VERSION)
+    loaded = parse_yaml(text.replace(_TAG, ""), path.name, SourceError)
+    if not isinstance(loaded, dict):
+        raise SourceError(f"{path.name}: not an OpenCV FileStorage file")
+    K = camera_matrix(_matrix(loaded, "camera_matrix", path), f"{path.name}: camera_matrix")
+    T = rigid_transform(_matrix(loaded, "T_camera_lidar", path), f"{path.name}: T_camera_lidar")
+    lens = "distortion_coefficients"
+    distortion = _matrix(loaded, lens, path).ravel() if loaded.get(lens) is not None else np.zeros(0)
     if len(distortion) not in _LENGTHS or not np.all(np.isfinite(distortion)):
         raise SourceError(f"{path.name}: {len(distortion)} distortion coefficients; 4, 5 or 8 are supported")
+    width, height = (_pixels(loaded.get(f"image_{side}")) for side in ("width", "height"))
     if (width, height) == (0, 0) and size is not None:
         width, height = size
     if min(width, height) < 16:
@@ -52,8 +57,20 @@ def write(path: Path, camera: CameraCalibration) -> None:
     path.write_text(storage.releaseAndGetString(), encoding="utf-8")
 
 
-def _matrix(storage: cv2.FileStorage, name: str, path: Path) -> F64:
-    node = storage.getNode(name)
-    if node.empty() or node.mat() is None:
+def _matrix(loaded: dict[Any, Any], name: str, path: Path) -> F64:
+    """As OpenCV writes one: ``rows``, ``cols`` and ``data``."""
+    node = loaded.get(name)
+    if node is None:
         raise SourceError(f"{path.name}: no {name}")
-    return np.asarray(node.mat(), dtype=np.float64)
+    try:
+        rows, columns = int(node["rows"]), int(node["cols"])
+        if min(rows, columns) < 1 or rows * columns > _MOST_NUMBERS:
+            raise ValueError
+        return np.asarray(node["data"], dtype=np.float64).reshape(rows, columns)
+    except (KeyError, TypeError, ValueError, OverflowError):
+        raise SourceError(f"{path.name}: {name} is not a matrix of OpenCV") from None
+
+
+def _pixels(value: Any) -> int:
+    """0 for what is no number of pixels."""
+    return value if isinstance(value, int) else 0

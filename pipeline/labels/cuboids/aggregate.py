@@ -3,8 +3,8 @@
 Sixteen beams show a few dozen points of a car in one sweep; a dozen sweeps show its outline. A standing vehicle's
 points are moved by ego motion, those of a moving one by its own track. Both are tried, and the one that aligns the
 points better is used, so nobody has to say whether the vehicle stands. Each sweep is then registered to those already
-overlaid (Open3D's point-to-point ICP, Besl and McKay 1992, seen from above, because beams hit a body at different
-heights in each sweep).
+overlaid by point-to-point ICP (Besl and McKay 1992), in the plane, because beams hit a body at different heights in
+each sweep. It is written here because Open3D's needs system libraries (X11, OpenGL, USB) that many machines lack.
 """
 
 from __future__ import annotations
@@ -12,13 +12,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.cuboids.points_of import Clustered, points_of
 from pipeline.labels.headings import Pose
@@ -36,6 +33,8 @@ _REACHES_M = (0.5, 0.35)
 those count in the end that are near."""
 _CARRIED_REACHES_M = (0.3,)
 """Own motion is so near at once."""
+_ICP_STEPS, _ICP_STILL = 30, 1e-4
+"""Steps at most; metres and radians that a step no longer changes."""
 _CAP_M = 0.5
 _MOST_MOVED_M, _MOST_TURNED_RAD = 0.8, math.radians(8.0)
 """A registration that says more than this has slid along a side."""
@@ -124,21 +123,38 @@ def _laid(frame: int, clouds: Mapping[int, F32], guesses: Mapping[int, Planar], 
 
 def _registered(points: F64, model: F64, guess: Planar, reaches_m: Sequence[float]) -> Planar:
     """A cloud onto others, seen from above; the guess where that says nothing certain."""
-    library = _library()
-    registration = library.pipelines.registration
-    source, target = _cloud(library, _turned(_some(points), guess)), _cloud(library, _some(model, MOST_SWEEPS))
-    T = np.eye(4)
+    moved, target = _turned(_some(points), guess), cKDTree(_some(model, MOST_SWEEPS))
+    by: Planar = (0.0, 0.0, 0.0)
     for reach_m in reaches_m:
-        how = registration.TransformationEstimationPointToPoint()
-        T = np.asarray(registration.registration_icp(source, target, reach_m, T, how).transformation)
-    turn_rad = math.atan2(T[1, 0], T[0, 0])
+        by = _icp(moved, target, reach_m, by)
     middle = _turned(points, guess).mean(axis=0)
-    shifted = T[:2, :2] @ middle + T[:2, 3] - middle
-    is_certain = T[2, 2] > 0.0 and abs(turn_rad) <= _MOST_TURNED_RAD and float(np.hypot(*shifted)) <= _MOST_MOVED_M
-    if not is_certain:
+    shifted = _turned(middle, by) - middle
+    if abs(by[2]) > _MOST_TURNED_RAD or float(np.hypot(*shifted)) > _MOST_MOVED_M:
         return guess
-    x, y = T[:2, :2] @ np.array(guess[:2]) + T[:2, 3]
-    return float(x), float(y), guess[2] + turn_rad
+    x, y = _turned(np.array(guess[:2]), by)
+    return float(x), float(y), guess[2] + by[2]
+
+
+def _icp(points: F64, target: cKDTree, reach_m: float, by: Planar) -> Planar:
+    """Point-to-point ICP in the plane, from a first transform on; points farther than the reach from the target count
+    for nothing."""
+    for _ in range(_ICP_STEPS):
+        moved = _turned(points, by)
+        apart, nearest = target.query(moved, distance_upper_bound=reach_m)
+        near = np.isfinite(apart)
+        if np.count_nonzero(near) < 2:
+            break
+        there = target.data[np.asarray(nearest)[near]]
+        here_mean, there_mean = points[near].mean(axis=0), there.mean(axis=0)
+        here, there = points[near] - here_mean, there - there_mean
+        turn_rad = math.atan2(
+            float(np.sum(here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0])), float(np.sum(here * there))
+        )
+        x, y = there_mean - _turned(here_mean, (0.0, 0.0, turn_rad))
+        last, by = by, (float(x), float(y), turn_rad)
+        if np.allclose(last, by, rtol=0.0, atol=_ICP_STILL):
+            break
+    return by
 
 
 def _by_own_motion(frame: int, clouds: Mapping[int, F32], poses: Mapping[int, Pose]) -> dict[int, Planar] | None:
@@ -190,19 +206,3 @@ def _moved(points: F32, by: Planar) -> F64:
 def _some(points: F64, sweeps: int = 1) -> F64:
     """Every so many of them, where there are more than are needed."""
     return points[:: -(-len(points) // (sweeps * _MOST_REGISTERED)) or 1]
-
-
-def _cloud(library: Any, points: F64) -> Any:
-    flat = np.column_stack([points, np.zeros(len(points))])
-    return library.geometry.PointCloud(library.utility.Vector3dVector(flat))
-
-
-@cache
-def _library() -> Any:
-    """Open3D, which takes seconds to import. BadInput, in one sentence, when a system library that it needs is
-    missing."""
-    try:
-        import open3d
-    except (ImportError, OSError) as error:
-        raise BadInput(f"Open3D cannot be loaded ({str(error).splitlines()[0]})") from None
-    return open3d

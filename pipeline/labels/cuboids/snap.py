@@ -34,12 +34,13 @@ _ENOUGH_POINTS = 12
 _BETTER_M, _BETTER_AROUND_M = 0.05, 0.02
 """By so much a placement must fit better, in this sweep and over all: less is no better than a hand."""
 _TURN_COSTS_M = 0.02
+"""By so much more must a placement fit that turns the cuboid."""
 _GROWN_M = 0.1
-_MOST_MOVED_M, _MOST_RESIZED_M = 1.2, 1.0
-"""Points that say more than this against a hand say it of something else."""
+"""Points must reach this far beyond a side to lengthen it."""
 _RAISED_M = 0.1
-_MOST_TURN_RAD = math.radians(25.0)
-"""Points that say more than this against a hand say it of something else."""
+"""A smaller change of height is not worth a change."""
+_MOST_MOVED_M, _MOST_RESIZED_M, _MOST_TURN_RAD = 1.2, 1.0, math.radians(25.0)
+"""Points that disagree with the person by more than this belong to something else."""
 _TWO_SIDES_M = 0.6
 """A shorter side seen is the depth of a bumper, and says nothing of the turn."""
 _GROUND_GAP_M = 0.6

@@ -1,9 +1,10 @@
 """A file whose parts are chained by hash: after each chunk, a metadata record holds the SHA-256 of all bytes since the
 previous record, and of that record's own hash.
 
-This detects and locates changed bytes and removed or inserted parts. Changes made with this program, or a rebuilt
-chain, leave no trace: the chain detects damage and careless changes and is not a signature. Other programs ignore these
-records; they are not in the file's index.
+This detects and locates changed bytes and removed or inserted parts. Anyone can build the chain of a changed file
+again; nobody can sign it again without the key, where it is signed (``pipeline.common.signing``). The signature of the
+last record is of the whole file, since each hash is over the one before. Other programs ignore these records; they are
+not in the file's index.
 """
 
 from __future__ import annotations
@@ -11,17 +12,20 @@ from __future__ import annotations
 import hashlib
 import io
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO, Literal, NamedTuple, Protocol
 
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import Metadata
+from mcap.records import DataEnd, Metadata
 
 from pipeline.common.progress import Progress, silent
+from pipeline.common.signing import Signature, SignatureCheck, Signer, check_signature
 from pipeline.common.user_files import open_regular
-from pipeline.recording.mcap.index import MAGIC, RECORD_HEAD, Unreadable, read_directory
+from pipeline.recording.mcap.chunk import unpack
+from pipeline.recording.mcap.index import MAGIC, RECORD_HEAD, Directory, Unreadable, read_directory, record_at
 
 NAME = "cipv-studio/chain"
 BEGINNING = ""
@@ -41,13 +45,20 @@ class Link(NamedTuple):
     """Of that text and all bytes since that record."""
     is_last: bool
     """No message follows: without it the file's end was cut off."""
+    signature: Signature | None = None
+    """Of all of this."""
+
+    def said(self) -> bytes:
+        """What is signed."""
+        return f"cipv-studio session\0{self.previous}\0{self.sha256}\0{int(self.is_last)}".encode()
 
     def record(self) -> bytes:
         """As it is in the file."""
+        values = {"previous": self.previous, "sha256": self.sha256, "last": str(int(self.is_last))}
+        if self.signature is not None:
+            values |= {"key": self.signature.key, "signature": self.signature.value}
         builder = RecordBuilder()
-        Metadata(NAME, {"previous": self.previous, "sha256": self.sha256, "last": str(int(self.is_last))}).write(
-            builder
-        )
+        Metadata(NAME, values).write(builder)
         return builder.end()
 
 
@@ -59,6 +70,12 @@ class Chain:
     """``cut off``: intact as far as it goes, and it does not go to the end."""
     changed: tuple[str, ...] = ()
     """Where the file is not as it was written, in words."""
+    signature: SignatureCheck = SignatureCheck()
+    """Of its last part."""
+
+    def is_signed_whole(self) -> bool:
+        """Whether it is as it was signed, to its end."""
+        return self.state == "intact" and self.signature.state == "signed"
 
 
 class Writes(Protocol):
@@ -69,10 +86,10 @@ class Writes(Protocol):
 
 class ChainWriter:
     """Hashes what is written, and puts a link behind it when asked to. previous: the last link's hash in a file that is
-    gone on with."""
+    gone on with. signer: signs each link."""
 
-    def __init__(self, stream: Writes, previous: str = BEGINNING) -> None:
-        self._stream, self._previous = stream, previous
+    def __init__(self, stream: Writes, previous: str = BEGINNING, signer: Signer | None = None) -> None:
+        self._stream, self._previous, self._signer = stream, previous, signer
         self._hash = hashlib.sha256(previous.encode())
         self._has_more = False
 
@@ -86,16 +103,21 @@ class ChainWriter:
         if not self._has_more and not is_last:
             return
         link = Link(self._previous, self._hash.hexdigest(), is_last)
+        if self._signer is not None:
+            link = link._replace(signature=self._signer.sign(link.said()))
         self._stream.write(link.record())
         self._previous = link.sha256
         self._hash, self._has_more = hashlib.sha256(link.sha256.encode()), False
 
 
-def verify(path: Path, progress: Progress = silent) -> Chain:
-    """Read the whole file. progress: of bytes. OSError when it cannot be read."""
+def verify(path: Path, progress: Progress = silent, key: str | None = None) -> Chain:
+    """Read the whole file. progress: of bytes. key: the public one that its signature must be of. OSError when it
+    cannot be read."""
     with open_regular(path) as file:
         size = file.seek(0, io.SEEK_END)
-        return _Walk(file, size, progress).chain()
+        walk = _Walk(file, size, progress)
+        chain = walk.chain()
+    return replace(chain, signature=walk.signature(key))
 
 
 def link_at(file: BinaryIO, offset: int) -> tuple[Link, int] | None:
@@ -105,8 +127,11 @@ def link_at(file: BinaryIO, offset: int) -> tuple[Link, int] | None:
     if len(head) < RECORD_HEAD.size:
         return None
     opcode, length = RECORD_HEAD.unpack(head)
-    link = _link(file.read(length)) if opcode == Opcode.METADATA and length <= _LONGEST_LINK else None
-    return (link, RECORD_HEAD.size + length) if link is not None else None
+    content = file.read(length) if opcode == Opcode.METADATA and length <= _LONGEST_LINK else b""
+    link = _link(content) if content else None
+    if link is None or link.record() != head + content:  # no hash is over these bytes: they can be written in one way
+        return None
+    return link, RECORD_HEAD.size + length
 
 
 class _Walk:
@@ -116,6 +141,14 @@ class _Walk:
         self._file, self._size, self._progress = file, size, progress
         self._links, self._has_data_end, self._ended = 0, False, False
         self._changed: list[str] = []
+        self._last: Link | None = None
+
+    def signature(self, key: str | None) -> SignatureCheck:
+        """Of the last link. One of a file that was changed is of another content."""
+        if self._last is None:
+            return SignatureCheck()
+        found = check_signature(self._last.signature, self._last.said(), key)
+        return replace(found, state="does not match") if found.state == "signed" and self._changed else found
 
     def chain(self) -> Chain:
         end = self._follow()
@@ -154,6 +187,8 @@ class _Walk:
                 self._has_data_end, self._ended = True, is_last
                 if has_more:
                     self._changed.append(f"bytes {begin:,} to {offset:,} were inserted")
+                if b"".join(self._pieces(offset, length)) != _DATA_END or not self._ends_whole():
+                    self._changed.append(f"bytes after {offset:,} were changed")
                 return offset
             if link is None:
                 self._hashed(offset, length, part)
@@ -166,6 +201,9 @@ class _Walk:
                 if part.hexdigest() != told.sha256:
                     self._changed.append(f"bytes {begin:,} to {offset:,} were changed")
                 self._links, previous, is_last = self._links + 1, told.sha256, told.is_last
+                self._last = told
+                if check_signature(told.signature, told.said(), None).state == "does not match":
+                    self._changed.append(f"the signature at byte {offset:,} does not match")
                 begin, has_more = offset + length, False
                 part = hashlib.sha256(previous.encode())
             offset += length
@@ -198,6 +236,17 @@ class _Walk:
             length -= len(piece)
             yield piece
 
+    def _meet_channels(self, directory: Directory) -> frozenset[int]:
+        """Those that messages are of, by the chunks that name them first: a summary could call them otherwise."""
+        mentioned = frozenset[int]()
+        for entry in directory.chunks:
+            mentioned |= entry.channels or frozenset()
+            if not mentioned <= directory.channels.keys():
+                with suppress(Exception):  # of a damaged one the library raises whatever it likes
+                    for record in unpack(record_at(self._file, entry.offset, entry.length, self._size)).named:
+                        directory.know(record)
+        return mentioned
+
     def _differences_of_summary(self) -> list[str]:
         """The index at the file's end is made from what the chain covers, and must say the same."""
         try:
@@ -208,11 +257,23 @@ class _Walk:
             return ["the index at its end is damaged"]
         by_data = read_directory(self._file, self._size, walk=True)
         by_data.metadata.pop(NAME, None)
+        mentioned = self._meet_channels(by_data)
         same = [(each.offset, each.length, each.start_ns, each.end_ns) for each in by_index.chunks] == [
             (each.offset, each.length, each.start_ns, each.end_ns) for each in by_data.chunks
         ]
         same = same and (by_index.attachments, by_index.metadata) == (by_data.attachments, by_data.metadata)
+        same = same and all(by_index.channels.get(each) == by_data.channels.get(each) for each in mentioned)
         return [] if same else ["the index at its end does not match the data"]
+
+
+def _data_end() -> bytes:
+    """The record behind the data, as it is written here: without a checksum."""
+    builder = RecordBuilder()
+    DataEnd(0).write(builder)
+    return builder.end()
+
+
+_DATA_END = _data_end()
 
 
 def _link(content: bytes) -> Link | None:
@@ -221,6 +282,7 @@ def _link(content: bytes) -> Link | None:
         if record.name != NAME:
             return None
         values = record.metadata
-        return Link(values["previous"], values["sha256"], values["last"] == "1")
+        signature = Signature(values["key"], values["signature"]) if "signature" in values else None
+        return Link(values["previous"], values["sha256"], values["last"] == "1", signature)
     except Exception:  # damaged bytes make the library raise whatever they like
         return None

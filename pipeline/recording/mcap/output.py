@@ -14,6 +14,7 @@ from mcap.records import DataEnd, Footer
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from pipeline.common.errors import BadInput
+from pipeline.common.signing import configured_signer
 from pipeline.recording.mcap.chain import ChainWriter
 from pipeline.recording.topics import PROFILE, Channel
 
@@ -31,8 +32,9 @@ class _Stream:
     """What ``mcap.writer`` writes to: straight to the system, all that it is given, chained by hash."""
 
     def __init__(self, path: Path) -> None:
+        signer = configured_signer()  # where that fails there is no file yet
         self.file = path.open("xb", buffering=0)
-        self.chain = ChainWriter(self.file)
+        self.chain = ChainWriter(self.file, signer=signer)
 
     def write(self, data: bytes) -> int:
         rest = memoryview(data)

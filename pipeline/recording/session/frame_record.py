@@ -203,14 +203,17 @@ def frame_record_from(data: bytes) -> FrameRecord:
 
 
 def ego_message(ego: EgoState) -> bytes:
+    """An ego state as a message of the session."""
     return _EGO.dump_json(ego)
 
 
 def health_message(streams: tuple[StreamHealth, ...]) -> bytes:
+    """The health of the sensor streams as a message of the session."""
     return _STREAMS.dump_json({"streams": streams})
 
 
 def route_message(route: Route) -> bytes:
+    """A route as a message of the session, degrees and metres."""
     lat_deg, lon_deg = (tuple(map(float, values)) for values in (route.lat_deg, route.lon_deg))
     return _ROUTE.dump_json(_RouteRecord(route.name, lat_deg, lon_deg, route.sigma_m))
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipeline.formats.file_reading import in_order
+from pipeline.formats.file_reading import in_order, read_bytes
 from pipeline.formats.kitti_records import parse_timestamps
+from pipeline.types.source import SourceError
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
@@ -49,6 +50,6 @@ class Files:
 def read_stamps(path: Path) -> tuple[int, ...]:
     """Nanoseconds of each line of ``timestamps.txt``; empty when there is no such file."""
     try:
-        return parse_timestamps(path.read_bytes())
-    except OSError:
+        return parse_timestamps(read_bytes(path))
+    except SourceError:
         return ()

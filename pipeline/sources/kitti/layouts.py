@@ -23,6 +23,8 @@ from pipeline.types.source import SourceError
 
 _BEGIN_NS = 1_000_000_000
 """Odometry sequences count seconds from 0, which elsewhere means that there is no stamp."""
+_LONGEST_S = 1e7
+"""Of a drive: four months."""
 
 
 def files_of(folder: Path) -> Files:
@@ -95,7 +97,11 @@ def sequence_calibration(path: Path, size: tuple[int, int]) -> KittiCalibration:
 
 
 def _read_seconds(path: Path) -> tuple[int, ...]:
+    """Nanoseconds of each line; empty where there is no such file or a line is no time."""
     try:
-        return tuple(_BEGIN_NS + round(float(line) * 1e9) for line in path.read_text().split())
-    except (OSError, ValueError):
+        seconds = [float(line) for line in read_bytes(path).split()]
+    except (SourceError, ValueError):
         return ()
+    if not all(0.0 <= each < _LONGEST_S for each in seconds):
+        return ()
+    return tuple(_BEGIN_NS + round(each * 1e9) for each in seconds)

@@ -38,6 +38,8 @@ Device = Annotated[int | str, BeforeValidator(_is_device)]
 
 
 class ConfigPart(BaseModel):
+    """A part of the sensor configuration: unknown keys and non-finite numbers are errors."""
+
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 

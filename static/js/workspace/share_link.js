@@ -125,6 +125,15 @@ async function apply(shared, agreed = false) {
   set("selection", shared.selection);
 }
 
+/**
+ * Open a moment that was chosen on this page. Only what would end live driving is asked about.
+ * @param {string} uri @param {number} index
+ */
+export function goTo(uri, index) {
+  const state = get("state");
+  apply({ uri, index, selection: null, preset: null, values: {}, layout: null }, !state?.live && !state?.recording);
+}
+
 /** Describe what the link would change beyond this page. @param {Shared} shared @returns {Promise<string[]>} */
 async function whatItChanges(shared) {
   const state = get("state"),

@@ -66,14 +66,15 @@ def test_record_names_a_file_in_a_folder_and_goes_on_in_another(tmp_path: Path) 
     assert sum(len(SessionSource("a", str(file))) for file in files) == 5
 
 
-def test_record_ends_as_it_should_on_ctrl_c(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_record_closes_its_session_whoever_ends_it(number: signal.Signals, tmp_path: Path) -> None:
     typed = ["record", "sim:straight", "--out", str(tmp_path / "a.mcap"), *LIDAR_ONLY]
     command = [sys.executable, "-c", "from app.cli import main; main()", *typed]
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         while "Ctrl-C" not in process.stderr.readline():
             assert process.poll() is None
-        os.kill(process.pid, signal.SIGINT)
+        os.kill(process.pid, number)
         said = process.stderr.read()
     assert process.returncode == 0
     session = SessionSource("a", str(tmp_path / "a.mcap"))

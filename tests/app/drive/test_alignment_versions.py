@@ -36,12 +36,14 @@ def test_a_damaged_file_and_entries_that_no_longer_apply_are_left_out(tmp_path: 
     file = tmp_path / "alignments.json"
     AlignmentVersions(file).add(TURNED, "", "2026", match=None, iou=None)
     rows = json.loads(file.read_text())
-    wrong = [rows[0] | {"values": {"alignment.yaw_deg": 400.0}}, {"id": 1}, 7]
+    wrong = [rows[0] | {"values": {"alignment.yaw_deg": 400.0}}, {"id": 1}, 7, rows[0] | {"id": float("inf")}]
     file.write_text(json.dumps([*wrong, *rows]))
     assert [each.values["alignment.yaw_deg"] for each in AlignmentVersions(file).all()] == [1.5]
-    for damaged in ("{", "[", "17", ""):
+    for damaged in ("{", "[", "17", "", "[" * 100_000):
         file.write_text(damaged)
         assert AlignmentVersions(file).all() == []
+        assert not file.exists()
+    assert len({each.read_text() for each in tmp_path.glob("*.damaged*")}) == 5, "each is kept"
 
 
 def test_too_many_and_a_disk_that_refuses_are_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

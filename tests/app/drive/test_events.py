@@ -118,7 +118,7 @@ def test_the_shortest_ttc_of_each_approach(name: str, ttcs: list[float | None], 
 def test_recorded_marks_are_at_their_frames():
     rows = [row(index, 7) for index in range(4)]
     marks = [Mark(rows[2].t_ns, "he braked"), Mark(rows[0].t_ns, "begin"), Mark(rows[3].t_ns + 10**12, "not run yet")]
-    events = recorded_marks(rows, marks)
+    events = recorded_marks([row.t_ns for row in rows], marks)
     assert [(event.kind, event.index, event.text, event.mark) for event in events] == [
         ("mark", 2, "he braked", None),
         ("mark", 0, "begin", None),

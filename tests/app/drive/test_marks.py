@@ -37,14 +37,22 @@ def test_a_mark_of_live_sensors_keeps_its_time(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    "content", ["", "{", "[]", '{"marks": 3}', '{"marks": [{"id": "x"}]}', "\x00", '{"marks": [3]}']
+    "content",
+    [
+        *("", "{", "[]", "\x00", "[" * 100_000),
+        *('{"marks": 3}', '{"marks": [{"id": "x"}]}', '{"marks": [3]}', '{"marks": [{"id": 1e999}]}'),
+    ],
 )
-def test_a_damaged_file_holds_no_marks(tmp_path: Path, content: str):
+def test_a_damaged_file_holds_no_marks_and_is_not_overwritten(tmp_path: Path, content: str):
     marks = Marks(tmp_path)
     marks.add("sim:a", 4)
     (file,) = tmp_path.iterdir()
     file.write_text(content)
-    assert Marks(tmp_path).of("sim:a") == []
+    again = Marks(tmp_path)
+    assert again.of("sim:a") == []
+    again.add("sim:a", 7)
+    assert [mark.index for mark in Marks(tmp_path).of("sim:a")] == [7]
+    assert file.with_name(f"{file.name}.damaged").read_text() == content
 
 
 def test_a_folder_that_cannot_be_written_refuses_the_mark(tmp_path: Path):

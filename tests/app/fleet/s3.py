@@ -46,7 +46,12 @@ def s3_server(monkeypatch: Any, every: int) -> Iterator[Unsteady]:
         for name, value in (("ACCESS_KEY_ID", "test"), ("SECRET_ACCESS_KEY", "test"), ("DEFAULT_REGION", "us-east-1")):
             monkeypatch.setenv(f"AWS_{name}", value)
         import boto3
+        import s3fs
+        from moto.backends import get_backend
 
+        get_backend("s3").reset()  # it is one for all servers of this process
+
+        s3fs.S3FileSystem.clear_instance_cache()  # those of an earlier server
         boto3.client("s3").create_bucket(Bucket=BUCKET)
         program.every = every
         yield program

@@ -13,8 +13,10 @@ from app.bench.fleet_tables import make_tables
 from app.cli import main
 from app.fleet.batch.tables import EQUAL_TABLES, EVENTS, FRAMES
 from app.fleet.batch.work import run_drive
+from app.fleet.desk import FleetDesk
 from app.fleet.find import FleetTables
-from app.fleet.pack import finished, pack, packed_file, packs_of
+from app.fleet.pack import finished, pack
+from app.fleet.pack_index import packed_file, packs_of
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
 from tests.app.fleet.fleets import BAD, begun, plan_of
@@ -86,6 +88,49 @@ def test_a_histogram_counts_what_was_found(tables: FleetTables):
     assert (len(edges), len(counts)) == (9, 8)
     assert sum(counts) == tables.find("cipv_id IS NOT NULL", "frames").total
     assert tables.histogram("false", "frames", "distance_m") == ([], [])
+
+
+def test_counts_of_a_columns_values(batch: Path, tables: FleetTables):
+    kinds = [row["kind"] for row in parts(batch, EVENTS.name)]
+    found = tables.counts("", "events", "kind")
+    assert dict(found) == {kind: kinds.count(kind) for kind in kinds}
+    assert [count for _, count in found] == sorted((count for _, count in found), reverse=True)
+    assert dict(tables.counts("false", "events", "kind")) == {}
+
+
+def test_rows_come_in_the_order_that_is_asked_for(tables: FleetTables):
+    for descending in (False, True):
+        found = tables.find("", "frames", order="distance_m", descending=descending)
+        shown = [row[found.columns.index("distance_m")] for row in found.rows]
+        known = [value for value in shown if value is not None]
+        assert known == sorted(known, reverse=descending)
+        assert shown[: len(known)] == known
+        assert None in shown
+    with pytest.raises(BadInput, match="no_such"):
+        tables.find("", "frames", order="no_such")
+
+
+def test_a_question_without_end_is_stopped(batch: Path):
+    endless = "(SELECT sum(a.range * b.range) FROM range(10000000) a, range(10000000) b) > 0"
+    with pytest.raises(BadInput, match=r"stopped after 0\.2 s"):
+        FleetTables(Store(str(batch)), most_s=0.2).find(endless)
+
+
+def test_a_desk_finds_what_later_batches_add(fleet: Path, tmp_path: Path):
+    inside, out = tmp_path / "in", tmp_path / "out"
+    inside.mkdir()
+    with pytest.raises(BadInput, match="no tables"):
+        FleetDesk(str(out))
+    shutil.copy(fleet / "near-0.mcap", inside / "near.mcap")
+    run = _run_all(inside, out)
+    desk = FleetDesk(str(out))
+    with desk.tables(None) as tables:
+        assert tables.find("", "drives").total == 1
+    shutil.copy(fleet / "far-0.mcap", inside / "far.mcap")
+    assert _run_all(inside, out) == run
+    with desk.tables(run) as tables:
+        assert tables.find("", "drives").total == 2
+    assert desk.runs() == [run]
 
 
 def test_drives_that_come_later_are_packed_too_and_replaced_ones_anew(fleet: Path, tmp_path: Path):

@@ -124,6 +124,8 @@ DOORS = {
     "opening": ("POST", "/api/source", {"uri": "test:car"}, 401, 403, 202),
     "exporting": ("POST", "/api/clip", {"first": 0, "last": 1, "kind": "csv"}, 401, 403, 404),
     "a mark by another spelling": ("POST", "/api/marks/", {"text": ""}, 401, 403, 405),
+    "the fleet": ("GET", "/api/fleet", None, 401, 403, 200),
+    "the drives of a fleet": ("GET", "/api/fleet/rows", None, 401, 403, 404),
     "viser": ("GET", "/viser/", None, 401, 403, 502),
     "rerun": ("GET", "/rerun/", None, 401, 200, 200),
 }

@@ -5,17 +5,21 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+import json
 import re
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import pytest
 from starlette.routing import Mount
 from starlette.types import Message, Receive, Scope, Send
+from starlette.websockets import WebSocket
 
+from app.core.client_role import Role
 from app.engine.engine import Engine
 from app.streaming.scene_requests import hear
-from app.streaming.stream import DISPLAY_MAY_SAY, Stream
+from app.streaming.slot import FrameCounts, Slot
+from app.streaming.stream import MAY_SAY, Stream
 from app.web.access import Access, Guard
 from app.web.server import create_app
 from app.web.tokens import Tokens
@@ -49,6 +53,7 @@ POST /api/labels/undo · POST /api/labels/redo · POST /api/labels/import · POS
 DELETE /api/jobs/{number} · POST /api/alignment/fit · DELETE /api/alignment/fit ·
 POST /api/alignment/versions · DELETE /api/alignment/versions/{number} ·
 POST /api/project · POST /api/project/ray · WEBSOCKET /viser · WEBSOCKET /viser/ ·
+GET /api/fleet · GET /api/fleet/rows · GET /api/fleet/histogram · GET /api/fleet/counts ·
 WEBSOCKET /viser/of/{name} · GET /viser/of/{name}/{path:path} · GET /viser · GET /viser/{path:path}
 """
 RULES: dict[str, Rule] = {
@@ -133,4 +138,26 @@ def test_every_word_of_the_stream_has_a_rule():
     source = inspect.getsource(Stream._receive) + inspect.getsource(hear)
     heard = set(re.findall(r"""said(?:\.get\(|\[)"(\w+)\"""", source))
     assert heard == set(WORDS)
-    assert {word for word, rule in WORDS.items() if rule == "whoever looks"} == DISPLAY_MAY_SAY
+    assert MAY_SAY["person"] == set(WORDS)
+    assert MAY_SAY["display"] == {word for word, rule in WORDS.items() if rule == "whoever looks"}
+
+
+class _Page:
+    """A WebSocket of a role that sends one message and leaves."""
+
+    def __init__(self, role: Role, said: dict[str, object]) -> None:
+        self.scope = {"type": "websocket", "state": {"role": role}}
+        self.state = self.scope["state"]
+        self._messages = iter([{"type": "websocket.receive", "text": json.dumps(said)}])
+
+    async def receive(self) -> Message:
+        return next(self._messages, {"type": "websocket.disconnect"})
+
+
+@pytest.mark.parametrize("role", ["display", "person"])
+def test_a_word_without_a_rule_is_read_by_nothing(role: Role, monkeypatch: pytest.MonkeyPatch):
+    heard: dict[str, object] = {}
+    monkeypatch.setattr("app.streaming.stream.hear", lambda looks, page, said: heard.update(said))
+    page = _Page(role, dict.fromkeys([*WORDS, "a word that somebody adds"]))
+    asyncio.run(Stream()._receive(cast("WebSocket", page), Slot(True, FrameCounts())))
+    assert set(heard) == {word for word, rule in WORDS.items() if role in WELCOME[rule]}

@@ -121,7 +121,7 @@ RECORDING = PROGRAM.replace("playing=True", "playing=True, desk=SessionRecorder(
 )
 
 
-@pytest.mark.parametrize("numbers", [[signal.SIGTERM], [signal.SIGHUP, signal.SIGTERM]])
+@pytest.mark.parametrize("numbers", [[signal.SIGINT], [signal.SIGTERM], [signal.SIGHUP, signal.SIGTERM]])
 def test_whoever_ends_it_its_recording_is_closed_first(tmp_path: Path, numbers: list[signal.Signals]):
     program = subprocess.Popen(
         [sys.executable, "-c", RECORDING, "0", "127.0.0.1", str(tmp_path)],
@@ -141,6 +141,67 @@ def test_whoever_ends_it_its_recording_is_closed_first(tmp_path: Path, numbers: 
                     program.send_signal(number)
                 program.communicate(timeout=60)
         assert program.returncode == 0
+        (session,) = tmp_path.iterdir()
+        assert session.read_bytes().endswith(b"\x89MCAP0\r\n"), "its index and its end are there"
+    finally:
+        program.kill()
+        program.communicate()
+
+
+HANGING = """
+import sys, threading
+from pathlib import Path
+from app.commands.serve import ServerOptions
+from app.engine.engine import Engine
+from app.engine.session_recording import SessionRecorder
+from app.labels.service.desk import LabelDesk
+from pipeline.params import Params
+from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
+
+def for_ever():
+    print("hangs", flush=True)
+    threading.Event().wait()
+
+class Hanging(Recording):
+    def frame(self, index):
+        return super().frame(index) if index != 7 else for_ever()
+
+engine = Engine(opener(Hanging()), lambda _: CountingDetector(), Params(), uri="test:car", playing=True,
+                desk=SessionRecorder(Path(sys.argv[1])), labels=LabelDesk(open_later=for_ever))
+ServerOptions(port=int(sys.argv[2])).serve(engine)
+"""
+
+
+def test_disks_and_databases_that_hang_for_ever_keep_neither_the_recording_open_nor_the_program_alive(
+    tmp_path: Path,
+) -> None:
+    with listen_socket("127.0.0.1", 0) as free:
+        port = free.getsockname()[1]
+    program = subprocess.Popen(
+        [sys.executable, "-c", HANGING, str(tmp_path), str(port)],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert program.stdout is not None
+        said = [program.stdout.readline()]
+        while not said[-1].startswith("http"):
+            said.append(program.stdout.readline())
+        with httpx.Client(base_url=said[-1].strip(), timeout=60) as client:
+            client.post("/api/recording", json={"on": True}).raise_for_status()
+            client.post("/api/playback", json={"seek": 3, "playing": True}).raise_for_status()
+            while said.count("hangs\n") < 2:  # the database, and the engine's disk
+                said.append(program.stdout.readline())
+            with connect(f"{client.base_url}/api/stream?own=7".replace("http", "ws"), max_size=None) as page:
+                page.send('{"ping": 1}')
+                page.recv(60)
+                program.send_signal(signal.SIGTERM)
+                _, errors = program.communicate(timeout=60)
+        assert program.returncode == 0
+        assert errors.splitlines()[-1] == "cipv: ended without waiting for work that hangs; the recording is closed"
         (session,) = tmp_path.iterdir()
         assert session.read_bytes().endswith(b"\x89MCAP0\r\n"), "its index and its end are there"
     finally:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import fsspec
 import pytest
 
@@ -126,8 +129,31 @@ def test_where_folders_are_limited_only_named_addresses_are_opened(session, tmp_
         open_remote(ADDRESS)
     monkeypatch.setenv("CIPV_ADDRESSES", "memory://fleet/ s3://other/")
     assert open_remote(ADDRESS).read(4) == b"\x89MCA"
-    with pytest.raises(OSError, match="outside the allowed addresses"):
-        open_remote("memory://fleet/../secret/a.mcap")
+    outside = ("memory://fleet/../secret/a.mcap", "memory://fleet/%2e%2e/secret/a.mcap", "memory://fleet/..%2Fa.mcap")
+    monkeypatch.setenv("CIPV_ADDRESSES", "memory://fleet s3://other/")
+    assert open_remote(ADDRESS).read(4) == b"\x89MCA"
+    for address in (*outside, "memory://fleet-2/a.mcap", "memory://fleet.evil.example/a.mcap"):
+        with pytest.raises(OSError, match="outside the allowed addresses"):
+            open_remote(address)
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize(
+    "address",
+    [
+        *(
+            "local://{pipe}",
+            "zip://a.mcap::file://{pipe}",
+            "memory://a::file://{pipe}",
+            "http://127.0.0.1/a::file://{pipe}",
+        ),
+        *("reference://a.mcap", "ftp://127.0.0.1/a.mcap", "github://a:b@c/a.mcap", "data://,a.mcap", "zip://{pipe}"),
+    ],
+)
+def test_what_is_no_store_is_not_opened_as_one(address: str, tmp_path: Path):
+    os.mkfifo(tmp_path / "a.mcap")
+    with pytest.raises(NotReachable, match="not the address of a store"):
+        open_source(address.format(pipe=tmp_path / "a.mcap"))
 
 
 def test_without_the_extra_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch):

@@ -7,17 +7,30 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from pipeline.common import user_files
 from pipeline.common.errors import BadInput
 from pipeline.common.user_files import FOLDERS_VARIABLE, Overloaded, open_regular, read_regular
+from pipeline.evaluation.scores.results_file import read_results
+from pipeline.formats.calibration_files import opencv
+from pipeline.labels.classes import read_classes
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.params import Params, from_yaml
 from pipeline.sources import open_any, open_source
 from pipeline.sources.live.devices.can import load_dbc
 from pipeline.sources.route_files import load_route
-from tests.pipeline.sources.conftest import write_astyx
+from tests.pipeline.sources.conftest import write_astyx, write_kitti_raw
+
+
+def _with_a_track(path: Path) -> None:
+    """A folder of images in which this is the only track."""
+    for index in range(2):
+        cv2.imwrite(str(path.parent / f"{index}.png"), np.zeros((8, 8, 3), np.uint8))
+    open_source(f"pictures:{path.parent}")
+
 
 Opens = Callable[[str], object]
 OPENERS: dict[str, tuple[str, Opens]] = {
@@ -32,6 +45,10 @@ OPENERS: dict[str, tuple[str, Opens]] = {
     "parameters": (".yaml", lambda path: from_yaml(Path(path), Params())),
     "labels": (".json", lambda path: read_bytes(Path(path))),
     "signals": (".dbc", lambda path: load_dbc(Path(path))),
+    "classes": (".yaml", lambda path: read_classes(Path(path))),
+    "results": (".jsonl", lambda path: read_results(Path(path))),
+    "calibration": (".yaml", lambda path: opencv.read(Path(path), None)),
+    "track beside images": (".gpx", lambda path: _with_a_track(Path(path))),
 }
 
 
@@ -47,6 +64,15 @@ def test_a_pipe_and_an_endless_device_are_refused_at_once(tmp_path: Path, name: 
         path.symlink_to(target)
     with pytest.raises(BadInput):
         opens(str(path))
+
+
+@pytest.mark.timeout(20)
+def test_a_pipe_among_the_stamps_of_a_folder_is_no_stamp(tmp_path: Path):
+    drive = write_kitti_raw(tmp_path / "2011_09_26")
+    for name in ("velodyne_points", "image_02"):
+        (drive / name / "timestamps.txt").unlink()
+        os.mkfifo(drive / name / "timestamps.txt")
+    assert open_source(f"kitti:{drive}").frame(0).sweep is not None
 
 
 def test_a_file_beyond_its_size_is_refused(tmp_path: Path):

@@ -123,3 +123,25 @@ def fused_place(x: float, y: float) -> dict[str, object]:
     """Where a vehicle is, to be put into another one."""
     there = fused(1, x, y)
     return {name: getattr(there, name) for name in ("bev", "cuboid", "closest_point", "distance_m")}
+
+
+@pytest.mark.parametrize(
+    ("sigma", "leads"),
+    [
+        pytest.param(5.0, False, id="what may stand must be in the path as surely as what stands"),
+        pytest.param(1.0, True, id="what surely drives need not"),
+    ],
+)
+def test_a_speed_that_is_mostly_noise_makes_no_traffic(sigma: float, leads: bool) -> None:
+    """A camera-only car at the path's edge, in the path by 60 %, that seems to drive off at 8 m/s."""
+    item = fused(1, 40.0, 1.1, source="V", velocity=(8.0 - 15.0, 0.0), length=4.3)
+    seen = dataclasses.replace(item, camera_speed_sigma_mps=sigma, distance_sigma_m=2.0)
+    path = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 1.2))
+    (moving,) = describe([seen], EGO, MotionParams())
+    state, choice = CipvState(), None
+    for _ in range(3):
+        state, choice = choose(state, (moving,), path, moment(EGO, 0.1), CipvParams())
+    assert choice is not None
+    (judged,) = choice.objects
+    assert (judged.in_path_probability or 0.0) > 0.5
+    assert (choice.lead is not None) is leads

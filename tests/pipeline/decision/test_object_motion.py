@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from pipeline.common.fast_replace import evolve
 from pipeline.decision.object_motion import closing_speed_mps, describe
 from pipeline.params import MotionParams
 from pipeline.types import EgoState
@@ -72,3 +73,21 @@ def test_oncoming_is_what_comes_nearer_by_its_own_motion(velocity: tuple[float, 
 def test_an_object_without_a_place_has_no_ttc() -> None:
     (item,) = describe([fused(1, None, source="V")], EgoState(0, 20.0), PARAMS)
     assert (item.ttc_s, item.speed_over_ground_mps, item.moving) == (None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("speed", "sigma", "surely"),
+    [
+        pytest.param(8.0, 5.0, False, id="a parked car, as the camera first has it"),
+        pytest.param(8.0, 1.0, True, id="eight metres a second, known well"),
+        pytest.param(8.0, None, True, id="by the LiDAR"),
+        pytest.param(1.0, None, False, id="standing"),
+    ],
+)
+def test_an_uncertain_speed_proves_no_motion(speed: float, sigma: float | None, surely: bool) -> None:
+    seen = evolve(fused(1, 30.0, velocity=(speed - 10.0, 0.0)), camera_speed_sigma_mps=sigma)
+    (item,) = describe([seen], EgoState(0, 10.0, 0.0), PARAMS)
+    assert item.surely_moving is surely
+    assert item.moving is (speed > PARAMS.moving_mps), "the result's meaning of it stays"
+    (unknown,) = describe([seen], None, PARAMS)
+    assert unknown.surely_moving is None

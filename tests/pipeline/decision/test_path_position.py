@@ -184,3 +184,48 @@ def test_the_nose_of_one_that_moves_over_is_farther_that_way(way: float) -> None
     gained = moving.high_m - steady.high_m if way > 0.0 else steady.low_m - moving.low_m
     assert gained == pytest.approx(0.45, abs=0.02)
     assert moving.high_m - moving.low_m == pytest.approx(steady.high_m - steady.low_m + 0.45, abs=0.02)
+
+
+# ------------------------------------------------------------ what a box shows beside a rear
+
+
+def by_its_box(x: float, y: float, yaw_rad: float = 0.0) -> FusedObject:
+    """A car whose rear's middle is at (x, y), as the camera has it: at its range along the bearing of its box's middle,
+    the box being that of all its corners."""
+    car = Cuboid((x + 2.15 * math.cos(yaw_rad), y + 2.15 * math.sin(yaw_rad), 0.75), (4.3, 1.8, 1.5), yaw_rad)
+    bearings = [math.atan2(b, a) for a, b in car.footprint()]
+    middle, range_m = (max(bearings) + min(bearings)) / 2, math.hypot(x, y)
+    return fused(1, range_m * math.cos(middle), range_m * math.sin(middle), source="V", length=4.3)
+
+
+@pytest.mark.parametrize(
+    ("x", "y"), [(12.0, 3.5), (20.0, -3.5), (30.0, 3.5), (20.0, -7.0), (45.0, 7.0), (25.0, 0.0), (60.0, -3.5)]
+)
+def test_the_rear_counts_though_the_box_shows_a_flank_too(x: float, y: float) -> None:
+    found, _ = placed(by_its_box(x, y))
+    assert found.offset_m == pytest.approx(y, abs=0.08)
+    unaware, *_ = place([by_its_box(x, y)], STRAIGHT, EGO, CipvParams(use_flank=False))
+    assert unaware is not None
+    assert abs(unaware[0].offset_m) <= abs(found.offset_m) + 1e-9, "a flank shows towards the path"
+    if y and x <= 30.0:
+        assert abs(unaware[0].offset_m - y) > 0.1
+        assert found.sigma_m > unaware[0].sigma_m
+
+
+def test_in_a_bend_a_flank_is_as_wide_as_a_rear() -> None:
+    """A car parked beside a bend, turned along it by half a right angle: its box is 1.3 m off its rear."""
+    s = samples(60.0)
+    center, headings = arc(1.0 / 40.0, s)
+    path = dataclasses.replace(STRAIGHT, center=center, left=center, right=center)
+    (x, y), yaw = center[25], float(headings[25])
+    rear = (float(x) + 3.2 * math.sin(yaw), float(y) - 3.2 * math.cos(yaw))  # 3.2 m to the right of the path
+    found, _ = placed(by_its_box(*rear, yaw), path)
+    assert found.offset_m == pytest.approx(-3.2, abs=0.35)
+    unaware, *_ = place([by_its_box(*rear, yaw)], path, EGO, CipvParams(use_flank=False))
+    assert unaware is not None
+    assert unaware[0].offset_m > -2.6
+
+
+def test_what_the_lidar_ranges_is_where_its_points_are() -> None:
+    item = fused(1, 20.0, 3.5)
+    assert placed(item)[0] == place([item], STRAIGHT, EGO, CipvParams(use_flank=False))[0][0]  # type: ignore[index]

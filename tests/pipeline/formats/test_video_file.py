@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pipeline.formats import video_file
 from pipeline.formats.video_file import VideoFile
 from pipeline.sources import SourceError
 from tests.pipeline.sources.captures import write_video
@@ -51,3 +53,38 @@ def test_two_who_read_by_turns_do_not_make_each_other_seek(tmp_path: Path) -> No
         for at in (index, index + 80):
             assert np.median(video.image(at)) == pytest.approx(2 * at, abs=8)
     assert sum(place.seeks for place in video._places) == 2
+
+
+@pytest.mark.parametrize("codec", ["mjpeg", "mpeg4"])
+def test_images_larger_than_a_cameras_are_refused_before_they_are_decoded(
+    codec: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """48 × 80 pixels are, where the budget is one less."""
+    write_video(tmp_path / "a.avi", 3, codec=codec)
+    monkeypatch.setattr(video_file, "MOST_PIXELS", 100_000)  # FFmpeg counts a margin of 128 pixels too
+    assert VideoFile(tmp_path / "a.avi").image(1).shape == (48, 80, 3)
+    monkeypatch.setattr(video_file, "MOST_PIXELS", 48 * 80 - 1)
+    with pytest.raises(SourceError, match=r"a\.avi: "):
+        VideoFile(tmp_path / "a.avi").image(1)
+
+
+PLAYLISTS = {
+    "HLS": "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n{url}\n#EXT-X-ENDLIST\n",
+    "DASH": '<?xml version="1.0"?><MPD xmlns="urn:mpeg:dash:schema:mpd:2011" type="static" '
+    'mediaPresentationDuration="PT1S"><Period><AdaptationSet mimeType="video/mp4"><Representation id="1" '
+    'bandwidth="1" codecs="avc1"><BaseURL>{url}</BaseURL></Representation></AdaptationSet></Period></MPD>',
+    "FFmpeg's list": "ffconcat version 1.0\nfile '{url}'\n",
+}
+
+
+@pytest.mark.parametrize("kind", PLAYLISTS)
+def test_what_a_playlist_names_is_neither_fetched_nor_read(kind: str, tmp_path: Path) -> None:
+    write_video(tmp_path / "other.avi", 3)
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.setblocking(False)
+        for url in (f"http://127.0.0.1:{listener.getsockname()[1]}/a.ts", "other.avi"):
+            (tmp_path / "a.ts").write_text(PLAYLISTS[kind].format(url=url))
+            with pytest.raises(SourceError, match="not a readable video"):
+                VideoFile(tmp_path / "a.ts")
+        with pytest.raises(BlockingIOError):
+            listener.accept()

@@ -81,7 +81,7 @@ def test_a_registered_network_brings_its_law_and_loses_it_with_its_weights(
 
 
 def test_a_place_that_cannot_be_written_to_is_named(network: Path) -> None:
-    law_file(network).with_suffix(".part").mkdir()
+    law_file(network).mkdir()
     with pytest.raises(BadInput, match=r"own\.law\.json cannot be written"):
         keep_law(network, LAW, {})
 

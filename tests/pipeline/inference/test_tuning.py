@@ -54,6 +54,14 @@ def test_what_is_kept_may_be_damaged(network: Path, damage: str) -> None:
     assert kept_way(network, 2) == untuned(2)
 
 
+def test_a_number_of_threads_without_end_is_none(network: Path) -> None:
+    keep(network, RunSettings((CPU,), 3))
+    file = tuning.store() / "tuning.json"
+    file.write_text(file.read_text(encoding="utf-8").replace('"threads": 3', '"threads": 1e999'), encoding="utf-8")
+    assert "1e999" in file.read_text(encoding="utf-8")
+    assert kept_way(network, 2) == untuned(2)
+
+
 @pytest.mark.parametrize(
     "way", [RunSettings(("NoSuchProvider",), 2), RunSettings((CPU,), 0), RunSettings((CPU,), 2, "FASTEST")]
 )

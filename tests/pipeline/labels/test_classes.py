@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -73,10 +74,15 @@ def test_a_projects_own_list_is_what_its_exports_say(tmp_path: Path) -> None:
     assert [track.label for track in back.tracks] == ["taxi"]
 
 
+BILLIONS = "a: &a [1, 1]\n" + "".join(f"{b}: &{b} [*{a}, *{a}, *{a}]\n" for a, b in pairwise("abcdefghijklmnop"))
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("[", "not YAML"),
+        ("classes: !!timestamp x", "not YAML"),
+        (BILLIONS, "aliases"),
         ("- car", "no classes"),
         ("classes: {}", "no classes"),
         ("classes: {van: {of: car}}", "van is of 'car', which is not a class"),

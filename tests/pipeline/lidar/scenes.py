@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import rotation
 from pipeline.sources import open_source
 from pipeline.types import F32, F64, Frame
@@ -42,9 +44,13 @@ def road_height(xy: F64, height_m: float, tilt_deg: tuple[float, float]) -> F64:
     return np.asarray((-height_m - xy @ normal[:2]) / normal[2])
 
 
-def real_frames(data_dir: Path) -> Iterator[tuple[Frame, tuple[TruthObject, ...]]]:
-    """Every real frame: Astyx (16 rings) and KITTI cut to what a VLP-16 would see of it (about 10 rings)."""
-    for uri in (f"astyx:{data_dir / 'astyx'}", f"kitti:{data_dir / 'kitti_0052'}"):
-        source = open_source(uri)
-        for index in range(len(source)):
-            yield source.frame(index), source.truth(index) or ()
+@cache
+def real_frames(data_dir: Path) -> tuple[tuple[Frame, tuple[TruthObject, ...]], ...]:
+    """Every real frame: Astyx (16 rings) and KITTI cut to what a VLP-16 would see of it (about 10 rings). Read once for
+    all tests of a process, and kept without the images, which no test of the LiDAR looks at."""
+    sources = [open_source(f"astyx:{data_dir / 'astyx'}"), open_source(f"kitti:{data_dir / 'kitti_0052'}")]
+    return tuple(
+        (evolve(source.frame(index), image=None), source.truth(index) or ())
+        for source in sources
+        for index in range(len(source))
+    )

@@ -11,6 +11,7 @@ from pipeline.path.corridor import Evidence, PathState, predict
 from pipeline.path.estimates import PathEstimate, arc, samples
 from pipeline.path.road_edges import EdgeState, Surroundings
 from pipeline.types import EgoState, Ground, Moment
+from pipeline.types.lane import EgoLane
 from tests.pipeline.path.lines import straight_lane
 
 PARAMS = PathParams(use_edges=True)
@@ -41,6 +42,21 @@ def test_without_own_motion_or_switched_off_there_are_no_edges() -> None:
     assert road_edges.follow(state, between_hedges(), Moment(0, 0.1, None, None), PARAMS)[1] is None
     off = PARAMS.model_copy(update={"use_edges": False})
     assert road_edges.follow(state, between_hedges(), NOW, off)[1] is None
+
+
+def test_where_paint_shows_the_road_its_edges_are_only_collected() -> None:
+    state = EdgeState()
+    for _ in range(3):
+        state, edges = road_edges.follow(state, between_hedges(), NOW, PARAMS, is_shown=True)
+        assert edges is None
+        assert state.shape is None
+    assert len(state.cells.xy) > 100, "for when the paint ends"
+
+
+@pytest.mark.parametrize(("lane", "shown"), [(straight_lane(), True), (None, False)])
+def test_the_path_tells_whether_paint_shows_the_road(lane: EgoLane | None, shown: bool) -> None:
+    state, _ = predict(PathState(), Evidence(lane=lane), NOW, PARAMS)
+    assert state.is_shown is shown
 
 
 def test_with_nothing_beside_the_road_there_are_no_edges() -> None:

@@ -60,3 +60,17 @@ def test_a_shape_that_is_followed_moves_with_the_car() -> None:
     moved = road_shape.moved_on(arc(0.02, S)[0], ego, 0.1, S)
     assert moved[0] == pytest.approx([0.0, 0.0])
     assert moved[:40] == pytest.approx(arc(0.02, S)[0][:40], abs=0.05)
+
+
+@pytest.mark.parametrize("speed_mps", [14.0, 20.0])
+def test_with_little_beside_it_a_road_goes_on_as_it_went(speed_mps: float) -> None:
+    """At speed a bend cannot end at once. With nothing but clutter, the shape is the arc just driven, though at 3 m/s²
+    sideways that is harder than roads mostly are; where the yaw rate is not known, it is straight."""
+    curvature = 3.0 / speed_mps**2
+    clutter = np.random.default_rng(1).uniform((2.0, -14.0), (45.0, 14.0), (30, 2))
+    center, sigma = found(clutter, EgoState(0, speed_mps, speed_mps * curvature))
+    off, _ = nearest(arc(curvature, S)[0], center[[20, 30]])
+    straight, _ = found(clutter, EgoState(0, speed_mps, None))
+    missed, _ = nearest(arc(curvature, S)[0], straight[[20, 30]])
+    assert (np.abs(off) < 2.0 * sigma[[20, 30]]).all()
+    assert abs(missed[1]) > 3.0 * abs(off[1])

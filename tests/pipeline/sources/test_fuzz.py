@@ -23,9 +23,9 @@ def small_bag(folder: Path, kind: Kind = "db3") -> Path:
     """A folder that is a bag, or, of ROS 1, has one in it."""
     if kind == "ros1":
         folder.mkdir()
-        write_bag(folder / "drive.bag", kind, sweeps=2)
+        write_bag(folder / "drive.bag", kind, sweeps=2, every=50)
         return folder
-    return write_bag(folder, kind, sweeps=2)
+    return write_bag(folder, kind, sweeps=2, every=50)
 
 
 two_of_nuscenes = partial(write_nuscenes, frames=2)

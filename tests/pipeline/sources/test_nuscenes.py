@@ -174,3 +174,16 @@ def test_a_pose_that_is_none_is_said(mini: Path) -> None:
     table.write_text(json.dumps(rows))
     with pytest.raises(SourceError, match=r"calibrated_sensor\.json: its rotation is not a unit quaternion"):
         open_source(str(mini))
+
+
+def test_without_a_calibrated_camera_every_frame_says_why_it_has_no_image(mini: Path) -> None:
+    table = mini / "v1.0-mini" / "calibrated_sensor.json"
+    rows = [row for row in json.loads(table.read_text()) if not row["camera_intrinsic"]]
+    table.write_text(json.dumps(rows))
+    source = open_source(str(mini))
+    frame = source.frame(0)
+    assert frame.sweep is not None
+    assert frame.image is None
+    (note,) = frame.notes
+    assert note.startswith("no images: no CAM_FRONT files")
+    assert note in source.notes

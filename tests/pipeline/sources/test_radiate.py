@@ -137,7 +137,9 @@ def test_what_has_no_times_is_left_out_and_said(missing: str, sequence: Path) ->
     frame = source.frame(0)
     if missing == "zed_left.txt":
         assert frame.image is None
-        assert "no images: no zed_left/*.png whose time is in zed_left.txt" in source.notes
+        said = "no images: no zed_left/*.png whose time is in zed_left.txt"
+        assert said in source.notes
+        assert said in frame.notes
     else:
         assert frame.ego is None
         assert "no ego speed recorded" in source.notes

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pipeline.alignment.projection import Angular, Pinhole
 from pipeline.common.geometry import transform
 from pipeline.params import DistanceParams, preset
-from pipeline.types import CameraCalibration, Detection
+from pipeline.types import Box, CameraCalibration, Detection
 from pipeline.vision.distance import PowerLaw, binned, fit_power_law, measure
 
 FOCAL_PX = 907.0
@@ -141,6 +141,26 @@ def test_the_angular_model_brings_its_own_focal_length() -> None:
     seen = measure((box,), alignment, None, DistanceParams())[0]
     assert seen.distance_m == pytest.approx(1444.0 / 60.0)
     assert seen.position == pytest.approx((seen.distance_m, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("case", "box", "other", "known"),
+    [
+        ("whole", (600.0, 300.0, 640.0, 330.0), None, True),
+        ("cut by the left edge", (0.5, 300.0, 40.0, 330.0), None, False),
+        ("cut by the right edge", (1240.0, 300.0, 1279.5, 330.0), None, False),
+        ("behind a nearer one", (600.0, 300.0, 640.0, 330.0), (630.0, 290.0, 700.0, 350.0), False),
+        ("before a farther one", (600.0, 300.0, 640.0, 330.0), (630.0, 290.0, 700.0, 325.0), True),
+        ("beside a nearer one", (600.0, 300.0, 640.0, 330.0), (650.0, 290.0, 700.0, 350.0), True),
+    ],
+)
+def test_the_aspect_is_that_of_boxes_that_show_the_whole_width(
+    case: str, box: Box, other: Box | None, known: bool
+) -> None:
+    camera = _camera()
+    boxes = tuple(Detection(each, "car", 0.9) for each in (box, other) if each is not None)
+    aspect = measure(boxes, _pinhole(camera), camera, DistanceParams())[0].aspect
+    assert aspect == (pytest.approx(math.log(30 / (box[2] - box[0]))) if known else None), case
 
 
 def test_order_and_number_are_kept() -> None:

@@ -62,6 +62,25 @@ def test_a_growing_box_is_a_closing_speed() -> None:
     assert math.hypot(*place_filter.position(state)) == pytest.approx(30.0, rel=0.02)
 
 
+def test_the_error_of_a_closing_speed_is_as_large_as_it_says() -> None:
+    """A parked car approached at 10 m/s, its box off by 2 px in every image and too small by a tenth for good."""
+    rng, off = np.random.default_rng(3), []
+    for _ in range(40):
+        images = []
+        for k in range(15):
+            range_m = 45.0 - k
+            tall = 721.0 * 1.5 / (1.1 * range_m) + rng.normal(0.0, 2.0)
+            images.append([seen(721.0 * 1.5 / tall, height_px=tall)])
+        shown = [tracks[0] for tracks in follow(images)]
+        first, last = shown[2], shown[-1]
+        assert first.speed_sigma_mps is not None
+        assert last.speed_sigma_mps is not None
+        assert last.velocity_mps is not None
+        assert last.speed_sigma_mps < 0.5 * first.speed_sigma_mps
+        off.append((last.velocity_mps[0] + 10.0) / last.speed_sigma_mps)
+    assert 0.4 < np.sqrt(np.mean(np.square(off))) < 1.5
+
+
 def test_a_small_box_does_not_become_its_neighbour() -> None:
     """Parked cars 55 m away, 30 px apart: when one is missed for three images, its number does not go to the next."""
     left, right = (lambda k: seen(55.0 - k, 560.0)), (lambda k: seen(55.0 - k, 590.0))

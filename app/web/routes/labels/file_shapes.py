@@ -27,6 +27,8 @@ class VersionJson(ApiModel):
     """Labelled vehicles."""
     frames: int
     """That have a label."""
+    signed_by: str
+    """Public key that it is signed with, hexadecimal; empty where it is not signed"""
 
 
 class NewVersion(Strict):

@@ -8,6 +8,8 @@ from pydantic import BaseModel, Field
 
 
 class FileValue(BaseModel):
+    """One named attribute."""
+
     name: str = ""
     """Which attribute this is, such as ``origin``."""
     val: Any = None
@@ -17,6 +19,8 @@ class FileValue(BaseModel):
 
 
 class FileShape(BaseModel):
+    """One named geometry."""
+
     val: list[float]
     """Cuboid: centre, rotation and size as 9 or 10 numbers. Box: centre and size in pixels. Polyline: x, y, z in
     turn."""
@@ -27,6 +31,8 @@ class FileShape(BaseModel):
 
 
 class Data(BaseModel):
+    """Attributes and geometries of an element."""
+
     text: list[FileValue] = Field(default_factory=list)
     """Attributes with strings."""
     num: list[FileValue] = Field(default_factory=list)
@@ -41,10 +47,13 @@ class Data(BaseModel):
     """Polylines, such as the ego lane's borders."""
 
     def said(self, name: str) -> Any:
+        """The value of an attribute by its name; None where the file does not give it."""
         return next((each.val for each in (*self.text, *self.num, *self.boolean) if each.name == name), None)
 
 
 class FileInterval(BaseModel):
+    """A range of frames."""
+
     frame_start: int
     """First frame number."""
     frame_end: int
@@ -52,6 +61,8 @@ class FileInterval(BaseModel):
 
 
 class Agent(BaseModel):
+    """A reference from a relation to an element."""
+
     type: str = "object"
     """What kind of element ``uid`` refers to."""
     uid: str
@@ -59,6 +70,8 @@ class Agent(BaseModel):
 
 
 class Element(BaseModel):
+    """An object, action, event, context or relation over the whole file."""
+
     name: str = ""
     """For people to read; elements are identified by their key."""
     type: str = ""
@@ -80,16 +93,22 @@ class Element(BaseModel):
 
 
 class InFrame(BaseModel):
+    """An object in one frame."""
+
     object_data: Data = Field(default_factory=Data)
     """What holds of the object in this frame alone."""
 
 
 class FileProperties(BaseModel):
+    """What a file says of a frame itself."""
+
     timestamp: str | float | None = None
     """Text or seconds, as the writer chose; None where frames are only numbered."""
 
 
 class FileFrame(BaseModel):
+    """One frame of the file."""
+
     objects: dict[str, InFrame] = Field(default_factory=dict)
     """What each object is in this frame, by the object's key."""
     frame_properties: FileProperties = Field(default_factory=FileProperties)
@@ -97,11 +116,15 @@ class FileFrame(BaseModel):
 
 
 class FilePose(BaseModel):
+    """Where a coordinate system is in its parent."""
+
     matrix4x4: list[float] | None = None
     """16 numbers, row by row: takes points of the system to its parent."""
 
 
 class System(BaseModel):
+    """A coordinate system, such as the ego frame or a camera."""
+
     parent: str = ""
     """Name of the system that the pose refers to; empty for the root."""
     pose_wrt_parent: FilePose | None = None
@@ -109,6 +132,8 @@ class System(BaseModel):
 
 
 class FileContent(BaseModel):
+    """Everything below the root of the file."""
+
     metadata: dict[str, Any]
     """Version of the schema and where the file comes from."""
     objects: dict[str, Element] = Field(default_factory=dict)
@@ -128,5 +153,7 @@ class FileContent(BaseModel):
 
 
 class File(BaseModel):
+    """A whole file."""
+
     openlabel: FileContent
     """The root that the standard demands."""

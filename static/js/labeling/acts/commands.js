@@ -13,7 +13,7 @@ import * as span from "../state/marked_frames.js";
 
 /** @typedef {import("../state/types.js").LabelTrack} LabelTrack */
 /** @typedef {import("../state/types.js").ItemRef} ItemRef */
-/** @typedef {"unlabelled"|"disagreement"|"proposed"|"sent_back"|"unreviewed"} Wanted */
+/** @typedef {"unlabelled"|"asked"|"disagreement"|"proposed"|"sent_back"|"unreviewed"} Wanted */
 
 /** Show a status message. @param {string} words */
 export const say = (words) => set("said", words);

@@ -7,7 +7,9 @@ import { over, span } from "../state/marked_frames.js";
 
 /** States that all vehicles in a frame are labelled (WHOLE_TAG in pipeline/labels/model.py). */
 export const WHOLE_TAG = "all labelled";
-export const KNOWN_TAGS = [WHOLE_TAG, "night", "rain", "snow", "fog", "glare", "sensor dirty", "tunnel"];
+/** Asks for labels of frames (NEXT_TAG in pipeline/labels/model.py). */
+export const NEXT_TAG = "label next";
+export const KNOWN_TAGS = [WHOLE_TAG, NEXT_TAG, "night", "rain", "snow", "fog", "glare", "sensor dirty", "tunnel"];
 
 /** Add a tag to the marked frames, or remove it. @param {string} tag @param {boolean} isOn */
 export const tagFrames = (tag, isOn) => over((frames) => act({ kind: "tag", ...frames, tag, on: isOn }));

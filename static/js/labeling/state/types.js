@@ -142,6 +142,7 @@
  * @property {number} t_unix_ms
  * @property {number} tracks
  * @property {number} frames
+ * @property {string} signed_by public key, empty where it is not signed
  * @typedef {object} Score
  * @property {number} revision
  * @property {number} run

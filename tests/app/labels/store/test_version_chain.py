@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
-from sqlalchemy import delete, update
+from sqlalchemy import delete, select, update
 
 from app.labels.errors import ActRefused
 from app.labels.store.drive_labels import DriveLabels
 from app.labels.store.tables import VersionRow
+from app.labels.store.version_chain import _sha256
+from pipeline.common.signing import PUBLIC_VARIABLE, SIGNING_VARIABLE, new_keys
 from tests.app.labels.doing import add
 
 
@@ -47,3 +51,43 @@ def test_those_from_before_there_was_a_chain_are_taken_as_they_are(frozen: Drive
     with frozen._database.writing() as connection:
         connection.execute(update(VersionRow).where(mine).values(previous="", sha256=""))
     assert len(frozen.label_set("second").tracks) == 2
+
+
+def test_a_signed_version_is_refused_once_it_was_changed_and_its_chain_built_again(
+    labels: DriveLabels, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    public, key = new_keys(tmp_path / "key")
+    monkeypatch.setenv(SIGNING_VARIABLE, str(tmp_path / "key"))
+    add(labels)
+    assert labels.freeze("first", "Ada").signed_by == key
+    assert [version.signed_by for version in labels.versions()] == [key]
+    monkeypatch.delenv(SIGNING_VARIABLE)
+    monkeypatch.setenv(PUBLIC_VARIABLE, str(public))
+    assert len(labels.label_set("first").tracks) == 1
+    mine = VersionRow.drive_id == labels._id
+    with labels._database.writing() as connection:
+        row = connection.execute(select(VersionRow.__table__).where(mine)).mappings().one()
+        forged = {**row, "person": "Bob"}
+        again = {"person": "Bob", "sha256": _sha256(forged, row["previous"])}
+        connection.execute(update(VersionRow).where(mine).values(again))
+    with pytest.raises(ActRefused, match="the signature does not match"):
+        labels.label_set("first")
+    with labels._database.writing() as connection:
+        connection.execute(update(VersionRow).where(mine).values(signature="", signed_by=""))
+    with pytest.raises(ActRefused, match="not signed"):
+        labels.label_set("first")
+    monkeypatch.delenv(PUBLIC_VARIABLE)
+    assert len(labels.label_set("first").tracks) == 1, "without a key to expect, one that is not signed is read"
+
+
+def test_one_that_another_key_signed_is_refused(
+    labels: DriveLabels, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    new_keys(tmp_path / "theirs")
+    ours, _ = new_keys(tmp_path / "ours")
+    monkeypatch.setenv(SIGNING_VARIABLE, str(tmp_path / "theirs"))
+    add(labels)
+    labels.freeze("first", "Ada")
+    monkeypatch.setenv(PUBLIC_VARIABLE, str(ours))
+    with pytest.raises(ActRefused, match="the signature does not match"):
+        labels.label_set("first")

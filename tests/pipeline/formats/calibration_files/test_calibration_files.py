@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import yaml
@@ -140,3 +141,35 @@ def test_a_file_of_something_else_is_refused(tmp_path: Path):
     file.write_text("%YAML:1.0\n---\nimage_width: 640\n")
     with pytest.raises(SourceError, match="no camera_matrix"):
         FORMATS["opencv"].read(file, None)  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("camera_matrix: !!opencv-matrix\n  rows: 3000000\n  cols: 3\n  dt: d\n  data: [1]\n", "not a matrix"),
+        ("camera_matrix: !!opencv-matrix\n  rows: 3\n  cols: 3\n  dt: d\n  data: [1, 2]\n", "not a matrix"),
+        ("camera_matrix: !!opencv-matrix\n  rows: .inf\n  cols: 3\n  dt: d\n  data: [1, 2]\n", "not a matrix"),
+        ("camera_matrix: 5\n", "not a matrix"),
+        ("- a\n", "not an OpenCV FileStorage file"),
+        ("a: [\n", "not YAML"),
+    ],
+)
+def test_a_damaged_file_of_opencv_is_said_in_a_sentence(text: str, said: str, tmp_path: Path):
+    file = tmp_path / "a.yaml"
+    file.write_text("%YAML:1.0\n---\n" + text)
+    with pytest.raises(SourceError, match=said):
+        FORMATS["opencv"].read(file, None)  # type: ignore[misc]
+
+
+def test_no_file_is_given_to_opencvs_own_parser(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """It writes beyond its memory: 300 damaged calibrations were enough to end the process."""
+    path, made = written("opencv", BENT, tmp_path), cv2.FileStorage
+
+    def only_written(name: str, flags: int) -> cv2.FileStorage:
+        assert flags & cv2.FILE_STORAGE_WRITE
+        return made(name, flags)
+
+    monkeypatch.setattr(cv2, "FileStorage", only_written)
+    read = FORMATS["opencv"].read
+    assert read is not None
+    same(read(path, None), BENT)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -11,11 +12,13 @@ import av
 import numpy as np
 import pytest
 
+from pipeline.formats import video_file
 from pipeline.sources.live.config import LiveConfig
-from pipeline.sources.live.devices.device_reader import DeviceLost
-from pipeline.sources.live.devices.video_stream import device_number
+from pipeline.sources.live.devices.device_reader import DeviceLost, ReaderStop
+from pipeline.sources.live.devices.video_stream import device_number, play_file, read_stream
 from pipeline.sources.live.source import LiveSensors
 from pipeline.types import Frame
+from pipeline.types.camera_shot import Shot
 from tests.pipeline.sources.live.rig import frames_until, opened
 
 
@@ -75,6 +78,26 @@ def test_video_over_http_is_a_camera_too(sensors: list[LiveSensors], tmp_path: P
             thread.join()
     assert frame.image is not None
     assert frame.image.bgr.shape == (48, 64, 3)
+
+
+@pytest.mark.parametrize("read", [read_stream, play_file])
+def test_images_larger_than_a_cameras_are_refused_in_streams_too(
+    read: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "drive.mp4"
+    film(path, 3)
+    shots: list[Shot] = []
+
+    def first() -> None:
+        stop = ReaderStop()
+        read(path if read is play_file else str(path), lambda shot: (shots.append(shot), stop.set()), stop)
+
+    first()
+    assert len(shots) == 1
+    monkeypatch.setattr(video_file, "MOST_PIXELS", 64 * 48 - 1)
+    with pytest.raises(DeviceLost):
+        first()
+    assert len(shots) == 1
 
 
 def test_a_camera_that_is_not_plugged_in_is_said(sensors: list[LiveSensors]) -> None:

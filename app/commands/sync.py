@@ -1,0 +1,100 @@
+"""`cipv sync`: copy finished sessions from a car to a store."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from app.commands.info import size_text
+from app.commands.support.arguments import option
+from app.commands.support.progress_bars import bytes_progress, task_progress
+from app.core.session_folder import SESSIONS
+from pipeline.common.errors import BadInput
+from pipeline.common.progress import Progress
+from pipeline.common.user_files import Overloaded
+
+if TYPE_CHECKING:
+    from app.fleet.sync.sync import SyncTally
+
+
+@dataclass(frozen=True)
+class SyncSessions:
+    """Copy finished sessions to a folder or store: clips of events first, then whole sessions, the oldest first. What
+    is there already is not sent again, and an interrupted copy is continued.
+
+    Example: cipv sync s3://fleet/car-7 --limit 1.5
+    """
+
+    address: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ADDRESS")]
+    """Where to: a folder, or an address in a store (s3://, gs://, az://); one for each car"""
+    folder: Annotated[Path, tyro.conf.arg(name="from", metavar="DIR")] = SESSIONS
+    """The folder of sessions"""
+    limit: Annotated[float | None, option("MB")] = None
+    """Send at most so many megabytes per second"""
+    clips: bool = True
+    """Send clips of events first"""
+    events: Literal["info", "notice", "warning", "alarm"] = "warning"
+    """The mildest events that get a clip; marks always do"""
+    around: Annotated[float, tyro.conf.arg(metavar="S")] = 5.0
+    """Seconds before and after an event that belong to its clip"""
+    json: bool = False
+    """Print what was done as JSON"""
+
+    def __call__(self) -> int:
+        from app.fleet.store import Store
+        from app.fleet.sync.sending import StoreFailed
+        from app.fleet.sync.sync import Sync, SyncOptions, SyncTally
+
+        if self.limit is not None and not self.limit > 0.0:
+            raise BadInput(f"--limit {self.limit:g}: expected more than 0")
+        if not 0.0 <= self.around <= 3600.0:
+            raise BadInput(f"--around {self.around:g}: expected 0 to 3600")
+        limit_bytes = self.limit * 1e6 if self.limit is not None else None
+        options = SyncOptions(self.clips, self.events, self.around, limit_bytes)
+        start, stopped = time.monotonic(), ""
+        with bytes_progress() as bar:
+
+            def begin(what: str, size: int) -> Progress:
+                for task in bar.tasks:
+                    bar.remove_task(task.id)
+                return task_progress(bar, what, size)
+
+            tally = SyncTally()
+            try:
+                Sync(self.folder, Store(self.address), options, begin, tally).run()
+            except (StoreFailed, Overloaded) as error:
+                stopped = str(error)
+        self._tell(tally, time.monotonic() - start, stopped)
+        return 1 if stopped or tally.failed else 0
+
+    def _tell(self, tally: SyncTally, seconds: float, stopped: str) -> None:
+        if self.json:
+            said = {
+                "sessions": tally.sessions,
+                "clips": tally.clips,
+                "bytes": tally.bytes,
+                "sessions_before": tally.before,
+                "unfinished": tally.unfinished,
+                "without_clips": tally.notes,
+                "failed": tally.failed,
+                "stopped": stopped or None,
+                "seconds": round(seconds, 1),
+            }
+            print(json.dumps(said, indent=1, ensure_ascii=False))
+        for name in tally.unfinished:
+            print(f"cipv: {name}: still being recorded, or cut off (`cipv recover`); not copied", file=sys.stderr)
+        for name, reason in (*tally.notes.items(), *tally.failed.items()):
+            print(f"cipv: {name}: {reason}", file=sys.stderr)
+        if stopped:
+            print(f"cipv: {stopped}; the next `cipv sync` continues", file=sys.stderr)
+        print(
+            f"cipv: {tally.sessions} sessions and {tally.clips} clips sent, {size_text(tally.bytes)} in "
+            f"{seconds:.0f} s; {tally.before} sessions sent before",
+            file=sys.stderr,
+        )

@@ -1,0 +1,1 @@
+"""Copies finished sessions from a car to a store: what happened first, then everything, oldest first."""

@@ -1,0 +1,39 @@
+"""Limits how often the server's libraries log the same line: clients decide how often that happens.
+
+Without descriptors asyncio reports each connection that it cannot accept with a traceback, thousands a second, and
+uvicorn each request that is none: logs would fill the disk that recordings are on.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+
+PERIOD_S = 60.0
+LOGGERS = ("asyncio", "uvicorn.error")
+_MOST_KNOWN = 200
+
+
+class OncePerPeriod(logging.Filter):
+    """Drops a text that was logged in the last ``PERIOD_S``, and any beyond 200 texts in that time."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._said_s: dict[str, float] = {}
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        text, now_s = record.getMessage(), time.monotonic()
+        self._said_s = {each: at_s for each, at_s in self._said_s.items() if now_s - at_s < PERIOD_S}
+        if text in self._said_s or len(self._said_s) >= _MOST_KNOWN:
+            return False
+        self._said_s[text] = now_s
+        return True
+
+
+_ONCE = OncePerPeriod()
+
+
+def limit_logs() -> None:
+    """For this process; safe to call again."""
+    for name in LOGGERS:
+        logging.getLogger(name).addFilter(_ONCE)

@@ -1,0 +1,54 @@
+/** The table of the Fleet view. */
+import { $, el } from "../core/dom.js";
+
+/** Columns whose names say too little. @type {Record<string, string>} */
+const TITLES = { t_s: "time (s)", index: "frame" };
+/** How names of columns end, and the units that they name. @type {[string, string][]} */
+const UNITS = [
+  ["_mps", "m/s"],
+  ["_sigmas", "σ"],
+  ["_s", "s"],
+  ["_m", "m"],
+];
+/** Not shown: the drive's name says it. */
+const HIDDEN = new Set(["address"]);
+const LEFT = new Set(["drive", "kind", "text", "title", "source", "type"]);
+
+/**
+ * @param {{columns: string[], rows: any[][]}} found
+ * @param {(row: Record<string, any>) => void} onOpen @param {(column: string) => void} onSort
+ * @param {{order: string, descending: boolean}} sorted
+ */
+export function showRows(found, onOpen, onSort, sorted) {
+  const shown = found.columns.filter((name) => !HIDDEN.has(name));
+  const heads = shown.map((name) => {
+    const [ending, unit] = UNITS.find(([each]) => name.endsWith(each)) ?? ["", ""];
+    const plain = name.slice(0, name.length - ending.length).replaceAll("_", " ");
+    const words = TITLES[name] ?? (unit ? `${plain} (${unit})` : plain);
+    const button = el("button", { type: "button", textContent: words, title: "Sort", onclick: () => onSort(name) });
+    const head = el("th", { class: LEFT.has(name) ? "left" : "", scope: "col" }, button);
+    if (name === sorted.order) head.ariaSort = sorted.descending ? "descending" : "ascending";
+    return head;
+  });
+  $("#fleet-rows thead").replaceChildren(el("tr", {}, ...heads));
+  const rows = found.rows.map((values) => {
+    const row = Object.fromEntries(found.columns.map((name, place) => [name, values[place]]));
+    const cells = shown.map((name) => {
+      return el("td", { class: LEFT.has(name) ? "left" : "", textContent: cell(name, row[name]) });
+    });
+    const line = el("tr", { tabIndex: 0, title: `Open ${row.address}` }, ...cells);
+    line.addEventListener("click", () => onOpen(row));
+    line.addEventListener("keydown", (event) => {
+      if (event.key === "Enter") onOpen(row);
+    });
+    return line;
+  });
+  $("#fleet-rows tbody").replaceChildren(...rows);
+}
+
+/** @param {string} name @param {any} value */
+function cell(name, value) {
+  if (value === null) return "–";
+  if (typeof value === "boolean") return value ? "yes" : "no";
+  return typeof value === "number" && UNITS.some(([each]) => name.endsWith(each)) ? value.toFixed(2) : String(value);
+}

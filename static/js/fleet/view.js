@@ -1,0 +1,186 @@
+/**
+ * The Fleet view: events, frames, objects or drives of a whole fleet, filtered and counted. A press on a row opens that
+ * moment in the dashboard. Filters stay while the page is open.
+ */
+import { newestOnly, request } from "../core/api.js";
+import { $, el, memory } from "../core/dom.js";
+import { goTo } from "../workspace/share_link.js";
+import { histogram, showKinds } from "./charts.js";
+import { CHARTS, condition, filters, setRange, toggleKind, toggleNamed, toggleTable } from "./filters.js";
+import { showRows } from "./rows.js";
+
+/**
+ * @typedef {object} Fleet
+ * @property {string|null} address
+ * @property {string[]} runs
+ * @property {string[]} kinds
+ * @property {Record<string, string>} named
+ */
+
+const TABLES = /** @type {const} */ (["events", "frames", "objects", "drives"]);
+const dialog = $("#fleet-dialog", HTMLDialogElement);
+/** @type {Fleet|null} */
+let fleet = null;
+
+export function setUp() {
+  $("#fleet-button").addEventListener("click", open);
+}
+
+async function open() {
+  fleet = await request("api/fleet").catch(() => null);
+  if (!fleet?.address) return showHint();
+  if (!filters.run || !fleet.runs.includes(filters.run)) filters.run = fleet.runs[0];
+  build();
+  dialog.showModal();
+  $("#fleet-where").focus();
+  await load();
+}
+
+function showHint() {
+  dialog.classList.remove("is-full");
+  dialog.replaceChildren(
+    el("h2", { textContent: "No fleet is open" }),
+    el(
+      "p",
+      {},
+      "Start the dashboard with the folder of a batch: ",
+      el("code", { textContent: "cipv serve SOURCE --fleet DIR" }),
+    ),
+    el("form", { class: "dialog-buttons", method: "dialog" }, el("button", { textContent: "Close" })),
+  );
+  dialog.showModal();
+}
+
+/** The dialog's parts; `load` fills them. */
+function build() {
+  const known = /** @type {Fleet} */ (fleet);
+  dialog.classList.add("is-full");
+  const tabs = TABLES.map((name) => {
+    const button = el("button", { type: "button", textContent: name, data: { of: name }, aria: { role: "tab" } });
+    button.addEventListener("click", () => changed(() => toggleTable(name)));
+    return button;
+  });
+  const runs = el(
+    "select",
+    { aria: { label: "Run" }, title: "Run" },
+    ...known.runs.map((name, place) => el("option", { value: name, textContent: place ? name : `${name} (last)` })),
+  );
+  runs.value = filters.run;
+  runs.addEventListener("change", () => changed(() => (filters.run = runs.value)));
+  const typed = el("input", {
+    type: "search",
+    id: "fleet-where",
+    value: filters.where,
+    placeholder: "SQL condition, such as min_ttc_s < 1.5 and speed_mps > 20",
+    spellcheck: false,
+    aria: { label: "Condition" },
+  });
+  typed.addEventListener("change", () => changed(() => (filters.where = typed.value)));
+  dialog.replaceChildren(
+    el(
+      "div",
+      { class: "fleet-bar" },
+      el("h2", { textContent: "Fleet" }),
+      el("code", { class: "facts", textContent: known.address ?? "" }),
+      runs,
+      el("div", { class: "tabs", aria: { role: "tablist", label: "Table" } }, ...tabs),
+      el("span", { class: "spacer" }),
+      el("span", { id: "fleet-facts", class: "facts", aria: { role: "status" } }),
+      el("button", { type: "button", textContent: "Clear filters", onclick: clear }),
+      el("form", { method: "dialog" }, el("button", { textContent: "Close" })),
+    ),
+    el("div", { class: "fleet-bar" }, typed),
+    el("p", { id: "fleet-problem", class: "fleet-problem", hidden: true, aria: { role: "alert" } }),
+    el("div", { id: "fleet-kinds", class: "chips fleet-chips", aria: { role: "group", label: "Kinds of event" } }),
+    el("div", { id: "fleet-charts", class: "fleet-charts" }),
+    el(
+      "div",
+      { class: "fleet-rows", tabIndex: -1 },
+      el("table", { id: "fleet-rows", class: "objects" }, el("thead"), el("tbody")),
+    ),
+  );
+}
+
+function clear() {
+  const field = $("#fleet-where", HTMLInputElement);
+  field.value = "";
+  changed(() => {
+    filters.where = "";
+    filters.kinds.clear();
+    filters.named.clear();
+    filters.ranges.clear();
+  });
+}
+
+/** Change the filters, and ask again. @param {() => unknown} change */
+function changed(change) {
+  change();
+  memory.write("fleet.of", filters.of);
+  load();
+}
+
+const load = newestOnly(async (/** @type {void} */ _) => {
+  const { of, run } = filters;
+  dialog.ariaBusy = "true";
+  for (const tab of dialog.querySelectorAll("[role=tab]"))
+    tab.setAttribute("aria-selected", String(/** @type {HTMLElement} */ (tab).dataset.of === of));
+  try {
+    const found = await ask("rows", { order: filters.order, descending: String(filters.descending) });
+    showRows(found, show, (column) => changed(() => sort(column)), filters);
+    const more = found.total > found.rows.length ? `, the first ${found.rows.length} shown` : "";
+    $("#fleet-facts").textContent = `${found.total.toLocaleString("en")} ${of}${more} · run ${run}`;
+    await loadCharts();
+    problem("");
+  } catch (error) {
+    problem(/** @type {Error} */ (error).message);
+  }
+  dialog.ariaBusy = "false";
+});
+
+async function loadCharts() {
+  const { of } = filters;
+  const kinds = of === "events" ? await ask("counts", { column: "kind" }, { kinds: true }) : [];
+  showKinds(
+    $("#fleet-kinds"),
+    of === "events" ? /** @type {Fleet} */ (fleet) : { kinds: [], named: {} },
+    kinds,
+    (kind) => changed(() => toggleKind(kind)),
+    (name) => changed(() => toggleNamed(name)),
+    filters,
+  );
+  const boxes = [];
+  for (const chart of CHARTS[of]) {
+    const found = await ask("histogram", { column: chart.column }, { chart });
+    const onRange = (/** @type {import("./filters.js").Range} */ range) => changed(() => setRange(chart.column, range));
+    boxes.push(histogram(chart, found, filters.ranges.get(chart.column) ?? [null, null], onRange));
+  }
+  $("#fleet-charts").replaceChildren(...boxes);
+}
+
+/**
+ * @param {string} what @param {Record<string, string>} more
+ * @param {Parameters<typeof condition>[0]} [without]
+ */
+function ask(what, more, without = {}) {
+  const query = new URLSearchParams({ of: filters.of, run: filters.run, where: condition(without), ...more });
+  return request(`api/fleet/${what}?${query}`);
+}
+
+/** @param {string} column */
+function sort(column) {
+  filters.descending = filters.order === column ? !filters.descending : false;
+  filters.order = column;
+}
+
+/** Open a row's moment. @param {Record<string, any>} row */
+function show(row) {
+  dialog.close();
+  goTo(row.address, row.index ?? 0);
+}
+
+/** @param {string} words empty: none */
+function problem(words) {
+  const line = $("#fleet-problem");
+  line.textContent = words;
+  line.hidden = !words;
+}
