@@ -21,7 +21,7 @@ PAGES = {"/": "#notices", "/drive/": "#notes"}
 
 @pytest.fixture
 def on_a_slow_disk() -> Iterator[tuple[Site, Recording]]:
-    recording = Recording()
+    recording = Recording(count=20_000)  # not read to its end before the disk hangs: what is in memory needs no disk
     watchdog = Watchdog(patience_s=0.2, first_s=2.0)
     engine = Engine(
         opener(recording), lambda _: CountingDetector(), Params(), uri=recording.uri, playing=True, watchdog=watchdog

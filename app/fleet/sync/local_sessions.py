@@ -37,12 +37,20 @@ class LocalSessions:
 
 
 class SessionFolder:
-    """A folder that sessions are recorded to. What a finished file begins with is read once."""
+    """A folder that sessions are recorded to. What a finished file begins with is read once.
 
-    def __init__(self, folder: Path) -> None:
+    Args:
+        folder: see above.
+        except_in: a folder whose files are left out, such as one that they are copied to.
+    """
+
+    def __init__(self, folder: Path, except_in: Path | None = None) -> None:
         if not folder.is_dir():
             raise BadInput(f"{folder}: no such folder")
-        self._folder = folder
+        self._folder = folder.resolve()
+        self._except_in = except_in.resolve() if except_in is not None else None
+        if self._except_in == self._folder:
+            raise BadInput(f"{folder}: cannot be copied into itself; give another folder or a store")
         self._known: dict[tuple[Path, int, int], LocalSession] = {}
 
     def look(self) -> LocalSessions:
@@ -51,6 +59,8 @@ class SessionFolder:
         for file in self._folder.rglob("*.mcap"):
             name = file.relative_to(self._folder).with_suffix("").as_posix()
             if any(part.startswith(".") for part in name.split("/")):
+                continue
+            if self._is_left_out(file):
                 continue
             try:
                 session = self._session(file, name)
@@ -63,6 +73,11 @@ class SessionFolder:
             else:
                 finished.append(session)
         return LocalSessions(tuple(sorted(finished)), tuple(sorted(unfinished)))
+
+    def _is_left_out(self, file: Path) -> bool:
+        """What lies around this folder leaves nothing out."""
+        inner = self._except_in
+        return inner is not None and inner.is_relative_to(self._folder) and file.is_relative_to(inner)
 
     def _session(self, file: Path, name: str) -> LocalSession | None:
         """None for a file that is not finished."""

@@ -78,7 +78,8 @@ class Sync:
 
     def __init__(self, folder: Path, store: Store, options: SyncOptions, begin: Begin, tally: SyncTally) -> None:
         self.tally = tally
-        self._folder, self._store, self._options, self._begin = SessionFolder(folder), store, options, begin
+        self._folder = SessionFolder(folder, except_in=store.folder)
+        self._store, self._options, self._begin = store, options, begin
         self._send, self._pace = sender(store).send, Pace(options.bytes_per_s)
         self._there = store.sizes("")
 

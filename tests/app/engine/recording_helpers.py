@@ -76,7 +76,7 @@ class SlowDetector(CountingDetector):
 
 
 class Recording:
-    """``gate``: cleared, reading a frame waits (at most 20 s); ``reading``: set when one begins;
+    """``gate``: cleared, reading a frame waits; ``reading``: set when one begins;
     ``broken``: frames that cannot be read."""
 
     rate_hz = 10.0

@@ -34,7 +34,9 @@ def address(log: Path) -> Iterator[str]:
             yield address
 
 
-def entries(log: Path) -> list[dict[str, Any]]:
+def entries(log: Path, count: int) -> list[dict[str, Any]]:
+    """What stands in it as soon as ``count`` entries do: one is written after its answer has left."""
+    assert wait_until(lambda: log.exists() and log.read_text(encoding="utf-8").count("\n") >= count)
     return [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()]
 
 
@@ -55,7 +57,7 @@ def test_what_a_browser_saves_as_a_file_is_logged_and_what_it_shows_is_not(addre
         )  # fmt: skip
         for path in files:
             assert person.get(path).status_code == 200
-    said = entries(log)
+    said = entries(log, 1 + len(files))
     assert [(each["method"], each["path"]) for each in said] == [("POST", "/api/clip"), *(("GET", it) for it in files)]
     assert {(each["role"], each["status"], each["client"]) for each in said[1:]} == {("person", 200, "127.0.0.1")}
 
@@ -66,7 +68,7 @@ def test_what_is_opened_and_changed_is_logged_with_who_did_it_and_no_token(addre
         person.post("/api/source", json={"uri": "test:car"}, params={"token": TOKENS.person})
         person.delete("/api/marks/999")
         display.delete("/api/marks/1")
-    said = entries(log)
+    said = entries(log, 3)
     assert [(each["role"], each["method"], each["path"], each["status"]) for each in said] == [
         ("display", "POST", "/api/marks", 201),
         ("person", "POST", "/api/source", 202),
@@ -83,7 +85,7 @@ def test_the_3d_view_whose_controls_change_parameters_is_logged_when_it_is_opene
         stream.recv(WAIT_S)
     own = {"subprotocols": [Subprotocol("viser-v1")], "open_timeout": WAIT_S}
     with connect(f"{url}/viser/of/abc", additional_headers=headers, **own):
-        (entry,) = entries(log)
+        (entry,) = entries(log, 1)
     assert (entry["role"], entry["method"], entry["path"]) == ("person", "WEBSOCKET", "/viser/of/abc")
 
 

@@ -14,6 +14,7 @@ from tests.browser.looks import box_of, pixels, repainted
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 SCREENS = Path(__file__).resolve().parents[3] / "build" / "screens"
 CAR = {"center": [LEAD_X, 0.0, 0.1], "size": [4.4, 1.8, 1.5], "yaw_rad": 0.0}
+SOON_MS = 30_000
 LOADED = "(image) => image.complete && image.naturalWidth > 0"
 
 
@@ -127,7 +128,7 @@ def test_the_selected_row_is_in_view_and_the_mode_survives_a_reload(hand: Hand, 
         hand.keys(",")
     selected = page.locator(".track-row[aria-selected=true]")
     expect(selected).to_have_attribute("data-id", str(made[-2]))
-    expect(selected).to_be_in_viewport()
+    expect(selected).to_be_in_viewport(timeout=SOON_MS)  # later, the detail pane may have brought it
     page.set_viewport_size({"width": 1280, "height": 720})
     SCREENS.mkdir(parents=True, exist_ok=True)
     page.screenshot(path=SCREENS / "labeling_30_vehicles.png")

@@ -99,9 +99,9 @@ export function setUp(parent) {
   }
 }
 
-/** The selected row; again when the details below it take its place. */
+/** The selected row; again when the details below it take its place. Out of sight, it does not know yet that it is. */
 function bringIntoView() {
-  body.querySelector("[aria-selected=true]")?.scrollIntoView({ block: "nearest" });
+  list.rowOf(get("track") ?? -1)?.scrollIntoView({ block: "nearest" });
 }
 
 /** The threshold and what it leaves, while there are proposals it applies to. */

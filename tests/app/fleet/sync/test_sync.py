@@ -19,6 +19,7 @@ from app.fleet.sync.s3_parts import PART_BYTES
 from app.fleet.sync.sending import BLOCK_BYTES, sender
 from app.fleet.sync.sync import Sync, SyncOptions, SyncTally
 from pipeline.common import remote_files
+from pipeline.common.errors import BadInput
 from pipeline.common.progress import silent
 from pipeline.recording.session.source import SessionSource
 from tests.app.fleet.s3 import BUCKET, Unsteady, s3_server
@@ -83,6 +84,17 @@ def check(car: Path, address: str) -> None:
 
 def test_to_a_folder(car: Path, tmp_path: Path):
     check(car, str(tmp_path / "nas"))
+
+
+def test_copies_below_the_folder_of_sessions_are_not_copied_again(car: Path):
+    check(car, str(car / "copies"))
+    with pytest.raises(BadInput, match="into itself"):
+        synced(car, str(car))
+
+
+def test_to_a_folder_around_that_of_sessions(car: Path):
+    _, begun = synced(car, str(car.parent), clips=False)
+    assert [what for what, _ in begun] == ["may/b", "a"]
 
 
 def test_to_s3_whose_requests_fail(car: Path, monkeypatch: pytest.MonkeyPatch):
