@@ -15,10 +15,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from pipeline.common import kalman
+from pipeline.lidar import divide_kernels as kernels
 from pipeline.lidar.cluster import WIDEST_M
 from pipeline.params import ClusterParams
 from pipeline.types import F32, F64, I32, I64, LidarTrack, Mask
@@ -31,8 +31,6 @@ reference point at up to 1–2 m/s."""
 _GAP_M = 0.3
 """Neighbouring returns of one surface are nearer: along a ring of a VLP-16 0.1 m at 28 m, twice that where it is
 thinned out."""
-_AROUND_M = 0.3
-"""Returns so far outside of an expected footprint are its own: two standard deviations of a cluster's position."""
 _DIRECTIONS = np.radians(np.arange(0.0, 180.0, 5.0))
 _LEAST_SEEDS = 2
 """One return may be a stray one."""
@@ -73,12 +71,12 @@ def divide(
         return labels
     expected = _expect([tracks[n] for n in known], filters.cov[known], dt_s)
     # only clusters that reach to two tracks, and those that these tracks have besides
-    reached = _reached(points, labels, expected.footprints, count)
+    reached = kernels.reach_clusters(points, labels, expected.footprints, count)
     involved = np.any(reached[:, reached.sum(axis=0) >= 2], axis=1, keepdims=True)
     if not np.any(involved):
         return labels
-    owner = _owners(points, labels, expected.footprints, reached & involved)
-    seeds = _counted(labels, owner, len(known), count)
+    owner = kernels.find_owners(points, labels, expected.footprints, reached & involved)
+    seeds = kernels.count_seeds(labels, owner, len(known), count)
     pieces, parts = labels.copy(), []
     for which in np.flatnonzero((seeds >= _LEAST_SEEDS).sum(axis=0) >= 2).tolist():
         present = np.flatnonzero(seeds[:, which] >= _LEAST_SEEDS)
@@ -96,7 +94,7 @@ def _homed(pieces: I32, parts: list[list[int]], owner: I32, tracks: int, min_poi
 
     parts: numbers of the pieces of each divided cluster. What is too small for a cluster and has no home stays with its
     cluster's largest part."""
-    seeds, sizes = _counted(pieces, owner, tracks, int(pieces.max()) + 1), np.bincount(pieces[pieces >= 0])
+    seeds, sizes = kernels.count_seeds(pieces, owner, tracks, int(pieces.max()) + 1), np.bincount(pieces[pieces >= 0])
     goes_to = np.arange(len(sizes), dtype=np.int32)
     for numbers in parts:
         largest = max(numbers, key=lambda number: int(sizes[number]))
@@ -115,10 +113,12 @@ def _homed(pieces: I32, parts: list[list[int]], owner: I32, tracks: int, min_poi
 def warm_up(points: F32, labels: I32, tracks: Sequence[LidarTrack]) -> None:
     """Compile the kernels before the first frame."""
     expected = _expect(tracks, np.zeros((len(tracks), 4, 4)), 0.0)
-    owner = _owners(points, labels, expected.footprints, _reached(points, labels, expected.footprints, 1))
-    _counted(labels, owner, len(tracks), 1)
-    joined = _joined(points[:2], np.arange(2, dtype=np.int32), 1.0)
-    _gaps(points[:2], joined, 2, 1.0)
+    owner = kernels.find_owners(
+        points, labels, expected.footprints, kernels.reach_clusters(points, labels, expected.footprints, 1)
+    )
+    kernels.count_seeds(labels, owner, len(tracks), 1)
+    joined = kernels.join(points[:2], np.arange(2, dtype=np.int32), 1.0)
+    kernels.measure_gaps(points[:2], joined, 2, 1.0)
 
 
 def _expect(tracks: Sequence[LidarTrack], cov: F64, dt_s: float) -> _Expected:
@@ -146,8 +146,8 @@ def _parts(points: F32, owner: I32, present: I64, expected: _Expected, params: C
     number[present] = np.arange(len(present), dtype=np.int32)
     seeds = np.full(len(first), -1, dtype=np.int32)
     np.maximum.at(seeds, cell, number[owner])
-    part = _joined(points[first], seeds, params.z_weight)
-    gaps = _gaps(points[first], part, len(present), params.z_weight)
+    part = kernels.join(points[first], seeds, params.z_weight)
+    gaps = kernels.measure_gaps(points[first], part, len(present), params.z_weight)
     # those that neither sets apart are what they would be without the others
     together = np.where(wide, _GAP_M, params.tolerance_m)
     part = _grouped(((gaps <= together) & ~apart) | np.eye(len(present), dtype=np.bool_))[part][cell]
@@ -212,107 +212,3 @@ def _renumbered(labels: I32) -> I32:
     number = np.full(int(known.max()) + 2, -1, dtype=np.int32)  # the last for what has no cluster
     number[known[clusters][np.argsort(first[clusters])]] = np.arange(clusters.sum(), dtype=np.int32)
     return number[labels]
-
-
-@numba.njit(cache=True, nogil=True)
-def _reached(points: F32, labels: I32, footprints: F64, clusters: int) -> Mask:
-    """(T, C) bool: the clusters whose bounds along ego x and y come near each footprint's."""
-    low, high = np.full((clusters, 2), np.inf), np.full((clusters, 2), -np.inf)
-    for i in range(len(points)):
-        if labels[i] >= 0:
-            for axis in range(2):
-                low[labels[i], axis] = min(low[labels[i], axis], points[i, axis])
-                high[labels[i], axis] = max(high[labels[i], axis], points[i, axis])
-    reached = np.zeros((len(footprints), clusters), dtype=np.bool_)
-    for t in range(len(footprints)):
-        x, y, length, width, cos, sin = footprints[t]
-        along, across = length * abs(cos) + width * abs(sin), length * abs(sin) + width * abs(cos)
-        for c in range(clusters):
-            outside_x = max(low[c, 0] - x, x - high[c, 0]) - along
-            outside_y = max(low[c, 1] - y, y - high[c, 1]) - across
-            reached[t, c] = max(outside_x, outside_y) <= _AROUND_M
-    return reached
-
-
-@numba.njit(cache=True, nogil=True)
-def _owners(points: F32, labels: I32, footprints: F64, reached: Mask) -> I32:
-    """(N,) int32 the only footprint in or around which a clustered point lies, −1 for none and for several. reached:
-    (T, C) bool, the footprints to be looked at for each cluster."""
-    near = np.empty((reached.shape[1], len(footprints)), dtype=np.int32)
-    count = np.zeros(reached.shape[1], dtype=np.int32)
-    for c in range(reached.shape[1]):
-        for t in range(len(footprints)):
-            if reached[t, c]:
-                near[c, count[c]] = t
-                count[c] += 1
-    owner = np.full(len(points), -1, dtype=np.int32)
-    for i in range(len(points)):
-        if labels[i] < 0:
-            continue
-        found = 0
-        for k in range(count[labels[i]]):
-            t = near[labels[i], k]
-            x, y, length, width, cos, sin = footprints[t]
-            dx, dy = points[i, 0] - x, points[i, 1] - y
-            along, across = abs(dx * cos + dy * sin) - length, abs(dy * cos - dx * sin) - width
-            if np.hypot(max(along, 0.0), max(across, 0.0)) <= _AROUND_M:
-                owner[i] = t
-                found += 1
-        if found > 1:
-            owner[i] = -1
-    return owner
-
-
-@numba.njit(cache=True, nogil=True)
-def _counted(labels: I32, owner: I32, tracks: int, clusters: int) -> I32:
-    """(T, C) int32 how many seeds each track has in each cluster."""
-    counts = np.zeros((tracks, clusters), dtype=np.int32)
-    for i in range(len(labels)):
-        if labels[i] >= 0 and owner[i] >= 0:
-            counts[owner[i], labels[i]] += 1
-    return counts
-
-
-@numba.njit(cache=True, nogil=True)
-def _joined(points: F32, seeds: I32, z_weight: float) -> I32:
-    """(M,) int32 the group of each point: that of the seed which a minimum spanning forest joins it with (Prim).
-
-    seeds: (M,) group of each seed, −1 for the others."""
-    group = seeds.copy()
-    done = np.zeros(len(points), dtype=np.bool_)
-    step2 = np.full(len(points), np.inf)
-    for i in range(len(points)):
-        if seeds[i] >= 0:
-            step2[i] = 0.0
-    for _ in range(len(points)):
-        at, least = -1, np.inf
-        for i in range(len(points)):
-            if not done[i] and step2[i] < least:
-                at, least = i, step2[i]
-        if at < 0:
-            break
-        done[at] = True
-        for i in range(len(points)):
-            if done[i]:
-                continue
-            dx, dy = points[i, 0] - points[at, 0], points[i, 1] - points[at, 1]
-            dz = z_weight * (points[i, 2] - points[at, 2])
-            away2 = dx * dx + dy * dy + dz * dz
-            if away2 < step2[i]:
-                step2[i], group[i] = away2, group[at]
-    return group
-
-
-@numba.njit(cache=True, nogil=True)
-def _gaps(points: F32, part: I32, parts: int, z_weight: float) -> F64:
-    """(P, P) least distance between points of two parts, m."""
-    gaps = np.full((parts, parts), np.inf)
-    for i in range(len(points)):
-        for j in range(i):
-            if part[i] != part[j]:
-                dx, dy = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
-                dz = z_weight * (points[i, 2] - points[j, 2])
-                away = np.sqrt(dx * dx + dy * dy + dz * dz)
-                if away < gaps[part[i], part[j]]:
-                    gaps[part[i], part[j]] = gaps[part[j], part[i]] = away
-    return gaps

@@ -35,15 +35,8 @@ from pipeline.types.frame import (
     StreamHealth,
     Sweep,
 )
-from pipeline.types.objects import (
-    Detection,
-    FusedObject,
-    Ground,
-    LidarTrack,
-    Obstacle,
-    VisionMeasurement,
-    VisionTrack,
-)
+from pipeline.types.measurements import Detection, Ground, Obstacle, VisionMeasurement
+from pipeline.types.objects import FusedObject, LidarTrack, VisionTrack
 from pipeline.types.result import (
     DROPPED,
     GROUND,

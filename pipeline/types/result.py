@@ -10,7 +10,8 @@ import numpy as np
 from pipeline.types.arrays import F32, F64, I32, Box, PixelWindow
 from pipeline.types.frame import EgoState, Frame, OwnMotion, StreamHealth
 from pipeline.types.lane import EgoLane
-from pipeline.types.objects import FusedObject, Ground, LidarTrack, Obstacle, VisionTrack
+from pipeline.types.measurements import Ground, Obstacle
+from pipeline.types.objects import FusedObject, LidarTrack, VisionTrack
 
 PathSource = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "traffic", "fused"]
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.app.fleet.fleets import make_fleet
+from tests.app.fleet.fleets import COPIES, make_fleet
 
 
 @pytest.fixture(scope="session")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Nine sessions of eight frames, and one that is none."""
-    return make_fleet(tmp_path_factory.mktemp("fleet"), copies=3)
+    """See ``make_fleet``."""
+    return make_fleet(tmp_path_factory.mktemp("fleet"), COPIES)

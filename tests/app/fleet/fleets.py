@@ -19,11 +19,13 @@ from pipeline.sources import open_source
 CHOICE = DetectorChoice(lanes="off", far_px=None)
 DRIVES = {"near": ("sim:cut_in", 60, 67), "far": ("sim:straight", 0, 7), "left": ("sim:cut_out", 40, 47)}
 """Name → scenario, first and last frame."""
+COPIES, LENGTH = 2, 8
+SESSIONS = COPIES * len(DRIVES)
 BAD = "torn.mcap"
 
 
 def make_fleet(folder: Path, copies: int = 1) -> Path:
-    """Sessions of eight frames, and one that is none."""
+    """Sessions of eight frames, ``copies`` of each drive, and one file that is none."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, (uri, first, last) in DRIVES.items():
         save(open_source(uri), folder / f"{name}-0.mcap", first, last)

@@ -11,10 +11,10 @@ import pytest
 
 from app.fleet.batch.schedule import Tally, client_of, run_batch
 from app.fleet.batch.work import run_drive
-from tests.app.fleet.fleets import BAD, begun, contents, plan_of
+from tests.app.fleet.fleets import BAD, SESSIONS, begun, contents, plan_of
 from tests.app.fleet.s3 import BUCKET, s3_server
 
-DRIVES, MEMORY = 9, "3GB"
+MEMORY, KILLS = "3GB", 3
 
 
 @pytest.fixture(scope="module")
@@ -33,48 +33,38 @@ def test_two_workers_give_the_bytes_of_none(fleet: Path, tmp_path: Path, expecte
     with client_of(None, 2, MEMORY) as client:
         assert client.dashboard_link.startswith("http")
         run_batch(client, work.jobs, tally, lambda now: said.append(now.left))
-    assert (tally.done, tally.left, list(tally.failed)) == (DRIVES, 0, [])
+    assert (tally.done, tally.left, list(tally.failed)) == (SESSIONS, 0, [])
     assert [Path(address).name for address in tally.aside] == [BAD]
     assert said == sorted(said, reverse=True)
     assert contents(tmp_path) == expected
     assert begun(plan_of(fleet, results=True), tmp_path).jobs == ()
 
 
-def test_workers_that_are_killed_change_nothing(fleet: Path, tmp_path: Path, expected: dict[str, str]):
-    """Whenever a drive has ended, a worker ends in the middle of another one."""
-    work = begun(plan_of(fleet, results=True), tmp_path)
-    tally, killed = Tally(len(work.all)), set[int]()
+def test_a_store_that_fails_every_twentieth_request_and_workers_that_are_killed_change_nothing(
+    fleet: Path, monkeypatch: pytest.MonkeyPatch, expected: dict[str, str]
+):
+    """Recordings and tables are in S3. Whenever a drive has ended, a worker ends in the middle of another one. The
+    names of drives are of their addresses, so contents alone are compared."""
+    killed = set[int]()
 
     def kill_one(now: Tally) -> None:
         workers = [pid for pid in client.run(os.getpid, on_error="ignore").values() if isinstance(pid, int)]
-        if len(killed) < kills and workers and now.left:
+        if len(killed) < KILLS and workers and now.left:
             killed.add(workers[0])
             os.kill(workers[0], signal.SIGKILL)
 
-    kills = int(os.environ.get("CIPV_FLEET_KILLS", "3"))
-    with client_of(None, 2, MEMORY) as client:
-        run_batch(client, work.jobs, tally, kill_one)
-    assert len(killed) == kills
-    assert (tally.done, tally.failed, len(tally.aside)) == (DRIVES, {}, 1)
-    assert contents(tmp_path) == expected
-
-
-def test_a_store_that_fails_every_twentieth_request(
-    fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, expected: dict[str, str]
-):
-    """Recordings and tables are in S3. The names of drives are of their addresses, so contents alone are compared."""
     with s3_server(monkeypatch, every=20) as server:
         system = fsspec.filesystem("s3", skip_instance_cache=True)
         system.put(str(fleet), f"{BUCKET}/in", recursive=True)
         work = begun(plan_of(f"s3://{BUCKET}/in", results=True), f"s3://{BUCKET}/out")
         tally = Tally(len(work.all))
         with client_of(None, 2, MEMORY) as client:
-            run_batch(client, work.jobs, tally, lambda _: None)
-        assert (tally.done, tally.failed, len(tally.aside)) == (DRIVES, {}, 1)
+            run_batch(client, work.jobs, tally, kill_one)
+        assert (tally.done, tally.failed, len(tally.aside)) == (SESSIONS, {}, 1)
         assert server.failed > 10
+        assert len(killed) == KILLS
         found = contents(f"s3://{BUCKET}/out")
-    kinds = ("frames", "objects", "events", "scores")
-    for kind in kinds:
+    for kind in ("frames", "objects", "events", "scores"):
         ours = sorted(sha for name, sha in found.items() if name.startswith(f"tables/{kind}/"))
         assert ours == sorted(sha for name, sha in expected.items() if name.startswith(f"tables/{kind}/"))
-        assert len(ours) == DRIVES
+        assert len(ours) == SESSIONS

@@ -19,7 +19,7 @@ from app.fleet.pack import finished, pack
 from app.fleet.pack_index import packed_file, packs_of
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
-from tests.app.fleet.fleets import BAD, begun, plan_of
+from tests.app.fleet.fleets import BAD, LENGTH, SESSIONS, begun, plan_of
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_packs_hold_the_rows_of_every_drive(batch: Path, tables: FleetTables):
 
 def test_a_bad_recording_has_no_rows(batch: Path, tables: FleetTables):
     drives = finished(tables.store, tables.run)
-    assert len(drives) == 9
+    assert len(drives) == SESSIONS
     assert not [drive for drive in drives if Path(BAD).stem in drive]
 
 
@@ -78,9 +78,9 @@ def test_frames_objects_and_drives(batch: Path, tables: FleetTables):
     frames = parts(batch, FRAMES.name)
     assert tables.find("cipv_id IS NOT NULL", "frames").total == sum(row["cipv_id"] is not None for row in frames)
     assert tables.find("cipv", "objects").total == tables.find("cipv_id IS NOT NULL", "frames").total
-    assert tables.find("", "drives").total == 9
+    assert tables.find("", "drives").total == SESSIONS
     assert len(tables.find("", "frames", limit=5).rows) == 5
-    assert tables.find("", "frames", limit=5).total == 72
+    assert tables.find("", "frames", limit=5).total == SESSIONS * LENGTH
 
 
 def test_a_histogram_counts_what_was_found(tables: FleetTables):

@@ -17,7 +17,7 @@ from app.fleet.pack import pack
 from app.fleet.store import Store
 from pipeline.evaluation.label_free.score import SCORES
 from pipeline.evaluation.scores.figures import FIGURES
-from tests.app.fleet.fleets import begun, plan_of
+from tests.app.fleet.fleets import SESSIONS, begun, plan_of
 
 LATE = next(score for score in SCORES if score.name == "late_leads")
 
@@ -76,7 +76,7 @@ def test_cipv_scores_prints_both(fleet: Path, tmp_path: Path, capsys: pytest.Cap
     assert end.value.code == 0
     said = json.loads(capsys.readouterr().out)
     assert said["runs"][work.key.name]["labelled.cipv_correct"] is not None
-    assert said["worth"]["late_leads"]["drives"] == 9
+    assert said["worth"]["late_leads"]["drives"] == SESSIONS
     with pytest.raises(SystemExit) as end:
         main(["scores", "--out", str(tmp_path)])
     assert "leads found late" in capsys.readouterr().out

@@ -1,0 +1,116 @@
+"""The compiled loops behind ``divide_tracked``: which tracks reach a cluster, whose seeds its points are, and how the
+rest joins them."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from pipeline.types import F32, F64, I32, Mask
+
+AROUND_M = 0.3
+"""Returns so far outside of an expected footprint are its own: two standard deviations of a cluster's position."""
+
+
+@numba.njit(cache=True, nogil=True)
+def reach_clusters(points: F32, labels: I32, footprints: F64, clusters: int) -> Mask:
+    """(T, C) bool: the clusters whose bounds along ego x and y come near each footprint's."""
+    low, high = np.full((clusters, 2), np.inf), np.full((clusters, 2), -np.inf)
+    for i in range(len(points)):
+        if labels[i] >= 0:
+            for axis in range(2):
+                low[labels[i], axis] = min(low[labels[i], axis], points[i, axis])
+                high[labels[i], axis] = max(high[labels[i], axis], points[i, axis])
+    reached = np.zeros((len(footprints), clusters), dtype=np.bool_)
+    for t in range(len(footprints)):
+        x, y, length, width, cos, sin = footprints[t]
+        along, across = length * abs(cos) + width * abs(sin), length * abs(sin) + width * abs(cos)
+        for c in range(clusters):
+            outside_x = max(low[c, 0] - x, x - high[c, 0]) - along
+            outside_y = max(low[c, 1] - y, y - high[c, 1]) - across
+            reached[t, c] = max(outside_x, outside_y) <= AROUND_M
+    return reached
+
+
+@numba.njit(cache=True, nogil=True)
+def find_owners(points: F32, labels: I32, footprints: F64, reached: Mask) -> I32:
+    """(N,) int32 the only footprint in or around which a clustered point lies, −1 for none and for several. reached:
+    (T, C) bool, the footprints to be looked at for each cluster."""
+    near = np.empty((reached.shape[1], len(footprints)), dtype=np.int32)
+    count = np.zeros(reached.shape[1], dtype=np.int32)
+    for c in range(reached.shape[1]):
+        for t in range(len(footprints)):
+            if reached[t, c]:
+                near[c, count[c]] = t
+                count[c] += 1
+    owner = np.full(len(points), -1, dtype=np.int32)
+    for i in range(len(points)):
+        if labels[i] < 0:
+            continue
+        found = 0
+        for k in range(count[labels[i]]):
+            t = near[labels[i], k]
+            x, y, length, width, cos, sin = footprints[t]
+            dx, dy = points[i, 0] - x, points[i, 1] - y
+            along, across = abs(dx * cos + dy * sin) - length, abs(dy * cos - dx * sin) - width
+            if np.hypot(max(along, 0.0), max(across, 0.0)) <= AROUND_M:
+                owner[i] = t
+                found += 1
+        if found > 1:
+            owner[i] = -1
+    return owner
+
+
+@numba.njit(cache=True, nogil=True)
+def count_seeds(labels: I32, owner: I32, tracks: int, clusters: int) -> I32:
+    """(T, C) int32 how many seeds each track has in each cluster."""
+    counts = np.zeros((tracks, clusters), dtype=np.int32)
+    for i in range(len(labels)):
+        if labels[i] >= 0 and owner[i] >= 0:
+            counts[owner[i], labels[i]] += 1
+    return counts
+
+
+@numba.njit(cache=True, nogil=True)
+def join(points: F32, seeds: I32, z_weight: float) -> I32:
+    """(M,) int32 the group of each point: that of the seed which a minimum spanning forest joins it with (Prim).
+
+    seeds: (M,) group of each seed, −1 for the others."""
+    group = seeds.copy()
+    done = np.zeros(len(points), dtype=np.bool_)
+    step2 = np.full(len(points), np.inf)
+    for i in range(len(points)):
+        if seeds[i] >= 0:
+            step2[i] = 0.0
+    for _ in range(len(points)):
+        at, least = -1, np.inf
+        for i in range(len(points)):
+            if not done[i] and step2[i] < least:
+                at, least = i, step2[i]
+        if at < 0:
+            break
+        done[at] = True
+        for i in range(len(points)):
+            if done[i]:
+                continue
+            dx, dy = points[i, 0] - points[at, 0], points[i, 1] - points[at, 1]
+            dz = z_weight * (points[i, 2] - points[at, 2])
+            away2 = dx * dx + dy * dy + dz * dz
+            if away2 < step2[i]:
+                step2[i], group[i] = away2, group[at]
+    return group
+
+
+@numba.njit(cache=True, nogil=True)
+def measure_gaps(points: F32, part: I32, parts: int, z_weight: float) -> F64:
+    """(P, P) least distance between points of two parts, m."""
+    gaps = np.full((parts, parts), np.inf)
+    for i in range(len(points)):
+        for j in range(i):
+            if part[i] != part[j]:
+                dx, dy = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
+                dz = z_weight * (points[i, 2] - points[j, 2])
+                away = np.sqrt(dx * dx + dy * dy + dz * dz)
+                if away < gaps[part[i], part[j]]:
+                    gaps[part[i], part[j]] = gaps[part[j], part[i]] = away
+    return gaps
