@@ -18,7 +18,7 @@ from pipeline.common.clips import begins_clip
 from pipeline.common.stopwatch import Stopwatch
 from pipeline.decision import acc, aeb, braking_evidence, cipv, object_motion
 from pipeline.ego_motion import coasting, own_motion
-from pipeline.fusion import agreement, drift, existence, returns
+from pipeline.fusion import agreement, drift, existence, ground_contact, returns
 from pipeline.fusion import fuse as fusion
 from pipeline.lanes import road_lines as lanes
 from pipeline.lidar import segmentation
@@ -103,6 +103,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     # Camera: the detector's boxes, each with a distance from its height, followed from image to image
     boxes = _measure_boxes(frame, aligned, params)
     boxes = returns.range_boxes(boxes, sweep, aligned, params.fusion)
+    boxes = ground_contact.measure_contacts(boxes, sweep, aligned, now.speed_mps, params.fusion)
     clock.lap("distance")
     vision_state, vision_tracks = vision_tracking.track(
         state.vision, boxes, now.dt_s, params.vision_tracking, now.speed_mps

@@ -14,7 +14,7 @@ y = −d·sin(x_img·h_res). The printed arctan(−y/x) is an atan2 here, and th
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import cv2
 import numpy as np
@@ -35,6 +35,9 @@ class Alignment(Protocol):
         """(N, 2) pixels and (N,) horizontal ranges from the ego origin, metres → (N, 3) ego points."""
         ...
 
+    is_metric: ClassVar[bool]
+    """Whether its rays start where the camera is, so that they meet things where the camera sees them."""
+
     def rays(self, pixels: F64) -> tuple[F64, F64]:
         """(N, 2) pixels → (3,) ego point they are seen from, and (N, 3) directions, not normalised."""
         ...
@@ -53,6 +56,7 @@ class Angular:
     """Column of the pixel that looks along ego +x."""
     cy: float
     """Row of that pixel."""
+    is_metric: ClassVar[bool] = False
 
     def project(self, points: F64) -> F64:
         points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
@@ -84,6 +88,7 @@ class Pinhole:
     T_camera_ego: F64
     """(4, 4), takes ego points to the camera frame."""
 
+    is_metric: ClassVar[bool] = True
     _NEAREST_M = 0.3
 
     def project(self, points: F64) -> F64:

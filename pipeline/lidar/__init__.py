@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.lidar import boxes, cluster, deskew, divide_tracked, downsample, ground, tracking
+from pipeline.lidar import boxes, cluster, deskew, divide_tracked, downsample, ground, road_profile, tracking
 from pipeline.params import DeskewParams, Params
 from pipeline.types import EgoState, Sweep
 
@@ -31,5 +31,6 @@ def warm_up() -> None:
         state, tracks = tracking.track(state, obstacles, 0.1, params.lidar_tracking)
         divide_tracked.warm_up(points, labels, tracks)
         cluster.kinds(labels, keep, plane.mask)
+        road_profile.fit_road_profile(points, plane.mask)
         deskew.deskew(sweep, EgoState(0, 10.0, 0.0), DeskewParams(enabled=True))
         downsample.keep_mask(sweep, params.downsample)

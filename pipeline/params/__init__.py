@@ -150,6 +150,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "size_gate": False,
             "keep_partners": False,
             "single_returns": False,
+            "use_ground_contact": False,
         },
         "existence": {"enabled": False},
         "path": {"use_edges": False},

@@ -184,6 +184,10 @@ class FusionParams(Section):
     single_returns: bool = choice(
         True, "Range far vehicles by single LiDAR returns inside their boxes, too few for a cluster"
     )
+    use_ground_contact: bool = choice(
+        True,
+        "kalman: correct a box's distance by where the box meets the road that the LiDAR measures; off: by its height",
+    )
     keep_partners: bool = choice(
         True, "A box stays with the cluster that it was joined with, unless another one fits clearly better"
     )

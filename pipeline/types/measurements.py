@@ -76,6 +76,12 @@ class VisionMeasurement:
     """Standard deviation of ``ranged_m``."""
     returns: int = 0
     """How many returns that is."""
+    contact_m: float | None = None
+    """The same distance by where the box meets the road; None where that is not seen."""
+    contact_share: float = 0.0
+    """Standard deviation of ln(``contact_m``) for what lasts from image to image."""
+    contact_noise_share: float = 0.0
+    """The same for what changes: the noise of the box's lower edge."""
     aspect: float | None = None
     """ln(height / width) of the box; None where it may show only part of the object's width."""
     class_factors: Mapping[str, float] = field(default_factory=dict)

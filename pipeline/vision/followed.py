@@ -14,7 +14,7 @@ from pipeline.params import VisionTrackingParams
 from pipeline.types import VisionMeasurement, VisionTrack
 from pipeline.vision import place_filter
 from pipeline.vision.place_filter import PlaceMeasurement
-from pipeline.vision.vehicle_height import BoxShape, Height, learn
+from pipeline.vision.vehicle_height import BoxShape, Height, RoadContact, hinted, learn
 
 FASTEST_OVER_GROUND_MPS = 70.0
 """250 km/h: nothing on a road is faster, and a filter that says so has run away."""
@@ -48,6 +48,8 @@ class Followed:
     """How tall it is for its class."""
     shape: BoxShape = BoxShape()
     """Of its boxes; what its height is guessed from until it is learned."""
+    contact: RoadContact = RoadContact()
+    """Where its boxes meet the road; likewise."""
     seen: VisionMeasurement | None = None
     """This image's sighting with a distance; None without one."""
 
@@ -90,7 +92,7 @@ def take_place(
         if followed.place_filter is not None:
             return evolve(followed, track=with_place(followed.track, followed.place_filter, followed.placed))
         return evolve(followed, track=evolve(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m))
-    followed = _shaped(followed, seen, params)
+    followed = _hinted(followed, seen, params)
     # a truck that is called a car in one image is as tall as before
     by_class_m = seen.distance_as(followed.track.label) or seen.distance_m
     share, own_m = seen.sigma_m / seen.distance_m, by_class_m * followed.height.factor
@@ -149,27 +151,37 @@ def learned(followed: Followed, range_m: float, sigma_m: float, params: VisionTr
     return evolve(followed, height=height, place_filter=place)
 
 
-def _shaped(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
-    """The object with the shape of this image's box, and with what that says of its height while nothing better is
-    known. Its place moves with that, so that it is no motion."""
-    if not params.use_aspect:
+def _hinted(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
+    """The object with what this image's box tells of its height while no range has: by its shape, and by where it
+    meets the road. Its place moves with that, so that it is no motion."""
+    by_class_m = seen.distance_as(followed.track.label)
+    shape, contact = followed.shape, followed.contact
+    if params.use_aspect:
+        shape = shape.seen(seen.aspect)
+    if seen.contact_m is not None and by_class_m is not None:
+        log_ratio = math.log(seen.contact_m / by_class_m)
+        contact = contact.seen(log_ratio, seen.contact_share, seen.contact_noise_share)
+    followed = evolve(followed, shape=shape, contact=contact)
+    if followed.height.is_ranged:
         return followed
-    shape = followed.shape.seen(seen.aspect)
-    if followed.height.sigma is not None:
-        return evolve(followed, shape=shape)
-    height = followed.height._replace(mean=shape.height if followed.track.label == "car" else 0.0)
+    height = hinted(shape if followed.track.label == "car" else BoxShape(), contact, seen.size_share or 0.0)
     place = followed.place_filter
-    if place is not None and height != followed.height:
+    if place is not None and height.mean != followed.height.mean:
         place = place_filter.scaled(place, height.factor / followed.height.factor)
-    return evolve(followed, shape=shape, height=height, place_filter=place)
+    return evolve(followed, height=height, place_filter=place)
 
 
-def renamed(followed: Followed, label: str, seen: VisionMeasurement) -> Height:
-    """What was learned of its height, for the class that it is taken for now: its metres stay the same."""
+def renamed(followed: Followed, label: str, seen: VisionMeasurement) -> Followed:
+    """The object as one of the class that it is taken for now: what is known of its height stays the same in metres."""
     before, now = seen.class_factors.get(followed.track.label), seen.class_factors.get(label)
-    if followed.height.sigma is None or before is None or now is None:
-        return followed.height
-    return followed.height._replace(mean=followed.height.mean + math.log(before / now))
+    if before is None or now is None or before == now:
+        return followed
+    step = math.log(before / now)
+    contact = followed.contact._replace(log_ratio=followed.contact.log_ratio + step)
+    height = followed.height
+    if height.sigma is not None:
+        height = height._replace(mean=height.mean + step)
+    return evolve(followed, height=height, contact=contact)
 
 
 def _is_plausible(place: CvState, ego_speed_mps: float | None) -> bool:

@@ -204,8 +204,8 @@ def _seen(
     if params.filter == "queue":
         ranges = track.ranges + 1 if seen.distance_m is not None else 0
         track = evolve(track, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position, ranges=ranges)
-    height = renamed(followed, label, seen)
-    current = evolve(followed, track=track, unseen_s=0.0, votes=votes, box_filter=box_filter, height=height)
+    followed = renamed(followed, label, seen)
+    current = evolve(followed, track=track, unseen_s=0.0, votes=votes, box_filter=box_filter)
     slip_m = slip * _CAR_WIDTH_M
     return take_place(current, seen, guess, ego_speed_mps, params, slip_m) if params.filter == "kalman" else current
 

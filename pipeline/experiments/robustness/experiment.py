@@ -47,6 +47,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "no road edges": {"path.use_edges": False},
     "flanks taken for rears": {"cipv.use_flank": False},
     "tall boxes like others": {"vision_tracking.use_aspect": False},
+    "boxes placed by height alone": {"fusion.use_ground_contact": False},
     "no range gate": {"fusion.range_gate": False},
     "no size gate": {"fusion.size_gate": False},
     "boxes change clusters freely": {"fusion.keep_partners": False},

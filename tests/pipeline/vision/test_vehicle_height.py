@@ -11,7 +11,7 @@ import pytest
 from pipeline.params import VisionTrackingParams
 from pipeline.types import Detection, VisionMeasurement
 from pipeline.vision.tracking import VisionTrackerState, learn_heights, track
-from pipeline.vision.vehicle_height import FLOOR_SHARE, NEAREST_M, BoxShape, Height, learn
+from pipeline.vision.vehicle_height import FLOOR_SHARE, NEAREST_M, BoxShape, Height, RoadContact, hinted, learn
 
 SPREAD, NOISE = 0.2, 0.03
 PARAMS = VisionTrackingParams()
@@ -179,3 +179,70 @@ def test_what_the_lidar_taught_counts_more_than_the_shape() -> None:
         if k < 10:
             state = learn_heights(state, {one.id: (26.0, 0.2)}, PARAMS)
     assert one.distance_m == pytest.approx(26.0, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("case", "contact", "factor", "sigma"),
+    [
+        ("no contact", RoadContact(), 1.0, None),
+        ("a van", RoadContact().seen(math.log(1.4), 0.07, 0.0), 1.35, 0.066),
+        ("a road that is hardly known", RoadContact().seen(math.log(1.4), 0.2, 0.0), 1.18, 0.141),
+        ("a height that no vehicle has", RoadContact().seen(math.log(2.2), 0.07, 0.0), 1.0, None),
+    ],
+)
+def test_where_boxes_meet_the_road_tells_the_height_as_well_as_the_road_is_known(
+    case: str, contact: RoadContact, factor: float, sigma: float | None
+) -> None:
+    height = hinted(BoxShape(), contact, SPREAD)
+    assert height.factor == pytest.approx(factor, abs=0.01), case
+    assert height.sigma == (None if sigma is None else pytest.approx(sigma, abs=0.001)), case
+    assert not height.is_ranged
+
+
+def test_a_contact_averages_single_boxes() -> None:
+    contact = RoadContact()
+    for k in range(20):
+        contact = contact.seen(0.3 + (0.1 if k % 2 else -0.1), 0.08, 0.1)
+        assert math.sqrt(contact.variance) > 0.08, "the road stays unknown"
+    assert contact.log_ratio == pytest.approx(0.3, abs=0.02)
+    assert math.sqrt(contact.variance) == pytest.approx(math.hypot(0.08, 0.1 / math.sqrt(10)))
+
+
+def test_a_range_overrules_a_contact() -> None:
+    """Even one that is far off and was sure of itself."""
+    height = hinted(BoxShape(), RoadContact().seen(0.4, 0.03, 0.0), SPREAD)
+    for _ in range(5):
+        height = learn(height, 25.0, NOISE, SPREAD, 25.0, 0.2)
+    assert height.is_ranged
+    assert height.factor == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize("from_k", [0, 8])
+def test_a_van_that_only_the_camera_sees_stands_where_it_meets_the_road(from_k: int) -> None:
+    """It keeps its distance ahead; that the road corrects it is no motion. from_k: when its lower edge comes in
+    sight."""
+    state, true_m = VisionTrackerState(), 50.0
+    for k in range(25):
+        contact_m = true_m if k >= from_k else None
+        measured = replace(seen(true_m / 1.4), contact_m=contact_m, contact_share=0.08 if contact_m else 0.0)
+        state, (one,) = track(state, (measured,), 0.1 if k else None, PARAMS, 0.0)
+    assert one.distance_m == pytest.approx(true_m * 1.4**-0.14, rel=0.02)
+    assert one.sigma_m is not None
+    assert 0.07 < one.sigma_m / one.distance_m < 0.1
+    assert one.velocity_mps is not None
+    assert abs(one.velocity_mps[0]) < 0.5
+
+
+def test_another_class_leaves_a_vehicle_where_it_meets_the_road() -> None:
+    """A truck's law says twice a car's; its boxes are called cars, then trucks."""
+    state, factors = VisionTrackerState(), {"car": 1.0, "truck": 1.5}
+    for k in range(30):
+        label = "car" if k < 10 else "truck"
+        plain = seen(40.0 * factors[label] / 1.25)
+        measured = replace(
+            plain, detection=replace(plain.detection, label=label), class_factors=factors,
+            contact_m=40.0, contact_share=0.07,
+        )  # fmt: skip
+        state, (one,) = track(state, (measured,), 0.1 if k else None, PARAMS, 0.0)
+        assert one.distance_m == pytest.approx(40.0, rel=0.1)
+    assert one.label == "truck"

@@ -1,0 +1,115 @@
+"""The distance of a vehicle by where its box meets the road: when it is one, and how sure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from pipeline.alignment.projection import Alignment, Angular, resolve
+from pipeline.common.geometry import F64
+from pipeline.fusion.ground_contact import measure_contacts
+from pipeline.params import AlignmentParams, FusionParams
+from pipeline.types import F32, Box, CameraCalibration, Detection, Ground, VisionMeasurement
+from tests.pipeline.lidar.test_road_profile import road
+
+EYE_M, FOCAL_PX, HORIZON_PX, MIDDLE_PX = 1.2, 1200.0, 300.0, 640.0
+"""The camera above the road."""
+
+
+def aligned() -> Alignment:
+    K = np.array([[FOCAL_PX, 0.0, MIDDLE_PX], [0.0, FOCAL_PX, HORIZON_PX], [0.0, 0.0, 1.0]])
+    T_camera_ego = np.array([[0, -1, 0, 0], [0, 0, -1, EYE_M - 0.8], [1, 0, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
+    found = resolve(AlignmentParams(), CameraCalibration(K, np.zeros(5), T_camera_ego, 1280, 720))
+    assert found is not None
+    return found
+
+
+@dataclass
+class Sweep:
+    points: F32
+    ground: Ground | None
+
+
+def swept(points: F32 | None = None) -> Sweep:
+    points = road() if points is None else points
+    planes: F64 = np.array([[0.0, 0.0, 1.0, 0.8]])
+    ground = Ground(np.ones(len(points), dtype=np.bool_), planes, np.array([0.0, 60.0]), np.array([True]))
+    return Sweep(points, ground)
+
+
+def box_of(range_m: float, height_m: float = 1.5, y_m: float = 0.0, width_m: float = 1.8) -> Box:
+    """Of an upright thing on a flat road."""
+    u, half = MIDDLE_PX - FOCAL_PX * y_m / range_m, FOCAL_PX * width_m / range_m / 2
+    bottom = HORIZON_PX + FOCAL_PX * EYE_M / range_m
+    return u - half, bottom - FOCAL_PX * height_m / range_m, u + half, bottom
+
+
+def seen(bbox: Box, distance_m: float | None, label: str = "car") -> VisionMeasurement:
+    place = None if distance_m is None else (distance_m, 0.0)
+    sigma_m = None if distance_m is None else 0.2 * distance_m
+    return VisionMeasurement(Detection(bbox, label, 0.8), distance_m, sigma_m, place, 0.05, 0.2)
+
+
+def contact(*boxes: VisionMeasurement, points: F32 | None = None) -> VisionMeasurement:
+    """The first box, measured among the others."""
+    found = measure_contacts(boxes, swept(points), aligned(), None, FusionParams())
+    assert found is not None
+    return found[0]
+
+
+@pytest.mark.parametrize("range_m", [15.0, 30.0, 45.0])
+@pytest.mark.parametrize(("height_m", "by_height"), [(1.5, 1.0), (2.1, 0.7)])
+def test_a_van_and_a_car_stand_where_they_meet_the_road(range_m: float, height_m: float, by_height: float) -> None:
+    measured = contact(seen(box_of(range_m, height_m), by_height * range_m))
+    assert measured.contact_m == pytest.approx(range_m, rel=0.05)
+    assert measured.distance_m == by_height * range_m, "the law's own distance stays what it was"
+
+
+def test_the_farther_the_less_sure_until_it_says_nothing() -> None:
+    shares = [contact(seen(box_of(range_m), range_m)).contact_share for range_m in (15.0, 30.0, 45.0)]
+    assert 0.07 <= shares[0] < shares[1] < shares[2] < 0.2
+    assert contact(seen(box_of(110.0), 110.0)).contact_m is None
+
+
+@pytest.mark.parametrize("slope", [-0.04, 0.04])
+def test_a_road_that_rises_or_falls_is_followed(slope: float) -> None:
+    range_m = 30.0
+    bottom = HORIZON_PX + FOCAL_PX * (EYE_M - slope * range_m) / range_m
+    u1, _, u2, _ = box_of(range_m)
+    measured = contact(seen((u1, bottom - 60.0, u2, bottom), range_m), points=road(slope=slope))
+    assert measured.contact_m == pytest.approx(range_m, rel=0.06)
+
+
+NEARER = seen(box_of(15.0), 15.0)
+
+
+@pytest.mark.parametrize(
+    ("case", "boxes"),
+    [
+        ("its lower edge is behind a nearer vehicle", (seen(box_of(40.0), 40.0), NEARER)),
+        ("no distance by its height", (seen(box_of(40.0), None),)),
+        ("nearer than a height is learned", (seen(box_of(9.0), 9.0),)),
+        ("no vehicle", (seen(box_of(40.0), 40.0, "person"),)),
+        ("beside the road", (seen(box_of(30.0, y_m=9.0), 30.0),)),
+        ("its lower edge is above the horizon", (seen((600.0, 200.0, 680.0, 290.0), 40.0),)),
+    ],
+)
+def test_no_contact(case: str, boxes: tuple[VisionMeasurement, ...]) -> None:
+    assert contact(*boxes).contact_m is None, case
+
+
+def test_a_nearer_vehicle_beside_it_hides_nothing() -> None:
+    assert contact(seen(box_of(40.0), 40.0), seen(box_of(15.0, y_m=3.0), 15.0)).contact_m is not None
+
+
+def test_without_what_it_rests_on_boxes_stay_as_they_are() -> None:
+    boxes = (seen(box_of(40.0), 40.0),)
+    params, angular = FusionParams(), Angular(0.001, 0.001, MIDDLE_PX, HORIZON_PX)
+    assert measure_contacts(None, swept(), aligned(), None, params) is None
+    assert measure_contacts(boxes, swept(road()[:10]), aligned(), None, params) == boxes
+    assert measure_contacts(boxes, Sweep(road(), None), aligned(), None, params) == boxes
+    assert measure_contacts(boxes, swept(), None, None, params) == boxes
+    assert measure_contacts(boxes, swept(), angular, None, params) == boxes, "its rays do not start at the camera"
+    assert measure_contacts(boxes, swept(), aligned(), None, FusionParams(use_ground_contact=False)) == boxes
