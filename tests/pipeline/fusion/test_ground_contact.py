@@ -100,8 +100,20 @@ def test_no_contact(case: str, boxes: tuple[VisionMeasurement, ...]) -> None:
     assert contact(*boxes).contact_m is None, case
 
 
-def test_a_nearer_vehicle_beside_it_hides_nothing() -> None:
+def test_a_nearer_vehicle_beside_it_and_a_second_box_on_itself_hide_nothing() -> None:
     assert contact(seen(box_of(40.0), 40.0), seen(box_of(15.0, y_m=3.0), 15.0)).contact_m is not None
+    u1, v1, u2, v2 = box_of(40.0)
+    assert contact(seen((u1, v1, u2, v2), 40.0), seen((u1, v1 - 2.0, u2, v2 + 4.0), 36.0)).contact_m is not None
+
+
+@pytest.mark.parametrize("range_m", [20.0, 40.0])
+@pytest.mark.parametrize("turned_deg", [-0.3, 0.3])
+def test_a_camera_that_is_turned_a_little_stays_within_its_sigma(range_m: float, turned_deg: float) -> None:
+    u1, v1, u2, v2 = box_of(range_m)
+    off = FOCAL_PX * np.radians(turned_deg)
+    measured = contact(seen((u1, v1 + off, u2, v2 + off), range_m))
+    assert measured.contact_m is not None
+    assert abs(np.log(measured.contact_m / range_m)) < 2.2 * measured.contact_share
 
 
 def test_without_what_it_rests_on_boxes_stay_as_they_are() -> None:
