@@ -214,6 +214,8 @@ def _why(lead: FusedObject, candidates: int) -> str:
     what = f"{lead.label or 'obstacle'} seen by {sensors_in_words(lead.source)}"
     if lead.distance_from == "returns":
         what += f", ranged by {lead.returns} LiDAR return{'s' if lead.returns > 1 else ''}"
+    elif lead.distance_from == "box" and lead.height_from == "road":
+        what += ", placed by where it meets the road"
     others = f", nearest of {candidates} in path" if candidates > 1 else ", alone in path"
     offset = lead.path_offset_m or 0.0
     side = (

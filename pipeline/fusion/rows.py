@@ -109,6 +109,7 @@ def box_row(object_id: int, seen: VisionTrack, gates: tuple[Gate, ...]) -> Fused
         camera_ranges=seen.ranges,
         camera_speed_sigma_mps=seen.speed_sigma_mps,
         returns=seen.returns,
+        height_from=seen.height_from,
         gates=gates,
     )
 

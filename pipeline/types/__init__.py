@@ -36,7 +36,7 @@ from pipeline.types.frame import (
     Sweep,
 )
 from pipeline.types.measurements import Detection, Ground, Obstacle, VisionMeasurement
-from pipeline.types.objects import FusedObject, LidarTrack, VisionTrack
+from pipeline.types.objects import FusedObject, HeightFrom, LidarTrack, VisionTrack
 from pipeline.types.result import (
     DROPPED,
     GROUND,
@@ -91,6 +91,7 @@ __all__ = [
     "GnssFix",
     "GnssQuality",
     "Ground",
+    "HeightFrom",
     "Layers",
     "LidarTrack",
     "Mask",

@@ -11,6 +11,10 @@ from pipeline.types.conditions import Braking, Eligibility, Gate
 from pipeline.types.measurements import Obstacle
 from pipeline.types.sensors import ObjectSource, are_several, is_camera_in, is_lidar_in, is_ranging_in
 
+HeightFrom = Literal["class", "shape", "road", "range"] | None
+"""Of a vehicle that the camera sees: the usual height of its class; the shape of its boxes; where they meet the road;
+measured ranges; None without a distance."""
+
 
 class LidarTrack(NamedTuple):
     """An obstacle followed over time."""
@@ -67,6 +71,8 @@ class VisionTrack:
     """Distances in a row that its place took in, since it was last begun."""
     returns: int = 0
     """LiDAR returns inside its box that its distance was measured by in this frame."""
+    height_from: HeightFrom = None
+    """How tall it is taken for, on which its distance rests."""
     speed_sigma_mps: float | None = None
     """Standard deviation of its velocity along the line of sight, with that of the law's lasting error; None without a
     velocity."""
@@ -157,6 +163,8 @@ class FusedObject:
     """Standard deviation of its velocity along the line of sight where that comes from its image boxes."""
     returns: int = 0
     """LiDAR returns inside its image box that ranged it in this frame, where it has no cluster."""
+    height_from: HeightFrom = None
+    """What the camera alone takes its height from, on which its distance rests; None for an object with a cluster."""
     existence: float | None = None
     """Probability that it is really there, by the evidence of both sensors; None where that is not weighed."""
     rigid_mps: float | None = None

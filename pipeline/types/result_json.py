@@ -137,6 +137,7 @@ def _object(each: FusedObject) -> dict[str, Any]:
         "distance_m": _number(each.distance_m),
         "distance_sigma_m": _number(each.distance_sigma_m),
         "distance_from": each.distance_from,
+        "height_from": each.height_from,
         "velocity_mps": _numbers(each.velocity_mps),
         "speed_over_ground_mps": _number(each.speed_over_ground_mps),
         "in_path": each.in_path,

@@ -11,7 +11,7 @@ from pipeline.common import kalman
 from pipeline.common.fast_replace import evolve
 from pipeline.common.kalman import CvState
 from pipeline.params import VisionTrackingParams
-from pipeline.types import VisionMeasurement, VisionTrack
+from pipeline.types import HeightFrom, VisionMeasurement, VisionTrack
 from pipeline.vision import place_filter
 from pipeline.vision.place_filter import PlaceMeasurement
 from pipeline.vision.vehicle_height import BoxShape, Height, RoadContact, hinted, learn
@@ -125,7 +125,8 @@ def take_place(
             filtered = None
     if filtered is None:
         filtered, placed = place_filter.start(sighting, guess.along_mps, guess.sigma_mps), 1
-    track = evolve(with_place(followed.track, filtered, placed, share), returns=seen.returns)
+    shown = with_place(followed.track, filtered, placed, share)
+    track = evolve(shown, returns=seen.returns, height_from=_height_from(followed))
     return evolve(followed, track=track, place_filter=filtered, placed=placed, unplaced_s=0.0, refused=0)
 
 
@@ -169,6 +170,14 @@ def _hinted(followed: Followed, seen: VisionMeasurement, params: VisionTrackingP
     if place is not None and height.mean != followed.height.mean:
         place = place_filter.scaled(place, height.factor / followed.height.factor)
     return evolve(followed, height=height, place_filter=place)
+
+
+def _height_from(followed: Followed) -> HeightFrom:
+    if followed.height.is_ranged:
+        return "range"
+    if followed.height.sigma is not None:
+        return "road"
+    return "shape" if followed.height.mean else "class"
 
 
 def renamed(followed: Followed, label: str, seen: VisionMeasurement) -> Followed:

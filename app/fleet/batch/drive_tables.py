@@ -167,6 +167,7 @@ def _object(frame: Frame, result: Result, item: FusedObject, record: Any) -> Val
         item.distance_m,
         item.distance_sigma_m,
         item.distance_from,
+        item.height_from,
         closing_speed_mps(item),
         item.ttc_s,
         item.speed_over_ground_mps,

@@ -98,6 +98,7 @@ OBJECTS = TableShape(
         ("distance_m", "float32", "m", "Distance to its nearest point"),
         ("distance_sigma_m", "float32", "m", "Standard deviation of the distance"),
         ("distance_from", "string", "", "Source of the distance: `cluster`, `returns` or `box`"),
+        ("height_from", "string", "", "Camera alone: source of its height: `class`, `shape`, `road` or `range`"),
         ("closing_speed_mps", "float32", "m/s", "How fast the gap shrinks"),
         ("ttc_s", "float32", "s", "Time to collision"),
         ("speed_over_ground_mps", "float32", "m/s", "Its own speed"),

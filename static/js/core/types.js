@@ -36,6 +36,7 @@
  * @property {number} hits
  * @property {number} lidar_points
  * @property {"cluster"|"returns"|"box"|null} distance_from  what measured it in this frame
+ * @property {"class"|"shape"|"road"|"range"|null} height_from  what its height, on which that rests, was taken from
  * @property {number|null} lateral_mps
  * @property {number|null} crossing_s
  * @property {Gate[]} gates

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,6 +33,20 @@ def test_the_nearest_in_path_leads_and_every_other_says_why_not() -> None:
     assert lead.distance_m == pytest.approx(25.0, abs=0.01)
     assert lead.reason == "car seen by both sensors, nearest of 2 in path, 0.4 m left of its centre"
     assert why_not == {1: "behind #2", 3: "out of path by 2.0 m", 4: "out of path by 1.7 m"}
+
+
+@pytest.mark.parametrize(
+    ("ranged_by", "said"),
+    [
+        ({"returns": 1}, "car seen by camera only, ranged by 1 LiDAR return, alone in path"),
+        ({"height_from": "road"}, "car seen by camera only, placed by where it meets the road, alone in path"),
+        ({"height_from": "class"}, "car seen by camera only, alone in path"),
+    ],
+)
+def test_what_places_a_lead_without_a_cluster_is_said(ranged_by: dict[str, Any], said: str) -> None:
+    lead, _ = decide(dataclasses.replace(fused(1, 40.0, source="V"), **ranged_by))
+    assert lead is not None
+    assert lead.reason.startswith(said)
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ FIELDS = {
     "own_motion": "speed_from speed_sigma_mps yaw_rate_from yaw_rate_sigma_radps pose sources",
     "own_motion.sources.0": "source speed_mps yaw_rate_radps",
     "objects.0": "id source type type_score bbox bev cuboid closest_point distance_m distance_sigma_m distance_from "
-    "velocity_mps "
+    "height_from velocity_mps "
     "speed_over_ground_mps in_path existence_probability in_path_probability path_offset_m lateral_mps crossing_s "
     "moving ttc_s carried "
     "seen_by hits lidar_points gates",

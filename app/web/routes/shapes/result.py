@@ -46,6 +46,8 @@ class ObjectJson(Exact):
     """Standard deviation of the distance."""
     distance_from: Literal["cluster", "returns", "box"] | None
     """What measured the distance in this frame; null when nothing did."""
+    height_from: Literal["class", "shape", "road", "range"] | None
+    """V: what the height that the distance rests on was taken from; null otherwise."""
     velocity_mps: Point | None
     """x, y relative to ego; null until seen twice."""
     speed_over_ground_mps: float | None
