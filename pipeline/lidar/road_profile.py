@@ -21,8 +21,8 @@ NEAREST_M, FARTHEST_M, ASIDE_M = 3.0, 60.0, 6.0
 _VERTICAL_MPS2 = 0.2
 """The sharpest crests and sags of roads take about this acceleration at the speed that they are built for: radii of
 1,000 m at 50 km/h, 2,600 to 3,000 m at 80, 4,500 to 5,200 m at 100 (AASHTO, A Policy on Geometric Design of Highways
-and Streets, 2018, tables 3-35 and 3-37). They are taken for two standard deviations."""
-_SHARPEST_PM, _USUAL_PM = 1.0 / 1000.0, 1.0 / 2000.0
+and Streets, 2018, tables 3-35 and 3-37). Many are driven faster, so they are taken for one standard deviation."""
+_SHARPEST_PM, _USUAL_PM = 1.0 / 500.0, 1.0 / 2000.0
 """Standard deviation of the vertical curvature, 1/m: where the car is slow, and while its speed is unknown."""
 _SLOPE_SIGMA, _CROSS_SIGMA, _HEIGHT_SIGMA_M = 0.1, 0.05, 1.0
 """Of the road against the ego frame: wider than any, so that only the returns decide."""
@@ -57,7 +57,7 @@ def fit_road_profile(points: F32, mask: Mask, speed_mps: float | None = None) ->
 
     points: (N, 4) float32 ``x y z intensity``, ego frame. mask: (N,) which of them are ground. speed_mps: own speed,
     which tells how sharply such a road can bend; None while unknown."""
-    bends_pm = _USUAL_PM if speed_mps is None else _VERTICAL_MPS2 / 2.0 / max(speed_mps**2, 1.0)
+    bends_pm = _USUAL_PM if speed_mps is None else _VERTICAL_MPS2 / max(speed_mps**2, 1.0)
     mean, cov, count = _fit(points, mask, min(bends_pm, _SHARPEST_PM))
     return RoadProfile(mean, cov) if count >= MIN_RETURNS and math.isfinite(mean.sum()) else None
 

@@ -40,6 +40,12 @@ _HINT_SIGHTINGS = 10
 follow a vehicle that turns."""
 
 
+_LOWEST, _TALLEST = -0.25, 0.45
+"""ln(height / usual height) of a sports car (1.2 m) and of a high van (2.4 m)."""
+_MAX_SIGMAS = 2.0
+"""A height farther beyond these than so many of its standard deviations is no vehicle's: the road is not known."""
+
+
 class BoxShape(NamedTuple):
     """The shape of a vehicle's boxes, averaged."""
 
@@ -114,17 +120,16 @@ class Height(NamedTuple):
 
 
 def hinted(shape: BoxShape, contact: RoadContact, size_share: float) -> Height:
-    """The height before any range: of the class, changed by the shape of the boxes and by where they meet the road. A
-    place on the road that no vehicle of the class can have is none.
+    """The height before any range: of the class, changed by the shape of the boxes and by where they meet the road.
 
     size_share: standard deviation of ln(height) within the class.
     """
     prior, noise = size_share**2, contact.variance
-    surprise = contact.log_ratio - shape.height
-    if not contact.sightings or surprise**2 > _MAX_SURPRISE * (prior + noise):
+    possible = min(max(contact.log_ratio, _LOWEST), _TALLEST)
+    if not contact.sightings or abs(contact.log_ratio - possible) > _MAX_SIGMAS * math.sqrt(noise):
         return Height(shape.height)
     gain = prior / (prior + noise)
-    return Height(shape.height + gain * surprise, math.sqrt((1.0 - gain) * prior))
+    return Height(shape.height + gain * (possible - shape.height), math.sqrt((1.0 - gain) * prior))
 
 
 def learn(

@@ -72,7 +72,7 @@ def pairs(folder: Path, seed: int = 1) -> Iterator[Pair]:
             continue
         rng = np.random.default_rng([seed, index])
         boxes = np.array([row for item in truth for row in _boxes(item, rng)]).reshape(-1, BOX_FIELDS)
-        simulated = sensor.sweep_of(boxes, ground_plane(frame.sweep), rng, frame.t_ns)
+        simulated = sensor.sweep_of(boxes, np.append(ground_plane(frame.sweep), 0.0), rng, frame.t_ns)
         yield Pair(frame.name, frame.sweep, simulated, truth)
 
 

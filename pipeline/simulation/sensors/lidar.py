@@ -25,9 +25,6 @@ from pipeline.simulation.world.roadside import Roadside
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, World
 from pipeline.types import F32, F64, I64, Sweep
 
-_SECANT_M = 20.0
-"""Over a crest the road is cast as a plane, which is right here: as far as the road returns rays."""
-
 
 @dataclass(frozen=True)
 class _Beams:
@@ -53,15 +50,16 @@ class Lidar:
 
     def sweep(self, world: World, roadside: Roadside, seed: int, index: int, t_ns: int) -> Sweep:
         """The sweep of one moment, ego frame. The same seed and index give the same points."""
-        road = np.array([-LIDAR_HEIGHT_M, world.lift_m(_SECANT_M) / _SECANT_M, 0.0])
+        road = np.array([-LIDAR_HEIGHT_M, 0.0, 0.0, -world.hump_per_m])
         return self.sweep_of(scene_boxes(world, roadside), road, np.random.default_rng([seed, 2, index]), t_ns)
 
     def sweep_of(self, boxes: F64, ground: F64, rng: np.random.Generator, t_ns: int) -> Sweep:
-        """The sweep of (B, 13) boxes of the ego frame on a plane z = ground[0] + ground[1]·x + ground[2]·y."""
+        """The sweep of (B, 13) boxes of the ego frame on z = ground[0] + ground[1]·x + ground[2]·y + ground[3]·x²/2."""
         x, y, z = self._beams.start
         shifted = boxes.copy()
         shifted[:, :3] -= self._beams.start
-        below = np.array([ground[0] + ground[1] * x + ground[2] * y - z, ground[1], ground[2]])
+        height, slope, cross, bend = ground
+        below = np.array([height + (slope + bend * x / 2.0) * x + cross * y - z, slope + bend * x, cross, bend])
         range_m, met, cosine = cast(self._beams.rays, self._times_s, shifted, below, self._beams.spare)
         return self._returns(range_m, met, cosine, boxes, rng, t_ns)
 

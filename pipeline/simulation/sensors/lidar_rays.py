@@ -46,9 +46,9 @@ def cast(rays: F64, times_s: F64, boxes: F64, ground: F64, spare: int) -> tuple[
     """The first hit of each ray of a sensor at the origin, every ray at its own time.
 
     rays: (COLUMNS, 16, 3). times_s: (COLUMNS,) after the moment to which the boxes belong. boxes: (B, 13). ground: z =
-    ground[0] + ground[1]·x + ground[2]·y. spare: by how many columns a mount may turn a ray away from where its column
-    looks. Returns (COLUMNS, 16) range (infinity: nothing), index of the box (−1: the ground) and cosine of the angle at
-    which the ray meets the surface."""
+    ground[0] + ground[1]·x + ground[2]·y + ground[3]·x²/2. spare: by how many columns a mount may turn a ray away from
+    where its column looks. Returns (COLUMNS, 16) range (infinity: nothing), index of the box (−1: the ground) and
+    cosine of the angle at which the ray meets the surface."""
     columns, channels = rays.shape[0], rays.shape[1]
     range_m = np.full((columns, channels), np.inf)
     met = np.full((columns, channels), -1, dtype=np.int64)
@@ -57,9 +57,10 @@ def cast(rays: F64, times_s: F64, boxes: F64, ground: F64, spare: int) -> tuple[
     for i in range(columns):
         for j in range(channels):
             falls = ground[1] * rays[i, j, 0] + ground[2] * rays[i, j, 1] - rays[i, j, 2]
-            if falls > 0.0:
-                range_m[i, j] = -ground[0] / falls
-                cosine[i, j] = falls * steep
+            bends = falls * falls - 2.0 * ground[3] * rays[i, j, 0] ** 2 * ground[0]
+            if bends >= 0.0 and falls + np.sqrt(bends) > 0.0:  # else it passes over the crest, or looks up
+                range_m[i, j] = -2.0 * ground[0] / (falls + np.sqrt(bends))
+                cosine[i, j] = np.sqrt(bends) * steep
     for b in range(boxes.shape[0]):
         first, last = _columns_of(boxes[b], columns, spare)
         z, half_l, half_w, half_h = boxes[b, 2], boxes[b, 3], boxes[b, 4], boxes[b, 5]

@@ -15,7 +15,7 @@ from pipeline.simulation.sensors.lidar_scene import WALL
 from pipeline.types import F64, EgoState, Sweep
 
 ON = DeskewParams(enabled=True)
-FLAT = np.array([-1.5, 0.0, 0.0])
+FLAT = np.array([-1.5, 0.0, 0.0, 0.0])
 
 
 def seen(x: float, y: float, yaw: float, speed_mps: float, yaw_rate_radps: float) -> Sweep:

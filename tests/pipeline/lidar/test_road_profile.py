@@ -57,7 +57,7 @@ def test_it_is_sure_where_it_has_returns_and_less_so_the_farther_beyond() -> Non
 
 @pytest.mark.parametrize(
     ("case", "faster_mps", "slower_mps"),
-    [("on a motorway", 33.0, 14.0), ("in town", 14.0, 7.0), ("unknown", 20.0, None)],
+    [("on a motorway", 33.0, 14.0), ("in town", 14.0, 7.0), ("unknown", 30.0, None)],
 )
 def test_roads_for_fast_traffic_bend_less(case: str, faster_mps: float, slower_mps: float | None) -> None:
     points = road()

@@ -17,7 +17,7 @@ FLAT = Ground(
 
 
 def swept(boxes: F64, tilt: float = 0.0) -> Sweep:
-    return Lidar().sweep_of(boxes, np.array([-HEIGHT_M, 0.0, tilt]), np.random.default_rng(0), 0)
+    return Lidar().sweep_of(boxes, np.array([-HEIGHT_M, 0.0, tilt, 0.0]), np.random.default_rng(0), 0)
 
 
 def box(x: float, y: float, length: float, width: float, high: float) -> list[float]:

@@ -187,7 +187,9 @@ def test_what_the_lidar_taught_counts_more_than_the_shape() -> None:
         ("no contact", RoadContact(), 1.0, None),
         ("a van", RoadContact().seen(math.log(1.4), 0.07, 0.0), 1.35, 0.066),
         ("a road that is hardly known", RoadContact().seen(math.log(1.4), 0.2, 0.0), 1.18, 0.141),
-        ("a height that no vehicle has", RoadContact().seen(math.log(2.2), 0.07, 0.0), 1.0, None),
+        ("taller than any van", RoadContact().seen(math.log(2.2), 0.07, 0.0), 1.0, None),
+        ("half as tall as a car", RoadContact().seen(math.log(0.5), 0.12, 0.0), 1.0, None),
+        ("as low as a sports car, or lower", RoadContact().seen(math.log(0.7), 0.1, 0.0), 0.82, 0.089),
     ],
 )
 def test_where_boxes_meet_the_road_tells_the_height_as_well_as_the_road_is_known(

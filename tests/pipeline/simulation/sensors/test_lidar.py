@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -48,6 +50,16 @@ def test_an_empty_road_is_rings_on_the_ground() -> None:
     assert sweep.points[:, 0].min() > -0.1, "the front half only"
 
 
+@pytest.mark.parametrize("radius_m", [-600.0, 600.0, 2000.0])
+def test_over_crests_and_in_sags_rings_lie_on_the_curved_road(radius_m: float) -> None:
+    """radius_m: positive on a crest, over which the flattest ring passes without meeting the road."""
+    now = replace(world_state.at(with_actors(""), 0.0), hump_per_m=1.0 / radius_m)
+    sweep = Lidar(LidarModel(range_sigma_m=0.0)).sweep(now, NOTHING, 1, 0, 0)
+    x, y, z = sweep.points[:, :3].T
+    np.testing.assert_allclose(z, -world_state.LIDAR_HEIGHT_M - x * x / radius_m / 2.0, atol=0.05)
+    assert (7 in sweep.ring[np.abs(y) < 0.2 * x]) == (radius_m < 0.0)
+
+
 boxes = st.tuples(
     st.floats(-20, 60), st.floats(-30, 30), st.floats(-0.5, 3),
     st.floats(0.1, 8), st.floats(0.1, 4), st.floats(0.1, 3), st.floats(-3.1, 3.1),
@@ -60,7 +72,7 @@ def test_every_ray_ends_at_the_nearest_box(given_boxes: list[tuple[float, ...]])
     """Against a reference that tries every ray with every box."""
     rows = np.array([[*box[:6], np.cos(box[6]), np.sin(box[6]), WALL, 0, 0, 0, 1] for box in given_boxes])
     rays = lidar_rays.directions()
-    ground = np.array([-world_state.LIDAR_HEIGHT_M, 0.0, 0.0])
+    ground = np.array([-world_state.LIDAR_HEIGHT_M, 0.0, 0.0, 0.0])
     range_m, _, _ = lidar_rays.cast(rays, np.zeros(len(rays)), rows, ground, 0)
     flat = rays.reshape(-1, 3)
     with np.errstate(divide="ignore"):
@@ -146,7 +158,7 @@ def test_what_drives_along_is_not_distorted() -> None:
 def test_moving_boxes_are_met_where_they_are_at_each_rays_time() -> None:
     """Against the same cast with every box put by hand to where it is when that column fires."""
     rays, times = lidar_rays.directions(), lidar_rays.firing_times_s().mean(axis=1)
-    ground = np.array([-0.5, 0.0, 0.0])
+    ground = np.array([-0.5, 0.0, 0.0, 0.0])
     box = np.array([18.0, 3.0, 0.5, 2.0, 1.0, 0.9, np.cos(0.4), np.sin(0.4), WALL, -25.0, 6.0, 0.5, 1.0])
     moving, _, _ = lidar_rays.cast(rays, times, box[None], ground, 0)
     still = np.zeros(len(times))
@@ -184,7 +196,7 @@ def test_a_side_met_at_a_grazing_angle_returns_less_than_a_rear() -> None:
     flat = np.array([[24.0, 3.0, 0.4, 30.0, 0.1, 0.9, 1.0, 0.0, PAINT, 0, 0, 0, 1.0]])  # a wall along
 
     def share(boxes: F64) -> float:
-        sensor, ground = Lidar(), np.array([-5.0, 0.0, 0.0])
+        sensor, ground = Lidar(), np.array([-5.0, 0.0, 0.0, 0.0])
         ends, met, _ = lidar_rays.cast(lidar_rays.directions(), np.zeros(lidar_rays.COLUMNS), boxes, ground, 0)
         away = (met == 0) & (ends > 22.0) & (ends < 27.0)
         got = sensor.sweep_of(boxes, ground, np.random.default_rng(1), 0).points
