@@ -165,7 +165,9 @@ def _hinted(followed: Followed, seen: VisionMeasurement, params: VisionTrackingP
     followed = evolve(followed, shape=shape, contact=contact)
     if followed.height.is_ranged:
         return followed
-    height = hinted(shape if followed.track.label == "car" else BoxShape(), contact, seen.size_share or 0.0)
+    label = followed.track.label
+    factor = max(seen.class_factors.get(label, 1.0), 1.0)
+    height = hinted(shape if label == "car" else BoxShape(), contact, seen.size_share or 0.0, factor)
     place = followed.place_filter
     if place is not None and height.mean != followed.height.mean:
         place = place_filter.scaled(place, height.factor / followed.height.factor)

@@ -41,7 +41,8 @@ follow a vehicle that turns."""
 
 
 _LOWEST, _TALLEST = -0.25, 0.45
-"""ln(height / usual height) of a sports car (1.2 m) and of a high van (2.4 m)."""
+"""ln(height / usual height of the class): of a sports car (1.2 m) among cars, and of a high van (2.4 m) among cars or a
+lorry (4 m) among trucks."""
 _MAX_SIGMAS = 2.0
 """A height farther beyond these than so many of its standard deviations is no vehicle's: the road is not known."""
 
@@ -119,13 +120,14 @@ class Height(NamedTuple):
         return size_share if self.sigma is None else min(size_share, max(self.sigma, FLOOR_SHARE))
 
 
-def hinted(shape: BoxShape, contact: RoadContact, size_share: float) -> Height:
+def hinted(shape: BoxShape, contact: RoadContact, size_share: float, class_factor: float = 1.0) -> Height:
     """The height before any range: of the class, changed by the shape of the boxes and by where they meet the road.
 
-    size_share: standard deviation of ln(height) within the class.
+    size_share: standard deviation of ln(height) within the class. class_factor: height of the class over a car's; what
+    is called a truck may be a car.
     """
     prior, noise = size_share**2, contact.variance
-    possible = min(max(contact.log_ratio, _LOWEST), _TALLEST)
+    possible = min(max(contact.log_ratio, _LOWEST - math.log(class_factor)), _TALLEST)
     if not contact.sightings or abs(contact.log_ratio - possible) > _MAX_SIGMAS * math.sqrt(noise):
         return Height(shape.height)
     gain = prior / (prior + noise)

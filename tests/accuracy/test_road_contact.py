@@ -60,7 +60,8 @@ def placed(folder: Path) -> Iterator[Placed]:
             true_m = float(np.hypot(*corners[int(overlap[row].argmax())][:, :2].T).min())
             ratio = math.log(each.contact_m / each.distance_m)
             contact = RoadContact().seen(ratio, each.contact_share, each.contact_noise_share)
-            known = hinted(BoxShape().seen(each.aspect), contact, each.size_share or 0.0)
+            factor = max(each.class_factors.get(each.detection.label, 1.0), 1.0)
+            known = hinted(BoxShape().seen(each.aspect), contact, each.size_share or 0.0, factor)
             by_height = math.log(each.distance_m / true_m)
             sigma = math.hypot(known.share(each.size_share or 0.0), each.noise_share or 0.0)
             if true_m > FAR_M:

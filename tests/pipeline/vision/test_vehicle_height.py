@@ -201,6 +201,12 @@ def test_where_boxes_meet_the_road_tells_the_height_as_well_as_the_road_is_known
     assert not height.is_ranged
 
 
+def test_what_is_called_a_truck_may_be_a_car() -> None:
+    contact = RoadContact().seen(math.log(1.0 / 1.6), 0.08, 0.0)
+    assert hinted(BoxShape(), contact, SPREAD).sigma is None
+    assert hinted(BoxShape(), contact, SPREAD, 1.6).factor == pytest.approx(1.6**-0.86, rel=0.01)
+
+
 def test_a_contact_averages_single_boxes() -> None:
     contact = RoadContact()
     for k in range(20):
