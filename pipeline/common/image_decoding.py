@@ -28,8 +28,8 @@ _BARE = frozenset({0x01, *range(0xD0, 0xD9)})
 
 
 class TooMuch(ValueError):
-    """An image over the budget, or of a format whose size cannot be determined before decoding; the text is the reason.
-    """
+    """An image over the budget, or of a format whose size cannot be determined before decoding; the text is the
+    reason."""
 
 
 def decode_within_budget(data: bytes) -> npt.NDArray[np.uint8] | None:

@@ -27,8 +27,8 @@ _T = TypeVar("_T")
 
 
 class NotReachable(BadInput):
-    """An address that cannot be used: nothing exists there, access is denied, or the package for its store is missing.
-    """
+    """An address that cannot be used: nothing exists there, access is denied, or the package for its store is
+    missing."""
 
 
 def is_remote(address: str) -> bool:

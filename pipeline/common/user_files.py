@@ -66,8 +66,8 @@ def check_regular(path: Path) -> None:
 
 
 def check_allowed(path: Path) -> None:
-    """OSError for a path that resolves, including symbolic links, to a place outside the folders of ``CIPV_FOLDERS``.
-    """
+    """OSError for a path that resolves, including symbolic links, to a place outside the folders of
+    ``CIPV_FOLDERS``."""
     named = os.environ.get(FOLDERS_VARIABLE)
     if named is None:
         return

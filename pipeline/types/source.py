@@ -203,8 +203,8 @@ class Mounted(Protocol):
 
 @runtime_checkable
 class Simulated(Protocol):
-    """A source that knows whether its images are from the simulator; detectors of real images perform worse on these.
-    """
+    """A source that knows whether its images are from the simulator; detectors of real images perform worse on
+    these."""
 
     is_simulated: bool
 
