@@ -209,9 +209,7 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, use_
     for n in range(len(edges)):
         for k in range(2):
             edge = rows[n // 2, 14 + 2 * (n % 2) + k]
-            edges[n, k] = (
-                edge if np.isfinite(edge) else 0.0
-            )  # the kernel below is compiled under the assumption that nothing is NaN
+            edges[n, k] = edge if np.isfinite(edge) else 0.0  # the kernel below assumes no NaN
     beside, _ = nearest(center, edges)
     out = np.empty((len(rows), 11))
     for n in range(len(rows)):
