@@ -109,9 +109,7 @@ def measure(
     notes = (note,) if note and (params.source == "lidar" or not given) else ()
     trusted = [each for each in map(_as_far_as_usable, sources) if each is not None and _may(each.source, params)]
     if recorded is not None and received is not None and params.source == "auto":
-        trusted = [
-            each for each in trusted if each.source != "gnss"
-        ]  # as accurate as the car's own sensor, but delayed
+        trusted = [each for each in trusted if each.source != "gnss"]  # as accurate as the car's own, but delayed
     if not trusted:
         return Measured(state, None, None, (*notes, *_nothing_of(params.source, sources)))
     # Speed and yaw rate are each taken from the most certain source
