@@ -46,12 +46,12 @@ COMMANDS = {
     "scores": "app.commands.scores:Scores",
     "bench": "app.commands.bench:Bench",
 }
-"""What is typed → module and class. Only that is imported: all together take seconds, and of a group's commands one
-may need much less than the others."""
+"""Command name → module and class. Only the chosen module is imported, since importing all takes seconds, and the
+commands of a group have different dependencies."""
 
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
 _NAMED_WRONG = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError)
-"""A path that a person named cannot be used; any other failure of the system is not their doing."""
+"""A path given by the user cannot be used; other system errors are not caused by the user."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -64,7 +64,7 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"cipv: {error}", file=sys.stderr)
         raise SystemExit(2) from None
     except BrokenPipeError:
-        # the reader of our output has gone (`cipv run … | head`): nothing is wrong, and nothing more can be written
+        # the reader of our output has exited (`cipv run … | head`): not an error, but nothing more can be written
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(0) from None
     except OSError as error:
@@ -80,7 +80,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _parse(arguments: list[str]) -> Callable[[], int]:
-    """The command that was typed, with its options. SystemExit after help, and with 2 for bad usage."""
+    """The command that was typed, with its options. SystemExit after help, and with 2 for wrong usage."""
     for words in (2, 1):
         name = " ".join(arguments[:words])
         if name in COMMANDS:
@@ -100,7 +100,8 @@ def _command(name: str) -> Any:
 
 
 def _stand_in(name: str) -> Callable[[], Callable[[], int]]:
-    """What the list of commands shows of one: its help, read in its source, since importing all takes seconds."""
+    """Placeholder in the list of commands: its help is parsed from its source, since importing all commands takes
+    seconds."""
 
     def command() -> Callable[[], int]:
         return _parse([name])

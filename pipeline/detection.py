@@ -20,11 +20,11 @@ Seen_co = TypeVar("Seen_co", bound=RawBoxes | RawLanes, covariant=True)
 
 
 class Detects(Protocol[Seen_co]):
-    """Looks at one image: a network, or anything that answers like one."""
+    """Processes one image: a network, or anything with the same interface."""
 
     @property
     def name(self) -> str:
-        """Equal names give equal answers: the key of caches."""
+        """Equal names give equal outputs; used as cache key."""
         ...
 
     @property
@@ -33,7 +33,7 @@ class Detects(Protocol[Seen_co]):
         ...
 
     def detect(self, bgr: U8) -> Seen_co:
-        """What is in an image (H, W, 3) uint8."""
+        """The detections in an image (H, W, 3) uint8."""
         ...
 
 
@@ -42,40 +42,40 @@ class Detectors:
     """The detectors of a recording. For live sensors wrap them in ``LiveDetectors``."""
 
     boxes: Detects[RawBoxes] | None = None
-    """Finds vehicles; None: nothing does."""
+    """Finds vehicles; None without a detector."""
     lanes: Detects[RawLanes] | None = None
-    """Finds lane lines; None: nothing does."""
+    """Finds lane lines; None without a detector."""
     lanes_every: int = 1
-    """Lane lines are looked for in every n-th frame, by its index, so in whatever order frames are asked for the
-    answers are the same. In between the lane tracker predicts."""
+    """Lane lines are detected in every n-th frame by its index, so the results do not depend on the order in which
+    frames are read. In between, the lane tracker predicts."""
     far: FarView | None = None
-    """Looks a second time at the far part of the image; None: nobody does."""
+    """Processes the far part of the image a second time; None without a second pass."""
     far_every: int = 1
-    """In every n-th frame, by its index."""
+    """The far view runs in every n-th frame by its index."""
 
     def looks_for_lanes(self, index: int) -> bool:
-        """Whether lane lines are looked for in the frame of this index."""
+        """Whether lane lines are detected in the frame with this index."""
         return self.lanes is not None and index % self.lanes_every == 0
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all that look: equal names give equal answers."""
+        """Names of all detectors: equal names give equal outputs."""
         asked = (self.boxes, self.lanes, self.far)
         return tuple(each.name for each in asked if each is not None)
 
     def looks_far(self, index: int) -> bool:
-        """Whether the far view is looked at in the frame of this index."""
+        """Whether the far view runs in the frame with this index."""
         return self.far is not None and index % self.far_every == 0
 
 
 CALM_TICKS = 50
-"""Ticks without a dropped one after which the far view is looked at in every tick again: 5 s at 10 Hz."""
+"""Number of ticks without a dropped one after which the far view runs in every tick again: 5 s at 10 Hz."""
 
 
 class LiveDetectors:
-    """The detectors for each tick of live sensors that is run. Lane lines are looked for again once ``lanes_every``
-    ticks were run; the frame index cannot say so, because it also counts the ticks that were dropped. Where ticks are
-    dropped, the machine is too slow for all of it, and the far view sits out every other tick."""
+    """Selects the detectors for each processed tick of live sensors. Lane lines are detected again after
+    ``lanes_every`` processed ticks; the frame index cannot be used, because it also counts dropped ticks. If ticks are
+    dropped, the machine is too slow for everything, and the far view runs only in every other tick."""
 
     def __init__(self, detectors: Detectors) -> None:
         self._detectors = detectors
@@ -85,7 +85,7 @@ class LiveDetectors:
         self._looked_far = False
 
     def of(self, frame: Frame) -> Detectors:
-        """The detectors for a tick; call it once for each. A tick without an image passes its turn to the next."""
+        """The detectors for a tick; call this once per tick. A tick without an image passes its turn to the next."""
         is_due = self._since_lanes >= self._detectors.lanes_every and frame.image is not None
         self._since_lanes = 1 if is_due else self._since_lanes + 1
         lanes = self._detectors.lanes if is_due else None
@@ -101,19 +101,19 @@ class LiveDetectors:
 
 
 class Look(Protocol):
-    """How a detector is asked about a frame's image: directly, or through a cache."""
+    """How a detector is called for a frame's image: directly, or through a cache."""
 
     def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen: ...
 
 
 def look(detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
-    """Ask directly."""
+    """Call the detector directly."""
     return detector.detect(bgr)
 
 
 def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
-    """The frame with what the detectors see in its image. A frame without an image, or whose recording already holds
-    detections, is returned as it is."""
+    """The frame with the detections in its image. A frame without an image, or whose recording already contains
+    detections, is returned unchanged."""
     if frame.image is None or frame.detections_given:
         return frame
     bgr = frame.image.bgr
@@ -128,10 +128,10 @@ def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
 
 
 def detector_for(source: AnySource, spec: str | None = None) -> Detector:
-    """The named vehicle detector, its input fitted to the source's images. Without a name: the embedded network for
-    the simulator, whose images it was trained on; the default network for everything else.
+    """The named vehicle detector, with an input size that fits the source's images. Without a name: the embedded
+    network for the simulator, whose images it was trained on; the default network for everything else.
 
-    Raises DetectorMissing when it is not installed, DetectorError when it cannot be run.
+    Raises DetectorMissing if it is not installed, DetectorError if it cannot be run.
     """
     if spec is None and is_simulated(source):
         spec = EMBEDDED
@@ -139,8 +139,8 @@ def detector_for(source: AnySource, spec: str | None = None) -> Detector:
 
 
 def far_view_for(source: AnySource, detector: Detects[RawBoxes] | None, size_px: int = WINDOW_PX) -> FarView | None:
-    """The far view of the same network for the source's images. None without a network, and where the images are
-    no larger than what it sees anyway. DetectorError when the network cannot be run at that size."""
+    """The far view with the same network for the source's images. None without a network, or if the images are no
+    larger than the network's input. DetectorError if the network cannot be run at that size."""
     size = image_size(source)
     return open_far_view(detector, size, size_px) if isinstance(detector, Detector) and size is not None else None
 
@@ -155,7 +155,7 @@ def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None
 
 
 def brings_detections(source: AnySource) -> bool:
-    """Whether a recording holds the detections of its images, so that no detector is needed."""
+    """Whether a recording contains the detections of its images, so that no detector is needed."""
     return not is_live_source(source) and cast("Source", source).frame(0).detections_given
 
 
@@ -169,16 +169,16 @@ def image_size(source: AnySource) -> tuple[int, int] | None:
 
 @dataclass(frozen=True)
 class DetectorChoice:
-    """Which detectors a person asked for."""
+    """The detectors chosen by the user."""
 
     boxes: str | None = None
-    """Name or path of the vehicle detector; None: the usual one."""
+    """Name or path of the vehicle detector; None for the default."""
     lanes: str | None = None
-    """Name or path of the lane network, ``classical`` or ``off``; None: the usual one."""
+    """Name or path of the lane network, ``classical`` or ``off``; None for the default."""
     lanes_every: int | None = None
-    """Lanes are looked for in every n-th frame; None: as the lane detector is quick."""
+    """Lanes are detected in every n-th frame; None for a default that depends on the lane detector's speed."""
     far_px: int | None = WINDOW_PX
-    """Side of the far view's window in native pixels; None: no far view."""
+    """Side of the far view's window in native pixels; None without a far view."""
 
 
 def open_detectors(
@@ -186,8 +186,8 @@ def open_detectors(
 ) -> Detectors:
     """All detectors for the source's images: none for LiDAR alone, and for recordings that contain detections.
 
-    say: told, in sentences, what a user should know about them. DetectorMissing when a named one is missing, or any
-    with ``sensors="camera"``; otherwise that is said and LiDAR runs alone.
+    say: receives sentences that a user should know about them. DetectorMissing if a named detector is missing, or any
+    detector with ``sensors="camera"``; otherwise this is reported through ``say`` and only the LiDAR is used.
     """
     if sensors == "lidar" or brings_detections(source):
         return Detectors()
@@ -202,7 +202,7 @@ def open_detectors(
 def open_boxes(
     source: AnySource, spec: str | None, sensors: str = "both", say: Callable[[str], object] = lambda _: None
 ) -> Detector | None:
-    """The vehicle detector alone, as ``open_detectors`` opens it."""
+    """Only the vehicle detector, opened as in ``open_detectors``."""
     try:
         detector = detector_for(source, spec)
     except DetectorMissing as missing:

@@ -18,15 +18,15 @@ from pipeline.warm_up import warm_up
 
 _SILENCE_S = 0.5
 _BESIDE = ThreadPoolExecutor(thread_name_prefix="own-motion")
-"""Own motion is measured while detectors look at the image."""
+"""Measures own motion while detectors process the image."""
 _TRIES = 10
 
 Sensors = Literal["lidar", "camera", "both"]
 
 
 def only(frame: Frame, sensors: Sensors) -> Frame:
-    """The frame as a car with only these sensors would have it. The image stays, because people still want to see
-    it; what detectors saw in it goes."""
+    """The frame as a car with only these sensors would have it. The image stays, so that it can be displayed;
+    detections in it are removed."""
     if sensors == "lidar":
         return replace(frame, raw_boxes=None, raw_lanes=None)
     if sensors == "camera":
@@ -35,26 +35,26 @@ def only(frame: Frame, sensors: Sensors) -> Frame:
 
 
 def sensed(frame: Frame, detectors: Detectors, sensors: Sensors = "both", ask: Look = look) -> Frame:
-    """A frame of a source made ready for ``step``: detectors have looked at its image, and sensors that are switched
-    off are gone. With LiDAR alone no detector is asked."""
+    """A frame of a source prepared for ``step``: detectors have processed its image, and data of disabled sensors is
+    removed. With LiDAR alone no detector runs."""
     return only(frame if sensors == "lidar" else detect(frame, detectors, ask), sensors)
 
 
 def advance(
     state: State, frame: Frame, params: Params, detectors: Detectors, sensors: Sensors = "both", ask: Look = look
 ) -> tuple[Frame, State, Result]:
-    """Run one frame as its source gave it.
+    """Run one frame of a source.
 
     Args:
-        state: what the frame before left; ``State()`` at the start.
+        state: state after the previous frame; ``State()`` at the start.
         frame: from the source.
         params: of this frame.
-        detectors: who looks at its image.
+        detectors: detectors that process its image.
         sensors: which sensors the car has.
-        ask: how a detector is asked: directly, or through a cache.
+        ask: how a detector is called: directly, or through a cache.
 
     Returns:
-        The frame that ``step`` was given, the state after it, and the result.
+        The frame as passed to ``step``, the state after it, and the result.
     """
     beside = _BESIDE.submit(measure_own_motion, state, only(frame, sensors), params)
     frame = sensed(frame, detectors, sensors, ask)
@@ -65,8 +65,8 @@ def advance(
 def run(
     source: Source, params: Params, detectors: Detectors, sensors: Sensors = "both", ask: Look = look
 ) -> Iterator[tuple[Frame, Result]]:
-    """Each frame of a recording with its result. Without detectors the LiDAR works alone. ask: how a detector is asked:
-    directly, or by what it answered before."""
+    """Each frame of a recording with its result. Without detectors only the LiDAR is used. ask: how a detector is
+    called: directly, or through a cache of earlier outputs."""
     return through((patiently(source, index) for index in range(len(source))), params, detectors, sensors, ask)
 
 
@@ -77,13 +77,13 @@ def run_live(
     sensors: Sensors = "both",
     on_silence: Callable[[], None] = lambda: None,
 ) -> Iterator[tuple[Frame, Result]]:
-    """The newest tick of live sensors with its result, again and again until the iterator is closed, which releases the
+    """The newest tick of live sensors with its result, repeatedly until the iterator is closed, which releases the
     sensors. on_silence: called every half second while no sensor delivers."""
     return _through(_ticks(source, params, on_silence), params, LiveDetectors(detectors).of, sensors)
 
 
 def patiently(source: Source, index: int) -> Frame:
-    """A frame, read again for a while where the system cannot read at this moment. Overloaded after that."""
+    """Read a frame, with retries if the system is temporarily unable to read. Overloaded if that does not help."""
     for _ in range(_TRIES):
         try:
             return source.frame(index)
@@ -115,7 +115,7 @@ def _through(
 
 
 def used(detectors: Detectors, params: Params) -> Detectors:
-    """Those of the detectors that these parameters ask for."""
+    """The detectors that are enabled by these parameters."""
     return detectors if params.detection.far_view else replace(detectors, far=None)
 
 

@@ -20,35 +20,35 @@ _MOST_ENTRIES = 20_000
 
 @dataclass(frozen=True)
 class SourceKind:
-    """One kind of recording or device, how it is recognised and what opens it."""
+    """One kind of recording or device: how it is recognised and what opens it."""
 
     scheme: str
-    """What a URI of this kind begins with, without the colon."""
+    """The URI scheme, without the colon."""
     usage: str
-    """What a person types, for help and error texts."""
+    """What a user types, for help and error texts."""
     opener: str
     """``module:function`` that opens it, called with the URI, the part after the colon and an ``Opening``."""
     folders: tuple[str, ...] = ()
-    """A folder with one of these folders inside is of this kind."""
+    """A folder that contains one of these folders is of this kind."""
     files: tuple[str, ...] = ()
-    """A folder with a file that matches one of these patterns is of this kind."""
+    """A folder that contains a file matching one of these patterns is of this kind."""
     suffixes: tuple[str, ...] = ()
-    """A file whose name ends so is of this kind."""
+    """A file with one of these suffixes is of this kind."""
     begins: tuple[tuple[int, bytes], ...] = ()
-    """A file with one of these at its offset is of this kind, whatever its name."""
+    """A file with one of these byte sequences at its offset is of this kind, whatever its name."""
     bare_suffixes: tuple[str, ...] = ()
-    """A path that ends so is opened without a scheme."""
+    """A path with one of these suffixes is opened without a scheme."""
     is_live: bool = False
-    """It names devices, which have no frames to choose from."""
+    """Whether it names devices, which have no random access."""
     built_in: str = ""
-    """``module:function`` that lists what comes with the product: (part after the colon, title) pairs."""
+    """``module:function`` that lists the built-in recordings: (part after the colon, title) pairs."""
 
     def load(self) -> Any:
         """The function that opens it."""
         return _imported(self.opener)
 
     def offers(self) -> list[tuple[str, str]]:
-        """(uri, title) of each recording of this kind that comes with the product."""
+        """(uri, title) of each built-in recording of this kind."""
         return [(f"{self.scheme}:{rest}", title) for rest, title in _imported(self.built_in)()] if self.built_in else []
 
 
@@ -124,22 +124,23 @@ KINDS: tuple[SourceKind, ...] = (
 
 
 def usages(*, live: bool = True) -> str:
-    """What can be typed for a source, as a list in words; without live sensors where only recordings are taken."""
+    """The source kinds that can be typed, as a list in words; without live sensors where only recordings are
+    accepted."""
     return ", ".join(kind.usage for kind in KINDS if live or not kind.is_live)
 
 
 def built_in() -> list[tuple[str, str]]:
-    """(uri, title) of every recording that comes with the product: the simulator's scenarios."""
+    """(uri, title) of every built-in recording: the simulator's scenarios."""
     return [offer for kind in KINDS for offer in kind.offers()]
 
 
 def kind_named(scheme: str) -> SourceKind | None:
-    """The kind of that scheme."""
+    """The kind with this scheme."""
     return next((kind for kind in KINDS if kind.scheme == scheme), None)
 
 
 def is_live(uri: str) -> bool:
-    """Whether a URI names devices that are read as they deliver."""
+    """Whether a URI names live devices."""
     scheme, colon, _ = uri.partition(":")
     kind = kind_named(scheme)
     return kind is not None and bool(colon) and kind.is_live
@@ -151,9 +152,9 @@ def kind_of_bare(path: str) -> SourceKind | None:
 
 
 def looks_like(path: Path) -> str | None:
-    """The scheme of a file or folder, by what lies in it or by its name; None for what is no recording that needs one.
+    """The scheme for a file or folder, by its content or name; None if it is not a recording that needs a scheme.
 
-    The folders inside say most, then the files inside, then the path's own suffix.
+    Folders inside it have priority, then files inside it, then its own suffix.
     """
     for kind in KINDS:
         if any((path / inside).is_dir() for inside in kind.folders):
@@ -167,7 +168,8 @@ def looks_like(path: Path) -> str | None:
 
 
 def _names(folder: Path) -> list[str]:
-    """What lies in a folder; of very many the first ones, which tell what it is of. Empty where it may not be read."""
+    """Names in a folder; for very large folders only the first ones, which suffice to recognise it. Empty if it cannot
+    be read."""
     try:
         with os.scandir(folder) as found:
             return [each.name for each in islice(found, _MOST_ENTRIES)]
@@ -176,14 +178,14 @@ def _names(folder: Path) -> list[str]:
 
 
 def _holds(folder: Path, names: list[str], pattern: str) -> bool:
-    """Whether one of these names is of a pattern, capitals or not; what follows a slash must lie in it."""
+    """Whether one of these names matches a pattern, ignoring case; the part after a slash must exist in that folder."""
     first, _, rest = pattern.partition("/")
     of_pattern = (name for name in names if fnmatchcase(name.lower(), first))
     return any(not rest or (folder / name / rest).exists() for name in of_pattern)
 
 
 def kind_by_first_bytes(begin: bytes) -> SourceKind | None:
-    """The kind of a file that begins so; of several the one that says most of it."""
+    """The kind of a file that starts with these bytes; if several match, the match farthest into the file."""
     found = [(at, kind) for kind in KINDS for at, magic in kind.begins if begin[at:].startswith(magic)]
     return max(found, key=lambda each: each[0])[1] if found else None
 

@@ -47,10 +47,10 @@ _LATE_MS = 50.0
 
 @dataclass(frozen=True)
 class State:
-    """Everything one frame leaves to the next, stage by stage."""
+    """The state that one frame passes to the next, by stage."""
 
     t_ns: int | None = None
-    """Of the last frame; None before the first."""
+    """Time of the last frame; None before the first."""
     lidar: lidar_tracking.LidarTrackerState = lidar_tracking.LidarTrackerState()
     """Tracks of the LiDAR's clusters."""
     vision: vision_tracking.VisionTrackerState = vision_tracking.VisionTrackerState()
@@ -62,45 +62,45 @@ class State:
     agreement: agreement.AgreementState = agreement.AgreementState()
     """How often camera and LiDAR agree."""
     drift: drift.DriftState = drift.DriftState()
-    """By which angle they come apart."""
+    """The angle between the two sensors."""
     own: EgoState | None = None
     """Ego motion of the last frame, measured or coasted; None while unknown."""
     measured: own_motion.OwnMotionState = own_motion.OwnMotionState()
     """Odometry and GNSS courses of earlier frames."""
     ground: Ground | None = None
-    """Of the last sweep; LiDAR odometry stands on it."""
+    """Ground of the last sweep; used by LiDAR odometry."""
     lanes: lanes.LaneState = lanes.LaneState()
     """Tracked lines and the camera's pitch."""
     edges: road_edges.EdgeState = road_edges.EdgeState()
     """Structure beside the road, moved along with the car."""
     traffic: traffic.TrafficState = traffic.NONE
-    """Where vehicles drove, moved along with the car."""
+    """Where vehicles have driven, moved along with the car."""
     path: corridor.PathState = corridor.PathState()
-    """Smoothed path and place on the route."""
+    """Smoothed path and position on the route."""
     cipv: cipv.CipvState = cipv.CipvState()
-    """Who leads, and the odds that each object is in the path."""
+    """The lead, and the odds that each object is in the path."""
     acc: acc.AccState = acc.AccState()
-    """The speed controller's memory."""
+    """State of the speed controller."""
     aeb: aeb.AebState = aeb.AebState()
-    """The active stage of emergency braking, and what called for it."""
+    """The active stage of emergency braking, and its cause."""
 
 
 def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured | None = None) -> tuple[State, Result]:
-    """Run every stage on one frame. The networks have run before: their answers are ``frame.raw_boxes`` and
-    ``frame.raw_lanes`` (``pipeline.detection.detect``). motion: what ``measure_own_motion`` returned, where it ran
-    beside them."""
+    """Run every stage on one frame. The networks have already run: their outputs are ``frame.raw_boxes`` and
+    ``frame.raw_lanes`` (``pipeline.detection.detect``). motion: result of ``measure_own_motion`` if it ran in parallel
+    with them."""
     clock = Stopwatch()
     motion = motion if motion is not None else measure_own_motion(state, frame, params)
     clock.lap("own_motion")
     state, now = _begin(state, frame, motion.ego, params)
     aligned = projection.resolve(params.alignment, frame.camera)
 
-    # LiDAR: what stands on the ground in this sweep, followed from sweep to sweep
+    # LiDAR: objects on the ground in this sweep, tracked from sweep to sweep
     sweep = segmentation.segment(frame.sweep, now.ego, params, clock, state.lidar, now.dt_s)
     lidar_state, lidar_tracks = lidar_tracking.track(state.lidar, sweep.obstacles, now.dt_s, params.lidar_tracking)
     clock.lap("lidar_tracking")
 
-    # Camera: the detector's boxes, each with a distance from its height, followed from image to image
+    # Camera: the detector's boxes, each with a distance from its height, tracked from image to image
     boxes = _measure_boxes(frame, aligned, params)
     boxes = returns.range_boxes(boxes, sweep, aligned, params.fusion)
     boxes = ground_contact.measure_contacts(boxes, sweep, aligned, now.speed_mps, params.fusion)
@@ -115,15 +115,15 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         state.fusion, lidar_tracks, vision_tracks, aligned, frame.image_size, params.fusion
     )
     vision_state = vision_tracking.learn_heights(vision_state, fused.ranged_boxes(), params.vision_tracking)
-    # A knocked mount: both sensors see the same vehicles, but apart
+    # A knocked mount: both sensors see the same vehicles, but with an angle between them
     drift_state, turned = drift.follow(state.drift, fused, aligned, frame.image_size, frame.t_ns, params.fusion)
     clock.lap("fusion")
-    # Existence: the evidence of each sensor for and against every object being where it is reported
+    # Existence: evidence from each sensor for and against every object being at its reported position
     existence_state, objects = existence.weigh(state.existence, fused.objects, sweep, frame, now, params.existence)
     clock.lap("existence")
     objects = object_motion.describe(objects, now.measured, params.motion)
 
-    # Path: lane lines, the route, the yaw rate, the road's edges and other vehicles, each weighed by how sure it is
+    # Path: lane lines, the route, the yaw rate, the road's edges and other vehicles, each weighted by its certainty
     road_z_m = frame.camera.road_z_m if frame.camera is not None else None
     view = lanes.RoadView(aligned, sweep.ground, road_z_m, _vehicle_boxes(boxes))
     lane_state, lane = lanes.follow(state.lanes, frame.raw_lanes, view, now, params.lanes)
@@ -147,7 +147,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     path = agreement.heed(path, agreement_state, params.fusion)
     clock.lap("path")
 
-    # Decision: the nearest vehicle in the path, a speed that keeps the gap to it, and brakes for an emergency
+    # Decision: the nearest vehicle in the path, a speed that keeps the gap to it, and emergency braking
     cipv_state, chosen = cipv.choose(state.cipv, objects, path, now, params.cipv)
     clock.lap("cipv")
     objects = braking_evidence.judge(chosen.objects, params.existence)
@@ -214,28 +214,29 @@ def _note_of(turned: drift.Drift | None) -> tuple[str, ...]:
 
 
 def measure_own_motion(state: State, frame: Frame, params: Params) -> own_motion.Measured:
-    """Own motion in a frame, from whatever measures it. It needs nothing of the networks, so it may run beside them."""
+    """Own motion in a frame, from all available sources. It does not depend on the networks, so it may run in
+    parallel."""
     dt_s = _since(state, frame, params)
     seen = own_motion.OdometryContext(state.ground, state.lidar.tracks, coasting.recent(state.own, params.motion))
     before = state.measured if dt_s is not None else own_motion.OwnMotionState()
     clock = Stopwatch()
     found = own_motion.measure(before, frame, yaw_rate.believable(frame.ego), seen, dt_s, params.motion)
     late_ms = clock.timing_ms()["total"]
-    if frame.streams and late_ms > _LATE_MS:  # of live sensors only: a recording's results do not depend on the clock
+    if frame.streams and late_ms > _LATE_MS:  # live sensors only: a recording's results must not depend on the clock
         return found._replace(notes=(*found.notes, f"LiDAR odometry took {late_ms:.0f} ms"))
     return found
 
 
 def _since(state: State, frame: Frame, params: Params) -> float | None:
-    """Seconds since the frame before; None at the start, after a gap and after a jump back in time."""
+    """Seconds since the previous frame; None at the start, after a gap and after a jump back in time."""
     if state.t_ns is None or begins_clip(state.t_ns, frame.t_ns, params.time.reset_gap_s):
         return None
     return (frame.t_ns - state.t_ns) / 1e9
 
 
 def _begin(state: State, frame: Frame, measured: EgoState | None, params: Params) -> tuple[State, Moment]:
-    """The state to go on from, and the moment. After a gap or a jump back in time the state is a fresh one, because a
-    track carried over either would be a guess; only object ids go on, so that none is given twice."""
+    """The state to continue from, and the moment. After a gap or a jump back in time the state is reset, because tracks
+    carried over it would be guesses; only object ids continue, so that none is used twice."""
     dt_s = _since(state, frame, params)
     if dt_s is None:
         state = State(fusion=fusion.FusionState(next_id=state.fusion.next_id))
@@ -246,8 +247,8 @@ def _begin(state: State, frame: Frame, measured: EgoState | None, params: Params
 def _measure_boxes(
     frame: Frame, aligned: projection.Alignment | None, params: Params
 ) -> tuple[VisionMeasurement, ...] | None:
-    """The detector's boxes after thresholds and suppression, each with its estimated distance; None when the camera or
-    the detector gave nothing."""
+    """The detector's boxes after thresholds and suppression, each with its estimated distance; None without an image or
+    without detections."""
     if frame.raw_boxes is None:
         return None
     detections = nms.select(frame.raw_boxes, params.detection)
@@ -255,5 +256,5 @@ def _measure_boxes(
 
 
 def _vehicle_boxes(boxes: tuple[VisionMeasurement, ...] | None) -> list[Box]:
-    """Where vehicles hide the road in the image."""
+    """Boxes of vehicles that hide the road in the image."""
     return [each.detection.bbox for each in boxes or () if each.detection.label in VEHICLES]

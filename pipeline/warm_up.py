@@ -22,14 +22,15 @@ _LOCK = threading.Lock()
 
 
 def warm_up() -> None:
-    """Make the first frame as fast as the rest: compile every kernel, or load it from numba's cache, and keep the
-    garbage collector away from frames. Only the first call works; calls from other threads wait until it is done."""
+    """Make the first frame as fast as the others: compile every kernel, or load it from numba's cache, and keep the
+    garbage collector from running during frames. Only the first call does this; calls from other threads wait until it
+    is done."""
     with _LOCK:
         _warm_up()
 
 
 def is_warm() -> bool:
-    """Whether ``warm_up`` has nothing left to do."""
+    """Whether ``warm_up`` has completed."""
     return _warm_up.cache_info().currsize > 0
 
 

@@ -7,14 +7,14 @@ from typing import Literal
 from starlette.requests import HTTPConnection
 
 Role = Literal["person", "display"]
-"""A display may look, mark and record; it changes no parameters, seeks nothing and opens nothing."""
+"""A display may view, mark and record; it cannot change parameters, seek or open sources."""
 
 
 def set_role(connection: HTTPConnection, role: Role) -> None:
-    """Remember the role of a connection for as long as it lives."""
+    """Store the role of a connection for its lifetime."""
     connection.scope.setdefault("state", {})["role"] = role
 
 
 def is_display(connection: HTTPConnection) -> bool:
-    """True for who came with the display's token."""
+    """Whether the client authenticated with the display's token."""
     return connection.scope.get("state", {}).get("role") == "display"

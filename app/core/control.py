@@ -13,58 +13,60 @@ from pipeline.params import Params, changes_of, with_changes
 
 @dataclass(frozen=True)
 class Wish:
-    """What clients want at one moment: standing values, and requests that are served once."""
+    """The requested state at one moment: persistent values, and one-shot requests that are served once."""
 
     params: Params
-    """For the shown frame and for whole-drive runs."""
+    """Parameters for the shown frame and for whole-drive runs."""
     preset: str = "default"
     """The preset that the parameters started from."""
     params_revision: int = 0
-    """Grows with every change of parameters."""
+    """Incremented with every change of parameters."""
     settled: bool = True
-    """The parameters are meant to stay; false while a slider is being dragged."""
+    """Whether the parameters are final; false while a slider is being dragged."""
     playing: bool = False
-    """False holds the shown frame."""
+    """False pauses on the shown frame."""
     speed: float = 1.0
     """Playback rate; 1 is real time."""
     loop: bool = True
     """Playback starts again at the end of the drive."""
     uri: str | None = None
-    """Served once: the source to open."""
+    """One-shot: the source to open."""
     target: int | None = None
-    """Served once: the frame to seek to."""
+    """One-shot: the frame to seek to."""
     steps: int = 0
-    """Served once: frames to move by."""
+    """One-shot: number of frames to move by."""
     stop: bool = False
-    """The engine shall end."""
+    """Whether the engine should stop."""
 
 
 class Settling(Protocol):
-    """Called with changes of parameters that are meant to stay."""
+    """Called with final changes of parameters."""
 
     def __call__(self, changes: Mapping[str, tuple[Any, Any]], person: str, *, merges: bool) -> object:
-        """changes: by dotted name (and ``preset``), before and after. merges: one step with the change before it."""
+        """changes: by dotted name (and ``preset``), before and after. merges: undone together with the previous
+        change."""
         ...
 
 
 class Asking(Protocol):
-    """Called when a client starts to wait for something."""
+    """Called when a client starts to wait for a request."""
 
     def __call__(self, *, rests: bool) -> object:
-        """rests: the request is not of a kind that usually repeats at once, as drags do."""
+        """rests: the request is of a kind that usually does not repeat immediately, unlike drags."""
         ...
 
 
 PRESET = "preset"
-"""The name under which changes of parameters hold the preset."""
+"""Name of the preset in changes of parameters."""
 
 
 class Control:
-    """Hands requests from any number of threads to the one worker.
+    """Passes requests from any number of threads to the single worker.
 
-    ``on_settle`` is called on the thread that changed parameters, before the call returns, one change after another.
-    ``on_ask`` is called on the thread that asks for another frame, source, parameters or the end, before the worker
-    takes the request; it must be quick."""
+    ``on_settle`` is called on the thread that changed parameters, before the call returns, one change at a time.
+    ``on_ask`` is called on the thread that requests another frame, source, parameters or the end, before the worker
+    takes the request; it must be quick.
+    """
 
     def __init__(self, first: Wish) -> None:
         self.on_settle: Settling = lambda changes, person, *, merges: None
@@ -76,12 +78,12 @@ class Control:
         self._changed = first.uri is not None
 
     def change(self, **values: Any) -> Wish:
-        """Replace fields of the wish and wake the worker."""
+        """Replace fields of the requested state and wake the worker."""
         with self._condition:
             return self._replace(replace(self._wish, **values))
 
     def seek(self, index: int) -> None:
-        """Go to a frame. It replaces an older seek and any steps not yet made."""
+        """Go to a frame. This replaces an earlier seek and any pending steps."""
         self.change(target=index, steps=0)
 
     def step(self, count: int) -> None:
@@ -100,8 +102,10 @@ class Control:
     ) -> int:
         """Use these parameters from now on. Returns their revision.
 
-        final: a step that can be undone; otherwise they are only tried, as while a slider is dragged. merges: one step
-        with the change before it, when that was of the same parameters. person: whose step it is."""
+        final: a change that can be undone; otherwise the parameters are only tried, as while a slider is dragged.
+        merges: undone together with the previous change if that was of the same parameters. person: who made the
+        change.
+        """
         with self._settling:
             revision, changes = self._take(params, preset, final)
             if changes:
@@ -111,33 +115,33 @@ class Control:
     def change_params(
         self, changes: Mapping[str, Any], *, final: bool = True, merge: bool = False, person: str = ""
     ) -> int:
-        """Change some parameters, by their dotted names, as they stand at this moment: of two callers at once neither
-        undoes the other. ParamsError for a bad one. Returns the revision."""
+        """Change some parameters, by their dotted names, starting from the current values: of two concurrent callers,
+        neither overwrites the other. ParamsError for an invalid one. Returns the revision."""
         with self._settling:
             changed = with_changes(self.peek().params, changes)
             return self.set_params(changed, final=final, merges=merge, person=person)
 
     def restore(self, changes: Mapping[str, Any]) -> None:
-        """Parameters as an undone or redone step has them, by dotted name (and ``preset``): no step of its own. What is
-        only tried at this moment goes. ParamsError when they are no parameters any more."""
+        """Set parameters as part of undo or redo, by dotted name (and ``preset``), without recording a new step.
+        Parameters that are only being tried are discarded. ParamsError if they are no longer valid."""
         with self._settling, self._condition:
             self._settled = self.check(changes)
             self._use(*self._settled, settled=True)
 
     def check(self, changes: Mapping[str, Any]) -> tuple[Params, str]:
-        """Parameters and preset as ``restore`` would have them."""
+        """Parameters and preset that ``restore`` would set."""
         params, preset = self._settled
         values = {name: value for name, value in changes.items() if name != PRESET}
         return with_changes(params, values), changes.get(PRESET, preset)
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Nobody else settles parameters while the block runs."""
+        """Prevents others from finalising parameters during the block."""
         with self._settling:
             yield
 
     def forget_tried(self) -> bool:
-        """Back to what was settled on; false when nothing else is being tried."""
+        """Revert to the last final parameters; false if no others are being tried."""
         with self._settling, self._condition:
             if self._wish.params == self._settled[0]:
                 return False
@@ -145,22 +149,22 @@ class Control:
             return True
 
     def peek(self) -> Wish:
-        """The wish as it stands, served or not."""
+        """The current requested state, served or not."""
         with self._condition:
             return self._wish
 
     def superseded(self) -> bool:
-        """True when the worker should drop what it is doing for a newer seek, source or the end."""
+        """Whether the worker should abort its current work for a newer seek, source or the end."""
         with self._condition:
             return self._wish.stop or self._wish.uri is not None or self._wish.target is not None
 
     @property
     def waiting(self) -> bool:
-        """Whether anything has changed that the worker has not taken yet."""
+        """Whether there are changes that the worker has not taken yet."""
         return self._changed
 
     def take(self, timeout_s: float | None) -> Wish:
-        """Wait until something changes or the time is over; the wishes served once are handed out and cleared."""
+        """Wait for a change or the timeout; one-shot requests are returned and cleared."""
         with self._condition:
             self._condition.wait_for(lambda: self._changed, timeout_s)
             taken, self._changed = self._wish, False
@@ -168,7 +172,7 @@ class Control:
             return taken
 
     def _take(self, params: Params, preset: str | None, final: bool) -> tuple[int, dict[str, tuple[Any, Any]]]:
-        """The revision, and what is settled that was not before."""
+        """The revision, and the values that became final."""
         with self._condition:
             preset = preset or self._wish.preset
             revision = self._use(params, preset, final)

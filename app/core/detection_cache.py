@@ -16,47 +16,47 @@ _CACHED_ANSWERS = 12288
 
 
 class Named(Protocol):
-    """What answers are kept for."""
+    """A detector whose outputs are cached."""
 
     @property
     def name(self) -> str:
-        """Equal names give equal answers."""
+        """Equal names give equal outputs."""
         ...
 
 
 class DetectionCache:
-    """Detections by (source, frame, detector), bounded. It outlives the source, so that reopening a recording runs no
-    network, unless the recording's files have changed. Any thread."""
+    """Detections by (source, frame, detector), with bounded memory. It outlives the source, so that reopening a
+    recording runs no network unless its files have changed. Any thread."""
 
     def __init__(self, limit: int = _CACHED_ANSWERS) -> None:
         self._lock = threading.Lock()
         self._answers: BoundedCache[tuple[str, int, str], RawBoxes | RawLanes] = BoundedCache(limit, lambda _: 1)
 
     def look_at(self, uri: str) -> CachedLook:
-        """How detectors are asked about the images of one source, as its files are now."""
+        """A detector call for the images of one source, in the current version of its files."""
         return CachedLook(self, fingerprint(uri))
 
     def get(self, key: tuple[str, int, str]) -> RawBoxes | RawLanes | None:
-        """An answer by (source and image, frame, detector); None where it is not cached."""
+        """An output by (source and image, frame, detector); None if it is not cached."""
         with self._lock:
             return self._answers.get(key)
 
     def put(self, key: tuple[str, int, str], answer: RawBoxes | RawLanes) -> None:
-        """Keep an answer; the oldest are dropped when memory is full."""
+        """Store an output; the oldest are dropped when memory is full."""
         with self._lock:
             self._answers.put(key, answer)
 
 
 class CachedLook:
-    """A ``pipeline.run.Look`` that asks the cache first. For one thread; ``clone`` it for a second one."""
+    """A ``pipeline.run.Look`` that checks the cache first. For one thread; ``clone`` it for another."""
 
     def __init__(self, cache: DetectionCache, source: str) -> None:
         self.spent_ms = 0.0
-        """How long detectors have run for it in all, in milliseconds."""
+        """Total time that detectors have run, in milliseconds."""
         self._cache, self._source = cache, source
 
     def clone(self) -> CachedLook:
-        """The same for a second thread."""
+        """A copy for another thread."""
         return CachedLook(self._cache, self._source)
 
     def knows(self, detector: Named, index: int) -> bool:

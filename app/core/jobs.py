@@ -23,21 +23,21 @@ ResultT = TypeVar("ResultT")
 
 
 class Cancelled(Exception):
-    """Raised by a job's progress callback inside its work once the job has been cancelled."""
+    """Raised from a job's progress callback, inside its work, after the job has been cancelled."""
 
 
 @dataclass(frozen=True)
 class JobStatus:
-    """A job at one moment."""
+    """The state of a job at one moment."""
 
     state: JobState = "waiting"
     """``done``, ``failed`` and ``cancelled`` are final."""
     done: int = 0
     """Units of work finished; the work chooses the unit."""
     total: int = 0
-    """Units of work in all; 0 until the work first reports."""
+    """Total units of work; 0 until the work first reports progress."""
     error: str | None = None
-    """One sentence that says why the job failed."""
+    """One sentence with the reason why the job failed."""
 
     @property
     def has_ended(self) -> bool:
@@ -55,16 +55,16 @@ def _never() -> bool:
 
 
 class BackgroundJob(Generic[ResultT]):
-    """One piece of work. Call ``run`` once, on the thread that is to do it; everything else is safe on any thread.
+    """One piece of work. Call ``run`` once, on the thread that should do it; everything else is safe on any thread.
 
     Args:
-        work: does the work and returns its result. It is given a ``Progress`` to call with (done, total), which raises
-            ``Cancelled`` once the job has been cancelled.
-        on_change: called on the working thread after each change of ``status``: at most every ``tell_every_s`` while
-            the work goes on, and always at its end.
+        work: does the work and returns its result. It gets a ``Progress`` to call with (done, total), which raises
+            ``Cancelled`` after the job has been cancelled.
+        on_change: called on the working thread after changes of ``status``: at most every ``tell_every_s`` during the
+            work, and always at its end.
         tell_every_s: shortest time between two calls of ``on_change`` for progress, in seconds.
         is_superseded: polled whenever the work reports progress; true cancels the job.
-        name: what the log calls it.
+        name: used in the log.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class BackgroundJob(Generic[ResultT]):
 
     @property
     def status(self) -> JobStatus:
-        """How far it is, or how it ended."""
+        """Its progress, or how it ended."""
         return self._status
 
     @property
@@ -97,16 +97,16 @@ class BackgroundJob(Generic[ResultT]):
         return self._result
 
     def cancel(self) -> bool:
-        """End the job as soon as its work next reports progress. False when it has ended already."""
+        """Cancel the job at its next progress report. False if it has already ended."""
         with self._lock:
             if self._status.has_ended:
                 return False
             self._status = replace(self._status, state="cancelled")
-            self._work = None  # it may hold a whole recording
+            self._work = None  # it may reference a whole recording
             return True
 
     def run(self) -> None:
-        """Do the work, here and now. Never raises: an error becomes ``status.error``."""
+        """Do the work on this thread. Never raises: an error becomes ``status.error``."""
         with self._lock:
             work, self._work = self._work, None
             if work is None:
@@ -118,7 +118,7 @@ class BackgroundJob(Generic[ResultT]):
             self._end("cancelled")
         except BadInput as error:
             self._end("failed", error=str(error))
-        except Exception as error:  # one job that fails takes nothing else with it
+        except Exception as error:  # a failing job must not affect anything else
             logger.exception("%s", self._name)
             self._end("failed", error=f"{type(error).__name__}: {first_line(error)}")
         else:
@@ -139,7 +139,7 @@ class BackgroundJob(Generic[ResultT]):
 
     def _end(self, state: JobState, result: ResultT | None = None, error: str | None = None) -> None:
         with self._lock:
-            if self._status.state != "cancelled":  # work that was cancelled in its last moment stays cancelled
-                self._result = result  # before the state, so that a job that is done has its result
+            if self._status.state != "cancelled":  # if it was cancelled at the last moment, it stays cancelled
+                self._result = result  # set before the state, so that a job that is done has its result
                 self._status = replace(self._status, state=state, error=error)
         self._on_change()

@@ -9,7 +9,8 @@ _T = TypeVar("_T")
 
 
 class Newest(Generic[_T]):
-    """A newer value replaces one that was not taken yet, so that the taker is never behind. Any thread."""
+    """Holds one value. A newer value replaces one that was not taken yet, so that the consumer never lags behind. Any
+    thread."""
 
     def __init__(self) -> None:
         self._condition = threading.Condition()
@@ -23,25 +24,25 @@ class Newest(Generic[_T]):
             self._condition.notify_all()
 
     def put_back(self, value: _T) -> None:
-        """What was taken and could not be used, unless a newer one is there."""
+        """Put back a value that was taken but could not be used, unless there is a newer one."""
         with self._condition:
             if self._value is None:
                 self.put(value)
 
     def take(self) -> _T | None:
-        """Wait for a value; None at the end, whether or not one is left."""
+        """Wait for a value; None after the end, even if a value is left."""
         with self._condition:
             self._condition.wait_for(lambda: self._ended or self._value is not None)
             value, self._value = self._value, None
             return None if self._ended else value
 
     def end(self) -> None:
-        """Wake whoever waits; from now on ``take`` gives None."""
+        """Wake all waiting threads; from now on ``take`` returns None."""
         with self._condition:
             self._ended = True
             self._condition.notify_all()
 
     def ends_within(self, timeout_s: float) -> bool:
-        """Wait so long, or until it has ended."""
+        """Wait for this time or until ``end`` is called; returns whether it was."""
         with self._condition:
             return self._condition.wait_for(lambda: self._ended, timeout_s)

@@ -23,14 +23,14 @@ class BoundedCache(Generic[K, V]):
         return len(self._entries)
 
     def get(self, key: K) -> V | None:
-        """The entry, or None when it is not held. Reading counts as use."""
+        """The entry, or None if it is not in the cache. Reading counts as use."""
         value = self._entries.get(key)
         if value is not None:
             self._entries.move_to_end(key)
         return value
 
     def put(self, key: K, value: V) -> None:
-        """Hold ``value``; an entry that alone exceeds the limit is held until the next one comes."""
+        """Store ``value``; an entry that exceeds the limit by itself is kept until the next one is stored."""
         old = self._entries.pop(key, None)
         if old is not None:
             self._total -= self._cost(old)

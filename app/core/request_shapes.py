@@ -19,11 +19,11 @@ class CuboidShape(BaseModel):
     model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 
     center: tuple[Finite, Finite, Finite]
-    """x y z of its middle."""
+    """x y z of its centre."""
     size: tuple[Meters, Meters, Meters]
     """Length, width, height."""
     yaw_rad: Annotated[float, Field(gt=-LARGEST_YAW_RAD, lt=LARGEST_YAW_RAD, allow_inf_nan=False)]
-    """Turn of the length axis from ego x, positive to the left."""
+    """Angle of the length axis from ego x, positive to the left."""
 
     def value(self) -> Cuboid:
         return Cuboid(self.center, self.size, self.yaw_rad)

@@ -10,24 +10,24 @@ from pipeline.common.errors import BadInput
 
 LOOPBACK_HOSTS = ("localhost", "127.0.0.1", "::1")
 WILDCARDS = ("0.0.0.0", "::")
-"""Every interface of this machine."""
+"""Addresses that mean every interface of this machine."""
 DEFAULT_PORT = 8420
 _PORTS_TO_TRY = 20
 _LAST_PORT = 65535
 
 
 class PortTaken(BadInput):
-    """The wanted address cannot be listened on; the text says which and what to do."""
+    """The requested address is not available; the text says which one and what to do."""
 
 
 def listen_socket(host: str, port: int, *, strict: bool = False) -> socket.socket:
-    """A bound socket on ``port`` or, unless ``strict``, the next free one above it. PortTaken when there is none."""
+    """A bound socket on ``port`` or, unless ``strict``, the next free one above it. PortTaken if there is none."""
     if not 0 <= port <= _LAST_PORT:
         raise PortTaken(f"invalid port {port}; expected 0 to {_LAST_PORT}")
     candidates = [port] if strict or port == 0 else range(port, min(port + _PORTS_TO_TRY, _LAST_PORT + 1))
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for candidate in candidates:
-        # asyncio switches Nagle's delay of 40 ms off only where the protocol is named
+        # asyncio disables Nagle's delay of 40 ms only if the protocol is set explicitly
         bound = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -43,12 +43,12 @@ def listen_socket(host: str, port: int, *, strict: bool = False) -> socket.socke
 
 
 def is_loopback(host: str) -> bool:
-    """True for an address or name that only this machine reaches."""
+    """Whether an address or name is reachable from this machine only."""
     return host.lower() in LOOPBACK_HOSTS or (is_address(host) and ipaddress.ip_address(host).is_loopback)
 
 
 def is_address(name: str | None) -> bool:
-    """Whether a host is an IP address rather than a name."""
+    """Whether a host is an IP address instead of a name."""
     try:
         ipaddress.ip_address(name or "")
     except ValueError:
@@ -57,11 +57,11 @@ def is_address(name: str | None) -> bool:
 
 
 def reachable(host: str) -> str:
-    """How a person writes the host in an address: for every interface, the one that leads out."""
+    """The host as a user would write it in an address; for all interfaces, the address of the outgoing one."""
     if host in WILDCARDS:
         probe = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            probe.connect(("192.0.2.1", 9))  # sends nothing: it only asks the system which way it would go
+            probe.connect(("192.0.2.1", 9))  # sends nothing: it only asks the system for the route
             host = probe.getsockname()[0]
         except OSError:
             host = socket.gethostname()

@@ -13,72 +13,72 @@ from pipeline.common.geometry import Cuboid
 
 @dataclass(frozen=True)
 class HeldCuboid:
-    """A labelled cuboid that may be dragged in the 3D view."""
+    """A labelled cuboid that can be dragged in the 3D view."""
 
     page: object
-    """Whose it is."""
+    """The page that owns it."""
     track: int
-    """Its label."""
+    """Its track id."""
     frame: int
-    """That the page shows it in."""
+    """The frame in which the page shows it."""
     cuboid: Cuboid
-    """In the ego frame, as the page has it."""
+    """In the ego frame, as on the page."""
 
     def is_of(self, other: HeldCuboid | None) -> bool:
-        """The same label in the same frame at the same page, wherever it is."""
+        """Whether both are the same label in the same frame on the same page, at any position."""
         return other is not None and (self.page, self.track, self.frame) == (other.page, other.track, other.frame)
 
 
 LabelRole = Literal["cipv", "path", "fused", "warning"]
-"""The lead, a proposal, what a person said, what was rejected or sent back: its colour in the palette."""
+"""The lead, a proposal, a label by a person, a rejected or returned label: selects its colour in the palette."""
 
 
 @dataclass(frozen=True)
 class LabelInView:
-    """A label as a page draws it."""
+    """A label as drawn by a page."""
 
     track: int
-    """Its label."""
+    """Its track id."""
     cuboid: Cuboid
     """In the ego frame."""
     text: str
-    """Number, class and state."""
+    """Id, class and state."""
     role: LabelRole
-    """Decides its colour."""
+    """Selects its colour."""
     facing: bool
     """Whether its front is known."""
 
 
 @dataclass(frozen=True)
 class LabelsInView:
-    """What a labeling page draws."""
+    """The labels drawn by a labeling page."""
 
     labels: tuple[LabelInView, ...]
-    """Of the shown frame."""
+    """The labels of the shown frame."""
     alone: bool
-    """Without the pipeline's objects."""
+    """Whether the pipeline's objects are hidden."""
 
 
 @dataclass(frozen=True)
 class PageView:
-    """What one page wants to see in its own 3D view."""
+    """What one page shows in its own 3D view."""
 
     selected: int | None = None
     """An object's id; None for no selection."""
     held: HeldCuboid | None = None
-    """The cuboid that has handles; None without one."""
+    """The cuboid with drag handles; None without one."""
     labels: LabelsInView | None = None
-    """None where the page does not label."""
+    """None if the page does not label."""
 
 
 NOTHING = PageView()
 OnDrag = Callable[[HeldCuboid, bool], None]
-"""What is held, as it is now, and whether the hand has let go."""
+"""Called with the dragged cuboid in its current position, and whether the drag has ended."""
 
 
 class SharedViewState:
-    """What each page looks at; and how many pages hold a 3D view that they do not show. A page is any object that
-    stands for it; the 3D view knows it by the name that it gave itself. Any thread."""
+    """The view state of each page, and how many pages have a hidden 3D view. A page is identified by any object; its 3D
+    view identifies it by the name that the page chose. Any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -90,63 +90,63 @@ class SharedViewState:
         self._on_drag: OnDrag = lambda held, ended: None
 
     def on_change(self, listener: Callable[[], None]) -> None:
-        """Call ``listener`` after every change; there is one."""
+        """Call ``listener`` after every change; only one is supported."""
         self._listener = listener
 
     def on_pick(self, pages: Callable[[object, int | None], None]) -> None:
-        """Call ``pages`` with the page, and what was picked in its 3D view; there is one."""
+        """Call ``pages`` with the page and the object picked in its 3D view; only one callback is supported."""
         self._pages = pages
 
     def on_drag(self, listener: OnDrag) -> None:
-        """Call ``listener`` when what is held is dragged; there is one."""
+        """Call ``listener`` when the held cuboid is dragged; only one is supported."""
         self._on_drag = listener
 
     def name(self, page: object, name: str) -> None:
-        """How the 3D view of this page calls it."""
+        """Set the name by which the 3D view identifies this page."""
         with self._lock:
             self._names[page] = name
         self._listener()
 
     def view_of(self, page: object) -> PageView:
-        """What a page wants to see."""
+        """The view state of a page."""
         with self._lock:
             return self._views.get(page, NOTHING)
 
     def view_of_name(self, name: str) -> PageView:
-        """What the page of this name wants to see; nothing where there is none."""
+        """The view state of the page with this name; empty if there is none."""
         with self._lock:
             return self._views.get(self._page(name), NOTHING)
 
     @property
     def hiding(self) -> int:
-        """Pages that hold a 3D view and do not show it."""
+        """Number of pages that have a 3D view but do not show it."""
         with self._lock:
             return len(self._hiding)
 
     def select(self, page: object, number: int | None) -> None:
-        """Mark an object in this page's 3D view; None: no object."""
+        """Highlight an object in this page's 3D view; None: no object."""
         self._change(page, selected=number)
 
     def hold(self, held: HeldCuboid) -> None:
-        """A cuboid that a page holds with the mouse, so that all views of that page show it."""
+        """Set the cuboid that a page edits with the mouse, so that all views of that page show it."""
         self._change(held.page, held=held)
 
     def let_go(self, page: object) -> None:
-        """This page holds nothing any more."""
+        """The page no longer holds a cuboid."""
         self._change(page, held=None)
 
     def label(self, page: object, labels: LabelsInView | None) -> None:
-        """What this page draws of its labels."""
+        """Set the labels that this page draws."""
         self._change(page, labels=labels)
 
     def hide(self, page: object, hides: bool) -> None:
-        """Whether this page hides its 3D view."""
+        """Set whether this page hides its 3D view."""
         with self._lock:
             (self._hiding.add if hides else self._hiding.discard)(page)
         self._listener()
 
     def leave(self, page: object) -> None:
-        """The page is gone."""
+        """Remove a page that has closed."""
         with self._lock:
             self._names.pop(page, None)
             self._views.pop(page, None)
@@ -154,7 +154,7 @@ class SharedViewState:
         self._listener()
 
     def pick(self, name: str, number: int | None) -> None:
-        """Somebody has clicked on this object in the 3D view of the page of this name, or beside all."""
+        """An object was clicked in the 3D view of the page with this name; None: a click beside all objects."""
         with self._lock:
             page = self._page(name)
         if page is not None:
@@ -162,7 +162,7 @@ class SharedViewState:
             self._pages(page, number)
 
     def drag(self, held: HeldCuboid, ended: bool) -> None:
-        """A hand has this label and has brought it there, whatever else is held by now. Any thread."""
+        """This label was dragged to a new position, whatever cuboid is held by now. Any thread."""
         with self._lock:
             view = self._views.get(held.page, NOTHING)
             if held.is_of(view.held):

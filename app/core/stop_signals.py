@@ -14,14 +14,14 @@ from threading import Event
 from typing import Any
 
 REST_S = 3.0
-"""With the moment that saving takes less than the 5 s after which impatient supervisors kill."""
+"""Together with the time for saving, this is less than the 5 s after which impatient supervisors kill."""
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, *((signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()))
 
 
 @contextmanager
 def asked_to_stop() -> Iterator[Event]:
-    """Set by the first signal; what is under way is then finished. Only a second Ctrl-C ends at once, with
-    KeyboardInterrupt: a system sends SIGTERM and SIGHUP one after the other, and means the same by both."""
+    """An event set by the first signal, after which the current work is completed. Only a second Ctrl-C ends
+    immediately, with KeyboardInterrupt: systems send SIGTERM followed by SIGHUP for a single request."""
     asked = Event()
 
     def ask(number: int, _: object) -> None:
@@ -34,10 +34,10 @@ def asked_to_stop() -> Iterator[Event]:
 
 
 def end_process_once(asked: Event, save: Callable[[], object]) -> None:
-    """Once ``asked``, save what must not be lost and end the process at most ``REST_S`` later, whatever hangs.
+    """Once ``asked`` is set, call ``save`` and end the process at most ``REST_S`` later, even if something hangs.
 
-    Python waits at its end for every thread of a pool, and a thread on a disk or a database that does not respond
-    never comes back: a supervisor would kill the program, and report a failure.
+    At exit, Python waits for all threads of a pool, and a thread that waits for a disk or database without response
+    never ends: a supervisor would kill the program and report a failure.
     """
 
     def end() -> None:
@@ -52,7 +52,7 @@ def end_process_once(asked: Event, save: Callable[[], object]) -> None:
 
 @contextmanager
 def as_interrupts() -> Iterator[None]:
-    """SIGTERM and SIGHUP raise KeyboardInterrupt, as Ctrl-C does: a command closes its files either way."""
+    """SIGTERM and SIGHUP raise KeyboardInterrupt, like Ctrl-C, so that a command closes its files in all cases."""
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
@@ -63,8 +63,8 @@ def as_interrupts() -> Iterator[None]:
 
 @contextmanager
 def _handled(handler: Any) -> Iterator[None]:
-    """Nothing changes on another thread than the main one, which gets the signals, and for a signal that whoever
-    started the program has it ignore (nohup)."""
+    """Has no effect outside the main thread, which receives the signals, and for signals that the parent process has
+    set to be ignored (nohup)."""
     before: dict[signal.Signals, Any] = {}
     if threading.current_thread() is threading.main_thread():
         before = {number: signal.getsignal(number) for number in _SIGNALS}

@@ -24,36 +24,36 @@ logger = logging.getLogger("cipv.watchdog")
 
 PATIENCE_S = 1.0
 FIRST_S = 30.0
-"""For what has been done less than ``_FEWEST`` times: the first runs of a network make room and compile."""
+"""Time limit for operations seen less than ``_FEWEST`` times: the first runs of a network allocate and compile."""
 NETWORK = "the network "
-"""What begins with that is a network's run."""
+"""Prefix of operations that are network runs."""
 _FEWEST, _KEPT = 20, 2000
 _LOOK_EVERY_S = 0.1
 _LATE_S = 0.5
-"""Where this watch itself comes so much too late, the machine is busy or was asleep, and nobody is blamed for that."""
+"""If the watchdog itself is late by this much, the machine is busy or was suspended, and no worker is blamed."""
 
 
 class Retired(BaseException):
-    """Raised in a worker that was taken to hang, once it is back: a fresh one does its work."""
+    """Raised in a worker that was considered stuck, when it continues: a new one has taken over its work."""
 
 
 @dataclass(frozen=True)
 class Stuck:
-    """A worker that hangs."""
+    """A worker that is stuck."""
 
     worker: str
-    """Its name, for people."""
+    """Its display name."""
     doing: str
-    """What it began and does not end."""
+    """The operation that does not end."""
     seconds: float
-    """For how long."""
+    """How long it has been running."""
     thread_id: int = 0
-    """Of the thread that hangs."""
+    """Id of the stuck thread."""
 
 
 @dataclass(eq=False)
 class _Heart:
-    """A worker. doing: None while it waits for work."""
+    """State of a worker. doing: None while it waits for work."""
 
     name: str
     on_stuck: Callable[[Stuck], object]
@@ -63,14 +63,14 @@ class _Heart:
     retired: bool = False
     native_id: int = field(default_factory=threading.get_native_id)
     delayed_s: float | None = None
-    """How long its thread had waited for a processor when it was last looked at; None before that, or where the system
-    does not say."""
+    """Time that its thread had waited for a processor at the last check; None before that, or if the system does not
+    report it."""
     starved_s: float = 0.0
     """How much of the time since ``since_s`` that was."""
 
 
 def waited_s(native_id: int) -> float | None:
-    """How long a thread has waited for a processor in its life (Linux); None where the system does not say."""
+    """Total time that a thread has waited for a processor (Linux); None if the system does not report it."""
     try:
         with open(f"/proc/self/task/{native_id}/schedstat", encoding="ascii") as file:
             return int(file.read().split()[1]) / 1e9
@@ -79,8 +79,8 @@ def waited_s(native_id: int) -> float | None:
 
 
 def busy_share() -> float:
-    """How much more work the machine has than processors: so much longer everything may take. 0 where the system does
-    not say."""
+    """Excess load of the machine relative to its processors; time limits are extended accordingly. 0 if the system does
+    not report it."""
     try:
         return os.getloadavg()[0] / (os.cpu_count() or 1)
     except (AttributeError, OSError):
@@ -97,8 +97,8 @@ _of_thread = _OfThread()
 
 @contextmanager
 def at_work(doing: str) -> Iterator[None]:
-    """What this thread does in the block; within another one, instead of what that one says. On a thread that nobody
-    watches it says nothing. Retired when it took too long."""
+    """Names this thread's current operation during the block; a nested block overrides the outer one. No effect on a
+    thread that is not watched. Raises Retired if it took too long."""
     heart, watchdog = _of_thread.heart, _of_thread.watchdog
     if heart is None or watchdog is None:
         yield
@@ -114,10 +114,10 @@ def at_work(doing: str) -> Iterator[None]:
 
 
 class Watchdog:
-    """The one place that knows what every worker does, and how long it usually takes. Any thread.
+    """Knows the current operation of every worker, and how long operations usually take. Any thread.
 
     Args:
-        patience_s: how much longer than ever something may take.
+        patience_s: how much longer than the longest time so far an operation may take.
         first_s: how long it may take while that is not known.
     """
 
@@ -137,8 +137,8 @@ class Watchdog:
 
     @contextmanager
     def watching(self, name: str, on_stuck: Callable[[Stuck], object]) -> Iterator[None]:
-        """This thread is a worker as long as the block lasts. on_stuck: called on another thread, once, when it hangs;
-        from then on it is retired."""
+        """Registers this thread as a worker during the block. on_stuck: called once, on another thread, when the worker
+        is stuck; from then on it is retired."""
         heart = _Heart(name, on_stuck)
         _of_thread.heart, _of_thread.watchdog = heart, self
         with self._lock:
@@ -153,7 +153,7 @@ class Watchdog:
                 self._hearts.discard(heart)
 
     def begins(self, heart: _Heart, doing: str | None) -> None:
-        """A worker begins something, and so has ended what it did before."""
+        """A worker begins an operation and has thereby ended the previous one."""
         now_s = time.monotonic()
         with self._lock:
             if heart.doing is not None:
@@ -161,13 +161,13 @@ class Watchdog:
             heart.doing, heart.since_s, heart.starved_s = doing, now_s, 0.0
 
     def allowed_s(self, doing: str) -> float:
-        """How long something may take."""
+        """Time limit of an operation."""
         took_s = self._took_s.get(doing, ())
         idle_s = max(took_s) + self._patience_s if len(took_s) >= _FEWEST else self._first_s
         return idle_s * max(1.0, busy_share())
 
     def look(self, now_s: float, late_s: float = 0.0) -> list[Stuck]:
-        """Retire who hangs, and tell. late_s: how much later than wanted this look is."""
+        """Retire stuck workers and call their callbacks. late_s: delay of this check."""
         found: list[tuple[_Heart, Stuck]] = []
         with self._lock:
             for heart in self._hearts:
@@ -184,7 +184,7 @@ class Watchdog:
             logger.error("%s hangs: %s, for %.1f s\n%s", *_told(stuck), _stack(heart.thread_id))
             try:
                 heart.on_stuck(stuck)
-            except Exception:  # the watch goes on, whatever becomes of one worker
+            except Exception:  # the watchdog continues if one callback fails
                 logger.exception("%s could not be restarted", heart.name)
         return [stuck for _, stuck in found]
 
@@ -208,6 +208,6 @@ def _told(stuck: Stuck) -> tuple[str, str, float]:
 
 
 def _stack(thread_id: int) -> str:
-    """Where a thread is now."""
+    """Current stack of a thread."""
     frame = sys._current_frames().get(thread_id)
     return "".join(traceback.format_stack(frame)) if frame is not None else ""

@@ -18,11 +18,11 @@ FitJob = BackgroundJob[AlignmentFit]
 
 
 class FitRefused(BadInput):
-    """A fit that cannot begin; the text says why."""
+    """A fit that cannot start; the text gives the reason."""
 
 
 class AlignmentFitting:
-    """``begin`` a fit, look at ``job``, ``cancel`` it. Any thread. Parameters are never changed here."""
+    """``begin`` a fit, read ``job``, ``cancel`` it. Any thread. Does not change parameters."""
 
     def __init__(self, drives: BackgroundRuns) -> None:
         self._drives = drives
@@ -31,12 +31,12 @@ class AlignmentFitting:
 
     @property
     def job(self) -> FitJob | None:
-        """The fit to the open recording; None when none was begun for it."""
+        """The fit for the open recording; None if none was started for it."""
         with self._lock:
             return self._job[1] if self._job is not None and self._job[0] is self._drives.recording else None
 
     def begin(self, recording: OpenRecording, model: ModelName, params: Params, offset: bool) -> FitJob:
-        """FitRefused while another one runs, and where nothing looks at images."""
+        """FitRefused if another fit is running, or if there is no detector."""
         if recording.setup.detectors.boxes is None and not recording.as_read(0).detections_given:
             raise FitRefused("a fit needs boxes of vehicles, but no detector is running")
         with self._lock:
@@ -44,7 +44,7 @@ class AlignmentFitting:
                 raise FitRefused("a fit is under way")
 
             def work(progress: Progress) -> AlignmentFit:
-                # not in turn with the background runs: somebody waits for it
+                # not scheduled with the background runs, because the user waits for it
                 return fit_drive(recording.with_boxes, recording.setup.total, model, params, offset, progress)
 
             job: FitJob = BackgroundJob(
@@ -55,7 +55,7 @@ class AlignmentFitting:
         return job
 
     def cancel(self) -> bool:
-        """Stop the fit, or forget its result. False when there is none."""
+        """Stop the fit, or discard its result. False if there is none."""
         with self._lock:
             if self._job is None:
                 return False

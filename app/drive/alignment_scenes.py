@@ -13,13 +13,14 @@ from pipeline.calibration.edge_match import Seen
 from pipeline.types import Frame
 
 FRAMES = 20
-"""Frames that are looked at, over the whole drive or the last shown ones: one sweep of 16 rings has few borders."""
+"""Number of evaluated frames, from the whole drive or the last shown ones: one sweep of 16 rings has few depth
+edges."""
 APART_NS = 500_000_000
-"""Of live sensors, frames nearer to each other than this show the same once more."""
+"""Minimum time between frames of live sensors: closer frames show the same scene."""
 
 
 class AlignmentScenes:
-    """The looked-at frames of what was asked about last. Any thread."""
+    """The evaluated frames of the last request. Any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -28,7 +29,7 @@ class AlignmentScenes:
         self._seen: deque[Seen] = deque(maxlen=FRAMES)
 
     def of_recording(self, recording: OpenRecording) -> list[Seen]:
-        """Frames all over a recording; they are looked at once."""
+        """Frames spread over a recording, each evaluated once."""
         with self._lock:
             if self._of is not recording:
                 self._begin(recording)
@@ -37,7 +38,7 @@ class AlignmentScenes:
             return list(self._seen)
 
     def of_shown(self, uri: str, frame: Frame) -> list[Seen]:
-        """The frames that were shown when this was called, and the one that is shown now."""
+        """The frames that were shown at earlier calls, and the current one."""
         with self._lock:
             if self._of != uri:
                 self._begin(uri)

@@ -19,31 +19,31 @@ SECTION = "alignment."
 
 
 class VersionRefused(BadInput):
-    """A version that cannot be kept; the text says why."""
+    """A version that cannot be stored; the text gives the reason."""
 
 
 @dataclass(frozen=True)
 class AlignmentVersion:
-    """One alignment as it was."""
+    """One saved alignment."""
 
     id: int
     """Its number."""
     saved_at: str
-    """When, ISO 8601, UTC."""
+    """Time of saving, ISO 8601, UTC."""
     drive: str
     """Title of the recording that was open."""
     note: str
-    """What the person wrote."""
+    """The user's note."""
     values: Mapping[str, Any]
     """Every alignment parameter by dotted name."""
     match: float | None
-    """Share of the best nearby alignment's edge score, 0–1; None where the drive could not tell."""
+    """Share of the best nearby alignment's edge score, 0–1; None if the drive could not tell."""
     iou: float | None
-    """Mean overlap of boxes and projected clusters, where the version is a fit's; else None."""
+    """Mean overlap of boxes and projected clusters if the version comes from a fit; else None."""
 
 
 class AlignmentVersions:
-    """Any thread. file: where they are kept; None keeps them in memory only."""
+    """Any thread. file: where versions are stored; None keeps them in memory only."""
 
     def __init__(self, file: Path | None = None) -> None:
         self._file = file
@@ -51,14 +51,14 @@ class AlignmentVersions:
         self._versions = _read(file)
 
     def all(self) -> list[AlignmentVersion]:
-        """The newest first."""
+        """All versions, newest first."""
         with self._lock:
             return self._versions[::-1]
 
     def add(
         self, params: Params, drive: str, saved_at: str, note: str = "", *, match: float | None, iou: float | None
     ) -> AlignmentVersion:
-        """Keep the alignment of ``params``. VersionRefused when there are too many, or when it cannot be saved."""
+        """Store the alignment of ``params``. VersionRefused if there are too many, or if it cannot be saved."""
         with self._lock:
             if len(self._versions) >= MOST:
                 raise VersionRefused(f"{MOST} alignments are saved; delete some")
@@ -69,7 +69,7 @@ class AlignmentVersions:
             return version
 
     def remove(self, number: int) -> bool:
-        """False when there is no such version."""
+        """Remove a version; false if there is none with this number."""
         with self._lock:
             rest = [each for each in self._versions if each.id != number]
             if len(rest) == len(self._versions):
@@ -93,7 +93,7 @@ def alignment_of(params: Params) -> dict[str, Any]:
 
 
 def _read(file: Path | None) -> list[AlignmentVersion]:
-    """What was kept; an entry that no longer applies is left out, and a damaged file is set aside."""
+    """The stored versions; entries that are no longer valid are left out, and a damaged file is set aside."""
     if file is None:
         return []
     try:

@@ -28,30 +28,30 @@ logger = logging.getLogger("cipv.drive")
 _TELL_EVERY_S = 0.25
 _PATIENCE_S = 10.0
 _TRY_AGAIN_S = 0.5
-"""After the system could not read."""
+"""Delay before a retry if the system could not read."""
 _MOST_HANGS = 3
-"""Of a frame, before its run is given up."""
+"""Number of hangs at one frame before its run is aborted."""
 Phase = Literal["detect", "run", "done", "failed"]
 
 
 @dataclass(frozen=True)
 class DriveState:
-    """How far the run of the present parameters over the whole drive is."""
+    """Progress of the run with the current parameters over the whole drive."""
 
     revision: int = 0
-    """Grows whenever there is something new to fetch."""
+    """Incremented whenever there is something new to fetch."""
     run: int | None = None
     """Number of the run; None without one."""
     base: int | None = None
-    """Number of the run that it is compared with."""
+    """Number of the base run for comparison."""
     done: int = 0
-    """Frames that have been run."""
+    """Number of processed frames."""
     total: int = 0
-    """Frames of the drive."""
+    """Number of frames in the drive."""
     running: bool = False
-    """False when done, failed or cancelled."""
+    """False if done, failed or cancelled."""
     phase: Phase = "done"
-    """``detect`` while networks run on images for the first time, ``run`` afterwards."""
+    """``detect`` while networks process the images for the first time, ``run`` afterwards."""
     note: str = ""
     """Why the run failed."""
 
@@ -60,8 +60,8 @@ class DriveState:
 
 
 class BackgroundRuns:
-    """``open`` a recording, ``want`` parameters, read ``recording``. ``on_change`` is called on any thread when
-    ``state`` has changed, at most every 0.25 s while a run is in progress."""
+    """``open`` a recording, ``want`` parameters, read ``recording``. ``on_change`` is called on any thread after a
+    change of ``state``, at most every 0.25 s while a run is in progress."""
 
     def __init__(self, detections: DetectionCache) -> None:
         self.turn = ComputeScheduler()
@@ -80,7 +80,7 @@ class BackgroundRuns:
 
     @property
     def recording(self) -> OpenRecording | None:
-        """The open recording; None for live sensors, or when nothing is open."""
+        """The open recording; None for live sensors, or if nothing is open."""
         return self._recording
 
     @property
@@ -102,14 +102,13 @@ class BackgroundRuns:
                 run.note,
             )
 
-    # ------------------------------------------------------------ wishes
+    # ------------------------------------------------------------ requests
 
     def start(self) -> None:
         self._thread.start()
 
     def stop(self, patience_s: float = _PATIENCE_S) -> None:
-        """End the thread. A running network is stopped; a read in progress is finished first, or left to itself after
-        ``patience_s``."""
+        """End the thread. A running network is stopped; a read in progress is awaited for at most ``patience_s``."""
         with self._condition:
             self._ended = True
             self._condition.notify_all()
@@ -118,25 +117,25 @@ class BackgroundRuns:
             self._thread.join(patience_s)
 
     def open(self, setup: RunSetup | None) -> None:
-        """Another recording, or none."""
+        """Switch to another recording, or none."""
         with self._condition:
             number = self._recording.runs.next_number if self._recording else 1
             self._recording = OpenRecording(setup, self._detections, number) if setup is not None else None
             self.changed()
 
     def want(self, params: Params, preset: str) -> None:
-        """Run the drive with these parameters unless that has been done. Other runs wait meanwhile."""
+        """Run the drive with these parameters unless that has been done. Other runs are postponed."""
         recording = self._recording
         if recording is not None and recording.runs.want(params, preset):
             self.changed()
 
     def offer(self, frame: Frame) -> None:
-        """Reuse a frame that has just been read and detected in."""
+        """Reuse a frame that has just been read and processed by the detectors."""
         if self._recording is not None:
             self._recording.inputs.offer(frame)
 
     def state_before(self, index: int, params: Params) -> State | None:
-        """The state with which the whole-drive run arrives at a frame; None if it has not got that far."""
+        """The state of the whole-drive run before a frame; None if it has not got that far."""
         recording = self._recording
         return recording.state_before(index, params) if recording is not None else None
 
@@ -156,7 +155,7 @@ class BackgroundRuns:
             self._run_all()
 
     def _start_anew(self, stuck: Stuck) -> None:
-        """The worker hangs: another goes on with the frame, and gives the run up when that hangs again and again."""
+        """The worker hangs: another one continues with the same frame, and aborts the run after repeated hangs."""
         self.on_stuck(stuck)
         recording, self._hangs = self._recording, self._hangs + 1
         run = recording.runs.unfinished() if recording is not None else None
@@ -172,10 +171,10 @@ class BackgroundRuns:
         while (work := self._next()) is not None:
             with suppress(Stopped), self.turn.background():
                 self._advance(*work)
-            del work  # a recording that is open no more is not kept while there is nothing to do
+            del work  # do not keep a closed recording in memory while idle
 
     def _next(self) -> tuple[OpenRecording, DriveRun] | None:
-        """Wait for a run that is not finished; None at the end."""
+        """Wait for an unfinished run; None at the end."""
         with self._condition:
             while not self._ended:
                 recording = self._recording
@@ -186,20 +185,20 @@ class BackgroundRuns:
             return None
 
     def _advance(self, recording: OpenRecording, run: DriveRun) -> None:
-        """One frame. Stopped leaves the run as it was."""
+        """Process one frame. If this is stopped, the run is unchanged."""
         began = time.perf_counter()
         self._phase = "run" if recording.has_been_looked_at(run.done) else "detect"
         try:
             recording.advance(run)
         except Stopped:
             raise
-        except Overloaded as error:  # says nothing of the frame: it is read again, and meanwhile nothing is final
+        except Overloaded as error:  # not a problem of the frame: it is read again, and until then nothing is final
             logger.warning("frame %s of %s: %s", run.done, recording.setup.uri, error)
             with self._condition:
                 self._condition.wait_for(lambda: self._ended, _TRY_AGAIN_S)
         except BadInput as error:
             run.note = str(error)
-        except Exception as error:  # whatever a recording or a network does, other runs go on
+        except Exception as error:  # if a recording or a network fails in any way, other runs continue
             logger.exception("frame %s of %s", run.done, recording.setup.uri)
             run.note = f"frame {run.done + 1}: {type(error).__name__}: {error}"
         finally:

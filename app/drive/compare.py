@@ -17,23 +17,23 @@ from pipeline.params import TimeParams
 from pipeline.types import are_several
 
 SAME_PLACE_M = 0.5
-"""Distances, or offsets from the path, that differ by less are one place."""
+"""Distances or path offsets that differ by less than this count as equal."""
 
 
 @dataclass(frozen=True)
 class Metric:
-    """One figure of both runs."""
+    """One metric of both runs."""
 
     name: str
-    """Shown to people."""
+    """Display name."""
     unit: str
     """Empty for counts."""
     base: float | None
-    """Of the run compared with; None where it is undefined."""
+    """Value for the base run; None if it is undefined."""
     run: float | None
-    """Of the run itself; None where it is undefined."""
+    """Value for the run itself; None if it is undefined."""
     better: Literal["higher", "lower"] | None = None
-    """Which direction is good; None where neither is."""
+    """Which direction is better; None if neither is."""
 
 
 @dataclass(frozen=True)
@@ -41,15 +41,15 @@ class Comparison:
     """Two runs of one drive side by side."""
 
     frames: int
-    """That both have run."""
+    """Number of frames that both runs have processed."""
     differing: tuple[tuple[int, int], ...]
     """First and last frame of each range in which they differ."""
     sentences: dict[int, str]
-    """What differs at the first frame of each range, by that frame."""
+    """The difference at the first frame of each range, by that frame."""
     metrics: tuple[Metric, ...]
-    """Those that need truth only where there is one."""
+    """Metrics that need truth are included only if there is truth."""
     judged: int
-    """Frames with truth."""
+    """Number of frames with truth."""
 
     @property
     def frames_differing(self) -> int:
@@ -57,7 +57,7 @@ class Comparison:
 
 
 def compare(base: Sequence[Row], run: Sequence[Row]) -> Comparison:
-    """The frames that both have."""
+    """Compare the frames that both runs have."""
     frames = min(len(base), len(run))
     base, run = base[:frames], run[:frames]
     differs = [index for index in range(frames) if not same_lead(base[index], run[index])]
@@ -69,7 +69,7 @@ def compare(base: Sequence[Row], run: Sequence[Row]) -> Comparison:
 
 
 def same_lead(a: Row, b: Row) -> bool:
-    """Whether two runs have the same lead in one frame, or both none."""
+    """Whether two runs have the same lead in one frame, or both have none."""
     if a.cipv_id is None or b.cipv_id is None:
         return a.cipv_id is b.cipv_id
     return _near(a.distance_m, b.distance_m) and _near(a.path_offset_m, b.path_offset_m)
@@ -98,7 +98,7 @@ def _lead(row: Row) -> str:
 
 
 def _against_truth(base: Sequence[Row], run: Sequence[Row]) -> tuple[Metric, ...]:
-    """``pipeline.evaluation.lead_verdict``'s figures over the frames that have truth."""
+    """The metrics of ``pipeline.evaluation.lead_verdict`` over the frames with truth."""
     a, b = (score(row.judged for row in rows if row.judged is not None) for rows in (base, run))
     return (
         Metric("CIPV correct", "frames", a.correct, b.correct, "higher"),
@@ -111,7 +111,7 @@ def _against_truth(base: Sequence[Row], run: Sequence[Row]) -> tuple[Metric, ...
 
 
 def _by_themselves(base: Sequence[Row], run: Sequence[Row]) -> tuple[Metric, ...]:
-    """What can be said without truth; more is not better by itself."""
+    """Metrics that need no truth; higher values are not necessarily better."""
     return (
         Metric("frames with a CIPV", "frames", _count(base, _leads), _count(run, _leads)),
         Metric("CIPV changes", "", _changes(base), _changes(run)),

@@ -16,26 +16,27 @@ from contextlib import contextmanager
 from pipeline.inference.cancellation import Cancellation
 
 HAND_RESTS_S = 0.3
-"""So long after what a person asked for was served nobody is taken to wait for anything: the page has drawn it, and
-somebody who drags has asked again."""
+"""After this time without a request, the user is assumed to be waiting for nothing: by then the page has drawn the last
+result, and a drag would have sent another request."""
 _SHARE = 0.3
-"""Of the time, while a drive plays."""
+"""Share of the time given to background work during playback."""
 _CREDIT_S = 0.03
-"""Work at a time, while a drive plays; a piece that was begun is finished, and paid for with waiting."""
+"""Budget for one piece of background work during playback; a piece that overruns is completed, and the excess is
+deducted from later ones."""
 _LONGEST_WAIT_S = 0.3
-"""For a frame that is shown, while a drive plays."""
+"""Maximum wait for a shown frame during playback."""
 _LONGEST_FRONT_S = 2.0
-"""Work in front that never ends, as with sensors that tick faster than the pipeline runs, and endless input only slow
-the background down; they do not stop it."""
+"""Continuous foreground work, as with sensors that tick faster than the pipeline runs, and continuous input slow down
+background work but do not stop it."""
 
 
 class ComputeScheduler:
-    """Shared by the threads in front, those in the background, and whoever asks for something."""
+    """Shared by foreground threads, background threads, and everything that makes requests."""
 
     def __init__(self) -> None:
         self._condition = threading.Condition()
         self._in_front: list[int] = []
-        """The threads at work there."""
+        """Threads currently working in the foreground."""
         self._served = 0
         self._playing = False
         self._ended = False
@@ -45,11 +46,11 @@ class ComputeScheduler:
         self._credit_s, self._credited_at_s = _CREDIT_S, time.monotonic()
         self._overdue_at_s: float | None = None
 
-    # ------------------------------------------------------------ in front
+    # ------------------------------------------------------------ foreground
 
     def asked(self, *, rests: bool = False) -> None:
-        """A person asks for something: what can be stopped gives way at once. rests: it is not the kind of thing that
-        is soon asked for again. Any thread; waits for nobody."""
+        """A user made a request: stoppable work yields at once. rests: the request is of a kind that usually does not
+        repeat immediately. Any thread; does not block."""
         with self._condition:
             if not rests:
                 self._has_asked = True
@@ -64,7 +65,7 @@ class ComputeScheduler:
 
     @contextmanager
     def foreground(self) -> Iterator[None]:
-        """Work that takes priority. Not for waiting: nothing else runs meanwhile."""
+        """Work with priority. Must not contain waiting, because nothing else runs meanwhile."""
         thread_id = threading.get_ident()
         with self._condition:
             self._in_front.append(thread_id)
@@ -81,14 +82,14 @@ class ComputeScheduler:
                 self._condition.notify_all()
 
     def leave_out(self, thread_id: int) -> None:
-        """A thread in front hangs: nobody waits for it any more."""
+        """A foreground thread hangs and is no longer waited for."""
         with self._condition:
             self._in_front = [each for each in self._in_front if each != thread_id]
             self._condition.notify_all()
 
     @contextmanager
     def stoppable(self) -> Iterator[None]:
-        """Networks asked in the block end with Stopped when a person asks for something."""
+        """Networks that run in the block end with Stopped when a user makes a request."""
         stop = Cancellation()
         with self._condition:
             self._stops.add(stop)
@@ -96,39 +97,39 @@ class ComputeScheduler:
             yield
 
     def playing(self, playing: bool) -> None:
-        """Whether frames are being played now."""
+        """Set whether frames are being played."""
         with self._condition:
             self._playing = playing
             self._condition.notify_all()
 
     def end(self) -> None:
-        """Nobody waits here any more."""
+        """Release all waiting threads."""
         with self._condition:
             self._ended = True
             for stop in self._stops:
                 stop.set()
             self._condition.notify_all()
 
-    # ------------------------------------------------------------ in the background
+    # ------------------------------------------------------------ background
 
     @contextmanager
     def background(self, *, to_the_end: bool = False) -> Iterator[None]:
-        """One piece of work, once it may begin. Its networks can be stopped, unless it has waited for too long: for one
-        thread, which then begins the piece again. to_the_end: they are not, for any other."""
+        """One piece of background work, once it may start. Its networks can be stopped, unless it has waited for too
+        long. For one thread, which starts a stopped piece again. to_the_end: for other threads; never stopped."""
         stop = self._let_begin(to_the_end)
         began_s = time.monotonic()
         try:
             with self._until_done(stop):
                 yield
             if not to_the_end:
-                self._overdue_at_s = None  # what was stopped has waited since it was first begun
+                self._overdue_at_s = None  # after a stop, the waiting time counts from the first start
         finally:
             with self._condition:
                 if self._playing:
                     self._credit_s -= time.monotonic() - began_s
 
     def _let_begin(self, to_the_end: bool) -> Cancellation:
-        """Wait for it. What is to stop the work is known to ``asked`` before anybody can ask."""
+        """Wait for permission to start. The cancellation is registered before any request can arrive."""
         stop = Cancellation()
         with self._condition:
             overdue_at_s = time.monotonic() + _LONGEST_FRONT_S

@@ -16,11 +16,11 @@ import numpy.typing as npt
 from pipeline.types import CameraImage, Frame
 
 _LIMIT_BYTES = 384e6
-"""About 1200 frames of a real VLP-16. What does not fit is read from the source again, in every run."""
+"""About 1200 frames of a real VLP-16. Frames beyond that are read from the source again in every run."""
 
 
 def without_pixels(frame: Frame) -> Frame:
-    """The frame with an image of the same size and stamp that takes no memory and shows nothing."""
+    """The frame with a placeholder image of the same size and timestamp that takes no memory."""
     if frame.image is None:
         return frame
     blank = np.broadcast_to(np.zeros((), np.uint8), frame.image.bgr.shape)
@@ -28,10 +28,11 @@ def without_pixels(frame: Frame) -> Frame:
 
 
 class InputStore:
-    """The frames of one recording as ``step`` takes them, by index. Any thread.
+    """The frames of one recording as inputs of ``step``, by index. Any thread.
 
-    It fills until it is full and then keeps what it has: runs go through a drive from its beginning, and a store that
-    let the oldest go would, for a drive that does not fit, never have the frame that is asked for next."""
+    It fills until it is full and then keeps its content: runs process a drive from its beginning, so if the drive does
+    not fit, evicting the oldest frames would always evict the ones that are needed next.
+    """
 
     def __init__(self, limit_bytes: float = _LIMIT_BYTES) -> None:
         self._limit = limit_bytes
@@ -44,15 +45,16 @@ class InputStore:
         return len(self._frames)
 
     def get(self, index: int) -> Frame | None:
-        """The frame without pixels; None when it is not held."""
+        """The frame without pixels; None if it is not stored."""
         return self._frames.get(index)
 
     def name(self, index: int) -> str | None:
-        """What the recording calls a frame; None when it was not seen yet. Of all frames, also of those not held."""
+        """Name of a frame in the recording; None if it has not been read yet. Also known for frames that are not
+        stored."""
         return self._names.get(index)
 
     def offer(self, frame: Frame) -> None:
-        """Hold a frame that the detectors have looked at, if there is room and it is not held yet."""
+        """Store a frame with its detections, if there is room and it is not stored yet."""
         self._names[frame.index] = frame.name
         if frame.index in self._frames:
             return

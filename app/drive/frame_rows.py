@@ -23,7 +23,7 @@ from pipeline.vision.classes import COCO_80
 
 SOURCES = ("", *OBJECT_SOURCES)
 LABELS = ("", *COCO_80)
-"""A class that is none of these is kept as nameless."""
+"""An object of any other class is stored without a class."""
 _DECIMALS = 4
 _PLACE = {name: place for place, name in enumerate(LABELS)}
 _NOWHERE = (math.nan,) * 7
@@ -53,23 +53,24 @@ OBJECT = np.dtype(
         ("score", "f4"),
     ]
 )
-"""``source`` is a place in ``SOURCES``; ``vehicle``: of a vehicle's class, or nameless; ``vl_gap``: camera's minus
-LiDAR's distance of a VL object, also in standard deviations of both. ``label`` is a place in ``LABELS``. ``cuboid``:
-center x y z, length, width, height, yaw; ``bev``: x y of four corners. ``score``: the detector's, of its class."""
+"""``source`` is an index into ``SOURCES``; ``vehicle``: of a vehicle class, or without a class; ``vl_gap``: camera's
+minus LiDAR's distance of a VL object, also in standard deviations of both. ``label`` is an index into ``LABELS``.
+``cuboid``: center x y z, length, width, height, yaw; ``bev``: x y of four corners. ``score``: the detector's score of
+its class."""
 Objects = npt.NDArray[np.void]
 
 
 class Row(NamedTuple):
-    """One frame. What belongs to the CIPV is None without one."""
+    """One frame. Fields of the CIPV are None without one."""
 
     t_ns: int
     """The tick."""
     cipv_id: int | None
-    """Object number in this run."""
+    """Object id in this run."""
     source: str | None
     """V, L or VL."""
     carried: bool | None
-    """Predicted, not seen in this frame."""
+    """Predicted instead of seen in this frame."""
     distance_m: float | None
     """To the CIPV."""
     closing_speed_mps: float | None
@@ -77,13 +78,13 @@ class Row(NamedTuple):
     ttc_s: float | None
     """None when the gap does not shrink."""
     path_offset_m: float | None
-    """Of the CIPV's nearest point from the centre of the path."""
+    """Offset of the CIPV's nearest point from the centre of the path."""
     speed_mps: float | None
-    """Of the ego vehicle; None where unknown."""
+    """Ego speed; None if unknown."""
     desired_speed_mps: float | None
-    """That ACC asks for."""
+    """Speed requested by ACC."""
     accel_mps2: float | None
-    """That ACC and AEB ask for."""
+    """Acceleration requested by ACC and AEB."""
     brake: float | None
     """Pedal, 0–1."""
     acc_state: str | None
@@ -91,29 +92,29 @@ class Row(NamedTuple):
     gaps: str
     """The sensors without data, joined by commas."""
     vl_disagreement_m: float | None
-    """How far the camera's and the LiDAR's distance of the CIPV are apart; None unless both have one."""
+    """Difference between the camera's and the LiDAR's distance of the CIPV; None unless both have one."""
     judged: Judged | None
-    """The verdict against truth; None where there is none."""
+    """The verdict against truth; None without truth."""
     extra: tuple[ColumnValue, ...] = ()
     """Values of ``EXTRA_COLUMNS``, in their order."""
     yaw_rate_radps: float | None = None
-    """Own yaw rate; None where nothing gives it."""
+    """Own yaw rate; None if not measured."""
     reach_m: float = 0.0
     """How far ahead a vehicle in the path would be detected (``lead_reach_m``)."""
 
 
 _INSIDE = ("t_ns", "judged", "extra", "yaw_rate_radps", "reach_m")
-"""What no timeline draws."""
+"""Fields that are not drawn in a timeline."""
 _OWN_COLUMNS = tuple(name for name in Row._fields if name not in _INSIDE)
 
 
 def column_names() -> tuple[str, ...]:
-    """The columns that ``GET /api/drive`` answers, in their order."""
+    """The columns returned by ``GET /api/drive``, in order."""
     return (*_OWN_COLUMNS, *EXTRA_COLUMNS)
 
 
 def row_of(frame: Frame, result: Result, judged: Judged | None = None) -> Row:
-    """What a timeline keeps of one frame."""
+    """The values that a timeline stores for one frame."""
     lead, acc = result.cipv, result.acc
     item = result.chosen()
     gap = _vl_gap(item, _by_id(result)) if item is not None else None
@@ -141,8 +142,8 @@ def row_of(frame: Frame, result: Result, judged: Judged | None = None) -> Row:
 
 
 def lead_reach_m(frame: Frame, result: Result) -> float:
-    """How far ahead a vehicle in the path would be detected: as far as it is known where the path goes. 0 unless
-    the camera looks: a LiDAR of 16 beams has hardly a point on a car beyond 35 m."""
+    """How far ahead a vehicle in the path would be detected: as far as the path is known. 0 without camera detections:
+    a LiDAR with 16 beams has hardly a point on a car beyond 35 m."""
     looks = frame.image is not None and frame.raw_boxes is not None
     return result.path.reach_m if looks else 0.0
 
@@ -177,18 +178,18 @@ def objects_of(result: Result) -> Objects:
 
 
 def columns_json(rows: Sequence[Row]) -> dict[str, list[Any]]:
-    """``{"cipv_id": […], …}``, numbers rounded as results are."""
+    """``{"cipv_id": […], …}``, numbers rounded as in results."""
     own = {name: [_plain(getattr(row, name)) for row in rows] for name in _OWN_COLUMNS}
     return own | {name: [_plain(row.extra[place]) for row in rows] for place, name in enumerate(EXTRA_COLUMNS)}
 
 
 def row_json(row: Row) -> dict[str, Any]:
-    """One frame's value of each column, as ``columns_json`` writes it."""
+    """One frame's value of each column, in the format of ``columns_json``."""
     return {name: values[0] for name, values in columns_json([row]).items()}
 
 
 def object_json(frames: Iterable[tuple[int, Objects]], object_id: int) -> dict[str, list[Any]]:
-    """One object's curve over the frames, each with its index, in which it was."""
+    """One object's values over the frames in which it existed, with the index of each frame."""
     found = [(index, records[records["id"] == object_id]) for index, records in frames]
     present = [(index, match[0]) for index, match in found if len(match)]
     curve: dict[str, list[Any]] = {

@@ -19,7 +19,7 @@ from pipeline.types import CameraCalibration, Frame
 from pipeline.types.source import TruthObject
 
 _MOST_STATES = 4000
-"""A state of a real drive takes about 25 KB beside its neighbours: 100 MB at most."""
+"""A state of a real drive adds about 25 KB to its neighbours: 100 MB at most."""
 _THIN_STATES = 500
 
 
@@ -29,13 +29,14 @@ class KnownState(NamedTuple):
     at: int
     """Index of the frame."""
     state: State
-    """Before that frame was run."""
+    """The state before that frame."""
 
 
 class DriveRun:
-    """Written by one thread through ``add``; any thread may read what is below ``done``.
+    """Written by one thread through ``add``; any thread may read entries below ``done``.
 
-    number: its id. name: a person's, empty without one. note: why it failed. seconds: time spent computing it."""
+    number: its id. name: given by the user, empty without one. note: why it failed. seconds: time spent computing it.
+    """
 
     def __init__(self, number: int, params: Params, preset: str, total: int) -> None:
         self.number, self.params, self.preset, self.total = number, params, preset, total
@@ -48,7 +49,7 @@ class DriveRun:
 
     @property
     def done(self) -> int:
-        """Frames 0 … done−1 are there."""
+        """Frames 0 … done−1 are available."""
         return self._head.at
 
     @property
@@ -56,7 +57,7 @@ class DriveRun:
         return self.done >= self.total
 
     def add(self, frame: Frame, truth: Sequence[TruthObject] | None, rule: LeadRule) -> None:
-        """Run the next frame, which must be number ``done``. Boxes and lanes are in it already."""
+        """Run the next frame, which must be number ``done``. It already contains boxes and lanes."""
         index, before = self._head
         after, result = step(before, frame, self.params)
         judged = None if truth is None else judge(result, truth, rule)
@@ -71,11 +72,11 @@ class DriveRun:
         return self._rows[max(0, first) : self.done]
 
     def objects(self) -> list[tuple[int, Objects]]:
-        """(index, records) of every frame that is there."""
+        """(index, records) of every available frame."""
         return list(enumerate(self._objects[: self.done]))
 
     def nearest_state(self, index: int) -> KnownState | None:
-        """The last kept state at or before ``index``; None where the pass has not come that far."""
+        """The last stored state at or before ``index``; None if the run has not got that far."""
         head, states = self._head, self._states
         if index >= head.at:
             return head if index == head.at else None
@@ -83,20 +84,20 @@ class DriveRun:
         return KnownState(at, states[at]) if at is not None else None
 
     def thin(self) -> None:
-        """Keep fewer states: a run that is not looked at needs them only once it is taken again."""
+        """Keep fewer states: a run that is not shown needs them only if it is selected again."""
         while len(self._states) > _THIN_STATES:
             self._every *= 2
             self._states = {index: state for index, state in self._states.items() if index % self._every == 0}
 
 
 def digest(uri: str, detectors: Sequence[str], sensors: str, params: Params) -> str:
-    """Twelve characters that are the same when, and only when, a run is made from the same."""
+    """Twelve characters that are equal if and only if the inputs of two runs are equal."""
     made_from = [uri, list(detectors), sensors, params.model_dump(mode="json")]
     return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:12]
 
 
 def calibration_digest(camera: CameraCalibration | None, params: Params) -> str:
-    """Twelve characters that are the same when, and only when, images and points are laid on each other the same."""
+    """Twelve characters that are equal if and only if images and points are aligned in the same way."""
     numbers = [] if camera is None else [camera.K, camera.distortion, camera.T_camera_ego]
     made_from = [[each.tolist() for each in numbers], params.alignment.model_dump(mode="json")]
     return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:12]

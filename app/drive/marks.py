@@ -15,11 +15,11 @@ from pipeline.common.whole_files import replace_text, set_aside
 MOST_MARKS = 10_000
 LONGEST_TEXT = 200
 LIVE = "live:"
-"""Whose marks are those made of live sensors: they belong to a time, and to every recording that has it."""
+"""Key of marks made with live sensors: they belong to a time, and to every recording that covers it."""
 
 
 class MarkRefused(BadInput):
-    """A mark that cannot be made or kept; the text says why."""
+    """A mark that cannot be made or stored; the text gives the reason."""
 
 
 @dataclass(frozen=True)
@@ -31,15 +31,16 @@ class SavedMark:
     index: int
     """Of the frame."""
     text: str = ""
-    """What the person wrote; may be empty."""
+    """The user's text; may be empty."""
     t_ns: int | None = None
-    """The frame's stamp, which is what counts for one of live sensors; None where it had none."""
+    """The frame's timestamp, which identifies the frame for live sensors; None if it had none."""
     in_session: bool = False
-    """Whether it went into a session that was being recorded, too."""
+    """Whether it was also written to a session that was being recorded."""
 
 
 class Marks:
-    """By recording. Any thread. folder: one small file a recording is kept there; None keeps them in memory only."""
+    """Marks by recording. Any thread. folder: one small file per recording is stored there; None keeps marks in memory
+    only."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self._folder = folder
@@ -47,14 +48,14 @@ class Marks:
         self._marks: dict[str, list[SavedMark]] = {}
 
     def of(self, uri: str) -> list[SavedMark]:
-        """By frame."""
+        """The marks of a recording, ordered by frame."""
         with self._lock:
             return sorted(self._loaded(uri), key=lambda mark: (mark.index, mark.id))
 
     def add(
         self, uri: str, index: int, text: str = "", *, t_ns: int | None = None, in_session: bool = False
     ) -> SavedMark:
-        """MarkRefused when there are too many, or when they cannot be kept."""
+        """Add a mark. MarkRefused if there are too many, or if they cannot be stored."""
         with self._lock:
             marks = self._loaded(uri)
             if len(marks) >= MOST_MARKS:
@@ -65,7 +66,7 @@ class Marks:
             return mark
 
     def remove(self, uri: str, number: int) -> bool:
-        """False when there is no such mark."""
+        """Remove a mark; false if there is none with this number."""
         with self._lock:
             marks = self._loaded(uri)
             rest = [mark for mark in marks if mark.id != number]
@@ -96,7 +97,7 @@ class Marks:
 
 
 def _read(file: Path | None) -> list[SavedMark]:
-    """What was kept. A missing file holds no marks, nor does a damaged one, which is set aside."""
+    """The stored marks; empty if the file is missing or damaged. A damaged file is set aside."""
     if file is None:
         return []
     try:
@@ -110,7 +111,7 @@ def _read(file: Path | None) -> list[SavedMark]:
 
 
 def _mark(row: dict[str, Any]) -> SavedMark:
-    """As it was written; what was written before marks had a time has none."""
+    """A mark as stored; marks from before timestamps were stored have none."""
     t_ns = row.get("t_ns")
     return SavedMark(
         int(row["id"]),

@@ -33,14 +33,14 @@ Truth = tuple[TruthObject, ...] | None
 
 @dataclass(frozen=True, eq=False)
 class RunSetup:
-    """What every run of a recording is made from."""
+    """The common inputs of all runs of a recording."""
 
     source: Source
-    """Also read for the shown frames; safe on any thread."""
+    """Also used to read the shown frames; safe on any thread."""
     timeline_s: F64
-    """(total,) place of each frame on the playback timeline, in seconds."""
+    """(total,) position of each frame on the playback timeline, in seconds."""
     detectors: Detectors
-    """For vehicles and lanes; their names are part of a run's digest."""
+    """Detectors for vehicles and lanes; their names are part of a run's digest."""
     sensors: Sensors
     """The sensors whose data the pipeline may use."""
 
@@ -71,75 +71,75 @@ class OpenRecording:
         self._truths: dict[int, Truth] = {}
         self.describing = Lock()
         self.described: LabeledDrive | None = None
-        """What files of labels must know of it, once somebody has asked; held by ``describing`` meanwhile."""
+        """Description of the drive for label files, once requested; ``describing`` is locked while it is made."""
 
     def advance(self, run: DriveRun) -> None:
-        """The next frame of a run. Whatever a source or a network raises."""
+        """Process the next frame of a run. Raises whatever a source or a network raises."""
         index = run.done
         run.add(self.input(index), self.truth(index), RULE)
 
     def state_before(self, index: int, params: Params) -> State | None:
-        """The state with which the run of these parameters arrived at a frame; None if it has not got that far."""
+        """The state before a frame in the run with these parameters; None if it has not got that far."""
         run = self.runs.of(params)
         kept = run.nearest_state(index) if run is not None else None
         return self._onwards(kept, index, params) if kept is not None else None
 
     def last_known_state(self, index: int, params: Params) -> KnownState:
-        """The last state that is known at or before a frame; that of the beginning where no run has been made."""
+        """The last known state at or before a frame; the initial state if there is no run."""
         run = self.runs.of(params)
         known = run.nearest_state(min(index, run.done)) if run is not None else None
         return known or KnownState(0, State())
 
     def state_from_start(self, index: int, params: Params) -> State:
-        """The state in which the run of these parameters arrives at a frame, computed here as far as none has come."""
+        """The state before a frame in the run with these parameters; computes the frames that no run has reached."""
         return self._onwards(self.last_known_state(index, params), index, params)
 
     def input(self, index: int) -> Frame:
-        """A frame as ``step`` takes it; its image may be without pixels."""
+        """A frame as input of ``step``; its image may be without pixels."""
         held = self.inputs.get(index)
         return held if held is not None else self.frame(index)
 
     def frame(self, index: int) -> Frame:
-        """A frame as ``step`` takes it, from the source, with its image."""
+        """A frame as input of ``step``, read from the source, with its image."""
         frame = sensed(self.as_read(index), self.setup.detectors, self.setup.sensors, self._ask)
         self.inputs.offer(frame)
         return frame
 
     def with_boxes(self, index: int) -> Frame:
-        """A frame from its source with the detector's boxes alone: no lanes, no far view."""
+        """A frame read from its source, only with the detector's boxes: no lanes, no far view."""
         return sensed(self.as_read(index), Detectors(self.setup.detectors.boxes), ask=self._ask)
 
     def has_been_looked_at(self, index: int) -> bool:
-        """Whether no network has to run on a frame any more."""
+        """Whether the outputs of all networks for a frame are available."""
         is_without = self.setup.sensors == "lidar" or self.setup.detectors == Detectors()
         return is_without or self.inputs.get(index) is not None
 
     def as_read(self, index: int) -> Frame:
-        """A frame as its source gives it, without detections."""
+        """A frame as read from its source, without detections."""
         with at_work("reading a frame"):
             return self.setup.source.frame(index)
 
     def names(self) -> tuple[str, ...]:
-        """The names of all frames; frames that were not read yet are read."""
+        """The names of all frames; frames that have not been read yet are read."""
         return tuple(self.inputs.name(index) or self.as_read(index).name for index in range(self.setup.total))
 
     @cached_property
     def marks(self) -> tuple[Mark, ...]:
-        """What was marked while it was recorded."""
+        """Marks made during the recording."""
         return self.setup.source.marks() if isinstance(self.setup.source, Marked) else ()
 
     @cached_property
     def stamps_ns(self) -> I64:
-        """(total,) when each frame was."""
+        """(total,) timestamps of the frames."""
         return np.array([self.setup.source.t_ns(index) for index in range(self.setup.total)], np.int64)
 
     def at_hand(self, index: int) -> Frame:
-        """A frame as ``step`` takes it, without pixels, if it is cached; otherwise as its source gives it."""
+        """A frame as input of ``step``, without pixels, if it is cached; otherwise as read from its source."""
         return self.inputs.get(index) or self.as_read(index)
 
     def save(self, path: Path, first: int, last: int, progress: Progress) -> None:
         """Write frames to a session file, with all data of the source."""
-        from pipeline.recording.save import save  # MCAP takes 0.2 s to import: only who saves pays
+        from pipeline.recording.save import save  # MCAP takes 0.2 s to import, so it is imported only when saving
 
         save(self.setup.source, path, first, last, progress)
 
@@ -150,11 +150,11 @@ class OpenRecording:
         return self._truths[index]
 
     def digest(self, params: Params) -> str:
-        """What a run is made from, as twelve characters."""
+        """Digest of a run's inputs, twelve characters."""
         return digest(self.setup.uri, self.setup.detectors.names, self.setup.sensors, params)
 
     def calibration_digest(self, params: Params) -> str:
-        """With which calibration images and points are laid on each other, as twelve characters."""
+        """Digest of the calibration that aligns images and points, twelve characters."""
         return calibration_digest(self.at_hand(0).camera, params)
 
     def _onwards(self, known: KnownState, index: int, params: Params) -> State:

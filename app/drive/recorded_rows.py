@@ -20,7 +20,7 @@ _SENSORS = ("lidar", "camera", "ego")
 
 
 def recorded_row(result: Mapping[str, Any]) -> Row:
-    """result: one frame, as in ``docs/reference/results.md``. KeyError or TypeError if it is none."""
+    """result: one frame, as in ``docs/reference/results.md``. KeyError or TypeError if it is invalid."""
     lead, acc, ego, sensors = (result[name] or {} for name in ("cipv", "acc", "ego", "sensors"))
     item: Mapping[str, Any] = next((each for each in result["objects"] if each["id"] == lead.get("id")), {})
     return Row(
@@ -45,7 +45,7 @@ def recorded_row(result: Mapping[str, Any]) -> Row:
 
 
 def recorded_objects(result: Mapping[str, Any]) -> Objects:
-    """(N,) ``OBJECT`` records of one frame, in the result's order. Raises as ``recorded_row`` does."""
+    """(N,) ``OBJECT`` records of one frame, in the result's order. Raises the same errors as ``recorded_row``."""
     records = np.zeros(len(result["objects"]), OBJECT)
     for field in ("closing_speed_mps", "vl_gap_m", "vl_gap_sigmas", "cuboid", "bbox", "bev", "velocity_mps"):
         records[field] = math.nan

@@ -15,7 +15,7 @@ LONGEST_NAME = 80
 
 
 class NoSuchRun(BadInput):
-    """A run that does not exist, or no longer does."""
+    """A run that does not exist, or was deleted."""
 
 
 class RunRefused(BadInput):
@@ -35,26 +35,26 @@ class RunRegistry:
 
     @property
     def current(self) -> DriveRun | None:
-        """The run of the present parameters."""
+        """The run with the current parameters."""
         return self._current
 
     @property
     def base(self) -> DriveRun | None:
-        """The run that others are compared with; at first the first one."""
+        """The base run for comparisons; initially the first one."""
         return self._base
 
     @property
     def next_number(self) -> int:
-        """What the next run will be called: a number is given once, also over several recordings."""
+        """Number of the next run: each number is used only once, also across recordings."""
         return self._next
 
     def all(self) -> list[DriveRun]:
-        """Every run, the oldest first."""
+        """Every run, oldest first."""
         with self._lock:
             return list(self._runs)
 
     def get(self, number: int) -> DriveRun:
-        """NoSuchRun when it is not there."""
+        """The run with this number; NoSuchRun if there is none."""
         with self._lock:
             found = next((run for run in self._runs if run.number == number), None)
         if found is None:
@@ -62,12 +62,12 @@ class RunRegistry:
         return found
 
     def of(self, params: Params) -> DriveRun | None:
-        """The run with these parameters; None when there is none."""
+        """The run with these parameters; None if there is none."""
         with self._lock:
             return next((run for run in reversed(self._runs) if run.params == params), None)
 
     def want(self, params: Params, preset: str) -> bool:
-        """Make the run of these parameters the current one; true if it was another before."""
+        """Make the run with these parameters the current one; true if it was not already."""
         with self._lock:
             if self._current is not None and self._current.params == params:
                 return False
@@ -90,7 +90,7 @@ class RunRegistry:
         return next((run for run in wanted if run is not None and not run.is_complete and not run.note), None)
 
     def keep(self, number: int, name: str) -> DriveRun:
-        """Save a run under a name, or rename it. RunRefused when too many are saved."""
+        """Save a run under a name, or rename it. RunRefused if too many are saved."""
         with self._lock:
             run = self.get(number)
             if not run.kept and sum(each.kept for each in self._runs) >= MOST_KEPT:
@@ -99,13 +99,13 @@ class RunRegistry:
             return run
 
     def compare_with(self, number: int) -> None:
-        """Make a run the base."""
+        """Make a run the base for comparisons."""
         with self._lock:
             self._base = self.get(number)
             self._let_go()
 
     def delete(self, number: int) -> None:
-        """RunRefused for the current run and the base."""
+        """Delete a run; RunRefused for the current run and the base."""
         with self._lock:
             run = self.get(number)
             if run is self._current or run is self._base:

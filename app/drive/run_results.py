@@ -21,7 +21,7 @@ _DECIMALS = 4
 
 
 def seen_of(records: Objects) -> list[Seen]:
-    """The objects of one frame as labels are proposed from."""
+    """The objects of one frame as input for label proposals."""
     return [
         Seen(
             int(record["id"]),
@@ -37,12 +37,13 @@ def seen_of(records: Objects) -> list[Seen]:
 
 
 def moments_of(rows: Sequence[Row]) -> dict[int, Moment]:
-    """What the car was doing at each frame, by index."""
+    """The car's motion in each frame, by index."""
     return {index: Moment(row.t_ns, row.speed_mps, row.yaw_rate_radps, row.reach_m) for index, row in enumerate(rows)}
 
 
 def results_of(run: DriveRun, *, leads_only: bool = False) -> Iterator[Result]:
-    """Every frame that is there, named by its index. leads_only: of its objects only the CIPV, which is quicker."""
+    """The results of all available frames, with the index as name. leads_only: only the CIPV of the objects, which is
+    faster."""
     for (index, records), row in zip(run.objects(), run.rows(), strict=False):
         yield _result(index, row, records[records["id"] == row.cipv_id] if leads_only else records)
 

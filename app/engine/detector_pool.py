@@ -26,13 +26,13 @@ ABLATION_NOTICES: dict[Sensors, tuple[str, ...]] = {
     "lidar": ("LiDAR only: no detection in the images",),
     "camera": ("Camera only: LiDAR points are not used",),
 }
-"""Notices about sensors that are left out."""
+"""Notices about disabled sensors."""
 
 
 class DetectorPool:
-    """``open_detector`` and ``open_lanes`` give those for a source's images; None: none, and nothing is said about
-    it. lanes_every: lanes are looked for in every n-th frame; None: as the lane detector is quick. far_view_px: side of
-    the far view's window; None: no far view."""
+    """``open_detector`` and ``open_lanes`` return the detectors for a source's images; None: no detector, without a
+    notice. lanes_every: lanes are detected in every n-th frame; None: depends on the lane detector's speed.
+    far_view_px: side of the far view's window; None: no far view."""
 
     def __init__(
         self,
@@ -51,12 +51,12 @@ class DetectorPool:
         self._opened_far: dict[_Kind, FarView | None] = {}
 
     def forget(self) -> None:
-        """Open all anew when they are asked for: one of them hangs."""
+        """Reopen all detectors at the next request, because one of them hangs."""
         self._opened, self._opened_far = {}, {}
 
     def both_for(self, source: AnySource, notices: list[Notice]) -> Detectors:
-        """What looks at the source's images; what is missing is None, and a notice says so. Nothing where detections
-        come with them."""
+        """The detectors for the source's images; a missing one is None, with a notice. Empty if the source contains
+        detections."""
         if brings_detections(source):
             return Detectors()
         lanes = self.lanes_for(source, notices)
@@ -65,7 +65,7 @@ class DetectorPool:
         return Detectors(boxes, lanes, every, self.far_view_for(source, boxes))
 
     def far_view_for(self, source: AnySource, boxes: Detects[RawBoxes] | None) -> FarView | None:
-        """The detector's second look at the source's images; None where it is off or adds nothing."""
+        """The detector's second pass for the source's images; None if it is disabled or adds nothing."""
         if self._far_view_px is None or boxes is None:
             return None
         kind = _kind_of(source)
@@ -74,7 +74,7 @@ class DetectorPool:
         return self._opened_far[kind]
 
     def lanes_for(self, source: AnySource, notices: list[Notice]) -> Detects[RawLanes] | None:
-        """The lane detector, which a notice names."""
+        """The lane detector, which is named in a notice."""
         if self._open_lanes is None:
             return None
         try:
@@ -86,7 +86,7 @@ class DetectorPool:
         return lanes
 
     def boxes_for(self, source: AnySource, notices: list[Notice]) -> Detects[RawBoxes] | None:
-        """The detector of vehicles; where there is none, LiDAR goes on alone and a notice says so."""
+        """The vehicle detector; without one, only the LiDAR is used and a notice says so."""
         if self._open is None:
             return None
         kind = _kind_of(source)
@@ -102,5 +102,5 @@ class DetectorPool:
 
 
 def _kind_of(source: AnySource) -> _Kind:
-    """What a detector is opened for: equal kinds share it."""
+    """Properties of a source that a detector depends on: sources of equal kind share it."""
     return is_simulated(source), image_size(source)

@@ -45,13 +45,13 @@ _COMPILING = "Preparing the pipeline … The first start after an installation t
 
 
 class Engine:
-    """``start`` it, send wishes through ``control``, read ``snapshot`` or listen. ``open_detector`` gives the
-    one for a source's images; None runs without a camera's detector and says nothing about it; ``open_lanes`` gives
-    the lane detector, which looks at every ``lanes_every``-th frame. ``far_view_px``: side of the window of the second
-    look, None for none. ``whole_drives``: a recording's whole drive is
-    computed in the background (``drives``), so that any frame is shown as it is in it. ``desk``: where what is shown
-    can be recorded; by default into the folder of this machine's sessions. ``labels``: what people say of it, and the
-    steps they can take back; by default gone at the end."""
+    """``start`` it, send requests through ``control``, read ``snapshot`` or listen. ``open_detector`` returns the
+    detector for a source's images; None runs without a vehicle detector and without a notice. ``open_lanes`` returns
+    the lane detector, which runs on every ``lanes_every``-th frame. ``far_view_px``: side of the window of the second
+    pass, None for none. ``whole_drives``: a recording's whole drive is computed in the background (``drives``), so that
+    any frame is shown as in a complete run. ``desk``: where what is shown can be recorded; by default the folder of
+    this machine's sessions. ``labels``: the labels, and the steps that can be undone; by default discarded at the
+    end."""
 
     def __init__(
         self,
@@ -80,14 +80,14 @@ class Engine:
         self.drives = BackgroundRuns(self._detections)
         self.control.on_ask = self.drives.turn.asked
         self.page_frames = PageFrames(self.drives.turn.foreground)
-        """For pages that do not follow what is shown."""
+        """For pages with their own playhead."""
         self.desk = desk or SessionRecorder()
         self.labels = labels or LabelDesk()
         self._whole_drives = whole_drives
         self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every, far_view_px)
         self._player: Player | None = None
         self.detectors = Detectors()
-        """Of what is open."""
+        """Detectors of the open source."""
         self.watchdog = self.drives.watchdog = watchdog or Watchdog()
         self.takeovers = Takeovers(self.watchdog, self._work, self._say_stuck, self.control.change, self.drives.turn)
 
@@ -99,8 +99,8 @@ class Engine:
         self.takeovers.begin()
 
     def stop(self) -> None:
-        """Close the recording, if there is one, then end the worker. A network run or a read in progress is finished
-        first, but not waited for longer than a system waits for a program that it has asked to end."""
+        """Close the recording, if any, then end the worker. A network run or a read in progress is finished first, but
+        waited for no longer than systems wait for a program that was asked to end."""
         self.control.change(stop=True)
         self.desk.stop()
         ends_s = time.monotonic() + _PATIENCE_S
@@ -110,7 +110,7 @@ class Engine:
 
     @property
     def source(self) -> AnySource | None:
-        """What is open."""
+        """The open source."""
         player = self._player
         return player.source if player is not None else None
 
@@ -121,13 +121,13 @@ class Engine:
 
     @property
     def snapshot(self) -> Snapshot:
-        """What is shown now. ``listen`` and ``wait_for`` tell what is shown next."""
+        """What is shown now. Use ``listen`` or ``wait_for`` for changes."""
         return self._publisher.snapshot
 
     # ------------------------------------------------------------ the worker
 
     def _work(self, is_first: bool) -> None:
-        """is_first: not in the place of another that hangs."""
+        """is_first: false if it replaces a worker that hangs."""
         if not is_first:
             self._take_over()
         while True:
@@ -139,18 +139,18 @@ class Engine:
                 return self._close()
             try:
                 self._serve(wish)
-            except Exception as error:  # the worker outlives whatever a recording or a network does
+            except Exception as error:  # the worker must survive any failure of a recording or a network
                 logger.exception("while serving %s", self.snapshot.uri)
                 self._fail(f"{type(error).__name__}: {first_line(error)}")
 
     def _serve(self, wish: Wish) -> None:
-        """All in front, but for the wait for sensors: others may work then."""
+        """Serve a request with foreground priority, except while waiting for sensors, when background work may run."""
         turn = self.drives.turn
         if wish.uri is not None:
             with turn.foreground():
                 if not self._open(wish.uri):
                     return
-                warm_up()  # as a rule ``drives`` has, beside the opening
+                warm_up()  # usually already done by ``drives`` while the source was opened
                 self._publisher.publish(replace(self.snapshot, busy=None))
         player = self._player
         if player is not None:
@@ -162,7 +162,8 @@ class Engine:
     # ------------------------------------------------------------ workers that hang
 
     def _take_over(self) -> None:
-        """The same source, where the worker before, or its helper, hangs; with a fresh network where that does."""
+        """Continue with the same source after the previous worker, or its helper, hung; with a new network if that
+        hung."""
         player, gives_up = self._player, self.takeovers.gives_up
         if player is None:
             return
@@ -179,7 +180,8 @@ class Engine:
             self.control.change(target=self.snapshot.index)
 
     def _say_stuck(self, stuck: Stuck, more: str = "") -> None:
-        """On every page, the in-vehicle display too, for a minute; what is off from now on, for good."""
+        """A notice on every page and on the in-vehicle display, for a minute; permanently if a function is disabled
+        from now on."""
         others = tuple(notice for notice in self.snapshot.notices if f"({stuck.doing})" not in notice.text)
         said = stuck_notice(stuck, more, is_recording=self.desk.state is not None)
         self._publisher.publish(replace(self.snapshot, notices=(*others, said)))
@@ -187,8 +189,8 @@ class Engine:
     # ------------------------------------------------------------ opening
 
     def _open(self, uri: str) -> bool:
-        """Replace what is open; when it cannot be opened the old one stays, a notice says why, and this is false. One
-        that takes long is given up for a newer wish."""
+        """Replace the open source; if the new one cannot be opened, the old one stays, a notice gives the reason, and
+        the result is false. If opening takes long, it is aborted for a newer request."""
         self._publisher.publish(replace(self.snapshot, busy=f"Opening {uri} …"))
         job = BackgroundJob(
             partial(self._opened, uri),
@@ -234,7 +236,7 @@ class Engine:
     def _player_of(self, source: AnySource, detectors: Detectors) -> Player:
         self.page_frames.open(None)
         if is_live_source(source):
-            # what decodes sensors' packets takes 0.1 s to import: only who has sensors pays
+            # decoding of sensor packets takes 0.1 s to import, so it is imported only for live sensors
             from app.engine.live_pipeline import LivePipeline
             from app.engine.live_player import LivePlayer
 
@@ -258,7 +260,7 @@ class Engine:
     # ------------------------------------------------------------ showing
 
     def _fail(self, text: str) -> None:
-        """Say what went wrong, and stop playing into it."""
+        """Show an error, and stop playback."""
         player = self._player
         playing = player is not None and player.goes_on_after_failing() and self.snapshot.playing
         if not playing:
@@ -266,7 +268,7 @@ class Engine:
         self._publisher.publish(self.snapshot.failed(text, playing))
 
     def _show(self, wish: Wish, processed: ProcessedFrame | None) -> None:
-        """The next snapshot: the new tick if there is one, and the wishes as they stand."""
+        """The next snapshot: the new tick if there is one, and the current requests."""
         shown, player, standing = self.snapshot, self._player, self.control.peek()
         if player is not None:
             player.go_on(standing, processed.frame.index if processed is not None else shown.index)
@@ -280,5 +282,5 @@ class Engine:
             self.labels.shown()
 
     def _with_parts(self, shown: Snapshot) -> Snapshot:
-        """With the state of the drive's run, of recording and of the labels."""
+        """Adds the state of the drive's run, of recording and of the labels."""
         return replace(shown, drive=self.drives.state, recording=self.desk.state, labels=self.labels.state)

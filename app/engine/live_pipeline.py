@@ -23,12 +23,12 @@ _SILENCE_S = 1.0
 
 
 class LivePipeline:
-    """``open`` the sensors, then ``wait`` for a frame and ``run`` it, over and over; ``close``."""
+    """``open`` the sensors, then repeatedly ``wait`` for a frame and ``run`` it; finally ``close``."""
 
     def __init__(self, source: LiveSource, detectors: Detectors, sensors: Sensors) -> None:
         self.source = source
         self.newest: ProcessedFrame | None = None
-        """The tick that was run last."""
+        """The last processed tick."""
         self._detectors, self._sensors = LiveDetectors(detectors), sensors
         self._first_ns: int | None = None
         self._ticked_s = monotonic()
@@ -41,13 +41,13 @@ class LivePipeline:
         self.source.close()
 
     def successor(self, detectors: Detectors) -> LivePipeline:
-        """The same sensors, which stay open, from the newest tick on, with other detectors."""
+        """Continues from the newest tick with the same sensors, which stay open, and other detectors."""
         fresh = LivePipeline(self.source, detectors, self._sensors)
         fresh.newest, fresh._first_ns = self.newest, self._first_ns
         return fresh
 
     def wait(self, params: Params, timeout_s: float) -> Frame | None:
-        """The newest tick of the sensors; None when none arrived in time."""
+        """The newest tick of the sensors; None if none arrived in time."""
         with at_work("the sensors' next tick"):
             return self.source.next(timeout_s, params.sync)
 
@@ -63,7 +63,7 @@ class LivePipeline:
         return self.newest
 
     def with_silence(self, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
-        """The notices, plus one that names the sensors it waits for once no tick has arrived for a second."""
+        """The notices, plus one that lists the missing sensors if no tick has arrived for a second."""
         others = tuple(notice for notice in notices if notice is not self._silence)
         if monotonic() - self._ticked_s < _SILENCE_S:
             self._silence = None
@@ -78,7 +78,7 @@ class LivePipeline:
 
 
 class _TimedLook:
-    """Asks detectors straight away, and measures how long they take."""
+    """Calls detectors directly, and measures their run time."""
 
     def __init__(self) -> None:
         self.spent_ms = 0.0

@@ -17,13 +17,13 @@ from pipeline.types import Frame
 from pipeline.types.source import LiveSource
 
 _WAIT_S = 0.02
-"""How long it waits for a tick before the worker looks for new wishes."""
+"""How long it waits for a tick before the worker checks for new requests."""
 _HEALTH_EVERY_S = 0.5
 
 
 class LivePlayer:
-    """A ``Player`` of live sensors. Paused, the shown tick is held and can be run again with other parameters;
-    playing on jumps to now. Every tick goes to the desk, shown or not."""
+    """A ``Player`` for live sensors. While paused, the shown tick is kept and can be rerun with other parameters;
+    resuming jumps to the present. Every tick is passed to the desk, shown or not."""
 
     live = True
     count = 0
@@ -35,7 +35,7 @@ class LivePlayer:
         self._health_told_s = 0.0
 
     def successor(self, detectors: Detectors) -> LivePlayer:
-        """Goes on where this one hangs; the sensors stay open."""
+        """Takes over from a hanging player; the sensors stay open."""
         return LivePlayer(self._pipeline.successor(detectors), self._control, self._drives, self._desk)
 
     @property
@@ -47,7 +47,7 @@ class LivePlayer:
         return self._pipeline.source.dropped
 
     def open(self) -> None:
-        """Shown from the first tick on."""
+        """Shows ticks from the first one on."""
         self._drives.open(None)
         self._pipeline.open()
         self._control.change(playing=True)
@@ -74,7 +74,7 @@ class LivePlayer:
         return None
 
     def go_on(self, standing: Wish, index: int) -> None:
-        """The drive that is computed beside a recording is not played."""
+        """Nothing to prepare: there is no drive computed in the background."""
         self._drives.turn.playing(False)
 
     def time_s(self, processed: ProcessedFrame) -> float:
@@ -88,5 +88,5 @@ class LivePlayer:
         return replace(shown, streams=self.source.health(), notices=self._pipeline.with_silence(shown.notices))
 
     def goes_on_after_failing(self) -> bool:
-        """The next tick may do."""
+        """The next tick may succeed."""
         return True

@@ -14,18 +14,18 @@ from pipeline.params import Params
 
 @dataclass(frozen=True, eq=False)
 class PageFrame:
-    """A frame as one page sees it."""
+    """A frame as shown on one page."""
 
     uri: str
-    """Of the recording."""
+    """URI of the recording."""
     time_s: float
-    """Its place on the playback timeline."""
+    """Its position on the playback timeline."""
     processed: ProcessedFrame
-    """Exact where the whole drive has been run up to it."""
+    """Exact if the whole drive has been run up to it."""
 
 
 class PageFrames:
-    """Any thread; frames are made one at a time, ahead of what is computed in the background. foreground: as of
+    """Any thread; frames are made one at a time, with priority over background work. foreground: see
     ``compute_scheduler``."""
 
     def __init__(self, foreground: Callable[[], AbstractContextManager[object]]) -> None:
@@ -34,19 +34,20 @@ class PageFrames:
         self._pipeline: SeekablePipeline | None = None
 
     def open(self, pipeline: SeekablePipeline | None) -> None:
-        """Frames come from this one; None while no recording is open. What is being made is made of the old one."""
+        """Use this pipeline for frames; None while no recording is open. A frame in progress is still made with the old
+        one."""
         self._pipeline = pipeline
 
     def can_be_exact(self, frame: PageFrame) -> bool:
-        """Whether more is known of it by now: made again, it would be exactly as in the whole drive."""
+        """Whether the whole-drive run has now reached it: made again, the frame would be exact."""
         pipeline, shown = self._pipeline, frame.processed
         if pipeline is None or shown.exact or not shown.whole:
             return False
         return pipeline.knows(shown.frame.index, shown.params)
 
     def make(self, index: int, params: Params, superseded: Callable[[], bool], *, at_once: bool) -> PageFrame | None:
-        """The frame, as the shared playhead would show it. None without a recording, or when ``superseded`` turned
-        true on the way. at_once: as of ``SeekablePipeline.seek``."""
+        """The frame, as the shared playhead would show it. None without a recording, or if ``superseded`` became true
+        meanwhile. at_once: see ``SeekablePipeline.seek``."""
         with self._lock:
             pipeline = self._pipeline
             if pipeline is None or superseded():

@@ -14,16 +14,16 @@ from pipeline.types.source import AnySource
 
 
 class OpenSource(Protocol):
-    """As ``pipeline.sources.open_any``."""
+    """Same signature as ``pipeline.sources.open_any``."""
 
     def __call__(self, uri: str, /, *, progress: Progress) -> AnySource: ...
 
 
 class Player(Protocol):
-    """Runs the pipeline on a recording or on live sensors. Used by the worker thread alone.
+    """Runs the pipeline on a recording or on live sensors. Used by the worker thread only.
 
-    live: sensors. count, duration_s: frames and length of a recording, 0 of sensors. skipped: frames since the opening
-    that came and were not shown.
+    live: whether these are live sensors. count, duration_s: frames and length of a recording, 0 for sensors. skipped:
+    frames since opening that arrived but were not shown.
     """
 
     @property
@@ -38,41 +38,42 @@ class Player(Protocol):
     def skipped(self) -> int: ...
 
     def open(self) -> None:
-        """Begin, once what was open before is closed."""
+        """Start, after the previous source was closed."""
         ...
 
     def wait_s(self, index: int) -> float | None:
-        """Seconds until it needs the worker, with this frame shown; None while only a wish or its own call does."""
+        """Seconds until it needs the worker, while this frame is shown; None if only a request or its own callback
+        needs it."""
         ...
 
     def wait(self, params: Params) -> None:
-        """Wait shortly for the next input of the pipeline. Other threads may work meanwhile."""
+        """Wait briefly for the next input of the pipeline. Other threads may work meanwhile."""
         ...
 
     def serve(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:
-        """What a wish makes of it; None when what is shown stays."""
+        """Process a request; None if the shown frame stays."""
         ...
 
     def go_on(self, standing: Wish, index: int) -> None:
-        """Make ready for what comes after the frame that is shown from now on."""
+        """Prepare the frames that follow the given one."""
         ...
 
     def time_s(self, processed: ProcessedFrame) -> float:
-        """Where a tick is on the timeline."""
+        """Position of a tick on the timeline."""
         ...
 
     def health(self, shown: Snapshot) -> Snapshot:
-        """The snapshot with how its sensors do, when that is due."""
+        """The snapshot with the sensors' health, if an update is due."""
         ...
 
     def goes_on_after_failing(self) -> bool:
-        """Something went wrong: whether it plays on all the same."""
+        """Whether it continues playback after an error."""
         ...
 
     def successor(self, detectors: Detectors) -> Player | None:
-        """Who goes on with these detectors where this one hangs; None where one made anew will do."""
+        """A player that takes over with these detectors if this one hangs; None if a newly created one can."""
         ...
 
     def close(self) -> None:
-        """Give everything back. Safe to call twice."""
+        """Release everything. Safe to call twice."""
         ...

@@ -14,23 +14,23 @@ class ProcessedFrame:
     """One frame, the pipeline's state before and after it, and its result."""
 
     before: State
-    """The state that the frame was run from, so that it can be run again with other parameters."""
+    """The state before the frame, so that it can be run again with other parameters."""
     frame: Frame
     """The input, detections included."""
     after: State
-    """The state that the next frame is run from."""
+    """The state for the next frame."""
     result: Result
-    """What the frame came to."""
+    """The result for this frame."""
     params: Params
-    """What it was run with."""
+    """The parameters used."""
     detect_ms: float
-    """How long networks took for it, in milliseconds."""
+    """Run time of the networks for this frame, in milliseconds."""
     exact: bool = False
-    """``before`` is the state of a run over the whole drive from its first frame, so the result equals that of
-    ``cipv run``; otherwise it comes from a short warm-up, and object numbers may differ."""
+    """Whether ``before`` is the state of a run over the whole drive from its first frame, so that the result equals
+    that of ``cipv run``; otherwise it comes from a short warm-up, and object ids may differ."""
     whole: bool = True
-    """The warm-up was complete and all detectors have run; otherwise the frame was wanted at once: trackers have hardly
-    any history, and lanes may not have been detected."""
+    """Whether the warm-up was complete and all detectors have run; otherwise the frame was made for immediate display:
+    trackers have hardly any history, and lanes may not have been detected."""
 
     def rerun(self, params: Params) -> ProcessedFrame:
         """The frame with other parameters, from the same state. Runs no network."""

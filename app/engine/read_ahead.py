@@ -15,10 +15,9 @@ logger = logging.getLogger("cipv.ahead")
 
 
 class ReadAhead:
-    """Has ``prepare(index)`` run for one index at a time. ``on_ready`` is called when it has, on the thread that did.
-
-    ``watching``: around all that the thread does. What went wrong is left to who reads the frame in earnest: it goes
-    wrong there again."""
+    """Runs ``prepare(index)`` for one index at a time on its own thread. ``on_ready`` is called afterwards on that
+    thread. ``watching``: context around all work of the thread. Errors are ignored here; they recur and are handled
+    when the frame is actually read."""
 
     def __init__(
         self,
@@ -33,24 +32,24 @@ class ReadAhead:
         self._under_way: int | None = None
         self._ready: int | None = None
         self._ended = False
-        # a read that hangs must not keep the program from ending
+        # a hanging read must not keep the program from exiting
         self._thread = threading.Thread(target=self._work, name="cipv-ahead", daemon=True)
         self._thread.start()
 
     @property
     def ready(self) -> int | None:
-        """The index that was prepared last."""
+        """The last prepared index."""
         with self._condition:
             return self._ready
 
     @property
     def busy(self) -> bool:
-        """Whether ``on_ready`` is going to be called."""
+        """Whether a call of ``on_ready`` is pending."""
         with self._condition:
             return self._wanted is not None or self._under_way is not None
 
     def want(self, index: int) -> None:
-        """Prepare this one next, instead of another that was wanted and not begun."""
+        """Prepare this index next, replacing a requested one that has not been started."""
         with self._condition:
             if index in (self._ready, self._under_way):
                 return
@@ -58,7 +57,7 @@ class ReadAhead:
             self._condition.notify()
 
     def end(self, patience_s: float = 0.0) -> None:
-        """Begin nothing more, and wait for what is under way, but not for ever."""
+        """Start nothing more, and wait for the current work, for a limited time."""
         with self._condition:
             self._ended = True
             self._condition.notify()

@@ -24,13 +24,13 @@ from pipeline.params import Params
 from pipeline.types.source import Source
 
 _READ_PATIENCE_S = 1.0
-"""A read that hangs must not keep the program from ending; its thread is a daemon."""
+"""A hanging read must not keep the program from exiting; its thread is a daemon."""
 
 
 class RecordedPlayer:
-    """A ``Player`` of one recording. ``setup`` says how its whole drive is computed in the background, so that any
-    frame is shown as it is there; None leaves that out. ``watching``: around the thread that works ahead. What is shown
-    goes to the session recorder."""
+    """A ``Player`` for one recording. ``setup`` defines how its whole drive is computed in the background, so that any
+    frame is shown as in a complete run; None disables that. ``watching``: context around the read-ahead thread. Shown
+    frames are passed to the session recorder."""
 
     live = False
 
@@ -56,7 +56,8 @@ class RecordedPlayer:
         self._drives.open(self._setup)
 
     def successor(self, detectors: Detectors) -> None:
-        """Its frames are always there: one made anew will do. What it prepares is not waited for."""
+        """None: a newly created player can take over, since the frames remain available. Pending preparation is not
+        waited for."""
         self._ahead.end()
 
     def close(self) -> None:
@@ -67,11 +68,11 @@ class RecordedPlayer:
             return self._drives.turn.rest_s if self._can_be_whole() else None
         left_s = self._clock.wait_s(index, time.monotonic())
         if self._ahead.busy and left_s <= 0:
-            return None  # what is due wakes the worker when it is there
+            return None  # the worker is woken when the due frame is ready
         return left_s
 
     def wait(self, params: Params) -> None:
-        """Its frames are always there."""
+        """Returns at once: its frames are always available."""
 
     def serve(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:
         processed = self._served(wish, shown)
@@ -103,7 +104,7 @@ class RecordedPlayer:
         self._clock = None
         return False
 
-    # ------------------------------------------------------------ what a wish makes of it
+    # ------------------------------------------------------------ processing a request
 
     def _served(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:
         index, last = shown.index, self.count - 1
@@ -124,8 +125,8 @@ class RecordedPlayer:
         return self._pipeline.seek(index, wish.params, self._control.superseded, at_once=at_once)
 
     def _better(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:
-        """The paused frame once more, when more is known of it than when it was shown: exactly as in the whole drive,
-        or, once the hand rests, after a whole warm-up, which gives way to every wish."""
+        """The paused frame again, if it can be improved: exact from the whole-drive run, or, after input stops, with a
+        complete warm-up, which is aborted by any request."""
         if self._pipeline.can_be_exact():
             return self._pipeline.rerun(wish.params)
         turn = self._drives.turn
@@ -141,12 +142,12 @@ class RecordedPlayer:
             raise
 
     def _can_be_whole(self) -> bool:
-        """Whether the frame was wanted at once; what could not be had is not tried again."""
+        """Whether the frame was made for immediate display; an improvement that failed is not tried again."""
         processed = self._pipeline.shown
         return processed is not None and not processed.whole and processed.frame.index != self._given_up
 
     def _step(self, shown: int, index: int, wish: Wish) -> ProcessedFrame | None:
-        """Every frame up to ``index``, none skipped."""
+        """Process every frame up to ``index``, without skipping."""
         self._clock = None
         processed = None
         for i in range(shown + 1, index + 1):
@@ -154,7 +155,7 @@ class RecordedPlayer:
         return processed
 
     def _play(self, index: int, wish: Wish) -> ProcessedFrame | None:
-        """The next frame that is due and was prepared, if there is one. Frames that are late already are skipped."""
+        """The next frame that is due and prepared, if any. Frames that are already late are skipped."""
         if self._clock is None:
             return None
         now = time.monotonic()
@@ -173,6 +174,6 @@ class RecordedPlayer:
         return None
 
     def _prepare(self, index: int) -> None:
-        """On the thread that works ahead."""
+        """Runs on the read-ahead thread."""
         with self._drives.turn.foreground():
             self._pipeline.prepare(index)

@@ -22,9 +22,10 @@ from pipeline.types import Frame
 from pipeline.types.source import Source
 
 WARM_UP_FRAMES = 10
-"""A seek runs this many frames before its target, so that trackers there have their history and confirmations."""
+"""A seek runs this many frames before its target, so that trackers there have history and confirmations."""
 AT_ONCE_FRAMES = 1
-"""The same when somebody waits and the frames before have been neither read nor detected in yet: 50 ms each."""
+"""The same for immediate display if the previous frames have been neither read nor processed by detectors yet: 50 ms
+each."""
 _CACHED_FRAMES_BYTES = 192e6
 
 
@@ -35,7 +36,8 @@ def _nothing_known(index: int, params: Params) -> State | None:
 class SeekablePipeline:
     """The pipeline, a source, the detectors for its images, and their caches. For one thread, except ``prepare``.
 
-    ``state_before`` gives the state with which a run over the whole drive arrives at a frame, None where unknown."""
+    ``state_before`` returns the state before a frame in a run over the whole drive, None if unknown.
+    """
 
     def __init__(
         self,
@@ -65,12 +67,14 @@ class SeekablePipeline:
         *,
         at_once: bool = False,
     ) -> ProcessedFrame | None:
-        """Jump to ``index``: exactly where the state there is known, otherwise from a fresh state ``WARM_UP_FRAMES``
-        before it. Either way the answer depends on the recording, the index and the parameters alone. None, with
-        nothing changed, when ``superseded`` turned true on the way.
+        """Jump to ``index``: exactly if the state there is known, otherwise from a fresh state ``WARM_UP_FRAMES``
+        before it. In both cases the result depends only on the recording, the index and the parameters. None, with
+        nothing changed, if ``superseded`` became true meanwhile.
 
-        at_once: if the frames before are not cached, the warm-up is cut to ``AT_ONCE_FRAMES``, the lane detector, which
-        takes longest, does not run, and others run on the frame itself only. The answer is then not ``whole``."""
+        at_once: if the previous frames are not cached, the warm-up is cut to ``AT_ONCE_FRAMES``, the lane detector,
+        which takes longest, does not run, and the others run only on the frame itself. The result is then not
+        ``whole``.
+        """
         known = self._known(index, params)
         first = whole_first = index if known is not None else max(0, index - WARM_UP_FRAMES)
         if at_once and not all(self._is_at_hand(i) for i in range(first, index)):
@@ -90,7 +94,7 @@ class SeekablePipeline:
         return self.shown
 
     def advance(self, index: int, params: Params) -> ProcessedFrame:
-        """Run ``index`` after the shown frame. Where the state there is unknown, trackers miss the frames skipped in
+        """Run ``index`` after the shown frame. If the state there is unknown, trackers miss the frames skipped in
         between; every filter uses the real time step."""
         shown, known = self.shown, self._known(index, params)
         if known is not None:
@@ -103,7 +107,7 @@ class SeekablePipeline:
         return self.shown
 
     def rerun(self, params: Params) -> ProcessedFrame | None:
-        """The shown frame with other parameters: from the state that they lead to where it is known, otherwise from the
+        """The shown frame with other parameters: from their state in the whole-drive run if known, otherwise from the
         state it started with. Runs no network and reads nothing, so a frame that is not ``whole`` stays that way."""
         if self.shown is None:
             return None
@@ -114,20 +118,21 @@ class SeekablePipeline:
         return self.shown
 
     def prepare(self, index: int) -> None:
-        """Read a frame and run the detectors on it, so that running it later waits for neither. For a second thread."""
+        """Read a frame and run the detectors on it, so that a later run does not wait for either. For a second
+        thread."""
         spent_ms = self._ask_ahead.spent_ms
         sensed(self._read(index), self._detectors, self._sensors, self._ask_ahead)
         self._ahead_ms = (index, self._ask_ahead.spent_ms - spent_ms)
 
     def can_be_exact(self) -> bool:
-        """Whether the shown frame differs from the run over the whole drive, and a rerun would make it equal."""
+        """Whether the shown frame differs from the whole-drive run and a rerun would make it equal."""
         shown = self.shown
         if shown is None or shown.exact or not shown.whole:
             return False
         return self._known(shown.frame.index, shown.params) is not None
 
     def knows(self, index: int, params: Params) -> bool:
-        """Whether the frame can be shown exactly as in the whole drive."""
+        """Whether the frame can be shown exactly as in the whole-drive run."""
         return self._known(index, params) is not None
 
     def _known(self, index: int, params: Params) -> State | None:
@@ -143,7 +148,7 @@ class SeekablePipeline:
         return ProcessedFrame(state, frame, after, result, params, detect_ms, exact)
 
     def _asked_at_once(self, index: int, *, is_wanted: bool = False) -> Detectors:
-        """The detectors to run on a frame that is wanted at once, or on the way there: all whose answers are cached."""
+        """The detectors to run on a frame for immediate display, or in its warm-up: those whose outputs are cached."""
         asked = self._detectors
         if asked.boxes is not None and not is_wanted and not self._ask.knows(asked.boxes, index):
             asked = replace(asked, boxes=None)
@@ -154,7 +159,7 @@ class SeekablePipeline:
         return asked
 
     def _is_at_hand(self, index: int) -> bool:
-        """Whether a frame has been read and detected in."""
+        """Whether a frame has been read and processed by the detectors."""
         with self._reading:
             is_read = self._frames.get(index) is not None
         return is_read and self._asked_at_once(index) is self._detectors

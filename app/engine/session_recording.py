@@ -24,10 +24,11 @@ _LONGEST_NAME = 60
 class SessionRecorder:
     """At most one recording at a time, of one source, into ``folder``. Any thread; ``take`` on the engine's.
 
-    A recording holds what was shown: playing a drive at double speed or seeking leaves out what was skipped. Of live
-    sensors it contains every tick that the pipeline ran on, also while playback is paused, and every sweep, image,
-    fix and own motion that came in between. A frame whose result is not exact yet waits, with its marks, for the exact
-    one, until the next frame comes or recording ends."""
+    A recording contains what was shown: frames skipped at double speed or by seeking are left out. For live sensors it
+    contains every tick that the pipeline processed, also while playback is paused, and every sweep, image, fix and own
+    motion in between. A frame whose result is not exact yet waits, with its marks, for the exact one, until the next
+    frame comes or recording ends.
+    """
 
     def __init__(self, folder: Path = SESSIONS) -> None:
         self._folder = folder
@@ -41,14 +42,16 @@ class SessionRecorder:
 
     @property
     def state(self) -> RecordingState | None:
-        """None while nothing is recorded. One that ended by itself stays, with its error, until it is stopped."""
+        """None while nothing is recorded. A recording that ended by itself stays, with its error, until it is
+        stopped."""
         recorder = self._recorder
         return recorder.state if recorder is not None else None
 
     def start(self, source: AnySource | None, detectors: Detectors | None = None) -> RecordingState:
-        """Record from the next frame on; a recording that goes on already just goes on. detectors: whose results.
+        """Record from the next frame on; if a recording is already running, it continues. detectors: whose results are
+        recorded.
 
-        BadInput when nothing is open, or no file can be made.
+        BadInput if nothing is open, or no file can be created.
         """
         with self._lock:
             if self._recorder is not None and self._recorder.state.error is None:
@@ -56,7 +59,7 @@ class SessionRecorder:
             self._end()
             if source is None:
                 raise BadInput("nothing is open to record")
-            # what MCAP and its schemas need takes 0.2 s to import: only who records pays
+            # MCAP and its schemas take 0.2 s to import, so they are imported only when recording
             from pipeline.recording.recorder import Recorder
             from pipeline.recording.save import about
 
@@ -72,12 +75,13 @@ class SessionRecorder:
             return recorder.state
 
     def stop(self) -> RecordingState | None:
-        """End the recording, wait until it is written, and say how it went; None (and no file) when it is empty."""
+        """End the recording, wait until it is written, and return its final state; None (and no file) if it is
+        empty."""
         with self._lock:
             return self._end()
 
     def mark(self, text: str) -> bool:
-        """A mark right after the newest frame; false when nothing is recorded, or no more."""
+        """Add a mark at the newest frame; false if nothing is being recorded."""
         with self._feeding:
             if self._recorder is None:
                 return False
@@ -87,7 +91,7 @@ class SessionRecorder:
             return self._recorder.state.error is None
 
     def take(self, processed: ProcessedFrame) -> None:
-        """Record a frame that the pipeline has run on. A rerun with other parameters is not recorded again."""
+        """Record a processed frame. A rerun with other parameters is not recorded again."""
         with self._feeding:
             recorder, last = self._recorder, self._last
             if recorder is None:
@@ -102,7 +106,7 @@ class SessionRecorder:
                 self._write_waiting(recorder)
 
     def _write_waiting(self, recorder: Recorder) -> None:
-        """The frame that waits, if one does, as it is known now."""
+        """Write the waiting frame, if any, with its current result."""
         if not self._waits or self._last is None:
             return
         processed, self._waits = self._last, False
@@ -130,7 +134,7 @@ class SessionRecorder:
 
 
 def new_session(out: Path, title: str) -> Path:
-    """``out`` itself when it names an MCAP file, else a file in that folder, named by title and local time."""
+    """``out`` itself if it names an MCAP file, else a file in that folder, named by title and local time."""
     if out.suffix.lower() == ".mcap":
         return out
     out.mkdir(parents=True, exist_ok=True)

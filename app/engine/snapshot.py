@@ -25,11 +25,11 @@ class Notice:
     """A sentence shown in the dashboard, with the remedy if there is one."""
 
     level: Literal["info", "warning", "error"]
-    """Decides the colour; only an ``error`` goes away by itself."""
+    """Defines the colour; only an ``error`` disappears by itself."""
     text: str
     """One or two sentences."""
     until_s: float = 0.0
-    """An error goes with the next frame, but not before this time of ``time.monotonic``."""
+    """An error disappears with the next frame, but not before this time of ``time.monotonic``."""
 
     @property
     def stays(self) -> bool:
@@ -42,41 +42,41 @@ class Snapshot:
     """Source, playback and the shown frame at one moment."""
 
     params: Params
-    """In use."""
+    """Parameters in use."""
     preset: str = "default"
     """The preset that the parameters started from."""
     params_revision: int = 0
-    """Grows with every change of parameters."""
+    """Incremented with every change of parameters."""
     uri: str | None = None
-    """As the source was opened; None before."""
+    """As passed when the source was opened; None before."""
     title: str = ""
-    """Of the recording."""
+    """Title of the recording."""
     rate_hz: float = 0.0
     """Nominal frame rate; 0 when unknown."""
     count: int = 0
     """Frames of the recording; 0 for live sensors."""
     index: int = 0
-    """Of the shown frame."""
+    """Index of the shown frame."""
     time_s: float = 0.0
-    """Place of the shown frame on the playback timeline, in seconds."""
+    """Position of the shown frame on the playback timeline, in seconds."""
     duration_s: float = 0.0
-    """Of the whole timeline."""
+    """Duration of the whole timeline."""
     playing: bool = False
-    """False holds the shown frame."""
+    """False pauses on the shown frame."""
     speed: float = 1.0
     """Playback rate; 1 is real time."""
     loop: bool = True
     """Whether playback starts again at the end of the drive."""
     busy: str | None = None
-    """What the engine is doing while it cannot serve requests."""
+    """What the engine is doing while it cannot serve requests; None otherwise."""
     detector: str | None = None
     """Name of the network for vehicles; None without one."""
     lane_detector: str | None = None
     """Name of the lane detector; None without one."""
     notices: tuple[Notice, ...] = ()
-    """What there is to tell the person now."""
+    """Current notices for the user."""
     sequence: int = 0
-    """Grows with every new result."""
+    """Incremented with every new result."""
     skipped: int = 0
     """Frames since the source was opened that were not shown in time."""
     made_unix_s: float = 0.0
@@ -84,18 +84,18 @@ class Snapshot:
     processed: ProcessedFrame | None = None
     """The shown frame; None before the first one."""
     drive: DriveState = DriveState()
-    """How far the whole-drive run is."""
+    """Progress of the whole-drive run."""
     labels: LabelState = LabelState()
-    """Of what is open."""
+    """State of the labels of the open source."""
     live: bool = False
-    """Live sensors, not a recording."""
+    """Whether the source is live sensors."""
     streams: tuple[StreamHealth, ...] = ()
     """Health of each live sensor, updated also while no tick arrives."""
     recording: RecordingState | None = None
     """None while nothing is recorded."""
 
     def opened(self, uri: str, player: Player, detectors: Detectors) -> Snapshot:
-        """The next snapshot once something else was opened: of the parameters and of playback it is the same."""
+        """The next snapshot after another source was opened; keeps parameters and playback settings."""
         return replace(
             self,
             uri=uri,
@@ -113,7 +113,7 @@ class Snapshot:
         )
 
     def following(self, wish: Wish, standing: Wish) -> Snapshot:
-        """The next snapshot with the parameters that were served and with playback as it is wished by now."""
+        """The next snapshot with the parameters that were served and the currently requested playback settings."""
         return replace(
             self,
             params=wish.params,
@@ -125,7 +125,7 @@ class Snapshot:
         )
 
     def with_result(self, processed: ProcessedFrame, player: Player) -> Snapshot:
-        """The next snapshot with a new result. Notices of one tick are over."""
+        """The next snapshot with a new result. Notices of the previous tick are removed."""
         return replace(
             self,
             processed=processed,
@@ -143,11 +143,11 @@ class Snapshot:
 
     @property
     def lasting_notices(self) -> tuple[Notice, ...]:
-        """Those that outlast the tick they came with."""
+        """Notices that remain after the tick they came with."""
         return tuple(notice for notice in self.notices if notice.stays)
 
     def state_json(self) -> dict[str, Any]:
-        """The state without the result, as the page and ``/api/state`` read it."""
+        """The state without the result, in the format of the page and ``/api/state``."""
         return {
             "uri": self.uri,
             "title": self.title,

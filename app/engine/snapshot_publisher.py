@@ -14,7 +14,7 @@ Listener = Callable[[Snapshot], None]
 
 
 class SnapshotPublisher:
-    """Holds the newest snapshot. ``publish`` on the worker's thread, the rest on any."""
+    """Holds the newest snapshot. ``publish`` is called on the worker's thread, everything else on any thread."""
 
     def __init__(self, first: Snapshot) -> None:
         self.snapshot = first
@@ -22,19 +22,20 @@ class SnapshotPublisher:
         self._changed = threading.Condition()
 
     def listen(self, listener: Listener) -> Callable[[], None]:
-        """Call ``listener`` on the worker's thread after every change; it must be quick. Returns how to end that."""
+        """Call ``listener`` on the worker's thread after every change; it must be quick. Returns a function that
+        unsubscribes."""
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener)
 
     def wait_for(self, condition: Callable[[Snapshot], bool], timeout_s: float) -> Snapshot:
-        """The first snapshot that satisfies ``condition``; TimeoutError when none came."""
+        """The first snapshot that satisfies ``condition``; TimeoutError if there is none in time."""
         with self._changed:
             if not self._changed.wait_for(lambda: condition(self.snapshot), timeout_s):
                 raise TimeoutError(f"nothing of the kind within {timeout_s:g} s; last: {self.snapshot.state_json()}")
             return self.snapshot
 
     def publish(self, snapshot: Snapshot) -> None:
-        """Show it, and tell the listeners if it is another."""
+        """Set the snapshot, and notify the listeners if it has changed."""
         with self._changed:
             changed = snapshot != self.snapshot
             self.snapshot = snapshot

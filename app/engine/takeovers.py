@@ -16,15 +16,15 @@ from app.drive.compute_scheduler import ComputeScheduler
 from app.engine.snapshot import Notice
 
 _MOST_HANGS = 3
-"""What hangs so often, of one source, is not tried again."""
+"""After this many hangs with one source, it is not tried again."""
 _GIVES_UP = ". It keeps hanging: networks are off and playback is paused until a source is opened"
 
 _SAID_S = 60.0
-"""How long a worker that hung is spoken of."""
+"""How long a notice about a hung worker is shown."""
 
 
 def stuck_notice(stuck: Stuck, more: str, *, is_recording: bool) -> Notice:
-    """What is said of a worker that hung, for a minute; with ``more``, of what is off from now on, for good."""
+    """The notice about a hung worker, for a minute; with ``more``, about what is disabled from now on, permanently."""
     goes_on = "; recording continues" if is_recording else ""
     text = f"{stuck.worker} hung for {stuck.seconds:.1f} s ({stuck.doing}) and was restarted{goes_on}"
     until_s = math.inf if more else time.monotonic() + _SAID_S
@@ -32,19 +32,19 @@ def stuck_notice(stuck: Stuck, more: str, *, is_recording: bool) -> Notice:
 
 
 class Say(Protocol):
-    """Tells people of a worker that hangs."""
+    """Notifies users of a hung worker."""
 
     def __call__(self, stuck: Stuck, more: str = "") -> object:
-        """more: what else there is to say."""
+        """more: additional text."""
         ...
 
 
 class Takeovers:
-    """Runs ``work(is_first)`` on a thread of its own, and once more on another when that one hangs. ``wake`` makes a
-    worker that waits look at ``asked``.
+    """Runs ``work(is_first)`` on its own thread, and again on another one if that hangs. ``wake`` makes a waiting
+    worker check ``asked``.
 
-    What is recorded goes on meanwhile: the threads of the sensors and of the recorder have nothing to do with it. The
-    thread that hangs does nothing more, should it come back (``app.core.watchdog``).
+    Recording continues meanwhile: the threads of the sensors and of the recorder are independent. If the hung thread
+    continues later, it does nothing more (``app.core.watchdog``).
     """
 
     def __init__(
@@ -65,16 +65,16 @@ class Takeovers:
 
     @property
     def gives_up(self) -> bool:
-        """Whether something hangs again and again, so that networks shall not run, and playback shall not go on."""
+        """Whether hangs keep recurring, so that networks must not run and playback must not continue."""
         return any(count >= _MOST_HANGS for count in self._hangs.values())
 
     @property
     def of_network(self) -> bool:
-        """Whether what hung last was a network."""
+        """Whether the last hang was in a network."""
         return self._last is not None and self._last.doing.startswith(NETWORK)
 
     def asked(self) -> bool:
-        """For the worker, once each time: its helper hangs, so it shall go on with fresh parts."""
+        """For the worker, true once per event: its helper hangs, so it must continue with new parts."""
         asked, self._is_asked = self._is_asked, False
         return asked
 
@@ -83,7 +83,7 @@ class Takeovers:
         self.thread.start()
 
     def end(self, patience_s: float) -> None:
-        """Begin no other, and wait for the one that works, unless it is the caller."""
+        """Start no other worker, and wait for the current one, unless it is the caller."""
         with self._lock:
             self._ended = True
         self._watchdog.stop()
@@ -91,11 +91,11 @@ class Takeovers:
             self.thread.join(patience_s)
 
     def forget(self) -> None:
-        """Another source may do better."""
+        """Reset the count, since another source may work better."""
         self._hangs.clear()
 
     def watching_helper(self, name: str) -> AbstractContextManager[None]:
-        """Around what another thread does for the present worker."""
+        """Context around the work of a helper thread for the current worker."""
         return self._watchdog.watching(name, partial(self._on_helper_stuck, self._count))
 
     def _fresh(self) -> threading.Thread:
@@ -106,7 +106,7 @@ class Takeovers:
             self._do(count == 0)
 
     def _on_stuck(self, count: int, stuck: Stuck) -> None:
-        """On the watchdog's thread."""
+        """Runs on the watchdog's thread."""
         with self._lock:
             if count != self._count or self._ended:
                 return
@@ -116,7 +116,7 @@ class Takeovers:
             self.thread.start()
 
     def _on_helper_stuck(self, count: int, stuck: Stuck) -> None:
-        """The worker itself is well, or is found to hang by the same thing."""
+        """The worker itself is fine, or its own hang is detected separately on the same thread."""
         with self._lock:
             if count == self._count and not self._ended:
                 self._tell(stuck)

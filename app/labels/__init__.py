@@ -7,4 +7,4 @@ transfer/  import and export of label files
 """
 
 URL_VARIABLE = "CIPV_LABELS_URL"
-"""Of the environment: a team's database."""
+"""Environment variable with the address of a team's database."""

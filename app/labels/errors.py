@@ -8,24 +8,24 @@ from pipeline.common.errors import BadInput
 
 
 class DatabaseError(BadInput):
-    """The database cannot be reached, read or written; the text says which and why, never with a password."""
+    """The database cannot be reached, read or written; the text says which one and why, without passwords."""
 
 
 class ActRefused(BadInput):
-    """It cannot be done to these labels as they stand; nothing was written."""
+    """The act is not possible with the current labels; nothing was written."""
 
 
 class BadAct(BadInput):
-    """It makes no sense, whatever the labels are."""
+    """The act is invalid, whatever the labels are."""
 
 
 class NoSuchLabel(BadInput):
-    """What it is about is not, or no longer, there."""
+    """The referenced item does not exist, or no longer does."""
 
 
 class Stale(ActRefused):
-    """Somebody changed an item, of that kind and number, since. theirs: the item as it stands; None where it was
-    removed. revision: of the labels in which it stands so."""
+    """Somebody has changed the item since. theirs: the current item; None if it was removed. revision: revision of the
+    labels that contains it."""
 
     def __init__(self, text: str, kind: str, number: int, theirs: dict[str, Any] | None, revision: int = 0) -> None:
         super().__init__(text)

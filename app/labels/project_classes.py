@@ -13,8 +13,8 @@ FILE = SESSIONS / "labels.yaml"
 
 
 def project_classes() -> ClassList:
-    """Of the file that ``CIPV_LABEL_CLASSES`` names, else of ``sessions/labels.yaml``, else the program's. BadInput in
-    one sentence for a file that cannot be read."""
+    """From the file in ``CIPV_LABEL_CLASSES``, else from ``sessions/labels.yaml``, else the defaults. BadInput in one
+    sentence for a file that cannot be read."""
     named = os.environ.get(VARIABLE)
     if named:
         return read_classes(Path(named))

@@ -6,7 +6,7 @@ from __future__ import annotations
 from pipeline.labels.model import Lead
 
 WORKING = "working"
-"""The labels as they are now, beside the names of frozen versions."""
+"""Name of the current labels, as opposed to frozen versions."""
 
 
 def frames_text(first: int, last: int | None = None) -> str:
@@ -15,10 +15,10 @@ def frames_text(first: int, last: int | None = None) -> str:
 
 
 def outside_text(first: int, last: int, count: int) -> str:
-    """Why frames are refused that a recording of ``count`` does not have."""
+    """Message for frames outside a recording of ``count`` frames."""
     return f"{frames_text(first, last)}: the recording has {count}"
 
 
 def lead_text(lead: Lead) -> str:
-    """A lead in a sentence: the number of its track, "none" or "can't tell"."""
+    """A lead as text: the id of its track, "none" or "can't tell"."""
     return f"#{lead}" if isinstance(lead, int) else {"none": "none", "unknown": "can't tell"}[lead]

@@ -44,7 +44,7 @@ class Encoder:
         self._last: tuple[CameraImage, int, SentImage] | None = None
 
     def message(self, snapshot: Snapshot, width_px: int = MAX_WIDTH_PX) -> bytes | None:
-        """The message for the snapshot's tick, its image at most ``width_px`` wide; None when there is no tick."""
+        """The message for the snapshot's tick, its image at most ``width_px`` wide; None without a tick."""
         if snapshot.processed is None:
             return None
         frame, result = snapshot.processed.frame, snapshot.processed.result
@@ -73,19 +73,19 @@ class Encoder:
 
 
 def pack(header: dict[str, Any], jpeg: bytes, arrays: bytes) -> bytes:
-    """The message, in the layout that the module's docstring describes."""
+    """The message, in the layout described in the module's docstring."""
     text = msgspec.json.encode(header)
     text += b" " * (-len(text) % 4)
     return b"".join([struct.pack("<I", len(text)), text, jpeg, b"\0" * (-len(jpeg) % 4), arrays])
 
 
 def display_json(result: Result, aligned: Alignment | None, scale: float) -> dict[str, Any]:
-    """What is drawn over the camera image. Boxes are those that fusion compared; ``cuboids`` are 8 corners, bottom
-    first; ``far_view`` is the window of the detector's second look, None without one; ``path`` is the corridor on the
-    ground of the sweep, None without a ground. ``lanes`` are the ego lane's lines where the camera saw them, None
-    without a lane detector; ``plan_lanes`` the same seen from above, x y in metres; ``plan_edges`` what runs beside the
-    road, likewise, None where the path is not taken from it; ``plan_traffic`` x, y and heading in rad of the vehicles
-    that show where the road goes; ``ground`` the planes under the sweep, n·p + d = 0, and the segments of x in which
+    """Overlays for the camera image. Boxes are those that fusion compared; ``cuboids`` are 8 corners, bottom first;
+    ``far_view`` is the window of the detector's second pass, None without one; ``path`` is the corridor on the ground
+    of the sweep, None without a ground. ``lanes`` are the ego lane's lines where the camera saw them, None without a
+    lane detector; ``plan_lanes`` the same seen from above, x y in metres; ``plan_edges`` the structure beside the road,
+    also from above, None if the path does not use it; ``plan_traffic`` x, y and heading in rad of the vehicles that
+    indicate the course of the road; ``ground`` the planes under the sweep, n·p + d = 0, and the segments of x in which
     they apply; ``ranking`` every object, best candidate for the CIPV first."""
     layers = result.layers
     path = {"center": result.path.center, "left": result.path.left, "right": result.path.right}
@@ -117,7 +117,7 @@ def _cuboids_json(result: Result, aligned: Alignment | None, scale: float) -> di
 def _on_ground(
     lines: dict[str, F64], ground: Ground | None, aligned: Alignment | None, scale: float
 ) -> dict[str, list[list[float] | None]] | None:
-    """Each (K, 2) ego line as pixels, one per point; None where the ground or the camera is not known."""
+    """Each (K, 2) ego line as pixels, one per point; None if the ground or the camera is not known."""
     if ground is None or aligned is None or not ground.fitted.any():
         return None
     return {
@@ -127,7 +127,7 @@ def _on_ground(
 
 
 def _lanes_json(lane: EgoLane | None, aligned: Alignment | None, scale: float) -> dict[str, Any]:
-    """The ego lane's lines where the camera saw them, and seen from above."""
+    """The ego lane's lines as seen in the image and from above."""
     if lane is None:
         return {"lanes": None, "plan_lanes": None}
     seen = in_image(lane, aligned) if aligned is not None else None

@@ -15,8 +15,8 @@ logger = logging.getLogger("cipv.stream")
 
 
 class OwnPlayhead:
-    """Of one page. ``show`` and ``seen`` are called on the event loop; ``told`` gets each frame's message on the thread
-    that made it. index: where it is."""
+    """The playhead of one page. ``show`` and ``seen`` are called on the event loop; ``told`` gets each frame's message
+    on the thread that made it. index: the current frame."""
 
     def __init__(
         self,
@@ -34,13 +34,13 @@ class OwnPlayhead:
         self._wanted = 0
 
     def show(self, index: int) -> None:
-        """Go to a frame; what is being made of another one is dropped."""
+        """Go to a frame; aborts making another one."""
         self.index = index
         self._wanted += 1
         self._threads.submit(self._make, self._wanted)
 
     def seen(self, snapshot: Snapshot) -> None:
-        """Something is new: parameters, or what is known of the whole drive."""
+        """There is something new: parameters, or results of the whole drive."""
         shown = self._frame
         if shown is None or self._is_left:
             return
@@ -49,11 +49,11 @@ class OwnPlayhead:
             self.show(self.index)
 
     def leave(self) -> None:
-        """The page follows the others again, or is gone."""
+        """The page follows the shared playhead again, or has closed."""
         self._is_left = True
 
     def snapshot(self, shared: Snapshot) -> Snapshot:
-        """What the page is shown of what all are shown."""
+        """The snapshot for this page, derived from the shared one."""
         own = self._frame
         if own is None or own.uri != shared.uri:
             return replace(shared, playing=False)
@@ -61,7 +61,8 @@ class OwnPlayhead:
         return replace(shared, processed=own.processed, index=index, time_s=own.time_s, playing=False)
 
     def _make(self, wanted: int) -> None:
-        """On its thread: at once, and then as it is in the whole drive, unless another one is wanted meanwhile."""
+        """Runs on its thread: makes the frame at once, and then as in the whole drive, unless another one is requested
+        meanwhile."""
 
         def superseded() -> bool:
             return self._is_left or wanted != self._wanted
@@ -80,5 +81,5 @@ class OwnPlayhead:
                     self._told(message, shared.sequence)
                 if made.processed.whole:
                     return
-        except Exception:  # whatever a recording does, the page keeps the frame it has
+        except Exception:  # if a recording fails in any way, the page keeps the frame it has
             logger.exception("the frame of a page of its own")

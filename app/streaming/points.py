@@ -9,7 +9,7 @@ from pipeline.alignment.projection import Alignment
 from pipeline.types import DROPPED, F32, F64, GROUND, I32, UNCLUSTERED, Frame, Result
 
 UNSEEN = -32768
-"""The pixel of a point outside the camera's view."""
+"""Pixel coordinate of points outside the camera's view."""
 UNKNOWN_AGE = 255
 _LIMIT = 32767
 _CODES = ((GROUND, 0), (UNCLUSTERED, 1), (DROPPED, 3))
@@ -18,7 +18,7 @@ U8 = npt.NDArray[np.uint8]
 
 
 def point_arrays(frame: Frame, result: Result, aligned: Alignment | None, scale: float) -> bytes:
-    """The message's last part; ``app.streaming.encode`` lays it out. ``scale``: sent pixels per image pixel."""
+    """The message's last part, in the layout of ``app.streaming.encode``. ``scale``: sent pixels per image pixel."""
     points, kind = result.layers.points, result.layers.kind
     places = points[:, :3].astype(np.float64)
     xyz = np.clip(np.round(places * 100.0), -_LIMIT, _LIMIT).astype("<i2")
@@ -43,7 +43,7 @@ def _pixels(uv: F64) -> npt.NDArray[np.int16]:
 
 
 def _owners(result: Result, kind: I32) -> npt.NDArray[np.uint16]:
-    """(N,) for each point, 1 + the place of its object in ``result.objects``."""
+    """(N,) for each point, 1 + index of its object in ``result.objects``."""
     cluster_of_track = {t.id: t.obstacle.cluster for t in result.layers.lidar_tracks if not t.carried}
     owner: npt.NDArray[np.uint16] = np.zeros(int(kind.max(initial=-1)) + 2, "<u2")
     for place, item in enumerate(result.objects):
@@ -61,7 +61,7 @@ def _codes(kind: I32) -> U8:
 
 
 def _intensity(points: F32) -> U8:
-    """0–255. KITTI's reflectance runs from 0 to 1, a Velodyne's own from 0 to 255."""
+    """0–255. KITTI's reflectance ranges from 0 to 1, a Velodyne's from 0 to 255."""
     values = points[:, 3]
     full = 255.0 if float(values.max(initial=0.0)) <= 1.0 else 1.0
     return np.clip(values * full, 0.0, 255.0).astype(np.uint8)
@@ -73,8 +73,8 @@ def _rings(frame: Frame, points: F32) -> U8:
 
 
 def _ages(frame: Frame, points: F32) -> U8:
-    """Milliseconds before the newest point of the sweep, at most 254; ``UNKNOWN_AGE`` where the recording does not
-    say when each point was measured."""
+    """Milliseconds before the newest point of the sweep, at most 254; ``UNKNOWN_AGE`` if the recording has no times of
+    the points."""
     time_s = frame.sweep.time_s if frame.sweep is not None else None
     if time_s is None or len(time_s) != len(points) or not len(points):
         return np.full(len(points), UNKNOWN_AGE, np.uint8)

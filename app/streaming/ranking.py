@@ -9,10 +9,10 @@ from typing import Any
 from pipeline.types import FusedObject, Gate, Result
 
 _OF_FUSION = frozenset({"iou", "range_sigmas", "class_size", "cluster_hits"})
-"""Gates between the objects of two sensors: failing one splits a pair into two rows, and excludes neither from being
-the CIPV."""
+"""Gates between the objects of two sensors: failing one splits a pair into two rows, but does not exclude either from
+being the CIPV."""
 BEHIND = "behind"
-"""What excludes an object that passed every test: another one is nearer, or better known in the same place."""
+"""Reason for an object that passed every test: another one is nearer, or better known at the same place."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,11 @@ class Ranked:
     distance_m: float | None
     """None when unknown."""
     stopped_by: str | None
-    """Name of the first gate that failed, or ``BEHIND``; None for the CIPV."""
+    """Name of the first failed gate, or ``BEHIND``; None for the CIPV."""
     value: float | None
-    """That the gate tested; None when there was nothing to test."""
+    """The value tested by the gate; None when there was nothing to test."""
     limit: float | None
-    """That it was held against."""
+    """The gate's limit."""
     reason: str
     """In words."""
 
@@ -65,7 +65,7 @@ def stopping_gate(item: FusedObject) -> Gate | None:
 
 
 def ranking_json(result: Result) -> list[dict[str, Any]]:
-    """As the page reads it."""
+    """The ranking in the page's JSON format."""
     return [{name: _plain(value) for name, value in vars(each).items()} for each in ranking(result)]
 
 

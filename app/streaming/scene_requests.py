@@ -17,7 +17,7 @@ _Number = Annotated[int, Field(ge=0, lt=2**53)]
 
 
 class _Held(BaseModel):
-    """A label that may be dragged."""
+    """A label that can be dragged."""
 
     track: _Number
     frame: _Number
@@ -42,7 +42,7 @@ class _Labels(BaseModel):
 
 
 def hear(looks: SharedViewState, page: object, said: Mapping[str, Any]) -> None:
-    """Take over what a page says of its 3D view. What is not valid counts as nothing held, nothing labelled; other
+    """Apply a page's message about its 3D view. Invalid content counts as nothing held and nothing labelled; other
     fields are ignored."""
     name = said.get("page_3d")
     if isinstance(name, str) and _NAME.fullmatch(name):

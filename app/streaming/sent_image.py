@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.types import U8, CameraImage
 
 MAX_WIDTH_PX = 1280
-"""For pages that do not say how wide they show the image."""
+"""Default for pages that do not report the width at which they show the image."""
 MIN_WIDTH_PX, WIDTH_STEP_PX = 320, 160
 JPEG_QUALITY = 80
 _JPEG = b"\xff\xd8"
@@ -31,14 +31,13 @@ class SentImage:
 
 
 def width_for(shown_px: float) -> int:
-    """The width to send for an image shown this wide. It changes in steps, so that dragging a pane's edge does not
+    """The image width to send for this displayed width. It changes in steps, so that dragging a pane's edge does not
     encode a new image for every pixel."""
     return max(MIN_WIDTH_PX, int(np.ceil(shown_px / WIDTH_STEP_PX)) * WIDTH_STEP_PX)
 
 
 def encode_image(image: CameraImage, width_px: int = MAX_WIDTH_PX) -> SentImage:
-    """The camera's own JPEG if there is one and it is small enough; otherwise the image encoded at most ``width_px``
-    wide."""
+    """The camera's own JPEG if it is small enough; otherwise the image encoded at most ``width_px`` wide."""
     height, width = image.bgr.shape[:2]
     if image.encoded is not None and image.encoded[:2] == _JPEG and width <= width_px:
         return SentImage(image.encoded, width, height, 1.0)

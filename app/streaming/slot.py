@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from app.streaming.own_playhead import OwnPlayhead
 
 FRAMES_UNDER_WAY = 2
-"""One being painted while the next is on its way."""
+"""One frame is painted while the next is in transit."""
 
 
 @dataclass
@@ -18,16 +18,17 @@ class FrameCounts:
     """Frames of all clients since the start."""
 
     sent: int = 0
-    """Handed to a connection."""
+    """Frames passed to a connection."""
     dropped: int = 0
-    """Replaced by a newer one before they were sent."""
+    """Frames replaced by a newer one before they were sent."""
 
 
 class Slot:
     """The newest unsent messages of one client, by kind. Used on the server's event loop only.
 
-    ``paced``: frames wait for ``painted``. ``traffic`` counts frames. image_px: how wide it shows the image, None
-    until it says so."""
+    ``paced``: frames wait for ``painted``. ``traffic`` counts frames. image_px: the width at which the client shows the
+    image, None until it reports it.
+    """
 
     def __init__(self, paced: bool = False, traffic: FrameCounts | None = None) -> None:
         self.image_px: int | None = None
@@ -46,7 +47,7 @@ class Slot:
         if order < self._newest.get(kind, order):
             return
         self._newest[kind] = order
-        replaced = self._unsent.pop(kind, None)  # so that the kinds stand in the order in which they came
+        replaced = self._unsent.pop(kind, None)  # keeps the kinds in order of arrival
         self._traffic.dropped += kind == "frame" and replaced is not None
         self._unsent[kind] = message
         if kind == "frame":
@@ -56,7 +57,7 @@ class Slot:
         self._filled.set()
 
     def put_own(self, message: bytes, order: int) -> None:
-        """A frame of the page's own playhead; ignored once it follows the others again."""
+        """A frame of the page's own playhead; ignored once it follows the shared playhead again."""
         if self.own is not None:
             self.put("frame", message, order)
 
@@ -66,7 +67,7 @@ class Slot:
         self._filled.set()
 
     async def take(self) -> list[str | bytes]:
-        """Wait for messages that may be sent, and take them all."""
+        """Wait for messages that may be sent, and remove and return all of them."""
         while True:
             await self._filled.wait()
             self._filled.clear()
@@ -76,8 +77,9 @@ class Slot:
             self._traffic.sent += "frame" in ready
             self._unsent = {kind: message for kind, message in self._unsent.items() if kind not in ready}
             if "frame" in ready:
-                ready.pop("state", None)  # the frame includes the state as it was
-                if self._state_after_frame is not None:  # also when it has been sent: the frame, late, says what was
+                ready.pop("state", None)  # the frame includes the state at its time
+                # even if it was sent before: the late frame has carried an older state
+                if self._state_after_frame is not None:
                     ready["state"] = self._state_after_frame
                     self._state_after_frame = None
             if ready:

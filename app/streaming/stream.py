@@ -46,8 +46,8 @@ MAY_SAY: Mapping[Role, frozenset[str]] = {
     "display": _CHANGES_NOTHING,
     "person": _CHANGES_NOTHING | {"own", "page_3d", "selected", "hides_3d", "held", "labels_3d"},
 }
-"""What each role is heard on. Everything else is dropped before anything reads it: a new message works for nobody until
-it is listed here."""
+"""The messages accepted from each role. All others are dropped before anything reads them: a new message works for
+nobody until it is listed here."""
 _LARGEST_PING = 1e15
 """Milliseconds; a page sends its own clock."""
 _WIDEST_PX = 4096
@@ -55,7 +55,7 @@ _WIDEST_PX = 4096
 
 @dataclass(frozen=True)
 class _Encoded:
-    """A frame's message, and the snapshot whose state it carries. By default none."""
+    """A frame's message, and the snapshot whose state it contains. By default none."""
 
     sequence: int = -1
     message: bytes | None = None
@@ -66,7 +66,7 @@ class Stream:
     """Between the engine's thread, which publishes, and the clients' slots on the event loop."""
 
     def __init__(self, looks: SharedViewState | None = None, frames: PageFrames | None = None) -> None:
-        """frames: for pages with a playhead of their own; without it every page follows."""
+        """frames: for pages with their own playhead; without it all pages follow the shared one."""
         self.traffic = FrameCounts()
         self._page_frames = frames
         self._pages = ThreadPoolExecutor(1, "cipv-pages")
@@ -76,7 +76,8 @@ class Stream:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._slots: list[Slot] = []
         self._encoder = Encoder()
-        self._threads = ThreadPoolExecutor(1, "cipv-stream")  # its own: whatever requests do, frames go on
+        # a separate pool, so that frames continue whatever requests do
+        self._threads = ThreadPoolExecutor(1, "cipv-stream")
         self._lock = threading.Lock()
         self._frame = _Encoded()
         self._width_px = MAX_WIDTH_PX
@@ -84,7 +85,7 @@ class Stream:
 
     @property
     def clients(self) -> int:
-        """Number of clients now."""
+        """Current number of clients."""
         return len(self._slots)
 
     def publish(self, snapshot: Snapshot) -> None:
@@ -96,11 +97,12 @@ class Stream:
         frame = self._encoded(snapshot) if snapshot.sequence > self._frame.sequence else _Encoded()
         try:
             loop.call_soon_threadsafe(self._distribute, snapshot, state_message(snapshot), frame)
-        except RuntimeError:  # the server closed its loop in between
+        except RuntimeError:  # the server has closed its loop in the meantime
             return
 
     async def serve(self, socket: WebSocket) -> None:
-        """Serve one client until it leaves. It may send ``{"ping": t}`` and gets ``t`` back with the server's clock."""
+        """Serve one client until it disconnects. It may send ``{"ping": t}`` and gets ``t`` back with the server's
+        clock."""
         await socket.accept()
         self._loop = asyncio.get_running_loop()
         slot = Slot(socket.query_params.get("paced") == "1", self.traffic)
@@ -118,7 +120,7 @@ class Stream:
                 await self._receive(socket, slot)
                 sender.cancel()
         except* (WebSocketDisconnect, RuntimeError):
-            pass  # the client left while something was being sent to it
+            pass  # the client disconnected during sending
         finally:
             self._slots.remove(slot)
             self._looks.leave(slot)
@@ -127,7 +129,7 @@ class Stream:
             self._fit_width()
 
     async def _receive(self, socket: WebSocket, slot: Slot) -> None:
-        """Read the client's messages until it leaves; unknown ones are ignored."""
+        """Read the client's messages until it disconnects; unknown ones are ignored."""
         while True:
             message = await socket.receive()
             if message["type"] == "websocket.disconnect":
@@ -147,7 +149,7 @@ class Stream:
                 await self._go(slot, said["own"])
 
     async def _go(self, slot: Slot, index: int | None) -> None:
-        """A page goes to a frame by itself, or follows the others again."""
+        """A page goes to a frame by itself, or follows the shared playhead again."""
         if index is None or self._page_frames is None:
             if slot.own is not None:
                 slot.own.leave()
@@ -162,7 +164,7 @@ class Stream:
         slot.own.show(index)
 
     def _newest(self) -> tuple[Snapshot | None, int]:
-        """What all are shown, and how wide images are sent. Any thread."""
+        """The shared snapshot, and the width of sent images. Any thread."""
         return self._snapshot, self._width_px
 
     def _tell_own(self, slot: Slot, message: bytes, order: int) -> None:
@@ -172,12 +174,12 @@ class Stream:
                 self._loop.call_soon_threadsafe(slot.put_own, message, order)
 
     def _tell_dragged(self, held: HeldCuboid, ended: bool) -> None:
-        """Tell the page that edits the label. Called on a thread of the 3D view."""
+        """Notify the page that edits the label. Called on a thread of the 3D view."""
         said = {"track": held.track, "frame": held.frame, "cuboid": held.cuboid._asdict(), "ended": ended}
         self._put(held.page, "held", _dump({"type": "held", **said}))
 
     async def _put_newest(self, slot: Slot, snapshot: Snapshot) -> None:
-        """The frame, and the state as it is now: the one in the frame may be older than what was told meanwhile."""
+        """The frame and the current state: the one in the frame may be older than states sent meanwhile."""
         if slot.own is not None:
             slot.own.show(slot.own.index)
             return
@@ -187,7 +189,7 @@ class Stream:
         slot.put("state", state_message(self._snapshot or snapshot))
 
     def _fit_width(self) -> bool:
-        """Use the width of the widest client. True when it has grown, so that the newest frame's image is too
+        """Use the width of the widest client. True if it has increased, so that the newest frame's image is too
         narrow."""
         wanted = max((slot.image_px or MAX_WIDTH_PX for slot in self._slots), default=MAX_WIDTH_PX)
         with self._lock:
@@ -210,13 +212,13 @@ class Stream:
         self._put(page, "selected", _dump({"type": "selected", "id": number}))
 
     def _put(self, page: object, kind: str, message: str) -> None:
-        """To one page. Any thread."""
+        """Send to one page. Any thread."""
         if self._loop is not None and isinstance(page, Slot):
             with suppress(RuntimeError):  # the server closed its loop
                 self._loop.call_soon_threadsafe(page.put, kind, message)
 
     def _distribute(self, snapshot: Snapshot, state: str, frame: _Encoded) -> None:
-        """state: of the snapshot. The frame may include an older one, when it was encoded again for a wider page."""
+        """state: of the snapshot. The frame may include an older one if it was encoded again for a wider page."""
         is_said = frame.of is snapshot
         for slot in self._slots:
             if slot.own is not None:
@@ -258,12 +260,12 @@ def _number(value: Any, limit: float) -> float | None:
 
 
 def _number_of(text: str | None) -> int | None:
-    """A frame's number of an address; None for what is none."""
+    """A frame's number from a URL; None if it is invalid."""
     return int(text) if text is not None and text.isascii() and text.isdecimal() and len(text) < 10 else None
 
 
 def _width(shown_px: Any) -> int | None:
-    """The width to send to a client that shows it this wide; None for an invalid width."""
+    """The image width to send to a client that displays it at this width; None for an invalid width."""
     shown = _number(float(shown_px) if isinstance(shown_px, str) and shown_px.isdecimal() else shown_px, _WIDEST_PX)
     return None if shown is None or shown <= 0 else width_for(shown)
 

@@ -54,7 +54,7 @@ PALETTE: dict[ColorRole, Shades] = {
     "warning": Shades("#fbbf24", "#b45309"),
     "lane": Shades("#fde68a", "#a16207"),
 }
-"""``cluster`` is a LiDAR cluster that belongs to no object (yet); ``dropped`` a point that down-sampling left out."""
+"""``cluster`` is a LiDAR cluster without an object; ``dropped`` is a point removed by down-sampling."""
 
 
 def rgb(role: ColorRole, theme: Literal["dark", "light"] = "dark") -> Rgb:
@@ -64,7 +64,7 @@ def rgb(role: ColorRole, theme: Literal["dark", "light"] = "dark") -> Rgb:
 
 
 def role_of(each: FusedObject, cipv_id: int | None) -> ColorRole:
-    """What an object's colour says: that it is the CIPV, else which sensors see it."""
+    """The colour role of an object: the CIPV, else by the sensors that see it."""
     if each.id == cipv_id:
         return "cipv"
     if each.tracked_by_two_sensors:
@@ -73,11 +73,11 @@ def role_of(each: FusedObject, cipv_id: int | None) -> ColorRole:
 
 
 def shade_of(color: Rgb, identity: int) -> Rgb:
-    """The colour a little darker or not, always the same for one identity, so that neighbours can be told apart."""
+    """The colour, darkened depending on the id, so that neighbours can be distinguished."""
     factor = (1.0, 0.82, 0.91, 0.73)[identity % 4]
     return int(color[0] * factor), int(color[1] * factor), int(color[2] * factor)
 
 
 def palette_css(theme: Literal["dark", "light"]) -> str:
-    """The palette as CSS custom properties, ``--cipv-<role>: #…;`` one a line."""
+    """The palette as CSS custom properties, ``--cipv-<role>: #…;``, one per line."""
     return "\n".join(f"--cipv-{role}: {getattr(shades, theme)};" for role, shades in PALETTE.items())

@@ -11,7 +11,7 @@ from pipeline.common.garbage_collection import freeze_loaded_objects
 
 
 class LateScene:
-    """A ``SceneFeed`` from the first time its port is asked for. Use it in a ``with`` block."""
+    """A ``SceneFeed`` that starts when its port is first requested. Use it in a ``with`` block."""
 
     def __init__(self, engine: Engine, looks: SharedViewState) -> None:
         self._engine, self._looks = engine, looks
@@ -21,7 +21,7 @@ class LateScene:
         self._ended = False
 
     def port(self) -> int | None:
-        """Where viser listens, on loopback; None at the end. The first to ask waits until it does. Any thread."""
+        """viser's port on loopback; None after the end. The first request waits until viser listens. Any thread."""
         with self._lock:
             if self._port is None and not self._ended:
                 from app.views.scene_feed import SceneFeed

@@ -8,21 +8,21 @@ from pipeline.common.geometry import F64
 from pipeline.types import FusedObject, Point3
 
 MARGIN_M = 0.3
-"""Pointers are imprecise and far cars small: a ray this close to a box hits it."""
+"""A ray this close to a box hits it, since pointers are imprecise and far cars are small."""
 _UNKNOWN_HEIGHT_M = 1.5
-"""Height assumed for a footprint without a cuboid, that of most cars."""
+"""Height assumed for a footprint without a cuboid, typical of cars."""
 
 
 def object_on_ray(objects: tuple[FusedObject, ...], origin: Point3, direction: Point3, floor_m: float) -> int | None:
     """The id of the first object on the ray; None without one. Ego frame, metres; ``floor_m`` is the ground's height,
-    used for footprints that no LiDAR has measured."""
+    used for footprints not measured by the LiDAR."""
     start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
     met = [(distance, each.id) for each in objects if (distance := _distance(each, start, along, floor_m)) is not None]
     return min(met)[1] if met else None
 
 
 def _distance(each: FusedObject, start: F64, along: F64, floor_m: float) -> float | None:
-    """Where the ray enters the object's box, in lengths of ``along``; None when it misses."""
+    """Where the ray enters the object's box, in multiples of ``along``; None if it misses."""
     if each.cuboid is not None:
         center, size, yaw_rad = np.asarray(each.cuboid.center), np.asarray(each.cuboid.size), each.cuboid.yaw_rad
     elif each.bev is not None:
@@ -37,7 +37,7 @@ def _distance(each: FusedObject, start: F64, along: F64, floor_m: float) -> floa
 
 
 def _entered(start: F64, along: F64, half: F64) -> float | None:
-    """Slab test against the box from −half to half: where the ray enters it, 0 from inside, None where it misses."""
+    """Slab test for the box from −half to half: where the ray enters it, 0 from inside, None if it misses."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = np.stack([(-half - start) / along, (half - start) / along])
     level = along == 0.0

@@ -20,7 +20,7 @@ U8 = npt.NDArray[np.uint8]
 ColorBy = Literal["kind", "height", "intensity", "range"]
 
 EGO_LENGTH_M, EGO_WIDTH_M, EGO_HEIGHT_M = 4.5, 1.8, 1.5
-"""A car of ordinary size, drawn behind the sensor: the paper mounts the LiDAR on the front bumper."""
+"""Typical size of a car, drawn behind the sensor: the paper mounts the LiDAR on the front bumper."""
 _LABEL_LIFT_M, _FLAT_LABEL_LIFT_M = 0.5, 1.2
 _HEIGHT_SPAN_M = (-0.3, 3.0)
 _RANGE_SPAN_M = (0.0, 80.0)
@@ -39,19 +39,19 @@ def object_color(each: FusedObject, result: Result) -> Rgb:
 
 
 def object_text(each: FusedObject) -> str:
-    """``#7 car 23.4 m``; ``?`` where the distance is unknown, with ``carried`` when the object was not seen."""
+    """``#7 car 23.4 m``; ``?`` if the distance is unknown, with ``carried`` if the object was not seen."""
     distance = "? m" if each.distance_m is None else f"{each.distance_m:.1f} m"
     return f"#{each.id} {each.label or 'obstacle'} {distance}{' carried' if each.carried else ''}"
 
 
 def stands_out(each: FusedObject, result: Result) -> bool:
-    """The CIPV, and objects in the path or seen by the camera now: not every pole, and no carried objects. These get a
-    name and a velocity arrow; arrows for all objects would fill the view."""
+    """Whether an object gets a name and a velocity arrow: the CIPV, and objects in the path or seen by the camera now;
+    no poles and no carried objects, since labels for all objects would fill the view."""
     return each.id == cipv_id(result) or (not each.carried and (each.imaged or each.in_path))
 
 
 def top_of(each: FusedObject, floor_m: float) -> Point3:
-    """Where the label of an object with a footprint goes: above its middle."""
+    """Position of an object's label: above its middle."""
     x, y = np.asarray(each.bev).mean(axis=0)
     if each.cuboid is None:
         return float(x), float(y), floor_m + _FLAT_LABEL_LIFT_M
@@ -59,7 +59,7 @@ def top_of(each: FusedObject, floor_m: float) -> Point3:
 
 
 def owners(result: Result) -> dict[int, FusedObject]:
-    """Which object a LiDAR cluster of this sweep belongs to, by cluster index."""
+    """The object of each LiDAR cluster of this sweep, by cluster index."""
     by_track = {each.lidar_track: each for each in result.objects if each.lidar_track is not None}
     return {
         track.obstacle.cluster: by_track[track.id]
@@ -71,8 +71,8 @@ def owners(result: Result) -> dict[int, FusedObject]:
 def point_colors(result: Result, by: ColorBy = "kind") -> U8:
     """(N, 3) RGB, one per point of ``result.layers.points``.
 
-    kind: grey ground, dim unclustered, clusters in their object's colour. The others run over one scale of colours:
-    height above the ground, intensity up to its 98th percentile, horizontal range up to 80 m.
+    kind: grey ground, dim unclustered points, clusters in their object's colour. The others use a continuous colour
+    scale: height above the ground, intensity up to its 98th percentile, horizontal range up to 80 m.
     """
     points = result.layers.points
     if by == "kind":
@@ -115,7 +115,7 @@ def _scale(values: npt.NDArray[np.floating], low: float, high: float) -> U8:
 
 
 def ground_height_m(result: Result) -> float | None:
-    """Height of the fitted ground at the ego origin; None without one, for example when there was no sweep."""
+    """Height of the fitted ground at the ego origin; None without one, for example without a sweep."""
     ground = result.layers.ground
     if ground is None:
         return None
@@ -124,7 +124,7 @@ def ground_height_m(result: Result) -> float | None:
 
 
 def _heights_m(result: Result) -> npt.NDArray[np.floating]:
-    """(N,) heights of the points over the ground, over the ego origin where none was found."""
+    """(N,) heights of the points above the ground, or above the ego origin without a fitted ground."""
     points, ground = result.layers.points, result.layers.ground
     above = points[:, 2].astype(np.float64) if ground is None else ground.above(points)
     return np.where(np.isfinite(above), above, points[:, 2])
@@ -150,7 +150,7 @@ def ego_cuboid(ground_m: float) -> Cuboid:
 
 
 def flat_outline(each: FusedObject, height_m: float) -> F64 | None:
-    """(5, 3) closed outline of an object's footprint at a height; None when its place is unknown."""
+    """(5, 3) closed outline of an object's footprint at a height; None if its position is unknown."""
     if each.bev is None:
         return None
     ring = np.asarray([*each.bev, each.bev[0]], dtype=np.float64)
@@ -158,7 +158,7 @@ def flat_outline(each: FusedObject, height_m: float) -> F64 | None:
 
 
 def on_ground(line: F64, height_m: float) -> F64:
-    """(K, 3) an ego x, y polyline (K, 2) laid at a height."""
+    """(K, 3) an ego x, y polyline (K, 2) placed at a height."""
     return np.column_stack([line, np.full(len(line), height_m)])
 
 

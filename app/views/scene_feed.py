@@ -14,11 +14,12 @@ from pipeline.params import ParamsError
 
 
 class SceneFeed:
-    """Draws the engine's newest snapshot in viser while a browser shows the 3D view. Older snapshots that wait while
-    one is drawn are dropped: the 3D view may be slower than the pipeline, but never lags behind it. Use it in a
+    """Draws the engine's newest snapshot in viser while a browser shows the 3D view. Snapshots that arrive during
+    drawing replace each other: the 3D view may be slower than the pipeline, but never lags behind it. Use it in a
     ``with`` block.
 
-    drawn: frames drawn so far."""
+    drawn: frames drawn so far.
+    """
 
     def __init__(self, engine: Engine, looks: SharedViewState | None = None) -> None:
         self._engine = engine
@@ -36,7 +37,7 @@ class SceneFeed:
 
     @property
     def port(self) -> int:
-        """Where viser listens, on loopback."""
+        """viser's port on loopback."""
         return self._view.port
 
     def __enter__(self) -> SceneFeed:
@@ -53,7 +54,7 @@ class SceneFeed:
         self._view.close()
 
     def _moved(self, name: str, value: Any) -> None:
-        """A slider in the 3D view was moved. Its bounds are the schema's, so only a race can be refused."""
+        """A slider in the 3D view was moved. Its bounds are those of the schema, so only a race can cause a refusal."""
         control = self._engine.control
         try:
             control.change_params({name: value}, merge=True)

@@ -28,15 +28,16 @@ from app.web.tokens import Guesses, Tokens
 
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _OWN_SITES = (None, "same-origin", "none")
-"""Whom a browser may ask the API for: Sec-Fetch-Site of W3C Fetch Metadata. ``same-site`` is another port of ours."""
+"""Accepted values of Sec-Fetch-Site (W3C Fetch Metadata). ``same-site`` is excluded, because it may be another port of
+this host."""
 _API = "/api/"
 _OPEN_TO_ALL = "/healthz"
-"""Says that the server lives and nothing else, to whoever watches over it."""
+"""Only reports that the server is alive, to any monitoring system."""
 _DISPLAY_MAY = frozenset({("POST", "/api/marks"), ("POST", "/api/recording")})
-"""What a display may change."""
+"""Requests by which a display may change something."""
 _DISPLAY_STREAM = "/api/stream"
 _COOKIE_DAYS = 400
-"""The longest that browsers keep one: a display in a car has no keyboard to type a link again."""
+"""The longest lifetime that browsers permit: a display in a car has no keyboard to type a link again."""
 
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
@@ -58,10 +59,10 @@ _TOO_MANY_GUESSES = JSONResponse({"detail": "too many wrong tokens; wait a minut
 
 
 class Access:
-    """The rule of names and origins, for requests and WebSockets alike.
+    """Checks host names and origins, for requests and WebSockets alike.
 
-    ``hosts``: further names this server may be called by; a wildcard among them means every address of this machine
-    and its own name. An address in figures cannot be rebound: only names can.
+    ``hosts``: further names of this server; a wildcard address among them means every address of this machine and its
+    own name. IP addresses are always accepted: only names can be used for DNS rebinding.
     """
 
     def __init__(self, hosts: Iterable[str] = ()) -> None:
@@ -73,7 +74,7 @@ class Access:
         self._hosts = frozenset((*LOOPBACK_HOSTS, *names)) - frozenset(WILDCARDS)
 
     def refusal(self, headers: Headers, *, changes: bool, path: str = _API) -> str | None:
-        """Why the request for a path is refused, in one sentence; None when it is welcome."""
+        """Why the request for a path is refused, in one sentence; None if it is accepted."""
         host = headers.get("host", "")
         if not self._knows(_host_name(host)):
             return f"host name {host!r} is not allowed; add it with --allow-host"
@@ -85,7 +86,7 @@ class Access:
         return None
 
     def allowed(self, connection: HTTPConnection) -> bool:
-        """True for a request or WebSocket that may change things."""
+        """Whether a request or WebSocket may change things."""
         return self.refusal(connection.headers, changes=True) is None
 
     def _knows(self, name: str | None) -> bool:
@@ -93,8 +94,8 @@ class Access:
 
 
 class Guard:
-    """ASGI middleware: refuses by ``Access`` and, where there are ``tokens``, by role; adds the security headers that a
-    response does not set itself. Everything is behind it: pages, API, streams, viser and rerun."""
+    """ASGI middleware: refuses requests by ``Access`` and, if there are ``tokens``, by role; adds the security headers
+    that a response does not set itself. It covers everything: pages, API, streams, viser and rerun."""
 
     def __init__(self, app: ASGIApp, access: Access, tokens: Tokens | None = None) -> None:
         self._app = app
@@ -116,7 +117,7 @@ class Guard:
         await answer(scope, receive, _with_headers(send))
 
     def _refused(self, connection: HTTPConnection, changes: bool) -> Response | None:
-        """What is answered instead; None for who is welcome."""
+        """The response to a refused request; None if it is accepted."""
         refusal = self._access.refusal(connection.headers, changes=changes, path=connection.scope["path"])
         if refusal is not None:
             return JSONResponse({"detail": refusal}, 403)
@@ -138,7 +139,8 @@ class Guard:
 
 
 def cookie_name(connection: HTTPConnection) -> str:
-    """Cookies know no ports: two servers of one machine would take each other's."""
+    """Name of the cookie with the port in it, because cookies are not separated by port: two servers on one machine
+    would overwrite each other's."""
     try:
         port = urlsplit(f"//{connection.headers.get('host', '')}").port
     except ValueError:
@@ -151,21 +153,21 @@ def _display_may(scope: Scope) -> bool:
     if scope["type"] == "websocket":
         return path == _DISPLAY_STREAM
     if path == "/viser" or path.startswith("/viser/"):
-        return False  # its controls change what all see
+        return False  # its controls change what all clients see
     if path == "/api/fleet" or path.startswith("/api/fleet/"):
-        return False  # drives of other cars
+        return False  # contains drives of other cars
     return scope["method"] in _READING or (scope["method"], path) in _DISPLAY_MAY
 
 
 def _bearer(headers: Headers) -> str | None:
-    """The token that a program sends."""
+    """The bearer token sent by a program."""
     kind, _, token = headers.get("authorization", "").partition(" ")
     return token.strip() if kind.lower() == "bearer" else None
 
 
 def _signed_in(connection: HTTPConnection, token: str) -> Response:
-    """The cookie, and on to the same page without the token. It goes on from a page of ours: a redirect would belong to
-    whoever made the link, and the browser would keep a strict cookie back from it."""
+    """Sets the cookie and forwards to the same page without the token. It forwards by a page of this server: with a
+    redirect, the browser would attribute the request to the site of the link and not send a strict cookie."""
     left = [(name, value) for name, value in connection.query_params.multi_items() if name != "token"]
     path = "/" + quote(connection.scope["path"].lstrip("/"))
     target = escape(f"{path}?{urlencode(left)}" if left else path, quote=True)
@@ -211,7 +213,7 @@ def _with_headers(send: Send) -> Send:
 
 
 def _host_name(host: str) -> str | None:
-    """The name in a Host header, without port and brackets; None when it is malformed."""
+    """The name in a Host header, without port and brackets; None if it is malformed."""
     try:
         return urlsplit(f"//{host}").hostname
     except ValueError:

@@ -16,11 +16,12 @@ REFUSALS: dict[int | str, dict[str, Any]] = {
         "this role · 404 not found, or not yet · 409 conflicts with the present state · 413 too large · 422 invalid",
     }
 }
-"""What every route may answer. Naming it takes the framework's own form of a 422 away, which nothing here sends."""
+"""Errors that every route may return. Listing them removes the framework's own 422 schema, which is not used here."""
 
 
 def titled(app: FastAPI) -> Callable[[], dict[str, Any]]:
-    """Instead of ``app.openapi``: a route is called by its docstring's first sentence, not by its function's name."""
+    """Replacement for ``app.openapi``: uses the first sentence of a route's docstring as its title, instead of the
+    function's name."""
     plain = app.openapi
 
     def described() -> dict[str, Any]:

@@ -24,15 +24,15 @@ from app.core.client_role import is_display
 
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _WITH_CONTROLS = "/viser"
-"""Begins the addresses of the one WebSocket through which parameters are changed."""
+"""Address prefix of the only WebSocket through which parameters are changed."""
 _SHOWN_BYTES = 500
-"""Of a request's body: what is opened and changed stands at its beginning; a file of labels is not copied."""
+"""Logged bytes of a request's body: its beginning says what is opened or changed; label files are not copied."""
 _LARGEST_BYTES, _KEPT = 5_000_000, 5
 
 
 class _PrivateFile(RotatingFileHandler):
-    """Only its owner may read it, also the fresh one after each rotation. Open only while an entry is written: nothing
-    tells a middleware that its application has ended."""
+    """Readable only by its owner, also after each rotation. It is open only while an entry is written, because a
+    middleware is not told when its application ends."""
 
     def emit(self, record: logging.LogRecord) -> None:
         super().emit(record)
@@ -46,7 +46,7 @@ class _PrivateFile(RotatingFileHandler):
 
 
 class Audit:
-    """ASGI middleware that writes to ``file``, which only its owner may read; older entries are in ``file.1`` …"""
+    """ASGI middleware that writes to ``file``, readable only by its owner; older entries are in ``file.1`` …"""
 
     def __init__(self, app: ASGIApp, file: Path) -> None:
         self._app = app

@@ -12,19 +12,20 @@ import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 HEADER_S = 10.0
-"""For a header: it fits into one packet."""
+"""Timeout for a header, which fits into one packet."""
 BODY_S = 120.0
-"""For a body: 64 MiB of labels over a slow wireless link."""
+"""Timeout for a body: 64 MiB of labels over a slow wireless link."""
 MOST_CONNECTIONS = 256
-"""At once, streams included; the descriptors that a process has by default are four times as many."""
+"""Limit of simultaneous connections, including streams; a process has four times as many file descriptors by
+default."""
 
 
 class LimitedProtocol(H11Protocol):
-    """Closes the connection of a client that is late. Of too many, that which has waited longest without a whole header
-    makes room; where there is none, the new one goes."""
+    """Closes the connection of a client that exceeds a timeout. With too many connections, the one that has waited
+    longest for a complete header is closed; if there is none, the new one is."""
 
     began_s = 0.0
-    """When it began to wait, by the loop's clock."""
+    """When it started waiting, by the loop's clock."""
     _waits: asyncio.TimerHandle | None = None
     _for_body = False
 
@@ -38,7 +39,7 @@ class LimitedProtocol(H11Protocol):
 
     @property
     def is_waiting(self) -> bool:
-        """For a header that is not whole."""
+        """Whether it is waiting for a complete header."""
         return self.conn.their_state is h11.IDLE and (self.cycle is None or self.cycle.response_complete)
 
     def data_received(self, data: bytes) -> None:
@@ -63,7 +64,7 @@ class LimitedProtocol(H11Protocol):
         super().connection_lost(exc)
 
     def _wait(self, timeout_s: float) -> None:
-        """From the first byte on; more bytes do not give more time."""
+        """Timeout from the first byte on; further bytes do not extend it."""
         if self._waits is None:
             self.began_s = self.loop.time()
             self._waits = self.loop.call_later(timeout_s, self.drop)
@@ -74,6 +75,6 @@ class LimitedProtocol(H11Protocol):
         self._waits, self._for_body = None, False
 
     def drop(self) -> None:
-        """Hang up at once."""
+        """Close the connection at once."""
         self.connections.discard(self)
         self.transport.abort()

@@ -11,17 +11,17 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 LARGEST_BODY = 1 << 20
 LARGEST_FILE = 64 << 20
-"""A file of labels."""
+"""Bytes of a label file."""
 LARGEST_MESSAGE = 1 << 20
-"""Bytes of one WebSocket message from a page; the page's own are some dozens."""
+"""Bytes of one WebSocket message from a page; the page's own messages have a few dozen."""
 
 _GOODBYE = {"connection": "close"}
-"""The rest of the body is not read, so nothing can follow on this connection."""
+"""The rest of the body is not read, so the connection cannot be reused."""
 
 
 class BodyLimit:
-    """ASGI middleware: 413 as soon as a body is longer than ``largest`` bytes, said or sent, or than what ``files``
-    allows for its path. What is beyond that is never held in memory."""
+    """ASGI middleware: 413 as soon as a body, declared or received, exceeds ``largest`` bytes, or the limit in
+    ``files`` for its path. Data beyond the limit is never held in memory."""
 
     def __init__(self, app: ASGIApp, largest: int = LARGEST_BODY, files: Mapping[str, int] | None = None) -> None:
         self._app = app
@@ -45,7 +45,7 @@ class BodyLimit:
             message = await receive()
             got += len(message.get("body", b""))
             if got > largest:
-                raise HTTPException(413, _too_large(largest), _GOODBYE)  # the framework hands it on as it is
+                raise HTTPException(413, _too_large(largest), _GOODBYE)  # the framework passes it through unchanged
             return message
 
         return receiving

@@ -15,7 +15,7 @@ _MOST_KNOWN = 200
 
 
 class OncePerPeriod(logging.Filter):
-    """Drops a text that was logged in the last ``PERIOD_S``, and any beyond 200 texts in that time."""
+    """Drops a message that was logged within the last ``PERIOD_S``, and any beyond 200 messages in that time."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -34,6 +34,6 @@ _ONCE = OncePerPeriod()
 
 
 def limit_logs() -> None:
-    """For this process; safe to call again."""
+    """Install the limit for this process; may be called repeatedly."""
     for name in LOGGERS:
         logging.getLogger(name).addFilter(_ONCE)

@@ -20,7 +20,7 @@ _BUCKETS_S = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.25, 0.5,
 
 
 class Metrics:
-    """One registry for one engine, so that two servers of a process do not count each other's."""
+    """One registry per engine, so that two servers in a process do not mix their counts."""
 
     def __init__(self, engine: Engine, stream: Stream) -> None:
         self._registry = CollectorRegistry()
@@ -47,7 +47,7 @@ class Metrics:
         ProcessCollector(registry=self._registry)
 
     def saw(self, snapshot: Snapshot) -> None:
-        """Called by the engine after the stream has taken the snapshot: what is not a new result is not counted."""
+        """Called by the engine after the stream has received the snapshot; only new results are counted."""
         processed = snapshot.processed
         if processed is None or snapshot.sequence <= self._sequence:
             return
@@ -66,13 +66,13 @@ class Metrics:
         return generate_latest(self._registry)
 
     def _rate_hz(self) -> float:
-        """Results a second, over the last seconds."""
+        """Results per second, over the last seconds."""
         now = time.monotonic()
         return sum(now - t <= _WINDOW_S for t in list(self._shown_at)) / _WINDOW_S
 
 
 class _Now(Collector):
-    """What is read at the moment of asking."""
+    """Values that are read on request."""
 
     def __init__(self, engine: Engine, stream: Stream, rate_hz: Callable[[], float]) -> None:
         self._engine = engine

@@ -24,17 +24,18 @@ from app.core.jobs import Cancelled
 from pipeline.common.progress import Progress
 
 AT_ONCE: Mapping[Role, int] = {"person": 30, "display": 6}
-"""Requests of a role under way, over all its clients. Browsers send six at a time; together they leave some threads."""
+"""Maximum concurrent requests of a role, over all its clients. Browsers send six at a time; together the roles leave
+some threads free."""
 STREAMS: Mapping[Role, int] = {"person": 48, "display": 16}
-"""Open WebSockets of a role."""
+"""Maximum open WebSockets of a role."""
 _WORK = "/api/"
-"""Requests that may take long."""
+"""Prefix of requests that may take long."""
 _LOOK_S = 0.25
 T = TypeVar("T")
 
 
 class RoleQuota:
-    """ASGI middleware: 429 for a request, 403 for a WebSocket, that is one too many of its role."""
+    """ASGI middleware: 429 for a request, 403 for a WebSocket, that exceeds its role's quota."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -46,7 +47,7 @@ class RoleQuota:
         role: Role = "display" if is_display(HTTPConnection(scope)) else "person"
         kind, limits = (scope["type"], AT_ONCE if scope["type"] == "http" else STREAMS)
         if kind == "http" and not scope["path"].startswith(_WORK):
-            # the files of a page, of which a browser asks for more than a few at once, and without which it is no page
+            # a page's files are exempt: browsers request many at once, and the page does not work without them
             return await self._app(scope, receive, send)
         if self._under_way[kind, role] >= limits[role]:
             if kind == "websocket":
@@ -64,8 +65,8 @@ _TOO_MANY = JSONResponse({"detail": "too many requests at once"}, 429, {"retry-a
 
 
 async def while_waited_for(request: Request, threads: Executor, work: Callable[[Progress], T]) -> T:
-    """What ``work`` returns, done on a thread of these. When the client leaves before, the work ends as it next reports
-    progress, and HTTPException 499 is raised, which nobody is there to read."""
+    """The result of ``work``, executed on a thread of this pool. If the client disconnects, the work is aborted at its
+    next progress report, and HTTPException 499 is raised, which no client receives."""
     gone = threading.Event()
 
     def progress(done: int, total: int) -> None:

@@ -42,16 +42,16 @@ from app.web.routes.runs import runs_router
 
 @dataclass(frozen=True, eq=False)
 class Services:
-    """What the routes work with."""
+    """The objects that the routes use."""
 
     engine: Engine
     """Plays, seeks and computes the shown frame."""
     stream: Stream
     """The state and frames that pages follow."""
     marks: Marks
-    """Of all recordings of this machine."""
+    """Marks of all recordings on this machine."""
     exports: ExportQueue
-    """Clips in the making."""
+    """Running and finished exports of clips."""
     viewer: ViewerFiles
     """The files of rerun's web viewer."""
     metrics: Metrics
@@ -59,9 +59,9 @@ class Services:
     alignments: AlignmentVersions
     """Saved alignments."""
     scenes: AlignmentScenes
-    """The frames by which an alignment is scored."""
+    """The frames used to score an alignment."""
     fitting: AlignmentFitting
-    """The fit that runs."""
+    """The running alignment fit."""
     fleet: FleetDesk | None
     """The tables of a fleet; None without one."""
 

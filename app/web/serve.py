@@ -39,14 +39,14 @@ def serve(
     ends_process: bool = False,
     fleet: FleetDesk | None = None,
 ) -> None:
-    """Serve until Ctrl-C, SIGTERM or SIGHUP. Starts and stops the engine; prints the page's address on a line of its
-    own when it answers, and links with tokens where other machines can come.
+    """Serve until Ctrl-C, SIGTERM or SIGHUP. Starts and stops the engine; once it responds, prints the page's address
+    on its own line, and links with tokens if other machines can connect.
 
-    always_token: also where only this machine can come, whose other users could do everything otherwise. tls: files of
-    a certificate and its key. fleet: the tables that the Fleet view searches. ends_process: the process does nothing
-    else, and ends even if some of its work hangs.
+    always_token: require tokens even if only this machine can connect, since its other users could do everything
+    otherwise. tls: files of a certificate and its key. fleet: the tables that the Fleet view searches. ends_process:
+    the process does nothing else, and ends even if some of its work hangs.
 
-    PortTaken and BadInput (a weak token, no certificate) before anything is started.
+    PortTaken and BadInput (a weak token, no certificate) are raised before anything is started.
     """
     is_private = is_loopback(host) and not tuple(hosts) and not always_token
     tokens = None if is_private else Tokens.from_environment()
@@ -55,8 +55,10 @@ def serve(
     if port not in (0, number):
         print(f"cipv: port {port} is in use; using {number}", file=sys.stderr)
     address = f"{'http' if tls is None else 'https'}://{reachable(host)}:{number}"
-    engine.labels.kept.station = f"{socket.gethostname()}:{number}"  # two on one machine have parameters of their own
-    # FastAPI silences this of its own use of pydantic, which a thread that silences something else at once undoes
+    # two servers on one machine have separate parameters
+    engine.labels.kept.station = f"{socket.gethostname()}:{number}"
+    # FastAPI suppresses this warning for its own use of pydantic, but a thread that suppresses another warning at the
+    # same time undoes that
     warnings.filterwarnings("ignore", message="The 'alias' attribute with value")
     with asked_to_stop() as asked:
         if ends_process:

@@ -47,7 +47,8 @@ from pipeline.common.errors import BadInput
 from pipeline.common.user_files import Overloaded
 
 _BACKLOG = 100
-"""Connections that the system holds until they are accepted. Without descriptors Python 3.11 tries as many at once."""
+"""Connections queued by the system until they are accepted. When file descriptors run out, Python 3.11 tries to accept
+this many at once."""
 STATIC = Path(__file__).resolve().parents[2] / "static"
 
 
@@ -62,10 +63,11 @@ def create_app(
     alignments: AlignmentVersions | None = None,
     fleet: FleetDesk | None = None,
 ) -> FastAPI:
-    """The application over a running engine. ``hosts``: names other than loopback it may be called by. ``marks``: where
-    marked moments are kept; None forgets them at the end. ``looks``: hears what people look at. ``tokens``: what who
-    comes must have; None where only this machine can come. ``audit``: the file of who did what; None keeps none.
-    ``alignments``: the saved ones; None forgets them at the end. ``fleet``: the tables that the Fleet view searches."""
+    """The application for a running engine. ``hosts``: names other than loopback by which it may be addressed.
+    ``marks``: storage of marks; None discards them at the end. ``looks``: receives the view state of the pages.
+    ``tokens``: tokens that clients must have; None if only this machine can connect. ``audit``: the audit log; None for
+    none. ``alignments``: saved alignments; None discards them at the end. ``fleet``: the tables that the Fleet view
+    searches."""
     access = Access(hosts)
     stream = Stream(looks, engine.page_frames)
     exports, viewer, metrics = ExportQueue(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
@@ -100,7 +102,7 @@ def create_app(
     if audit is not None:
         app.add_middleware(Audit, file=audit)
     app.add_middleware(RoleQuota)
-    app.add_middleware(Guard, access=access, tokens=tokens)  # the last one added is the first to be asked
+    app.add_middleware(Guard, access=access, tokens=tokens)  # the last middleware added runs first
     app.add_exception_handler(RequestValidationError, _one_sentence)
     app.add_exception_handler(Overloaded, _overloaded)
     for make_router in ROUTERS:
@@ -113,18 +115,18 @@ def create_app(
 
 @dataclass(frozen=True)
 class TlsFiles:
-    """What HTTPS is served with, PEM."""
+    """Files for HTTPS, PEM."""
 
     certificate: Path
-    """With those that lead to its root, if any."""
+    """Including its chain up to the root, if any."""
     key: Path
-    """Of the certificate, without a passphrase."""
+    """Key of the certificate, without a passphrase."""
 
     def check(self) -> None:
-        """BadInput when they cannot be used."""
+        """BadInput if they cannot be used."""
         try:
             ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.certificate, self.key, password=_no_password)
-        except (OSError, ValueError) as error:  # an SSLError is an OSError
+        except (OSError, ValueError) as error:  # SSLError is a subclass of OSError
             reason = getattr(error, "reason", None) or getattr(error, "strerror", None) or str(error)
             raise BadInput(f"{self.certificate}, {self.key}: cannot be used for TLS: {reason}") from None
 
@@ -134,8 +136,8 @@ def _no_password() -> str:
 
 
 class Server(uvicorn.Server):
-    """Says where it is as soon as it answers, and ends once it is ``asked`` to, a moment later. Compressing the stream
-    would cost more than sending it."""
+    """Prints its address as soon as it responds, and ends shortly after ``asked`` is set. Compression is off, because
+    compressing the stream would cost more than sending it."""
 
     def __init__(
         self,
@@ -168,8 +170,8 @@ class Server(uvicorn.Server):
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Signals are the program's: uvicorn would raise SIGTERM again at the end, which then kills the program before
-        its recording is closed."""
+        """The program handles signals itself: uvicorn would raise SIGTERM again at the end, which would kill the
+        program before its recording is closed."""
         yield
 
     async def on_tick(self, counter: int) -> bool:
@@ -189,14 +191,14 @@ class Server(uvicorn.Server):
 
 
 def _file_of(path: str) -> str:
-    """Path under ``static/`` of a page's address: the in-vehicle page is served as ``/drive/``."""
+    """Path under ``static/`` for a page's address: the in-vehicle page is served as ``/drive/``."""
     first, *rest = Path(path).parts or ("",)
     return os.path.join("incar", *rest) if first == "drive" else path
 
 
 class _Pages(StaticFiles):
-    """Static files that the browser always asks about again, so that an update is never half old. on_ask: called for
-    each of them: somebody waits for a page."""
+    """Static files that browsers revalidate each time, so that an update is never half applied. on_ask: called for each
+    of them, because a user waits for a page."""
 
     def __init__(self, on_ask: Callable[[], object]) -> None:
         super().__init__(directory=STATIC, html=True)
@@ -217,8 +219,8 @@ def _overloaded(_: Request, error: Exception) -> Response:
 
 
 def _palette() -> Response:
-    """The palette that all views share, as CSS custom properties for either theme. --image-… are the shades to draw
-    over a photograph with, the same in both."""
+    """The palette of all views as CSS custom properties for both themes. --image-… are the shades for drawing over a
+    photograph, the same in both."""
     dark, light = palette_css("dark"), palette_css("light")
     text = (
         f":root {{\n{dark}\n{dark.replace('--cipv-', '--image-')}\n}}\n"
@@ -229,7 +231,7 @@ def _palette() -> Response:
 
 
 async def _one_sentence(_: Request, error: Exception) -> JSONResponse:
-    """422 with the first complaint: where, and what is wrong there."""
+    """422 with the first validation error: its position and what is wrong."""
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     if first["type"] == "json_invalid":

@@ -15,7 +15,7 @@ def catalog() -> list[tuple[str, str]]:
 
 
 def sessions(folder: Path = SESSIONS) -> list[tuple[str, str]]:
-    """(uri, title) of the sessions of this machine, the newest first."""
+    """(uri, title) of the sessions on this machine, newest first."""
     files = (
         sorted(folder.glob("*.mcap"), key=lambda file: (-file.stat().st_mtime, file.name)) if folder.is_dir() else ()
     )
@@ -23,7 +23,7 @@ def sessions(folder: Path = SESSIONS) -> list[tuple[str, str]]:
 
 
 def recordings() -> list[tuple[str, str]]:
-    """(uri, title) of what lies right below the data folder and ``sessions`` and looks like a known recording."""
+    """(uri, title) of entries directly below the data folder and ``sessions`` that look like a known recording."""
     found = []
     for root in (data_dir(), SESSIONS):
         for path in sorted(root.iterdir()) if root.is_dir() else ():

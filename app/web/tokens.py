@@ -20,26 +20,27 @@ from pipeline.common.errors import BadInput
 _BYTES = 24
 _MOST_ADDRESSES = 10_000
 SHORTEST = 16
-"""Characters of a token that somebody chose; 16 of them from a random source cannot be guessed over a network."""
+"""Minimum length of a user-defined token; 16 random characters cannot be guessed over a network."""
 FEWEST_DIFFERENT = 8
-"""Different ones among them: sixteen random letters have fewer once in ten million times."""
+"""Minimum number of distinct characters: sixteen random letters have fewer once in ten million cases."""
 _VARIABLES: dict[Role, str] = {"person": "CIPV_TOKEN", "display": "CIPV_DISPLAY_TOKEN"}
 
 
 @dataclass(frozen=True)
 class Tokens:
-    """One secret a role."""
+    """One secret for each role."""
 
     person: str
     """May do everything."""
     display: str
     """May watch only."""
     chosen: frozenset[Role] = frozenset()
-    """Whose come from the environment, where other programs' logs do not show them: they are never printed."""
+    """Roles whose tokens come from the environment, where other programs' logs do not show them: these are never
+    printed."""
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str] = os.environ) -> Tokens:
-        """``CIPV_TOKEN`` and ``CIPV_DISPLAY_TOKEN``; what is not set is made up anew. BadInput for a weak one."""
+        """``CIPV_TOKEN`` and ``CIPV_DISPLAY_TOKEN``; a token that is not set is generated. BadInput for a weak one."""
         chosen: dict[Role, str] = {}
         for role, variable in _VARIABLES.items():
             token = environment.get(variable) or secrets.token_urlsafe(_BYTES)
@@ -53,11 +54,11 @@ class Tokens:
         return cls(**chosen, chosen=frozenset(role for role, name in _VARIABLES.items() if environment.get(name)))
 
     def shown(self, role: Role) -> str:
-        """The token as it is printed: by the variable's name where it has one."""
+        """The token as printed: by the variable's name if it comes from one."""
         return f"${_VARIABLES[role]}" if role in self.chosen else getattr(self, role)
 
     def role_of(self, given: str | None) -> Role | None:
-        """Whose token it is; None for nobody's. Takes as long for every answer."""
+        """The role of a token; None if it is invalid. Runs in constant time."""
         digest = _digest(given or "")
         is_person = hmac.compare_digest(digest, _digest(self.person))
         is_display = hmac.compare_digest(digest, _digest(self.display))
@@ -65,22 +66,23 @@ class Tokens:
 
 
 def _repeats(token: str) -> bool:
-    """Whether it is one piece again and again: then it is in itself doubled, elsewhere than at its ends."""
+    """Whether it consists of one repeated piece: then it occurs in its own doubling at an inner position."""
     return token in (token + token)[1:-1]
 
 
 class Guesses:
-    """Wrong tokens by address. Whoever tries more than ``allowed`` different ones in ``per_s`` waits for each answer;
-    who is right never waits, so that nobody can lock others out."""
+    """Wrong tokens by address. A client that tries more than ``allowed`` different ones in ``per_s`` must wait for each
+    response; a correct token is never delayed, so that nobody can lock others out."""
 
     def __init__(self, allowed: int = 10, per_s: float = 60.0, clock: Callable[[], float] = time.monotonic) -> None:
         self._allowed, self._per_s, self._clock = allowed, per_s, clock
         self._wrong: dict[str, dict[bytes, float]] = {}
 
     def wrong(self, address: str, token: str) -> bool:
-        """Count a try; whether it was one too many. The same again, as by a page with an old cookie, is none."""
+        """Count an attempt; returns whether it exceeds the limit. Repeating the same token, as by a page with an old
+        cookie, does not count."""
         if len(self._wrong) >= _MOST_ADDRESSES:
-            self._wrong.clear()  # so many at once are one attacker's, who has them all
+            self._wrong.clear()  # so many at once come from one attacker who controls all addresses
         now_s = self._clock()
         recent = {each: at_s for each, at_s in self._wrong.get(address, {}).items() if at_s > now_s - self._per_s}
         if len(recent) <= self._allowed:
@@ -90,5 +92,5 @@ class Guesses:
 
 
 def _digest(token: str) -> bytes:
-    """Of one length, so that a comparison does not tell the token's."""
+    """A digest of fixed length, so that a comparison does not reveal the token's length."""
     return hashlib.sha256(token.encode("utf-8", "surrogateescape")).digest()

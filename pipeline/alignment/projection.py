@@ -25,7 +25,7 @@ from pipeline.types import Box, CameraCalibration
 
 
 class Alignment(Protocol):
-    """What both models do."""
+    """Interface of both models."""
 
     def project(self, points: F64) -> F64:
         """(N, 3) ego points → (N, 2) pixels u, v; NaN for points that the camera cannot see."""
@@ -36,10 +36,10 @@ class Alignment(Protocol):
         ...
 
     is_metric: ClassVar[bool]
-    """Whether its rays start where the camera is, so that they meet things where the camera sees them."""
+    """Whether its rays start at the camera's position, so that they hit objects where the camera sees them."""
 
     def rays(self, pixels: F64) -> tuple[F64, F64]:
-        """(N, 2) pixels → (3,) ego point they are seen from, and (N, 3) directions, not normalised."""
+        """(N, 2) pixels → (3,) ego point where the rays start, and (N, 3) directions, not normalised."""
         ...
 
 
@@ -49,11 +49,11 @@ class Angular:
     origin."""
 
     h_res_rad: float
-    """Radians per pixel across."""
+    """Radians per pixel, horizontally."""
     v_res_rad: float
-    """Radians per pixel down."""
+    """Radians per pixel, vertically."""
     cx: float
-    """Column of the pixel that looks along ego +x."""
+    """Column of the pixel in the direction of ego +x."""
     cy: float
     """Row of that pixel."""
     is_metric: ClassVar[bool] = False
@@ -79,12 +79,12 @@ class Angular:
 
 @dataclass(frozen=True)
 class Pinhole:
-    """A calibrated camera; takes the parallax between the two mounts into account."""
+    """A calibrated camera, including the parallax between the two mounts."""
 
     K: F64
     """(3, 3) intrinsics, pixels."""
     distortion: F64
-    """OpenCV's coefficients; empty for none."""
+    """OpenCV's coefficients; empty without distortion."""
     T_camera_ego: F64
     """(4, 4), takes ego points to the camera frame."""
 
@@ -96,10 +96,10 @@ class Pinhole:
         behind = in_camera[:, 2] < self._NEAREST_M
         in_camera[behind] = (0.0, 0.0, 1.0)
         uv: F64 = np.empty((len(in_camera), 2))
-        if self.distortion.size and len(in_camera):  # OpenCV gives None for no points
+        if self.distortion.size and len(in_camera):  # OpenCV returns None for no points
             uv[:] = cv2.projectPoints(in_camera, np.zeros(3), np.zeros(3), self.K, self.distortion)[0].reshape(-1, 2)
         else:
-            for axis in (0, 1):  # numpy takes four times as long over rows of two
+            for axis in (0, 1):  # in numpy, rows of two take four times as long
                 uv[:, axis] = in_camera[:, axis] / in_camera[:, 2] * self.K[axis, axis] + self.K[axis, 2]
         uv[behind] = np.nan
         return uv
@@ -125,16 +125,16 @@ class Pinhole:
 
 
 def angular_from_calibration(camera: CameraCalibration) -> Angular:
-    """The angular model that agrees with a calibrated camera at its centre: fx and fy pixels per radian, and the
-    origin where ego +x points (at infinity, since the model has no mounting position)."""
+    """The angular model that matches a calibrated camera at its centre: fx and fy pixels per radian, and the origin in
+    the direction of ego +x (at infinity, since the model has no mounting position)."""
     forward = camera.T_camera_ego[:3, :3] @ np.array([1.0, 0.0, 0.0])
     u, v = (camera.K @ (forward / forward[2]))[:2]
     return Angular(1.0 / camera.K[0, 0], 1.0 / camera.K[1, 1], float(u), float(v))
 
 
 def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignment | None:
-    """The model to use: parameters where they are set, the recording's calibration for the rest. None when neither is
-    known, and nothing can be projected. Pinhole needs a calibration; angular does not, if all four values are set."""
+    """The model to use: parameters if set, the recording's calibration for the rest. None if neither is known; then
+    nothing can be projected. Pinhole needs a calibration; angular does not, if all four values are set."""
     if params.model == "pinhole" and camera is not None:
         return Pinhole(camera.K, camera.distortion, corrected(params, camera).T_camera_ego)
     measured = angular_from_calibration(camera) if camera is not None else None
@@ -151,12 +151,13 @@ def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignm
 
 
 def corrected(params: AlignmentParams, camera: CameraCalibration) -> CameraCalibration:
-    """The calibration as the parameters correct its mount."""
+    """The calibration with the parameters' correction of its mount."""
     return replace(camera, T_camera_ego=camera.T_camera_ego @ inverse(_correction(params, camera)))
 
 
 def _correction(params: AlignmentParams, camera: CameraCalibration) -> F64:
-    """(4, 4) rotation of the camera in its mount, in ego axes, about its position, which then moves."""
+    """(4, 4) correction of the camera's rotation in its mount, in ego axes, about its position, followed by a shift of
+    the position."""
     turn = rotation(*(np.radians(angle) for angle in (params.roll_deg, params.pitch_deg, params.yaw_deg)))
     place = inverse(camera.T_camera_ego)[:3, 3]
     correction = np.eye(4)
@@ -165,9 +166,10 @@ def _correction(params: AlignmentParams, camera: CameraCalibration) -> F64:
 
 
 def project_cuboids(alignment: Alignment, corners: F64, width: int, height: int) -> list[Box | None]:
-    """Image boxes around the (M, 8, 3) corners of cuboids, clipped to the image; None for one outside of it.
+    """Image boxes around the (M, 8, 3) corners of cuboids, clipped to the image; None for a cuboid outside it.
 
-    Paper: "the cuboid of the bounding box … is projected onto the image". All at once, because a sweep has dozens."""
+    Paper: "the cuboid of the bounding box … is projected onto the image". All at once, because a sweep has dozens.
+    """
     uv = alignment.project(corners.reshape(-1, 3)).reshape(-1, 8, 2)
     behind = np.isnan(uv)
     enough = np.sum(~behind[..., 0], axis=1) >= 4

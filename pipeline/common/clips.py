@@ -10,10 +10,11 @@ from collections.abc import Sequence
 
 
 def begins_clip(before_ns: int, now_ns: int, longest_gap_s: float) -> bool:
-    """Whether a frame belongs to another clip than the frame before it."""
+    """Whether a new clip starts at this frame, because the gap to the previous frame is too long."""
     return not 0 < now_ns - before_ns <= longest_gap_s * 1e9
 
 
 def first_frames(t_ns: Sequence[int], longest_gap_s: float) -> list[int]:
-    """Index of each clip's first frame, in order; empty without frames. t_ns: of each frame, in recorded order."""
+    """Index of the first frame of each clip, in order; empty without frames. t_ns: time of each frame, in recorded
+    order."""
     return [n for n, now in enumerate(t_ns) if n == 0 or begins_clip(t_ns[n - 1], now, longest_gap_s)]

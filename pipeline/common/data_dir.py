@@ -10,7 +10,7 @@ _PROJECT = Path(__file__).resolve().parents[2]
 
 
 def data_dir() -> Path:
-    """``$CIPV_DATA``; without the variable, the folder ``shared/data`` beside the project. It need not exist."""
+    """``$CIPV_DATA``, or else the folder ``shared/data`` beside the project. The folder need not exist."""
     named = os.environ.get("CIPV_DATA")
     return Path(named) if named else _PROJECT.parent / "shared" / "data"
 

@@ -9,5 +9,5 @@ class BadInput(Exception):
 
 
 def first_line(error: BaseException | None) -> str:
-    """What another library says of an error, in one line."""
+    """The first line of another library's error message."""
     return (str(error).strip().splitlines() or ["no reason given"])[0]

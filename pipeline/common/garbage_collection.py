@@ -13,11 +13,11 @@ from contextlib import contextmanager
 from threading import Lock
 
 _COLLECT_AFTER = 5_000
-"""More objects than one frame makes: reference counting frees those of a frame when the next result replaces it."""
+"""More than the objects made in one frame; reference counting frees those when the next result replaces this one."""
 
 
 class _Pause:
-    """Counts the blocks that want a pause, so that it ends with the last one."""
+    """Counts nested and concurrent pauses, so that collection resumes when the last one ends."""
 
     def __init__(self) -> None:
         self._lock, self._count, self._was_on = Lock(), 0, False
@@ -41,8 +41,8 @@ _PAUSE = _Pause()
 
 @contextmanager
 def gc_paused() -> Iterator[None]:
-    """No collection runs in any thread while the block lasts; for work of a few seconds. A collector that was off
-    before stays off."""
+    """Disable garbage collection in all threads during the block, for work of a few seconds. If collection was disabled
+    before, it stays disabled."""
     _PAUSE.begin()
     try:
         yield
@@ -51,17 +51,18 @@ def gc_paused() -> Iterator[None]:
 
 
 def freeze_loaded_objects() -> None:
-    """Exempt everything that exists now from collection. Modules and compiled kernels live as long as the process, and
-    a full collection that walks through all of them takes 0.1 s, in the middle of a frame.
+    """Exempt all existing objects from collection. Modules and compiled kernels live as long as the process, and a full
+    collection that traverses them takes 0.1 s in the middle of a frame.
 
-    Call it again after a large import. It does not collect first: imports leave only some tens of objects behind, and
-    looking for them would add 0.06 s to every start."""
+    Call it again after a large import. It does not collect first: imports leave only a few dozen unreachable objects,
+    and finding them would add 0.06 s to every start.
+    """
     gc.freeze()
 
 
 def collect_rarely() -> None:
-    """Set the collector up for a process that runs the pipeline: what is loaded is exempt, and a small collection runs
-    only after more objects than a frame makes."""
+    """Configure the collector for a process that runs the pipeline: loaded objects are exempt, and a generation-0
+    collection runs only after more allocations than one frame makes."""
     freeze_loaded_objects()
-    atexit.register(gc.unfreeze)  # otherwise extension modules report leaks when the process ends
+    atexit.register(gc.unfreeze)  # otherwise extension modules report leaks at exit
     gc.set_threshold(_COLLECT_AFTER, *gc.get_threshold()[1:])

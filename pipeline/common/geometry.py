@@ -13,14 +13,14 @@ F64 = npt.NDArray[np.float64]
 
 
 class Cuboid(NamedTuple):
-    """A box standing upright on the ground."""
+    """An upright box on the ground."""
 
     center: tuple[float, float, float]
-    """x y z of its middle."""
+    """x y z of its centre."""
     size: tuple[float, float, float]
     """Length, width, height along its own axes."""
     yaw_rad: float
-    """Turn of its length axis from ego x, positive to the left."""
+    """Angle of its length axis from ego x, positive to the left."""
 
     def footprint(self) -> F64:
         """(4, 2) corners seen from above: front left, front right, rear right, rear left."""
@@ -32,7 +32,7 @@ class Cuboid(NamedTuple):
 
 
 _SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)]) / 2
-"""Along length and along width: front left, front right, rear right, rear left."""
+"""Signs along length and width: front left, front right, rear right, rear left."""
 
 
 def corners_of(cuboids: Sequence[Cuboid]) -> F64:

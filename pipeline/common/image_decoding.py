@@ -15,23 +15,25 @@ import numpy.typing as npt
 MOST_PIXELS = 50_000_000
 """About four times the 12 megapixels of the largest automotive cameras; 150 MB as blue, green and red."""
 LARGEST_BYTES = 64 << 20
-"""More than such an image takes as a PNG that hardly shrinks."""
+"""More than an image of this size takes even as a barely compressible PNG."""
 _MOST_PASSES = 1_000_000_000
-"""Pixels times scans of a progressive JPEG, which each scan goes over: seconds. Encoders make about ten scans."""
+"""Pixels × scans of a progressive JPEG, since each scan visits every pixel; the limit is a few seconds of decoding.
+Encoders make about ten scans."""
 _PNG, _PNG_HEADER = b"\x89PNG\r\n\x1a\n", struct.Struct(">I4sII")
 _JPEG, _SCAN = b"\xff\xd8", b"\xff\xda"
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
-"""JPEG's markers that an image's size stands behind (ITU-T T.81, table B.1)."""
+"""JPEG markers that are followed by the image size (ITU-T T.81, table B.1)."""
 _BARE = frozenset({0x01, *range(0xD0, 0xD9)})
-"""Those without a length."""
+"""Markers without a length field."""
 
 
 class TooMuch(ValueError):
-    """An image beyond the budget, or of no kind whose size is known before it is decoded; the text is why."""
+    """An image over the budget, or of a format whose size cannot be determined before decoding; the text is the
+    reason."""
 
 
 def decode_within_budget(data: bytes) -> npt.NDArray[np.uint8] | None:
-    """(H, W, 3) uint8, blue green red, of a JPEG or PNG; None when it is damaged. TooMuch before it is decoded."""
+    """(H, W, 3) uint8, blue green red, of a JPEG or PNG; None if it is damaged. Raises TooMuch before decoding."""
     check_budget(data)
     try:
         image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
@@ -41,7 +43,7 @@ def decode_within_budget(data: bytes) -> npt.NDArray[np.uint8] | None:
 
 
 def check_budget(data: bytes) -> None:
-    """TooMuch when a compressed image would take more bytes, pixels or time than any camera's."""
+    """TooMuch if a compressed image would take more bytes, pixels or time than that of any real camera."""
     if len(data) > LARGEST_BYTES:
         raise TooMuch(f"an image larger than {LARGEST_BYTES >> 20} MiB")
     size = _size_of(data)
@@ -53,13 +55,13 @@ def check_budget(data: bytes) -> None:
 
 
 def check_pixels(width: int, height: int) -> None:
-    """TooMuch when an image, or a video's, is larger than any camera's."""
+    """TooMuch if an image or video frame is larger than that of any real camera."""
     if width * height > MOST_PIXELS:
         raise TooMuch(f"an image of {width}×{height} pixels")
 
 
 def _size_of(data: bytes) -> tuple[int, int] | None:
-    """Width and height by the header; None for neither a JPEG nor a PNG."""
+    """Width and height from the header; None if it is neither a JPEG nor a PNG."""
     if data.startswith(_PNG) and len(data) >= len(_PNG) + _PNG_HEADER.size:
         _, kind, width, height = _PNG_HEADER.unpack_from(data, len(_PNG))
         return (width, height) if kind == b"IHDR" else None

@@ -30,7 +30,7 @@ class CvState(NamedTuple):
 
 
 def start(position: npt.ArrayLike, R: F64, speed_sigma: float) -> CvState:
-    """A track at its first sighting: the place as measured, the velocity 0 ± ``speed_sigma`` m/s along each axis.
+    """State of a new track: the measured position, with velocity 0 ± ``speed_sigma`` m/s along each axis.
 
     position: (…, 2) m. R: (2, 2) covariance of the measured position, m².
     """
@@ -42,7 +42,7 @@ def start(position: npt.ArrayLike, R: F64, speed_sigma: float) -> CvState:
 
 
 def predict(state: CvState, dt_s: float, accel_sigma: float) -> CvState:
-    """The state ``dt_s`` ≥ 0 seconds later. ``accel_sigma``: m/s², along each axis. ValueError when time runs back."""
+    """The state ``dt_s`` ≥ 0 seconds later. ``accel_sigma``: m/s², along each axis. ValueError for a negative dt."""
     if dt_s < 0.0:
         raise ValueError(f"a filter cannot run back in time: dt = {dt_s} s")
     mean, cov = _predict(state.mean.reshape(-1, 4), state.cov.reshape(-1, 4, 4), dt_s, accel_sigma**2)
@@ -50,7 +50,7 @@ def predict(state: CvState, dt_s: float, accel_sigma: float) -> CvState:
 
 
 def update(state: CvState, z: npt.ArrayLike, R: F64) -> CvState:
-    """The state after a position ``z`` (…, 2) m measured with covariance ``R`` (2, 2) m² (Joseph form)."""
+    """The state updated by a measured position ``z`` (…, 2) m with covariance ``R`` (2, 2) m² (Joseph form)."""
     z = np.asarray(z, dtype=np.float64).reshape(-1, 2)
     mean, cov = _update(state.mean.reshape(-1, 4), state.cov.reshape(-1, 4, 4), z, R)
     return CvState(mean.reshape(state.mean.shape), cov.reshape(state.cov.shape))
@@ -78,7 +78,7 @@ def _predict(mean, cov, dt, accel_var):  # type: ignore[no-untyped-def]  # pragm
 
 @numba.njit(cache=True, nogil=True)
 def _update(mean, cov, z, R):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Joseph form, which stays symmetric and positive however the gains are rounded."""
+    """Joseph form: stays symmetric and positive semi-definite despite rounding of the gains."""
     new_mean, new_cov = np.empty_like(mean), np.empty_like(cov)
     keep = np.empty((4, 4))
     for t in range(len(mean)):

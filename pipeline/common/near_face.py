@@ -9,12 +9,14 @@ import numpy as np
 
 _Point = tuple[float, float]
 _TOO_NEAR_M, _FLANK_SIGMA = 1.0, 0.5
-"""Nearer, a box is cut by the image's edges; how far off the shift by a flank may be, as a share of it."""
+"""Closer than the first, boxes are cut by the image's edges. The second is the standard deviation of the shift by a
+flank, as a share of the shift."""
 
 
 def near_face_middle(bev: tuple[_Point, _Point, _Point, _Point]) -> _Point:
-    """The middle of the side that faces the ego origin: of the two at the nearest corner the one more square to the
-    line of sight. (Between the two nearest corners lies a short side of what is only a thin slice of a rear.)"""
+    """Middle of the side that faces the ego origin: of the two sides at the nearest corner, the one more perpendicular
+    to the line of sight. (Simply connecting the two nearest corners would select a short side of a cluster that is a
+    thin slice of a rear.)"""
     (ax, ay), (bx, by), (cx, cy), (dx, dy) = bev
     sight = np.array([atan2(ay + by + cy + dy, ax + bx + cx + dx)])
     x, y = outlines(np.array([[ax, ay, bx, by, cx, cy, dx, dy]]), sight)[0].tolist()
@@ -23,8 +25,9 @@ def near_face_middle(bev: tuple[_Point, _Point, _Point, _Point]) -> _Point:
 
 @numba.njit(cache=True, nogil=True)
 def outlines(rows, along):  # type: ignore[no-untyped-def]
-    """(5·N, 2): of each row the middle of the side that faces the ego origin, and the corners in their order around it,
-    those of that side first: of the two at the nearest corner the one more square to the direction ``along`` (N,)."""
+    """(5·N, 2): for each row, the middle of the side that faces the ego origin, then the corners in order around the
+    outline, starting with that side. The side is the one at the nearest corner that is more perpendicular to the
+    direction ``along`` (N,)."""
     found = np.empty((5 * len(rows), 2))
     for n in range(len(rows)):
         near = 0
@@ -47,11 +50,12 @@ def outlines(rows, along):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def without_flank(row, heading):  # type: ignore[no-untyped-def]
-    """Moves a footprint that the camera placed by the middle of its box to where its rear is, and says by how much that
-    may be off.
+    """Moves a footprint that the camera placed by the middle of its box to the position of its rear, and returns the
+    uncertainty of this shift.
 
-    The box of a vehicle that faces along the path, but is not straight ahead, shows its rear and a flank. Its middle is
-    off the rear's by half of what the flank adds to the width, always towards the path in front of us."""
+    The box of a vehicle that faces along the path but is not straight ahead shows its rear and a flank. Its middle is
+    offset from the middle of the rear by half the width that the flank adds, always towards the path in front of us.
+    """
     x, y = 0.5 * (row[4] + row[6]), 0.5 * (row[5] + row[7])
     range_m, sight = np.hypot(x, y), np.arctan2(y, x)
     ahead, aside = np.cos(heading - sight), np.sin(heading - sight)
@@ -71,6 +75,6 @@ def without_flank(row, heading):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _square(row, a, b, along):  # type: ignore[no-untyped-def]
-    """How square the side between corners a and b is to a direction: |sin| of the angle between them."""
+    """How perpendicular the side between corners a and b is to a direction: |sin| of the angle between them."""
     dx, dy = row[2 * b] - row[2 * a], row[2 * b + 1] - row[2 * a + 1]
     return abs(dy * np.cos(along) - dx * np.sin(along)) / max(np.hypot(dx, dy), 1e-9)

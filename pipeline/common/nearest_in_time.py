@@ -12,7 +12,8 @@ Times = npt.NDArray[np.int64]
 
 
 def nearest(times_ns: Times, t_ns: int, within_ns: int) -> int | None:
-    """Index of the time nearest to ``t_ns`` in ascending times, the earlier of two; None when none is within reach."""
+    """Index of the time nearest to ``t_ns`` in ascending times, the earlier one if two are equally near; None if none
+    is within ``within_ns``."""
     at = int(np.searchsorted(times_ns, t_ns))
     around = [index for index in (at - 1, at) if 0 <= index < len(times_ns)]
     best = min(around, key=lambda index: abs(int(times_ns[index]) - t_ns), default=None)
@@ -20,7 +21,7 @@ def nearest(times_ns: Times, t_ns: int, within_ns: int) -> int | None:
 
 
 class Timeline(Generic[Value]):
-    """Values sorted by time, whatever order they are given in."""
+    """Values sorted by time; they may be passed in any order."""
 
     def __init__(self, times_ns: list[int], values: list[Value]) -> None:
         order = np.argsort(np.asarray(times_ns, dtype=np.int64), kind="stable")

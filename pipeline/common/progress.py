@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 Progress = Callable[[int, int], object]
-"""Called with (done, total) as the work proceeds. An exception that it raises ends the work."""
+"""Called with (done, total) as the work proceeds. If it raises an exception, the work is aborted."""
 
 
 def silent(done: int, total: int) -> None:

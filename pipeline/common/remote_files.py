@@ -16,9 +16,9 @@ from pipeline.common.errors import BadInput, first_line
 from pipeline.common.user_files import FOLDERS_VARIABLE, Overloaded
 
 ADDRESSES_VARIABLE = "CIPV_ADDRESSES"
-"""Stores, or folders in them, that may be opened where ``CIPV_FOLDERS`` is set: addresses separated by spaces."""
+"""Stores, or folders in them, that may be opened if ``CIPV_FOLDERS`` is set: addresses separated by spaces."""
 BLOCK_BYTES = 256 << 10
-"""What is read at least with one request: heads of records lie near one another."""
+"""Minimum read size of one request, since record headers lie close together."""
 _OF_TESTS = "memory"
 _STORES = frozenset({"s3", "gs", "gcs", "az", "abfs", "abfss", "adl", "http", "https", _OF_TESTS})
 _TRIES = 6
@@ -27,21 +27,23 @@ _T = TypeVar("_T")
 
 
 class NotReachable(BadInput):
-    """An address that cannot be used: nothing there, no right to it, or no package for its store."""
+    """An address that cannot be used: nothing exists there, access is denied, or the package for its store is
+    missing."""
 
 
 def is_remote(address: str) -> bool:
-    """Whether an address names a store, and not a file of this machine."""
+    """Whether this is the address of a store instead of a local file."""
     scheme, separator, _ = address.partition("://")
     return bool(separator) and scheme.isalnum() and len(scheme) > 1 and scheme != "file"
 
 
 def file_system(address: str) -> tuple[Any, str]:
-    """fsspec's file system for an address or a path of this machine, and the path in it. NotReachable when it names
-    neither, when the package for it is missing, and when it cannot be an address of its store.
+    """fsspec's file system for a store address or a local path, and the path in it. NotReachable if it is neither, if
+    the package for it is missing, or if the address is not valid for its store.
 
-    fsspec knows many more: archives, caches and devices, one inside the other with ``::``. They would be ways around
-    the rules of ``user_files``."""
+    fsspec supports many more protocols, such as archives, caches and devices, chained with ``::``. They are refused
+    because they would bypass the rules of ``user_files``.
+    """
     scheme = address.partition("://")[0].lower()
     if "::" in address or (is_remote(address) and scheme not in _STORES):
         known = ", ".join(sorted(_STORES - {_OF_TESTS}))
@@ -54,14 +56,14 @@ def file_system(address: str) -> tuple[Any, str]:
         ) from None
     try:
         system, path = url_to_fs(address)
-    except Exception as error:  # each store's package has errors of its own, without a common base
+    except Exception as error:  # each store's package has its own errors, without a common base class
         raise NotReachable(f"{address}: {first_line(error)}") from None
     return system, path
 
 
 def patiently(work: Callable[[], _T], what: str) -> _T:
-    """The answer of a store, asked again a few times while it fails. NotReachable when nothing is there or access is
-    denied; Overloaded when the store goes on failing."""
+    """Result of a request to a store, retried a few times if it fails. NotReachable if nothing exists there or access
+    is denied; Overloaded if all retries fail."""
     pause_s = _FIRST_PAUSE_S
     for left in reversed(range(_TRIES)):
         try:
@@ -70,7 +72,7 @@ def patiently(work: Callable[[], _T], what: str) -> _T:
             raise NotReachable(f"{what}: not found") from None
         except PermissionError as error:
             raise NotReachable(f"{what}: access denied: {first_line(error)}") from None
-        except Exception as error:  # each store's package has errors of its own, without a common base
+        except Exception as error:  # each store's package has its own errors, without a common base class
             if not left:
                 raise Overloaded(f"{what}: store error: {first_line(error)}") from error
             time.sleep(pause_s)
@@ -79,20 +81,21 @@ def patiently(work: Callable[[], _T], what: str) -> _T:
 
 
 def facts(address: str) -> dict[str, Any]:
-    """What a store says of a file: at least its ``size`` in bytes. Raises what ``patiently`` raises."""
+    """File metadata from a store: at least its ``size`` in bytes. Raises the same errors as ``patiently``."""
     system, path = file_system(address)
     found = patiently(lambda: system.info(path), address)
     return dict(found)
 
 
 def version_of(facts: dict[str, Any]) -> str:
-    """What is another when a file of a store was replaced: its ETag, else its time of change; with its size."""
+    """A value that changes when a file in a store is replaced: its ETag, else its modification time; combined with its
+    size."""
     tag = facts.get("ETag") or facts.get("etag") or facts.get("LastModified") or facts.get("mtime") or ""
     return f"{facts.get('size')} {tag}"
 
 
 def open_remote(address: str) -> BinaryIO:
-    """A file of a store, open for reading. Raises what ``patiently`` raises, and OSError where addresses are not
+    """A file in a store, open for reading. Raises the same errors as ``patiently``, and OSError if the address is not
     allowed."""
     check_allowed_address(address)
     system, path = file_system(address)
@@ -103,7 +106,7 @@ def open_remote(address: str) -> BinaryIO:
 
 
 def check_allowed_address(address: str) -> None:
-    """OSError for an address that is not one of ``CIPV_ADDRESSES`` where ``CIPV_FOLDERS`` limits what may be opened."""
+    """OSError if ``CIPV_FOLDERS`` restricts what may be opened and the address is not in ``CIPV_ADDRESSES``."""
     if os.environ.get(FOLDERS_VARIABLE) is None:
         return
     allowed = os.environ.get(ADDRESSES_VARIABLE, "").split()
@@ -112,12 +115,12 @@ def check_allowed_address(address: str) -> None:
 
 
 def _is_below(address: str, beginning: str) -> bool:
-    """Whether an address is one or lies in one: ``s3://cars-2/a`` is not below ``s3://cars``."""
+    """Whether an address equals another or lies below it: ``s3://cars-2/a`` is not below ``s3://cars``."""
     return address == beginning or address.startswith(beginning if beginning.endswith("/") else f"{beginning}/")
 
 
 class _Ranges(io.RawIOBase):
-    """A file of which each read is one request."""
+    """A remote file in which each read is one request."""
 
     def __init__(self, system: Any, path: str, address: str, size: int) -> None:
         self._system, self._path, self._address, self._size = system, path, address, size

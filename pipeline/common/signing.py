@@ -28,24 +28,24 @@ SignatureState = Literal["not signed", "signed", "does not match"]
 
 
 class Signature(NamedTuple):
-    """As it is stored, both in hexadecimal digits."""
+    """A signature as stored; both fields are hexadecimal."""
 
     key: str
     """The public key, 32 bytes."""
     value: str
-    """64 bytes."""
+    """The signature, 64 bytes."""
 
 
 @dataclass(frozen=True)
 class SignatureCheck:
-    """What a signature says."""
+    """Result of checking a signature."""
 
     state: SignatureState = "not signed"
-    """``does not match``: it is not of this content, or not of the key that it must be of."""
+    """``does not match``: it does not match the content or is not by the expected key."""
     key: str | None = None
-    """The public key that it is of; None where nothing is signed."""
+    """The public key of the signature; None if there is none."""
     is_expected: bool = False
-    """Whether that is the key that somebody asked for. Without this anyone may have signed."""
+    """Whether the key is the one the user expects. If False, anyone may have signed."""
 
     def __str__(self) -> str:
         if self.state != "signed":
@@ -60,13 +60,14 @@ class Signer:
         self._key, self._public = key, key.public_key().public_bytes_raw().hex()
 
     def sign(self, said: bytes) -> Signature:
-        """Of any bytes; they begin with what they are, so that a signature of one thing is none of another."""
+        """Sign any bytes. They must begin with a content type, so that a signature of one type cannot be reused for
+        another."""
         return Signature(self._public, self._key.sign(said).hex())
 
 
 def new_keys(private: Path) -> tuple[Path, str]:
-    """Write a new private key, readable by its owner only, and ``NAME.pub`` beside it. The path of the public key, and
-    its 64 hexadecimal digits. BadInput when one of the files exists or cannot be written."""
+    """Write a new private key, readable by its owner only, and ``NAME.pub`` beside it. Returns the path of the public
+    key and its 64 hexadecimal digits. BadInput if one of the files exists or cannot be written."""
     ed25519, serialization = _cryptography()
     key, public = ed25519.Ed25519PrivateKey.generate(), private.with_name(f"{private.name}.pub")
     pem, raw = serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8
@@ -86,8 +87,8 @@ def new_keys(private: Path) -> tuple[Path, str]:
 
 
 def configured_signer() -> Signer | None:
-    """Of ``CIPV_SIGNING_KEY``; None where that is not set. BadInput for a file that is no such key, or that others may
-    read: nothing is written unsigned by mistake."""
+    """Signer with the key in ``CIPV_SIGNING_KEY``; None if it is not set. BadInput if the file is not a private key or
+    is readable by others, so that nothing is left unsigned by mistake."""
     named = os.environ.get(SIGNING_VARIABLE)
     if not named:
         return None
@@ -106,8 +107,8 @@ def configured_signer() -> Signer | None:
 
 
 def expected_key(path: Path | None = None) -> str | None:
-    """The public key in a file, by default that of ``CIPV_PUBLIC_KEY``; None where neither is given. BadInput for a
-    file that is no such key."""
+    """The public key in a file, by default the file in ``CIPV_PUBLIC_KEY``; None if neither is given. BadInput if the
+    file is not a public key."""
     named = path or os.environ.get(PUBLIC_VARIABLE)
     if not named:
         return None
@@ -123,8 +124,8 @@ def expected_key(path: Path | None = None) -> str | None:
 
 
 def check_signature(signature: Signature | None, said: bytes, expected: str | None) -> SignatureCheck:
-    """Whether a signature is of these bytes and of the expected key, if there is one. BadInput where the package for it
-    is missing."""
+    """Whether a signature matches these bytes and, if given, the expected key. BadInput if the required package is
+    missing."""
     if signature is None:
         return SignatureCheck()
     ed25519, _ = _cryptography()
@@ -148,7 +149,7 @@ def _read(path: Path) -> bytes:
 
 
 def _cryptography() -> tuple[ModuleType, ModuleType]:
-    """Its modules of Ed25519 and of key files. BadInput where it is not installed."""
+    """The package's modules for Ed25519 and for key files. BadInput if it is not installed."""
     try:
         from cryptography.hazmat.primitives import serialization
         from cryptography.hazmat.primitives.asymmetric import ed25519

@@ -6,7 +6,7 @@ from time import perf_counter_ns
 
 
 class Stopwatch:
-    """Starts when it is made. ``lap`` after each stage gives the stage the time since the lap before."""
+    """Starts on construction. Each call of ``lap`` attributes the time since the previous call to a stage."""
 
     def __init__(self) -> None:
         self._start = self._last = perf_counter_ns()

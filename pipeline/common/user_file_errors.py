@@ -15,7 +15,7 @@ from pipeline.common.errors import BadInput
 from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
 
 _MOST_NODES = 200_000
-"""Values of a YAML document; a few dozen bytes of aliases can stand for billions."""
+"""Maximum number of values in a YAML document; a few dozen bytes of aliases can expand to billions."""
 _QUOTED = re.compile("['\"].*['\"]", re.DOTALL)
 _PLAIN_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
 _IN_OUR_WORDS = {
@@ -27,8 +27,8 @@ _IN_OUR_WORDS = {
 
 
 def read_yaml(path: Path, what: str, refuse: Callable[[str], BadInput] = BadInput) -> Any:
-    """The plain values of a YAML file, None of an empty one. Else what ``refuse`` makes of a sentence that begins with
-    ``what`` is raised."""
+    """The plain values of a YAML file; None if it is empty. On failure, raises the error that ``refuse`` makes from a
+    sentence that begins with ``what``."""
     try:
         text = read_regular(path, LARGEST_TEXT_BYTES).decode("utf-8")
     except UnicodeDecodeError:
@@ -39,8 +39,8 @@ def read_yaml(path: Path, what: str, refuse: Callable[[str], BadInput] = BadInpu
 
 
 def parse_yaml(text: str, what: str, refuse: Callable[[str], BadInput] = BadInput) -> Any:
-    """As ``read_yaml``, of a text. The sentence says where the text is wrong and not what stands there: who asks for a
-    file by a wrong name shall not be shown it."""
+    """Like ``read_yaml``, for a text. The message gives the position of an error but never the content: a user who
+    opens a file by mistake must not see what is in it."""
     try:
         if _nodes_of(yaml.compose(text, yaml.SafeLoader), {}) > _MOST_NODES:
             raise refuse(f"{what}: not YAML: its aliases expand to more than {_MOST_NODES} values")
@@ -53,19 +53,19 @@ def parse_yaml(text: str, what: str, refuse: Callable[[str], BadInput] = BadInpu
         mark, said = error.problem_mark or error.context_mark, (error.context, error.problem)
         where = f"line {mark.line + 1}, column {mark.column + 1}" if mark is not None else None
         raise refuse(f"{what}: not YAML: {_without_content(', '.join(filter(None, (*said, where))))}") from None
-    except ValueError as error:  # a day that is in no calendar, a number without end
+    except ValueError as error:  # an invalid date, an infinite number
         raise refuse(f"{what}: not YAML: {_without_content(str(error))}") from None
-    except Exception:  # a value that is none of its tag's (``!!int ""``) makes PyYAML raise whatever it stumbles over
+    except Exception:  # a value that does not fit its tag (``!!int ""``): PyYAML lets arbitrary exceptions through
         raise refuse(f"{what}: not YAML: a value does not match its tag") from None
 
 
 def _without_content(text: str) -> str:
-    """One line of what a parser says, without what it quotes."""
+    """A parser's message on one line, without the content that it quotes."""
     return _QUOTED.sub("…", (text.splitlines() or ["damaged"])[0])
 
 
 def _nodes_of(node: yaml.Node | None, known: dict[int, int]) -> int:
-    """How many values a document has once each alias is put in; too many for one that contains itself."""
+    """Number of values in a document after alias expansion; over the limit if it contains itself."""
     if node is None:
         return 0
     if id(node) not in known:
@@ -78,7 +78,8 @@ def _nodes_of(node: yaml.Node | None, known: dict[int, int]) -> int:
 
 
 def given_path(text: str | Path, refuse: Callable[[str], BadInput] = BadInput) -> Path:
-    """A path as a person typed it, ``~`` resolved. Else what ``refuse`` makes of a sentence is raised."""
+    """A path as typed by a user, with ``~`` resolved. On failure, raises the error that ``refuse`` makes from a
+    sentence."""
     try:
         return Path(text).expanduser()
     except RuntimeError:
@@ -86,13 +87,13 @@ def given_path(text: str | Path, refuse: Callable[[str], BadInput] = BadInput) -
 
 
 def reason_of(error: Exception) -> str:
-    """Why the system refused, in words."""
+    """The reason of a system error, in words."""
     return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
 
 
 def first_complaint(error: ValidationError, model: type[BaseModel]) -> str:
-    """The first thing that is wrong with what should have been a ``model``, after where it stands; for a name that does
-    not exist the one that was meant, if any is near. Of what is missing in one place all is named at once."""
+    """The first validation error of ``model`` and its position; for an unknown name also the most similar known name,
+    if any. Missing fields at the same position are listed together."""
     errors = error.errors()
     first = errors[0]
     place = first["loc"]
@@ -107,28 +108,28 @@ def first_complaint(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def _shown(part: int | str) -> str:
-    """A name as it may be shown; what is no name may be any line of any file."""
+    """A field name if it is safe to show; anything else may be arbitrary file content."""
     return str(part) if isinstance(part, int) or _PLAIN_NAME.fullmatch(part) else "…"
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """``; did you mean data_port?``, empty when no known name is near."""
+    """``; did you mean data_port?``; empty if no known name is similar."""
     near = get_close_matches(name, known, n=1)
     return f"; did you mean {near[0]}?" if near else ""
 
 
 def _names_at(model: type[BaseModel], place: Iterable[int | str]) -> list[str]:
-    """The settings that there are below a place."""
+    """The names of the settings at a position in the model."""
     below = [model]
     for part in place:
         fields = [above.model_fields[part] for above in below if part in above.model_fields]
-        if fields:  # else it is a number in a list, or which kind of thing it was taken for
+        if fields:  # otherwise it is a list index or the tag of a union
             below = [each for field in fields for each in _models_in(field.annotation)]
     return [name for each in below for name in each.model_fields]
 
 
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    """Those that a field may hold, alone or in a list."""
+    """The models that a field may hold, directly or in a list."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [found for each in get_args(annotation) for found in _models_in(each)]

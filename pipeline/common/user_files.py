@@ -16,19 +16,19 @@ from typing import BinaryIO
 
 _TRANSIENT = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOBUFS, errno.EAGAIN, errno.EINTR})
 FOLDERS_VARIABLE = "CIPV_FOLDERS"
-"""Folders, joined as in PATH. Where it is set, nothing that a user names outside them is opened."""
+"""Folders, joined as in PATH. If set, user-supplied paths outside these folders are refused."""
 LARGEST_TEXT_BYTES = 16 << 20
-"""Of settings, scenarios, calibrations and signal definitions; the largest DBC files have a few MB."""
+"""For settings, scenarios, calibrations and signal definitions; the largest DBC files have a few MB."""
 
 
 class Overloaded(Exception):
-    """The system cannot read at this moment, whatever is in the file: too many are open, or the memory is full. No
-    OSError, so that nobody takes it for damage: it is tried again."""
+    """The system cannot read at the moment, whatever the file contains: too many open files, or out of memory. Not an
+    OSError, so that it is retried and not mistaken for a damaged file."""
 
 
 @contextmanager
 def overload_told_apart() -> Iterator[None]:
-    """Overloaded instead of an OSError that says nothing of the file."""
+    """Raises Overloaded instead of an OSError that is not caused by the file itself."""
     try:
         yield
     except OSError as error:
@@ -38,7 +38,7 @@ def overload_told_apart() -> Iterator[None]:
 
 
 def open_regular(path: Path) -> BinaryIO:
-    """A file, open for reading. OSError for anything that is no regular file, and outside the allowed folders."""
+    """A file, open for reading. OSError if it is not a regular file or is outside the allowed folders."""
     check_allowed(path)
     with overload_told_apart():
         number = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -51,7 +51,7 @@ def open_regular(path: Path) -> BinaryIO:
 
 
 def read_regular(path: Path, largest: int) -> bytes:
-    """The whole of such a file. OSError too when it is larger than ``largest`` bytes."""
+    """The whole content of such a file. OSError also if it is larger than ``largest`` bytes."""
     with open_regular(path) as file, overload_told_apart():
         data = file.read(largest + 1)
     if len(data) > largest:
@@ -60,13 +60,14 @@ def read_regular(path: Path, largest: int) -> bytes:
 
 
 def check_regular(path: Path) -> None:
-    """The same for a library that opens a file by its name."""
+    """The same check for a library that opens files by name."""
     check_allowed(path)
     _check(path.stat().st_mode, path)
 
 
 def check_allowed(path: Path) -> None:
-    """OSError for a path outside the folders of ``CIPV_FOLDERS``, wherever its links lead."""
+    """OSError for a path that resolves, including symbolic links, to a place outside the folders of
+    ``CIPV_FOLDERS``."""
     named = os.environ.get(FOLDERS_VARIABLE)
     if named is None:
         return

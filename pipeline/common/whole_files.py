@@ -15,10 +15,10 @@ _LOG = logging.getLogger(__name__)
 
 @contextmanager
 def replacing(target: Path) -> Iterator[BinaryIO]:
-    """A file to write in place of ``target``, which it replaces when the block ends, on the disk as well.
+    """A file to write; it replaces ``target`` when the block ends and is synced to disk.
 
-    After an error in the block, or if the power fails, ``target`` is as it was. Missing folders are created. OSError
-    where the file cannot be written.
+    After an error in the block or a power failure, ``target`` is unchanged. Missing folders are created. OSError if the
+    file cannot be written.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f".{target.name}.{uuid.uuid4().hex}")
@@ -39,9 +39,9 @@ def replace_text(target: Path, text: str) -> None:
 
 
 def set_aside(damaged: Path) -> None:
-    """Rename a file that cannot be read as ``NAME.damaged``, so that the next save does not overwrite it.
+    """Rename a file that cannot be read to ``NAME.damaged``, so that the next save does not overwrite it.
 
-    Files set aside before are kept, too. A file that cannot be renamed stays, which the log says.
+    Files renamed earlier are kept as well. If a file cannot be renamed, it stays, and this is logged.
     """
     aside = damaged.with_name(f"{damaged.name}.damaged")
     if aside.exists():

@@ -19,54 +19,54 @@ from pipeline.types import AccCommand, Braking, Cipv, EgoState, FusedObject, Pat
 
 STANDSTILL_MPS = 0.1
 CREEP_MPS = 3.0
-"""Below this speed own motion shows no curve: a car that may not creep would never learn its path."""
+"""Below this speed own motion shows no curvature, so a car that may not creep would never determine its path."""
 _SLOW_MPS, _FAST_MPS = 5.0, 20.0
-"""Speeds between which ISO 15622's limits change."""
+"""Speeds between which ISO 15622's limits are interpolated."""
 State = Literal["cruise", "follow", "stop", "warn"]
 
 
 @dataclass(frozen=True)
 class AccState:
-    """The PID's memory."""
+    """State of the PID controller."""
 
     integral_m: float = 0.0
     """Integral of the speed error over time."""
     error_mps: float | None = None
-    """Speed error of the frame before; None at the start."""
+    """Speed error of the previous frame; None at the start."""
     accel_mps2: float = 0.0
-    """Commanded in the frame before."""
+    """Acceleration commanded in the previous frame."""
     on_course: Mapping[int, int] = field(default_factory=dict)
-    """By object id, for how many frames in a row its course has led into the corridor."""
+    """By object id, number of consecutive frames in which its course has led into the corridor."""
 
 
 @dataclass(frozen=True)
 class Demand:
-    """One demand for a speed; the smallest wins."""
+    """One requested speed; the smallest wins."""
 
     speed_mps: float
-    """The speed demanded."""
+    """The requested speed."""
     state: State
-    """What the car is said to do if this demand wins."""
+    """The state that is reported if this demand wins."""
     reason: str
     """Why, in words."""
     object_id: int | None = None
     """The object that the car slows down for."""
     no_faster: bool = False
-    """Do not accelerate, even if the PID's memory asks for it."""
+    """Do not accelerate, even if the PID state would."""
 
 
 def control(
     state: AccState, situation: Situation, params: AccParams, emergency: AebParams
 ) -> tuple[AccState, AccCommand | None]:
-    """Pedals for this frame; None, with the memory cleared, where own speed is neither known nor was a moment ago.
-    emergency: what a required deceleration is reckoned with."""
+    """Pedals for this frame; None, with the state cleared, if own speed is unknown and was not known recently either.
+    emergency: parameters for the required deceleration."""
     ego = situation.now.ego
     if ego is None:
         return AccState(), None
     threats = _on_course(situation, params)
     on_course = {item.id: state.on_course.get(item.id, 0) + 1 for item in threats}
     confirmed = [item for item in threats if on_course[item.id] >= params.confirm_frames]
-    # Each rule demands a speed, and the smallest demand wins
+    # Each rule requests a speed, and the smallest one wins
     demand = min(
         (
             follow(ego, situation.lead, params),
@@ -75,7 +75,7 @@ def control(
         ),
         key=lambda wish: wish.speed_mps,
     )
-    # A PID turns the speed error into an acceleration, and that into pedals
+    # A PID controller converts the speed error to an acceleration, and this to pedal positions
     hardest = _hardest_mps2(state, demand.object_id, situation, params, emergency)
     state, accel = pid(state, demand.speed_mps - ego.speed_mps, situation.now.dt_s, params, hardest)
     accel = min(accel, 0.0) if demand.no_faster else accel
@@ -93,12 +93,11 @@ def control(
 def _hardest_mps2(
     state: AccState, object_id: int | None, situation: Situation, params: AccParams, emergency: AebParams
 ) -> float:
-    """The hardest braking that is called for: comfortable in strength and onset, unless avoiding a collision takes more
-    and what is known of the object justifies it. A gap that is too short but does not shrink, as after a cut-in, is
-    opened gently, where the paper's law alone would brake fully; and what leads for a few frames hardly slows the
-    car."""
+    """The hardest permitted braking: comfortable in strength and onset, unless avoiding a collision takes more and the
+    evidence for the object justifies it. A gap that is too short but does not shrink, as after a cut-in, is opened
+    gently, where the paper's law alone would brake fully. A lead of only a few frames hardly slows the car."""
     assert situation.now.ego is not None
-    required, strongest = 0.0, params.comfort_decel_mps2  # to the set speed, too
+    required, strongest = 0.0, params.comfort_decel_mps2  # also applies when slowing to the set speed
     if object_id is not None:
         item = next((each for each in situation.objects if each.id == object_id), None)
         required = _required_mps2(object_id, item, situation, emergency)
@@ -108,8 +107,8 @@ def _hardest_mps2(
 
 
 def _onset_mps2(state: AccState, ego: EgoState, dt_s: float | None, params: AccParams) -> float:
-    """The deceleration that comfort permits ``dt_s`` after the last. ISO 15622: it grows by no more than 2.5
-    m/s³ above 20 m/s and 5 m/s³ below 5 m/s, linearly between them."""
+    """The deceleration that comfort permits ``dt_s`` after the last one. ISO 15622: it increases by at most 2.5 m/s³
+    above 20 m/s and 5 m/s³ below 5 m/s, linear in between."""
     if dt_s is None or params.comfort_jerk_mps3 <= 0.0:
         return math.inf
     slowness = min(max((_FAST_MPS - ego.speed_mps) / (_FAST_MPS - _SLOW_MPS), 0.0), 1.0)
@@ -117,7 +116,7 @@ def _onset_mps2(state: AccState, ego: EgoState, dt_s: float | None, params: AccP
 
 
 def _required_mps2(object_id: int, item: FusedObject | None, situation: Situation, emergency: AebParams) -> float:
-    """The deceleration that avoids it. What has no known speed may be standing."""
+    """The deceleration required to avoid the object. An object of unknown speed is assumed to stand still."""
     lead, ego = situation.lead, situation.now.ego
     assert ego is not None
     distance: float | None = None
@@ -142,8 +141,8 @@ def desired_gap_m(speed_mps: float, params: AccParams) -> float:
 
 
 def follow(ego: EgoState, cipv: Cipv | None, params: AccParams) -> Demand:
-    """v_desired = v_current · (d − d_min) / (d_desired − d_min) (paper, Eq. acc), clipped to [0, set speed]. The law is
-    not defined for a lead beyond d_desired: the set speed."""
+    """v_desired = v_current · (d − d_min) / (d_desired − d_min) (paper, Eq. acc), clipped to [0, set speed]. Beyond
+    d_desired, where the law is not defined, the set speed."""
     set_speed = params.set_speed_kmh / 3.6
     if cipv is None:
         return cruise(params)
@@ -161,7 +160,7 @@ def follow(ego: EgoState, cipv: Cipv | None, params: AccParams) -> Demand:
 
 def _approach_speed_mps(ego: EgoState, cipv: Cipv, params: AccParams) -> float:
     """The speed from which braking by ``approach_decel_mps2`` still ends at the lead's speed and the gap desired there.
-    The paper's law begins at the desired gap, which is too late for a slow lead: from 100 km/h it would take 9 m/s²."""
+    The paper's law starts at the desired gap, which is too late for a slow lead: from 100 km/h it would take 9 m/s²."""
     if params.approach_decel_mps2 <= 0.0 or cipv.closing_speed_mps is None:
         return math.inf
     lead_mps = max(ego.speed_mps - cipv.closing_speed_mps, 0.0)
@@ -170,8 +169,8 @@ def _approach_speed_mps(ego: EgoState, cipv: Cipv, params: AccParams) -> float:
 
 
 def avoid(ego: EgoState, threats: Iterable[FusedObject], params: AccParams) -> list[Demand]:
-    """Slow down for objects other than the CIPV while their TTC is below the limit (paper, Algorithm 3; its "slow down
-    until TTC goes below" means above)."""
+    """Slow down for objects other than the CIPV while their TTC is below the limit (paper, Algorithm 3; where it says
+    "slow down until TTC goes below", it means above)."""
     return [
         Demand(
             ego.speed_mps * (item.ttc_s or 0.0) / params.ttc_limit_s,
@@ -184,8 +183,8 @@ def avoid(ego: EgoState, threats: Iterable[FusedObject], params: AccParams) -> l
 
 
 def _on_course(situation: Situation, params: AccParams) -> list[FusedObject]:
-    """The objects other than the CIPV that would be hit before the TTC limit. Only those whose course leads into the
-    corridor by then: an oncoming car in its own lane also has a short TTC, and passes."""
+    """The objects other than the CIPV that would be hit before the TTC limit. Only objects whose course leads into the
+    corridor by then: an oncoming car in its own lane also has a short TTC, but passes."""
     return [
         item
         for item in situation.objects

@@ -27,18 +27,18 @@ _NONE, _WARN, _PARTIAL, _FULL = range(4)
 
 @dataclass(frozen=True)
 class AebState:
-    """What one frame leaves to the next."""
+    """State from one frame to the next."""
 
     level: int = _NONE
     """The active stage: 0 none, 1 warning, 2 partial braking, 3 full braking."""
     streak: tuple[int, ...] = (0, 0, 0)
-    """For each of the three stages, the frames in a row that called for it."""
+    """For each of the three stages, the number of consecutive frames that requested it."""
     calm_s: float = 0.0
-    """How long no danger has been present while a braking stage was active."""
+    """How long no threat has been present while a braking stage was active."""
     cause: str = ""
-    """What the stage is active for, in words."""
+    """Why the stage is active, in words."""
     object_id: int | None = None
-    """The object it is active for."""
+    """The object that activated it."""
 
 
 class Threat(NamedTuple):
@@ -49,9 +49,9 @@ class Threat(NamedTuple):
     ttc_s: float
     """Time to collision."""
     required_mps2: float
-    """Deceleration required to avoid it; infinite when no distance is left."""
+    """Deceleration required to avoid it; infinite if no distance is left."""
     justified: Braking
-    """The hardest braking that what is known of it can justify."""
+    """The hardest braking that the evidence for it justifies."""
 
 
 def guard(
@@ -61,12 +61,12 @@ def guard(
     params: AebParams,
     pedals: AccParams,
 ) -> tuple[AebState, AccCommand | None]:
-    """ACC's command, or that of the active stage where it brakes harder. A warning leaves the pedals to ACC. Without
-    own speed nothing can be said about braking: no command, and no stage."""
+    """ACC's command, or that of the active stage if it brakes harder. A warning leaves the pedals to ACC. Without own
+    speed the required braking cannot be computed: no command, and no stage."""
     ego = situation.now.ego
     if ego is None or command is None or not params.enabled:
         return AebState(), command
-    # The threat that needs the hardest braking decides the stage, which is held until the danger has passed
+    # The threat that requires the hardest braking determines the stage, which is held until the danger has passed
     threats = find_threats(situation, params)
     worst = max(threats, key=lambda threat: (_level(threat, params), threat.required_mps2), default=None)
     state = _next(state, worst, ego, situation.now.dt_s or 0.0, params)
@@ -74,7 +74,7 @@ def guard(
 
 
 def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
-    """The CIPV, and any other dependable object that heads into the corridor, while the gap to them shrinks."""
+    """The CIPV, and any other reliable object that heads into the corridor, while the gap to them shrinks."""
     found = []
     for item in situation.objects:
         closing = closing_speed_mps(item)
@@ -90,14 +90,15 @@ def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
 
 
 def _justified(item: FusedObject, required_mps2: float) -> Braking:
-    """As its evidence says; but what no LiDAR has measured and no tyre could avoid is not believed."""
+    """According to its evidence. But an object that the LiDAR has not measured and that no braking could avoid is not
+    trusted."""
     if item.ranged:
         return item.justifies
     return min(item.justifies, Braking.PARTIAL) if required_mps2 <= FRICTION_MPS2 else Braking.COMFORT
 
 
 def _level(threat: Threat, params: AebParams) -> int:
-    """The stage asked for, no harder than the evidence justifies; a warning needs none beyond that of a lead."""
+    """The requested stage, no harder than the evidence justifies; a warning only requires the evidence of a lead."""
     if threat.ttc_s < params.full_ttc_s or threat.required_mps2 > params.full_when_mps2:
         return min(_FULL, _WARN + threat.justified)
     if threat.ttc_s < params.partial_ttc_s or threat.required_mps2 > params.partial_when_mps2:
@@ -106,7 +107,8 @@ def _level(threat: Threat, params: AebParams) -> int:
 
 
 def _next(state: AebState, worst: Threat | None, ego: EgoState, dt_s: float, params: AebParams) -> AebState:
-    """The stage that is active now: one called for in enough frames in a row, or a braking one that is not over yet."""
+    """The stage that is active now: one requested in enough consecutive frames, or a braking stage that has not
+    ended."""
     fast = ego.speed_mps * 3.6 >= params.min_speed_kmh
     asked = _level(worst, params) if worst is not None and fast else _NONE
     streak = tuple(count + 1 if asked > level else 0 for level, count in enumerate(state.streak))

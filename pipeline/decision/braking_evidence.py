@@ -13,14 +13,14 @@ from pipeline.params import ExistenceParams
 from pipeline.types import Braking, FusedObject
 
 RANGED_SIGHTINGS = 3
-"""From two sightings the LiDAR knows no more than the difference of two noisy places."""
+"""After only two sightings, the LiDAR's speed is just the difference of two noisy positions."""
 FRICTION_MPS2 = 9.8
-"""Dry asphalt. What the camera alone has followed for a second and what now takes more than tyres can do was not
-overlooked until now: it is a fault of the track."""
+"""Dry asphalt. If the camera alone has followed an object for a second and it now requires more braking than tyres can
+deliver, the object was not overlooked until now; the track is wrong."""
 
 
 def judge(objects: tuple[FusedObject, ...], params: ExistenceParams) -> tuple[FusedObject, ...]:
-    """Each object with the hardest braking that it can justify."""
+    """Each object with the hardest braking that its evidence justifies."""
     return tuple(evolve(item, justifies=_justified(item, params)) for item in objects)
 
 
@@ -31,7 +31,7 @@ def _justified(item: FusedObject, params: ExistenceParams) -> Braking:
         return Braking.COMFORT
     is_steady = item.camera_ranges >= params.camera_ranges
     if item.ranged:
-        # a camera track, however long, does not make one LiDAR sighting a measured speed
+        # a camera track, however long, does not turn one LiDAR sighting into a measured speed
         return Braking.FULL if item.lidar_hits >= RANGED_SIGHTINGS else Braking.PARTIAL
     is_in_path = (item.in_path_probability or 0.0) >= params.min_braking
     return Braking.PARTIAL if is_steady and is_in_path else Braking.COMFORT

@@ -23,28 +23,28 @@ from pipeline.types import Cipv, FusedObject, Moment, Path, Rejection, sensors_i
 
 AGREEMENT_SIGMAS = 3.0
 _BLUR_M = 0.2
-"""Sightings of an object that moves sideways are averaged over no longer than it takes to move this far."""
+"""Sightings of an object that moves sideways are averaged over at most the time in which it moves this far."""
 _HOVERS_MPS = 1.0
 _HALF_WAY = 0.7
-"""A running mean has turned half way after 0.7 of its time constant: an object that moves sideways is judged where it
-will be by then."""
+"""A running mean reaches half of a step after 0.7 of its time constant: an object that moves sideways is judged at its
+predicted position at that time."""
 
 
 @dataclass(frozen=True)
 class CipvState:
-    """What one frame leaves to the next."""
+    """State from one frame to the next."""
 
     lead_id: int | None = None
     """The CIPV."""
     odds: dict[int, float] = field(default_factory=dict)
-    """By object id, the running mean of the log-odds that it is in the path."""
+    """By object id, running mean of the log-odds that the object is in the path."""
 
 
 class Choice(NamedTuple):
-    """The CIPV and why."""
+    """The CIPV and the reasons for the choice."""
 
     objects: tuple[FusedObject, ...]
-    """Every object, with its place against the path, its eligibility and its gates."""
+    """Every object, with its position relative to the path, its eligibility and its gates."""
     lead: Cipv | None
     """The CIPV with the reason."""
     next_lead: Cipv | None
@@ -57,9 +57,9 @@ class _Judged(NamedTuple):
     """One object after all conditions were checked."""
 
     item: FusedObject
-    """With its place against the path, its eligibility and its gates."""
+    """The object with its position relative to the path, its eligibility and its gates."""
     odds: float | None
-    """The running mean of its log-odds; None where its place is not known."""
+    """Running mean of its log-odds; None if its position is not known."""
     why_not: str | None
     """Why it cannot be the lead; None if it can."""
 
@@ -72,10 +72,10 @@ def choose(
     params: CipvParams,
 ) -> tuple[CipvState, Choice]:
     """The CIPV of this frame, the next one, and a reason for each other object."""
-    # Where each object is across the path, and which conditions of a lead it meets
+    # Position of each object relative to the path, and which conditions of a lead it meets
     places = place(objects, path, now.ego, params)
     judged = [_judge(state, item, placed, path, now.dt_s, params) for item, placed in zip(objects, places, strict=True)]
-    # The nearest of those that meet them all leads
+    # The nearest object that meets all conditions is the lead
     able = [each.item for each in judged if each.why_not is None]
     nearest = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
     lead = _surer(nearest, able) if nearest is not None else None
@@ -97,7 +97,7 @@ def _judge(
     dt_s: float | None,
     params: CipvParams,
 ) -> _Judged:
-    """Judge one object. placed: its place against the path, and when it will cross the edge."""
+    """Judge one object. placed: its position relative to the path, and when it will cross the edge."""
     where, crossing_s = placed if placed is not None else (None, None)
     leads, widening_m, odds = item.id == state.lead_id, 0.0, None
     if where is not None:
@@ -114,7 +114,7 @@ def _judge(
     if where is not None and where.margin_m() >= 0.0 and is_ahead:
         comes_in = where.middle_m * believed_mps(where.sideways_mps, item) < 0.0
         if not is_in or (comes_in and not verdict.eligibility.probable):
-            crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
+            crossing_s = 0.0  # it is over the edge, but not yet for long enough to count as in the path
     item = evolve(
         item,
         gates=(*item.gates, *verdict.gates),
@@ -137,20 +137,20 @@ def _rejections(judged: list[_Judged], lead: FusedObject | None) -> Iterator[Rej
 
 
 def _fresh(dt_s: float | None, decide_s: float) -> float:
-    """The weight of a new sighting in the running mean."""
+    """Weight of a new sighting in the running mean."""
     return 1.0 - exp(-dt_s / decide_s) if dt_s and decide_s > 0.0 else 1.0
 
 
 def _widening_m(leads: bool, moving_mps: float, params: CipvParams) -> float:
-    """How much wider the path is for the last lead, so that one at the edge does not flicker. Less for a lead that
-    moves sideways: it is leaving."""
+    """How much wider the path is for the previous lead, so that a lead at the edge does not flicker. Less for a lead
+    that moves sideways, because it is leaving."""
     return params.hysteresis_m * max(0.0, 1.0 - abs(moving_mps) / _HOVERS_MPS) if leads else 0.0
 
 
 def _surer(nearest: FusedObject, able: list[FusedObject]) -> FusedObject:
-    """The nearest candidate, or a better measured one that is probably the same car. One car has two rows when its box
-    and its cluster were not joined, or when it was lost and found again under another id. If the two distances agree, a
-    carried row yields to one seen now, and a camera-only row to one that is ranged."""
+    """The nearest candidate, or a better measured one that is probably the same car. One car has two rows if its box
+    and its cluster were not joined, or if it was lost and found again under another id. If the two distances agree, a
+    carried row yields to one seen now, and a camera-only row to one with a measured range."""
     rank = _surety(nearest)
     same_place = [item for item in able if _surety(item) > rank and _agree(nearest, item)]
     return min(same_place, key=lambda item: (item.distance_m or 0.0, item.id), default=nearest)
@@ -161,7 +161,7 @@ def _surety(item: FusedObject) -> int:
 
 
 def _agree(a: FusedObject, b: FusedObject) -> bool:
-    """Whether two distances are the same within three standard deviations of both."""
+    """Whether two distances agree within three standard deviations of both."""
     if a.distance_m is None or b.distance_m is None:
         return False
     sigma = hypot(a.distance_sigma_m or 0.0, b.distance_sigma_m or 0.0)
@@ -173,11 +173,11 @@ def _why_after(item: FusedObject, lead: FusedObject) -> str:
     return f"probably the same object as #{lead.id}, which is better measured" if doubtful else f"behind #{lead.id}"
 
 
-# ---------------------------------------------------------------- who will be next
+# ---------------------------------------------------------------- next lead
 
 
 def _is_outside(item: FusedObject) -> bool:
-    """Out of the path, or over its edge only just now."""
+    """Outside the path, or crossing its edge just now."""
     surely_in = item.in_path and item.eligibility is not None and item.eligibility.probable
     return not item.in_path or (not surely_in and item.crossing_s == 0.0)
 
@@ -185,7 +185,7 @@ def _is_outside(item: FusedObject) -> bool:
 def _next_lead(
     judged: list[FusedObject], able: list[FusedObject], lead: FusedObject | None, params: CipvParams
 ) -> Cipv | None:
-    """The next CIPV: the vehicle nearer than the lead that will enter the path first; otherwise the one behind the
+    """The next CIPV: a vehicle nearer than the lead that will enter the path first; otherwise the one behind the
     lead."""
     lead_m = lead.distance_m if lead is not None and lead.distance_m is not None else float("inf")
     cutting_in = [

@@ -15,30 +15,30 @@ from pipeline.params import CipvParams
 from pipeline.types import VEHICLES, Conditions, Eligibility, FusedObject, Gate, Path
 
 ABREAST_M = 1.0
-"""From the bumper: what begins nearer and aside is beside the car."""
+"""Measured from the bumper: an object that begins nearer than this and to the side is beside the car."""
 OWN_HALF_WIDTH_M = 1.0
-"""Of a passenger car; with mirrors it is a little wider, and in height of bumpers a little narrower."""
+"""Half width of a passenger car, without mirrors."""
 _KNOWN_M = 0.5
-"""A tracked distance that is as sure as this is as good as a measured one."""
+"""A tracked distance with at most this standard deviation counts as measured."""
 ON_A_VAGUE_PATH = 0.25
-"""What is left of the permitted uncertainty on a path that is not usable: a metre, as a guess has."""
+"""Factor on the permitted uncertainty if the path is not usable; this leaves one metre."""
 STAYS_UP_TO = 1.5
-"""The lead stays it while its place against the path is this much more uncertain than a new one's may be."""
+"""Factor on the permitted position uncertainty for the current lead, compared with a new one."""
 
 
 class Candidate(NamedTuple):
-    """An object with all that its conditions are checked by."""
+    """An object with everything needed to check its conditions."""
 
     item: FusedObject
     """The object."""
     place: Place | None
-    """Where it is against the path; None where that is not known."""
+    """Its position relative to the path; None if not known."""
     odds: float
     """Running mean of the log-odds that it is in the path."""
     leads: bool
-    """Whether it was the lead in the frame before."""
+    """Whether it was the lead in the previous frame."""
     widening_m: float
-    """By how much the path is wider for it, to either side."""
+    """How much wider the path is for it, on either side."""
     path: Path
     """The path ahead."""
     params: CipvParams
@@ -46,8 +46,8 @@ class Candidate(NamedTuple):
 
     @property
     def aside_m(self) -> float:
-        """How far it is from the middle of the path: as measured now, unless its sightings so far say otherwise; then
-        the offset that they stand for."""
+        """Its distance from the middle of the path: as measured now, unless its earlier sightings contradict it; then
+        the offset that corresponds to the running mean."""
         assert self.place is not None
         margin_m = self.place.margin_m(self.widening_m)
         if (margin_m >= 0.0) == (self.odds > 0.0):
@@ -57,33 +57,33 @@ class Candidate(NamedTuple):
 
 
 Answer = tuple[bool, float | None, float]
-"""Whether a condition is met, the number that decided it (None where there was none), and its limit."""
+"""Whether a condition is met, the value that decided it (None without one), and its limit."""
 
 
 class Condition(NamedTuple):
-    """One thing that a lead must be."""
+    """One condition that a lead must meet."""
 
     shown_as: str
     """Name of its gate, for display only."""
     check: Callable[[Candidate], Answer]
-    """Whether a candidate is it, with number and limit."""
+    """Checks a candidate; returns the answer with value and limit."""
     why_not: Callable[[Candidate], str]
-    """The sentence that says why it failed. Only the first failure of an object is put in words."""
+    """Returns the sentence that says why it failed. Used only for an object's first failure."""
 
 
 class GateVerdict(NamedTuple):
-    """What was found about one candidate."""
+    """The result of checking one candidate."""
 
     eligibility: Eligibility
-    """Which conditions it meets: what decisions read."""
+    """Which conditions it meets; used by decisions."""
     gates: tuple[Gate, ...]
-    """The same with numbers and limits: what people read."""
+    """The same with values and limits, for display."""
     why_not: str | None
     """Why it cannot be the lead; None if it can."""
 
 
 def judge(who: Candidate) -> GateVerdict:
-    """Hold one object against every condition of a lead."""
+    """Check one object against every condition of a lead."""
     answers = [condition.check(who) for condition in CONDITIONS]
     eligibility = Conditions(*[met for met, _, _ in answers])
     gates = tuple(
@@ -100,13 +100,13 @@ def may_cut_in(item: FusedObject) -> bool:
 
 
 def is_solid(item: FusedObject) -> bool:
-    """Whether an object is surely there, now, and large enough to matter, whatever its class and place."""
+    """Whether an object certainly exists now and is large enough to matter, whatever its class and position."""
     found = item.eligibility
     return found is not None and found.distance and found.confirmed and found.seen and found.size
 
 
 def _vehicle(who: Candidate) -> Answer:
-    """A named object must be a vehicle; a nameless one is judged by its size."""
+    """An object with a class must be a vehicle; one without is judged by its size."""
     label = who.item.label
     return label is None or label in VEHICLES, None, 1.0
 
@@ -117,22 +117,23 @@ def _distance(who: Candidate) -> Answer:
 
 
 def _confirmed(who: Candidate) -> Answer:
-    """Two sensors that both see it now are enough at once; one alone must see it again. The lead is confirmed."""
+    """Two sensors that both see it now confirm it at once; a single sensor must see it several times. The previous lead
+    counts as confirmed."""
     at_once = who.item.seen_by_two_sensors or who.leads
     hits, needed = _sightings(who.item), 1 if at_once else who.params.confirm_hits
     return hits >= needed, hits, needed
 
 
 def _sightings(item: FusedObject) -> int:
-    """Of the object where it is now. A camera track whose place was reset, because its distances no longer fitted it,
-    may follow another vehicle than before: only the sightings since then confirm it."""
+    """Number of sightings of the object at its current position. A camera track whose position was reset, because its
+    distances no longer fitted, may now follow another vehicle, so only the sightings since then count."""
     return min(item.hits, item.camera_ranges) if item.imaged and not item.ranged else item.hits
 
 
 def _seen(who: Candidate) -> Answer:
-    """An object whose distance was not measured in this frame may stay the lead, so that the lead does not flicker; it
-    may not become it, because where it is now is only a guess. One that the camera sees and the LiDAR has just lost is
-    still known."""
+    """If an object's distance was not measured in this frame, it may remain the lead, which prevents flicker, but may
+    not become the lead, because its current position is only predicted. An object that the camera sees and the LiDAR
+    has just lost still counts as known."""
     item = who.item
     just_lost = item.ranged and item.seen_by_camera and not item.seen_by_lidar
     followed = just_lost and (item.distance_sigma_m or 0.0) < _KNOWN_M
@@ -145,7 +146,8 @@ def _not_seen(who: Candidate) -> str:
 
 
 def _size(who: Candidate) -> Answer:
-    """What no camera has named must be as large as a vehicle's rear or side: kerbs, posts and hedges are not leads."""
+    """An object not classified by a camera must be as large as a vehicle's rear or side: kerbs, posts and hedges are
+    not leads."""
     item, params = who.item, who.params
     if item.imaged or item.cuboid is None:
         return True, None, params.min_width_m
@@ -169,8 +171,8 @@ def _wrong_size(who: Candidate) -> str:
 
 
 def _ahead(who: Candidate) -> Answer:
-    """By the way along the path to it, from the bumper. What is wider aside than the car reaches is still beside it
-    until it is a little farther: no steering moves the car onto it within that way."""
+    """Measured along the path from the bumper. An object farther to the side than half the car's width counts as beside
+    it until it is somewhat farther ahead: the car cannot be steered onto it within that distance."""
     if who.place is None:
         return False, None, 0.0
     limit_m = 0.0 if abs(who.place.offset_m) <= OWN_HALF_WIDTH_M else ABREAST_M
@@ -178,7 +180,7 @@ def _ahead(who: Candidate) -> Answer:
 
 
 def _in_path(who: Candidate) -> Answer:
-    """In metres, what the running mean of the log-odds says: see ``aside_m``."""
+    """The running mean of the log-odds, expressed in metres: see ``aside_m``."""
     if who.place is None:
         return False, None, who.path.half_width_m
     return who.odds > 0.0, who.aside_m, who.place.limit_m + who.widening_m
@@ -192,8 +194,9 @@ def _out_of_path(who: Candidate) -> str:
 
 
 def _placed(who: Candidate) -> Answer:
-    """Far ahead an object's place against the path may be uncertain by more than a lane; then it cannot be said to be
-    in it. On a path that is too vague to drive by, only what lies where the path is known well may lead."""
+    """Far ahead, the uncertainty of an object's position relative to the path may exceed a lane's width, so it cannot
+    be called in the path. If the path is too uncertain to drive by, only objects where the path is known well may
+    lead."""
     limit = who.params.max_sigma_m * (STAYS_UP_TO if who.leads else 1.0)
     limit *= 1.0 if who.path.usable else ON_A_VAGUE_PATH
     sigma = who.place.sigma_m if who.place is not None else 0.0
@@ -205,17 +208,19 @@ def _uncertain(who: Candidate) -> str:
 
 
 def _probable(who: Candidate) -> Answer:
-    """That it exists, and that it exists in the path. A weak box that nothing supports exists by less than a half; a
-    car 60 m away on a road that may bend either way is in the path by less than a half, though it be straight ahead;
-    and what does both just so does not do both at once. The lead was seen in the path when that was known well enough:
-    it is asked only on which side of the edge it is now.
+    """Probability that it exists, and that it exists in the path. It is below a half for a weak box without other
+    support, and for a car 60 m straight ahead on a road that may bend either way; if both are just above a half, the
+    product is not. The current lead was seen in the path while that was known well enough, so only the side of the edge
+    on which it is now is checked.
 
-    A new lead must exist more surely than it must be in the path: braking for what is not there at all is worse than
-    for a car that is beside the path, and far away no place is sure. What stands must be in the path more surely: of 43
-    standing vehicles within 40 m on two KITTI drives, 2 were. Oncoming traffic must be so nearly for certain: each of
-    its drivers keeps clear of us, and where a bend is not known yet the next one seems to come straight at the car."""
+    For a new lead, the required probability of existence is higher than that of being in the path: braking for a false
+    object is worse than braking for a car beside the path, and far away no position is certain. Standing vehicles must
+    be in the path with a higher probability: of 43 standing vehicles within 40 m on two KITTI drives, 2 were. Oncoming
+    traffic must be in it almost certainly: its drivers keep clear of us, and before a bend is known, oncoming cars seem
+    to come straight at us.
+    """
     there, in_path = _existence(who), _in_path_probability(who) if who.odds > 0.0 else 1.0
-    # what is out of the path has a gate for that
+    # objects out of the path already fail another gate
     asked = ((there, _needed_existence(who)), (in_path, who.params.stay_probability))
     if not who.leads:
         asked = (asked[0], (there * in_path, _needed_probability(who)))
@@ -232,7 +237,7 @@ def _needed_existence(who: Candidate) -> float:
 
 
 def _needed_probability(who: Candidate) -> float:
-    """Of a new lead."""
+    """The probability required of a new lead."""
     usual, params = who.params.become_probability, who.params
     if who.item.oncoming:
         return max(usual, params.become_oncoming)

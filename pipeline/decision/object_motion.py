@@ -16,15 +16,15 @@ from pipeline.path.yaw_rate import usable_rate
 from pipeline.types import EgoState, FusedObject
 
 SMALLEST_CLOSING_MPS = 0.1
-"""A gap that shrinks more slowly than this does not shrink measurably, and has no TTC."""
+"""If a gap shrinks more slowly than this, it is not measurable, and there is no TTC."""
 _SMALLEST_GAP_M = 0.1
 _SURE_SIGMAS = 2.0
 _ONCOMING_MPS = 3.0
-"""Slower, it may be an error of its speed."""
+"""A slower object may only seem to be oncoming due to its speed error."""
 
 
 def closing_speed_mps(item: FusedObject) -> float | None:
-    """How fast the gap to the object's nearest point shrinks; None where place or velocity are unknown."""
+    """How fast the gap to the object's nearest point shrinks; None if position or velocity is unknown."""
     if item.velocity_mps is None or item.closest_point is None or not item.distance_m:
         return None
     x, y, _ = item.closest_point
@@ -34,7 +34,7 @@ def closing_speed_mps(item: FusedObject) -> float | None:
 def required_decel_mps2(distance_m: float, closing_mps: float, params: AebParams) -> float:
     """The constant deceleration that ends the approach ``margin_m`` before contact: Δv² / (2·d), where d is the
     distance left after brake build-up. Δv is the *relative* speed: a moving lead needs less than a standing one.
-    Infinite when no distance is left."""
+    Infinite if no distance is left."""
     if closing_mps <= 0.0:
         return 0.0
     left_m = distance_m - params.margin_m - closing_mps * params.build_up_s
@@ -42,9 +42,10 @@ def required_decel_mps2(distance_m: float, closing_mps: float, params: AebParams
 
 
 def describe(objects: Iterable[FusedObject], ego: EgoState | None, params: MotionParams) -> tuple[FusedObject, ...]:
-    """Each object with its TTC, and, where ego speed is known, its speed over ground and whether it moves.
+    """Each object with its TTC, and, if ego speed is known, its speed over ground and whether it moves.
 
-    The relative velocity is measured in the turning ego frame: over the ground add the ego's own speed and ω × r."""
+    The relative velocity is measured in the rotating ego frame, so the speed over ground adds the ego speed and ω × r.
+    """
     return tuple(_described(item, ego, params) for item in objects)
 
 

@@ -23,72 +23,72 @@ from pipeline.path.yaw_rate import usable_rate
 from pipeline.types import EgoState, FusedObject, Path
 
 LIDAR_SIDEWAYS_SIGMA_M = 0.15
-"""Lateral uncertainty of a cluster: the width of a beam, and which part of the car was hit."""
+"""Lateral uncertainty of a cluster: the width of a beam, and the unknown part of the car that was hit."""
 BEARING_SIGMA_RAD = 0.005
-"""How well a box's middle is known sideways (0.3°, ``vision_tracking.bearing_sigma_deg``)."""
+"""Standard deviation of the bearing of a box's middle (0.3°, ``vision_tracking.bearing_sigma_deg``)."""
 SIDEWAYS_SIGMA_MPS = 0.5
-"""Error of a tracked cluster's sideways speed: only what exceeds it is believed."""
+"""Error of a tracked cluster's lateral speed; only the part above it is used."""
 CAMERA_SIDEWAYS_PER_S = 0.02
-"""Additional error of a camera-only object, per metre of distance: it is placed by its bearing, and swings with its
-estimated distance."""
+"""Additional error of a camera-only object, per metre of distance: its position follows from its bearing, so its
+lateral position varies with the estimated distance."""
 _SLANTED = 0.64
-"""Turned by more than 20° from along or across the path, as |sin 2φ|."""
+"""Rotated by more than 20° from along or across the path, as |sin 2φ|."""
 _WIDEST_M, _LONGEST_M = 3.2, 6.0
-"""A vehicle that drives along is no wider across the path, but for as much of its flank as can be seen."""
+"""Maximum extent across the path of a vehicle that drives along it, and the length of its flank that may be visible."""
 _CAR_LENGTH_M, _SLOWEST_MPS, _MOST_TURNED = 4.5, 5.0, 0.2
-"""A car that changes lanes faster than the second is turned by its sideways over its forward speed, at most the third;
-its nose is this car length further on."""
+"""A car that changes lanes and is faster than the second is rotated by lateral speed over forward speed, at most by the
+third; its nose is ahead by the first."""
 _SURELY_RIGID = 0.5
-"""``rigid_mps`` is what is left of the slower side's speed after two standard deviations: less than that speed."""
+"""``rigid_mps`` is the slower side's speed minus two standard deviations, so it is lower than that speed."""
 _NO_SIDES = ((nan, nan), (nan, nan))
 _SUREST_M = 0.01
 SURE = 4.0
-"""Log-odds beyond which nothing gets surer: the sigmas themselves are not known that well."""
+"""Limit of the log-odds: the sigmas themselves are not known that precisely."""
 
 
 class Place(NamedTuple):
-    """One object against the path. Sideways is positive to the left of the path's centre."""
+    """Position of one object relative to the path. Lateral values are positive to the left of the path's centre."""
 
     offset_m: float
-    """Of the middle of its nearest face."""
+    """Lateral offset of the middle of its nearest face."""
     ahead_m: float
-    """Path length to the foot of that point."""
+    """Path length to the foot of that point on the centre line."""
     low_m: float
     """Its rightmost extent across the path."""
     high_m: float
     """Its leftmost extent across the path."""
     middle_m: float
-    """Between the two."""
+    """Middle between the two."""
     left_m: float
     """How far to the left the middle may be for the object to be in the path."""
     right_m: float
     """The same to the right."""
     sigma_m: float
-    """Standard deviation of its sideways position against the path, with the errors of both."""
+    """Standard deviation of its lateral position relative to the path, including the path's error."""
     sideways_mps: float | None
-    """Speed to the left of the path, over ground; None where its velocity is not known."""
+    """Speed to the left of the path, over ground; None if its velocity is not known."""
 
     @property
     def limit_m(self) -> float:
-        """``left_m`` or ``right_m``, on the side where it is."""
+        """``left_m`` or ``right_m``, for the side where it is."""
         return self.left_m if self.middle_m >= 0.0 else self.right_m
 
     def margin_m(self, extra_m: float = 0.0) -> float:
-        """How far inside the path it is; negative: outside. extra_m widens the path."""
+        """How far inside the path it is; negative if outside. extra_m widens the path."""
         return min(self.left_m + extra_m - self.middle_m, self.right_m + extra_m + self.middle_m)
 
     def probability(self, extra_m: float = 0.0) -> float:
-        """That it is in the path, its position being normal around where it was measured. Unlike ``log_odds``, which
-        asks on which side of an edge it lies, this falls below a half when the path is known less well than it is wide.
-        """
+        """Probability that it is in the path, for a normal distribution around its measured position. Unlike
+        ``log_odds``, which only depends on the side of the edge, this is below a half if the path's uncertainty exceeds
+        its width."""
         left_m, right_m = self.left_m + extra_m - self.middle_m, self.right_m + extra_m + self.middle_m
         scale = 1.0 / (max(self.sigma_m, _SUREST_M) * sqrt(2.0))
         return max(0.0, 0.5 * (erf(left_m * scale) + erf(right_m * scale)))
 
     def log_odds(self, extra_m: float, moves_m: float) -> float:
-        """Log-odds of this sighting that the object is in the path: the log-likelihood ratio of its position against
-        the nearest one on the other side of the edge, at most ±4. moves_m: distance to the left that the object is
-        assumed to have moved on."""
+        """Log-odds from this sighting that the object is in the path: the log-likelihood ratio of its position compared
+        with the nearest position on the other side of the edge, at most ±4. moves_m: distance to the left by which the
+        object is assumed to have moved since."""
         if self.ahead_m <= 0.0:
             return -SURE
         middle = self.middle_m + moves_m
@@ -97,12 +97,12 @@ class Place(NamedTuple):
         return surety if margin >= 0.0 else -surety
 
     def crossing_s(self, believed_mps: float, half_left_m: float, half_right_m: float) -> float | None:
-        """Seconds until the nearer side of an object outside of the path crosses the edge, or until one inside has
-        left; None when its believed sideways speed (positive to the left) leads to neither. 0: on the edge."""
+        """Seconds until the nearer side of an object outside the path crosses the edge, or until an object inside has
+        left; None if its estimated lateral speed (positive to the left) leads to neither. 0: on the edge."""
         if believed_mps == 0.0 or self.ahead_m <= 0.0:
             return None
         outwards = (self.middle_m > 0.0) == (believed_mps > 0.0)
-        if outwards != (self.margin_m() >= 0.0):  # it moves within the path towards its middle, or away from the path
+        if outwards != (self.margin_m() >= 0.0):  # it moves towards the middle inside the path, or away outside it
             return None
         if outwards:
             way = self.margin_m()
@@ -112,8 +112,8 @@ class Place(NamedTuple):
 
 
 def believed_mps(sideways_mps: float | None, item: FusedObject) -> float:
-    """The part of a sideways speed that neither noise explains nor a footprint that grows as more of it comes into
-    view."""
+    """The part of a lateral speed that is explained neither by noise nor by a footprint that grows as more of the
+    object becomes visible."""
     if sideways_mps is None or item.moving is False:
         return 0.0
     doubt = SIDEWAYS_SIGMA_MPS + (CAMERA_SIDEWAYS_PER_S * (item.distance_m or 0.0) if not item.ranged else 0.0)
@@ -121,8 +121,8 @@ def believed_mps(sideways_mps: float | None, item: FusedObject) -> float:
 
 
 def _rigid_share(item: FusedObject) -> float:
-    """How much of its sideways speed is motion of the whole object: all of it where both sides surely move by half of
-    it or more. Nothing is known of what the LiDAR does not follow."""
+    """Share of its lateral speed that is motion of the whole object: 1 if both sides move at half of that speed or
+    more. For objects that the LiDAR does not track this is unknown, and 1 is returned."""
     if item.rigid_mps is None or item.velocity_mps is None or not item.velocity_mps[1]:
         return 1.0
     return min(max(item.rigid_mps / item.velocity_mps[1] / _SURELY_RIGID, 0.0), 1.0)
@@ -131,7 +131,7 @@ def _rigid_share(item: FusedObject) -> float:
 def place(
     objects: Sequence[FusedObject], path: Path, ego: EgoState | None, params: CipvParams
 ) -> list[tuple[Place, float | None] | None]:
-    """Each object's place with its ``crossing_s``; None where its position is unknown."""
+    """Each object's position with its ``crossing_s``; None if its position is unknown."""
     known = [item for item in objects if item.bev is not None]
     if not known:
         return [None] * len(objects)
@@ -166,7 +166,8 @@ def warm_up() -> None:
 
 def _numbers(item: FusedObject) -> tuple[float, ...]:
     """One row for ``_against``: the four corners x y, yaw, velocity x y, sigma of the distance, whether only the camera
-    has it, whether it is carried, ``box_sides``, how much of its sideways speed is its own. NaN where unknown."""
+    sees it, whether it is carried, ``box_sides``, share of its lateral speed that is motion of the whole object. NaN if
+    unknown."""
     a, b, c, d = item.bev  # type: ignore[misc]
     e, f = item.box_sides if item.box_sides is not None else _NO_SIDES
     yaw_rad = item.cuboid.yaw_rad if item.cuboid is not None else nan
@@ -189,9 +190,9 @@ def _numbers(item: FusedObject) -> tuple[float, ...]:
 
 @numba.njit(cache=True, nogil=True)
 def _against(rows, center, left, right, half_width, profile, step, overlap, use_flank, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]
-    """(N, 11) of (N, 19) rows as ``_numbers`` gives them: distances from the centre to the left and to the right edge
-    there, sideways speed, then the numbers of ``Place`` as far as ``sigma_m``. half_width: of a path that has no edges
-    of its own, else 0."""
+    """(N, 11) from (N, 19) rows of ``_numbers``: distances from the centre to the left and to the right edge at the
+    object, lateral speed, then the fields of ``Place`` up to ``sigma_m``. half_width: for a path without edges, else
+    0."""
     middles = np.empty((len(rows), 2))
     for n in range(len(rows)):
         for k in range(2):
@@ -208,7 +209,7 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, use_
     for n in range(len(edges)):
         for k in range(2):
             edge = rows[n // 2, 14 + 2 * (n % 2) + k]
-            edges[n, k] = edge if np.isfinite(edge) else 0.0  # the kernel below is told that nothing is NaN
+            edges[n, k] = edge if np.isfinite(edge) else 0.0  # the kernel below assumes no NaN
     beside, _ = nearest(center, edges)
     out = np.empty((len(rows), 11))
     for n in range(len(rows)):
@@ -221,12 +222,12 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, use_
         flank = _LONGEST_M * abs(near_y * cos - near_x * sin) / max(np.hypot(near_x, near_y), 0.1)
         low, high = _reach(offsets, has_sides, beside[2 * n], beside[2 * n + 1], flank, rows[n, 8] - heading)
         vx, vy = rows[n, 9], rows[n, 10]
-        # the path lies still on the ground: over ground one that follows its bend does not move sideways; where the own
-        # speed is not known, relative to ego and its x axis
+        # the path is fixed to the ground, so an object that follows its bend does not move sideways relative to it;
+        # without own speed, relative to ego and its x axis
         along, across = vx + speed - yaw_rate * near_y, vy + yaw_rate * near_x
         sideways = across * cos - along * sin if ego_known else vy
         forward = along * cos + across * sin
-        if ego_known and forward > _SLOWEST_MPS:  # the nose of one that moves over is farther that way than its rear
+        if ego_known and forward > _SLOWEST_MPS:  # if it changes lanes, its nose is farther to the side than its rear
             doubt = SIDEWAYS_SIGMA_MPS + (CAMERA_SIDEWAYS_PER_S * ahead if rows[n, 12] else 0.0)
             nose = _CAR_LENGTH_M * min(max(abs(sideways) - doubt, 0.0) * rows[n, 18] / forward, _MOST_TURNED)
             low, high = (low, high + nose) if sideways > 0.0 else (low - nose, high)
@@ -244,12 +245,14 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, use_
 
 @numba.njit(cache=True, nogil=True)
 def _reach(offsets, has_sides, first, second, flank, turn):  # type: ignore[no-untyped-def]
-    """From where to where an object reaches across the path. offsets: (5,) of its outline. first, second: of its box's
-    sides. flank: how much of one that drives along may show, m. turn: of the object against the path, rad.
+    """Minimum and maximum lateral position of an object relative to the path. offsets: (5,) of its outline. first,
+    second: of its box's sides. flank: how much of the flank may be visible if it drives along the path, m. turn: of the
+    object relative to the path, rad.
 
-    Of what drives along, the nearest face says where it is: how long it is and how it is turned are known poorly. What
-    stands slantwise to the path, as one that turns across it does, reaches as far as its far corners, and as its box
-    does: of a dark flank at 30 m a few points come back."""
+    For an object that drives along the path, only the nearest face is used: its length and orientation are known
+    poorly. An object at an angle to the path, such as one that turns across it, extends to its far corners and to the
+    sides of its camera box, because a dark flank at 30 m returns only a few points.
+    """
     low, high = min(offsets[1], offsets[2]), max(offsets[1], offsets[2])
     too_wide = has_sides and abs(second - first) > _WIDEST_M + flank
     if too_wide or abs(np.sin(2.0 * turn)) > _SLANTED:
@@ -261,7 +264,7 @@ def _reach(offsets, has_sides, first, second, flank, turn):  # type: ignore[no-u
 
 @numba.njit(cache=True, nogil=True)
 def _headings(center, along, step):  # type: ignore[no-untyped-def]
-    """(N,) directions of a line at path lengths (N,)."""
+    """(N,) directions of the line at path lengths (N,)."""
     out = np.empty(len(along))
     for n in range(len(along)):
         k = min(max(int(along[n] / step), 0), len(center) - 2)
@@ -271,12 +274,12 @@ def _headings(center, along, step):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _sigma_m(near_x, near_y, cos, sin, distance_sigma, by_camera, carried):  # type: ignore[no-untyped-def]
-    """Of an object's place across the path. A wrong distance moves it along the line of sight, which in a bend is not
-    the way the path goes there."""
+    """Standard deviation of an object's lateral position relative to the path. A distance error moves the object along
+    the line of sight, which in a bend differs from the path's direction."""
     distance = max(np.hypot(near_x, near_y), 0.1)
     slant = abs(near_y * cos - near_x * sin) / distance
     if by_camera:
         aside = BEARING_SIGMA_RAD * distance * (2.0 if carried else 1.0)
-    else:  # while a cluster is carried its sigma grows, to either side as much as ahead
+    else:  # while a cluster is carried, its sigma grows sideways as much as ahead
         aside = np.hypot(LIDAR_SIDEWAYS_SIGMA_M, distance_sigma if carried else 0.0)
     return np.hypot(distance_sigma * slant, aside)

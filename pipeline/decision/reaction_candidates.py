@@ -12,27 +12,26 @@ from pipeline.path.estimates import STEP_M
 from pipeline.types import Cipv, FusedObject, Path
 
 _VELOCITY_HITS = 3
-"""After two sightings the LiDAR's velocity is the difference of two noisy positions, which may point across the road,
-and so it is after a sighting that lay elsewhere than expected. That the camera has followed the object for longer does
-not help."""
+"""After two sightings the LiDAR's velocity is the difference of two noisy positions, which may point across the road.
+The same holds after a sighting far from the predicted position. A longer camera track does not improve this."""
 _SURE_SIGMAS = 2.0
-"""Of the path's uncertainty, by which oncoming traffic must be inside the corridor."""
+"""Number of standard deviations of the path by which oncoming traffic must be inside the corridor."""
 
 
 def is_dependable(item: FusedObject) -> bool:
-    """Seen now, with a measured range, and every condition of a lead met but class and place. A box height alone says
-    too little about speed to brake for what is not even the lead."""
+    """Seen now, with a measured range, and all conditions of a lead met except class and position. A distance from box
+    height alone gives too uncertain a speed to brake for an object that is not the lead."""
     has_velocity = item.ranged and (not item.imaged or item.lidar_steady >= _VELOCITY_HITS)
     return has_velocity and not item.carried and is_solid(item)
 
 
 def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None) -> bool:
-    """Whether the object is in the corridor, or its sideways motion takes it there before the car reaches it. What
-    stands still beside the road stays there: its sideways speed is noise.
+    """Whether the object is in the corridor, or its lateral motion takes it there before the car reaches it. An object
+    that stands still beside the road stays there: its lateral speed is noise.
 
-    Where the path is known less well than it is wide no course leads into it: in a bend other traffic follows the road,
-    as the car will. Oncoming traffic, which keeps to its lane, must be surely in ours. Behind the lead neither it nor
-    what crosses there can be reached.
+    If the path's uncertainty exceeds its width, no course counts as leading into it: in a bend, other traffic follows
+    the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty. Oncoming
+    or crossing objects behind the lead cannot be reached.
     """
     if item.path_offset_m is None or item.velocity_mps is None or item.ttc_s is None:
         return False
@@ -45,7 +44,7 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None) -> bool:
     if item.moving is False or (item.in_path and not oncoming):
         return item.in_path
     if item.closest_point is None or item.closest_point[0] < ABREAST_M:
-        return False  # beside the car already: braking would not avoid it
+        return False  # already beside the car: braking would not avoid it
     sideways = believed_mps(item.lateral_mps, item)
     toward = -sideways if item.path_offset_m > 0 else sideways
     aside_m = abs(item.path_offset_m) - max(toward, 0.0) * item.ttc_s
@@ -53,6 +52,6 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None) -> bool:
 
 
 def _sigma_m(path: Path, ahead_m: float) -> float:
-    """Standard deviation of the path so far ahead."""
+    """Standard deviation of the path at this distance ahead."""
     profile = path.profile_m
     return float(profile[min(int(ahead_m / STEP_M), len(profile) - 1)]) if len(profile) else 0.0

@@ -15,7 +15,7 @@ from pipeline.types import Coasting, EgoState
 def follow(
     before: EgoState | None, measured: EgoState | None, dt_s: float | None, params: MotionParams
 ) -> EgoState | None:
-    """The measured motion; without one, that of the frame before, older by ``dt_s``. None before the first
+    """The measured motion; without one, the previous frame's motion, aged by ``dt_s``. None before the first
     measurement."""
     if measured is not None or before is None:
         return measured

@@ -23,34 +23,36 @@ from pipeline.params import DeskewParams
 from pipeline.types import F32, F64, EgoState, Ground, LidarTrack, Sweep
 
 _KEPT = 5
-"""Sweeps that make the map. Three pull own speed towards zero by 0.17 m/s, five by 0.03; ten gain nothing more."""
+"""Number of sweeps in the map. With three, own speed is biased towards zero by 0.17 m/s, with five by 0.03; ten bring
+no further gain."""
 _CELL_SIGMA_M = 0.25
-"""How well one cell of structure fixes the place: points of a 16-channel LiDAR lie so far from each other on it."""
+"""Position accuracy from one cell of structure: limited by the spacing of points of a 16-channel LiDAR."""
 _FEWEST_CELLS = 15.0
-"""With fewer cells along either axis the place is not fixed, but guessed."""
+"""With fewer cells along either axis, the position is not observable."""
 _FEWEST_POINTS = 40
 _LEAST_FIT = 0.4
-"""Share of structure that must lie on the sweeps before: 0.73 and more in a street, 0.5 along a bare motorway."""
+"""Minimum share of structure that matches the previous sweeps: 0.73 and more in a street, 0.5 on a bare motorway."""
 _ACCEL_MPS2, _JERK_MPS3 = 3.0, 2.0
 _TURN_RADPS2, _TURN_JERK_RADPS3 = 0.2, 0.1
-"""What cars do: braking to 3 m/s² without an emergency; at 10 m/s, bends entered with a lateral jerk of 1 m/s³."""
+"""Usual dynamics of cars: braking up to 3 m/s² without an emergency; at 10 m/s, bends entered with a lateral jerk of 1
+m/s³."""
 _GATE_SIGMAS = 5.0
 _FASTEST_MPS, _START_STEP_M = 45.0, 2.0
-"""Without any motion known it is looked for up to this speed, in steps that registration bridges."""
+"""Without a known motion, speeds up to this are searched, in steps small enough for registration to converge."""
 _AGREEING = 2
-"""Displacements that must agree before motion is believed."""
+"""Number of displacements that must agree before the motion is trusted."""
 _MOST_REFUSED = 2
 _LONGEST_GAP_S = 1.5
-"""After so long without a sweep odometry starts anew."""
+"""After this time without a sweep, odometry restarts."""
 _DESKEW = DeskewParams(enabled=True)
 
 
 @dataclass(frozen=True, eq=False)
 class OdometryState:
-    """What one sweep leaves to the next."""
+    """State from one sweep to the next."""
 
     clouds: tuple[F32, ...] = ()
-    """Structure of the last sweeps, (N, 3) each, ego frame of its time."""
+    """Structure of the last sweeps, (N, 3) each, in the ego frame of its time."""
     poses: tuple[F64, ...] = ()
     """(4, 4) of each: T_start_ego."""
     speed: RateFilter | None = None
@@ -58,11 +60,11 @@ class OdometryState:
     turning: RateFilter | None = None
     """Yaw rate, rad/s."""
     agreeing: int = 0
-    """Displacements in a row that agreed."""
+    """Number of consecutive displacements that agreed."""
     refused: int = 0
-    """Displacements in a row that did not."""
+    """Number of consecutive displacements that did not agree."""
     unplaced_s: float = 0.0
-    """Time since a sweep was last placed."""
+    """Time since a sweep was last registered."""
 
 
 class LidarMotion(NamedTuple):
@@ -77,18 +79,18 @@ class LidarMotion(NamedTuple):
     yaw_rate_sigma_radps: float
     """Standard deviation of the yaw rate."""
     pose: tuple[float, float, float]
-    """x, y in metres and heading in radians since odometry began, in the ego frame of then."""
+    """x, y in metres and heading in radians since odometry started, in the ego frame of that moment."""
 
 
 class OdometryStep(NamedTuple):
-    """Odometry after a sweep."""
+    """Result of odometry for one sweep."""
 
     state: OdometryState
     """For the next sweep."""
     motion: LidarMotion | None
-    """None while it is not believed."""
+    """None while it is not trusted."""
     note: str = ""
-    """Why it is not, in words; empty while nothing is wrong."""
+    """Why it is not trusted, in words; empty if nothing is wrong."""
 
 
 def follow(
@@ -102,12 +104,12 @@ def follow(
     """Own motion after one more sweep.
 
     Args:
-        before: what the sweep before left.
-        sweep: this one; None when it is missing.
-        ground: road of the sweep before; without it only the next sweep can be used.
-        tracks: what the sweep before left of LiDAR tracks: vehicles are kept out.
-        dt_s: seconds since the frame before; None at the start and after a gap, where odometry starts anew.
-        prior: own motion as another sensor has it, to begin with.
+        before: state after the previous sweep.
+        sweep: the current sweep; None if it is missing.
+        ground: road of the previous sweep; without it only the next sweep can be used.
+        tracks: LiDAR tracks of the previous sweep, used to exclude vehicles.
+        dt_s: seconds since the previous frame; None at the start and after a gap, where odometry restarts.
+        prior: own motion from another sensor, as initial value.
     """
     if dt_s is None:
         return OdometryStep(OdometryState(), None)
@@ -173,7 +175,7 @@ def _too_little(points: int, fixed: structure.Support) -> str:
 def _foreseen(
     before: OdometryState, dt_s: float, prior: EgoState | None
 ) -> tuple[RateFilter | None, RateFilter | None]:
-    """Speed and yaw rate expected now: of the filters, else of another sensor."""
+    """Predicted speed and yaw rate: from the filters, else from another sensor."""
     if before.speed is not None and before.turning is not None:
         return (
             rate_filter.predict(before.speed, dt_s, _JERK_MPS3),
@@ -188,19 +190,19 @@ def _foreseen(
 
 
 def _starts(dt_s: float) -> list[float]:
-    """Speeds to begin at where none is known."""
+    """Initial speeds to try if none is known."""
     count = ceil(_FASTEST_MPS * dt_s / _START_STEP_M)
     return [k * _START_STEP_M / dt_s for k in range(count + 1)]
 
 
 def _surprise(foreseen: RateFilter, moved: float, dt_s: float, sigma: float) -> float:
-    """How many standard deviations a displacement lies from the expected one."""
+    """Deviation of a displacement from the predicted one, in standard deviations."""
     expected, spread = rate_filter.expected(foreseen, dt_s)
     return abs(moved - expected) / hypot(spread**0.5, sigma)
 
 
 def _moved_by(moved: float, turned: float) -> F64:
-    """(4, 4) of a short arc along the ground."""
+    """(4, 4) transform of a short arc along the ground."""
     pose = np.eye(4)
     c, s = cos(turned), sin(turned)
     pose[:2, :2] = [[c, -s], [s, c]]

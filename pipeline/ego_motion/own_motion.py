@@ -28,35 +28,35 @@ from pipeline.types import (
 _CONTRADICT_SIGMAS, _CONTRADICT_MPS = 5.0, 1.0
 """Speeds that differ by more than both contradict each other."""
 _CONTRADICT_RADPS = 3.0 * pi / 180.0
-"""The same of yaw rates."""
+"""The same for yaw rates."""
 _VAGUE_MPS, _VAGUE_RADPS = 1.0, 2.0 * pi / 180.0
-"""Less sure own motion is not used: 1 m/s no longer tells a standing car from one that creeps, and 2°/s at 10 m/s
-put the path at 30 m off by 1.6 m, half a lane."""
+"""Own motion with a larger sigma is not used: 1 m/s does not distinguish a standing car from a creeping one, and 2°/s
+at 10 m/s shift the path at 30 m by 1.6 m, half a lane."""
 _SPEED_SIGMA_MPS: dict[MotionSource, tuple[float, float]] = {"can": (0.1, 0.01), "ins": (0.05, 0.0), "gnss": (0.2, 0.0)}
-"""Of each source: a constant part, and a share of the speed (a tyre's radius wears by a hundredth)."""
+"""For each source: a constant part, and a share of the speed (tyre wear changes the radius by 1 %)."""
 _YAW_RATE_SIGMA_RADPS: dict[MotionSource, float] = {"can": 0.005, "ins": 0.002, "gnss": 1.0 * pi / 180.0}
-"""A car's own sensor as measured in comma2k19; a receiver's is a slope of courses that are good to 0.2°."""
+"""The car's own sensor as measured in comma2k19; for a receiver, the slope of courses that are accurate to 0.2°."""
 
 
 @dataclass(frozen=True)
 class OwnMotionState:
-    """What one frame leaves to the next."""
+    """State from one frame to the next."""
 
     odometry: OdometryState = OdometryState()
-    """Of the LiDAR; empty while it is not asked."""
+    """State of LiDAR odometry; empty while it is not used."""
     courses: Courses = ()
-    """Of the last GNSS fixes."""
+    """Courses of the last GNSS fixes."""
 
 
 class OdometryContext(NamedTuple):
-    """What the frame before left that odometry needs."""
+    """The previous frame's data that odometry needs."""
 
     ground: Ground | None
     """Its road."""
     tracks: tuple[LidarTrack, ...]
     """Its LiDAR tracks."""
     motion: EgoState | None
-    """Its own motion, measured or carried on."""
+    """Its own motion, measured or predicted."""
 
 
 class Measured(NamedTuple):
@@ -65,11 +65,11 @@ class Measured(NamedTuple):
     state: OwnMotionState
     """For the next frame."""
     ego: EgoState | None
-    """Speed and yaw rate; None where nothing measures them."""
+    """Speed and yaw rate; None if nothing measures them."""
     own: OwnMotion | None
-    """Where they are from."""
+    """The sources of own motion."""
     notes: tuple[str, ...]
-    """What is wrong, in sentences."""
+    """Problems, as sentences."""
 
 
 def measure(
@@ -83,21 +83,21 @@ def measure(
     """Own motion in a frame.
 
     Args:
-        before: what the frame before left.
-        frame: its sweep and GNSS fix count.
-        recorded: the frame's own motion, where it is believable.
-        seen: what the frame before left of its surroundings.
-        dt_s: seconds since the frame before; None at the start and after a gap.
-        params: ``source`` says who may be asked.
+        before: state after the previous frame.
+        frame: its sweep and GNSS fix are used.
+        recorded: the frame's own motion, if plausible.
+        seen: the previous frame's surroundings.
+        dt_s: seconds since the previous frame; None at the start and after a gap.
+        params: ``source`` restricts the sources.
     """
     if params.source == "off":
         return Measured(OwnMotionState(), None, None, ())
-    # What the car and its receiver measured
+    # Measurements of the car and its receiver
     courses, received = before.courses, None
     if frame.gnss is not None and (recorded is None or recorded.source != "gnss"):
         courses, received = from_gnss.follow(courses, frame.gnss)
     given = [each for each in (recorded, received) if each is not None]
-    # LiDAR odometry, where those leave something to be desired
+    # LiDAR odometry, if these are not sufficient
     odometry, placed, note = OdometryState(), None, ""
     if _asks_the_lidar(params, given):
         prior = seen.motion if seen.motion is not None else recorded
@@ -109,10 +109,10 @@ def measure(
     notes = (note,) if note and (params.source == "lidar" or not given) else ()
     trusted = [each for each in map(_as_far_as_usable, sources) if each is not None and _may(each.source, params)]
     if recorded is not None and received is not None and params.source == "auto":
-        trusted = [each for each in trusted if each.source != "gnss"]  # as good as the car's own, but later
+        trusted = [each for each in trusted if each.source != "gnss"]  # as accurate as the car's own, but delayed
     if not trusted:
         return Measured(state, None, None, (*notes, *_nothing_of(params.source, sources)))
-    # Of speed and yaw rate, each comes from the source that is surest of it
+    # Speed and yaw rate are each taken from the most certain source
     speed = min(trusted, key=lambda each: each.speed_sigma_mps)
     turns = [each for each in trusted if each.yaw_rate_sigma_radps is not None]
     turning = min(turns, key=lambda each: each.yaw_rate_sigma_radps or 0.0) if turns else None
@@ -127,14 +127,14 @@ def _asks_the_lidar(params: MotionParams, given: list[EgoState]) -> bool:
 
 
 def _may(source: MotionSource, params: MotionParams) -> bool:
-    """Whether own motion may be taken from there."""
+    """Whether this source is permitted."""
     if params.source == "can":
         return source in ("can", "ins")
     return params.source in ("auto", source)
 
 
 def _usual(ego: EgoState) -> MotionEstimate:
-    """What is recorded, as sure as such sensors are."""
+    """The recorded own motion, with the usual uncertainty of such sensors."""
     constant, share = _SPEED_SIGMA_MPS[ego.source]
     turning = None if ego.yaw_rate_radps is None else _YAW_RATE_SIGMA_RADPS[ego.source]
     return MotionEstimate(
@@ -149,7 +149,7 @@ def _of_lidar(placed: LidarMotion) -> MotionEstimate:
 
 
 def _as_far_as_usable(each: MotionEstimate) -> MotionEstimate | None:
-    """The estimate without what is too vague to use: a bad yaw rate bends the path more than none would."""
+    """The estimate without values that are too uncertain: a bad yaw rate bends the path more than none."""
     if each.speed_sigma_mps > _VAGUE_MPS:
         return None
     if each.yaw_rate_sigma_radps is not None and each.yaw_rate_sigma_radps > _VAGUE_RADPS:
@@ -158,7 +158,7 @@ def _as_far_as_usable(each: MotionEstimate) -> MotionEstimate | None:
 
 
 def _as_ego(own: OwnMotion, frame: Frame, recorded: EgoState | None) -> EgoState:
-    """Own motion for the stages. What is recorded stays as it is where nothing else adds to it."""
+    """Own motion for the stages. The recorded value is unchanged unless another source adds to it."""
     turning = own.turning
     if recorded is not None and own.speed.source == recorded.source:
         if turning is None or turning.source == recorded.source:
@@ -174,12 +174,12 @@ def _as_ego(own: OwnMotion, frame: Frame, recorded: EgoState | None) -> EgoState
 
 
 def _beyond_usual(turning: MotionEstimate) -> float | None:
-    """The sigma of the LiDAR's yaw rate; that of sensors is part of ``path.yaw_rate_sigma_radps``."""
+    """The sigma of the LiDAR's yaw rate; that of other sensors is part of ``path.yaw_rate_sigma_radps``."""
     return turning.yaw_rate_sigma_radps if turning.source == "lidar" else None
 
 
 def _nothing_of(wanted: str, sources: list[MotionEstimate]) -> tuple[str, ...]:
-    """A sentence where the source that was asked for has nothing and others have."""
+    """A sentence if the requested source delivers nothing but others do."""
     others = [_NAMES[each.source] for each in sources]
     if wanted not in ("can", "gnss") or not others:
         return ()
@@ -187,7 +187,7 @@ def _nothing_of(wanted: str, sources: list[MotionEstimate]) -> tuple[str, ...]:
 
 
 def _contradictions(own: OwnMotion) -> tuple[str, ...]:
-    """A sentence for each source whose speed or yaw rate the chosen one contradicts."""
+    """A sentence for each source whose speed or yaw rate contradicts the chosen one."""
     found, chosen = list[str](), own.speed
     for each in own.sources:
         apart = abs(each.speed_mps - chosen.speed_mps)
@@ -202,7 +202,8 @@ def _contradictions(own: OwnMotion) -> tuple[str, ...]:
 
 
 def _turns_otherwise(chosen: MotionEstimate | None, each: MotionEstimate) -> list[str]:
-    """A sentence where the yaw rate of another source contradicts the chosen one; a receiver lags, and never does."""
+    """A sentence if the yaw rate of another source contradicts the chosen one. Not for a receiver, because of its
+    lag."""
     if chosen is None or chosen.yaw_rate_radps is None or each.yaw_rate_radps is None:
         return []
     if "gnss" in (chosen.source, each.source):

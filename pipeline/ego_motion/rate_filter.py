@@ -14,7 +14,7 @@ class RateFilter(NamedTuple):
     rate: float
     """m/s or rad/s."""
     change: float
-    """The same per second."""
+    """Its rate of change: m/s² or rad/s²."""
     rate_var: float
     """Variance of the rate."""
     cross: float
@@ -29,7 +29,7 @@ class RateFilter(NamedTuple):
 
 
 def start(moved: float, dt_s: float, moved_sigma: float, change_sigma: float) -> RateFilter:
-    """From one displacement: its mean rate, and a change of 0 ± ``change_sigma``."""
+    """Initialised from one displacement: its mean rate, and a change of 0 ± ``change_sigma``."""
     return RateFilter(
         moved / dt_s,
         0.0,
@@ -40,7 +40,8 @@ def start(moved: float, dt_s: float, moved_sigma: float, change_sigma: float) ->
 
 
 def predict(before: RateFilter, dt_s: float, jerk: float) -> RateFilter:
-    """The filter ``dt_s`` later. jerk: how much the change drifts in a second, growing with the square root of time."""
+    """The filter ``dt_s`` later. jerk: random walk of the change in one second, growing with the square root of
+    time."""
     rate, change, a, b, c = before
     q = jerk * jerk
     return RateFilter(
@@ -53,14 +54,14 @@ def predict(before: RateFilter, dt_s: float, jerk: float) -> RateFilter:
 
 
 def expected(now: RateFilter, dt_s: float) -> tuple[float, float]:
-    """The displacement over the last ``dt_s`` that the predicted filter expects, and its variance."""
+    """The displacement over the last ``dt_s`` predicted by the filter, and its variance."""
     h = -0.5 * dt_s * dt_s
     moved = now.rate * dt_s + now.change * h
     return moved, dt_s * dt_s * now.rate_var + 2.0 * dt_s * h * now.cross + h * h * now.change_var
 
 
 def update(now: RateFilter, moved: float, dt_s: float, moved_sigma: float) -> RateFilter:
-    """The predicted filter corrected by the displacement over the last ``dt_s``."""
+    """The predicted filter, corrected by the displacement over the last ``dt_s``."""
     foreseen, spread = expected(now, dt_s)
     h = -0.5 * dt_s * dt_s
     noise = moved_sigma * moved_sigma

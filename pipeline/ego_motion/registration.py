@@ -15,27 +15,27 @@ from scipy.spatial import cKDTree
 from pipeline.types import F32, F64
 
 VOXEL_M = 1.0
-"""KISS-ICP's own choice for 100 m of range."""
+"""KISS-ICP's default for a range of 100 m."""
 _MAP_VOXEL_M, _MATCHED_VOXEL_M = 0.5 * VOXEL_M, 1.5 * VOXEL_M
 _PER_VOXEL, _ITERATIONS = 20, 10
-"""Ten iterations come as close to KITTI's reference as fifty: 0.13 and 0.15 m/s."""
+"""Ten iterations are as close to KITTI's reference as fifty: 0.13 and 0.15 m/s."""
 _CONVERGED = 1e-3
 _KERNEL_M = 0.5
-"""Points farther off than this count little; three times as far, they do not count."""
+"""Points farther off than this get little weight, beyond three times this none."""
 _MOST_MATCHED = 1500
-"""Keeps the time bounded; a VLP-16's sweep has 300 to 900."""
+"""Limits the computing time; a VLP-16's sweep has 300 to 900."""
 _FITS_M = 0.5
-"""Points of one surface in two sweeps of 16 rings lie no farther apart."""
+"""Maximum distance between points of one surface in two sweeps of 16 rings."""
 _JUDGED_BY = 2
 
 
 class Registration(NamedTuple):
-    """Where a cloud lies among earlier ones."""
+    """Pose of a cloud relative to earlier ones."""
 
     pose: F64
     """(4, 4) T_map_cloud."""
     fit: float
-    """Share of its points, 0–1, that lie on the last clouds."""
+    """Share of its points, 0–1, that match the last clouds."""
 
 
 def warm_up() -> None:
@@ -44,18 +44,18 @@ def warm_up() -> None:
 
 
 def thinned(points: F32) -> F32:
-    """(M, 3) float32, the first of (N, 3) points in each voxel of the map's resolution."""
+    """(M, 3) float32, the first of (N, 3) points in each voxel at the map's resolution."""
     return _voxels(points, _MAP_VOXEL_M).astype(np.float32)
 
 
 def align(cloud: F32, clouds: Sequence[F32], poses: Sequence[F64], guesses: Sequence[F64]) -> Registration:
-    """The place of a thinned cloud among earlier ones, from the best of the guesses.
+    """The pose of a down-sampled cloud relative to earlier ones, from the best of the guesses.
 
     Args:
         cloud: (N, 3), in its own frame.
         clouds: earlier ones, each in its own frame, newest last.
         poses: T_map_cloud of each.
-        guesses: T_map_cloud to begin at; more than one where the motion is not known yet.
+        guesses: initial T_map_cloud; several if the motion is not known yet.
     """
     library = _library()
     grid = library._VoxelHashMap(voxel_size=VOXEL_M, max_distance=100.0, max_points_per_voxel=_PER_VOXEL)
@@ -64,7 +64,7 @@ def align(cloud: F32, clouds: Sequence[F32], poses: Sequence[F64], guesses: Sequ
     matched = _voxels(cloud, _MATCHED_VOXEL_M)
     matched = matched[:: -(-len(matched) // _MOST_MATCHED) or 1]
     source = library._Vector3dVector(matched)
-    # one thread: sums of several would come in any order
+    # one thread: with several, the order of summation would vary
     method = library._Registration(max_num_iterations=_ITERATIONS, convergence_criterion=_CONVERGED, max_num_threads=1)
 
     def registered(guess: F64) -> F64:
@@ -82,12 +82,12 @@ def align(cloud: F32, clouds: Sequence[F32], poses: Sequence[F64], guesses: Sequ
     tree = cKDTree(np.vstack([_moved(points, pose) for points, pose in pairs]))
     placed = [Registration(pose, _fit(tree, _moved(matched, pose))) for pose in found]
     best = max(placed, key=lambda each: each.fit)
-    # a far guess takes more than one round to arrive
+    # from a distant guess, one round does not converge
     return best if len(guesses) == 1 else Registration(registered(registered(best.pose)), best.fit)
 
 
 def _fit(tree: cKDTree, points: F64) -> float:
-    """Share of the points near one of the tree's."""
+    """Share of the points that are close to one of the tree's points."""
     distance, _ = tree.query(points, distance_upper_bound=_FITS_M)
     return float(np.isfinite(distance).mean()) if len(points) else 0.0
 
@@ -103,7 +103,8 @@ def _voxels(points: F32 | F64, size_m: float) -> F64:
 
 @cache
 def _library() -> Any:
-    """KISS-ICP's compiled part; its Python part takes a second to import, to read settings that are not used here."""
+    """KISS-ICP's compiled part; its Python part takes a second to import, for reading settings that are not used
+    here."""
     from kiss_icp.pybind import kiss_icp_pybind
 
     return kiss_icp_pybind

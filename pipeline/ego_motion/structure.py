@@ -17,32 +17,32 @@ import numpy as np
 from pipeline.types import F32, F64, Ground, LidarTrack, Sweep
 
 NEAREST_M, FARTHEST_M = 2.5, 80.0
-"""Nearer points are the car's own body; farther ones of a 16-channel LiDAR are too few to be matched."""
+"""Closer points are the car's own body; farther ones are too sparse to match with a 16-channel LiDAR."""
 _ABOVE_ROAD_M = 0.3
-"""Kerbs and the road's own unevenness stay below this."""
+"""Kerbs and the road's unevenness are lower than this."""
 _VEHICLE_M, _LONGEST_M, _WIDEST_M, _MARGIN_M = 1.2, 15.0, 3.0, 0.5
-"""Clusters with a footprint from the rear of a small car up to that of a coach may be vehicles. Points so far around
-them go with them."""
+"""Clusters with a footprint between the rear of a small car and a coach may be vehicles. Points within the margin
+around them are excluded as well."""
 _CELL_M, _NOISE_M = 1.5, 0.05
-"""Structure is judged in cells of this size; a LiDAR's noise (3 cm) makes a pole no narrower than that."""
+"""Structure is evaluated in cells of this size; due to a LiDAR's noise (3 cm), a pole is at least this thick."""
 _LONGEST_LEVER_M = 30.0
-"""Farther structure is scanned so sparsely that its longer lever gains nothing."""
+"""Structure farther away is sampled so sparsely that its longer lever arm brings no gain."""
 
 
 def standing(sweep: Sweep, ground: Ground, tracks: tuple[LidarTrack, ...], dt_s: float) -> F32:
-    """(M, 3) float32 points that stand on the road and lie in no vehicle. ground: of the sweep before, which a car
-    leaves by centimetres. tracks: of the sweep before, ``dt_s`` ago."""
+    """(M, 3) float32 points above the road that are in no vehicle. ground: of the previous sweep; the road changes by
+    centimetres in between. tracks: of the previous sweep, ``dt_s`` ago."""
     points = sweep.points
     range_m = np.hypot(points[:, 0], points[:, 1])
     keep = (range_m > NEAREST_M) & (range_m < FARTHEST_M)
-    keep &= ground.above(points) > _ABOVE_ROAD_M  # False without ground, whose height is not a number
+    keep &= ground.above(points) > _ABOVE_ROAD_M  # False without ground, where the height is NaN
     points = np.ascontiguousarray(points[keep, :3])
     boxes = _vehicles(tracks, dt_s)
     return points[~_inside(points, boxes)] if len(boxes) else points
 
 
 def _vehicles(tracks: tuple[LidarTrack, ...], dt_s: float) -> F64:
-    """(B, 6) ``x y half_length half_width cos sin`` of what may be a vehicle, where it should be now."""
+    """(B, 6) ``x y half_length half_width cos sin`` of possible vehicles, predicted to now."""
     rows = []
     for track in tracks:
         cuboid = track.obstacle.cuboid
@@ -64,19 +64,19 @@ def warm_up() -> None:
 
 
 class Support(NamedTuple):
-    """How well structure fixes own motion."""
+    """How well structure constrains own motion."""
 
     along_x: float
-    """Cells that fix motion along x."""
+    """Number of cells that constrain motion along x."""
     along_y: float
-    """Cells that fix motion along y."""
+    """Number of cells that constrain motion along y."""
     turning_m2: float
-    """What fixes the heading: squared lever arms of all cells, m²."""
+    """Constraint of the heading: squared lever arms of all cells, m²."""
 
 
 def support(points: F32) -> Support:
-    """What (M, 3) points that stand on the road fix. A cell of them fixes its own normal fully, and the direction along
-    it by how little it extends that way."""
+    """Constraints from (M, 3) points above the road. A cell fully constrains the direction of its normal, and its
+    tangential direction the more the shorter it is."""
     return Support(*_support(points, _CELL_M, _NOISE_M**2, FARTHEST_M, _LONGEST_LEVER_M))
 
 
@@ -119,12 +119,12 @@ def _support(points, cell_m, noise_var, reach_m, lever_m):  # type: ignore[no-un
         xx, yy, xy = sums[c, 3] / count - mx * mx, sums[c, 4] / count - my * my, sums[c, 5] / count - mx * my
         middle, half = 0.5 * (xx + yy), np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
         long_var, thin_var = middle + half + noise_var, max(middle - half, 0.0) + noise_var
-        # unit vector along the cell's structure: cos² and sin² of its direction
+        # unit vector along the cell's structure: cos² and sin² of its angle
         c2 = 0.5 + 0.25 * (xx - yy) / half if half > 1e-9 else 0.5
         lengthwise = 2.0 * thin_var / (long_var + thin_var)
         along_x += (1.0 - c2) + c2 * lengthwise
         along_y += c2 + (1.0 - c2) * lengthwise
-        # the same as levers about the origin: of the direction along the cell, and of its normal
+        # the same as lever arms about the origin: for the direction along the cell, and for its normal
         cs = 0.5 * xy / half if half > 1e-9 else 0.0
         along2 = c2 * mx * mx + 2.0 * cs * mx * my + (1.0 - c2) * my * my
         square = mx * mx + my * my

@@ -16,7 +16,7 @@ from pipeline.params import FusionParams
 from pipeline.types import VEHICLES, FusedObject, Path
 
 _REACH_M = 35.0
-"""Farther away a sweep may have too little of a car to make a cluster of it."""
+"""Farther away, a sweep may hit a car too rarely to form a cluster."""
 _CONFIRMED = 3
 _NARROWEST_M, _WIDEST_M = 1.2, 6.0
 _SAME_RANGE_SIGMAS, _APART_RAD = 1.5, radians(8.0)
@@ -24,17 +24,17 @@ _SAME_RANGE_SIGMAS, _APART_RAD = 1.5, radians(8.0)
 
 @dataclass(frozen=True)
 class AgreementState:
-    """How camera and LiDAR have agreed lately."""
+    """Recent agreement of camera and LiDAR."""
 
     share: float = 0.0
-    """Of the vehicles that both sensors should see, how many come apart: a running mean, 0–1."""
+    """Share of vehicles, 0–1, that both sensors should see but do not match: a running mean."""
 
 
 def follow(
     state: AgreementState, objects: tuple[FusedObject, ...], dt_s: float | None, params: FusionParams
 ) -> AgreementState:
-    """The share after this frame; as it was where nothing near is seen by either."""
-    # Of the near objects, the share that one sensor has alone where the other should see them too; averaged over time
+    """The share after this frame; unchanged if neither sensor sees anything near."""
+    # Among near objects that both sensors should see, the share seen by only one of them; averaged over time
     near = [item for item in objects if item.distance_m is not None and item.distance_m <= _REACH_M]
     joined = sum(item.seen_by_two_sensors for item in near)
     apart = _come_apart(near)
@@ -45,7 +45,7 @@ def follow(
 
 
 def heed(path: Path, state: AgreementState, params: FusionParams) -> Path:
-    """The path, not to be driven after while the sensors disagree: a lead may be where it is not looked for."""
+    """The path, marked as not usable while the sensors disagree: a lead may then be outside the searched area."""
     if state.share < params.disagree_share:
         return path
     doubt = "camera and LiDAR disagree about where cars are"
@@ -59,8 +59,8 @@ def heed(path: Path, state: AgreementState, params: FusionParams) -> Path:
 
 
 def _come_apart(near: list[FusedObject]) -> int:
-    """Pairs of a car that only the camera has and a cluster that only the LiDAR has, as far away and a little aside;
-    each cluster is taken once."""
+    """Number of pairs of a camera-only car and a LiDAR-only cluster at the same distance with a small lateral offset;
+    each cluster is used once."""
     clusters = [item for item in near if not item.imaged and not item.carried and _is_a_car_wide(item)]
     count = 0
     for box in near:
@@ -80,7 +80,7 @@ def _is_a_car_wide(item: FusedObject) -> bool:
 
 
 def _are_apart(box: FusedObject, cluster: FusedObject) -> bool:
-    """As far away as each other, in another direction than fusion joins."""
+    """Whether both are at the same distance but in directions too different for fusion to join them."""
     if box.closest_point is None or cluster.closest_point is None:
         return False
     sigma_m = hypot(box.distance_sigma_m or 0.0, cluster.distance_sigma_m or 0.0)

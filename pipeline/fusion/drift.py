@@ -24,60 +24,61 @@ from pipeline.params import FusionParams
 from pipeline.types import F64, VEHICLES, Box, FusedObject
 
 BORDER_PX = 3.0
-"""A box that ends this close to the image's border is cut."""
+"""A box this close to the image's border counts as cut."""
 LIKE_WIDTH, NARROWEST = 0.35, 0.4
-"""A cluster whose width differs from its box's by a larger share is a part of the vehicle, or more than it; beside the
-axis, where its side may be missing, a narrower one counts too."""
+"""If a cluster's width differs from its box's by a larger share than the first, it covers only a part of the vehicle,
+or more than it. Vehicles beside the camera's axis, whose side may be missing in the cluster, are accepted from the
+second share on."""
 NARROWEST_M = 1.3
-"""Narrower clusters are the visible part of a vehicle behind others, whose box a detector draws whole."""
+"""Narrower clusters are the visible part of a vehicle behind others; a detector draws the box of the whole vehicle."""
 NEAREST_M, FARTHEST_M = 5.0, 40.0
-"""Nearer, the two mounts see different sides of a car; farther, one or two rings are on it."""
+"""Closer, the two mounts see different sides of a car; farther, only one or two rings hit it."""
 LASTING_SHARE = 0.06
-"""By how much of its height a box's middle or foot is off as long as the vehicle is seen (1 σ)."""
+"""Constant error of the middle or foot of a vehicle's box, as a share of the box height (1 σ)."""
 LASTING_DEG = 0.12
-"""The same of a cluster whose sides lie between beams 0.2° to 0.4° apart."""
+"""Constant error of a cluster whose sides lie between beams 0.2° to 0.4° apart."""
 FRAME_SHARE = 0.08
-"""By how much more in one frame."""
+"""Additional error in each frame, as a share of the box height."""
 SMALLEST_DEG = 0.4
-"""Smaller angles move a car 30 m away by about a tenth of its width: fusion does without them."""
+"""Smaller angles move a car 30 m away by about a tenth of its width, which fusion tolerates."""
 FEWEST_FRAMES, FEWEST_VEHICLES = 5, 3
-"""A vehicle counts once it has been seen for half a second at 10 Hz; of two vehicles both may be wrong pairs."""
+"""A vehicle counts after half a second at 10 Hz; with only two vehicles, both may be wrong pairs."""
 REMEMBERED = 20
-"""Frames after which a vehicle's mean forgets: a lead that stays for minutes is judged by the last seconds."""
+"""Frames over which a vehicle's mean is taken, so that a lead followed for minutes is judged by the last seconds."""
 FASTEST_DEGPS = 6.0
-"""Bearings that change faster are those of vehicles that are passed, seen from a new side in every frame."""
+"""Faster bearings belong to vehicles that we pass, which are seen from a different side in every frame."""
 RECENT_SHARE = 0.4
-"""Of the time that is looked at: vehicles from before the knock must not outvote those after it."""
+"""Share of the time window treated as recent, so that vehicles from before a knock do not outvote those after it."""
 TIME_SIGMA_S = 0.04
-"""Standard deviation of the time between the sensors. Vehicles whose bearing changes fast, as oncoming ones', are off
-by as much as an angle would be; where all of them are, they tell no angle."""
+"""Standard deviation of the time offset between the sensors. For vehicles whose bearing changes fast, such as oncoming
+ones, a time offset looks like an angle; if all vehicles are of this kind, no angle can be determined."""
 HUBER, ROUNDS = 1.5, 10
-"""Deviations beyond which a vehicle counts less; how often that is weighed anew."""
+"""Number of standard deviations beyond which a vehicle gets less weight; number of re-weighting rounds."""
 AGREEING_SHARE = 0.7
-"""Of the vehicles that must say at least half of the angle, each by itself."""
+"""Share of the vehicles that must each show at least half of the angle."""
 
 
 class CuboidOffset(NamedTuple):
-    """How far one vehicle's cuboid has lain from its box."""
+    """Measured offset between one vehicle's cuboid and its box."""
 
     id: int
     """Of the fused object."""
     t_ns: int
-    """The last frame of both."""
+    """The last frame in which both were seen."""
     frames: int
-    """In which both sensors have seen it so far."""
+    """Number of frames in which both sensors have seen it."""
     yaw_deg: float
-    """Mean over the frames; the turn of the camera to the left that puts one on the other."""
+    """Mean over the frames: the camera rotation to the left that would align the two."""
     pitch_deg: float
-    """The same downwards."""
+    """The same for rotation downwards."""
     height_deg: float
-    """Of the box, mean over the frames."""
+    """Height of the box, mean over the frames."""
     rate_degps: float = 0.0
-    """How fast its bearing changes, to the left, mean over the frames."""
+    """Rate of change of its bearing, positive to the left, mean over the frames."""
 
 
 class Drift(NamedTuple):
-    """By how much the camera is turned against what its calibration says."""
+    """Rotation of the camera relative to its calibration."""
 
     yaw_deg: float
     """To the left."""
@@ -88,11 +89,11 @@ class Drift(NamedTuple):
     pitch_sigma_deg: float
     """Standard deviation of ``pitch_deg``."""
     vehicles: int
-    """That say so."""
+    """Number of vehicles that it was estimated from."""
 
     @property
     def note(self) -> str:
-        """For people, with what to do."""
+        """A sentence for the user, with the remedy."""
         yaw = f"yaw {self.yaw_deg:+.1f}° ± {self.yaw_sigma_deg:.1f}°"
         pitch = f"pitch {self.pitch_deg:+.1f}° ± {self.pitch_sigma_deg:.1f}°"
         who = f"judging by {self.vehicles} vehicles"
@@ -100,7 +101,7 @@ class Drift(NamedTuple):
 
 
 class DriftState(NamedTuple):
-    """The vehicles of the last seconds."""
+    """The vehicles of the last few seconds."""
 
     sightings: tuple[CuboidOffset, ...] = ()
     """One per vehicle; one not seen for ``fusion.drift_s`` is dropped."""
@@ -114,10 +115,11 @@ def follow(
     t_ns: int,
     params: FusionParams,
 ) -> tuple[DriftState, Drift | None]:
-    """The state after this frame, and the angles that it leaves little doubt of; None while there is no such doubt."""
+    """The state after this frame, and the angles if they are significant; None otherwise."""
     if aligned is None or image_size is None:
         return DriftState(), None
-    # Each vehicle tells the angle between its box and its projected cuboid; those of the last seconds judge together
+    # Each vehicle gives the angle between its box and its projected cuboid; all vehicles of the last seconds are
+    # evaluated together
     known = {each.id: each for each in state.sightings if t_ns - each.t_ns <= params.drift_s * 1e9}
     for item in fused.objects:
         box = fused.vision_boxes.get(item.id)
@@ -132,7 +134,7 @@ def follow(
 
 
 def judge(sightings: tuple[CuboidOffset, ...], params: FusionParams) -> Drift | None:
-    """The angles of all sightings together, or of the newest ones, if they are surely not zero."""
+    """The angles estimated from all sightings, or from the newest ones, if they differ significantly from zero."""
     newest_ns = max((each.t_ns for each in sightings), default=0)
     recent = tuple(each for each in sightings if newest_ns - each.t_ns <= RECENT_SHARE * params.drift_s * 1e9)
     return _judged(sightings, params) or _judged(recent, params)
@@ -156,7 +158,7 @@ def _judged(sightings: tuple[CuboidOffset, ...], params: FusionParams) -> Drift 
 
 
 def _tells(item: FusedObject, box: Box, size: tuple[int, int]) -> bool:
-    """Whether both sensors see all of the vehicle now."""
+    """Whether both sensors see the whole vehicle in this frame."""
     if item.cuboid is None or not item.seen_by_two_sensors or item.label not in VEHICLES:
         return False
     if item.cuboid.size[1] < NARROWEST_M:
@@ -166,10 +168,12 @@ def _tells(item: FusedObject, box: Box, size: tuple[int, int]) -> bool:
 
 
 def _angles(cuboid: Cuboid, box: Box, aligned: Alignment) -> tuple[float, float, float] | None:
-    """Yaw and pitch between a cuboid and its box, and the box's height, degrees; None where their widths differ.
+    """Yaw and pitch between a cuboid and its box, and the box's height, degrees; None if their widths differ.
 
-    Of a vehicle beside the camera's axis the box ends inwards at the far end of its side, which the LiDAR seldom
-    meets; outwards both end at the corner of its near face. So such a vehicle tells by its outer edge alone."""
+    For a vehicle beside the camera's axis, the inner edge of the box is at the far end of the vehicle's side, which the
+    LiDAR rarely hits; the outer edge is at the corner of its near face in both. For such a vehicle, only the outer edge
+    is used.
+    """
     uv = aligned.project(cuboid.corners())
     if np.isnan(uv).any():
         return None
@@ -195,7 +199,7 @@ def _angles(cuboid: Cuboid, box: Box, aligned: Alignment) -> tuple[float, float,
 
 
 def _rate_degps(item: FusedObject) -> float:
-    """How fast its bearing changes, as far as its speed is known."""
+    """Rate of change of its bearing, as far as its velocity is known."""
     if item.velocity_mps is None or item.cuboid is None:
         return 0.0
     (x, y, _), (vx, vy) = item.cuboid.center, item.velocity_mps
@@ -203,7 +207,7 @@ def _rate_degps(item: FusedObject) -> float:
 
 
 def _with(before: CuboidOffset | None, number: int, t_ns: int, found: tuple[float, ...]) -> CuboidOffset:
-    """The sighting with one frame more. found: as the fields after ``frames``."""
+    """The sighting with one more frame. found: values in the order of the fields after ``frames``."""
     if before is None:
         return CuboidOffset(number, t_ns, 1, *found)
     frames = min(before.frames + 1, REMEMBERED)
@@ -217,11 +221,11 @@ def _sigma_deg(each: CuboidOffset) -> float:
 
 
 def _common(values: F64, sigmas: F64, rates: F64) -> tuple[float, float, bool]:
-    """The angle that all vehicles share beside a common time offset, its standard deviation, and whether most of them
-    say so one by one. Robust (Huber): a wrong pair or two do not move it."""
+    """The angle that all vehicles share besides a common time offset, its standard deviation, and whether most of the
+    vehicles individually confirm it. Robust (Huber), so that a few wrong pairs have little effect."""
     weight = sigmas**-2
     for _ in range(ROUNDS):
-        # The normal equations of angle + rate · time are 2 × 2: written out, they take a third less time than a solver
+        # The normal equations of angle + rate · time are 2 × 2; written out, they take a third less time than a solver
         w, wr = weight.sum(), weight @ rates
         wrr = (weight * rates) @ rates + TIME_SIGMA_S**-2
         right, right_r = weight @ values, (weight * values) @ rates

@@ -26,69 +26,70 @@ from pipeline.params import ExistenceParams
 from pipeline.types import Frame, FusedObject, Gate, Moment
 
 SURE = 4.0
-"""Log-odds beyond which nothing gets surer: 98 %."""
+"""Limit of the log-odds: 98 %."""
 _EVEN_SCORE, _SCORE_SLOPE = 0.45, 8.5
-"""Boxes of this score are a vehicle half of the time; the log-odds grow by the slope for each 1.0 of score. A logistic
-fit to 1,473 boxes of YOLOX-nano on Astyx and KITTI, against labelled vehicles. With any one of the four recordings left
-out: 0.40 to 0.52, and 7.7 to 10.1."""
+"""A box with this score is a vehicle with probability 0.5; the log-odds grow by the slope per 1.0 of score. Logistic
+fit to 1,473 boxes of YOLOX-nano on Astyx and KITTI, compared with labelled vehicles. Leaving out any one of the four
+recordings gives 0.40 to 0.52, and 7.7 to 10.1."""
 _MEAN_S, _LONGEST_MEAN_S = 0.5, 2.0
-"""Over how long a box's score is averaged, and at most over how long a missing one counts: as long as the object has
-been followed. False boxes of YOLOX-nano on Astyx and KITTI come in bursts of one to four images; what has been there
-for two seconds is merely missed."""
+"""Time constant for averaging a box's score, and the maximum time constant for missing boxes, which otherwise is the
+time that the object has been followed. False boxes of YOLOX-nano on Astyx and KITTI come in bursts of one to four
+images; an object seen for two seconds has merely been missed."""
 _ALONG, _ALONG_AFTER_M, _ALONG_SHARE = 2.0, 25.0, 0.5
-"""False boxes are drawn on what stands, and what stands comes nearer by every metre that the car drives. What has not,
-over 25 m, goes along: a vehicle. At 50 m a box tells distance to 7 % from image to image, so half of 25 m is more than
-two standard deviations of a difference."""
+"""False boxes are drawn on static structures, which come nearer by every metre that the car drives. If the distance has
+not shrunk accordingly over 25 m, the object moves along with us, so it is a vehicle. At 50 m the distance from a box
+has a noise of 7 % from image to image, so half of 25 m is more than two standard deviations of a difference."""
 _HIDDEN_SHARE = 0.3
-"""Of a box: a network still finds most vehicles of which so much is hidden."""
+"""Hidden share of a box up to which a network still finds most vehicles."""
 _EMPTY_S = 1.0
-"""How long it matters that a place was empty: after so long the camera has measured the place anew."""
+"""Time constant for forgetting that a place was empty: by then the camera has measured the position again."""
 _CLUSTER, _STOPPED, _PIERCED, _SILENT, _TAKEN = 2.0, 1.0, -3.0, -2.0, -2.0
-"""What one sweep adds: a cluster on the object; rays that ended where it is said to be; rays that passed through; rays
-that came back from nowhere; near the car, rays that ended there but in the cluster of something else. Of 394 labelled
-vehicles within 30 m in 126 frames of a VLP-16, with a place as vague as a box makes it, none was looked through
-and 6 were silent; with one as sure as it gets, none and 10. Sweeps follow each other too soon to be that many
-witnesses, so one is worth less."""
+"""Log-odds added by one sweep: a cluster on the object; rays that ended at its reported position; rays that passed
+through; rays without a return; close to the car, rays that ended there but in the cluster of another object. Of 394
+labelled vehicles within 30 m in 126 frames of a VLP-16, with the position uncertainty of a box, none was passed through
+and 6 returned no rays; with the smallest position uncertainty, none and 10. The values are lower than these counts
+suggest, because successive sweeps are not independent."""
 
 
 _FOLLOWED_S = 0.5
-"""A box was joined with a neighbour's cluster for a moment; what the LiDAR has seen for longer it has followed."""
+"""A box may be joined with a neighbour's cluster for a moment; an object seen by the LiDAR for longer than this was
+really tracked by it."""
 
 
 class Existence(NamedTuple):
-    """Of one object, what earlier frames leave."""
+    """Evidence about one object from earlier frames."""
 
     score: float | None
-    """Running mean of its boxes' scores; None before the first."""
+    """Running mean of its boxes' scores; None before the first box."""
     lidar: float
     """The LiDAR's log-odds."""
     camera_ranges: int = 0
-    """Distances in a row that the camera's place rests on."""
+    """Number of consecutive distances that the camera's position is based on."""
     age_s: float = 0.0
-    """Since it was first seen."""
+    """Time since it was first seen."""
     from_m: float | None = None
-    """Its distance when the camera's place was begun; None before that."""
+    """Its distance when the camera's position was initialised; None before that."""
     travelled_m: float = 0.0
-    """How far the car has driven since."""
+    """Distance driven by the car since then."""
     shrunk_m: float = 0.0
-    """By how much its distance has shrunk since."""
+    """Decrease of its distance since then."""
     cluster_s: float = 0.0
-    """How long the LiDAR has seen it."""
+    """Total time that the LiDAR has seen it."""
 
     @property
     def goes_along(self) -> bool:
-        """Whether its distance has shrunk by less than what stands would have come nearer: see ``_ALONG``."""
+        """Whether its distance has shrunk by less than that of a static object would have: see ``_ALONG``."""
         return self.travelled_m >= _ALONG_AFTER_M and self.shrunk_m < _ALONG_SHARE * self.travelled_m
 
 
 @dataclass(frozen=True)
 class ExistenceState:
-    """What is known of the existence of each object."""
+    """Evidence about the existence of each object."""
 
     known: dict[int, Existence] = field(default_factory=dict)
     """By object id."""
     looks_far: bool = False
-    """Whether far parts of images are looked at a second time, if not in every frame."""
+    """Whether far parts of images are processed a second time, at least in some frames."""
 
 
 def weigh(
@@ -99,15 +100,16 @@ def weigh(
     now: Moment,
     params: ExistenceParams,
 ) -> tuple[ExistenceState, tuple[FusedObject, ...]]:
-    """The objects with their ``existence`` and, where rays could tell, a gate that says what they told.
+    """The objects with their ``existence`` and, if rays give evidence, a gate that shows it.
 
-    frame: which the objects are of."""
+    frame: the frame of these objects.
+    """
     if not params.enabled:
         return ExistenceState(), objects
     rays = rays_to(objects, sweep)
     seen = frame.raw_boxes
     looks_far = state.looks_far or (seen is not None and seen.far is not None)
-    # where a far view sits out a frame, what is far may be missing for that
+    # in frames without a far view, far objects may be missing for that reason
     looked = seen is not None and (seen.far is not None or not looks_far)
     missed = _missed(objects, frame.image_size) if looked else frozenset()
     known: dict[int, Existence] = {}
@@ -124,8 +126,8 @@ def weigh(
 
 
 def _missed(objects: tuple[FusedObject, ...], size: tuple[int, int] | None) -> frozenset[int]:
-    """Ids of the objects that only the camera follows and that it should have seen: their box lies in the image (size:
-    width and height), and no box that was seen, which may hide it or be it, covers much of it."""
+    """Ids of the objects that only the camera tracks and that it should have seen: their box lies in the image (size:
+    width and height), and no seen box, which may hide the object or belong to it, covers much of it."""
     asked = [each for each in objects if not each.ranged and not each.seen_by_camera and each.bbox is not None]
     if not asked or size is None:
         return frozenset()
@@ -146,7 +148,7 @@ def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bo
         score -= _weight(dt_s, min(max(age_s, _MEAN_S), _LONGEST_MEAN_S)) * score
     is_begun_anew = item.camera_ranges < before.camera_ranges
     if lidar < 0.0:
-        # that a place is empty says nothing about another place, and ever less about where the object is now
+        # evidence that a place is empty does not apply to another place, and decays as the object moves on
         lidar = 0.0 if is_begun_anew else lidar * math.exp(-dt_s / _EMPTY_S)
     from_m, travelled_m, shrunk_m = before.from_m, before.travelled_m, before.shrunk_m
     if is_begun_anew or from_m is None or now.speed_mps is None:
@@ -161,13 +163,13 @@ def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bo
 
 
 def _weight(dt_s: float, mean_s: float) -> float:
-    """Of one frame in a running mean."""
+    """Weight of one frame in a running mean."""
     return 1.0 - math.exp(-dt_s / mean_s)
 
 
 def _said_by_lidar(item: FusedObject, rays: Rays | None, was_followed: bool) -> float:
-    """What this sweep adds to the log-odds. What the LiDAR had followed, and whose returns are another's now, has been
-    joined with its neighbour; what it never followed is a second box on that neighbour."""
+    """Log-odds added by this sweep. If the LiDAR has tracked the object and its returns now belong to another cluster,
+    the two clusters have merged; if the LiDAR never tracked it, it is a second box on the neighbour."""
     if item.seen_by_lidar:
         return _CLUSTER
     if rays is not None and rays.is_free:
@@ -185,7 +187,7 @@ def _said_by_lidar(item: FusedObject, rays: Rays | None, was_followed: bool) -> 
 
 
 def _told(item: FusedObject, probability: float, rays: Rays | None) -> FusedObject:
-    """The object with its probability and the gates of what rays could tell."""
+    """The object with its probability and the gates for the evidence from rays."""
     found: list[Gate] = []
     if rays is not None and (share := rays.free_share) is not None:
         found.append(Gate("free_road", share, CLEAR_SHARE, not (rays.is_free or rays.is_silent)))

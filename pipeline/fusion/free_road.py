@@ -25,33 +25,34 @@ from pipeline.fusion.vehicle_sizes import usual_size_m
 from pipeline.types import F32, I32, U8, FusedObject, Ground, Point3
 
 _BODY_LOW_M, _BODY_HIGH_M = 0.3, 1.2
-"""Heights over the road between which every vehicle is solid: under it is air, over it is glass."""
+"""Heights above the road between which every vehicle is solid: below is air, above is glass."""
 _BODY_SHARE = 0.7
-"""Of its width; the sides may be off by the box's error."""
+"""Share of its width; the sides may be off by the box's error."""
 MIN_RAYS = 3
-"""Fewer may be one speck of dirt or one mixed pixel."""
+"""Fewer rays may be a speck of dirt or a mixed pixel."""
 CLEAR_SHARE = 0.8
-"""Of the rays that reached the place, so many passed through where it is free."""
+"""A place is free if this share of the rays that reached it passed through."""
 _SILENT_RAYS = 10
-"""So many rays or more would have to be swallowed for a vehicle to be silent: two rings, 1° each."""
+"""Minimum number of rays without a return for this to be evidence: two rings, 1° each."""
 _SILENT_M = 36.0
-"""Nearer than this the body of a vehicle returns rays, whatever its paint. Measured for vehicles within 30 m (see
-``existence``), whose places reach this far."""
+"""Closer than this, the body of a vehicle returns rays whatever its paint. Measured for vehicles within 30 m (see
+``existence``), whose position uncertainty extends to this distance."""
 NEAR_M = 20.0
-"""Nearer than this a vehicle has a cluster: of 47 labelled ones on Astyx and KITTI the camera alone had none."""
+"""Closer than this, every vehicle has a cluster: of 47 labelled ones on Astyx and KITTI, none was seen by the camera
+alone."""
 _SLICE_M, _MOST_SLICES = 2.0, 24
 _AHEAD = 0.5
 """Elevations of the rings are measured within 27° of straight ahead (as a tangent)."""
 _MIN_RING = 5
-"""Returns of a ring ahead from which its elevation is known."""
+"""Number of returns of a ring ahead needed to determine its elevation."""
 _SIGMAS, _MARGIN_M = 2.0, 1.0
-"""The place reaches so many standard deviations, and a metre, to either side of the distance said."""
+"""The searched range extends this many standard deviations plus a metre to either side of the reported distance."""
 _FLANK_M = 3.0
-"""Of a vehicle that stands slantwise the middle lies so much farther than its nearest corner."""
+"""If a vehicle stands at an angle, its middle is up to this much farther than its nearest corner."""
 
 
 class SweepRays(Protocol):
-    """A sweep as far as its rays matter."""
+    """The parts of a sweep that are needed to evaluate its rays."""
 
     @property
     def points(self) -> F32:
@@ -60,7 +61,7 @@ class SweepRays(Protocol):
 
     @property
     def kind(self) -> I32:
-        """(N,) int32 what each point was taken for: 0 and above, the number of its cluster."""
+        """(N,) int32 classification of each point: 0 and above is the number of its cluster."""
         ...
 
     @property
@@ -80,44 +81,44 @@ class SweepRays(Protocol):
 
 
 class Rays(NamedTuple):
-    """How the rays towards one place ended, at body height."""
+    """Where the rays towards one place ended, at body height. The place is divided into slices."""
 
     through: float
-    """Beyond it: of the slice that the fewest passed."""
+    """Rays that passed through; minimum over all slices."""
     stopped: float
-    """At it, in all slices, in no cluster."""
+    """Rays that ended in the place without belonging to a cluster; sum over all slices."""
     taken: float
-    """At it, in all slices, in the cluster of something else."""
+    """Rays that ended in the place in the cluster of another object; sum over all slices."""
     clear: float
-    """Of those that reached a slice, how many came back from beyond it: the least of all slices."""
+    """Share of the rays reaching a slice that came back from behind it; minimum over all slices."""
     silent: float
-    """As ``through``, with those that came back from nowhere."""
+    """Like ``through``, including rays without a return."""
     silent_share: float
-    """As ``clear``, with those that came back from nowhere."""
+    """Like ``clear``, including rays without a return."""
 
     @property
     def is_free(self) -> bool:
-        """Whether they show that nothing stands there."""
+        """Whether the rays show that nothing is there."""
         return self.through >= MIN_RAYS and self.clear >= CLEAR_SHARE
 
     @property
     def is_silent(self) -> bool:
-        """Whether a vehicle there would have to swallow nearly all rays."""
+        """Whether a vehicle there would have to absorb nearly all rays."""
         return self.silent >= _SILENT_RAYS and self.stopped + self.taken < MIN_RAYS
 
     @property
     def is_stopped(self) -> bool:
-        """Whether rays ended there that may be its own."""
+        """Whether rays ended there that may belong to the object."""
         return self.stopped >= MIN_RAYS
 
     @property
     def is_taken(self) -> bool:
-        """Whether all rays that ended there are known to be of something else."""
+        """Whether all rays that ended there belong to other objects."""
         return self.taken >= MIN_RAYS and not self.is_stopped
 
     @property
     def free_share(self) -> float | None:
-        """Of those that reached the place, how many went on; None if too few did."""
+        """Share of the rays reaching the place that passed through; None if too few reached it."""
         if self.through + self.stopped + self.taken >= MIN_RAYS:
             return self.clear
         return self.silent_share if self.silent >= _SILENT_RAYS else None
@@ -127,13 +128,13 @@ class _Beams(NamedTuple):
     """The rings of a sweep."""
 
     slope: F64
-    """(C,) height over distance ahead; NaN of a ring of which too little comes back."""
+    """(C,) height over distance ahead; NaN for a ring with too few returns."""
     step_rad: float
-    """Between two rays of a ring."""
+    """Angle between two rays of a ring."""
 
 
 def rays_to(objects: tuple[FusedObject, ...], sweep: SweepRays) -> dict[int, Rays]:
-    """How the rays towards each object ended that the LiDAR has no cluster of, by its id."""
+    """Where the rays ended towards each object without a LiDAR cluster, by object id."""
     asked = [item for item in objects if not item.seen_by_lidar and item.closest_point is not None and item.distance_m]
     if not asked or not len(sweep.points) or sweep.ground is None:
         return {}
@@ -149,8 +150,8 @@ def rays_to(objects: tuple[FusedObject, ...], sweep: SweepRays) -> dict[int, Ray
 
 
 def _place(item: FusedObject, origin: Point3) -> tuple[float, float, float, float, float]:
-    """Direction from the LiDAR (unit x, y), from how far to how far along it the object may begin, and half the angle
-    that its body takes, as a tangent."""
+    """Direction from the LiDAR (unit x, y), minimum and maximum distance along it at which the object may begin, and
+    the tangent of half the angle that its body covers."""
     assert item.closest_point is not None
     x, y = item.closest_point[0] - origin[0], item.closest_point[1] - origin[1]
     range_m = max(math.hypot(x, y), 0.1)
@@ -193,8 +194,8 @@ def _slopes(points: F32, ring: U8, origin: F64) -> F64:
 
 @numba.njit(cache=True, nogil=True)
 def _count(points, ring, kind, origin, places, slope, step_rad, silent_m):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(K, 6) as ``Rays``, of (K, 7) places: unit x, y, near, far, tangent of half the angle, and the road's height at
-    near and far, all from ``origin``. slope, step_rad: the beams."""
+    """(K, 6) fields of ``Rays`` for (K, 7) places: unit x, y, near, far, tangent of half the angle, and the road's
+    height at near and far, all relative to ``origin``. slope, step_rad: the beams."""
     out = np.zeros((len(places), 6))
     through, stopped = np.zeros((len(places), _MOST_SLICES)), np.zeros((len(places), _MOST_SLICES))
     taken = np.zeros((len(places), _MOST_SLICES))

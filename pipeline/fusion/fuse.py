@@ -23,22 +23,22 @@ from pipeline.types import Box, FusedObject, Gate, LidarTrack, Mask, Point2, Vis
 
 _SURELY_ONE = 0.5
 _KEPT_IOU = 0.2
-"""By so much more must another cluster overlap a box than the one that it was joined with: boxes of a VLP-16's few
-rings and of a network change by as much from frame to frame."""
+"""Another cluster must overlap a box by this much more than the one it was joined with: with a VLP-16's few rings,
+overlaps vary by as much from frame to frame."""
 _TAKES_OVER_HITS = 2
-"""Sightings of a cluster before it may take the place of one that is still there: a spurious one lasts for a sweep."""
+"""Sightings of a cluster before it may replace one that still exists: a spurious cluster lasts for one sweep."""
 
 
 @dataclass(frozen=True)
 class FusionState:
-    """Which fused identity each sensor's track carries, so that an object keeps its number from V to VL to L."""
+    """Object id of each sensor's tracks, so that an object keeps its id when it changes from VL to V or L."""
 
     next_id: int = 1
-    """The number that the next new object gets; numbers are never given twice."""
+    """Id of the next new object; ids are never reused."""
     by_lidar: dict[int, int] = field(default_factory=dict)
-    """Object id of each LiDAR track id, of the last frame."""
+    """Object id of each LiDAR track id, in the last frame."""
     by_vision: dict[int, int] = field(default_factory=dict)
-    """Object id of each camera track id, of the last frame."""
+    """Object id of each camera track id, in the last frame."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ class Fusion:
     """Boxes of the camera tracks in image pixels, by object id."""
 
     def ranged_boxes(self) -> dict[int, tuple[float, float]]:
-        """Distance and its standard deviation by the LiDAR, by id of the vision track, of what both surely see now:
-        boxes that overlap by less than a half may be those of two vehicles, one beside the other."""
+        """LiDAR distance and its standard deviation, by id of the vision track, for objects that both sensors surely
+        see now: boxes that overlap by less than a half may belong to two vehicles side by side."""
         return {
             item.vision_track: (item.distance_m, item.distance_sigma_m)
             for item in self.objects
@@ -66,7 +66,7 @@ class Fusion:
         }
 
     def _overlap(self, number: int) -> float:
-        """IoU of the two boxes of an object that both have; 0 where one has none."""
+        """IoU of an object's two boxes; 0 if one is missing."""
         hit, seen = self.lidar_boxes.get(number), self.vision_boxes.get(number)
         return float(iou_matrix(np.array([hit]), np.array([seen]))[0, 0]) if hit and seen else 0.0
 
@@ -80,21 +80,21 @@ def fuse(
     params: FusionParams,
 ) -> tuple[FusionState, Fusion]:
     """One row per physical object. ``image_size`` is (width, height) in pixels; without it or without an alignment
-    nothing can be compared, and every track keeps a row of its own."""
-    # LiDAR cuboids are projected into the image, where they can be compared with boxes
+    nothing can be compared, and every track gets its own row."""
+    # LiDAR cuboids are projected into the image to compare them with boxes
     corners = corners_of([track.obstacle.cuboid for track in lidar])
     ranges_m, sigmas_m = [range_m(track) for track in lidar], [lidar_sigma_m(track) for track in lidar]
     projected: list[Box | None] = [None] * len(lidar)
     if alignment is not None and image_size is not None:
         projected = project_cuboids(alignment, _to_the_gaps(corners, ranges_m, params), *image_size)
-    # What overlaps, agrees in range and has a plausible size may be joined; the best pairs are
+    # Pairs that overlap, agree in range and have a plausible size may be joined; the best pairs are
     overlap = _overlap(vision, projected)
     were_one = _were_one(state, vision, lidar) & params.keep_partners
     joinable, gates = _gates(overlap, were_one, vision, lidar, ranges_m, sigmas_m, params)
     partner = _assign(overlap + _KEPT_IOU * were_one, joinable, params)
     nearest_of_vision, nearest_of_lidar = _most_overlapping(overlap), _most_overlapping(overlap.T)
 
-    # Every pair, and everything that is alone, is one object, under the id that its tracks had before
+    # Every pair and every unmatched track is one object, under the id that its tracks had before
     pairs: list[tuple[int | None, int | None]] = [(i, partner.get(i)) for i in range(len(vision))]
     claimed = set(partner.values())
     pairs += [(None, j) for j in range(len(lidar)) if j not in claimed]
@@ -107,7 +107,8 @@ def fuse(
     )
     objects = []
     for object_id, (i, j) in zip(ids, pairs, strict=True):
-        # of an object that one sensor has alone: the tests of the partner it overlaps most, which say why it is alone
+        # for an object seen by only one sensor: the tests of the partner with the largest overlap, which explain why
+        # they were not joined
         compared = (i if i is not None else nearest_of_lidar[j or 0], j if j is not None else nearest_of_vision[i or 0])
         tested = gates.get(compared, ())
         seen = vision[i] if i is not None else None
@@ -127,8 +128,8 @@ def fuse(
 def _box_sides(
     vision: tuple[VisionTrack, ...], ranges_m: list[float | None], alignment: Alignment | None
 ) -> dict[int, tuple[Point2, Point2]]:
-    """Vision index → where its box's left and right edge are at its distance, of what the camera sees now. ranges_m: of
-    each, the LiDAR's where it has it."""
+    """Vision index → position of the box's left and right edge at its distance, for boxes seen in this frame. ranges_m:
+    of each box, from the LiDAR if available."""
     seen = [i for i, each in enumerate(vision) if not each.carried and ranges_m[i] is not None]
     if alignment is None or not seen:
         return {}
@@ -142,8 +143,8 @@ def _box_sides(
 
 
 def _to_the_gaps(corners: F64, ranges_m: list[float], params: FusionParams) -> F64:
-    """(M, 8, 3) corners made taller by half the gap between rings at either end: an object's edge lies anywhere between
-    the last ring that hit it and the next one that did not. At 25 m a gap is 0.9 m, half a car."""
+    """(M, 8, 3) corners extended at the top and bottom by half the gap between rings: an object's edge lies anywhere
+    between the last ring that hit it and the next one that did not. At 25 m a gap is 0.9 m, half a car."""
     margin = np.array(ranges_m) * math.tan(math.radians(params.ring_gap_deg / 2))
     taller = corners.copy()
     taller[:, :4, 2] -= margin[:, None]
@@ -173,8 +174,8 @@ def _gates(
     sigmas_m: list[float],
     params: FusionParams,
 ) -> tuple[np.ndarray, dict[tuple[int, int], tuple[Gate, ...]]]:
-    """Which pairs may be one object, and the tests each overlapping pair went through. were_one: as ``_were_one`` gives
-    it. ranges_m, sigmas_m: of the LiDAR tracks."""
+    """Which pairs may be one object, and the tests of each overlapping pair. were_one: as returned by ``_were_one``.
+    ranges_m, sigmas_m: of the LiDAR tracks."""
     is_held = np.any(were_one & np.array([not each.carried for each in lidar], dtype=np.bool_), axis=1).tolist()
     lengths_m = [max(track.obstacle.cuboid.size[:2]) for track in lidar]
     joinable = np.zeros(overlap.shape, dtype=bool)
@@ -183,7 +184,7 @@ def _gates(
     for i, j, iou in zip(rows.tolist(), columns.tolist(), overlap[rows, columns].tolist(), strict=True):
         tests = [Gate("iou", iou, params.min_iou, iou >= params.min_iou)]
         distance, sigma = vision[i].distance_m, vision[i].sigma_m
-        # boxes of nearly one place and size are one object: there it is the height law that errs, not the LiDAR
+        # boxes of nearly the same place and size are one object: then the height law is wrong, not the LiDAR
         doubtful = params.range_gate and iou < params.sure_iou
         if doubtful and distance is not None and sigma is not None:
             gap = abs(distance - ranges_m[j]) / math.hypot(sigma, sigmas_m[j])
@@ -200,7 +201,7 @@ def _gates(
 
 
 def _most_overlapping(overlap: F64) -> list[int]:
-    """For each row the column that it overlaps most, the first of equals; empty where there are no columns."""
+    """For each row, the column with the largest overlap, the first one if several are equal; empty without columns."""
     return overlap.argmax(axis=1).tolist() if overlap.shape[1] else [0] * len(overlap)
 
 
@@ -219,8 +220,8 @@ def _assign(overlap: F64, joinable: np.ndarray, params: FusionParams) -> dict[in
 
 
 def _identities(state: FusionState, keys: list[tuple[int | None, int | None]]) -> tuple[FusionState, list[int]]:
-    """The fused id of each (vision track, LiDAR track) row. A row inherits the oldest identity of its tracks that no
-    other row has taken; pairs choose first, so that a lone fragment never takes a whole object's number."""
+    """The object id of each (vision track, LiDAR track) row. A row inherits the oldest id of its tracks that is not yet
+    taken; pairs choose first, so that a single fragment never takes over the id of a whole object."""
     order = sorted(range(len(keys)), key=lambda k: (None in keys[k], k))
     ids = [0] * len(keys)
     taken: set[int] = set()

@@ -28,52 +28,54 @@ from pipeline.params import FusionParams
 from pipeline.types import I32, VEHICLES, Ground, VisionMeasurement
 
 NEAREST_M = 30.0
-"""By the camera. Nearer vehicles have a cluster, or something hides them."""
+"""Minimum distance, measured by the camera. Closer vehicles have a cluster or are occluded."""
 SIGMA_M = 0.5
-"""Of the nearest point of a vehicle by a few returns. Measured on Astyx beyond 30 m: 80 % between −0.4 and +0.4 m; a
-return of a roof or a flank lies up to 2.5 m further, which is less than σ of the camera's distance there."""
+"""Standard deviation of a vehicle's nearest point measured by a few returns. Measured on Astyx beyond 30 m: 80 %
+between −0.4 and +0.4 m; a return from a roof or flank lies up to 2.5 m farther, which is less than σ of the camera's
+distance there."""
 _EDGE_SHARE = 0.08
-"""Of the box's width, at either side: what a network draws too wide, and the calibration's error of a pixel or two."""
+"""Margin at either side as a share of the box's width: boxes drawn too wide, and calibration errors of a pixel or
+two."""
 _BOTTOM_SHARE = 0.06
 _LOW_M, _HIGH_M = 0.25, 3.5
-"""Heights over the road between which a vehicle returns rays."""
+"""Heights above the road between which a vehicle returns rays."""
 _SIGMAS = 3.0
-"""The range agrees with the camera's within so many standard deviations."""
+"""The range must agree with the camera's within this many standard deviations."""
 _GAP_M = 1.0
-"""Points further apart in range are two things, or two faces of one."""
+"""Points with a larger difference in range belong to two objects, or to two faces of one."""
 _BESIDE_SHARE = 0.6
-"""How far to either side of the box, in widths, a thing that goes on is looked for."""
+"""Search width to either side of the box, in box widths, for a structure that continues beyond the box."""
 _SAME_RANGE_M, _SAME_HEIGHT_DEG = 1.5, 1.0
 _CLEARLY = 1.0
-"""By how much, in log-likelihood, the best group beats the second."""
+"""Minimum difference of log-likelihood between the best and the second-best group."""
 
 
 class SweepReturns(SweepRays, Protocol):
-    """A segmented sweep, as far as single points matter."""
+    """A segmented sweep, with the parts needed to evaluate single points."""
 
     @property
     def kind(self) -> I32:
-        """(N,) what each point was taken for: ≥ 0 a cluster, −1 ground."""
+        """(N,) classification of each point: ≥ 0 a cluster, −1 ground."""
         ...
 
 
 class _Points(NamedTuple):
-    """What of a sweep is far and above the road."""
+    """The far points of a sweep that are above the road."""
 
     uv: F64
     range_m: F64
     """Horizontal, from the ego origin."""
     elevation_deg: F64
-    """From the sensor."""
+    """Elevation seen from the sensor."""
     clustered: np.ndarray
 
 
 class _Group(NamedTuple):
-    """Points of about one range inside a box."""
+    """Points at about one range inside a box."""
 
     rows: np.ndarray
     fit: float
-    """Log-likelihood that they are the vehicle's."""
+    """Log-likelihood that the points belong to the vehicle."""
 
 
 def range_boxes(
@@ -82,7 +84,7 @@ def range_boxes(
     alignment: Alignment | None,
     params: FusionParams,
 ) -> tuple[VisionMeasurement, ...] | None:
-    """The boxes, those of far vehicles with ``ranged_m`` and ``returns`` where the sweep holds returns of them."""
+    """The boxes; those of far vehicles get ``ranged_m`` and ``returns`` if the sweep contains returns from them."""
     if not params.single_returns or not boxes or alignment is None or sweep.ground is None:
         return boxes
     asked = [each.detection.label in VEHICLES and (each.distance_m or 0.0) >= NEAREST_M for each in boxes]
@@ -110,7 +112,7 @@ def _ranged(seen: VisionMeasurement, points: _Points) -> VisionMeasurement:
     side, bottom, share = _EDGE_SHARE * (x2 - x1), _BOTTOM_SHARE * (y2 - y1), seen.sigma_m / seen.distance_m
     u, v = points.uv[:, 0], points.uv[:, 1]
     off = np.log(points.range_m / seen.distance_m) / share
-    with np.errstate(invalid="ignore"):  # what lies behind the camera has no pixel
+    with np.errstate(invalid="ignore"):  # points behind the camera have no pixel
         inside = (u > x1 + side) & (u < x2 - side) & (v > y1) & (v < y2 - bottom) & (np.abs(off) < _SIGMAS)
     rows = np.flatnonzero(inside)
     if not len(rows):
@@ -128,8 +130,8 @@ def _ranged(seen: VisionMeasurement, points: _Points) -> VisionMeasurement:
 
 
 def _goes_on(points: _Points, group: np.ndarray, box: tuple[float, float]) -> bool:
-    """Whether the thing that a group belongs to goes on at both sides of the box (left and right edge, pixels), at the
-    same range and about the same height."""
+    """Whether the structure that a group belongs to continues on both sides of the box (left and right edge, pixels),
+    at the same range and about the same height."""
     x1, x2 = box
     reach = _BESIDE_SHARE * (x2 - x1)
     range_m, low, high = points.range_m[group[0]], points.elevation_deg[group].min(), points.elevation_deg[group].max()

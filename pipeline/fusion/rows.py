@@ -9,8 +9,9 @@ from pipeline.fusion.vehicle_sizes import usual_size_m
 from pipeline.types import Box, FusedObject, Gate, LidarTrack, Point2, VisionTrack
 
 LIDAR_RANGE_SIGMA_M = 0.2
-"""Of a cluster's nearest point as the vehicle's nearest point: the VLP-16's ±3 cm, and where its beams fall on
-a bumper and a grille. Measured against the nearest corner of 400 labelled vehicles: 90 % within 0.3 to 0.5 m."""
+"""Standard deviation of a cluster's nearest point as an estimate of the vehicle's nearest point: the VLP-16's ±3 cm,
+plus where its beams hit the bumper and grille. Compared with the nearest corner of 400 labelled vehicles: 90 % within
+0.3 to 0.5 m."""
 
 CARRIED_SPEED_SIGMA_MPS, CARRIED_ACCEL_SIGMA_MPS2 = 0.5, 3.0
 
@@ -34,8 +35,8 @@ _UNKNOWN = FusedObject(
     lidar_track=None,
     vision_track=None,
 )
-"""Of which nothing is known: every row is made from it, because ``evolve`` takes a quarter of the time of a frozen
-record's ``__init__``."""
+"""A row with all fields unknown. Every row is derived from it, because ``evolve`` takes a quarter of the time of a
+frozen record's ``__init__``."""
 
 
 def hit_row(
@@ -48,7 +49,8 @@ def hit_row(
     sigma_m: float,
     gates: tuple[Gate, ...],
 ) -> FusedObject:
-    """Table 3 of what the LiDAR has: place, distance and velocity are its own, the type is the camera's."""
+    """Table 3 for an object seen by the LiDAR: position, distance and velocity are from the LiDAR, the class is from
+    the camera."""
     row = evolve(
         _UNKNOWN,
         id=object_id,
@@ -78,8 +80,8 @@ def hit_row(
         label=seen.label,
         score=seen.score,
         bbox=box if box is not None else seen.bbox,
-        # for the one frame in which the LiDAR has just found what the camera follows the velocity is the camera's:
-        # whoever brakes for it must not lose its speed then
+        # in the one frame in which the LiDAR finds an object that the camera already follows, the velocity is the
+        # camera's, so that braking for it does not lose its speed
         velocity_mps=hit.velocity_mps if hit.velocity_mps is not None else seen.velocity_mps,
         seen_by=row.seen_by if seen.carried else "V" if hit.carried else "VL",
         hits=max(hit.hits, seen.hits),
@@ -89,7 +91,7 @@ def hit_row(
 
 
 def box_row(object_id: int, seen: VisionTrack, gates: tuple[Gate, ...]) -> FusedObject:
-    """Table 3 of what the camera alone has."""
+    """Table 3 for an object seen only by the camera."""
     place = seen.position
     return evolve(
         _UNKNOWN,
@@ -121,16 +123,16 @@ def range_m(track: LidarTrack) -> float:
 
 
 def _typical_footprint(near_face: Point2, label: str) -> Quad:
-    """A rectangle of a class's usual size behind a measured nearest face. Its turn is not known: vehicles ahead are
-    drawn along ego x."""
+    """A rectangle of a class's usual size behind a measured nearest face. Its orientation is unknown: vehicles ahead
+    are drawn along ego x."""
     length, width, _ = usual_size_m(label)
     x, y = near_face
     return (x + length, y + width / 2), (x + length, y - width / 2), (x, y - width / 2), (x, y + width / 2)
 
 
 def lidar_sigma_m(track: LidarTrack) -> float:
-    """Standard deviation of a LiDAR track's distance. It grows while the track is carried, by what the tracked speed
-    may be off and by what the object may do meanwhile."""
+    """Standard deviation of a LiDAR track's distance. It grows while the track is carried, due to the error of the
+    tracked speed and possible manoeuvres of the object."""
     drift_m = CARRIED_SPEED_SIGMA_MPS * track.unseen_s + CARRIED_ACCEL_SIGMA_MPS2 * track.unseen_s**2 / 2
     return math.hypot(LIDAR_RANGE_SIGMA_M, drift_m)
 

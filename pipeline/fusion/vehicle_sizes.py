@@ -14,7 +14,7 @@ USUAL_SIZE_M: dict[str, tuple[float, float, float]] = {
 
 
 def usual_size_m(label: str) -> tuple[float, float, float]:
-    """Length, width, height of a class; what is none of them counts as a car."""
+    """Length, width, height of a class; unknown classes count as a car."""
     return USUAL_SIZE_M.get(label, USUAL_SIZE_M["car"])
 
 
@@ -26,7 +26,7 @@ LARGEST_SIZE_M: dict[str, tuple[float, float, float]] = {
     "bicycle": (3.0, 1.3, 2.3),
     "person": (2.0, 1.5, 2.3),
 }
-"""Length, width, height of the largest of a class, with half a metre or more of length for the noise of a cluster: the
+"""Length, width, height of the largest vehicles of a class, with half a metre or more of length for cluster noise: the
 longest vans, which detectors call cars (7.4 m), lorries with a trailer (18.75 m long, 2.6 m wide without mirrors, 4 m
 tall, Directive 96/53/EC), tandems, cargo bicycles."""
 
@@ -34,5 +34,5 @@ LONGEST_M: dict[str, float] = {label: size[0] for label, size in LARGEST_SIZE_M.
 
 
 def largest_size_m(label: str) -> tuple[float, float, float]:
-    """Length, width, height of the largest of a class; what is none of them counts as a car."""
+    """Length, width, height of the largest vehicles of a class; unknown classes count as a car."""
     return LARGEST_SIZE_M.get(label, LARGEST_SIZE_M["car"])

@@ -18,13 +18,15 @@ from pipeline.types import U8, CameraCalibration, RawLanes
 NAME = "classical"
 _NOTE = "Lane lines by colour and gradient (classical), without a network"
 _CAMERA_HEIGHT_M = 1.4
-"""Of a camera behind a windshield; a tenth more or less changes the expected width of paint by as much."""
+"""Height of a camera behind a windshield; a deviation of 10 % changes the expected width of paint by the same
+amount."""
 _PAINT_WIDTH_M = 0.15
 _ROWS = 90
 _BELOW_HORIZON, _ABOVE_EDGE = 0.03, 0.02
-"""Shares of the image's height left out below the horizon and above the lower edge."""
+"""Shares of the image's height that are ignored below the horizon and above the lower edge."""
 _MIN_CONTRAST, _FULL_CONTRAST = 9.0, 60.0
-"""Grey levels by which paint must be brighter than both sides, and by which it is surely paint."""
+"""Minimum brightness difference between paint and both sides in grey levels, and the difference from which it is
+certainly paint."""
 _PER_ROW = 12
 
 
@@ -33,14 +35,14 @@ class ClassicalLanes:
     """The detector for images of one camera."""
 
     name: str
-    """Key of caches; equal names give equal points."""
+    """Cache key; equal names give equal points."""
     horizon: float
-    """Row of the horizon as a share of the image's height; nothing above it is searched."""
+    """Row of the horizon as a share of the image's height; only rows below it are searched."""
     notes: tuple[str, ...] = (_NOTE,)
     """Shown with every result."""
 
     def detect(self, bgr: U8) -> RawLanes:
-        """Centres of what may be paint, in some ninety rows of an image (H, W, 3) uint8; not grouped to lines."""
+        """Centres of possible paint in some ninety rows of an image (H, W, 3) uint8; not grouped into lines."""
         height, width = bgr.shape[:2]
         horizon_px = self.horizon * height
         rows = np.linspace(horizon_px + _BELOW_HORIZON * height, (1.0 - _ABOVE_EDGE) * height - 2, _ROWS)
@@ -53,21 +55,23 @@ class ClassicalLanes:
 
 
 def open_classical(camera: CameraCalibration | None) -> ClassicalLanes:
-    """For the images of a calibrated camera, or of an unknown one on a dashboard."""
+    """The detector for images of a calibrated camera, or of an unknown dashboard camera."""
     horizon = horizon_share(camera)
     return ClassicalLanes(NAME if camera is None else f"{NAME}-{horizon:.3f}", horizon)
 
 
 @numba.njit(cache=True, nogil=True)
 def _paint(bgr, rows, paint_px, min_contrast, full_contrast):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """For each row, the places whose band of paint's width is brighter (or yellower) than the bands beside it."""
+    """For each row, the positions of bands with the width of paint that are brighter (or yellower) than the bands
+    beside them."""
     columns = bgr.shape[1]
     points, scores = np.empty((len(rows) * _PER_ROW, 2), np.float32), np.empty(len(rows) * _PER_ROW, np.float32)
     bright, yellow = np.zeros(columns + 1), np.zeros(columns + 1)
     contrast = np.zeros(columns)
     count = 0
     for k in range(len(rows)):
-        for u in range(columns):  # sums along the row, of three rows together: less noise, any band's mean at once
+        # prefix sums along the row, over three rows: less noise, and the mean of any band in O(1)
+        for u in range(columns):
             light = colour = 0.0
             for v in range(rows[k] - 1, rows[k] + 2):
                 blue, green, red = float(bgr[v, u, 0]), float(bgr[v, u, 1]), float(bgr[v, u, 2])
@@ -87,7 +91,7 @@ def _paint(bgr, rows, paint_px, min_contrast, full_contrast):  # type: ignore[no
                 left = (total[u - half - gap] - total[u - half - gap - band]) / band
                 right = (total[u + half + gap + band + 1] - total[u + half + gap + 1]) / band
                 over = middle - max(left, right)
-                if over > abs(left - right):  # a step, such as a shadow's edge, is no band
+                if over > abs(left - right):  # a step, such as a shadow's edge, is not a band
                     best = max(best, over)
             contrast[u] = best
         found = 0

@@ -13,13 +13,14 @@ _DRAWN_FROM_M = 1.0
 
 
 def polylines(lane: EgoLane) -> dict[str, F64]:
-    """``left`` and ``right`` as (K, 2) ego x, y every metre as far as paint supports them; (0, 2) without a line."""
+    """``left`` and ``right`` as (K, 2) ego x, y, one point per metre where paint supports them; (0, 2) without a
+    line."""
     return {"left": _polyline(lane.left), "right": _polyline(lane.right)}
 
 
 def in_image(lane: EgoLane, aligned: Alignment) -> dict[str, F64]:
     """``left`` and ``right`` as (K, 2) pixels u, v where the lines were seen, NaN behind the camera. The alignment does
-    not know of the pitch, so each point is put where the pitch made it seem to be."""
+    not include the estimated pitch, so each point is moved to where it appears with this pitch."""
     plane = lane.plane
     eye, _ = aligned.rays(np.zeros((0, 2)))
     height_m = float(eye[2] - (plane[0] * eye[0] + plane[1] * eye[1] + plane[2]))

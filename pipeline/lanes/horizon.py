@@ -8,15 +8,15 @@ from pipeline.common.geometry import F64
 from pipeline.types import CameraCalibration
 
 _UNCALIBRATED = 0.57
-"""Share of the image's height at which a dashboard camera sees it, where no calibration says it."""
+"""Row of the horizon as a share of the image's height, for an uncalibrated dashboard camera."""
 
 
 def horizon_row(camera: CameraCalibration) -> float:
-    """The row in which ego +x vanishes, pixels; lens distortion is small there and left out."""
+    """The row in which ego +x vanishes, pixels; lens distortion is small there and neglected."""
     forward: F64 = camera.T_camera_ego[:3, :3] @ np.array([1.0, 0.0, 0.0])
     return float(camera.K[1, 1] * forward[1] / forward[2] + camera.K[1, 2])
 
 
 def horizon_share(camera: CameraCalibration | None) -> float:
-    """The same as a share of the image's height; of an unknown camera that of one on a dashboard."""
+    """The same as a share of the image's height; for an unknown camera, that of a dashboard camera."""
     return horizon_row(camera) / camera.height if camera is not None else _UNCALIBRATED

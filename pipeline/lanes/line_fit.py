@@ -25,61 +25,61 @@ _NEAREST_M, _VOTE_REACH_M, _FARTHEST_M = 2.5, 32.0, 90.0
 _BIN_M, _BINS = 0.2, 90
 """Lateral histogram at x = 0: ±9 m."""
 _PEAK_GAP_M = 1.2
-"""Two lines of one road are not nearer; a double line is one."""
+"""Minimum distance between two lines of one road; a double line counts as one."""
 _MAX_LINES = 6
 _VOTED_POINTS = 220
 _WIDE_GATE_M, _GATE_PER_M = 0.35, 0.012
 _PAINT_SIGMA_M = 0.05
 _LAST_GATE = 0.5
-"""The gate narrows to this share over the rounds, as the line settles onto its points."""
+"""The gate shrinks to this share over the rounds, as the line converges to its points."""
 _AROUND = 2.5
 _BY_CHANCE = 1.0 / _AROUND
-"""Points within this many gates are looked at; of clutter spread evenly over them such a share lies within the gate."""
+"""Points within this many gates are considered; of evenly distributed clutter, this share lies within the gate."""
 _SHARED_ERROR = 4.0
-"""Points of neighbouring rows err together: this many count as one."""
+"""Errors of points in neighbouring rows are correlated: this many count as one."""
 _COVER_FROM_M, _COVER_STEP_M, _COVER_BINS = 4.0, 2.0, 12
 _ENOUGH_POINTS = 14
 _ENOUGH_COVER = 5.0
-"""Pieces of 2 m with paint in them that make a line sure; a broken line of 3 m in 12 m has about as many to 28 m."""
+"""Number of 2 m segments with paint for a certain line; a broken line of 3 m in 12 m has about as many up to 28 m."""
 
 
 @dataclass(frozen=True, eq=False)
 class RoadCurve:
-    """What the lines of a road share, and how far each value is searched around its start."""
+    """Shape shared by all lines of a road, and the search range of each value."""
 
     heading_rad: float = 0.0
-    """Of the road against the car, positive to the left."""
+    """Heading of the road relative to the car, positive to the left."""
     curvature_per_m: float = 0.0
     """1/radius, positive to the left."""
     pitch_rad: float = 0.0
-    """Of the camera against its calibration, positive downwards."""
+    """Pitch of the camera relative to its calibration, positive downwards."""
     heading_reach_rad: float = 0.12
     """Search range to either side."""
     curvature_reach_per_m: float = 1.0 / 120.0
-    """Search range to either side: radii down to 120 m at first."""
+    """Search range to either side: initially down to a radius of 120 m."""
     pitch_reach_rad: float = 0.03
     """Search range to either side."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedLine:
-    """y(x) of one line, from the foot of the camera."""
+    """y(x) of one line, relative to the foot of the camera."""
 
     coefficients: F64
     """(4,) of y = c0 + c1 x + c2 x² + c3 x³, metres."""
     covariance: F64
     """(4, 4) of the coefficients."""
     x_min_m: float
-    """Nearest point that the fit rests on."""
+    """Nearest point used by the fit."""
     x_max_m: float
-    """Farthest such point."""
+    """Farthest point used by the fit."""
     quality: float
     """0–1."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """Points of an image on the road."""
+    """Points of an image, projected to the road."""
 
     slope: F64
     """(M,) float64 y/x; see this module's docstring."""
@@ -88,18 +88,18 @@ class Sightings:
     weight: F64
     """(M,) float64, 0–1."""
     height_m: float
-    """Of the camera over the road."""
+    """Height of the camera above the road."""
 
     def only(self, picked: Picked) -> Sightings:
         return Sightings(self.slope[picked], self.inverse[picked], self.weight[picked], self.height_m)
 
     def x_m(self, pitch_rad: float) -> F64:
-        """(M,) metres ahead under a pitch."""
+        """(M,) metres ahead for a given pitch."""
         return 1.0 / (self.inverse + pitch_rad / self.height_m)
 
 
 def shared_shape(seen: Sightings, around: RoadCurve) -> tuple[RoadCurve, F64]:
-    """The shape under which the points gather most sharply into lines, and their lateral histogram (90,) there."""
+    """The shape for which the points concentrate most sharply into lines, and their lateral histogram (90,) for it."""
     if len(seen.slope) > _VOTED_POINTS:
         seen = seen.only(np.linspace(0, len(seen.slope) - 1, _VOTED_POINTS).astype(np.int64))
     headings = _grid(around.heading_rad, around.heading_reach_rad, 0.015)
@@ -110,7 +110,8 @@ def shared_shape(seen: Sightings, around: RoadCurve) -> tuple[RoadCurve, F64]:
 
 
 def peaks(histogram: F64) -> list[float]:
-    """Lateral places (metres at x = 0, from the foot of the camera) where the histogram has lines, strongest first."""
+    """Lateral positions (metres at x = 0, from the foot of the camera) of the peaks in the histogram, strongest
+    first."""
     smooth = np.convolve(histogram, (0.5, 1.0, 0.5), mode="same")
     found: list[float] = []
     for place in np.argsort(-smooth, kind="stable").tolist():
@@ -125,8 +126,8 @@ def peaks(histogram: F64) -> list[float]:
 def fit_line(
     seen: Sightings, y0_m: float, shape: RoadCurve, bearing_sigma_rad: float, rounds: int = 3
 ) -> FittedLine | None:
-    """The line near ``y0_m``, of about the shared shape, through the points around it; None with too few. rounds: of
-    weighing the points anew."""
+    """The line near ``y0_m``, of about the shared shape, through the points around it; None with too few points.
+    rounds: number of re-weighting rounds."""
     prior = np.array([y0_m, shape.heading_rad, shape.curvature_per_m / 2.0, 0.0])
     x = seen.x_m(shape.pitch_rad)
     ok, mean, cov, x_min, x_max, quality = _fit(
@@ -136,25 +137,26 @@ def fit_line(
 
 
 _PRIOR_INFO = 1.0 / np.array([1.0, 0.03, 1.5e-3, 1e-5]) ** 2
-"""How far one line may differ from the shape that all share: place, heading, half a curvature, its change."""
+"""Permitted deviation of one line from the shared shape: position, heading, half the curvature, its change."""
 
 
 def _grid(middle: float, reach: float, step: float) -> F64:
-    count = int(reach / step + 1e-6)  # what is known to less than a step is left to the fit
+    count = int(reach / step + 1e-6)  # values known better than one step are left to the fit
     return np.asarray(middle + step * np.arange(-count, count + 1), np.float64)
 
 
 @numba.njit(cache=True, nogil=True)
 def _vote(slope, inverse, weight, height, headings, bends, pitches):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Sharpness of the lateral histogram under each hypothesis; the hypotheses in the middle win a tie."""
+    """Sharpness of the lateral histogram for each hypothesis; ties are won by the hypotheses in the middle."""
     best_score = -1.0
     best, best_histogram = np.zeros(3), np.zeros(_BINS)
     x, y, w = np.empty(len(slope)), np.empty(len(slope)), np.empty(len(slope))
     voters, count = np.empty(len(slope), np.int64), 0
-    for i in range(len(slope)):  # the same ones for every pitch: one that lets more of them in would seem sharper
+    for i in range(len(slope)):  # the same points for every pitch: a pitch that includes more points would seem sharper
         shifted = inverse[i] + pitches[len(pitches) // 2] / height
         if shifted > 1.0 / _VOTE_REACH_M and shifted < 1.0 / _NEAREST_M:
-            w[count] = weight[i] * min(1.0 / shifted, 20.0)  # rows lie dense near the car: metres count, not rows
+            # rows are dense near the car, so weight by metres instead of rows
+            w[count] = weight[i] * min(1.0 / shifted, 20.0)
             voters[count] = i
             count += 1
     for pitch in pitches:
@@ -185,7 +187,7 @@ def _vote(slope, inverse, weight, height, headings, bends, pitches):  # type: ig
 
 @numba.njit(cache=True, nogil=True)
 def _fit(x, y, slope, weight, prior, prior_info, height, bearing_sigma, rounds):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Re-weighted least squares with a prior, in x/10 so that the normal matrix is well conditioned."""
+    """Iteratively re-weighted least squares with a prior, in x/10 so that the normal matrix is well conditioned."""
     mean, cov, info = prior.copy(), np.zeros((4, 4)), np.zeros((4, 4))
     scale = np.array([1.0, 0.1, 0.01, 0.001])
     covered = np.zeros(_COVER_BINS)
@@ -194,7 +196,7 @@ def _fit(x, y, slope, weight, prior, prior_info, height, bearing_sigma, rounds):
     count = 0
     for turn in range(rounds):
         narrow = 1.0 - (1.0 - _LAST_GATE) * turn / max(rounds - 1, 1)
-        sums, right = np.zeros(7), np.zeros(4)  # of the powers of x/10 up to 6: a Hankel matrix holds no more
+        sums, right = np.zeros(7), np.zeros(4)  # sums of the powers of x/10 up to 6, which define the Hankel matrix
         covered[:] = 0.0
         x_min, x_max = 1e9, 0.0
         near = inside = score = 0.0

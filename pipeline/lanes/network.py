@@ -28,11 +28,11 @@ from pipeline.lanes.horizon import horizon_share
 from pipeline.types import F32, U8, CameraCalibration, RawLanes
 
 _FREE_SIZE: Size = (360, 640)
-"""Input (height, width) of a graph of free size: that of the BDD100K networks."""
+"""Input (height, width) for a graph with free size: that of the BDD100K networks."""
 _PADDING = 114
 _MIN_SCORE = 0.3
 _MOST_SKY = 0.6
-"""More of an image than this is never cut off, whatever its calibration says."""
+"""At most this share of an image is cut off as sky, whatever its calibration says."""
 
 
 @dataclass(frozen=True)
@@ -40,19 +40,19 @@ class LaneNetwork:
     """A loaded lane network."""
 
     name: str
-    """File and digest, so that equal names give equal points: the key of caches."""
+    """File and digest; equal names give equal points, so this is used as cache key."""
     providers: tuple[str, ...]
     """ONNX Runtime's execution providers in use."""
     input_size: Size
     """Height, width in pixels."""
     head: LaneHead
-    """How its outputs are read."""
+    """How its outputs are decoded."""
     notes: tuple[str, ...]
-    """What there is to say about it with every result."""
+    """Notes for the user, added to every result."""
     threads: int
-    """Threads that one image is computed with."""
+    """Number of threads per image."""
     horizon: float
-    """Where the camera sees the horizon, as a share of its image's height."""
+    """Row of the horizon in the camera's image, as a share of its height."""
     sha256: str
     """Of the file."""
     _session: ort.InferenceSession = field(repr=False, compare=False)
@@ -60,19 +60,19 @@ class LaneNetwork:
     def detect(self, bgr: U8) -> RawLanes:
         """Points on lines in an image (H, W, 3) uint8, in its pixels.
 
-        DetectorError for an array that is no such image or a network that fails on it.
+        DetectorError for an array that is not such an image, or if the network fails on it.
         """
         check_image(bgr)
         placed = _placed((bgr.shape[0], bgr.shape[1]), self.input_size, self.head, self.horizon)
         found = self.head.points(run_session(self._session, self._blob(bgr, placed)))
         keep = found.score >= _MIN_SCORE
         uv = found.uv[keep] * (self.input_size[1], self.input_size[0])
-        uv = (uv - placed.shift) / placed.scale + (0.0, placed.top) - 0.5  # whole numbers are the middles of pixels
+        uv = (uv - placed.shift) / placed.scale + (0.0, placed.top) - 0.5  # integers are pixel centres
         inside = np.all((uv >= 0.0) & (uv <= (bgr.shape[1] - 1, bgr.shape[0] - 1)), axis=1)
         return RawLanes(self.name, uv[inside].astype(np.float32), found.score[keep][inside], found.line[keep][inside])
 
     def _blob(self, bgr: U8, placed: _Placed) -> F32:
-        """(1, 3, h, w) float32 as the network takes it."""
+        """(1, 3, h, w) float32, the network's input."""
         height, width = placed.size
         resized = cv2.resize(bgr[placed.top :], (width, height), interpolation=cv2.INTER_LINEAR)
         if (height, width) != self.input_size:
@@ -87,7 +87,8 @@ class LaneNetwork:
 
 @dataclass(frozen=True)
 class _Placed:
-    """Where an image lies in the input: its rows from ``top`` on, scaled (x, y), its corner at ``shift`` (x, y)."""
+    """Placement of an image in the input: its rows from ``top`` on, scaled by (x, y), with its corner at ``shift`` (x,
+    y)."""
 
     top: int
     size: Size
@@ -96,10 +97,10 @@ class _Placed:
 
 
 def open_lane_network(spec: str | None, threads: int = 2, camera: CameraCalibration | None = None) -> LaneNetwork:
-    """Load a lane network by name or path; None: the default one (``pipeline.inference.model_registry``). camera: of
-    the images; None where it is not known.
+    """Load a lane network by name or path; None: the default one (``pipeline.inference.model_registry``). camera:
+    camera of the images; None if it is not known.
 
-    DetectorMissing when there is no file, DetectorError when the file is not a lane network that can be run.
+    DetectorMissing if there is no file, DetectorError if the file is not a lane network that can be run.
     """
     path = find_graph(spec, "lanes")
     if path is None:
@@ -112,7 +113,7 @@ def open_lane_network(spec: str | None, threads: int = 2, camera: CameraCalibrat
 
 
 def _loaded(path: Path, threads: int, horizon: float) -> LaneNetwork:
-    """The network, proven by a run on a grey image."""
+    """The network, tested by running it on a grey image."""
     model = with_empty_masks(read_graph(path))
     try:
         own = input_size(model)

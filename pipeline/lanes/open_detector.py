@@ -12,26 +12,26 @@ from pipeline.types import CameraCalibration
 
 OFF = "off"
 _NETWORK_EVERY, _NETWORK_EVERY_S = 3, 0.3
-"""On a CPU a network takes longer than a frame lasts. In between, its lines are carried on by own motion, but not for
-longer than this: in a recording with few frames a second it looks at more of them."""
+"""On a CPU, a network takes longer than a frame interval. In between, its lines are moved by own motion, but no longer
+than this time: at low frame rates it runs on more of the frames."""
 LaneDetector = LaneNetwork | ClassicalLanes
 _REMEDY = "; for real roads pull a network with `cipv models pull twinlitenet`"
 
 
 def usual_every(lanes: object, rate_hz: float) -> int:
-    """The default of ``Detectors.lanes_every`` at ``rate_hz`` frames a second: every how many frames a lane detector
-    looks at the image."""
+    """The default of ``Detectors.lanes_every`` at ``rate_hz`` frames per second: a lane detector runs on every n-th
+    frame."""
     if not isinstance(lanes, LaneNetwork):
         return 1
     return max(1, min(_NETWORK_EVERY, int(_NETWORK_EVERY_S * rate_hz + 1e-6)))
 
 
 def open_lanes(spec: str | None, camera: CameraCalibration | None, drawn: bool = False) -> LaneDetector | None:
-    """The named lane detector: a network's name or file, ``classical``, or ``off``, which is none. Without a name: the
-    default network if one is here, except for drawn images, whose paint the classical one sees as well at a tenth of
-    the cost. camera: of the images; None where it is not known.
+    """The named lane detector: a network's name or file, ``classical``, or ``off`` for none. Without a name: the
+    default network if it is installed, except for rendered images, in which the classical one finds the paint as well
+    at a tenth of the cost. camera: camera of the images; None if it is not known.
 
-    DetectorMissing when the named one is not here, DetectorError when it cannot be run.
+    DetectorMissing if the named one is not installed, DetectorError if it cannot be run.
     """
     if spec == OFF:
         return None

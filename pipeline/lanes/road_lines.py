@@ -31,28 +31,30 @@ Seed = tuple[float, Sightings]
 
 _MIN_POINTS = 12
 _NEAR_M, _FAR_M = 5.0, 12.0
-"""Where the road's height is read from the LiDAR's ground: its rings are dense there."""
+"""Range in which the road's height is taken from the LiDAR's ground: its rings are dense there."""
 _PLANE_GAIN = 0.1
-"""Weight of one sweep in the road's plane: one fit errs by centimetres, and the car's pitch changes slowly."""
+"""Weight of one sweep in the running mean of the road's plane: one fit has an error of centimetres, and the car's pitch
+changes slowly."""
 _UNPARALLEL = 0.004
-"""Real lines of one road differ this much in heading, radians."""
+"""Real lines of one road differ in heading by this much, radians."""
 _HEADING_AT_M = 15.0
 _HEADING = np.array([0.0, 1.0, 2.0 * _HEADING_AT_M, 3.0 * _HEADING_AT_M**2])
-"""A line's slope dy/dx there, of its coefficients."""
+"""Derivative dy/dx of a line there, as a function of its coefficients."""
 _FLATNESS_RAD = 0.003
-"""A road that bends up or down ahead looks like this much pitch."""
+"""A vertical curve of the road ahead appears as this much pitch."""
 _STRAY_M = 9.0
 """Lines farther to the side are ignored."""
 _HOPELESS = 0.05
 _BEYOND = 0.6
-"""Points that seem farther than ``max_range_m`` may be nearer under another pitch: this much of the inverse."""
+"""Points beyond ``max_range_m`` may be nearer with another pitch, so points are kept down to this share of its
+inverse."""
 _COMPARED = powers(10.0)
 _APART_M = 0.6
 
 
 @dataclass(frozen=True)
 class Pitch:
-    """The camera's pitch against its calibration."""
+    """The camera's pitch relative to its calibration."""
 
     rad: float
     """Positive downwards."""
@@ -62,54 +64,54 @@ class Pitch:
 
 @dataclass(frozen=True, eq=False)
 class LaneMeasurement:
-    """The lines of one image in the ego frame, strongest first, and the pitch under which they were mapped."""
+    """The lines of one image in the ego frame, strongest first, and the pitch used to map them."""
 
     source: str
     """Name of the detector."""
     lines: tuple[FittedLine, ...]
     """Strongest first."""
     pitch: Pitch
-    """Under which the lines were mapped to the ground."""
+    """Pitch used to map the lines to the ground."""
 
 
 @dataclass(frozen=True, eq=False)
 class LaneState:
-    """What one frame leaves to the next."""
+    """State from one frame to the next."""
 
     tracks: tracking.LaneTracks = tracking.LaneTracks()
     """Every tracked line."""
     pitch: Pitch | None = None
-    """The camera's pitch as estimated so far; None before the first frame."""
+    """Current estimate of the camera's pitch; None before the first frame."""
     plane: F64 | None = None
-    """(3,) a, b, c of the road z = a·x + b·y + c, a running mean over the sweeps that showed it; None before one
-    did."""
+    """(3,) a, b, c of the road z = a·x + b·y + c, a running mean over the sweeps in which it was visible; None before
+    the first of them."""
     sweeps: int = 0
-    """How many sweeps showed it."""
+    """Number of sweeps in which it was visible."""
 
 
 class RoadView(NamedTuple):
-    """How the road lies in one image."""
+    """Geometry of the road in one image."""
 
     aligned: Alignment | None
-    """Where ego points fall in the image; None: not known, and nothing can be measured."""
+    """Projection of ego points into the image; None if not known, and nothing can be measured."""
     ground: Ground | None = None
     """The ground of this frame's sweep, if any."""
     road_z_m: float | None = None
-    """The road below the car in the ego frame, as the calibration has it; None: as the parameter has it."""
+    """Height of the road below the car in the ego frame, from the calibration; None to use the parameter."""
     vehicles: Sequence[Box] = ()
-    """Boxes in the image, pixels, that hide the road."""
+    """Image boxes of vehicles that hide the road, pixels."""
 
 
 def follow(
     state: LaneState, raw: RawLanes | None, view: RoadView, now: Moment, params: LaneParams
 ) -> tuple[LaneState, EgoLane | None]:
-    """One frame: measure if a lane detector has looked at it, and track. None until one has."""
-    # The road: the plane that the LiDAR's ground shows, else as far below as calibration or parameter say
+    """One frame: measure if a lane detector has processed it, and track. None before the first measurement."""
+    # The road: the plane of the LiDAR's ground, else the height from calibration or parameter
     plane, sweeps = _settled(state, road_plane(view.ground))
     level_m = view.road_z_m if view.road_z_m is not None else -params.mount_height_m
     road = plane if plane is not None else np.array([0.0, 0.0, level_m])
 
-    # An image that a detector looked at gives lines on the road, and the pitch that makes them parallel
+    # A processed image gives lines on the road, and the pitch for which they are parallel
     pitch = _drifted(state.pitch, now.dt_s, params)
     measured = None
     if raw is not None and view.aligned is not None:
@@ -117,7 +119,7 @@ def follow(
         measured = measure(_beside(raw, view.vehicles), view.aligned, road, pitch, params, expected)
         pitch = measured.pitch
 
-    # Every line is tracked; the ego lane is the pair of them that the car is between
+    # Every line is tracked; the ego lane is the pair of lines around the car
     tracks = tracking.predict(state.tracks, now.ego, now.dt_s, params)
     if measured is not None:
         tracks = tracking.update(tracks, measured.source, measured.lines, params)
@@ -128,10 +130,10 @@ def follow(
 def measure(
     raw: RawLanes, aligned: Alignment, plane: F64, pitch: Pitch, params: LaneParams, expected: RoadCurve | None = None
 ) -> LaneMeasurement:
-    """Lines on the road from points in the image; none where too few points lie on it.
+    """Lines on the road from points in the image; none if too few points lie on it.
 
-    plane: (3,) as in ``LaneState``. pitch: as believed before this image. expected: the shape of the tracked lines,
-    around which the search is then narrow; None searches wide.
+    plane: (3,) as in ``LaneState``. pitch: estimate before this image. expected: the shape of the tracked lines, which
+    narrows the search; None for a wide search.
     """
     nothing = LaneMeasurement(raw.model, (), pitch)
     eye, rays = aligned.rays(np.asarray(raw.points, np.float64))
@@ -156,7 +158,7 @@ def measure(
 
 
 def _beside(raw: RawLanes, vehicles: Sequence[Box]) -> RawLanes:
-    """Without the points on vehicles: their edges and reflections look like paint."""
+    """The points outside vehicles, whose edges and reflections look like paint."""
     if not vehicles or not len(raw.points):
         return raw
     u, v = raw.points.T[:, :, None]
@@ -177,7 +179,7 @@ def road_plane(ground: Ground | None) -> F64 | None:
 
 
 def _settled(state: LaneState, seen: F64 | None) -> tuple[F64 | None, int]:
-    """The plane after one more sweep, and of how many it is."""
+    """The plane after one more sweep, and the number of sweeps."""
     if seen is None or state.plane is None:
         return (state.plane, state.sweeps) if seen is None else (seen, 1)
     gain = max(_PLANE_GAIN, 1.0 / (state.sweeps + 1))
@@ -192,7 +194,7 @@ def warm_up() -> None:
 
 
 def _drifted(pitch: Pitch | None, dt_s: float | None, params: LaneParams) -> Pitch:
-    """The pitch as believed now: towards its calibration and less sure as time passes."""
+    """The predicted pitch: it decays towards its calibration and becomes less certain over time."""
     start = float(np.radians(params.pitch_sigma_deg))
     if pitch is None or dt_s is None:
         return Pitch(0.0, start)
@@ -201,8 +203,8 @@ def _drifted(pitch: Pitch | None, dt_s: float | None, params: LaneParams) -> Pit
 
 
 def _on_road(raw: RawLanes, rays: F64, plane: F64, height_m: float, max_range_m: float) -> tuple[Sightings, I32]:
-    """Where each ray meets the road ahead, and which line its point belongs to; rays that do not are left out. In
-    inverse distance a ray near the horizon is no special case."""
+    """Intersection of each ray with the road ahead, and the line of its point; rays without intersection are left out.
+    In inverse distance, a ray near the horizon is no special case."""
     forward = np.maximum(rays[:, 0], 1e-6)
     slope = rays[:, 1] / forward
     inverse = (plane[0] + plane[1] * slope - rays[:, 2] / forward) / height_m
@@ -211,8 +213,8 @@ def _on_road(raw: RawLanes, rays: F64, plane: F64, height_m: float, max_range_m:
 
 
 def _seeds(line: I32, seen: Sightings, shape: RoadCurve, histogram: F64) -> list[Seed]:
-    """Where each line lies at x = 0, and which points it may be made of: those that the detector says are one line, or,
-    where it does not say, any that are near a peak of the histogram."""
+    """Position of each line at x = 0, and the points that may belong to it: those grouped by the detector, or without
+    grouping, those near a peak of the histogram."""
     groups = sorted(set(line[line >= 0].tolist()))
     if not groups:
         return [(y0, seen) for y0 in line_fit.peaks(histogram)]
@@ -222,17 +224,17 @@ def _seeds(line: I32, seen: Sightings, shape: RoadCurve, histogram: F64) -> list
 
 
 def _fitted(seeds: list[Seed], shape: RoadCurve, bearing_sigma_rad: float) -> list[tuple[FittedLine, Sightings]]:
-    """The line through each seed's points, with those points; without the hopeless ones."""
+    """The line through each seed's points, with those points; failed fits are left out."""
     fits = [(line_fit.fit_line(points, y0, shape, bearing_sigma_rad), points) for y0, points in seeds]
     return [(found, points) for found, points in fits if found is not None and found.quality > _HOPELESS]
 
 
 def _parallel(lines: list[FittedLine], height_m: float, tried_rad: float, before: Pitch) -> Pitch:
-    """The pitch under which the lines are parallel, joined with what was believed before.
+    """The pitch for which the lines are parallel, combined with the previous estimate.
 
-    Under a pitch error p a line at lateral place c0 seems turned by c0·p/h, so p/h is the slope of heading over place.
-    The heading is taken where it is known best, in the middle of what is seen. Parallels of curvature κ are concentric:
-    at x they differ in heading by κ²·x for each metre between them.
+    A pitch error p makes a line at lateral position c0 appear rotated by c0·p/h, so p/h is the slope of heading over
+    position. The heading is evaluated in the middle of the visible part, where it is most accurate. Parallels of
+    curvature κ are concentric: at x their headings differ by κ²·x per metre between them.
     """
     if len(lines) < 2:
         return before
@@ -253,7 +255,7 @@ def _parallel(lines: list[FittedLine], height_m: float, tried_rad: float, before
 
 
 def _distinct(lines: list[FittedLine]) -> list[FittedLine]:
-    """Without those that slid onto a better one while they were fitted."""
+    """Without lines that converged to a better one during the fit."""
     kept: list[FittedLine] = []
     places: list[float] = []
     for line in sorted(lines, key=lambda each: -each.quality):
@@ -270,7 +272,8 @@ def _plausible(line: FittedLine, params: LaneParams) -> bool:
 
 
 def _in_ego(line: FittedLine, eye: F64, to_ego: F64, height_m: float, pitch: Pitch) -> FittedLine:
-    """From the foot of the camera to the ego origin; what the pitch leaves open goes into the covariance."""
+    """Transforms a line from the foot of the camera to the ego origin; adds the uncertainty of the pitch to the
+    covariance."""
     c0, _, c2, _ = line.coefficients
     by_pitch = np.array([0.0, -c0, 0.0, c2]) / height_m * pitch.sigma_rad
     mean = to_ego @ line.coefficients

@@ -21,31 +21,31 @@ from pipeline.types.lane import EgoLane, LaneLine, Side, powers
 
 _COMPARE_AT = powers([5.0, 15.0])
 _SIDE_AT_M = 4.0
-"""Distance ahead at which a line counts as left or right of the car: where the front wheels will be."""
+"""Distance ahead at which a line counts as left or right of the car: about the front wheels."""
 _OVER_M = 20.0
 _PLACES = powers([_SIDE_AT_M, 0.0, _OVER_M / 2, _OVER_M])
 _CAR_HALF_M = 0.9
-"""A line of a lane that the car is in with all its width is no farther than the widest lane less this."""
+"""If the whole car is inside a lane, the lane's line is no farther than the widest lane minus this."""
 _MOST_UNPARALLEL, _USUALLY_UNPARALLEL = 0.05, 0.02
-"""How much the slopes of a lane's two lines may and usually do differ."""
+"""Maximum and usual difference in slope between a lane's two lines."""
 _FURTHEST_M = 5.0
 _USUAL_WIDTH_M = 3.5
 _USUALLY_OFF_MIDDLE_M = 0.7
 _SEEN_GAIN = 0.35
-"""Weight of a sighting in a line's quality."""
+"""Weight of a new measurement in a line's quality."""
 _FADE_S = 0.8
-"""The quality of a line that is not seen falls to a third in this time."""
+"""Time in which the quality of an unseen line falls to a third."""
 _FORGOTTEN = 0.1
 _UNKNOWN_DRIFT_MPS = 0.5
-"""How fast lines may move sideways where the car's own motion is not known."""
+"""Lateral speed of lines assumed if own motion is not known."""
 _YAW_RATE_SIGMA_RADPS = 0.01
 _UNKNOWN_YAW_RATE_RADPS = 0.06
 _UNKNOWN_SPEED_MPS = 20.0
 _NOT_CUBIC = np.diag(np.square([0.03, 1e-3, 1e-4, 4e-6]))
-"""Covariance that remains however often a line is seen, because roads are neither cubics nor planes. Set so that in the
-simulator's S-curve 95 % of the lines lie within 2.5 sigma at 30 m."""
+"""Covariance that remains however often a line is seen, because roads are neither cubics nor planes. Tuned so that in
+the simulator's S-curve 95 % of the lines lie within 2.5 sigma at 30 m."""
 _CLOTHOID_PER_M2 = 1.0 / 150.0**2
-"""How fast roads change their curvature: a clothoid of parameter A = 150 m, that of a road for 80 km/h."""
+"""Rate of change of a road's curvature: a clothoid of parameter A = 150 m, as in a road for 80 km/h."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +57,13 @@ class LineTrack:
     covariance: F64
     """(4, 4) of the coefficients."""
     x_min_m: float
-    """Nearest x that the line was seen at."""
+    """Smallest x at which the line was seen."""
     x_max_m: float
-    """Farthest x that the line was seen at."""
+    """Largest x at which the line was seen."""
     quality: float
     """0–1; fades while the line is not seen."""
     seen: int = 1
-    """In how many images."""
+    """Number of images in which it was seen."""
     unseen_s: float = 0.0
     """Time since it was last seen."""
 
@@ -75,13 +75,13 @@ class LaneTracks:
     lines: tuple[LineTrack, ...] = ()
     """In no particular order."""
     source: str | None = None
-    """The detector's name; None before it first delivered."""
+    """The detector's name; None before its first result."""
     age_s: float = 0.0
-    """Time since it last did."""
+    """Time since its last result."""
 
 
 def predict(tracks: LaneTracks, ego: EgoState | None, dt_s: float | None, params: LaneParams) -> LaneTracks:
-    """The lines ``dt_s`` later, seen from the moved car, without those not seen for too long."""
+    """The lines ``dt_s`` later, relative to the moved car, without those not seen for too long."""
     if dt_s is None:
         return tracks
     speed = ego.speed_mps if ego is not None else 0.0
@@ -105,7 +105,7 @@ def predict(tracks: LaneTracks, ego: EgoState | None, dt_s: float | None, params
 
 
 def update(tracks: LaneTracks, source: str, measured: tuple[FittedLine, ...], params: LaneParams) -> LaneTracks:
-    """The lines after an image. A line that was not found in it fades; a new one starts with its measured quality."""
+    """The lines after an image. A line that was not found in it fades; a new line starts with its measured quality."""
     pairs = _pairs(tracks.lines, measured, params.gate_m)
     lines = [_joined(line, measured[pairs[i]]) if i in pairs else _faded(line) for i, line in enumerate(tracks.lines)]
     new = [found for j, found in enumerate(measured) if j not in pairs.values()]
@@ -114,10 +114,10 @@ def update(tracks: LaneTracks, source: str, measured: tuple[FittedLine, ...], pa
 
 
 def ego_lane(tracks: LaneTracks, pitch_rad: float, plane: F64, params: LaneParams) -> EgoLane | None:
-    """The pair of lines that the car is most likely between; None before a detector ever delivered.
+    """The pair of lines that the car is most likely between; None before the first result of a detector.
 
-    Each side takes a believed line or none. A pair whose width is no lane's is not taken: one of the two is wrong, or
-    the calibration is, and if no other line says which, the better supported one stands alone.
+    Each side has a trusted line or none. A pair whose width is implausible for a lane is not used: one of the lines or
+    the calibration is wrong, and unless another line decides which, only the better supported line is returned.
     """
     if tracks.source is None:
         return None
@@ -131,7 +131,7 @@ def ego_lane(tracks: LaneTracks, pitch_rad: float, plane: F64, params: LaneParam
 
 
 def expected_shape(tracks: LaneTracks) -> RoadCurve | None:
-    """Heading and curvature of the best line, to search around; None when none is sure."""
+    """Heading and curvature of the best line, to search around; None if no line is certain."""
     best = max(tracks.lines, key=lambda line: line.quality, default=None)
     if best is None or best.quality < 0.5 or best.seen < 3:
         return None
@@ -152,8 +152,8 @@ def shifted(way_m: float) -> F64:
 
 
 def _noise(ego: EgoState | None, dt_s: float) -> F64:
-    """What the car's motion and the road's bending leave open in a step: place, heading, half
-    a curvature, its change."""
+    """Process noise of one step, from the car's motion and the change of the road's curvature: position, heading, half
+    the curvature, its change."""
     knows_turn = ego is not None and ego.yaw_rate_radps is not None
     way = (ego.speed_mps if ego is not None else _UNKNOWN_SPEED_MPS) * dt_s
     turn = (_YAW_RATE_SIGMA_RADPS if knows_turn else _UNKNOWN_YAW_RATE_RADPS) * dt_s
@@ -163,7 +163,7 @@ def _noise(ego: EgoState | None, dt_s: float) -> F64:
 
 
 def _pairs(lines: tuple[LineTrack, ...], measured: tuple[FittedLine, ...], gate_m: float) -> dict[int, int]:
-    """Which track is which measured line: nearest first, one-to-one, within the gate at 5 and 15 m."""
+    """Assignment of tracks to measured lines: nearest first, one-to-one, within the gate at 5 and 15 m."""
     if not lines or not measured:
         return {}
     old = np.array([_COMPARE_AT @ line.coefficients for line in lines])
@@ -201,8 +201,8 @@ def _quality_now(line: LineTrack) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A line that may be one of the ego lane's. beside_m: where it passes the front wheels; ahead_m: mean place over
-    the first 20 m; heading: its mean slope there."""
+    """A line that may belong to the ego lane. beside_m: lateral position at the front wheels; ahead_m: mean lateral
+    position over the first 20 m; heading: its mean slope there."""
 
     line: LineTrack
     quality: float
@@ -218,8 +218,8 @@ class _Candidate:
 
 
 def _worth(left: _Candidate | None, right: _Candidate | None, params: LaneParams) -> float:
-    """How good a pair is: well supported, long known, as wide as a lane, with the car near its middle. A single line
-    must not lie under the car, as shadows and tracks in snow do: on which side of it the lane is cannot be told."""
+    """Score of a pair: well supported, long known, as wide as a lane, with the car near its middle. A single line must
+    not lie under the car, as shadows and tracks in snow do, because the side of the lane would be unknown."""
     both = [each for each in (left, right) if each is not None]
     worth = sum(each.quality * each.line.seen / (each.line.seen + 1.0) for each in both)
     places = sum(each.beside_m for each in both)
@@ -236,7 +236,7 @@ def _worth(left: _Candidate | None, right: _Candidate | None, params: LaneParams
 
 
 def _width_m(left: _Candidate, right: _Candidate) -> float:
-    """Mean over the first 20 m, square to the lines."""
+    """Mean over the first 20 m, perpendicular to the lines."""
     return (left.ahead_m - right.ahead_m) * math.cos(math.atan((left.heading + right.heading) / 2.0))
 
 

@@ -11,9 +11,10 @@ from pipeline.types import EgoState, Sweep
 
 
 def warm_up() -> None:
-    """Compile every kernel, or load it from numba's cache, on a made-up sweep: a flat road and one wall on it.
+    """Compile every kernel, or load it from numba's cache, using a synthetic sweep: a flat road with one wall on it.
 
-    Twice: to numba an array that may not be written, as one read from a file, is a type of its own."""
+    Done twice, since numba treats read-only arrays, such as those read from a file, as a separate type.
+    """
     params = Params()
     x, y = np.meshgrid(np.linspace(3.0, 20.0, 20), np.linspace(-5.0, 5.0, 20))
     road = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, -1.5), np.zeros(x.size)])

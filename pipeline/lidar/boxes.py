@@ -17,26 +17,27 @@ from pipeline.params import BoxParams
 from pipeline.types import F32, F64, I32, Obstacle
 
 NEAREST_M = 0.05
-"""Distances to a side below this count as this (Zhang's d0), or one point on a side would outweigh all others."""
+"""Lower bound of distances to a side (Zhang's d0); otherwise one point on a side would outweigh all others."""
 SEARCH_POINTS = 200
-"""The turn of a larger cluster is judged by this many of its points, spread over it."""
+"""For larger clusters, the orientation is determined from this many points, evenly sampled."""
 WIDEST_REAR_M = 2.7
-"""No vehicle is wider: a longer side is a length."""
+"""No vehicle is wider, so a longer side is a length."""
 MIN_SIDE_M = 0.05
-"""Sides are never shown thinner than the range noise."""
+"""Minimum displayed side length, about the range noise."""
 MIN_AREA_M2 = 0.1
-"""The footprint that densities refer to is never smaller: a rear seen by a single ring has none."""
+"""Lower bound of the footprint used for densities: a rear seen by a single ring has no area."""
 
 
 def fit_obstacles(points: F32, labels: I32, ground: Ground, params: BoxParams) -> tuple[Obstacle, ...]:
-    """One obstacle a cluster, in the order of the labels 0, 1, ….
+    """One obstacle per cluster, in the order of the labels 0, 1, ….
 
-    points: (N, 4) float32 ``x y z intensity``, ego frame. labels: (N,) int32 as ``cluster`` gives them.
+    points: (N, 4) float32 ``x y z intensity``, ego frame. labels: (N,) int32 as returned by ``cluster``.
 
-    The yaw lies in (−π/2, π/2]. A box's turn is known only modulo 90°: the length axis is the side that is too long to
-    be a vehicle's rear, else the one closer to ego x, since vehicles ahead mostly drive our way. The cuboid stands on
-    the ground when its lowest point is within ``ground_gap_m`` of it: the next ring below may have passed under.
-    ``closest_point`` is the cluster's point of least horizontal range from the ego origin.
+    The yaw lies in (−π/2, π/2]. A box's orientation is known only modulo 90°: the length axis is the side that is too
+    long to be a vehicle's rear, else the one closer to ego x, since most vehicles ahead drive in our direction. The
+    cuboid is extended down to the ground if its lowest point is within ``ground_gap_m`` of it, because the next ring
+    below may have passed under it. ``closest_point`` is the cluster's point with the smallest horizontal range from the
+    ego origin.
     """
     count = int(labels.max(initial=-1)) + 1
     if count == 0:
@@ -62,18 +63,18 @@ def fit_obstacles(points: F32, labels: I32, ground: Ground, params: BoxParams) -
 
 
 def turns(params: BoxParams) -> F64:
-    """(K,) the turns in [0, π/2) that a box may have."""
+    """(K,) the candidate orientations of a box, in [0, π/2)."""
     step_rad = np.radians(params.yaw_step_deg)
     return np.arange(np.ceil(np.pi / 2 / step_rad - 1e-9)) * step_rad if params.method == "l_shape" else np.zeros(1)
 
 
 @numba.njit(cache=True, nogil=True)
 def _boxes(points: F32, labels: I32, count: int, turns: F64) -> tuple[F64, I32]:
-    """turns: (K,) as ``turns`` gives them. boxes (count, 13) float64: center x, y, length, width, yaw, lowest z,
+    """turns: (K,) as returned by ``turns``. boxes (count, 13) float64: center x, y, length, width, yaw, lowest z,
     highest z, closest point x, y, z, spread x, y, z. sizes (count,) int32."""
     start = np.zeros(count + 1, dtype=np.int32)
     for i in range(len(labels)):
-        start[labels[i] + 1] += 1  # what has no cluster, −1, counts at 0 and is taken away again
+        start[labels[i] + 1] += 1  # points without a cluster, −1, are counted at 0 and subtracted again
     start[0] = 0
     size = start[1:].copy()
     for c in range(count):
@@ -96,7 +97,7 @@ def _boxes(points: F32, labels: I32, count: int, turns: F64) -> tuple[F64, I32]:
 
 @numba.njit(cache=True, nogil=True)
 def _best_turn(x: F64, y: F64, cos: F32, sin: F32) -> int:
-    """Place of the turn of the best closeness, the first of several."""
+    """Index of the orientation with the best closeness, the first one if several are equal."""
     if len(cos) < 2 or len(x) < 3:
         return 0
     stride = (len(x) + SEARCH_POINTS - 1) // SEARCH_POINTS
@@ -107,12 +108,12 @@ def _best_turn(x: F64, y: F64, cos: F32, sin: F32) -> int:
     return int(np.argmax(closeness))
 
 
-# Nothing in the two loops over points below can raise or is stored: then the compiler makes the most of them.
+# Nothing in the two loops over points below can raise or is stored, so that the compiler can optimise them fully.
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "nnan"})
 def _sides(x: F32, y: F32, cos: F32, sin: F32, u_side: F32, v_side: F32) -> None:
-    """For each turn the end of x·cos + y·sin, and of y·cos − x·sin, that the points gather at."""
+    """For each orientation, the end of x·cos + y·sin, and of y·cos − x·sin, where the points concentrate."""
     sum_x = sum_y = np.float32(0.0)
     for i in range(len(x)):
         sum_x += x[i]
@@ -131,8 +132,8 @@ def _sides(x: F32, y: F32, cos: F32, sin: F32, u_side: F32, v_side: F32) -> None
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "nnan"})
 def _closeness(x: F32, y: F32, cos: F32, sin: F32, u_side: F32, v_side: F32, closeness: F32) -> None:
-    """For each turn Σ 1/max(d, d0), d the distance of a point to the nearer of two sides of the box: of each pair of
-    parallel sides the one that the points gather at (Zhang 2017, Algorithm 4)."""
+    """For each orientation Σ 1/max(d, d0), where d is a point's distance to the nearer of two sides of the box: of each
+    pair of parallel sides, the one where the points concentrate (Zhang 2017, Algorithm 4)."""
     nearest = np.float32(NEAREST_M)
     for k in range(len(cos)):
         score = np.float32(0.0)
@@ -144,7 +145,7 @@ def _closeness(x: F32, y: F32, cos: F32, sin: F32, u_side: F32, v_side: F32, clo
 
 @numba.njit(cache=True, nogil=True)
 def _describe(x: F64, y: F64, z: F64, turn: float, out: F64) -> None:
-    """One row of ``_boxes``, of the rectangle with this turn around the points. Two passes over all that is asked."""
+    """One row of ``_boxes`` for the rectangle with this orientation around the points, computed in two passes."""
     cos, sin = np.cos(turn), np.sin(turn)
     u_low = v_low = z_low = least = np.inf
     u_high = v_high = z_high = -np.inf
@@ -175,7 +176,7 @@ def _describe(x: F64, y: F64, z: F64, turn: float, out: F64) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _rectangle(u_low: float, u_high: float, v_low: float, v_high: float, turn: float, out: F64) -> None:
-    """center x, y, length, width, yaw of a rectangle with this turn, into ``out``."""
+    """Writes center x, y, length, width, yaw of a rectangle with this orientation into ``out``."""
     cos, sin = np.cos(turn), np.sin(turn)
     u_mid, v_mid = (u_low + u_high) / 2, (v_low + v_high) / 2
     out[0], out[1] = u_mid * cos - v_mid * sin, u_mid * sin + v_mid * cos

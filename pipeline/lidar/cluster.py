@@ -27,26 +27,26 @@ WIDEST_M = 2.6
 
 
 def candidates(points: F32, ground: Ground, keep: Mask, params: ClusterParams) -> Mask:
-    """(N,) bool: kept points that may belong to an object: not ground, and no higher above it than ``max_height_m``
-    (bridges and signs are no obstacles). Where no ground was found every kept point may."""
+    """(N,) bool: kept points that may belong to an object: not ground, and at most ``max_height_m`` above it (bridges
+    and signs are no obstacles). Without a fitted ground, all kept points."""
     return no_higher_than(ground, points, keep & ~ground.mask, params.max_height_m)
 
 
 def cluster(points: F32, candidates: Mask, params: ClusterParams) -> I32:
-    """(N,) int32 cluster of each point, −1 where none; clusters are numbered in order of their first point.
+    """(N,) int32 cluster of each point, −1 for none; clusters are numbered in order of their first point.
 
-    points: (N, 4) float32 ``x y z intensity``, ego frame, finite. candidates: (N,) bool, the points to cluster; of
-    these, points beyond ``max_range_m`` (horizontally), and behind the sensor with ``front_only``, stay out. Clusters
-    of fewer than ``min_points`` or more than ``max_points`` are dropped.
+    points: (N, 4) float32 ``x y z intensity``, ego frame, finite. candidates: (N,) bool, the points to cluster. Of
+    these, points beyond ``max_range_m`` (horizontally) are ignored, as are points behind the sensor with
+    ``front_only``. Clusters of fewer than ``min_points`` or more than ``max_points`` are dropped.
     """
     chosen = _within(points, candidates, params.max_range_m, params.front_only)
     labels = np.full(len(points), UNLABELLED, dtype=np.int32)
     if len(chosen) == 0:
         return labels
-    # a hair smaller than tolerance/√3, so that rounding cannot put a pair that is too far apart into one cell
+    # slightly smaller than tolerance/√3, so that rounding cannot put two points that are too far apart into one cell
     cell_m = params.tolerance_m / np.sqrt(3.0) * (1.0 - 1e-6)
     xyz, column, level, shape = _cells(points, chosen, params.z_weight, cell_m)
-    # numpy's zeros come from the system unread, so that a large and empty grid costs nothing
+    # np.zeros allocates lazily, so that a large empty grid costs nothing
     first_cell = np.zeros(shape[0] * shape[1], dtype=np.int32)
     roots = _components(xyz, column, level, first_cell, shape[1], params.tolerance_m)
     if params.divide_m < params.tolerance_m:
@@ -56,8 +56,8 @@ def cluster(points: F32, candidates: Mask, params: ClusterParams) -> I32:
 
 
 def _divide(points: F32, chosen: I32, roots: I32, params: ClusterParams) -> None:
-    """Gives the points of components that are too wide for one vehicle the roots that a tolerance of ``divide_m`` has,
-    in place."""
+    """Splits components that are too wide for one vehicle by using the tolerance ``divide_m`` for their points; changes
+    ``roots`` in place."""
     wide = np.flatnonzero(_is_wide(points, chosen, roots, WIDEST_M)).astype(np.int32)
     if not len(wide):
         return
@@ -69,7 +69,8 @@ def _divide(points: F32, chosen: I32, roots: I32, params: ClusterParams) -> None
 
 @numba.njit(cache=True, nogil=True)
 def _is_wide(points: F32, chosen: I32, roots: I32, widest_m: float) -> Mask:
-    """(M,) bool: the point's component takes a larger angle than something of that width at its nearest point."""
+    """(M,) bool: the angle of the point's component is larger than that of an object of this width at the component's
+    nearest point."""
     low, high = np.full(len(roots), np.inf), np.full(len(roots), -np.inf)
     nearest = np.full(len(roots), np.inf)
     for k in range(len(roots)):
@@ -85,9 +86,10 @@ def _is_wide(points: F32, chosen: I32, roots: I32, widest_m: float) -> Mask:
 
 @numba.njit(cache=True, nogil=True)
 def kinds(labels, keep, ground):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(N,) int32 what each point was taken for: its cluster, or ``GROUND``, ``UNCLUSTERED``, ``DROPPED``.
+    """(N,) int32 classification of each point: its cluster, or ``GROUND``, ``UNCLUSTERED``, ``DROPPED``.
 
-    labels: (N,) int32 as ``cluster`` gives them. keep, ground: (N,) bool."""
+    labels: (N,) int32 as returned by ``cluster``. keep, ground: (N,) bool.
+    """
     kind = labels.copy()
     for i in range(len(kind)):
         if kind[i] < 0:
@@ -97,7 +99,8 @@ def kinds(labels, keep, ground):  # type: ignore[no-untyped-def]  # pragma: no c
 
 @numba.njit(cache=True, nogil=True)
 def _within(points: F32, candidates: Mask, max_range_m: float, front_only: bool) -> I32:
-    """Indices of the candidates in range. Without a branch, since neighbours in a sweep differ in what they are."""
+    """Indices of the candidates in range. Branch-free, since the conditions vary from point to point and would be
+    mispredicted."""
     chosen = np.empty(len(points) + 1, dtype=np.int32)
     count, limit2 = 0, max_range_m * max_range_m
     for i in range(len(points)):
@@ -111,9 +114,10 @@ def _within(points: F32, candidates: Mask, max_range_m: float, front_only: bool)
 def _cells(
     points: F32, chosen: I32, z_weight: float, cell_m: float
 ) -> tuple[F64, npt.NDArray[np.int64], I32, tuple[int, int]]:
-    """xyz (M, 3) float64 with z weighted; the column and the level of each point; columns along x and y.
+    """xyz (M, 3) float64 with z weighted; the column and the level of each point; number of columns along x and y.
 
-    Two empty columns surround the grid, so that neighbours need no bounds test."""
+    Two empty columns surround the grid, so that neighbours need no bounds check.
+    """
     xyz = np.empty((len(chosen), 3))
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for k in range(len(chosen)):
@@ -140,8 +144,8 @@ def _cells(
 def _components(
     xyz: F64, column: npt.NDArray[np.int64], level: I32, first_cell: I32, ny: int, tolerance_m: float
 ) -> I32:
-    """(M,) the first point of each point's component. ``first_cell`` is the grid, all zeros on entry: per column, one
-    more than the number of its newest cell; the cells of a column are a chain."""
+    """(M,) the first point of each point's component. ``first_cell`` is the grid, all zeros on entry: for each column,
+    one plus the number of its newest cell. The cells of a column form a linked list."""
     count = len(xyz)
     cell_of = np.empty(count, dtype=np.int32)
     below = np.empty(count, dtype=np.int32)  # the next cell of the same column, −1 at the end
@@ -150,7 +154,7 @@ def _components(
     size = np.zeros(count + 1, dtype=np.int32)
     cells, c = 0, -1
     for k in range(count):
-        if k > 0 and column[k] == column[k - 1] and level[k] == level[k - 1]:  # a beam's next point, mostly
+        if k > 0 and column[k] == column[k - 1] and level[k] == level[k - 1]:  # usually the next point of the same beam
             cell_of[k] = c
             size[c] += 1
             continue
@@ -169,7 +173,7 @@ def _components(
         start[c + 1] = start[c] + size[c]
     place = start[:-1].copy()
     by_cell = np.empty(count, dtype=np.int32)
-    for k in range(count):  # stable: a cell's first entry is its first point
+    for k in range(count):  # stable order: a cell's first entry is its first point
         by_cell[place[cell_of[k]]] = k
         place[cell_of[k]] += 1
     packed = np.empty((count, 3))
@@ -182,7 +186,7 @@ def _components(
     for c in range(cells):
         mine = _root(parent, c)
         for dx in range(3):
-            for dy in range(-2 if dx > 0 else 0, 3):  # half of the neighbours; the other half looks back
+            for dy in range(-2 if dx > 0 else 0, 3):  # half of the neighbours suffices by symmetry
                 other = first_cell[cell_column[c] + dx * ny + dy] - 1
                 while other >= 0:
                     if abs(cell_level[other] - cell_level[c]) <= 2:
@@ -191,7 +195,7 @@ def _components(
                             mine, theirs = min(mine, theirs), max(mine, theirs)
                             parent[theirs] = mine
                     other = below[other]
-    # cells are numbered by their first points, so the least cell of a component holds its first point
+    # cells are numbered by their first points, so the lowest cell of a component contains its first point
     roots = np.empty(count, dtype=np.int32)
     for k in range(count):
         roots[k] = by_cell[start[_root(parent, cell_of[k])]]
@@ -200,7 +204,7 @@ def _components(
 
 @numba.njit(cache=True, nogil=True)
 def _root(parent: I32, c: int) -> int:
-    """The least cell joined with ``c``, halving the path on the way."""
+    """The lowest cell joined with ``c``; halves the path on the way."""
     while parent[c] != c:
         parent[c] = parent[parent[c]]
         c = parent[c]
@@ -209,7 +213,7 @@ def _root(parent: I32, c: int) -> int:
 
 @numba.njit(cache=True, nogil=True)
 def _bounds(packed: F64, start: I32) -> F64:
-    """(C, 6) lowest and highest x, y, z of each cell's points."""
+    """(C, 6) minimum and maximum x, y, z of each cell's points."""
     bounds = np.empty((len(start) - 1, 6))
     for c in range(len(bounds)):
         for axis in range(3):
@@ -222,8 +226,8 @@ def _bounds(packed: F64, start: I32) -> F64:
 
 @numba.njit(cache=True, nogil=True)
 def _touch(packed: F64, start: I32, bounds: F64, c: int, other: int, limit2: float) -> bool:
-    """Whether any point of one cell lies within the tolerance of any point of the other. What is farther than that from
-    a cell's bounds is farther from each of its points: most pairs are told apart by that."""
+    """Whether any point of one cell is within the tolerance of any point of the other. Most pairs are ruled out early:
+    a point that is too far from a cell's bounds is too far from all its points."""
     dx = max(bounds[other, 0] - bounds[c, 3], bounds[c, 0] - bounds[other, 3], 0.0)
     dy = max(bounds[other, 1] - bounds[c, 4], bounds[c, 1] - bounds[other, 4], 0.0)
     dz = max(bounds[other, 2] - bounds[c, 5], bounds[c, 2] - bounds[other, 5], 0.0)
@@ -245,7 +249,7 @@ def _touch(packed: F64, start: I32, bounds: F64, c: int, other: int, limit2: flo
 
 @numba.njit(cache=True, nogil=True)
 def _number(roots: I32, chosen: I32, labels: I32, min_points: int, max_points: int) -> None:
-    """Writes 0, 1, … into ``labels`` for the components of an accepted size, by first point."""
+    """Writes 0, 1, … into ``labels`` for components of an accepted size, in order of their first point."""
     size = np.zeros(len(roots), dtype=np.int32)
     for k in range(len(roots)):
         size[roots[k]] += 1

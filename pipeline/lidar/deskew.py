@@ -21,9 +21,9 @@ from pipeline.types import EgoState, Sweep
 
 
 def deskew(sweep: Sweep | None, ego: EgoState | None, params: DeskewParams) -> Sweep | None:
-    """The sweep with static objects where they are at its tick.
+    """The sweep with static objects at their positions at its tick.
 
-    Unchanged where deskewing is off, points have no times, or own speed is unknown. An unknown yaw rate counts as
+    Unchanged if deskewing is off, points have no times, or own speed is unknown. An unknown yaw rate is treated as
     driving straight.
     """
     if sweep is None or sweep.time_s is None or ego is None or not params.enabled:
@@ -34,8 +34,8 @@ def deskew(sweep: Sweep | None, ego: EgoState | None, params: DeskewParams) -> S
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def _moved(points, time_s, speed_mps, yaw_rate_radps):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(N, 4) points at the tick. Sine and cosine by their series: at 1 rad/s the angle stays below 0.06 rad, and what
-    is left out below a micrometre at 100 m."""
+    """(N, 4) points at the tick. Sine and cosine are truncated series: at 1 rad/s the angle stays below 0.06 rad, and
+    the error below a micrometre at 100 m."""
     moved = np.empty_like(points)
     for i in range(len(points)):
         angle = yaw_rate_radps * time_s[i]

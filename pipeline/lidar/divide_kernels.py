@@ -9,12 +9,13 @@ import numpy as np
 from pipeline.types import F32, F64, I32, Mask
 
 AROUND_M = 0.3
-"""Returns so far outside of an expected footprint are its own: two standard deviations of a cluster's position."""
+"""Returns this far outside an expected footprint still belong to it: two standard deviations of a cluster's position.
+"""
 
 
 @numba.njit(cache=True, nogil=True)
 def reach_clusters(points: F32, labels: I32, footprints: F64, clusters: int) -> Mask:
-    """(T, C) bool: the clusters whose bounds along ego x and y come near each footprint's."""
+    """(T, C) bool: the clusters whose bounds along ego x and y are near each footprint's bounds."""
     low, high = np.full((clusters, 2), np.inf), np.full((clusters, 2), -np.inf)
     for i in range(len(points)):
         if labels[i] >= 0:
@@ -34,8 +35,8 @@ def reach_clusters(points: F32, labels: I32, footprints: F64, clusters: int) -> 
 
 @numba.njit(cache=True, nogil=True)
 def find_owners(points: F32, labels: I32, footprints: F64, reached: Mask) -> I32:
-    """(N,) int32 the only footprint in or around which a clustered point lies, −1 for none and for several. reached:
-    (T, C) bool, the footprints to be looked at for each cluster."""
+    """(N,) int32 the only footprint that contains a clustered point or is close to it, −1 for none or several. reached:
+    (T, C) bool, the footprints to test for each cluster."""
     near = np.empty((reached.shape[1], len(footprints)), dtype=np.int32)
     count = np.zeros(reached.shape[1], dtype=np.int32)
     for c in range(reached.shape[1]):
@@ -63,7 +64,7 @@ def find_owners(points: F32, labels: I32, footprints: F64, reached: Mask) -> I32
 
 @numba.njit(cache=True, nogil=True)
 def count_seeds(labels: I32, owner: I32, tracks: int, clusters: int) -> I32:
-    """(T, C) int32 how many seeds each track has in each cluster."""
+    """(T, C) int32 number of seeds of each track in each cluster."""
     counts = np.zeros((tracks, clusters), dtype=np.int32)
     for i in range(len(labels)):
         if labels[i] >= 0 and owner[i] >= 0:
@@ -73,9 +74,10 @@ def count_seeds(labels: I32, owner: I32, tracks: int, clusters: int) -> I32:
 
 @numba.njit(cache=True, nogil=True)
 def join(points: F32, seeds: I32, z_weight: float) -> I32:
-    """(M,) int32 the group of each point: that of the seed which a minimum spanning forest joins it with (Prim).
+    """(M,) int32 the group of each point: that of the seed it is joined with by a minimum spanning forest (Prim).
 
-    seeds: (M,) group of each seed, −1 for the others."""
+    seeds: (M,) group of each seed, −1 for the other points.
+    """
     group = seeds.copy()
     done = np.zeros(len(points), dtype=np.bool_)
     step2 = np.full(len(points), np.inf)
@@ -103,7 +105,7 @@ def join(points: F32, seeds: I32, z_weight: float) -> I32:
 
 @numba.njit(cache=True, nogil=True)
 def measure_gaps(points: F32, part: I32, parts: int, z_weight: float) -> F64:
-    """(P, P) least distance between points of two parts, m."""
+    """(P, P) smallest distance between points of two parts, m."""
     gaps = np.full((parts, parts), np.inf)
     for i in range(len(points)):
         for j in range(i):

@@ -24,31 +24,32 @@ from pipeline.params import ClusterParams
 from pipeline.types import F32, F64, I32, I64, LidarTrack, Mask
 
 MIN_HITS = 5
-"""Sightings of a track, half a second at 10 Hz, before a cluster is divided for it: its velocity has settled."""
+"""Sightings of a track, half a second at 10 Hz, before a cluster is divided for it. By then its velocity has converged.
+"""
 _APART_MPS, _APART_SIGMAS = 2.0, 3.0
-"""Two tracks move apart when their velocities differ by more than both. A footprint that grows as we pass moves its
-reference point at up to 1–2 m/s."""
+"""Two tracks move apart if their velocities differ by more than both limits. The reference point of a footprint that
+grows while we pass moves at up to 1–2 m/s."""
 _GAP_M = 0.3
-"""Neighbouring returns of one surface are nearer: along a ring of a VLP-16 0.1 m at 28 m, twice that where it is
-thinned out."""
+"""Neighbouring returns of one surface are closer: along a ring of a VLP-16 0.1 m at 28 m, twice that where it is
+down-sampled."""
 _DIRECTIONS = np.radians(np.arange(0.0, 180.0, 5.0))
 _LEAST_SEEDS = 2
-"""One return may be a stray one."""
+"""A single return may be an outlier."""
 _CELL_M = 0.08
-"""Returns nearer to each other than about this are joined as one: near the car a ring has one every centimetre."""
+"""Returns closer together than about this are joined as one: near the car a ring has one every centimetre."""
 _MOST_CELLS = 1000
-"""Of a cluster to be divided. Joining takes time with the square of it: 2.4 ms for so many, 35 ms for 4,000."""
+"""Limit for one cluster to be divided. Joining takes quadratic time: 2.4 ms for this many, 35 ms for 4,000."""
 
 
 class _Expected(NamedTuple):
-    """Tracks that a cluster may be divided for, where they are expected now."""
+    """Tracks that a cluster may be divided for, at their positions predicted for now."""
 
     footprints: F64
     """(T, 6) x, y, half length, half width, cos and sin of the yaw."""
     velocity: F64
     """(T, 2) m/s."""
     variance: F64
-    """(T,) of the velocity, both axes."""
+    """(T,) variance of the velocity, both axes."""
 
 
 def divide(
@@ -59,18 +60,19 @@ def divide(
     dt_s: float | None,
     params: ClusterParams,
 ) -> I32:
-    """(N,) int32 labels as ``cluster`` gives them, each vehicle that had to share a cluster with a label of its own.
+    """(N,) int32 labels as returned by ``cluster``, with a separate label for each vehicle that shared a cluster.
 
-    points: (N, 4) float32 ``x y z intensity``, ego frame. labels: (N,) int32. tracks, filters: of the sweep before,
-    with their constant-velocity filters, in the same order. dt_s: time since then; None at a start. A part of a divided
-    cluster joins the cluster that has most of its track, so that a flank is not cut off from its rear.
+    points: (N, 4) float32 ``x y z intensity``, ego frame. labels: (N,) int32. tracks, filters: tracks of the previous
+    sweep and their constant-velocity filters, in the same order. dt_s: time since then; None at a start. A part of a
+    divided cluster is merged into the cluster that contains most of its track, so that a flank is not cut off from its
+    rear.
     """
     count = int(labels.max(initial=-1)) + 1
     known = [n for n, each in enumerate(tracks) if each.hits >= MIN_HITS and each.velocity_mps is not None]
     if not params.divide_tracked or dt_s is None or len(known) < 2 or count == 0:
         return labels
     expected = _expect([tracks[n] for n in known], filters.cov[known], dt_s)
-    # only clusters that reach to two tracks, and those that these tracks have besides
+    # only clusters near two or more tracks, and the other clusters near these tracks
     reached = kernels.reach_clusters(points, labels, expected.footprints, count)
     involved = np.any(reached[:, reached.sum(axis=0) >= 2], axis=1, keepdims=True)
     if not np.any(involved):
@@ -90,10 +92,11 @@ def divide(
 
 
 def _homed(pieces: I32, parts: list[list[int]], owner: I32, tracks: int, min_points: int) -> I32:
-    """The pieces, those of divided clusters joined with what else there is of their tracks.
+    """Labels in which the pieces of divided clusters are merged with the other points of their tracks.
 
-    parts: numbers of the pieces of each divided cluster. What is too small for a cluster and has no home stays with its
-    cluster's largest part."""
+    parts: numbers of the pieces of each divided cluster. A piece that is too small for a cluster and belongs to no
+    track stays with the largest part of its cluster.
+    """
     seeds, sizes = kernels.count_seeds(pieces, owner, tracks, int(pieces.max()) + 1), np.bincount(pieces[pieces >= 0])
     goes_to = np.arange(len(sizes), dtype=np.int32)
     for numbers in parts:
@@ -104,9 +107,9 @@ def _homed(pieces: I32, parts: list[list[int]], owner: I32, tracks: int, min_poi
                 goes_to[number] = home
             elif sizes[number] < min_points:
                 goes_to[number] = largest
-    for _ in parts:  # a home may have moved itself
+    for _ in parts:  # the target may have been merged itself
         goes_to = goes_to[goes_to]
-    goes_to = np.append(goes_to, -1).astype(np.int32)  # the last for what has no cluster
+    goes_to = np.append(goes_to, -1).astype(np.int32)  # the last entry is for points without a cluster
     return goes_to[pieces]
 
 
@@ -122,7 +125,7 @@ def warm_up(points: F32, labels: I32, tracks: Sequence[LidarTrack]) -> None:
 
 
 def _expect(tracks: Sequence[LidarTrack], cov: F64, dt_s: float) -> _Expected:
-    """cov: (T, 4, 4) of the tracks' filters."""
+    """cov: (T, 4, 4) covariances of the tracks' filters."""
     velocity = np.array([each.velocity_mps or (0.0, 0.0) for each in tracks])
     rows = [(*each.obstacle.cuboid.center[:2], *each.obstacle.cuboid.size[:2]) for each in tracks]
     footprints = np.array(rows) * (1.0, 1.0, 0.5, 0.5)
@@ -132,9 +135,10 @@ def _expect(tracks: Sequence[LidarTrack], cov: F64, dt_s: float) -> _Expected:
 
 
 def _parts(points: F32, owner: I32, present: I64, expected: _Expected, params: ClusterParams) -> I32 | None:
-    """(M,) int32 the part of each point of a cluster, 0 first; None where it stays whole.
+    """(M,) int32 the part of each point of a cluster, 0 first; None if it stays whole.
 
-    owner: (M,) the track of each point that is a seed, else −1. present: tracks with enough of them."""
+    owner: (M,) the track of each point that is a seed, else −1. present: tracks with enough seeds.
+    """
     apart = _move_apart(expected.velocity[present], expected.variance[present])
     wide = _are_wide(expected.footprints[present])
     if not np.any(apart | wide):
@@ -142,13 +146,13 @@ def _parts(points: F32, owner: I32, present: I64, expected: _Expected, params: C
     first, cell = _thinned(points, params.z_weight)
     if len(first) > _MOST_CELLS:
         return None
-    number = np.full(len(expected.velocity) + 1, -1, dtype=np.int32)  # the last for what is no seed
+    number = np.full(len(expected.velocity) + 1, -1, dtype=np.int32)  # the last entry is for points that are no seeds
     number[present] = np.arange(len(present), dtype=np.int32)
     seeds = np.full(len(first), -1, dtype=np.int32)
     np.maximum.at(seeds, cell, number[owner])
     part = kernels.join(points[first], seeds, params.z_weight)
     gaps = kernels.measure_gaps(points[first], part, len(present), params.z_weight)
-    # those that neither sets apart are what they would be without the others
+    # pairs that neither condition separates are treated as without tracks
     together = np.where(wide, _GAP_M, params.tolerance_m)
     part = _grouped(((gaps <= together) & ~apart) | np.eye(len(present), dtype=np.bool_))[part][cell]
     return part if part.max() > 0 else None
@@ -165,35 +169,35 @@ def _thinned(points: F32, z_weight: float) -> tuple[I64, I64]:
 
 
 def _move_apart(velocity: F64, variance: F64) -> Mask:
-    """(T, T) whether two tracks surely move at different velocities."""
+    """(T, T) whether the velocities of two tracks differ significantly."""
     differ = np.hypot(*(velocity[:, None] - velocity[None]).transpose(2, 0, 1))
     apart: Mask = differ > np.maximum(_APART_MPS, _APART_SIGMAS * np.sqrt(variance[:, None] + variance[None]))
     return apart
 
 
 def _are_wide(footprints: F64) -> Mask:
-    """(T, T) whether two footprints together are wider than any vehicle: across the line of sight to the nearer one, or
-    in every direction."""
+    """(T, T) whether two footprints together are wider than any vehicle: perpendicular to the line of sight to the
+    nearer one, or in every direction."""
     x, y, length, width, cos, sin = (column[:, None] for column in footprints.T)
     along, across = length * np.array([1, 1, -1, -1]), width * np.array([1, -1, -1, 1])
     corner_x, corner_y = x + along * cos - across * sin, y + along * sin + across * cos
     turn, away_m = np.arctan2(corner_y, corner_x), np.hypot(corner_x, corner_y).min(axis=1)
     seen_m = _together(turn[:, :, None])[:, :, 0] * np.minimum(away_m[:, None], away_m[None])
-    # (T, 4, D) how far the corners reach in D directions
+    # (T, 4, D) projections of the corners onto D directions
     reach = corner_x[:, :, None] * np.cos(_DIRECTIONS) + corner_y[:, :, None] * np.sin(_DIRECTIONS)
     wide: Mask = (seen_m > WIDEST_M) | (_together(reach).min(axis=2) > WIDEST_M)
     return wide
 
 
 def _together(corners: F64) -> F64:
-    """(T, T, D) extent of two footprints together, of what their corners (T, 4, D) are at."""
+    """(T, T, D) extent of two footprints together, from the projections of their corners (T, 4, D)."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     extent: F64 = np.maximum(high[:, None], high[None]) - np.minimum(low[:, None], low[None])
     return extent
 
 
 def _grouped(same: Mask) -> I32:
-    """(T,) int32 number of the component of each, 0 first, of a symmetric relation (T, T)."""
+    """(T,) int32 component of each element in a symmetric relation (T, T), numbered from 0."""
     groups = np.full(len(same), -1, dtype=np.int32)
     for n in range(len(same)):
         if groups[n] < 0:
@@ -209,6 +213,6 @@ def _renumbered(labels: I32) -> I32:
     """The same clusters, numbered in order of their first point."""
     known, first = np.unique(labels, return_index=True)
     clusters = known >= 0
-    number = np.full(int(known.max()) + 2, -1, dtype=np.int32)  # the last for what has no cluster
+    number = np.full(int(known.max()) + 2, -1, dtype=np.int32)  # the last entry is for points without a cluster
     number[known[clusters][np.argsort(first[clusters])]] = np.arange(clusters.sum(), dtype=np.int32)
     return number[labels]

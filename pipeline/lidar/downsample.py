@@ -11,9 +11,9 @@ from pipeline.types import Mask, Sweep
 
 def keep_mask(sweep: Sweep, params: DownsampleParams) -> Mask:
     """(N,) bool: the first and then every ``keep_every``-th point of each channel, in the order of the sweep, without
-    what is nearer than ``blind_range_m``: a bumper mount sees the car's own body.
+    points closer than ``blind_range_m``, since a sensor on the bumper sees the car's own body.
 
-    Counting is per channel, so every ring is thinned alike whatever order the points come in.
+    Points are counted per channel, so that every ring is down-sampled equally in any order of points.
     """
     seen: Mask = _beyond(sweep.points, params.blind_range_m)
     return seen & _thinned(sweep, params) if params.keep_every > 1 else seen
@@ -31,7 +31,7 @@ def _thinned(sweep: Sweep, params: DownsampleParams) -> Mask:
 
 @numba.njit(cache=True, nogil=True)
 def _beyond(points, range_m):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(N,) bool: the points at least this far away, horizontally."""
+    """(N,) bool: points at least this far away, horizontally."""
     far, limit2 = np.empty(len(points), dtype=np.bool_), np.float32(range_m * range_m)
     for i in range(len(points)):
         far[i] = points[i, 0] * points[i, 0] + points[i, 1] * points[i, 1] >= limit2

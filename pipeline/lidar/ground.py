@@ -27,16 +27,17 @@ from pipeline.types import Ground as Ground
 
 
 def no_higher_than(ground: Ground, points: F32, of: Mask, height_m: float) -> Mask:
-    """(N,) bool: those points of the mask ``of`` that are at most this high above the ground, or have none."""
+    """(N,) bool: the points of the mask ``of`` that are at most this high above the ground, or where no ground was
+    fitted."""
     return np.asarray(kernels.no_higher_than(points, of, ground.planes, ground.edges, height_m))
 
 
 def fit_ground(points: F32, keep: Mask, params: GroundParams) -> Ground:
-    """Planes of the road and which points lie on it.
+    """Planes of the road, and which points lie on it.
 
-    points: (N, 4) float32 ``x y z intensity``, ego frame, finite. keep: (N,) bool, the points to use.
-    A point is ground when it is no higher than ``distance_m`` over its segment's plane: what lies below the road
-    (a ditch, a reflection in a puddle) is no obstacle either.
+    points: (N, 4) float32 ``x y z intensity``, ego frame, finite. keep: (N,) bool, the points to use. A point is ground
+    if it is at most ``distance_m`` above its segment's plane: points below the road (a ditch, a reflection in a puddle)
+    are no obstacles either.
     """
     return Ground(
         *kernels.ground(

@@ -12,12 +12,12 @@ from pipeline.types import F32, F64, Mask
 U32 = npt.NDArray[np.uint32]
 
 MIN_COS_BEND = float(np.cos(np.radians(3.0)))
-"""Neighbouring planes turn by 3° at most: roads change their slope by less over the length of a segment."""
+"""Neighbouring planes differ by 3° at most: the slope of roads changes by less over the length of a segment."""
 X_BIN_M = 0.1
 EDGE_SAMPLE = 8
-"""Segments are cut by every eighth point: their sizes need not be exact."""
+"""Segment bounds are computed from every eighth point: their sizes need not be exact."""
 _BLOCK = 1024
-"""Points whose three axes and heights fit the first-level cache together."""
+"""Number of points whose coordinates and heights fit into the L1 cache together."""
 
 
 @numba.njit(cache=True, nogil=True)
@@ -34,7 +34,7 @@ def ground(
     half_width_m: float,
     min_range_m: float,
 ) -> tuple[Mask, F64, F64, Mask]:
-    """mask (N,), planes (S, 4), edges (S + 1,), fitted (S,) as ``Ground`` has them."""
+    """mask (N,), planes (S, 4), edges (S + 1,), fitted (S,) as in ``Ground``."""
     x, y, z = _axes(points)
     inside = _area(x, y, keep, reach_m, half_width_m, min_range_m)
     planes, edges, fitted = _fit(x, y, z, inside, segments, iterations, lowest, seed_m, distance_m, min_nz, reach_m)
@@ -45,14 +45,15 @@ def ground(
 
 @numba.njit(cache=True, nogil=True)
 def no_higher_than(points: F32, of: Mask, planes: F64, edges: F64, height_m: float) -> Mask:
-    """(N,) bool: those of the mask ``of`` no higher than this over the plane of their segment, or without a plane."""
+    """(N,) bool: points of the mask ``of`` that are at most this high above the plane of their segment, or in a segment
+    without a plane."""
     x, y, z = _axes(points)
     return _no_higher_than(x, y, z, of, planes, edges, height_m)
 
 
 @numba.njit(cache=True, nogil=True)
 def _axes(points: F32) -> tuple[F32, F32, F32]:
-    """x, y, z (N,) float32 each: separate arrays are what vector instructions can read."""
+    """x, y, z (N,) float32 each: separate arrays can be vectorised."""
     count = len(points)
     x, y, z = np.empty(count, np.float32), np.empty(count, np.float32), np.empty(count, np.float32)
     for i in range(count):
@@ -62,7 +63,7 @@ def _axes(points: F32) -> tuple[F32, F32, F32]:
 
 @numba.njit(cache=True, nogil=True)
 def _area(x: F32, y: F32, keep: Mask, reach_m: float, half_width_m: float, min_range_m: float) -> U32:
-    """Indices of the kept points that planes are fitted to."""
+    """Indices of the kept points that are used to fit planes."""
     reach, half_width = np.float32(reach_m), np.float32(half_width_m)
     near2 = np.float32(min_range_m * min_range_m)
     inside = np.empty(len(x), dtype=np.bool_)
@@ -90,7 +91,7 @@ def _fit(
     min_nz: float,
     reach_m: float,
 ) -> tuple[F64, F64, Mask]:
-    """planes (S, 4), edges (S + 1,), fitted (S,) of the points in the area of the fit."""
+    """planes (S, 4), edges (S + 1,), fitted (S,) for the points in the fitted area."""
     edges = _edges(all_x, area, segments, reach_m)
     x, y, z, starts = _by_segment(all_x, all_y, all_z, area, edges)
     planes = np.full((segments, 4), np.nan)
@@ -105,7 +106,7 @@ def _fit(
         planes[:] = np.nan
         return planes, edges, fitted
     root = int(np.argmin(raggedness))
-    for k in range(1, segments):  # from the root ahead, then from the root back
+    for k in range(1, segments):  # outwards from the root: first ahead, then back
         s = root + k if root + k < segments else segments - 1 - k
         neighbour = planes[s - 1] if s > root else planes[s + 1]
         shared = edges[s] if s > root else edges[s + 1]
@@ -120,15 +121,16 @@ def _fit(
 
 @numba.njit(cache=True, nogil=True)
 def _set_row(rows: F64, index: int, row: F64) -> None:
-    """rows[index] = row, which would take seconds to compile: numba's message for rows of another length does."""
+    """rows[index] = row, in a form that compiles seconds faster: numba's plain assignment includes an error message for
+    rows of another length."""
     for k in range(len(row)):
         rows[index, k] = row[k]
 
 
 @numba.njit(cache=True, nogil=True)
 def _meets(plane: F64, neighbour: F64, x: float, distance_m: float) -> bool:
-    """Whether a road can go on from one plane to the other: about one height straight ahead of or behind the ego, at
-    (x, 0), and no kink between them."""
+    """Whether the road can continue from one plane to the other: about the same height straight ahead of or behind the
+    ego car, at (x, 0), and no kink between them."""
     step = (plane[3] + plane[0] * x) / plane[2] - (neighbour[3] + neighbour[0] * x) / neighbour[2]
     bend = plane[0] * neighbour[0] + plane[1] * neighbour[1] + plane[2] * neighbour[2]
     return abs(step) <= distance_m and bend >= MIN_COS_BEND
@@ -136,7 +138,7 @@ def _meets(plane: F64, neighbour: F64, x: float, distance_m: float) -> bool:
 
 @numba.njit(cache=True, nogil=True)
 def _edges(x: F32, area: U32, segments: int, reach_m: float) -> F64:
-    """(S + 1,) float64: bounds along x, multiples of 0.1 m, that split the area's points evenly; judged by every
+    """(S + 1,) float64: bounds along x, multiples of 0.1 m, that split the area's points evenly; computed from every
     eighth point."""
     bins = int(np.ceil(2.0 * reach_m / X_BIN_M))
     histogram = np.zeros(bins + 1, dtype=np.int32)
@@ -159,7 +161,7 @@ def _edges(x: F32, area: U32, segments: int, reach_m: float) -> F64:
 def _by_segment(
     all_x: F32, all_y: F32, all_z: F32, area: U32, edges: F64
 ) -> tuple[F32, F32, F32, npt.NDArray[np.int64]]:
-    """x, y, z (M,) float32 of the area's points in the order of their segments; (S + 1,) where each segment starts."""
+    """x, y, z (M,) float32 of the area's points ordered by segment; (S + 1,) where each segment starts."""
     segments, count = len(edges) - 1, len(area)
     x, y, z = np.empty(count, np.float32), np.empty(count, np.float32), np.empty(count, np.float32)
     for k in range(count):
@@ -178,7 +180,7 @@ def _by_segment(
     place = starts.copy()
     here, at = np.uint8(0), place[0]
     for k in range(count):
-        if segment[k] != here:  # seldom: a ring stays in one segment for long, so the place stays in a register
+        if segment[k] != here:  # rare, so the position mostly stays in a register
             place[here] = at
             here, at = segment[k], place[segment[k]]
         i = area[k]
@@ -189,7 +191,7 @@ def _by_segment(
 
 @numba.njit(cache=True, nogil=True)
 def _no_higher_than(x: F32, y: F32, z: F32, of: Mask, planes: F64, edges: F64, height_m: float) -> Mask:
-    """As ``no_higher_than``, of separate axes. A block of points stays in the nearest cache over its passes."""
+    """Like ``no_higher_than``, for separate axes. Each block of points stays in the L1 cache for all passes."""
     lower = np.empty(len(x), dtype=np.bool_)
     for first in range(0, len(x), _BLOCK):
         block = slice(first, first + _BLOCK)

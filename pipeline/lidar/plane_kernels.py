@@ -9,13 +9,14 @@ import numpy.typing as npt
 from pipeline.types import F32, F64
 
 MIN_SEEDS = 20
-"""Fewer points than this carry no plane."""
+"""Minimum number of points for a plane."""
 MIN_SPREAD_M = 0.7
-"""Standard deviation that the seeds need along both directions of their plane; below it they are a line."""
+"""Minimum standard deviation of the seeds along both directions of their plane; below it they form a line."""
 MIN_SHARE = 0.05
-"""Nor is it the road where it holds less than this share of its segment's points."""
+"""A plane with a smaller share of its segment's points is not the road."""
 LOWEST_SHARE = 5
-"""The lowest points are at most one in five of a segment's: sparse segments would else count cars among them."""
+"""At most one in five points of a segment is used as its lowest points; otherwise sparse segments would include cars.
+"""
 HEIGHT_BINS, HEIGHT_LOW_M, BINS_PER_M = 2000, -10.0, 100
 
 
@@ -31,11 +32,13 @@ def refine(
     distance_m: float,
     min_nz: float,
 ) -> tuple[F64, float]:
-    """One segment: its plane (4,), and how ragged that is: the standard deviation of its points across it over their
-    share of the segment's points, m; infinite where it cannot be the road. ``prior`` (4,) says which way is low.
+    """One segment: its plane (4,) and a cost in m: the standard deviation of its points from the plane, divided by
+    their share of the segment's points; infinite if it cannot be the road. ``prior`` (4,) defines the downward
+    direction.
 
-    The band around the plane narrows evenly from ``seed_m`` to ``distance_m``: taken at once, a narrow band keeps to
-    the strip of a tilted road that the lowest points came from."""
+    The band around the plane narrows evenly from ``seed_m`` to ``distance_m``: a narrow band from the start would only
+    select the strip of a tilted road that contains the lowest points.
+    """
     plane, raggedness = prior.copy(), np.inf
     low, high = _seed_heights(x, y, z, prior, lowest, seed_m)
     for k in range(1, iterations + 1):
@@ -55,9 +58,9 @@ def refine(
 
 @numba.njit(cache=True, nogil=True)
 def _seed_heights(x: F32, y: F32, z: F32, prior: F64, lowest: int, seed_m: float) -> tuple[float, float]:
-    """Bounds of the seeds' height over ``prior``: the mean of the lowest points ± ``seed_m``.
+    """Bounds of the seeds' height above ``prior``: the mean of the lowest points ± ``seed_m``.
 
-    Heights are counted in whole centimetres, so that the lowest are found without sorting.
+    Heights are quantised to whole centimetres, so that the lowest can be found without sorting.
     """
     a, b, c = np.float32(prior[0]), np.float32(prior[1]), np.float32(prior[2])
     d, scale = np.float32(prior[3] - HEIGHT_LOW_M), np.float32(BINS_PER_M)
@@ -67,7 +70,7 @@ def _seed_heights(x: F32, y: F32, z: F32, prior: F64, lowest: int, seed_m: float
         levels[i] = np.uint16(min(max((a * x[i] + b * y[i] + c * z[i] + d) * scale, bottom), top))
     wanted = min(max(1, min(lowest, len(x) // LOWEST_SHARE)), len(x))
     least, most = 0, HEIGHT_BINS - 1
-    while least < most:  # halving finds the level of the last of them: eleven counts, each by vector instructions
+    while least < most:  # bisection for the highest level among them: eleven vectorised counts
         middle = (least + most) // 2
         if _up_to(levels, middle)[0] >= wanted:
             most = middle
@@ -81,7 +84,7 @@ def _seed_heights(x: F32, y: F32, z: F32, prior: F64, lowest: int, seed_m: float
 
 @numba.njit(cache=True, nogil=True)
 def _up_to(levels: npt.NDArray[np.uint16], highest: int) -> tuple[int, int]:
-    """How many levels are no higher than this, and their sum."""
+    """Number of levels up to this one, and their sum."""
     count, total = np.uint32(0), np.uint32(0)
     for i in range(len(levels)):
         counts = np.uint32(levels[i] <= highest)
@@ -92,10 +95,10 @@ def _up_to(levels: npt.NDArray[np.uint16], highest: int) -> tuple[int, int]:
 
 @numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
 def _moments(x: F32, y: F32, z: F32, plane: F64, low_m: float, high_m: float) -> tuple[float, F64, F64]:
-    """Count, mean (3,) and covariance (3, 3) of the points whose height over ``plane`` lies in low_m … high_m.
+    """Count, mean (3,) and covariance (3, 3) of the points whose height above ``plane`` lies in low_m … high_m.
 
-    One branch-free pass in single precision, which the compiler turns into vector instructions. Sums are taken around
-    the first point, so that what cancels is small.
+    One branch-free pass in single precision, which the compiler vectorises. Sums are relative to the first point to
+    keep cancellation errors small.
     """
     one, none = np.float32(1.0), np.float32(0.0)
     a, b, c, d = np.float32(plane[0]), np.float32(plane[1]), np.float32(plane[2]), np.float32(plane[3])
@@ -129,7 +132,7 @@ def _moments(x: F32, y: F32, z: F32, plane: F64, low_m: float, high_m: float) ->
 
 @numba.njit(cache=True, nogil=True)
 def _flattest(cov: F64) -> tuple[F64, float, float]:
-    """Of a symmetric (3, 3) covariance: the eigenvector of the smallest eigenvalue, pointing up, that eigenvalue, and
+    """For a symmetric (3, 3) covariance: the eigenvector of the smallest eigenvalue, pointing up, that eigenvalue, and
     the middle one. Cyclic Jacobi rotations (Golub, Van Loan, *Matrix Computations*, section 8.5)."""
     m, v = cov.copy(), np.eye(3)
     negligible = 1e-30 * (m[0, 0] + m[1, 1] + m[2, 2]) ** 2

@@ -16,16 +16,16 @@ from pipeline.types import F32, I32, U8, EgoState, Ground, Obstacle, Sweep
 
 @dataclass(frozen=True)
 class SegmentedSweep:
-    """What one sweep holds."""
+    """The segmentation of one sweep."""
 
     points: F32
     """(N, 4) float32 ``x y z intensity``, deskewed, before down-sampling."""
     ring: U8
     """(N,) uint8, the channel of each point."""
     kind: I32
-    """(N,) int32, what each point was taken for (``pipeline.types.Layers``)."""
+    """(N,) int32, classification of each point (``pipeline.types.Layers``)."""
     obstacles: tuple[Obstacle, ...] | None
-    """One a cluster; None without a sweep."""
+    """One per cluster; None without a sweep."""
     ground: Ground | None
     """The road under the sweep; None without a sweep."""
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -33,7 +33,7 @@ class SegmentedSweep:
 
     @property
     def sensor_height_m(self) -> float:
-        """Of the sensor over the road; NaN without ground."""
+        """Height of the sensor above the road; NaN without ground."""
         return float(self.ground.above(np.array([self.origin]))[0]) if self.ground is not None else float("nan")
 
 
@@ -48,15 +48,15 @@ def segment(
     before: LidarTrackerState | None = None,
     dt_s: float | None = None,
 ) -> SegmentedSweep:
-    """Obstacles and ground of a sweep. ego: own motion, for deskewing. clock: gets a lap for each stage. before: what
-    is followed since earlier sweeps, dt_s ago; None where each sweep stands for itself."""
-    # Points as they were at the tick, not while the sensor turned
+    """Obstacles and ground of a sweep. ego: own motion, for deskewing. clock: records a lap for each stage. before:
+    tracker state of the previous sweep, dt_s ago; None to segment each sweep independently."""
+    # Move points to where they were at the tick, instead of while the sensor turned
     sweep = deskew.deskew(sweep, ego, params.deskew)
     clock.lap("deskew")
     if sweep is None:
         return _NO_SWEEP
 
-    # Fewer points in each channel, none of them from the own body
+    # Down-sample each channel and drop the car's own body
     keep = downsample.keep_mask(sweep, params.downsample)
     clock.lap("downsample")
 
@@ -64,10 +64,10 @@ def segment(
     plane = ground.fit_ground(sweep.points, keep, params.ground)
     clock.lap("ground")
 
-    # What stands on it: points near each other are one object, across the gaps between rings too
+    # Objects on the road: neighbouring points form one cluster, also across the gaps between rings
     candidates = cluster.candidates(sweep.points, plane, keep, params.cluster)
     labels = cluster.cluster(sweep.points, candidates, params.cluster)
-    if before is not None:  # unless they are known to drive apart
+    if before is not None:  # split clusters of tracks that move apart
         labels = divide_tracked.divide(sweep.points, labels, before.tracks, before.filters, dt_s, params.cluster)
     clock.lap("cluster")
 

@@ -7,13 +7,12 @@ import numpy as np
 from pipeline.types import F64, I64
 
 _SIDE_NOISE_M = 0.15
-"""Least noise of a side: neighbouring rays of a VLP-16 are 0.1 m apart at 28 m, and a rounded corner
-adds as much."""
+"""Minimum noise of a side: neighbouring rays of a VLP-16 are 0.1 m apart at 28 m, and a rounded corner adds as much."""
 _SURE_SIGMAS = 2.0
 
 
 def recorded(history: F64, partner: I64, place: F64, clock_s: float, frames: int) -> F64:
-    """(T, frames, 5) the history with this tick's sightings at its end."""
+    """(T, frames, 5) the history with this tick's sightings appended."""
     kept: F64 = np.full((len(history), frames, 5), np.nan)
     common = min(frames, history.shape[1])
     kept[:, frames - common :] = history[:, history.shape[1] - common :]
@@ -25,15 +24,15 @@ def recorded(history: F64, partner: I64, place: F64, clock_s: float, frames: int
 
 
 def first_sightings(place: F64, clock_s: float, frames: int) -> F64:
-    """(N, frames, 5) the histories of tracks seen once, now."""
+    """(N, frames, 5) the histories of new tracks with one sighting, at the current time."""
     history: F64 = np.full((len(place), frames, 5), np.nan)
     history[:, -1, 0], history[:, -1, 1:] = clock_s, place
     return history
 
 
 def slopes(history: F64) -> F64:
-    """(T, C) speed in m/s of the least-squares line through each column of (T, H, 1 + C) ``t_s …``; NaN where all are
-    of one time."""
+    """(T, C) speed in m/s from a least-squares line through each column of (T, H, 1 + C) ``t_s …``; NaN if all times
+    are equal."""
     known = ~np.isnan(history[:, :, :1])
     table = np.where(known, history, 0.0)
     mean = table.sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1)
@@ -47,11 +46,12 @@ def slopes(history: F64) -> F64:
 
 
 def rigid_sideways(history: F64) -> F64:
-    """(T,) how fast each track surely moves along ego y as a whole, m/s, of its (H, 5) history: the speed that both of
-    its sides share, less what their scatter explains; 0 where they part.
+    """(T,) lateral speed of each track as a whole along ego y, m/s, from its (H, 5) history: the speed common to both
+    sides, minus what their scatter can explain; 0 if the sides move differently.
 
-    A parked car's footprint grows while we pass, as more of its flank comes into view: its reference point moves by
-    metres, one of its sides does not. A car that pulls out takes both sides along."""
+    A parked car's footprint grows while we pass, as more of its flank becomes visible: its reference point moves by
+    metres, but one of its sides does not. If a car pulls out, both sides move.
+    """
     if not len(history):
         return np.zeros(0)
     sides = history[:, :, [0, 3, 4]]

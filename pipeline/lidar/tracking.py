@@ -27,28 +27,29 @@ from pipeline.params import LidarTrackingParams
 from pipeline.types import F64, I64, LidarTrack, Obstacle, Point3
 
 NEVER = 1e6
-"""Cost of a pair that a gate forbids: more than all permitted pairs together."""
+"""Cost of a pair that a gate forbids: more than the cost of all permitted pairs together."""
 MIN_GATE_POINTS = 10
-"""Counts and densities below this many points are noise: one ring more or less doubles them."""
+"""Below this many points, counts and densities are noise: one ring more or less doubles them."""
 _SIDES_FRAMES = 10
-"""Sightings over which the sides of a footprint are compared: a second at 10 Hz."""
+"""Sightings over which the sides of a footprint are compared: one second at 10 Hz."""
 _JUMP_M = 1.0
-"""A cluster that lies farther from where its object was expected is another part of it: several times its noise, and
-ten times what braking at 1 g does within a tenth of a second. Its velocity is wrong for a while."""
+"""If a cluster is farther than this from its predicted position, it is a different part of the object: this is several
+times its noise, and ten times the effect of braking at 1 g within a tenth of a second. Its velocity is wrong for a
+while."""
 THINNEST_M = 0.5
-"""Thinnest footprint for comparing densities. A rear alone is as thin as the LiDAR's noise; with some flank the same
-car has twenty times the area."""
+"""Minimum thickness of a footprint for comparing densities. A rear alone is as thin as the LiDAR's noise; with some
+flank the same car has twenty times the area."""
 
 
 class Looks(NamedTuple):
-    """What obstacles are associated by."""
+    """Features of obstacles used for association."""
 
     place: F64
     """(M, 2) reference points, ego x, y."""
     shape: F64
-    """(M, 5) number of points, density, spread along x, y and z, as the gates compare them."""
+    """(M, 5) number of points, density, spread along x, y and z, as used by the gates."""
     sides: F64
-    """(M, 2) least and greatest ego y of each footprint."""
+    """(M, 2) minimum and maximum ego y of each footprint."""
 
 
 _NO_FILTERS = kalman.CvState(np.zeros((0, 4)), np.zeros((0, 4, 4)))
@@ -56,21 +57,21 @@ _NO_FILTERS = kalman.CvState(np.zeros((0, 4)), np.zeros((0, 4, 4)))
 
 @dataclass(frozen=True)
 class LidarTrackerState:
-    """What one frame leaves to the next; arrays have one row per track, in the order of ``tracks``."""
+    """State from one frame to the next; arrays have one row per track, in the order of ``tracks``."""
 
     tracks: tuple[LidarTrack, ...] = ()
-    """As they were given to fusion."""
+    """Tracks as passed to fusion."""
     filters: kalman.CvState = _NO_FILTERS
     """mean (T, 4), cov (T, 4, 4)."""
     shape: F64 = field(default_factory=lambda: np.zeros((0, 5)))
-    """(T, 5) of the last sighting, as in ``Looks``."""
+    """(T, 5) shape at the last sighting, as in ``Looks``."""
     history: F64 = field(default_factory=lambda: np.zeros((0, 1, 5)))
-    """(T, H, 5) ``t_s x y low high`` of the last sightings' reference points and sides, newest last, NaN before the
+    """(T, H, 5) ``t_s x y low high``: reference points and sides of the last sightings, newest last, NaN before the
     first."""
     next_id: int = 1
-    """Number of the next new track; numbers are never given twice."""
+    """Number of the next new track; numbers are never reused."""
     clock_s: float = 0.0
-    """Runs from the first frame; the time of ``history``."""
+    """Seconds since the first frame; the time base of ``history``."""
 
 
 def track(
@@ -79,14 +80,14 @@ def track(
     dt_s: float | None,
     params: LidarTrackingParams,
 ) -> tuple[LidarTrackerState, tuple[LidarTrack, ...]]:
-    """One tick: the next state, and every living track by ascending id.
+    """One tick: the next state, and all live tracks by ascending id.
 
-    obstacles: None when the LiDAR delivered nothing; then every track is carried by its prediction. dt_s: seconds ≥ 0
-    since the tick before; None at the first, and then earlier tracks are dropped.
+    obstacles: None if the LiDAR delivered nothing; then every track is predicted without an update. dt_s: seconds ≥ 0
+    since the previous tick; None at the first tick, which drops earlier tracks.
     """
     if dt_s is None:
         state, dt_s = LidarTrackerState(next_id=state.next_id, clock_s=state.clock_s), 0.0
-    # Every track is predicted to now and takes the nearest obstacle that its gates permit, one-to-one
+    # Predict every track to now and assign the nearest obstacle that its gates permit, one-to-one
     clock_s = state.clock_s + dt_s
     sweep, has_sweep = obstacles or (), obstacles is not None
     seen = looks(sweep)
@@ -103,7 +104,7 @@ def track(
     if params.rigid_sideways:
         sideways = rigid_sideways(history[:, -_SIDES_FRAMES:]).tolist()
 
-    # A track that found its obstacle is updated; one that did not is carried, or dropped
+    # Update matched tracks; carry or drop the others
     tracks, rows = [], []
     for i, (last, j, speed) in enumerate(zip(state.tracks, partner.tolist(), velocity.tolist(), strict=True)):
         if j >= 0:
@@ -116,7 +117,7 @@ def track(
             continue
         rows.append(i)
 
-    # Every obstacle that no track took starts a new one
+    # Start a new track for every unmatched obstacle
     matched = partner >= 0
     is_fresh = np.ones(len(sweep), dtype=np.bool_)
     is_fresh[partner[matched]] = False
@@ -139,8 +140,8 @@ def track(
 
 
 def looks(obstacles: tuple[Obstacle, ...]) -> Looks:
-    """Place and shape of each. The reference point is the middle of the footprint's rear: of its two axes the one
-    closer to ego x, at the end of smaller x."""
+    """Position and shape of each obstacle. The reference point is the middle of the footprint's rear: the end with the
+    smaller x of the axis that is closer to ego x."""
     rows = [(*o.cuboid.center, *o.cuboid.size, o.cuboid.yaw_rad, o.points, o.density, *o.spread) for o in obstacles]
     return Looks(*_looks(np.array(rows, dtype=np.float64).reshape(-1, 12)))
 
@@ -169,12 +170,12 @@ def _looks(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
 def associate(
     state: LidarTrackerState, filters: kalman.CvState, seen: Looks, dt_s: float, params: LidarTrackingParams
 ) -> I64:
-    """(T,) the obstacle of each track, −1 for none: one-to-one, of least total distance, gated pairs only. The filters
-    stand at the present time already."""
+    """(T,) the obstacle of each track, −1 for none: one-to-one, with the smallest total distance, gated pairs only. The
+    filters are already predicted to now."""
     partner = np.full(len(state.tracks), -1)
     if not state.tracks or not len(seen.place):
         return partner
-    # a copy, since to numba a part of an array is another type than the whole of one
+    # a copy, since numba treats a non-contiguous slice as a separate type
     expected = filters.mean[:, :2].copy() if params.filter == "kalman" else _extrapolated(state, dt_s)
     new = np.array([t.hits < 2 for t in state.tracks])
     gate = params.gate_m + new * params.start_speed_mps * dt_s
@@ -205,8 +206,8 @@ def _gated(
     max_density_ratio: float,
     max_spread_change_m: float,
 ) -> F64:
-    """(n, m) distance of each obstacle from each expected place; ``NEVER`` where a gate keeps the two apart. before,
-    now: (n, 5) and (m, 5) as in ``Looks.shape``."""
+    """(n, m) distance of each obstacle from each expected position; ``NEVER`` if a gate forbids the pair. before, now:
+    (n, 5) and (m, 5) as in ``Looks.shape``."""
     cost = np.full((len(expected), len(places)), NEVER)
     for i in range(len(expected)):
         for j in range(len(places)):
@@ -224,14 +225,14 @@ def _gated(
 
 
 def _extrapolated(state: LidarTrackerState, dt_s: float) -> F64:
-    """(T, 2) where the trajectories lead to now."""
+    """(T, 2) positions extrapolated from the trajectories to now."""
     since_s = np.array([[t.unseen_s + dt_s] for t in state.tracks])
     velocity = np.array([t.velocity_mps or (0.0, 0.0) for t in state.tracks])
     return np.asarray(state.history[:, -1, 1:3] + velocity * since_s)
 
 
 def _jumped(filters: kalman.CvState, seen: Looks, partner: I64) -> list[bool]:
-    """Whether each track's obstacle lies elsewhere than expected. filters: predicted to now."""
+    """Whether each track's obstacle is far from its predicted position. filters: predicted to now."""
     if not len(seen.place):
         return [False] * len(partner)
     away = seen.place[partner] - filters.mean[:, :2]
@@ -239,7 +240,7 @@ def _jumped(filters: kalman.CvState, seen: Looks, partner: I64) -> list[bool]:
 
 
 def _correct(filters: kalman.CvState, place: F64, partner: I64, params: LidarTrackingParams) -> kalman.CvState:
-    """The filters after their measurements; as predicted where there is none."""
+    """The filters updated by their measurements; unmatched ones stay as predicted."""
     rows = np.flatnonzero(partner >= 0)
     if not len(rows):
         return filters
@@ -254,14 +255,14 @@ def _noise(params: LidarTrackingParams) -> F64:
 
 
 def _lives_on(last: LidarTrack, unseen_s: float, has_sweep: bool, params: LidarTrackingParams) -> bool:
-    """Whether a track that is not seen now is carried. One seen only once or twice is dropped at once: its velocity is
-    the difference of two noisy positions, and would send a ghost across the road."""
+    """Whether an unseen track is carried. A track seen only once or twice is dropped at once: its velocity is the
+    difference of two noisy positions and would move a ghost across the road."""
     too_young = has_sweep and last.hits < params.carry_hits
     return not too_young and unseen_s <= params.max_missed_s + 1e-9
 
 
 def _carried(last: LidarTrack, dt_s: float) -> LidarTrack:
-    """Not seen: the obstacle as it was, moved on by its velocity. It belongs to no cluster of this sweep (−1)."""
+    """The obstacle of an unseen track, moved by its velocity. It belongs to no cluster of this sweep (−1)."""
     vx, vy = last.velocity_mps or (0.0, 0.0)
     _, cuboid, closest, points, density, spread = last.obstacle
     there = Cuboid(_moved(cuboid.center, vx * dt_s, vy * dt_s), cuboid.size, cuboid.yaw_rad)

@@ -23,12 +23,12 @@ LARGEST_BIRGE = 3.0
 IN_DISPUTE = 1.5
 """Factor on the sigma while a source is ignored: the others may be the ones that are wrong."""
 EDGE_SIGMA_M = 0.5
-"""Where lane lines are this uncertain, the edges lie half way between them and the usual half width."""
+"""Sigma of the lane lines at which the edges lie half way between them and the usual half width."""
 
 
 @dataclass(frozen=True, eq=False)
 class FusedPath:
-    """The path of all sources together, at s = 0, 1, … m."""
+    """The path fused from all sources, at s = 0, 1, … m."""
 
     center: F64
     """(K, 2) ego x, y."""
@@ -41,7 +41,7 @@ class FusedPath:
     shares: F64
     """(K, S) weight of each of ``SOURCES`` in the mean."""
     behind_m: F64
-    """(K,) how far it still lags behind its sources."""
+    """(K,) remaining offset between the smoothed path and its sources."""
 
 
 def normals(center: F64) -> F64:
@@ -52,8 +52,8 @@ def normals(center: F64) -> F64:
 def fuse(
     estimates: list[PathEstimate], expected: FusedPath | None, half_width_m: float, outlier_sigmas: float
 ) -> tuple[FusedPath, tuple[str, ...]]:
-    """One path from one or more estimates, and a sentence for each source ignored. expected: the path of the frame
-    before, where it should be now; it takes part in the comparison of sources, not in the mean."""
+    """One path from one or more estimates, and a sentence for each ignored source. expected: the previous frame's path,
+    predicted to now; it takes part in the comparison of sources, not in the mean."""
     centers = np.stack([each.center for each in estimates])
     sigmas = np.stack([each.sigma_m for each in estimates])
     compared = int(COMPARED_M / STEP_M)
@@ -77,11 +77,11 @@ def fuse(
 
 def _edges(estimates: list[PathEstimate], half_width_m: float) -> tuple[F64, F64]:
     """Distances from the centre to the edges: those of the lane where its lines are known well, whichever source
-    carries the centre; the usual half width elsewhere."""
+    dominates the centre; elsewhere the usual half width."""
     usual = np.full(len(estimates[0].center), half_width_m)
     for each in estimates:
         if each.left_m is not None and each.right_m is not None:
-            if each.source == "edges":  # they are parallel to the path: as far from it as they are from the car
+            if each.source == "edges":  # these edges are parallel to the path: as far from it as they are from the car
                 return each.left_m, each.right_m
             trust = EDGE_SIGMA_M**2 / (EDGE_SIGMA_M**2 + each.sigma_m**2)
             return usual + trust * (each.left_m - usual), usual + trust * (each.right_m - usual)
@@ -90,12 +90,13 @@ def _edges(estimates: list[PathEstimate], half_width_m: float) -> tuple[F64, F64
 
 def blend(fresh: FusedPath, expected: FusedPath, keep: float, largest_m: float) -> FusedPath:
     """Make the path follow its sources smoothly. keep: 0–1, the weight of the expected path at equal sigmas. largest_m:
-    no point moves farther than this in one frame, apart from what the fresh path knows better: a path that has just
-    lost a source does not jump to the remaining ones.
+    no point moves farther than this in one frame, unless the fresh path is more certain. A path that has just lost a
+    source therefore does not jump to the remaining ones.
 
-    Both come from the same sources, so they are joined by covariance intersection (Julier and Uhlmann 1997): the
-    weights are ``keep`` and 1 − ``keep`` times the inverse variances, and the result is never more certain than
-    either."""
+    Both paths come from the same sources, so they are combined by covariance intersection (Julier and Uhlmann 1997):
+    the weights are ``keep`` and 1 − ``keep`` times the inverse variances, and the result is never more certain than
+    either.
+    """
     center, sigma, kept, behind = _blend(
         fresh.center, fresh.sigma_m, expected.center, expected.sigma_m, keep, largest_m
     )
@@ -113,9 +114,9 @@ def blend(fresh: FusedPath, expected: FusedPath, keep: float, largest_m: float) 
 def moved(
     path: FusedPath, travelled_m: float, turned_rad: float, dt_s: float, coasting: Coasting | None = None
 ) -> FusedPath:
-    """The path of ``dt_s`` ago in the car's frame now, after a short arc. Errors of speed and yaw rate add 0.3 m
-    sideways and 0.003 rad in a second, growing with the square root of time. coasting: adds the errors of a motion that
-    is no longer measured; a wrong distance driven shifts a bend sideways."""
+    """The path of ``dt_s`` ago in the current ego frame, after a short arc. Errors of speed and yaw rate add 0.3 m
+    sideways and 0.003 rad in one second, growing with the square root of time. coasting: adds the errors of a motion
+    that is no longer measured; an error of the driven distance shifts a bend sideways."""
     rows = np.column_stack([path.sigma_m, path.left_m, path.right_m, path.shares])
     center, rows = _moved(path.center, rows, travelled_m, turned_rad, STEP_M)
     s = np.arange(len(center)) * STEP_M
@@ -128,7 +129,7 @@ def moved(
 
 @numba.njit(cache=True, nogil=True)
 def _normals(center):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Central differences, three-point ones at the ends."""
+    """Central differences, with three-point differences at the ends."""
     count = len(center)
     out = np.empty((count, 2))
     for k in range(count):
@@ -146,8 +147,8 @@ def _normals(center):  # type: ignore[no-untyped-def]  # pragma: no cover
 @numba.njit(cache=True, nogil=True)
 def _fuse(centers, sigmas, ref, memory, memory_sigma, known, compared, limit, largest, dispute_factor):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Weighted mean along the normals of source ``ref``. Sources are left out one by one, the worst first, while one
-    lies more than ``limit`` sigmas (root mean square up to ``compared``) from all the rest and two others remain, the
-    remembered path being one of them. disagree: that figure for those left out, else 0."""
+    differs by more than ``limit`` sigmas (root mean square up to ``compared``) from all the others and two others
+    remain; the remembered path counts as one. disagree: that deviation for the sources left out, else 0."""
     count, size = sigmas.shape
     normal = _normals(centers[ref])
     d = np.empty((count + 1, size))
@@ -197,7 +198,7 @@ def _fuse(centers, sigmas, ref, memory, memory_sigma, known, compared, limit, la
 
 @numba.njit(cache=True, nogil=True)
 def _against_the_rest(d, var, used, i, size):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """How many sigmas source i lies from the weighted mean of the others, root mean square along the path."""
+    """Deviation of source i from the weighted mean of the others in sigmas, root mean square along the path."""
     much2 = 0.0
     for k in range(size):
         total, mean = 0.0, 0.0
@@ -211,7 +212,7 @@ def _against_the_rest(d, var, used, i, size):  # type: ignore[no-untyped-def]  #
 
 @numba.njit(cache=True, nogil=True)
 def _blend(fresh, fresh_sigma, old, old_sigma, keep, largest):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Covariance intersection along the normals of the fresh path, no faster than is sensible."""
+    """Covariance intersection along the normals of the fresh path, with limited step size."""
     size = len(fresh)
     normal = _normals(fresh)
     center, sigma, kept, behind = np.empty((size, 2)), np.empty(size), np.empty(size), np.zeros(size)
@@ -233,8 +234,8 @@ def _blend(fresh, fresh_sigma, old, old_sigma, keep, largest):  # type: ignore[n
 
 @numba.njit(cache=True, nogil=True)
 def _moved(center, rows, travelled, turned, spacing):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Points turned and moved into the new ego frame, and sampled anew from the foot of its origin on. Beyond the last
-    point the line goes straight on, a tenth of a metre less sure a metre."""
+    """Points transformed to the new ego frame and resampled from the foot of its origin on. Beyond the last point, the
+    line is extended straight, and its sigma grows by 0.1 m per metre."""
     size, columns = rows.shape
     mx, my = travelled * np.cos(0.5 * turned), travelled * np.sin(0.5 * turned)
     c, s = np.cos(turned), np.sin(turned)

@@ -33,51 +33,52 @@ from pipeline.types.lane import EgoLane
 
 _LOOK_AHEAD_M = (10, 30, 60)
 _CARRIES_ALONE = 0.7
-"""Share at 30 m from which a source gives the path its name."""
+"""Share at 30 m from which the path is named after a single source."""
 _NO_SHARE = 0.005
-"""Smaller shares are not named."""
+"""Smaller shares are not reported."""
 _FASTEST_SHIFT_MPS = 3.0
-"""Largest lateral speed of any point of the corridor, apart from its uncertainty: a lane change takes a second."""
+"""Largest lateral speed of any point of the corridor, plus its uncertainty: a lane change takes a second."""
 _USABLE_WITHOUT_SPEED_M, _USABLE_AT_STANDSTILL_M = 20.0, 5.0
-"""How far ahead a path must be known where the speed is unknown, or ``usable_s`` times the speed too short."""
+"""How far ahead a path must be known if the speed is unknown, or so low that ``usable_s`` times the speed is too
+short."""
 
 
 @dataclass(frozen=True, eq=False)
 class PathState:
-    """What one frame leaves to the next."""
+    """State from one frame to the next."""
 
     yaw: YawRate | None = None
     """Smoothed yaw rate; None before the first."""
     gnss: GnssState = GnssState()
-    """Where on the route the car is."""
+    """The car's position on the route."""
     last: FusedPath | None = None
-    """The fused path; None where nothing can be carried over."""
+    """The fused path; None if nothing can be carried over."""
     is_shown: bool = False
-    """Whether lane lines or a route showed the road."""
+    """Whether lane lines or a route showed the course of the road."""
 
 
 class Evidence(NamedTuple):
-    """What shows the path ahead, own motion apart; each may be missing."""
+    """Sources of the path other than own motion; each may be missing."""
 
     lane: EgoLane | None = None
-    """The painted lines on either side."""
+    """The painted lines on both sides."""
     fix: GnssFix | None = None
-    """Where the car is on the Earth, if a fix came with this frame."""
+    """Position of the car on the Earth, if a fix came with this frame."""
     route: Route | None = None
-    """The road it follows."""
+    """The route that the car follows."""
     edges: PathEstimate | None = None
-    """The path along what runs beside the road."""
+    """The path along structures beside the road."""
     traffic: PathEstimate | None = None
     """The path along the headings of other vehicles."""
 
 
 def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParams) -> tuple[PathState, Path]:
-    """The path ahead. Whatever is missing is left out; with nothing at all the path is straight, and its sigma says how
-    little that is worth. It goes on by ``now.motion``, however old, until its own sigma ends it."""
+    """The path ahead, from the available sources. With none, the path is straight, with a correspondingly large sigma.
+    It keeps using ``now.motion``, however old, until its own sigma makes it unusable."""
     ego = now.motion if now.motion is not None and isfinite(now.motion.speed_mps) else None
     dt_s = now.dt_s
 
-    # Each source says where the path is and how sure it is of that at each distance
+    # Each source gives the path and its uncertainty at each distance
     yaw = yaw_rate.follow(state.yaw, ego, dt_s, params) if params.use_yaw_rate else None
     placed, wrong_fix = gnss.follow(state.gnss, evidence.route, evidence.fix, ego, now.t_ns, dt_s, params)
     placed, along_route, wrong_route = gnss.ahead(placed, params)
@@ -89,13 +90,15 @@ def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParam
         estimates += [each for each in (evidence.edges, evidence.traffic) if each is not None]
     guess = straight(ego, params)
     if all(each.sigma_m[0] > guess.sigma_m[0] for each in estimates) or _fades(ego, estimates):
-        estimates.append(guess)  # of the next metres a vague route tells less than that the car goes where it points
+        # for the next metres, a vague route is worse than the assumption that the car continues in its direction
+        estimates.append(guess)
 
-    # They are compared with each other and with the last path, moved on; what disagrees is left out, the rest weighed
+    # Sources are compared with each other and with the last path, predicted to now; outliers are left out, the rest is
+    # averaged
     expected = _expected(state.last, yaw, ego, dt_s, len(estimates[0].center))
     fresh, left_out = blend_estimates.fuse(estimates, expected, params.half_width_m, params.outlier_sigmas)
 
-    # The path of the frame before takes part, so that nothing jumps when a source comes or goes
+    # The previous path is blended in, so that nothing jumps when a source appears or disappears
     path = fresh
     if expected is not None and dt_s:
         keep = exp(-dt_s / params.smoothing_s) if params.smoothing_s > 0.0 else 0.0
@@ -110,7 +113,7 @@ def corridor(ego: EgoState | None, params: PathParams) -> Path:
 
 
 def warm_up() -> None:
-    """Compile the path's kernels: two frames of a made-up drive along a route."""
+    """Compile the path's kernels with two frames of a synthetic drive along a route."""
     place = np.array([0.0, 0.001])
     route, params, state = Route("warm-up", place, place, 0.01), PathParams(), PathState()
     for k in range(2):
@@ -123,15 +126,15 @@ def warm_up() -> None:
 
 
 def _shows_the_road(each: PathEstimate | None, params: PathParams) -> bool:
-    """Whether paint or a route shows the road well. Then its edges and other vehicles add nothing, and may not outvote
-    it: a car keeps to its lane where the kerb goes another way, or where others turn off."""
+    """Whether lane lines or a route show the road well. Then road edges and other vehicles add nothing and must not
+    outvote them: a car keeps to its lane where the kerb diverges or other vehicles turn off."""
     return each is not None and float(each.sigma_m[int(_LOOK_AHEAD_M[1] / STEP_M)]) <= params.good_sigma_m
 
 
 def _expected(
     last: FusedPath | None, yaw: YawRate | None, ego: EgoState | None, dt_s: float | None, size: int
 ) -> FusedPath | None:
-    """The last path where it should be now; None when there is none, or own motion is not known."""
+    """The last path, predicted to now; None without a last path or own motion."""
     if last is None or ego is None or not dt_s or len(last.center) != size:
         return None
     rate = yaw_rate.usable_rate(ego)
@@ -143,8 +146,8 @@ def _expected(
 
 
 def _fades(ego: EgoState | None, estimates: list[PathEstimate]) -> bool:
-    """Whether own motion is no longer measured and no line shows the road. Then, as yaw rate and pose get less certain,
-    a straight guess gradually takes over."""
+    """Whether own motion is no longer measured and no line shows the road. Then a straight guess gradually takes over
+    as yaw rate and pose become less certain."""
     return ego is not None and ego.coasting is not None and all(each.source != "lane" for each in estimates)
 
 
@@ -183,18 +186,18 @@ def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], para
 
 
 def _by_source(shares: F64) -> dict[str, float]:
-    """(S,) shares of ``SOURCES`` by their names."""
+    """(S,) shares of ``SOURCES`` by name."""
     return {str(name): share for name, share in zip(SOURCES, shares.tolist(), strict=True) if share > _NO_SHARE}
 
 
 def _carrier(shares: F64) -> PathSource:
-    """The source that carries the path, by (S,) shares of ``SOURCES``."""
+    """The source that the path is named after, from (S,) shares of ``SOURCES``."""
     main = int(np.argmax(shares))
     return SOURCES[main] if shares[main] >= _CARRIES_ALONE else "fused"
 
 
 def _reach_m(sigma_m: F64, params: PathParams) -> float:
-    """How far ahead the path is good enough to drive by, from (K,) sigmas; negative where it is nowhere."""
+    """How far ahead the path is accurate enough to drive by, from (K,) sigmas; negative if nowhere."""
     too_vague = np.flatnonzero(~(sigma_m <= params.good_sigma_m))
     return float(too_vague[0] - 1) * STEP_M if len(too_vague) else params.length_m
 
@@ -212,16 +215,17 @@ def offset(path: Path, points: F64) -> F64:
 
 
 def nearest_on_path(path: Path, points: F64) -> tuple[F64, F64]:
-    """Signed offset (N,) and path length (N,) of each point's foot on the centre line. A point before the first or
-    beyond the last piece is measured against that piece's extension."""
+    """Signed offset (N,) and path length (N,) of each point's foot on the centre line. Points before the first or
+    beyond the last segment are measured relative to the extension of that segment."""
     return nearest(path.center, np.asarray(points, dtype=np.float64))
 
 
 @numba.njit(cache=True, nogil=True)
 def nearest(center, points):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Kernel of ``nearest_on_path``, for other kernels: the nearest foot wins, the first of equals."""
+    """Kernel of ``nearest_on_path``, also used by other kernels: the nearest foot wins, the first one if several are
+    equal."""
     pieces = len(center) - 1
-    # a column each: separate arrays are what vector instructions can read
+    # one array per column, so that the loop can be vectorised
     x, y, dx, dy = np.empty(pieces), np.empty(pieces), np.empty(pieces), np.empty(pieces)
     first, last, along = np.zeros(pieces), np.empty(pieces), np.zeros(pieces + 1)
     for k in range(pieces):
@@ -230,7 +234,7 @@ def nearest(center, points):  # type: ignore[no-untyped-def]  # pragma: no cover
         last[k] = np.sqrt(wx * wx + wy * wy)
         dx[k], dy[k] = wx / last[k], wy / last[k]
         along[k + 1] = along[k] + last[k]
-    first[0], last[-1] = -np.inf, np.inf  # the ends go on for ever
+    first[0], last[-1] = -np.inf, np.inf  # the first and last segment extend to infinity
     offset, reached, away2 = np.empty(len(points)), np.empty(len(points)), np.empty(pieces)
     for n in range(len(points)):
         px, py = points[n, 0], points[n, 1]
@@ -245,13 +249,13 @@ def nearest(center, points):  # type: ignore[no-untyped-def]  # pragma: no cover
     return offset, reached
 
 
-# No branch and nothing that can raise: then the compiler vectorises it, and looking at every piece is faster than
-# choosing which ones to look at.
+# No branch and nothing that can raise, so the compiler vectorises it; testing every segment is then faster than
+# selecting the segments to test.
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz", "contract", "reassoc"})
 def _away2(x, y, dx, dy, first, last, px, py, out):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Into ``out`` the squared distance of a point from each piece of the line; the least of them."""
+    """Writes the squared distance of a point from each segment of the line into ``out``; returns the smallest."""
     least = np.inf
     for k in range(len(x)):
         rx, ry = px - x[k], py - y[k]

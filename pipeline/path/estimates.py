@@ -22,27 +22,27 @@ PathSourceName = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "traff
 SOURCES: tuple[PathSourceName, ...] = ("lane", "gnss", "yaw_rate", "straight", "edges", "traffic")
 STEP_M = 1.0
 UNKNOWN_SIGMA_M = 1e3
-"""Sigma of a position about which a source says nothing."""
+"""Sigma where a source gives no position."""
 
 _STRAIGHT_CURVATURE = 1e-6
 _FASTEST_CURVATURE_PER_M = 1.0 / 500.0
-"""Curvature assumed possible where the speed is not known: a road for 100 km/h has curves down to a 500 m radius."""
+"""Curvature assumed possible if the speed is not known: a road for 100 km/h has curves down to a 500 m radius."""
 TIGHTEST_CURVATURE_PER_M = 0.02
 _LANE_WIDTH_SIGMA_M = 0.3
-"""Uncertainty of a lane's width where only one of its lines is seen."""
+"""Uncertainty of a lane's width if only one of its lines is seen."""
 _USUAL_LANE_M = 3.5
 _CAR_HALF_M, _SOON_M = 0.9, 15.0
-"""Half a car's width, and the distance within which a line is crossed if it is crossed on purpose."""
+"""Half a car's width, and the distance within which a line is crossed if the crossing is intended."""
 _HEADING_AT = 5
-"""The lane's heading against the car is taken over so many metres."""
+"""Length in metres over which the lane's heading relative to the car is measured."""
 _PITCH_SIGMA_RAD, _EYE_HEIGHT_M = 0.003, 1.2
-"""How far the road ahead may bend up or down against the car, and how high a camera sits: together, how far off a
-point on the road may be taken to be."""
+"""Possible slope of the road ahead relative to the car, and the height of a camera: together they give the distance
+error of a point on the road."""
 
 
 @dataclass(frozen=True, eq=False)
 class PathEstimate:
-    """The path as one source has it, at s = 0, 1, … m."""
+    """The path according to one source, at s = 0, 1, … m."""
 
     source: PathSourceName
     """Whose estimate it is."""
@@ -51,28 +51,28 @@ class PathEstimate:
     sigma_m: F64
     """(K,) float64, standard deviation of the lateral position."""
     left_m: F64 | None = None
-    """(K,) float64, distance from the centre to the lane's left edge; None where the source does not see edges."""
+    """(K,) float64, distance from the centre to the lane's left edge; None if the source does not see edges."""
     right_m: F64 | None = None
-    """The same of the right edge."""
+    """The same for the right edge."""
 
 
 @lru_cache(maxsize=8)
 def samples(length_m: float) -> F64:
-    """(K,) path lengths at which every estimate is given, read-only."""
+    """(K,) path lengths of the samples of every estimate, read-only."""
     s = np.arange(0.0, length_m + STEP_M / 2, STEP_M)
     s.flags.writeable = False
     return s
 
 
 SHARPEST_BEGIN_PER_M2 = 0.0044
-"""How fast a road's curvature changes along it at most: a street corner of 15 m radius that begins over 15 m. Lateral
-jerk bounds it at speed; a car that creeps could turn its wheels on the spot, but the road ahead of it does not."""
+"""Maximum change of a road's curvature along it: a street corner of 15 m radius that begins over 15 m. At speed,
+lateral jerk limits it further; a creeping car could turn its wheels on the spot, but the road ahead does not."""
 
 
 def arc(curvature: float, s: F64) -> tuple[F64, F64]:
     """(K, 2) points and (K,) headings at path lengths ``s`` of an arc from the origin along +x; curvature is positive
-    to the left. At path length s the heading has turned by θ = s/r and the place has moved aside by r(1 − cos θ). It
-    stops turning at a quarter circle: no corridor leads behind the car."""
+    to the left. At path length s the heading has turned by θ = s/r and the lateral offset is r(1 − cos θ). The arc
+    continues straight after a quarter circle, so that no corridor leads behind the car."""
     theta = np.clip(curvature * s, -np.pi / 2, np.pi / 2)
     if abs(curvature) < _STRAIGHT_CURVATURE:
         return np.column_stack([s, 0.5 * curvature * s * s]), theta
@@ -83,7 +83,7 @@ def arc(curvature: float, s: F64) -> tuple[F64, F64]:
 
 
 def straight(ego: EgoState | None, params: PathParams) -> PathEstimate:
-    """Straight ahead: the fallback that is always available. Its sigma covers every curvature that the speed allows."""
+    """Straight ahead: the fallback that is always available. Its sigma covers all curvatures possible at this speed."""
     s = samples(params.length_m)
     if ego is None:
         curvature_sigma = _FASTEST_CURVATURE_PER_M
@@ -96,8 +96,8 @@ def straight(ego: EgoState | None, params: PathParams) -> PathEstimate:
 
 
 def between_lines(lane: EgoLane | None, params: PathParams) -> PathEstimate | None:
-    """The middle between the lane's two lines, or half a lane beside the one that is seen; None without any. The lines
-    need not be parallel. Where a line ends, its own covariance grows, and so does the sigma here."""
+    """The middle between the lane's two lines, or half a lane beside the only visible one; None without lines. The
+    lines need not be parallel. Beyond the end of a line its covariance grows, and so does the sigma here."""
     if lane is None or (lane.left is None and lane.right is None):
         return None
     x, reach = _along(lane, params)
@@ -115,10 +115,12 @@ def between_lines(lane: EgoLane | None, params: PathParams) -> PathEstimate | No
 
 
 def _leaving(x: F64, y: F64, left: F64, right: F64) -> tuple[F64, F64]:
-    """How far from the middle of its lane a car that points out of it will be at each x, and the uncertainty of that.
+    """For a car that points out of its lane: its expected distance from the middle of the lane at each x, and the
+    uncertainty.
 
-    The car either stays in the lane or goes on as it points, which is the likelier the sooner its side crosses the
-    line: mean and spread of the two."""
+    The car either stays in the lane or continues in its direction; the latter is the more likely the sooner its side
+    crosses the line. The result is the mean and spread of both cases.
+    """
     heading = float(y[_HEADING_AT] - y[0]) / _HEADING_AT
     to_line_m = float(left[0] + y[0] if heading < 0.0 else right[0] - y[0]) - _CAR_HALF_M
     crossing_m = max(to_line_m, 0.0) / max(abs(heading), 1e-6)
@@ -132,7 +134,7 @@ def _places(line: LaneLine | None, x: F64) -> tuple[F64, F64] | None:
 
 
 def _along(lane: EgoLane, params: PathParams) -> tuple[F64, float]:
-    """x at which the lines are read, and how far paint supports either of them."""
+    """x at which the lines are sampled, and how far paint supports either of them."""
     reach = max(line.x_max_m for line in (lane.left, lane.right) if line is not None)
     return samples(params.length_m), reach
 
@@ -140,8 +142,8 @@ def _along(lane: EgoLane, params: PathParams) -> tuple[F64, float]:
 def _as_estimate(
     x: F64, y: F64, sigma: F64, left: F64, right: F64, reach: float, params: PathParams
 ) -> PathEstimate | None:
-    """Places y(x) as samples along the path, edges and sigma along its normal. In a bend the camera's pitch against
-    the road shifts the lines sideways; what lies beyond the paint is less sure by how far a road may bend away."""
+    """Resamples y(x) along the path, with edges and sigma along its normal. In a bend, the camera's pitch relative to
+    the road shifts the lines sideways. Beyond the paint, the sigma grows by how far a road may bend away."""
     slope = np.gradient(y, STEP_M)
     stretch = np.sqrt(1.0 + slope * slope)
     travelled = np.concatenate([[0.0], np.cumsum(0.5 * (stretch[1:] + stretch[:-1]) * STEP_M)])
@@ -149,7 +151,7 @@ def _as_estimate(
     beyond = np.maximum(x - reach, 0.0)
     too_far = (
         x * x / _EYE_HEIGHT_M * _PITCH_SIGMA_RAD
-    )  # a point taken for too far lies aside by so much times the slope
+    )  # a distance error shifts a point sideways by the error times the slope
     sigma = across * np.sqrt(sigma**2 + (slope * too_far) ** 2 + (0.5 * _FASTEST_CURVATURE_PER_M * beyond**2) ** 2)
     if not (np.isfinite(y).all() and np.isfinite(sigma).all()):
         return None

@@ -21,18 +21,19 @@ from pipeline.common.geometry import F64
 from pipeline.types import Coasting
 
 WHITE_SHARE = 0.2
-"""Scatter from fix to fix as a share of the receiver's sigma (0.3 m where it says 1.5 m; 2 mm where RTK says 1 cm)."""
+"""Fix-to-fix scatter as a share of the receiver's sigma (0.3 m for a sigma of 1.5 m; 2 mm for RTK with 1 cm)."""
 WHITE_FLOOR_M = 0.03
 COURSE_SIGMA_MPS = 0.1
-"""Noise of the sideways speed from which a receiver takes its course: the course's sigma is this over the speed."""
+"""Noise of the lateral speed from which a receiver computes its course: the course's sigma is this divided by the
+speed."""
 _START_HEADING_SIGMA_RAD = 0.1
 _SMALLEST_JUMP_M = 0.6
-"""A fix no farther than this from where it was expected is no jump, however sure the filter is."""
+"""A fix within this distance of the expected position is not a jump, however certain the filter is."""
 
 
 class _Growth(NamedTuple):
-    """Dead reckoning: speed off by a hundredth and 5 cm/s; heading a random walk of 0.003 rad in a second, which also
-    covers ten seconds of the 0.0005 rad/s bias measured."""
+    """Dead reckoning: speed error of 1 % plus 5 cm/s; heading a random walk of 0.003 rad in one second, which also
+    covers ten seconds of the measured bias of 0.0005 rad/s."""
 
     speed_share: float = 0.01
     speed_mps: float = 0.05
@@ -45,29 +46,29 @@ GROWTH = _Growth()
 
 @dataclass(frozen=True, eq=False)
 class MapPose:
-    """A Gaussian over place and heading on the map."""
+    """A Gaussian over position and heading on the map."""
 
     mean: F64
     """(3,) float64 east and north in metres, heading in radians counter-clockwise from east."""
     cov: F64
-    """(3, 3) float64 covariance of the same."""
+    """(3, 3) float64 covariance of ``mean``."""
 
 
 def start(x: float, y: float, heading_rad: float, place_sigma_m: float) -> MapPose:
-    """At the first fix that comes with a course."""
+    """The pose at the first fix that has a course."""
     return MapPose(np.array([x, y, heading_rad]), np.diag([place_sigma_m**2] * 2 + [_START_HEADING_SIGMA_RAD**2]))
 
 
 def white_sigma_m(sigma_m: float) -> float:
-    """Scatter from fix to fix of a receiver that reports ``sigma_m``."""
+    """Fix-to-fix scatter of a receiver that reports ``sigma_m``."""
     return max(WHITE_FLOOR_M, WHITE_SHARE * sigma_m)
 
 
 def predict(
     pose: MapPose, speed_mps: float, yaw_rate_radps: float | None, dt_s: float, coasting: Coasting | None = None
 ) -> MapPose:
-    """The pose ``dt_s`` later by dead reckoning; a yaw rate that nobody ever measured is 0 ± 0.05 rad/s. coasting: what
-    comes on top where speed and yaw rate are those of a while ago."""
+    """The pose ``dt_s`` later by dead reckoning; a yaw rate that was never measured is 0 ± 0.05 rad/s. coasting:
+    additional uncertainty if speed and yaw rate are no longer measured."""
     turn = GROWTH.heading_rad_per_root_s if yaw_rate_radps is not None else GROWTH.heading_without_yaw_rate
     along = (GROWTH.speed_share * speed_mps + GROWTH.speed_mps) * dt_s
     along_var, turn_var = along**2, turn**2 * dt_s
@@ -78,8 +79,8 @@ def predict(
 
 
 def jump_m(pose: MapPose, x: float, y: float, sigma_m: float, sigmas: float) -> float | None:
-    """How far a fix lies from where it was expected, when that is farther than the noise explains (the innovation's
-    Mahalanobis distance against ``sigmas``); None when it is where it should be."""
+    """Distance of a fix from the expected position, if it is larger than noise explains (the innovation's Mahalanobis
+    distance exceeds ``sigmas``); else None."""
     dx, dy = x - float(pose.mean[0]), y - float(pose.mean[1])
     a, b, d = float(pose.cov[0, 0]) + sigma_m**2, float(pose.cov[0, 1]), float(pose.cov[1, 1]) + sigma_m**2
     distance2 = (d * dx * dx - 2.0 * b * dx * dy + a * dy * dy) / (a * d - b * b)
@@ -88,13 +89,13 @@ def jump_m(pose: MapPose, x: float, y: float, sigma_m: float, sigmas: float) -> 
 
 
 def with_fix(pose: MapPose, x: float, y: float, sigma_m: float) -> MapPose:
-    """The pose after a fix that scatters by ``sigma_m`` each way."""
+    """The pose after a fix with standard deviation ``sigma_m`` on each axis."""
     mean, cov = _measure(pose.mean, pose.cov, 0, x, sigma_m**2)
     return MapPose(*_measure(mean, cov, 1, y, sigma_m**2))
 
 
 def with_course(pose: MapPose, heading_rad: float, speed_mps: float) -> MapPose:
-    """The pose after a course; one that lies more than 90° off is a car that reverses, and says nothing."""
+    """The pose after a course; a course more than 90° off belongs to a reversing car and is ignored."""
     off = (heading_rad - float(pose.mean[2]) + pi) % (2 * pi) - pi
     if not isfinite(off) or abs(off) > pi / 2:
         return pose
@@ -122,7 +123,7 @@ def _predict(mean, cov, speed, yaw_rate, dt, along_var, turn_var):  # type: igno
 
 @numba.njit(cache=True, nogil=True)
 def _measure(mean, cov, i, value, var):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """State i measured (Joseph form)."""
+    """Update with a measurement of state i (Joseph form)."""
     gain = cov[:, i] / (cov[i, i] + var)
     keep = np.eye(3)
     for k in range(3):

@@ -16,71 +16,73 @@ from pipeline.types import F32, I32, U8, EgoState, FusedObject, Ground, LidarTra
 
 _FEWEST_CELLS = 25
 _ANEW_EVERY = 3
-"""A shape that is followed may be the wrong one: in every third frame it is looked for as if nothing were known of it,
-which takes as long again."""
+"""A tracked shape may be the wrong one, so in every third frame the shape is also searched from scratch, which doubles
+the time."""
 _LOWEST_M = 0.1
-"""A sensor that seems to lie lower has no road below it."""
+"""Minimum sensor height above the road; a lower value means that there is no road below it."""
 
 
 class Surroundings(NamedTuple):
-    """What the stages before found in a frame."""
+    """Results of the earlier stages in a frame."""
 
     points: F32
-    """(N, 4) of the sweep."""
+    """(N, 4) points of the sweep."""
     kind: I32
-    """(N,) what each point was taken for."""
+    """(N,) classification of each point."""
     ring: U8 | None
-    """(N,) the channel of each; None without a sweep."""
+    """(N,) the channel of each point; None without a sweep."""
     ground: Ground | None
     """The road below."""
     tracks: tuple[LidarTrack, ...]
-    """Of clusters."""
+    """LiDAR tracks of the clusters."""
     objects: tuple[FusedObject, ...]
-    """With whether they move."""
+    """All objects, including whether they move."""
     sensor_height_m: float
-    """Over the road."""
+    """Height of the sensor above the road."""
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeState:
-    """What one frame leaves to the next."""
+    """State from one frame to the next."""
 
     cells: Cells = NONE
     """Structure beside the road."""
     shape: F64 | None = None
-    """(K, 2) the road's shape in that frame; None where it is not known."""
+    """(K, 2) shape of the road in that frame; None if it is not known."""
     turn: int = 0
-    """Frames so far, modulo ``_ANEW_EVERY``."""
+    """Frame counter, modulo ``_ANEW_EVERY``."""
 
 
 class Edges(NamedTuple):
-    """The road by its edges."""
+    """The course of the road from its edges."""
 
     path: PathEstimate
-    """Along them, as far from them as the car is now."""
+    """The path along the edges, at the car's present distance from them."""
     cells: F64
-    """(M, 2) ego x, y of the structure that it was taken from."""
+    """(M, 2) ego x, y of the structure that was used."""
 
 
 def follow(
     state: EdgeState, around: Surroundings, now: Moment, params: PathParams, is_shown: bool = False
 ) -> tuple[EdgeState, Edges | None]:
-    """One frame. None without own motion, which places earlier sweeps, and where too little stands beside the road.
+    """One frame. None without own motion, which is needed to place earlier sweeps, and if there is too little structure
+    beside the road.
 
-    is_shown: lane lines or a route show the road already. Then there are none either: what stands beside the road is
-    collected, for when they end, but its shape, which takes most of the time, is not looked for."""
+    is_shown: lane lines or a route already show the road. Then the result is None as well: structure is collected for
+    later, but the shape is not searched, which takes most of the time.
+    """
     ego, dt_s = now.ego, now.dt_s
     if ego is None or not params.use_edges:
         return EdgeState(), None
-    # What stood beside the road in earlier sweeps, moved on by own motion, and what this one sees there, but without
-    # what drives
+    # Structure beside the road from earlier sweeps, moved by own motion, and from this sweep, without moving vehicles
     before = road_structure.moved(state.cells, ego, dt_s) if dt_s else NONE
     cells = road_structure.merged(before, _seen(around))
     driving = [item for item in around.objects if road_structure.drives(item)]
     cells = road_structure.without(cells, driving)
     if is_shown or len(cells.xy) < _FEWEST_CELLS:
         return EdgeState(cells), None
-    # The shape along which most of it lies at the same distance is the road's, and the nearest of it is its room
+    # The shape with the most structure at a constant distance is the road's, and the nearest structure limits the free
+    # width
     starts = road_shape.begin(state.shape, ego, dt_s, state.turn == 0, params)
     shape, sigma_m = road_shape.fitted(cells.xy, cells.blocks, starts, ego, params)
     room_m = road_shape.room(shape, cells.xy[cells.stands], params.half_width_m)

@@ -23,72 +23,73 @@ from pipeline.path.ground_points import now_at
 from pipeline.types import EgoState
 
 _NODES_M = (20.0, 40.0)
-"""A shape is a cubic: where it is aside at these two distances, and its heading at the car."""
+"""A shape is a cubic, given by its lateral offset at these two distances and its heading at the car."""
 _TEMPER = 0.2
-"""Cells of one car or one hedge are not independent of each other: five are worth one."""
+"""Cells of one car or one hedge are not independent: five count as one."""
 _BAND_M = 12.0
 _IMPROBABLE = 12.0
 _CHANCE = 1.0
-"""How many of the cells are where they are by chance, against those that line up."""
+"""Number of cells expected by chance, relative to those that line up."""
 _EDGE_M, _EDGE_CELLS, _EDGE_SHARE = 0.5, 5, 0.3
-"""An edge is so wide a strip beside the road with so many cells, and with this share of the fullest one's."""
+"""An edge is a strip beside the road of this width with at least this many cells and this share of the fullest strip's
+cells."""
 _CLEAR_M = 0.9
 """Half a car's width."""
 _CHANGES_OVER_M, _MOST_CHANGE_PER_M = (3.0, 10.0, 30.0), (0.01, 0.025, 0.1)
-"""How much a road's curvature over the next 6, over the next 20 and over the 20 m beyond may differ from that of the
-way just driven: by what its lateral jerk allows to their middles, but by no more than a street corner does."""
+"""Permitted difference of a road's curvature over the next 6 m, the next 20 m and the 20 m beyond from that of the way
+just driven: limited by lateral jerk up to the middle of each section, and by the curvature of a street corner."""
 _MODEL_SIGMA_PER_M2 = 0.0004
-"""A street is no cubic."""
+"""Model error, since a street is not exactly a cubic."""
 
 
 class Grid(NamedTuple):
-    """Which shapes are tried: how far aside at the two nodes (m) and the heading (rad), each from −most to most."""
+    """The shapes to try: lateral offset at the two nodes (m) and the heading (rad), each from −max to max."""
 
     first_m: tuple[float, float]
-    """At the near node: most, step."""
+    """At the near node: maximum, step."""
     second_m: tuple[float, float]
-    """At the far node: most, step."""
+    """At the far node: maximum, step."""
     heading: tuple[float, float]
-    """Most, step."""
+    """Maximum, step."""
     bin_m: float
-    """Width of the lateral bins in which points vote."""
+    """Width of the lateral bins for the votes of the points."""
 
 
 _WIDE = Grid((8.0, 1.0), (24.0, 2.0), (0.0, 1.0), 1.5)
 _USUAL = Grid((4.0, 0.5), (15.0, 1.25), (0.02, 0.02), 1.0)
 _FINE = Grid((1.5, 0.25), (4.5, 0.5), (0.02, 0.02), 0.5)
 _MOST_CELLS, _MOST_FINE = 150, 200
-"""Keeps the time bounded; a sweep of 16 rings has 100 to 300."""
+"""Limits the computing time; a sweep of 16 rings has 100 to 300."""
 
 
 class Prior(NamedTuple):
-    """What roads can be, before anything beside one is seen."""
+    """Prior over road shapes, before structure beside the road is considered."""
 
     bend_sigma: float
-    """Of the curvature over 20 m, 1/m."""
+    """Standard deviation of the curvature over 20 m, 1/m."""
     heading_sigma: float
-    """Of the road against the car, rad."""
+    """Standard deviation of the road's heading relative to the car, rad."""
     own: float
     """Curvature of the way just driven, 1/m."""
     own_sigma: float
-    """Of the road's curvature over the next 6 m against it."""
+    """Standard deviation of the road's curvature over the next 6 m from ``own``."""
     later_sigma: float
-    """Of that over the next 20 m."""
+    """The same for the next 20 m."""
     far_sigma: float
-    """Of that over the 20 m beyond."""
+    """The same for the 20 m beyond."""
 
 
 class Starts(NamedTuple):
-    """Lines from which shapes are measured, (K, 2) each; one of them at least."""
+    """Lines relative to which shapes are searched, (K, 2) each; at least one is set."""
 
     own: F64 | None
-    """The arc of own motion: wherever the road goes, it begins along it. None: not tried again yet."""
+    """The arc of own motion: any road starts along it. None: no search from scratch in this frame."""
     before: F64 | None
-    """The shape of the frame before, moved on; None where there is none."""
+    """The previous frame's shape, predicted to now; None without one."""
 
 
 def begin(before: F64 | None, ego: EgoState, dt_s: float | None, anew: bool, params: PathParams) -> Starts:
-    """Where to look for the shape. anew: also as if nothing were known of it."""
+    """The lines to search around. anew: also search from scratch."""
     s = samples(params.length_m)
     moved = moved_on(before, ego, dt_s, s) if before is not None and dt_s else None
     if moved is not None and not anew:
@@ -98,16 +99,16 @@ def begin(before: F64 | None, ego: EgoState, dt_s: float | None, anew: bool, par
 
 
 def moved_on(shape: F64, ego: EgoState, dt_s: float, s: F64) -> F64:
-    """The shape of the frame before, from the car on, parallel to itself."""
+    """The previous frame's shape, starting at the car and parallel to itself."""
     line = _resampled(now_at(shape, ego, dt_s), s)
-    turned = np.arctan2(line[1, 1], line[1, 0])  # a road that the car is not along is not the road
+    turned = np.arctan2(line[1, 1], line[1, 0])  # a road whose direction differs from the car's is not the car's road
     turned = turned - np.clip(turned, -0.02, 0.02)
     c, sn = np.cos(turned), np.sin(turned)
     return np.column_stack([line[:, 0] * c + line[:, 1] * sn, line[:, 1] * c - line[:, 0] * sn])
 
 
 def _resampled(line: F64, s: F64) -> F64:
-    """The line from beside the origin on, at ``s``, moved so that it begins there; straight beyond its end."""
+    """The line sampled at ``s`` from beside the origin on, shifted to start at the origin; straight beyond its end."""
     _, along = nearest(line, np.zeros((1, 2)))
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     at = s + max(float(along[0]), 0.0)
@@ -123,8 +124,8 @@ def fitted(xy: F64, blocks: F64, starts: Starts, ego: EgoState, params: PathPara
 
     Args:
         xy: (M, 2) cells.
-        blocks: (M,) how strongly each says that no road leads through it, in log-likelihood.
-        starts: lines from which shapes are measured.
+        blocks: (M,) log-likelihood of each cell that no road leads through it.
+        starts: lines relative to which shapes are searched.
         ego: own motion.
         params: of the path.
     """
@@ -152,8 +153,8 @@ def fitted(xy: F64, blocks: F64, starts: Starts, ego: EgoState, params: PathPara
 
 
 def room(line: F64, xy: F64, usual_m: float) -> tuple[float, float]:
-    """How far the corridor reaches to the left and to the right of the line: half way between the car's own side and an
-    edge as near as that, for what stands beyond the middle belongs rather to the edge; else as usual."""
+    """Free width of the corridor to the left and to the right of the line: half way between the car's side and an edge
+    if one is near, because the space beyond rather belongs to the edge; else the usual width."""
     aside, along = nearest(line, xy)
     near = aside[(along > 0.0) & (along < _NODES_M[1])]
     left, right = (_nearest_edge_m(side[side > _CLEAR_M]) for side in (near, -near))
@@ -168,7 +169,7 @@ def _nearest_edge_m(aside: F64) -> float:
 
 
 def _round(line: F64, xy: F64, blocks: F64, grid: Grid, prior: Prior, s: F64) -> tuple[F64, F64, float]:
-    """The line moved to the most probable shape around it, (K,) its sigma, and the log-evidence."""
+    """The line shifted to the most probable shape around it, (K,) its sigma, and the log-evidence."""
     aside, along = nearest(line, xy)
     keep = np.flatnonzero((along > 0.0) & (along < _NODES_M[1] + 5.0) & (np.abs(aside) < 2.0 * _BAND_M))
     keep = keep[:: -(-len(keep) // (_MOST_FINE if grid is _FINE else _MOST_CELLS)) or 1]
@@ -188,7 +189,7 @@ def _steps(most: float, step: float) -> F64:
 
 
 def _bends(line: F64) -> tuple[float, F64]:
-    """Heading at the car, and (3,) mean curvature from 0 to 6, from 0 to 20 and from 20 to 40 m."""
+    """Heading at the car, and (3,) mean curvature from 0 to 6 m, 0 to 20 m and 20 to 40 m."""
     way = np.diff(line, axis=0)
     heading = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
     from_to = ((0, 6), (0, 19), (20, 39))
@@ -209,7 +210,7 @@ def _cubic(first: F64, second: F64, heading: F64) -> tuple[F64, F64]:
 
 
 def _moments(s: F64, first: F64, second: F64, heading: F64, weights: F64) -> tuple[F64, F64]:
-    """Mean and standard deviation of how far aside the shape is at ``s``, straight beyond the last node."""
+    """Mean and standard deviation of the shape's lateral offset at ``s``, straight beyond the last node."""
     h, u, w = np.meshgrid(heading, first, second, indexing="ij")
     a, b = _cubic(u, w, h)
     near = np.minimum(s, _NODES_M[1])
@@ -268,7 +269,7 @@ def _weights(  # type: ignore[no-untyped-def]
                 likeliest = min(likeliest, out[i, j, k])
     best = -np.inf
     s2, s3 = s * s, s * s * s
-    per_m, middle, last = 1.0 / bin_m, band_m / bin_m + 1.0, bins - 1.0  # the outer bins hold what is out of the band
+    per_m, middle, last = 1.0 / bin_m, band_m / bin_m + 1.0, bins - 1.0  # the outer bins collect cells outside the band
     for i in range(len(heading)):
         for j in range(len(first)):
             for k in range(len(second)):

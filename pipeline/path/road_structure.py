@@ -16,48 +16,51 @@ from pipeline.types import F32, F64, GROUND, I32, U8, VEHICLES, EgoState, FusedO
 from pipeline.types.arrays import Mask
 
 REACH_M, ASIDE_M = 48.0, 24.0
-"""Farther ahead, or farther to the side, a 16-channel LiDAR shows nothing of a road's edge."""
+"""Farther ahead or to the side, a 16-channel LiDAR does not resolve a road's edge."""
 _BEHIND_M = -8.0
 CELL_M = 0.5
-"""One vote a cell: rings lie so close on what is near that it would outvote all that is far."""
+"""One vote per cell: otherwise near structure, where rings are dense, would outvote everything far away."""
 _LOW_M, _HIGH_M = 0.3, 2.5
-"""Above the road's own unevenness, below the crowns of trees."""
+"""Height range: above the road's unevenness, below the crowns of trees."""
 _STEP_M, _STEP_MOST_M = 0.05, 0.25
-"""Height of a kerb: from a lowered one up to where it counts as standing."""
+"""Height of a kerb: from a lowered kerb up to the height from which structure counts as standing."""
 _FLAT_M, _FLAT_SHARE = 0.02, 0.05
-"""A stretch of a ring is level if its heights differ by no more than a road's roughness, over so much of its range."""
+"""A stretch of a ring is level if its heights vary by at most the road's roughness over this share of its range."""
 _SLANT, _SLACK_M = 1.5, 0.4
-"""A ring that climbs by h comes nearer by its share h/H of the range, H being the sensor's height over the road, and
-takes so much way for it: what takes longer is the crown of the road, no kerb."""
+"""A ring that climbs by h comes nearer by h/H of its range, where H is the sensor's height above the road, and covers a
+corresponding length. If it covers more, it is the crown of the road, not a kerb."""
 _KERBS_TO_M = 30.0
 _KEPT_S = 2.5
-"""Own motion places a cell as well as it was measured for as long: 1 % of 25 m, and 0.5° of heading."""
+"""During this time, own motion keeps a cell's position as accurate as it was measured: 1 % of 25 m, and 0.5° of
+heading."""
 _DRIVES_MPS = 4.0
-"""What the LiDAR alone takes for moving may be a hedge of which ever more is seen; faster it is a vehicle."""
+"""If only the LiDAR sees an object move, it may be a hedge that becomes visible bit by bit; above this speed it is a
+vehicle."""
 _LONG_M = 6.0
 _MARGIN_M = 0.8
 _BLOCKED, _PERHAPS_A_LEAD = 4.0, 1.5
-"""Nobody drives through a hedge. A car in the way may be a parked one in a bend, or a lead; a kerb, a crown."""
+"""Log-likelihoods. Nobody drives through a hedge. A car in the way may be parked in a bend or may be a lead; a kerb may
+be the crown of the road."""
 
 
 class Cells(NamedTuple):
-    """Cells of structure."""
+    """Grid cells that contain structure."""
 
     xy: F64
     """(M, 2) ego x, y."""
     blocks: F64
-    """(M,) how strongly each says that no road leads through it, in log-likelihood."""
+    """(M,) log-likelihood of each cell that no road leads through it."""
     age_s: F64
-    """(M,) time since each was last seen."""
+    """(M,) time since each cell was last seen."""
     stands: Mask
-    """(M,) bool, whether it stands up: a kerb does not."""
+    """(M,) bool, whether it is standing structure; a kerb is not."""
 
 
 NONE = Cells(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
 
 
 def moved(cells: Cells, ego: EgoState, dt_s: float) -> Cells:
-    """Where the cells of ``dt_s`` ago lie now, without those too old or too far behind."""
+    """Current positions of the cells of ``dt_s`` ago, without those too old or too far behind."""
     xy = now_at(cells.xy, ego, dt_s)
     age_s = cells.age_s + dt_s
     keep = (xy[:, 0] > _BEHIND_M) & (age_s <= _KEPT_S)
@@ -69,11 +72,11 @@ def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int], 
 
     Args:
         points: (N, 4) of the sweep.
-        kind: (N,) what each was taken for; ≥ 0 the number of its cluster.
-        ring: (N,) the channel of each.
+        kind: (N,) classification of each point; ≥ 0 the number of its cluster.
+        ring: (N,) the channel of each point.
         ground: the road below them.
         long: clusters that are too long for a car.
-        height_m: of the sensor over the road.
+        height_m: of the sensor above the road.
     """
     near = np.flatnonzero((points[:, 0] > 0.0) & (points[:, 0] < REACH_M) & (np.abs(points[:, 1]) < ASIDE_M))
     points, kind, ring = points[near], kind[near], ring[near]
@@ -88,7 +91,7 @@ def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int], 
 
 
 def merged(before: Cells, fresh: Cells) -> Cells:
-    """All cells, one in each square of the grid, the fresh ones first."""
+    """All cells, one per square of the grid; fresh cells have priority."""
     xy, blocks, age_s, stands = (np.concatenate(pair) for pair in zip(fresh, before, strict=True))
     if not len(xy):
         return NONE
@@ -98,7 +101,7 @@ def merged(before: Cells, fresh: Cells) -> Cells:
 
 
 def without(cells: Cells, objects: Sequence[FusedObject]) -> Cells:
-    """The cells that are in none of the objects, nor right beside them."""
+    """The cells that are not in or directly beside any of the objects."""
     keep = np.ones(len(cells.xy), np.bool_)
     for item in objects:
         if item.cuboid is not None:
@@ -111,7 +114,7 @@ def without(cells: Cells, objects: Sequence[FusedObject]) -> Cells:
 
 
 def drives(item: FusedObject) -> bool:
-    """Whether it surely is a vehicle that drives."""
+    """Whether the object is certainly a moving vehicle."""
     if not item.moving or item.cuboid is None or (item.speed_over_ground_mps or 0.0) < _DRIVES_MPS:
         return False
     return item.label in VEHICLES or max(item.cuboid.size[:2]) < _LONG_M
@@ -130,11 +133,11 @@ def long(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int
 
 
 def _kerbs(points: F32, ring: U8, above: F64, height_m: float) -> F64:
-    """(M, 2) places on kerbs: between a flat stretch of a ring and the next that is higher or lower by a kerb's height.
-    A ring climbs a kerb slantwise, so that its points in between lie along it."""
+    """(M, 2) points on kerbs: between a level stretch of a ring and the next one that is higher or lower by a kerb's
+    height. A ring crosses a kerb at an angle, so the points in between lie along the kerb."""
     if not len(points):
         return np.zeros((0, 2))
-    order = np.argsort(ring, kind="stable")  # along a ring, points come in the order in which they were measured
+    order = np.argsort(ring, kind="stable")  # within a ring, points stay in the order of measurement
     xy = points[order, :2].astype(np.float64)
     slant = _SLANT / height_m
     on_kerb = _between_levels(
@@ -150,7 +153,7 @@ def warm_up() -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _between_levels(xy, ring, above, flat_m, flat_share, step, most, slant, slack):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(N,) bool, which points lie between two level stretches of their ring, one a kerb's height above the other."""
+    """(N,) bool, which points lie between two level stretches of their ring that differ by a kerb's height."""
     out = np.zeros(len(xy), np.bool_)
     first, last_end, last_level = 0, -1, 0.0
     while first < len(xy):

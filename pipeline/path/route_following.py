@@ -24,8 +24,8 @@ from pipeline.types import EgoState, GnssFix, Route
 
 _DOUBT_FADES_S = 3.0
 _ANEW_DOUBT_FADES_S = 60.0
-"""How long doubt lasts after a permanent jump. What moves a receiver by metres, a reflection or another correction
-service, lasts for minutes, and nothing shows yet whether the old or the new position was wrong."""
+"""Duration of the doubt after a permanent jump. Causes of jumps by metres, such as reflections or a change of the
+correction service, last for minutes, and it is not known whether the old or the new position was wrong."""
 _SMALLEST_DOUBT_M = 0.3
 """Below this doubt the car counts as located again."""
 _OLDEST_FIX_S = 1.0
@@ -40,24 +40,24 @@ _SEARCH_M = 60.0
 
 @dataclass(frozen=True, eq=False)
 class GnssState:
-    """Where the car is on the route, from frame to frame."""
+    """State of the car's position on the route, from frame to frame."""
 
     line: RouteLine | None = None
-    """The route laid out; None without a route."""
+    """The route as a line; None without a route."""
     pose: MapPose | None = None
     """Of the car on the map; None before the first fix with a course."""
     fix_t_ns: int | None = None
-    """Of the last fix looked at: a fix that is repeated counts once."""
+    """Time of the last processed fix, so that a repeated fix counts once."""
     fix_sigma_m: float = 0.0
-    """Standard deviation of the last fix believed."""
+    """Standard deviation of the last accepted fix."""
     doubt_m: float = 0.0
-    """What the last jump left, fading."""
+    """Position doubt left by the last jump, decaying."""
     refused_s: float = 0.0
-    """For how long every fix has been refused."""
+    """How long every fix has been rejected."""
     at_m: float | None = None
     """Distance along the route; None while not on it."""
     placed_anew: bool = False
-    """After a jump that stayed, until the doubt has faded."""
+    """True after a permanent jump, until the doubt has faded."""
 
 
 def follow(
@@ -69,8 +69,8 @@ def follow(
     dt_s: float | None,
     params: PathParams,
 ) -> tuple[GnssState, tuple[str, ...]]:
-    """The pose at the frame's tick, and sentences about what is wrong. Does nothing without a route, because a position
-    on the Earth says nothing about the path then."""
+    """The pose at the frame's tick, and sentences about problems. Does nothing without a route, because then a position
+    on the Earth says nothing about the path."""
     if route is None or not params.use_gnss:
         return GnssState(), ()
     line = state.line if state.line is not None and _is_same(state.line.route, route) else lay_out(route)
@@ -88,7 +88,7 @@ def follow(
 
 
 def _dead_reckoned(state: GnssState, ego: EgoState | None, dt_s: float) -> GnssState:
-    """The pose moved on by own speed and yaw rate; without own speed it is lost."""
+    """The pose predicted with own speed and yaw rate; without own speed it is lost."""
     if state.pose is None or dt_s <= 0.0:
         return state
     pose = None
@@ -108,7 +108,7 @@ def _with_fix(
     dt_s: float,
     params: PathParams,
 ) -> tuple[GnssState, tuple[str, ...]]:
-    """Use a new fix, or reject it when it jumped. A fix that was seen before is ignored."""
+    """Use a new fix, or reject it if it jumped. A fix that was already processed is ignored."""
     if fix is None or fix.t_ns == state.fix_t_ns or not _is_whole(fix):
         return state, ()
     age_s = (t_ns - fix.t_ns) / 1e9
@@ -138,8 +138,8 @@ def _with_fix(
 def _refused(
     state: GnssState, fix: GnssFix, jump_m: float, x: float, y: float, dt_s: float, params: PathParams
 ) -> tuple[GnssState, tuple[str, ...]]:
-    """A jump does not move the pose but makes it doubtful. When every fix has been rejected for a while, the pose is
-    wrong, or the receiver is for long: the pose restarts at the fixes, and the doubt stays."""
+    """A jump does not move the pose but makes it doubtful. If every fix has been rejected for a while, either the pose
+    is wrong or the receiver stays wrong: the pose restarts at the fixes, and the doubt remains."""
     assert state.pose is not None
     refused_s, pose = state.refused_s + dt_s, state.pose
     stayed = refused_s >= params.gnss_restart_s
@@ -157,8 +157,8 @@ def _refused(
 
 
 def ahead(state: GnssState, params: PathParams) -> tuple[GnssState, PathEstimate | None, tuple[str, ...]]:
-    """The route ahead of the car as points in the ego frame; None, with a sentence, when the car is off the route or
-    its position unknown."""
+    """The route ahead of the car as points in the ego frame; None, with a sentence, if the car is off the route or its
+    position is unknown."""
     if state.line is None:
         return state, None, ()
     if state.pose is None:
@@ -185,11 +185,13 @@ def ahead(state: GnssState, params: PathParams) -> tuple[GnssState, PathEstimate
 
 
 def _doubted(aside_m: float, turned: F64, doubt_m: float, params: PathParams) -> tuple[float, F64]:
-    """By how much to move a route that lies ``aside_m`` of the car to the right, and the variance that doubt adds.
+    """How far to shift a route that lies ``aside_m`` to the right of the car, and the variance added by the doubt.
 
-    A doubtful position still shows how the road bends. Sideways it is weighed against the assumption that cars keep to
-    the middle of their lane: in full doubt the route leads through the car. Along the road nothing helps: where the
-    route has ``turned``, (N,) radians, from the car's position, an error along it is an error sideways."""
+    A doubtful position still shows how the road bends. Laterally, it is weighed against the assumption that cars keep
+    to the middle of their lane: in full doubt the route leads through the car. There is no such correction along the
+    road: where the route has ``turned``, (N,) radians, since the car's position, an error along the road becomes a
+    lateral error.
+    """
     keeping_var = params.lane_keeping_sigma_m**2
     believed = keeping_var / (keeping_var + doubt_m**2)
     return (1.0 - believed) * aside_m, believed * doubt_m**2 + (doubt_m * np.sin(turned)) ** 2
@@ -200,8 +202,8 @@ def _at(state: GnssState, at_m: float | None) -> GnssState:
 
 
 def _match(line: RouteLine, pose: MapPose, last_m: float | None, reach_m: float) -> float | None:
-    """Place along the route of the point nearest to the car, driven the same way as the car goes: a route may cross
-    itself, or come back on the other side of the road. Near the last match where there is one."""
+    """Position along the route of the point nearest to the car with the car's direction of travel: a route may cross
+    itself, or come back on the other side of the road. Searched near the last match if there is one."""
     x, y, heading = pose.mean.tolist()
     first = 0 if last_m is None else max(0, int((last_m - _SEARCH_M) / SPACING_M))
     last = len(line.places) if last_m is None else min(len(line.places), int((last_m + _SEARCH_M) / SPACING_M) + 1)
@@ -224,7 +226,7 @@ def _sideways_variance(pose: MapPose) -> float:
 
 
 def _beyond_the_end(center: F64, s: F64, left_m: float) -> F64:
-    """Beyond its end the route is extended straight, so that its points stay distinct; their sigma marks them
+    """Extends the route straight beyond its end, so that its points stay distinct; their sigma marks them as
     unusable."""
     over = np.maximum(s - left_m, 0.0)
     if not over.any():

@@ -22,22 +22,22 @@ _NORTH, _SOUTH = 32600, 32700
 
 @dataclass(frozen=True, eq=False)
 class RouteLine:
-    """A route as a line on the UTM grid."""
+    """A route as a line on a UTM grid."""
 
     route: Route
-    """What it was made from, to tell whether it is still the same."""
+    """The original route, to detect changes."""
     epsg: int
-    """Code of the UTM zone that its first point lies in."""
+    """EPSG code of the UTM zone of its first point."""
     places: F64
-    """(K, 2) float64 east, north; one a metre."""
+    """(K, 2) float64 east, north; one point per metre."""
     headings: F64
     """(K,) float64 radians counter-clockwise from grid east."""
 
 
 def lay_out(route: Route) -> RouteLine | None:
-    """The route as a line; None when it has no two places apart. Places closer than 0.3 m are the same (a car that
-    stood). Recorded places scatter: they are smoothed over a length of 20 sigmas, 8 m at most, which draws a bend of
-    125 m radius 0.26 m inwards at worst, and not at all where RTK recorded them."""
+    """The route as a line; None if all its points coincide. Points closer than 0.3 m are merged (a car that stood
+    still). Recorded positions scatter, so they are smoothed over a length of 20 sigmas, 8 m at most; this shifts a bend
+    of 125 m radius inwards by 0.26 m at worst, and not at all for RTK recordings."""
     lat, lon = np.asarray(route.lat_deg, np.float64), np.asarray(route.lon_deg, np.float64)
     good = np.isfinite(lat) & np.isfinite(lon)
     lat, lon = lat[good], lon[good]
@@ -50,7 +50,7 @@ def lay_out(route: Route) -> RouteLine | None:
         return None
     length_m = min(_SMOOTHING_PER_SIGMA * route.sigma_m, _LONGEST_SMOOTHING_M)
     if length_m > SPACING_M:
-        from scipy.ndimage import gaussian_filter1d  # 0.1 s to import: a planned route is smooth already
+        from scipy.ndimage import gaussian_filter1d  # takes 0.1 s to import, and planned routes are already smooth
 
         line = gaussian_filter1d(_extended(line, int(4 * length_m)), length_m, axis=0)[int(4 * length_m) :][: len(line)]
     headings = np.unwrap(np.arctan2(np.gradient(line[:, 1]), np.gradient(line[:, 0])))
@@ -58,14 +58,15 @@ def lay_out(route: Route) -> RouteLine | None:
 
 
 def utm_zone(lat_deg: float, lon_deg: float) -> int:
-    """EPSG code of the UTM zone of a place on WGS 84."""
+    """EPSG code of the UTM zone of a WGS 84 position."""
     zone = min(int((lon_deg + 180.0) / 6.0) % 60 + 1, 60)
     return (_NORTH if lat_deg >= 0.0 else _SOUTH) + zone
 
 
 def to_grid(epsg: int, lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
-    """East, north (metres) of a place, and the grid convergence there (radians): how far grid north lies clockwise of
-    true north (Snyder, *Map Projections*, USGS PP 1395, eq. 8-9 without its small terms: right to 1e-5 in a zone)."""
+    """East, north (metres) of a position, and the grid convergence there (radians): the angle of grid north clockwise
+    from true north (Snyder, *Map Projections*, USGS PP 1395, eq. 8-9 without its small terms: accurate to 1e-5 within a
+    zone)."""
     x, y = _to_utm(epsg).transform(lon_deg, lat_deg)
     middle_deg = 6.0 * ((epsg % 100) - 1) - 177.0
     off = radians((lon_deg - middle_deg + 180.0) % 360.0 - 180.0)
@@ -78,7 +79,7 @@ def _to_utm(epsg: int) -> Transformer:
 
 
 def _evenly(places: F64) -> F64 | None:
-    """One place a metre along the line through the given ones."""
+    """Points one metre apart on the line through the given points."""
     kept = places[_apart(places, _SMALLEST_STEP_M)] if len(places) else places
     if len(kept) < 2:
         return None
@@ -90,7 +91,7 @@ def _evenly(places: F64) -> F64 | None:
 
 
 def _extended(line: F64, count: int) -> F64:
-    """The line with straight ends, so that smoothing does not shorten it."""
+    """The line with straight extensions, so that smoothing does not shorten it."""
     steps = np.arange(1, count + 1)[:, None]
     first, last = line[0] - line[min(5, len(line) - 1)], line[-1] - line[max(-6, -len(line))]
     first, last = first / max(np.hypot(*first), 1e-9), last / max(np.hypot(*last), 1e-9)
@@ -99,7 +100,7 @@ def _extended(line: F64, count: int) -> F64:
 
 @numba.njit(cache=True, nogil=True)
 def _apart(places, smallest):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Which places lie at least ``smallest`` from the last one kept."""
+    """Which points lie at least ``smallest`` from the last one kept."""
     keep = np.zeros(len(places), np.bool_)
     keep[0] = True
     last = 0

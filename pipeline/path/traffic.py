@@ -25,30 +25,31 @@ from pipeline.path.ground_points import now_at
 from pipeline.types import I64, VEHICLES, EgoState, FusedObject, Moment
 
 HEADING_SIGMA_RAD = 0.1
-"""A lane change at 10 m/s, which takes some three seconds: what a heading says of the road is no surer."""
+"""The heading during a lane change at 10 m/s that takes some three seconds: a vehicle's heading indicates the road's
+direction no more accurately."""
 _LINK_M = 5.0
-"""A vehicle has driven when it has moved by this much over ground: more than its length, by which the place that is
-measured of a parked one may wander while the car passes."""
+"""A vehicle counts as driven once it has moved by this much over ground: more than its length, by which the measured
+position of a parked vehicle may shift while the car passes."""
 _POINT_M = 1.0
-"""Places of one vehicle are kept this far apart."""
+"""Minimum distance between stored positions of one vehicle."""
 _STRAYS_M, _STRAYS = 0.5, 0.2
-"""How far, and by what share of the way, a vehicle's places may stray from what its velocity says. A track that goes
-from one parked car to the next moves in jumps."""
+"""Maximum deviation of a vehicle's positions from what its velocity implies, absolute and as a share of the way. A
+track that jumps from one parked car to the next exceeds it."""
 _SLOWEST_MPS = 4.0
-"""What is slower over ground may be parking, or turning off."""
+"""A vehicle slower over ground may be parking or turning off."""
 _TURNED_OFF_RAD = 0.6
-"""A vehicle that points further away than this from where the car points, or from the arc on which it would be reached,
-crosses the road or leaves it, as far as anybody can tell: a bend of 50 m radius turns by so much over 30 m. At 25 m a
-bend of 30 m radius that begins half way turns a car in it by 0.2 rad from that arc, the next lane by 0.3 rad."""
+"""A vehicle whose direction differs by more than this from the car's, or from that of the arc that leads to it, is
+treated as crossing or leaving the road: a bend of 50 m radius turns by this much over 30 m. At 25 m, a bend of 30 m
+radius that begins half way turns a car in it by 0.2 rad from that arc, one in the next lane by 0.3 rad."""
 _KEPT_S, _BEHIND_M = 20.0, -10.0
 _USUAL_TIME_S = 3.0
-"""Over this time ahead the curvature wanders as far as the lateral jerk of roads lets it change."""
+"""Time ahead over which the curvature changes as much as the lateral jerk of roads permits."""
 _WIDEST_RAD = 1.2
 
 
 @dataclass(frozen=True, eq=False)
 class TrafficState:
-    """What one frame leaves to the next: where vehicles were, newest last."""
+    """State from one frame to the next: past positions of vehicles, newest last."""
 
     xy: F64
     """(N, 2) ego x, y."""
@@ -62,18 +63,19 @@ NONE = TrafficState(np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int64))
 
 
 class Traffic(NamedTuple):
-    """The road by the vehicles on it."""
+    """The course of the road from the vehicles on it."""
 
     path: PathEstimate
-    """From the car on, along their headings."""
+    """The path from the car along their headings."""
     headings: F64
-    """(N, 3) ego x, y, heading in rad: what it was made of."""
+    """(N, 3) ego x, y, heading in rad: the input of ``path``."""
 
 
 def follow(
     state: TrafficState, objects: Sequence[FusedObject], now: Moment, params: PathParams
 ) -> tuple[TrafficState, Traffic | None]:
-    """One frame. None without own motion, which tells driving from standing, and where no vehicle has driven yet."""
+    """One frame. None without own motion, which is needed to distinguish moving from standing vehicles, and if no
+    vehicle has driven yet."""
     ego, dt_s = now.ego, now.dt_s
     if ego is None or not params.use_traffic:
         return NONE, None
@@ -93,7 +95,7 @@ def warm_up() -> None:
 
 
 def _moved(state: TrafficState, ego: EgoState, dt_s: float) -> TrafficState:
-    """What was kept of the frame before, where it is now."""
+    """The stored positions, transformed to now."""
     xy = now_at(state.xy, ego, dt_s)
     age_s = state.age_s + dt_s
     keep = (xy[:, 0] > _BEHIND_M) & (age_s <= _KEPT_S)
@@ -101,8 +103,8 @@ def _moved(state: TrafficState, ego: EgoState, dt_s: float) -> TrafficState:
 
 
 def _with(state: TrafficState, item: FusedObject, ego: EgoState) -> TrafficState:
-    """With where a vehicle is now, if it drives: one that the camera names, the LiDAR places, and whose velocity and
-    places tell the same."""
+    """Adds the current position of a vehicle if it moves: it must be classified by the camera and measured by the
+    LiDAR, and its velocity must agree with its positions."""
     if not item.seen_by_lidar or item.label not in VEHICLES or item.lidar_track is None:
         return state
     if item.bev is None or item.velocity_mps is None:
@@ -116,7 +118,7 @@ def _with(state: TrafficState, item: FusedObject, ego: EgoState) -> TrafficState
         if np.hypot(*moved) < _POINT_M and np.hypot(*velocity) * waited_s < _LINK_M:
             return state
         if np.hypot(*(moved - velocity * waited_s)) > _STRAYS_M + _STRAYS * np.hypot(*moved):
-            mine = ~mine  # it is another vehicle now, or never drove
+            mine = ~mine  # it is now a different vehicle, or never drove
             state = TrafficState(state.xy[mine], state.age_s[mine], state.vehicle[mine])
     return TrafficState(
         np.vstack([state.xy, place]), np.append(state.age_s, 0.0), np.append(state.vehicle, item.lidar_track)
@@ -124,8 +126,8 @@ def _with(state: TrafficState, item: FusedObject, ego: EgoState) -> TrafficState
 
 
 def _headings(state: TrafficState, vehicle: int) -> list[tuple[float, float, float]]:
-    """x, y and heading of each link of one vehicle's way ahead of the car, newest first: of its axis, an oncoming one's
-    is turned round. None of one that has turned off, and none where it was too slow."""
+    """x, y and heading of each link of one vehicle's way ahead of the car, newest first; headings of oncoming vehicles
+    are reversed. Empty for a vehicle that has turned off; links driven too slowly are left out."""
     mine = state.vehicle == vehicle
     xy, age_s = state.xy[mine], state.age_s[mine]
     found: list[tuple[float, float, float]] = []
@@ -148,12 +150,12 @@ def _headings(state: TrafficState, vehicle: int) -> list[tuple[float, float, flo
 
 
 def _along(seen: F64, ego: EgoState, params: PathParams) -> PathEstimate:
-    """The road from the car on, by (N, 3) headings. Each is seen at the length of the arc that leads to its place."""
+    """The road ahead of the car, from (N, 3) headings. Each applies at the arc length to its position."""
     s, speed = samples(params.length_m), max(ego.speed_mps, params.min_speed_mps, 0.1)
     aside = np.clip(np.arctan2(seen[:, 1], seen[:, 0]), -_WIDEST_RAD, _WIDEST_RAD)
     reached = np.hypot(seen[:, 0], seen[:, 1]) / np.sinc(aside / np.pi)
     at = np.clip(np.round(reached / STEP_M).astype(np.intp), 0, len(s) - 1)
-    # headings seen at one place are one measurement of their mean
+    # headings at one position are averaged and count as one measurement
     count = np.bincount(at, minlength=len(s)).astype(np.float64)
     total = np.bincount(at, weights=seen[:, 2], minlength=len(s))
     begins = min(params.lateral_jerk_mps3 / speed**3, SHARPEST_BEGIN_PER_M2)
@@ -173,9 +175,9 @@ def _along(seen: F64, ego: EgoState, params: PathParams) -> PathEstimate:
 
 @numba.njit(cache=True, nogil=True)
 def _smooth(total, count, size, ds, density, start):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(size,) heading and sigma of the place aside along the road: state (place, heading, curvature), the curvature a
-    random walk of ``density`` 1/m³. total, count: (size,) sum and number of headings seen at each length. start: (3,)
-    sigmas at the car, around zero."""
+    """(size,) heading and sigma of the lateral position along the road. The state is (lateral position, heading,
+    curvature), where the curvature is a random walk of ``density`` 1/m³. total, count: (size,) sum and number of
+    headings at each length. start: (3,) sigmas at the car, around zero."""
     F = np.array([[1.0, ds, 0.5 * ds * ds], [0.0, 1.0, ds], [0.0, 0.0, 1.0]])
     Q = density * np.array(
         [

@@ -29,7 +29,7 @@ from pipeline.types import EgoState
 
 _FASTEST_RADPS = 2.0
 _LASTING = 0.5
-"""Share of the noise that smoothing does not lower."""
+"""Share of the noise that smoothing does not reduce."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +39,15 @@ class YawRate:
     rate_radps: float
     """Positive to the left."""
     variance: float
-    """(rad/s)²; grows while none is measured."""
+    """(rad/s)²; grows while no yaw rate is measured."""
 
 
 def follow(before: YawRate | None, ego: EgoState | None, dt_s: float | None, params: PathParams) -> YawRate | None:
     """The yaw rate now: a random walk that changes with the lateral jerk of roads, j/v in rad/s² (Kalman, one state).
 
     A rate that is not finite, or faster than any car turns, counts as not measured. None before the first measurement,
-    and where own speed is unknown or too low for the yaw rate to show a curve."""
+    and if own speed is unknown or too low for the yaw rate to show a curve.
+    """
     if ego is None or not isfinite(ego.speed_mps) or ego.speed_mps < params.min_speed_mps:
         return None
     if before is not None and dt_s:
@@ -64,36 +65,37 @@ def follow(before: YawRate | None, ego: EgoState | None, dt_s: float | None, par
 
 
 def usable_rate(ego: EgoState | None) -> float | None:
-    """The measured yaw rate; None when there is none, or an implausible one."""
+    """The measured yaw rate; None if it is missing or implausible."""
     rate = ego.yaw_rate_radps if ego is not None else None
     return rate if rate is not None and isfinite(rate) and abs(rate) <= _FASTEST_RADPS else None
 
 
 def believable(ego: EgoState | None) -> EgoState | None:
-    """Own motion without an implausible yaw rate; None where the speed is not a finite number."""
+    """Own motion without an implausible yaw rate; None if the speed is not finite."""
     if ego is None or not isfinite(ego.speed_mps):
         return None
     return ego if ego.yaw_rate_radps == usable_rate(ego) else evolve(ego, yaw_rate_radps=None)
 
 
 def doubts(ego: EgoState | None) -> tuple[str, ...]:
-    """What is wrong with a measured own motion, in sentences."""
+    """Problems of a measured own motion, as sentences."""
     if ego is None or not isfinite(ego.speed_mps) or ego.yaw_rate_radps is None or usable_rate(ego) is not None:
         return ()
     return ("implausible yaw rate ignored",)
 
 
 def ahead(yaw: YawRate | None, ego: EgoState | None, params: PathParams) -> PathEstimate | None:
-    """The arc ahead, r(1 − cos θ) aside at path length s = rθ; None where no yaw rate is known.
+    """The arc ahead, with lateral offset r(1 − cos θ) at path length s = rθ; None if no yaw rate is known.
 
     Its sigma combines the car's position and lateral speed within its lane, the yaw rate's error and the lateral jerk
-    of roads. The variance of a yaw rate that is no longer measured has grown."""
+    of roads. If the yaw rate is no longer measured, its variance has grown.
+    """
     if yaw is None or ego is None or ego.speed_mps < params.min_speed_mps:
         return None
     s, speed = samples(params.length_m), ego.speed_mps
     time_s = s / speed
     center, _ = arc(_of_the_road(yaw.rate_radps, params.yaw_rate_sigma_radps) / speed, s)
-    # a driver's corrections last for seconds: smoothing does not make the yaw rate surer than they are
+    # a driver's corrections last for seconds, so smoothing does not make the yaw rate more certain than that
     rate_sigma = max(yaw.variance**0.5, _LASTING * params.yaw_rate_sigma_radps)
     variance = (
         params.lane_keeping_sigma_m**2

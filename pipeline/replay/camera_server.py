@@ -18,7 +18,7 @@ _SEND_TIMEOUT_S = 1.0
 
 
 class CameraServer:
-    """Listens on host:port (0: any free one, see ``port``) while it is plugged in. BadInput when the port is taken."""
+    """Listens on host:port (0: any free one, see ``port``) while it is plugged in. BadInput if the port is taken."""
 
     def __init__(self, host: str, port: int) -> None:
         self._host = host
@@ -29,7 +29,7 @@ class CameraServer:
         self.plug_in()
 
     def plug_in(self) -> None:
-        """Take connections (again)."""
+        """Accept connections (again)."""
         if self._listener is not None:
             return
         listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -46,7 +46,7 @@ class CameraServer:
         threading.Thread(target=self._accept, args=(listener,), name="cipv-replay-camera", daemon=True).start()
 
     def unplug(self) -> None:
-        """Close every connection and take none."""
+        """Close all connections and accept no more."""
         listener, self._listener = self._listener, None
         if listener is not None:
             with contextlib.suppress(OSError):
@@ -58,7 +58,7 @@ class CameraServer:
             client.close()
 
     def send(self, jpeg: bytes, stamp_ns: int) -> None:
-        """Give the image to whoever watches."""
+        """Send the image to all connected clients."""
         head = (
             f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n"
             f"X-Timestamp: {stamp_ns / 1e9:.6f}\r\n\r\n"
@@ -82,7 +82,7 @@ class CameraServer:
             threading.Thread(target=self._greet, args=(client,), daemon=True).start()
 
     def _greet(self, client: socket.socket) -> None:
-        """Answer the request whatever it asks for; from then on the client gets images."""
+        """Answer the request, whatever its path; from then on the client receives images."""
         try:
             client.settimeout(_SEND_TIMEOUT_S)
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

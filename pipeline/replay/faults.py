@@ -18,20 +18,20 @@ FaultKind = Literal["silence", "garbage", "duplicate", "out_of_order", "clock_ju
 
 
 class Fault(BaseModel):
-    """One fault of one sensor. disconnect: nothing is sent, and a connection is closed and not taken. clock_jump: the
-    sensor's own clock is off by ``by_s``. garbage: random bytes come between. out_of_order, duplicate: every fifth
-    message."""
+    """One fault of one sensor. disconnect: nothing is sent; connections are closed and refused. clock_jump: the
+    sensor's own clock is off by ``by_s``. garbage: random bytes are inserted. out_of_order, duplicate: affects every
+    fifth message."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     sensor: Sensor
-    """Which stream it befalls."""
+    """The affected stream."""
     kind: FaultKind
-    """What goes wrong; see the class."""
+    """Type of fault; see the class."""
     from_s: float = Field(ge=0.0)
     """Seconds after the start."""
     to_s: float = Field(gt=0.0)
-    """Seconds after the start, when all is well again."""
+    """Seconds after the start at which the fault ends."""
     by_s: float = 7.0
     """clock_jump only: how far the clock jumps, seconds."""
 
@@ -51,7 +51,7 @@ def load(path: Path) -> tuple[Fault, ...]:
 
 
 def disturb(events: Iterable[WireEvent], faults: Sequence[Fault], start_ns: int, seed: int = 1) -> Iterator[WireEvent]:
-    """The events as a car with these faults sends them. The same seed gives the same garbage."""
+    """The events that a car with these faults would send. The same seed gives the same garbage."""
     rng = random.Random(seed)
     held: dict[Sensor, WireEvent] = {}
     for count, event in enumerate(events):
@@ -74,7 +74,7 @@ def disturb(events: Iterable[WireEvent], faults: Sequence[Fault], start_ns: int,
 
 
 def disconnected(faults: Iterable[Fault], sensor: Sensor, at_s: float) -> bool:
-    """Whether the sensor's plug is out at a moment."""
+    """Whether the sensor is unplugged at this time."""
     return any(fault.kind == "disconnect" and _is_on(fault, sensor, at_s) for fault in faults)
 
 

@@ -21,14 +21,14 @@ class Message(NamedTuple):
     t_ns: int
     """When it was measured, in the recording's time."""
     sensor: Sensor
-    """Decides what ``value`` is."""
+    """Determines the type of ``value``."""
     value: Sweep | bytes | GnssFix | EgoState
-    """A sweep, or a LiDAR's packet as it was captured; a JPEG; a fix; ego motion."""
+    """A sweep or a captured LiDAR packet; a JPEG; a fix; ego motion."""
 
 
 def of_recording(source: Source, first: int = 0, last: int | None = None) -> Iterator[Message]:
-    """Frames ``first`` to ``last`` as messages. An image without a stamp is taken at its frame's tick. A capture's
-    LiDAR packets are sent as they were."""
+    """Frames ``first`` to ``last`` as messages. An image without a timestamp gets its frame's tick. Captured LiDAR
+    packets are sent unchanged."""
     if isinstance(source, RawPackets):
         packets = (Message(t_ns, "lidar", payload) for t_ns, payload in source.packets())
         others = (message for message in _of_frames(source, first, last) if message.sensor != "lidar")
@@ -57,7 +57,7 @@ def of_frame(frame: Frame) -> Iterator[Message]:
 
 
 def jpeg_of(image: CameraImage) -> bytes:
-    """As the camera gave it where that is a JPEG, else encoded."""
+    """The camera's own JPEG if there is one, else encoded."""
     if image.encoded is not None and image.encoded.startswith(b"\xff\xd8"):
         return image.encoded
     _, jpeg = cv2.imencode(".jpg", image.bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])

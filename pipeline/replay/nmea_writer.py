@@ -12,7 +12,7 @@ _KNOT_MPS = 1852.0 / 3600.0
 
 
 def sentences(fix: GnssFix, utc_ns: int) -> bytes:
-    """Three sentences stamped ``utc_ns``, to the hundredth of a second as receivers do."""
+    """Three sentences with time ``utc_ns``, to the hundredth of a second as from receivers."""
     rounded_ns = round(utc_ns / 1e7) * 10_000_000
     at = datetime.fromtimestamp(rounded_ns // 1_000_000_000, UTC)
     clock = f"{at:%H%M%S}.{rounded_ns % 1_000_000_000 // 10_000_000:02d}"
@@ -28,7 +28,7 @@ def sentences(fix: GnssFix, utc_ns: int) -> bytes:
 
 
 def _angle(degrees: float, width: int, signs: str) -> str:
-    """Degrees and minutes to 0.2 mm."""
+    """Degrees and minutes with a resolution of 0.2 mm."""
     minutes = round(abs(degrees) * 60.0, 7)
     whole = int(minutes // 60)
     return f"{whole:0{width}d}{minutes - 60 * whole:010.7f},{signs[degrees < 0]}"

@@ -18,7 +18,7 @@ from pipeline.sources.live.health import Sensor
 from pipeline.types import F64
 
 _AHEAD = 400
-"""Events made ahead: half a second of a VLP-16."""
+"""Number of events prepared ahead: half a second of a VLP-16."""
 _START_IN_NS = 300_000_000
 _LATE_NS, _TOO_LATE_NS = 20_000_000, 200_000_000
 
@@ -28,12 +28,12 @@ class ReplayCounts:
     """What was sent, and whether this machine kept up."""
 
     events: dict[Sensor, int] = field(default_factory=dict)
-    """Number by sensor."""
+    """Number of events by sensor."""
     late: int = 0
     """Events sent over 20 ms late."""
     slips: int = 0
-    """How often something was over 200 ms late and everything from it on was put off: a sensor may fall silent, but it
-    does not lag behind its own clock."""
+    """Number of times that an event was over 200 ms late and all later events were postponed: a sensor may fall silent,
+    but it does not lag behind its own clock."""
 
 
 def replay(
@@ -46,8 +46,8 @@ def replay(
     start_ns: int | None = None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> ReplayCounts:
-    """Play to the end, or until ``stopped``. A sensor that nobody listens to is left out. start_ns: when to begin,
-    unix, by default soon; faults are counted from it."""
+    """Play to the end, or until ``stopped``. A sensor without a sender is left out. start_ns: start time, unix, by
+    default soon; times of faults are relative to it."""
     wanted = (message for message in messages if message.sensor in senders)
     first = next(iter(wanted), None)
     if first is None:
@@ -84,7 +84,7 @@ def _wait_until(
     plugged: dict[Sensor, bool],
     stopped: Callable[[], bool],
 ) -> bool:
-    """Wait for the moment, pulling and putting in plugs on the way. False when it was stopped."""
+    """Wait until this time, unplugging and plugging sensors in between. False if it was stopped."""
     while not stopped():
         now_ns = time.time_ns()
         for sensor, sender in senders.items():
@@ -100,7 +100,7 @@ def _wait_until(
 
 
 def _made_ahead(events: Iterator[WireEvent], stopped: Callable[[], bool]) -> Iterator[WireEvent]:
-    """The events, made by a thread up to ``_AHEAD`` of them early. What that thread raises is raised here."""
+    """The events, prepared by a thread up to ``_AHEAD`` events early. Errors of that thread are raised here."""
     made: queue.Queue[WireEvent | BaseException | None] = queue.Queue(_AHEAD)
     done = threading.Event()
 
@@ -118,7 +118,7 @@ def _made_ahead(events: Iterator[WireEvent], stopped: Callable[[], bool]) -> Ite
                 if done.is_set():
                     return
             put(None)
-        except Exception as error:  # handed to whoever waits for the events
+        except Exception as error:  # passed on to the consumer of the events
             put(error)
 
     threading.Thread(target=make, name="cipv-replay-maker", daemon=True).start()

@@ -27,7 +27,7 @@ _STAMP_AT = 1200
 
 
 class Sender(Protocol):
-    """One sensor's way out. unplugged: connections are closed and none is taken until it is plugged in again."""
+    """Output of one sensor. Unplugged: connections are closed and refused until it is plugged in again."""
 
     def send(self, payload: Any, stamp_ns: int) -> None: ...
 
@@ -37,7 +37,7 @@ class Sender(Protocol):
 
 
 def open_senders(config: LiveConfig) -> dict[Sensor, Sender]:
-    """A sender for each sensor of the config that can be played to. BadInput where one cannot be."""
+    """A sender for each configured sensor that can be simulated. BadInput if one cannot be opened."""
     senders: dict[Sensor, Sender] = {}
     if config.lidar is not None:
         senders["lidar"] = LidarSender(config.lidar)
@@ -53,7 +53,7 @@ def open_senders(config: LiveConfig) -> dict[Sensor, Sender]:
 
 
 class LidarSender:
-    """Data and position packets over UDP; a data packet's stamp is put in as the sensor does, µs past the hour."""
+    """Data and position packets over UDP; a data packet's timestamp is set as by the sensor, µs past the hour."""
 
     def __init__(self, config: LidarConfig) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -67,7 +67,7 @@ class LidarSender:
         if len(payload) == PACKET_BYTES:
             stamp = struct.pack("<I", stamp_ns % _HOUR_NS // 1000)
             payload = payload[:_STAMP_AT] + stamp + payload[_STAMP_AT + 4 :]
-        with contextlib.suppress(OSError):  # nobody listens: a sensor sends all the same
+        with contextlib.suppress(OSError):  # nobody listens: a sensor sends anyway
             port = self._position_port if len(payload) == POSITION_BYTES else self._data_port
             self._socket.sendto(payload, (self._host, port))
 
@@ -101,7 +101,7 @@ class CameraSender:
 
 
 class UdpNmeaSender:
-    """NMEA sentences over UDP, one datagram a fix."""
+    """NMEA sentences over UDP, one datagram per fix."""
 
     def __init__(self, host: str, port: int) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -119,7 +119,7 @@ class UdpNmeaSender:
 
 
 class TcpNmeaSender:
-    """A receiver with a TCP port: it listens, and says its sentences to whoever connected."""
+    """A receiver with a TCP port: it listens, and sends its sentences to all clients."""
 
     def __init__(self, host: str, port: int) -> None:
         self._where = (host, port)
@@ -169,7 +169,7 @@ class TcpNmeaSender:
 
 
 class CanSender:
-    """Speed and yaw rate in the messages of the DBC file; signals that are not ours are zero, or their smallest."""
+    """Speed and yaw rate in the messages of the DBC file; other signals are zero, or their minimum."""
 
     def __init__(self, config: CanConfig) -> None:
         self._config, self._database = config, load_dbc(config.dbc)
@@ -193,7 +193,7 @@ class CanSender:
         self._bus.shutdown()
 
     def _messages(self, payload: EgoState | bytes) -> dict[str, Any]:
-        """What to say, by the DBC's message names. Garbage is cut short, which a decoder cannot take."""
+        """The values to send, by the DBC's message names. Garbage is truncated, so that it cannot be decoded."""
         speed, yaw_rate = self._config.speed_mps, self._config.yaw_rate_radps
         if isinstance(payload, bytes):
             return {speed.message: payload[:1]}

@@ -18,7 +18,7 @@ from pipeline.types import F64, Sweep
 _PACKET_NS = round(12 * BLOCK_US * 1000)
 ROTATION_NS = PACKETS_A_ROTATION * _PACKET_NS
 _AHEAD_NS = ROTATION_NS // 2 + 20_000_000
-"""What belongs to a message is sent at most this much before its time; recordings may be that much out of order."""
+"""Events of a message are sent at most this much before its time; recordings may be out of order by as much."""
 
 
 class WireEvent(NamedTuple):
@@ -27,19 +27,19 @@ class WireEvent(NamedTuple):
     send_ns: int
     """When to send it, Unix time."""
     sensor: Sensor
-    """Decides address and protocol."""
+    """Determines address and protocol."""
     stamp_ns: int
-    """The sensor's own time that goes with it."""
+    """The sensor's own timestamp."""
     payload: Any
-    """A packet without its stamp, a JPEG, a ``GnssFix`` or an ``EgoState``; bytes of any other kind are garbage and
-    sent as they are."""
+    """A packet without its timestamp, a JPEG, a ``GnssFix`` or an ``EgoState``; bytes for any other sensor are garbage
+    and sent unchanged."""
 
 
 def to_wire(
     messages: Iterable[Message], start_ns: int, speed: float = 1.0, T_ego_lidar: F64 | None = None
 ) -> Iterator[WireEvent]:
-    """Events in order of time, the first at ``start_ns``. At another speed than 1 the world runs faster or slower, the
-    sensors do not: the head turns as it does, and a sweep that falls into another is left out."""
+    """Events in order of time, the first at ``start_ns``. At a speed other than 1 the world runs faster or slower, but
+    the sensors do not: the head rotates at its usual rate, and a sweep that overlaps another is left out."""
     waiting: list[tuple[int, int, WireEvent]] = []
     first_ns: int | None = None
     busy_until_ns, count = 0, 0
@@ -59,7 +59,7 @@ def to_wire(
 
 
 def _own_stamp_ns(message: Message, at_ns: int) -> int:
-    """Of a captured packet its own, which has nothing to do with the host's; of all others the moment itself."""
+    """A captured packet's own timestamp, which is independent of the host's clock; for all others the given time."""
     if message.sensor == "lidar" and isinstance(message.value, bytes) and len(message.value) == PACKET_BYTES:
         return int.from_bytes(message.value[-6:-2], "little") * 1000
     return at_ns

@@ -31,15 +31,15 @@ _IN_STORE = "files ending in .mcap; `cipv import` converts any recording to one"
 
 
 def open_source(uri: str, *, rings: int = 16, progress: Progress = silent) -> Source:
-    """Open a recording: ``scheme:rest``, or a path that is recognised by what is in it.
+    """Open a recording: ``scheme:rest``, or a path that is recognised by its content.
 
     Args:
-        uri: what a person typed.
-        rings: how many rings to keep of a LiDAR that has more (KITTI's HDL-64).
-        progress: told how much was read, where a whole file has to be.
+        uri: as typed by a user.
+        rings: how many rings to keep if the LiDAR has more (KITTI's HDL-64).
+        progress: receives the reading progress if a whole file must be read.
 
     Raises:
-        SourceError: in one sentence, when the scheme is unknown, names devices, or the recording cannot be opened.
+        SourceError: in one sentence, if the scheme is unknown, names devices, or the recording cannot be opened.
     """
     kind, rest = _kind_and_rest(uri, live=False)
     if kind.is_live:
@@ -48,7 +48,7 @@ def open_source(uri: str, *, rings: int = 16, progress: Progress = silent) -> So
 
 
 def open_live(uri: str) -> LiveSource:
-    """Open ``live:<config.yaml>``; ``start`` it to read. SourceError when the file cannot be used."""
+    """Open ``live:<config.yaml>``; ``start`` it to read. SourceError if the file cannot be used."""
     kind, rest = _kind_and_rest(uri, live=True)
     if not kind.is_live:
         raise SourceError(f"{uri}: this is a recording; live sensors are needed here")
@@ -56,13 +56,13 @@ def open_live(uri: str) -> LiveSource:
 
 
 def open_any(uri: str, *, rings: int = 16, progress: Progress = silent) -> AnySource:
-    """Open devices or a recording, whichever the URI names. Errors as of ``open_source``."""
+    """Open devices or a recording, depending on the URI. Raises the same errors as ``open_source``."""
     kind, rest = _kind_and_rest(uri, live=True)
     return cast("AnySource", kind.load()(uri, rest, Opening(rings, progress)))
 
 
 def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
-    """What opens a URI, and the part after its scheme. live: whether error texts offer live sensors, too."""
+    """The source kind of a URI, and the part after its scheme. live: whether error texts mention live sensors, too."""
     if is_remote(uri):
         in_store = kind_of_bare(uri)
         if in_store is None:
@@ -82,7 +82,7 @@ def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
 
 
 def _exists(uri: str) -> bool:
-    """Whether it is a path with a colon in its name."""
+    """Whether it is an existing path with a colon in its name."""
     try:
         return Path(uri).exists()
     except (OSError, ValueError):

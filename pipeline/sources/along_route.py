@@ -12,12 +12,12 @@ S = TypeVar("S", Source, LiveSource, AnySource)
 
 
 def along_route(source: S, route: Route | None) -> S:
-    """The same source, with the route in every frame of it; without a route, the source itself."""
+    """The same source with the route added to every frame; without a route, the source itself."""
     return source if route is None else cast("S", _AlongRoute(source, route))
 
 
 class _AlongRoute:
-    """All but frames comes from the source itself, recording or sensors alike."""
+    """Everything except frames is delegated to the wrapped source, recording or sensors."""
 
     def __init__(self, source: Any, route: Route) -> None:
         self._source, self._route = source, route

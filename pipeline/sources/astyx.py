@@ -38,9 +38,10 @@ _CHANNELS = 16
 _HALF_ROTATION_NS = 50_000_000
 _NOMINAL_STEP_NS = 300_000_000
 _NOMINAL_SIZE = (2048, 618)
-"""What the calibration files do not say, where no image does."""
+"""Image size if no image can be read; the calibration files do not contain it."""
 _ROAD_Z_M = -1.55
-"""The radar's height above the road, which the files do not say: the median over its own sweeps' ground."""
+"""The road's height relative to the radar, which the files do not contain: the median over the fitted ground of its
+sweeps."""
 _COLUMNS = 6  # X Y Z Reflectivity LaserID Timestamp
 _HEAD_BYTES = 4096
 _LABELS = {"motorcyclist": "motorcycle", "cyclist": "bicycle", "towed object": "trailer"}
@@ -49,7 +50,7 @@ _RING_OF_LASER = np.array([laser // 2 + 8 * (laser % 2) for laser in range(_CHAN
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> AstyxSource:
-    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    """Loaded by name from ``pipeline.source_kinds``. SourceError if it cannot be opened."""
     return AstyxSource(uri, rest)
 
 
@@ -133,8 +134,8 @@ class AstyxSource:
 
 
 def parse_sweep(data: bytes, file: str, t_ns: int, T_ego_lidar: F64, notes: list[str]) -> Sweep:
-    """The sweep of one LiDAR text file, in the ego frame. Rows that are no point (cut, not numbers, no such laser, no
-    return) are left out and counted in ``notes``. SourceError when none is left."""
+    """The sweep of one LiDAR text file, in the ego frame. Invalid rows (truncated, not numeric, invalid laser, no
+    return) are left out and counted in ``notes``. SourceError if none is left."""
     rows, bad = parse_rows(data, _COLUMNS)
     bad -= 1 if data.lstrip()[:1].isalpha() else 0  # the header line
     laser = rows[:, 4]
@@ -170,8 +171,8 @@ def parse_calibration(data: bytes, file: str, size: tuple[int, int]) -> tuple[F6
 
 
 def _parse_labels(data: bytes) -> tuple[TruthObject, ...]:
-    """The boxes of one label file: centres and sizes in metres, ``orientation_quat`` with w first. Ids are all −1 in
-    the recording, so objects have none."""
+    """The boxes of one label file: centres and sizes in metres, ``orientation_quat`` with w first. All ids in the
+    recording are −1, so objects have none."""
     try:
         return tuple(_label(entry) for entry in json.loads(data)["objects"])
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
@@ -194,7 +195,7 @@ def _read_calibration(path: Path, size: tuple[int, int]) -> tuple[F64, CameraCal
 
 
 def _first_stamp_ns(path: Path | None) -> int | None:
-    """The tick of a sweep: the first row's stamp (µs since the hour) and half a rotation. None when unreadable."""
+    """The tick of a sweep: the first row's timestamp (µs since the hour) plus half a rotation. None if unreadable."""
     if path is None:
         return None
     try:
@@ -209,7 +210,7 @@ def _first_stamp_ns(path: Path | None) -> int | None:
 
 
 def _fill_gaps(stamps: list[int | None]) -> list[int]:
-    """A frame without a stamp follows the one before it by the recording's usual step."""
+    """A frame without a timestamp follows the previous one by the recording's usual step."""
     filled: list[int] = []
     for stamp in stamps:
         filled.append(stamp if stamp is not None else filled[-1] + _NOMINAL_STEP_NS if filled else 0)

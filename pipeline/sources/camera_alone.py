@@ -28,16 +28,16 @@ from pipeline.types.source import Opening, SourceError, TruthObject
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png")
 _OPTIONS = ("rate_hz", "hfov_deg", "height_m", "nmea", "gpx", "rig", "gnss_offset_s")
 _RATE_HZ = 10.0
-"""Frames a second that are taken of a video: more add nothing to tracking, and cost a network's time each."""
+"""Frames per second used from a video: more do not improve tracking, but each costs a network run."""
 _DIAGONAL_DEG, _HEIGHT_M = 78.0, 1.3
 _EPOCH_NS = 631_152_000 * 1_000_000_000
-"""1990: smaller names count images."""
+"""1990: smaller numbers in names are image counters."""
 _STAMP = re.compile(r"^\d{16}(\d{3})?$")
 
 
 def open_video(uri: str, rest: str, how: Opening) -> CameraAlone:
-    """``video:FILE?rate_hz=10&hfov_deg=70&…``. Called by name, from ``pipeline.source_kinds``. SourceError when it
-    cannot be opened."""
+    """``video:FILE?rate_hz=10&hfov_deg=70&…``. Loaded by name from ``pipeline.source_kinds``. SourceError if it cannot
+    be opened."""
     path, options = split_options(rest, _OPTIONS)
     file = recording_file(path)
     video = VideoFile(file, how.progress)
@@ -53,8 +53,8 @@ def open_video(uri: str, rest: str, how: Opening) -> CameraAlone:
 
 
 def open_images(uri: str, rest: str, how: Opening) -> CameraAlone:
-    """``pictures:DIR?rate_hz=10&…``, in order of name. Names of 16 or 19 digits are µs or ns since 1970. Called by
-    name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    """``pictures:DIR?rate_hz=10&…``, in order of name. Names of 16 or 19 digits are µs or ns since 1970. Loaded by name
+    from ``pipeline.source_kinds``. SourceError if it cannot be opened."""
     path, options = split_options(rest, _OPTIONS)
     folder = recording_folder(path)
     files = files_by_name(folder, IMAGE_SUFFIXES)
@@ -70,7 +70,7 @@ def open_images(uri: str, rest: str, how: Opening) -> CameraAlone:
 
 
 class CameraAlone:
-    """A recording of images. ticks: ns of each, ascending. read: (image, JPEG file or None) of each."""
+    """A recording of images only. ticks: ns of each, ascending. read: returns (image, JPEG file or None) of each."""
 
     def __init__(
         self,
@@ -89,7 +89,7 @@ class CameraAlone:
         rig = rig_files.load_rig(rig_file) if rig_file is not None else rig_files.Rig()
         fixes = _track(path, options, ticks[0], notes)
         if fixes and not fixes[0].t_ns <= ticks[0] <= fixes[-1].t_ns:
-            # a video's clock starts at zero: the track is taken to begin with it
+            # a video's clock starts at zero: the track is assumed to start with it
             begin = fixes[0].t_ns + round(number_option(options, "gnss_offset_s", 0.0) * 1e9)
             ticks = [begin + tick - ticks[0] for tick in ticks]
             notes.append("the GNSS track is assumed to start with the images; ?gnss_offset_s= shifts it")
@@ -143,7 +143,7 @@ class CameraAlone:
         return CameraImage(t_ns, bgr, encoded)
 
     def _assumed(self, options: dict[str, str], notes: list[str]) -> CameraCalibration | None:
-        """A dash cam's calibration for the first readable image."""
+        """A dash cam's calibration with the size of the first readable image."""
         for index in range(len(self)):
             image = self._image(index, 0, [])
             if image is not None:
@@ -169,7 +169,7 @@ _NO_SPEED = "no ego speed recorded"
 
 
 def _track(path: Path, options: dict[str, str], near_ns: int, notes: list[str]) -> list[GnssFix]:
-    """The fixes of a file beside the recording, in order of time; none without one."""
+    """The fixes in a file beside the recording, in order of time; empty without one."""
     gpx = named(path, options, "gpx", (".gpx",)) or _the_only_one(path, options, (".gpx",))
     if gpx is not None:
         fixes = parse_gpx(read_bytes(gpx).decode("utf-8", "replace"), gpx.name)
@@ -180,8 +180,8 @@ def _track(path: Path, options: dict[str, str], near_ns: int, notes: list[str]) 
 
 
 def _the_only_one(path: Path, options: dict[str, str], suffixes: tuple[str, ...]) -> Path | None:
-    """The track in a folder of images, or beside the only video of a folder, whatever its name; None of several, and
-    where an option names one."""
+    """The track file in a folder of images, or beside the only video of a folder, whatever its name; None if there are
+    several, or if an option names one."""
     folder = path if path.is_dir() else path.parent
     if "gpx" in options or "nmea" in options or (path.is_file() and len(files_by_name(folder, SUFFIXES)) > 1):
         return None
@@ -197,7 +197,7 @@ def _positive(options: dict[str, str], name: str, otherwise: float) -> float:
 
 
 def _stamp_ns(name: str) -> int:
-    """The time that an image's name is; 0 when it is none."""
+    """The time in an image's name; 0 if there is none."""
     if not _STAMP.match(name):
         return 0
     t_ns = int(name) * (1000 if len(name) == 16 else 1)

@@ -15,10 +15,10 @@ from pipeline.types import Frame
 
 
 def fingerprint(uri: str) -> str:
-    """Sixteen characters that are another when a file of the recording was edited or replaced: by the name, size and
-    time of change of the file and of what shares its stem (a video, sentences), of all files of a folder, and of files
-    named in options; of a file in a store by its size and what the store says of its version. A URI that names no file,
-    as of a built-in scenario, stays as it is."""
+    """Sixteen characters that change if a file of the recording is edited or replaced. Based on the name, size and
+    modification time of the file and of files with the same stem (video, NMEA), of all files of a folder, and of files
+    named in options; for a file in a store, on its size and version. A URI without a file, such as a built-in scenario,
+    is returned unchanged."""
     _, _, rest = uri.partition(":")
     digest = hashlib.sha256(uri.encode(errors="replace"))
     if is_remote(uri):
@@ -34,9 +34,9 @@ def fingerprint(uri: str) -> str:
 
 
 def content_key(t_ns: Sequence[int], frame: Callable[[int], Frame]) -> str:
-    """Sixteen characters of what is in a recording, wherever it lies and whatever form it has: a session that was made
-    of it has the same, and so has one whose LiDAR was found to be mounted otherwise, or beside which a video was put.
-    From the ticks of all frames, and what the sensor sent in the first, the middle and the last one."""
+    """Sixteen characters that identify the content of a recording, independent of its location and format: a session
+    recorded from it has the same key, and the key does not change with the LiDAR's mount or a video added beside it.
+    Based on the ticks of all frames, and the sensor data of the first, middle and last one."""
     digest = hashlib.sha256(np.array(t_ns, np.int64).tobytes())
     for index in sorted({0, len(t_ns) // 2, len(t_ns) - 1}) if t_ns else ():
         digest.update(_as_sent(frame(index)))
@@ -44,7 +44,8 @@ def content_key(t_ns: Sequence[int], frame: Callable[[int], Frame]) -> str:
 
 
 def _as_sent(frame: Frame) -> bytes:
-    """The intensities of a sweep, which no mount changes; where there are none the image, or else the places."""
+    """The intensities of a sweep, which do not depend on the mount; without intensities the image, else the
+    positions."""
     intensity = frame.sweep.points[:, 3] if frame.sweep is not None else np.empty(0)
     if (intensity != intensity[:1]).any():
         return intensity.tobytes()
@@ -54,7 +55,7 @@ def _as_sent(frame: Frame) -> bytes:
 
 
 def _files(rest: str) -> Iterator[Path]:
-    """What the part after the scheme names, in a fixed order."""
+    """The files named by the part after the scheme, in a fixed order."""
     path, _, query = rest.partition("?")
     if not path:
         return
@@ -67,7 +68,7 @@ def _files(rest: str) -> Iterator[Path]:
         for _, value in parse_qsl(query):
             yield main.parent / Path(value).expanduser()
             yield main / Path(value).expanduser()
-    except (OSError, RuntimeError, ValueError):  # what cannot be read is for who opens it to say
+    except (OSError, RuntimeError, ValueError):  # unreadable paths are reported when the recording is opened
         return
 
 

@@ -42,14 +42,14 @@ _NO_IMAGES = f"no images: no {_CAMERA} files that calibrated_sensor.json knows"
 _CHANNELS = 32
 _NOMINAL_SIZE = (1600, 900)
 _LATEST_US = 9_000_000_000_000_000
-"""Later times, which are no camera's, do not fit into 64 bits of nanoseconds."""
+"""Later times do not fit into 64 bits of nanoseconds and are invalid."""
 _IMAGE_WITHIN_NS = 60_000_000
-"""Of a camera at 12 Hz, the nearest image is at most 42 ms away."""
+"""With a camera at 12 Hz, the nearest image is at most 42 ms away."""
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> NuscenesSource:
-    """``nuscenes:DIR?scene=scene-0061&version=v1.0-mini``. Called by name, from ``pipeline.source_kinds``. SourceError
-    when it cannot be opened."""
+    """``nuscenes:DIR?scene=scene-0061&version=v1.0-mini``. Loaded by name from ``pipeline.source_kinds``. SourceError
+    if it cannot be opened."""
     return NuscenesSource(uri, rest)
 
 
@@ -185,7 +185,7 @@ def _tables(folder: Path, path: str, version: str | None) -> Path:
 
 
 def _scene(tables: Path, name: str | None) -> tuple[SceneRow, list[str]]:
-    """The scene of a name, else the first one, and the names of the others."""
+    """The scene with this name, else the first one, and the names of the others."""
     scenes = sorted(read_table(tables, "scene", SceneRow), key=lambda scene: scene.name)
     if not scenes:
         raise SourceError(f"{tables.name}/scene.json: no scenes in it")
@@ -206,7 +206,7 @@ def _sensors(tables: Path) -> dict[str, tuple[CalibratedSensorRow, str]]:
 def _rows_of(
     rows: list[SampleDataRow], channel: str, sensors: dict[str, tuple[CalibratedSensorRow, str]], folder: Path
 ) -> list[SampleDataRow]:
-    """The files of a sensor that are there, below the data set's folder, in order of time."""
+    """The existing files of a sensor, below the data set's folder, in order of time."""
     of_channel = {token for token, (_, name) in sensors.items() if name == channel}
     of_sensor = [row for row in rows if row.calibrated_sensor_token in of_channel and 0 < row.timestamp < _LATEST_US]
     found = [row for row in of_sensor if _is_below(folder, row.filename)]
@@ -214,7 +214,7 @@ def _rows_of(
 
 
 def _is_below(folder: Path, filename: str) -> bool:
-    """Whether a file is there, and where a data set's own files are: a table may name any."""
+    """Whether a file exists and is inside the data set's folder: a table may name any path."""
     try:
         return ".." not in Path(filename).parts and not Path(filename).is_absolute() and (folder / filename).is_file()
     except (OSError, ValueError):
@@ -228,7 +228,7 @@ def _pose_of_sensor(sensor: CalibratedSensorRow) -> F64:
 def _labels(
     tables: Path, samples: set[str]
 ) -> tuple[dict[str, list[AnnotationRow]], dict[str, tuple[str, int]] | None]:
-    """Boxes by sample, and category and number by instance; None where the tables have no labels."""
+    """Boxes by sample, and category and number by instance; None if the tables contain no labels."""
     if not (tables / "sample_annotation.json").is_file():
         return {}, None
     boxes: dict[str, list[AnnotationRow]] = {}

@@ -29,12 +29,12 @@ _UNITS_NS = ((10**18, 1), (10**15, 1_000), (10**12, 1_000_000))
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> PcdSource:
-    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    """Loaded by name from ``pipeline.source_kinds``. SourceError if it cannot be opened."""
     return PcdSource(uri, rest)
 
 
 class PcdSource:
-    """``<folder>?rig=file.yaml``. The file ``rig.yaml`` in the folder is taken without being named."""
+    """``<folder>?rig=file.yaml``. A file ``rig.yaml`` in the folder is used by default."""
 
     def __init__(self, uri: str, rest: str) -> None:
         path, options = split_options(rest, ("rig",))
@@ -73,7 +73,7 @@ class PcdSource:
         return Frame(index, name, t_ns, sweep, image, camera, notes=tuple(notes))
 
     def outlines(self) -> Iterator[Frame]:
-        """A camera's images are of one size: the first one tells whether the calibration is theirs."""
+        """All images of a camera have one size: the first one shows whether the calibration matches."""
         first = image_of(next(iter(self._images.values()), None), None, self._size, []) if self._images else None
         camera = rig_files.calibration_for(self._camera, first, [])
         return (Frame(index, name, self.t_ns(index), camera=camera) for index, name in enumerate(self._names))
@@ -102,7 +102,7 @@ class PcdSource:
 
 
 def _stamp_ns(name: str) -> int | None:
-    """The time that a file's name is; None when it is none."""
+    """The time in a file's name; None if there is none."""
     if not _NUMBER.match(name):
         return None
     whole, _, fraction = name.partition(".")

@@ -32,7 +32,7 @@ _NO_IMAGES = "no images: no zed_left/*.png whose time is in zed_left.txt"
 _IMAGE_WITHIN_NS, _STATE_WITHIN_NS = 100_000_000, 500_000_000
 _STAMP = re.compile(rb"Frame:\s*(\d{1,9})\s+Time:\s*(\d{1,10})\.(\d{1,9})\s*$")
 _ROAD_Z_M = -2.1
-"""Of the LiDAR's road returns at 4 to 12 m in the SDK's sample; the files do not say how high it sits."""
+"""From the LiDAR's road returns at 4 to 12 m in the SDK's sample; the files do not contain its height."""
 _SIZE = (672, 376)
 _K = np.array([[337.9191448899105, 0.0, 341.7366010946575], [0.0, 338.6957068549526, 200.7359735313929], [0, 0, 1.0]])
 _DISTORTION = np.array([-0.183879883467351, 0.0308609205858947, 0.0, 0.0])
@@ -48,12 +48,11 @@ class TimedFiles(NamedTuple):
     times_ns: Times
     """(N,) int64, ascending."""
     paths: list[Path]
-    """Of each time."""
+    """Path for each time."""
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> RadiateSource:
-    """``radiate:DIR?rig=FILE``. Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be
-    opened."""
+    """``radiate:DIR?rig=FILE``. Loaded by name from ``pipeline.source_kinds``. SourceError if it cannot be opened."""
     return RadiateSource(uri, rest)
 
 
@@ -147,8 +146,8 @@ class RadiateSource:
 
 
 def parse_sweep(data: bytes, file: str, notes: list[str]) -> tuple[F32, U8]:
-    """(N, 4) float32 ``x y z intensity`` in the ego frame and (N,) uint8 ring of ``x,y,z,intensity,ring`` a line. Lines
-    that are no point are left out and counted in ``notes``. SourceError when none is left."""
+    """(N, 4) float32 ``x y z intensity`` in the ego frame and (N,) uint8 ring from lines ``x,y,z,intensity,ring``.
+    Invalid lines are left out and counted in ``notes``. SourceError if none is left."""
     rows, bad = parse_rows(data.replace(b",", b" "), _COLUMNS)
     bad -= 1 if data.lstrip()[:1].isalpha() else 0  # a header
     good = np.all(np.abs(rows[:, :3]) < 1000.0, axis=1) & (rows[:, 3] >= 0.0) & (rows[:, 3] <= 255.0)
@@ -165,8 +164,8 @@ def parse_sweep(data: bytes, file: str, notes: list[str]) -> tuple[F32, U8]:
 
 
 def parse_state(data: bytes, file: str, t_ns: int) -> tuple[EgoState, GnssFix]:
-    """Own motion and place of a ``GPS_IMU_Twist`` file: 18 lines, of which the first is latitude, longitude and height,
-    the next three the covariance of the place, the last two the velocities north, east and down and the turn rates
+    """Own motion and position from a ``GPS_IMU_Twist`` file of 18 lines: the first is latitude, longitude and height,
+    the next three the covariance of the position, the last two the velocities north, east and down and the turn rates
     about forward, right and down. SourceError names the file."""
     lines = [line for line in data.decode("utf-8", "replace").splitlines() if line.strip()]
     try:
@@ -187,7 +186,7 @@ def parse_state(data: bytes, file: str, t_ns: int) -> tuple[EgoState, GnssFix]:
 
 
 def default_camera() -> CameraCalibration:
-    """The left camera of ``default-calib.yaml``; images are as the camera took them, not rectified."""
+    """The left camera of ``default-calib.yaml``; images are raw, not rectified."""
     x, y, z = np.radians(_TURNS_DEG)
     Rx = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
     Ry = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
@@ -201,7 +200,7 @@ def default_camera() -> CameraCalibration:
 
 
 def _files_in_time(folder: Path, name: str, suffixes: tuple[str, ...]) -> TimedFiles:
-    """The files of a sensor whose time is known. Numbers are those of the index; where files begin anew at 1, as in a
+    """The files of a sensor with known times. File numbers are those of the index; if they restart at 1, as in a
     cut-out sequence, they count its lines."""
     files = {int(stem): path for stem, path in files_by_name(folder / name, suffixes).items() if stem.isdecimal()}
     try:

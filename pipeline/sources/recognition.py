@@ -15,13 +15,13 @@ from pipeline.source_kinds import KINDS, SourceKind, kind_by_first_bytes, kind_n
 
 _FIRST_BYTES = 64
 _DEEPEST = 3
-"""Folders within folders that are searched for a recording: ``data/2011_09_26/2011_09_26_drive_0009_sync``."""
+"""Depth of nested folders that are searched for a recording: ``data/2011_09_26/2011_09_26_drive_0009_sync``."""
 _MOST_ENTRIES = 1000
-"""Of a folder that are looked at: a folder of anything else may have millions."""
+"""Maximum entries of a folder that are examined: other folders may have millions."""
 _MOST_LOOKED_AT = 3000
-"""In all folders inside one, to name a recording in it."""
+"""Maximum entries examined in all folders inside one, to find a recording."""
 _PROBLEMS = (OSError, RuntimeError, ValueError, Overloaded)
-"""What a path may make the system say: no such user's home, a null byte, a link to itself."""
+"""Errors that a path may cause: unknown home directory, a null byte, a link to itself."""
 
 _IMAGE = "one image; open its folder, which is played in order of name"
 _CLOUD = "one point cloud; open its folder, which is played in order of name"
@@ -42,14 +42,14 @@ _FILES: tuple[tuple[tuple[str, ...], str], ...] = (
     ((".rrd",), "an export for the rerun viewer; open the recording that it was made of"),
     ((".blf", ".asc", ".mf4", ".dbc"), "a log or definition of a vehicle bus, without LiDAR and images"),
 )
-"""Files that people have, by suffix: what they are, and what to do."""
+"""Common other files, by suffix: what they are, and what to do."""
 _FOLDERS: tuple[tuple[str, str], ...] = (
     ("samples/LIDAR_TOP", "files of nuScenes without their tables; the folder v1.0-mini or v1.0-trainval is missing"),
     ("sensors/lidar", "a log of Argoverse 2; it is not read, convert it to a ROS bag or to PCD files, one a sweep"),
     ("LIDAR_CONCAT", "a data set of TIER IV; it is not read, convert it to a ROS bag or to PCD files, one a sweep"),
     ("poses", "poses of KITTI's odometry sequences; the folders with velodyne and calib.txt are missing"),
 )
-"""The same of folders, by a folder inside."""
+"""The same for folders, by a folder inside."""
 _BEGINS: tuple[tuple[bytes, str], ...] = (
     (b"\x89PNG", _IMAGE),
     (b"\xff\xd8\xff", _IMAGE),
@@ -62,14 +62,14 @@ _BEGINS: tuple[tuple[bytes, str], ...] = (
         "a database; if it is of a ROS 2 bag, open the bag's folder or rename it so that it ends in .db3",
     ),
 )
-"""The same by how a file begins."""
+"""The same by the first bytes of a file."""
 
 
 def recording_at(uri: str) -> tuple[SourceKind, str] | None:
-    """What opens a path without a scheme, and what to give it; options may follow a question mark.
+    """The source kind for a path without a scheme, and its argument; options may follow a question mark.
 
-    A folder with a single recording in it stands for that one. Files of one name are one recording: a capture and the
-    video beside it. None when there is nothing of a known kind.
+    A folder that contains a single recording stands for that one. Files with the same name are one recording: a capture
+    and the video beside it. None if there is nothing of a known kind.
     """
     bare = kind_of_bare(uri)
     if bare is not None:
@@ -86,8 +86,8 @@ def recording_at(uri: str) -> tuple[SourceKind, str] | None:
 
 
 def about_path(uri: str, live: bool) -> str:
-    """What a path that is of no known kind looks like, and what to do; begins with a colon or a semicolon. live:
-    whether live sensors are offered."""
+    """What a path of unknown kind looks like, and what to do; begins with a colon or a semicolon. live: whether live
+    sensors are mentioned."""
     path = uri.partition("?")[0]
     otherwise = f"; use one of {usages(live=live)}"
     try:
@@ -104,7 +104,7 @@ def about_path(uri: str, live: bool) -> str:
 
 
 def _recording(place: Path, deepest: int) -> tuple[SourceKind, Path | None] | None:
-    """The kind of a path, and the path inside that is meant where it is not the path itself."""
+    """The kind of a path, and the path inside it if the recording is not the path itself."""
     kind = _kind_of(place)
     if kind is not None and not _holds_one_of_its_own(place, kind):
         return kind, None
@@ -125,7 +125,7 @@ def _recording(place: Path, deepest: int) -> tuple[SourceKind, Path | None] | No
 
 
 def _holds_one_of_its_own(place: Path, kind: SourceKind) -> bool:
-    """Whether a folder was recognised by recordings in it, as KITTI's of a day is."""
+    """Whether a folder was recognised by recordings inside it, such as KITTI's folder of a day."""
     return (
         place.is_dir()
         and not any((place / name).is_dir() for name in kind.folders)
@@ -134,7 +134,7 @@ def _holds_one_of_its_own(place: Path, kind: SourceKind) -> bool:
 
 
 def _kind_of(place: Path) -> SourceKind | None:
-    """By what lies in a folder, by a file's name, else by how it begins."""
+    """By the content of a folder, by a file's name, else by its first bytes."""
     bare = kind_of_bare(place.name)
     if bare is not None and place.is_file():
         return _by_content(place) or bare
@@ -145,7 +145,7 @@ def _kind_of(place: Path) -> SourceKind | None:
 
 
 def _is_there(place: Path) -> bool:
-    """Whether there is anything, a link that leads nowhere included. OSError where that must not be known."""
+    """Whether the path exists, including broken links. OSError if that may not be revealed."""
     try:
         os.lstat(place)
     except (FileNotFoundError, NotADirectoryError):
@@ -154,7 +154,7 @@ def _is_there(place: Path) -> bool:
 
 
 def _by_content(path: Path) -> SourceKind | None:
-    """By how a file begins; None where it says nothing, and where there is none that can be read."""
+    """By the first bytes of a file; None if they are unknown or the file cannot be read."""
     try:
         return kind_by_first_bytes(_first_bytes(path.expanduser())) if path.expanduser().is_file() else None
     except _PROBLEMS:
@@ -162,14 +162,14 @@ def _by_content(path: Path) -> SourceKind | None:
 
 
 def _entries(folder: Path) -> list[Path]:
-    """What lies in a folder, sorted; hidden files and, of very many, the rest are passed over."""
+    """Entries of a folder, sorted; hidden files are skipped, and the rest of very large folders."""
     with os.scandir(folder) as found:
         names = islice((each.name for each in found if not each.name.startswith(".")), _MOST_ENTRIES)
         return [folder / name for name in sorted(names)]
 
 
 def _is_folder(path: Path) -> bool:
-    """Whether a path is a folder itself, not a link to one, and may be looked at."""
+    """Whether a path is a folder itself, not a link to one, and may be read."""
     return os.path.isdir(path) and not os.path.islink(path)
 
 
@@ -212,7 +212,7 @@ def _about_folder(folder: Path) -> str:
 
 
 def _recordings_below(folder: Path) -> Iterator[Path]:
-    """The nearest first. What cannot be read is passed over, and so is the rest where there is too much."""
+    """Nearest first. Unreadable entries are skipped, and the rest if there are too many."""
     level, looked_at = [folder], 0
     for _ in range(_DEEPEST):
         inside: list[Path] = []

@@ -27,7 +27,7 @@ class RigCamera(ConfigPart):
     """The camera of a recording."""
 
     calibration: CalibrationConfig | None = None
-    """None where it is not known."""
+    """None if it is not known."""
     time_offset_ms: OffsetMs = 0.0
     """Added to the times of images."""
 
@@ -40,7 +40,7 @@ class RigGnss(ConfigPart):
 
 
 class Rig(ConfigPart):
-    """Offsets are added to the sensor's own times, as in the live configuration."""
+    """Offsets are added to the sensors' own times, as in the live configuration."""
 
     lidar: RigLidar = RigLidar()
     """Where it sits."""
@@ -55,7 +55,7 @@ class Rig(ConfigPart):
 
 
 def load_rig(path: Path) -> Rig:
-    """The file's content. SourceError in one sentence when it cannot be used."""
+    """The content of the file. SourceError in one sentence if it cannot be used."""
     try:
         rig = Rig.model_validate(read_yaml(path, path.name, SourceError) or {})
     except ValidationError as error:
@@ -67,8 +67,8 @@ def load_rig(path: Path) -> Rig:
 
 
 def rig_in_folder(folder: Path, options: dict[str, str]) -> Path | None:
-    """The file of a recording that is a folder: the option ``rig`` names it, else it is ``rig.yaml``; None without one.
-    SourceError when the named one is missing."""
+    """The rig file of a recording that is a folder: the option ``rig``, else ``rig.yaml``; None without one.
+    SourceError if the file in the option is missing."""
     path = folder / options.get("rig", "rig.yaml")
     if path.is_file():
         return path
@@ -80,7 +80,7 @@ def rig_in_folder(folder: Path, options: dict[str, str]) -> Path | None:
 def calibration_for(
     camera: CameraCalibration | None, image: CameraImage | None, notes: list[str]
 ) -> CameraCalibration | None:
-    """The calibration, if it is of the image's size; else None, and ``notes`` says so."""
+    """The calibration if it has the image's size; else None, with a note in ``notes``."""
     if camera is None or image is None:
         return camera
     height, width = image.bgr.shape[:2]

@@ -33,9 +33,9 @@ _NORTH_NAMES = ("northing", "northing_m", "north", "utm_northing", "utm_y")
 _ZONE_NAMES = ("epsg", "zone", "utm_zone")
 _UTM_NORTH, _UTM_SOUTH = 32600, 32700
 SIGMA_BY_NMEA_QUALITY_M = {1: 2.0, 2: 0.8, 4: 0.02, 5: 0.3}
-"""Of GGA's quality field: single, differential, RTK fixed, RTK float."""
+"""By GGA's quality field: single, differential, RTK fixed, RTK float."""
 _UNKNOWN_SIGMA_M = 0.5
-"""Of a file that does not say how good it is: a drawn or surveyed route."""
+"""For a file without accuracy: a drawn or surveyed route."""
 _LARGEST_FILE_BYTES = 200_000_000
 
 PositionRows = list[tuple[float, float]]
@@ -46,7 +46,7 @@ class RouteError(BadInput):
 
 
 def load_route(path: str) -> Route:
-    """The route in a file, ``?epsg=32632`` behind its name where its places are of a UTM zone that it does not name.
+    """The route in a file; append ``?epsg=32632`` to its name if its positions are in a UTM zone that it does not name.
     RouteError says in one sentence what is wrong."""
     path, _, zone = path.partition("?epsg=")
     file = given_path(path, RouteError)
@@ -64,7 +64,7 @@ def load_route(path: str) -> Route:
 
 
 def from_fixes(name: str, fixes: Iterable[GnssFix]) -> Route:
-    """The route of an earlier drive, as good as its median fix. RouteError when it goes nowhere."""
+    """The route of an earlier drive, with the accuracy of its median fix. RouteError if it does not move."""
     known = list(fixes)
     sigma_m = median(fix.sigma_m for fix in known) if known else 0.0
     return _route(name, [(fix.lat_deg, fix.lon_deg) for fix in known], sigma_m, name)
@@ -79,7 +79,7 @@ def _route(name: str, rows: PositionRows, sigma_m: float, path: str) -> Route:
 
 
 def _reader(suffix: str, text: str) -> Callable[[str, str], tuple[PositionRows, float]]:
-    """By the file's name, else by how it begins."""
+    """By the file's name, else by its first characters."""
     start = text.lstrip("\ufeff \r\n\t")[:200]
     if suffix == ".gpx" or start.startswith("<"):
         return _gpx
@@ -119,7 +119,7 @@ def _column(names: list[str], known: tuple[str, ...]) -> int | None:
 
 
 def _from_utm(lines: list[list[str]], east: int, north: int, zone_at: int | None, zone: str, path: str) -> PositionRows:
-    """Latitudes and longitudes of places in metres of one UTM zone: the one asked for, else the file's own."""
+    """Latitudes and longitudes of positions in metres of one UTM zone: the requested one, else the file's own."""
     rows = [row for row in lines if len(row) > max(east, north)]
     named = {row[zone_at].strip() for row in rows if len(row) > zone_at} if zone_at is not None and not zone else {zone}
     epsg = {utm_epsg(each) for each in named}
@@ -134,8 +134,8 @@ def _from_utm(lines: list[list[str]], east: int, north: int, zone_at: int | None
 
 
 def utm_epsg(zone: str) -> int | None:
-    """EPSG code of a UTM zone on WGS 84 given as one (32632, EPSG:32632) or as number and hemisphere (32N); None for
-    anything else. Letters of latitude bands are not taken: band S lies in the north."""
+    """EPSG code of a UTM zone on WGS 84 given as code (32632, EPSG:32632) or as number and hemisphere (32N); None for
+    anything else. Letters of latitude bands are not accepted: band S is in the north."""
     match = re.fullmatch(r"(?:EPSG:)?(32[67])(\d\d)|(\d{1,2}) ?([NS])", zone.strip().upper())
     if match is None:
         return None
@@ -169,7 +169,7 @@ def _nmea(text: str, path: str) -> tuple[PositionRows, float]:
 
 def _nmea_place(line: str) -> tuple[str, tuple[float, float], float] | None:
     """Kind, latitude and longitude in degrees, and sigma in metres; None for a sentence of another kind, without a fix,
-    with a wrong checksum, or with something else where its numbers should be."""
+    with a wrong checksum, or with invalid numbers."""
     try:
         sentence = parse_sentence(line[line.index("$") :])
         kind = sentence.sentence_type if sentence is not None else ""
@@ -183,7 +183,8 @@ def _nmea_place(line: str) -> tuple[str, tuple[float, float], float] | None:
 
 
 def _from_session(path: str, name: str) -> Route:
-    from pipeline.recording.session.source import SessionSource  # half a second of imports: only who opens one pays
+    # takes half a second to import, only needed for sessions
+    from pipeline.recording.session.source import SessionSource
 
     session = SessionSource(f"mcap:{path}", path)
     try:

@@ -28,10 +28,10 @@ _LONGEST_LINE = 1024
 
 
 class Beside:
-    """Everything of a frame but its sweep. notes: what was found, and what had to be assumed.
+    """All data of a frame except its sweep. notes: what was found, and what had to be assumed.
 
-    begin_ns: when the recording begins, which is when its video is taken to begin. fixes: what the recording itself
-    says of the place; used where no file of sentences lies beside it. progress: told how much of a video was read.
+    begin_ns: when the recording begins; its video is assumed to begin at the same time. fixes: positions in the
+    recording itself, used if there is no NMEA file beside it. progress: receives the reading progress of a video.
     SourceError for a named file that cannot be used.
     """
 
@@ -71,8 +71,8 @@ class Beside:
         return evolve(outline, sweep=sweep, image=image, notes=tuple(notes))
 
     def outlines(self, times_ns: Sequence[int]) -> Iterator[Frame]:
-        """As ``frame`` without sweep and image, one for each of these times. A video's images are of one size: the
-        first one tells whether the calibration is theirs."""
+        """Like ``frame`` without sweep and image, one for each of these times. All images of a video have one size: the
+        first one shows whether the calibration matches."""
         first = self._image(self._video_begins_ns, []) if self._video is not None else None
         camera = rig_files.calibration_for(self._camera, first, [])
         return (self._outline(index, t_ns, camera) for index, t_ns in enumerate(times_ns))
@@ -106,13 +106,13 @@ class Beside:
 
 
 def rig_of(recording: Path, options: dict[str, str]) -> rig_files.Rig:
-    """The file that says where sensors sit; without one every sensor is at the ego origin."""
+    """The file with the sensors' mounts; without one, every sensor is at the ego origin."""
     path = named(recording, options, "rig", rig_files.SUFFIXES)
     return rig_files.load_rig(path) if path is not None else rig_files.Rig()
 
 
 def named(recording: Path, options: dict[str, str], option: str, suffixes: tuple[str, ...]) -> Path | None:
-    """The file that an option names, from the recording's folder; else the one with the recording's own name."""
+    """The file named by an option, relative to the recording's folder; else the one with the recording's own name."""
     if option in options:
         path = recording.parent / given_path(options[option], SourceError)
         if not path.is_file():
@@ -122,7 +122,7 @@ def named(recording: Path, options: dict[str, str], option: str, suffixes: tuple
 
 
 def fixes_of(path: Path, near_ns: int, notes: list[str]) -> list[GnssFix]:
-    """Every fix of a file of sentences. Damaged lines are counted in ``notes``."""
+    """Every fix in an NMEA file. Damaged lines are counted in ``notes``."""
     reader, fixes = NmeaReader(), []
     try:
         with open_regular(path) as file:

@@ -22,7 +22,7 @@ _TRUTH_RANGE_M = 120.0
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> SimulatedSource:
-    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    """Loaded by name from ``pipeline.source_kinds``. SourceError if it cannot be opened."""
     return SimulatedSource(uri, rest)
 
 
@@ -86,7 +86,7 @@ def _notes(scene: scenario.Scenario) -> Iterator[str]:
 
 
 def truth_of(now: world_state.World) -> tuple[TruthObject, ...]:
-    """Every vehicle that is at least partly ahead of the LiDAR and within 120 m, hidden ones too."""
+    """Every vehicle that is at least partly ahead of the LiDAR and within 120 m, including hidden ones."""
     return tuple(
         TruthObject(state.actor.kind, state.cuboid, state.actor.id)
         for state in sorted(now.actors, key=lambda state: state.actor.id)

@@ -23,7 +23,7 @@ def split_options(rest: str, known: tuple[str, ...]) -> tuple[str, dict[str, str
 
 
 def number_option(options: dict[str, str], name: str, otherwise: float) -> float:
-    """A finite number. SourceError when it is none."""
+    """A finite number. SourceError for anything else."""
     try:
         value = float(options.get(name, otherwise))
     except ValueError:

@@ -16,6 +16,6 @@ Point3 = tuple[float, float, float]
 Box = tuple[float, float, float, float]
 """Axis-aligned image box ``x1 y1 x2 y2`` in pixels."""
 PixelWindow = tuple[int, int, int, int]
-"""A part of an image, ``x1 y1 x2 y2`` in whole pixels, the last ones not in it."""
+"""Pixel region of an image, ``x1 y1 x2 y2``; x2 and y2 are exclusive."""
 VEHICLES = frozenset({"car", "truck", "bus", "motorcycle"})
 """Class names that may be a lead vehicle. Detector labels are mapped to the COCO names by the detector."""

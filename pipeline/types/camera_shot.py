@@ -39,5 +39,6 @@ class Shot:
 
 
 def is_whole_jpeg(data: bytes) -> bool:
-    """Whether data begins and ends as a JPEG does. A truncated one decodes to grey, which a detector takes for road."""
+    """Whether the data starts and ends like a JPEG. A truncated JPEG decodes to grey areas, which a detector mistakes
+    for road."""
     return data.startswith(_JPEG_START) and _JPEG_END in data[-_END_BYTES:]

@@ -8,15 +8,14 @@ from typing import Generic, NamedTuple, TypeVar
 
 
 class Gate(NamedTuple):
-    """One test an object went through, for people to read. No decision looks at gates: decisions read ``Conditions``,
-    and gates are made from the same answers."""
+    """One test of an object, for display only. Decisions read ``Conditions``; gates are made from the same answers."""
 
     name: str
-    """What the test is called where it is shown."""
+    """Name of the test as shown to the user."""
     value: float | None
-    """The number that was tested; None when there was nothing to test."""
+    """The tested value; None when there was nothing to test."""
     limit: float
-    """What it was held against."""
+    """The limit that the value is compared with."""
     passed: bool
     """Whether the object passed."""
 
@@ -25,40 +24,40 @@ Each = TypeVar("Each")
 
 
 class Conditions(NamedTuple, Generic[Each]):
-    """One value for each condition that a lead must meet, in the order in which the first failure is the reason given:
-    what the object is, where it is, and only then how well it is known. So nothing in the next lane is said to wait for
-    its third sighting."""
+    """One value for each condition that a lead must meet. The first failed condition is the reason that is shown, so
+    the order is: what the object is, where it is, and only then how well it is known. This way an object in the next
+    lane is never reported as waiting for its third sighting."""
 
     vehicle: Each
-    """Its class is a vehicle's, or not known."""
+    """Its class is a vehicle class, or unknown."""
     distance: Each
     """Its distance is known."""
     size: Each
-    """It is as large as a vehicle, where only its size says what it is."""
+    """It is as large as a vehicle. Tested only if no class is known."""
     ahead: Each
     """It is ahead of the bumper."""
     in_path: Each
-    """Its sightings so far say that it is in the path."""
+    """According to all sightings so far, it is in the path."""
     confirmed: Each
-    """It was seen often enough."""
+    """It has been seen often enough."""
     seen: Each
-    """It was seen in this frame, and its distance measured."""
+    """It was seen in this frame and its distance was measured."""
     placed: Each
-    """Its place against the path is known well enough."""
+    """Its position relative to the path is known well enough."""
     probable: Each
-    """It exists and is in the path with enough probability."""
+    """The probability that it exists and is in the path is high enough."""
 
 
 class Braking(IntEnum):
     """How hard the car brakes."""
 
     COMFORT = 0
-    """As adaptive cruise control does for any lead."""
+    """Like adaptive cruise control for any lead."""
     PARTIAL = 1
-    """As emergency braking begins."""
+    """First level of emergency braking."""
     FULL = 2
-    """As hard as it can."""
+    """As hard as the car can."""
 
 
 Eligibility = Conditions[bool]
-"""Which conditions of a lead an object meets (``pipeline.decision.gates`` decides)."""
+"""Which lead conditions an object meets (decided in ``pipeline.decision.gates``)."""

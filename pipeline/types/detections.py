@@ -13,8 +13,8 @@ from pipeline.types.arrays import F32, I32, PixelWindow
 class DistanceLaw:
     """Distance from the height of a detector's boxes: depth of a car in metres = coefficient · height ^ exponent.
 
-    How tightly a network draws its boxes, and how tall the vehicles it meets are, is in these numbers, so each detector
-    has its own law.
+    The numbers depend on how tightly a network draws its boxes and how tall the vehicles are, so each detector has its
+    own law.
     """
 
     coefficient: float
@@ -22,35 +22,35 @@ class DistanceLaw:
     exponent: float
     """−1 for an ideal pinhole camera."""
     focal_px: float
-    """Focal length of the camera that heights refer to."""
+    """Focal length of the camera that the heights refer to."""
     truck_ratio: float
     """Height of a truck's box relative to a car's at the same depth."""
     bus_ratio: float
-    """The same of a bus."""
+    """The same ratio for a bus."""
     motorcycle_ratio: float
-    """The same of a motorcycle."""
+    """The same ratio for a motorcycle."""
 
     def at_focal(self, focal_px: float) -> DistanceLaw:
-        """The same law for heights in the images of a camera of another focal length."""
+        """The same law for heights in images of a camera with another focal length."""
         factor = (self.focal_px / focal_px) ** self.exponent
         return replace(self, coefficient=self.coefficient * factor, focal_px=focal_px)
 
 
 REAL_VEHICLES = DistanceLaw(1444.0, -1.0, 907.0, truck_ratio=1.6, bus_ratio=2.0, motorcycle_ratio=0.75)
-"""The law of a detector that has no law of its own. Fitted by ``pipeline.calibration.distance`` to YOLOX's boxes of 38
-labelled cars, 1.59 m tall, of two real cameras (Astyx 047–051 and 057–059, KITTI 2011_09_26 drive 0052). 907 px is 720p
-with a 78° diagonal. Motorcycles are boxed without their riders."""
+"""The default for a detector without its own law. Fitted by ``pipeline.calibration.distance`` to YOLOX's boxes of 38
+labelled cars, 1.59 m tall, from two real cameras (Astyx 047–051 and 057–059, KITTI 2011_09_26 drive 0052). 907 px is
+720p with a 78° diagonal. Motorcycles are boxed without their riders."""
 
 
 @dataclass(frozen=True)
 class RawBoxes:
     """A detector's candidates above a low floor, before thresholds and non-maximum suppression.
 
-    Thresholds are parameters of the pipeline and the network is not, so this is what is cached per image and model.
+    This is what is cached per image and model: thresholds are pipeline parameters and can change, the network cannot.
     """
 
     model: str
-    """The detector's name: equal names give equal boxes."""
+    """The detector's name; equal names give equal boxes."""
     boxes: F32
     """(M, 4) float32 ``x1 y1 x2 y2``, pixels of the raw image."""
     scores: F32
@@ -58,14 +58,14 @@ class RawBoxes:
     labels: tuple[str, ...]
     """M class names in COCO's spelling."""
     law: DistanceLaw = REAL_VEHICLES
-    """Distance from box heights, where no parameter says otherwise."""
+    """Law for distance from box height, unless a parameter overrides it."""
     far: PixelWindow | None = None
-    """The part of the image that was looked at a second time, at native resolution; None: none."""
+    """The image region that was detected a second time at native resolution; None without a second pass."""
     far_count: int = 0
-    """How many of the candidates, the last ones, come from that look."""
+    """How many candidates come from the second pass; they are the last ones."""
 
     def with_far(self, far: RawBoxes) -> RawBoxes:
-        """The candidates of both looks. Doubles go with the other doubles in non-maximum suppression."""
+        """The candidates of both passes. Duplicates are removed later by non-maximum suppression."""
         return replace(
             self,
             boxes=np.concatenate([self.boxes, far.boxes]),
@@ -76,7 +76,7 @@ class RawBoxes:
         )
 
     def without_far(self) -> RawBoxes:
-        """The candidates of the whole image alone."""
+        """Only the candidates of the pass over the whole image."""
         count = len(self.boxes) - self.far_count
         return replace(
             self,
@@ -93,7 +93,7 @@ class RawLanes:
     """What a lane detector saw in one image, before any geometry; cached per image and model like ``RawBoxes``."""
 
     model: str
-    """The detector's name: equal names give equal points."""
+    """The detector's name; equal names give equal points."""
     points: F32
     """(M, 2) float32 ``u v`` on painted lines, pixels of the raw image."""
     scores: F32

@@ -47,7 +47,7 @@ class CameraCalibration:
     K: F64
     """(3, 3) intrinsic matrix, pixels."""
     distortion: F64
-    """(0,), (4,), (5,) or (8,) coefficients in OpenCV's order, of the raw image."""
+    """(0,), (4,), (5,) or (8,) coefficients in OpenCV's order, for the raw image."""
     T_camera_ego: F64
     """(4, 4), takes ego points to the camera frame (z along the optical axis, x right, y down)."""
     width: int
@@ -55,15 +55,15 @@ class CameraCalibration:
     height: int
     """Of the image, pixels."""
     road_z_m: float | None = None
-    """The road below the car in the ego frame; None where the recording does not say."""
+    """Height of the road below the car in the ego frame; None where the recording does not contain it."""
 
 
 @dataclass(frozen=True)
 class Coasting:
-    """How uncertain an own motion is that is no longer measured."""
+    """Extra uncertainty of an own motion that is predicted because it is no longer measured."""
 
     age_s: float
-    """Time since it was last measured."""
+    """Time since the last measurement."""
     travelled_var_m2: float
     """What this tick adds to the variance of the distance driven."""
     turned_var_rad2: float
@@ -73,7 +73,7 @@ class Coasting:
 
 
 MotionSource = Literal["can", "ins", "gnss", "lidar"]
-"""What measures own motion: the car's bus or its odometry, an inertial unit, a GNSS receiver, the LiDAR."""
+"""Where own motion is measured: the vehicle bus or wheel odometry, an inertial unit, a GNSS receiver, the LiDAR."""
 
 
 @dataclass(frozen=True)
@@ -87,16 +87,16 @@ class EgoState:
     yaw_rate_radps: float | None = None
     """Positive to the left; None when no sensor gives it."""
     coasting: Coasting | None = None
-    """Set while it is carried on without a measurement; None while it is measured."""
+    """Set while own motion is predicted; None while it is measured."""
     source: MotionSource = "can"
     """What measured it."""
     yaw_rate_sigma_radps: float | None = None
-    """Standard deviation of the yaw rate; None where it is that of usual sensors."""
+    """Standard deviation of the yaw rate; None for the default of usual sensors."""
 
 
 @dataclass(frozen=True)
 class MotionEstimate:
-    """Own motion as one source has it."""
+    """Own motion according to one source."""
 
     source: MotionSource
     """Which one."""
@@ -112,17 +112,17 @@ class MotionEstimate:
 
 @dataclass(frozen=True)
 class OwnMotion:
-    """Where own motion is from: the surest source of the speed, and of the yaw rate."""
+    """The most certain sources of speed and yaw rate."""
 
     speed: MotionEstimate
     """The source that gives the speed."""
     turning: MotionEstimate | None
     """The source that gives the yaw rate; None where none does."""
     sources: tuple[MotionEstimate, ...]
-    """Every source that has a say in this frame."""
+    """Every source used in this frame."""
     pose: tuple[float, float, float] | None = None
-    """x, y in metres and heading in radians since the LiDAR's odometry began, in the ego frame of then; None without
-    it."""
+    """x, y in metres and heading in radians since LiDAR odometry started, in the ego frame of that moment; None without
+    LiDAR odometry."""
 
 
 GnssQuality = Literal["single", "dgnss", "rtk_float", "rtk_fixed"]
@@ -130,7 +130,7 @@ GnssQuality = Literal["single", "dgnss", "rtk_float", "rtk_fixed"]
 
 @dataclass(frozen=True)
 class GnssFix:
-    """Where the ego origin is on the Earth (WGS 84)."""
+    """Position of the ego origin on the Earth (WGS 84)."""
 
     t_ns: int
     """When the fix holds."""
@@ -152,7 +152,7 @@ class GnssFix:
 
 @dataclass(frozen=True)
 class Route:
-    """A planned or previously driven road as a line on the Earth (WGS 84), in driving order."""
+    """A planned or previously driven route as a line on the Earth (WGS 84), in driving order."""
 
     name: str
     """For people: the file it came from."""
@@ -171,7 +171,8 @@ class StreamHealth:
     sensor: Literal["lidar", "camera", "gnss", "ego"]
     """Which sensor."""
     state: Literal["ok", "stale", "silent", "absent"]
-    """``absent``: nothing has arrived since the start. ``stale``: messages are overdue. ``silent``: for long."""
+    """``absent``: nothing has arrived since the start. ``stale``: messages are overdue. ``silent``: overdue for long.
+    """
     rate_hz: float | None
     """Over the last seconds; None until enough messages arrived."""
     age_ms: float | None
@@ -189,7 +190,7 @@ class Frame:
     """Everything known at one tick. Any branch may be missing; ``notes`` says why."""
 
     index: int
-    """Its number in the recording, from 0; of live sensors the number of the tick, dropped ones included."""
+    """Its number in the recording, from 0; for live sensors the number of the tick, including dropped ticks."""
     name: str
     """The frame's name in the recording."""
     t_ns: int
@@ -203,21 +204,21 @@ class Frame:
     ego: EgoState | None = None
     """Own motion as measured."""
     raw_boxes: RawBoxes | None = None
-    """What the detector saw in the image; None: no detector looked."""
+    """The detector's candidates; None if no detector ran."""
     notes: tuple[str, ...] = ()
     """What is missing or wrong, in sentences a user can act on."""
     gnss: GnssFix | None = None
     """Where the car is on the Earth."""
     raw_lanes: RawLanes | None = None
-    """What the lane detector saw in the image; None: no detector looked."""
+    """The lane detector's points; None if no lane detector ran."""
     route: Route | None = None
-    """The road that the car follows."""
+    """The route that the car follows."""
     streams: tuple[StreamHealth, ...] = ()
     """Health of each sensor of a live source."""
     timing_ms: Mapping[str, float] = field(default_factory=dict)
-    """Of a live source: how long its data was under way, by stage."""
+    """Of a live source: latency of its data, by stage."""
     detections_given: bool = False
-    """The recording holds what was seen in the image, so no detector looks at it."""
+    """The recording contains detections, so no detector runs."""
 
     @property
     def image_size(self) -> tuple[int, int] | None:

@@ -28,18 +28,18 @@ class LaneLine:
     coefficients: F64
     """(4,) float64 c0 … c3, of metres."""
     covariance: F64
-    """(4, 4) float64 of the coefficients; grows while the line is not measured."""
+    """(4,) float64 c0 … c3, with x and y in metres."""
     x_min_m: float
-    """From here paint supports the line."""
+    """(4, 4) float64 covariance of the coefficients; grows while the line is not measured."""
     x_max_m: float
-    """As far as here paint supports the line; beyond, ``sigma_m`` says how little it is worth."""
+    """x where the support by paint starts."""
     quality: float
-    """0–1, how well the detector and the track support it."""
+    """0–1, how well the detector and the tracking support it."""
     age_s: float
     """Time since it was last measured."""
 
     def y_m(self, x_m: npt.ArrayLike) -> F64:
-        """Lateral place at x, metres to the left. Same shape as ``x_m``."""
+        """Lateral position at x, metres to the left. Same shape as ``x_m``."""
         return powers(x_m) @ self.coefficients
 
     def sigma_m(self, x_m: npt.ArrayLike) -> F64:
@@ -53,13 +53,13 @@ class EgoLane:
     """The lines left and right of the car."""
 
     left: LaneLine | None
-    """None where no line is believed."""
+    """None if no line is confirmed."""
     right: LaneLine | None
-    """None where no line is believed."""
+    """None if no line is confirmed."""
     source: str
     """The lane detector's name; ``classical`` for the one without a network."""
     age_s: float
-    """Time since the detector last delivered anything."""
+    """Time since the lane detector last delivered a result."""
     pitch_rad: float
     """Estimated pitch of the camera against its calibration, positive downwards, used to map the lines to the road."""
     width_m: float | None

@@ -21,33 +21,33 @@ class Path:
     """Where the car is going."""
 
     source: PathSource
-    """Which source carries it at 30 m; ``fused`` when none does alone."""
+    """The main source at 30 m; ``fused`` if no single source dominates there."""
     center: F64
-    """(K, 2) float64 ego x, y, from the bumper outwards."""
+    """(K, 2) float64 ego x, y, starting at the bumper."""
     left: F64
     """(K, 2) float64, the left edge; not necessarily parallel to the centre."""
     right: F64
     """(K, 2) float64, the right edge."""
     half_width_m: float
-    """Half the corridor's width where no lane lines give it."""
+    """Half the corridor's width used where there are no lane lines."""
     sigma_m: dict[str, float]
     """Standard deviation of the centre's lateral position at 10, 30 and 60 m."""
     weights: dict[str, float]
-    """Each source's share over the whole length."""
+    """Weight of each source, averaged over the whole length."""
     profile_m: F64 = field(default_factory=lambda: np.zeros(0))
     """(K,) float64, ``sigma_m`` at every point; empty where it was not computed."""
     carried_by: dict[str, dict[str, float]] = field(default_factory=dict)
-    """Each source's share at 10, 30 and 60 m."""
+    """Weight of each source at 10, 30 and 60 m."""
     reach_m: float = 0.0
-    """How far ahead it is good enough to drive by."""
+    """How far ahead the path is accurate enough to drive by."""
     usable: bool = True
-    """Whether it reaches far enough at this speed, and nothing else speaks against it."""
+    """Whether it reaches far enough at this speed and nothing else makes it unusable."""
     doubt: str = ""
-    """Why it is not usable; empty while it is."""
+    """Why it is not usable; empty while it is usable."""
     confidence: float = 1.0
-    """Probability, 0–1, that the true centre lies within the corridor as far as it must reach."""
+    """Probability, 0–1, that the true centre lies within the corridor over the required length."""
     notes: tuple[str, ...] = ()
-    """What is wrong with its sources, in sentences for people."""
+    """Problems with its sources, as sentences for the user."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Cipv:
     distance_m: float
     """Of the object."""
     closing_speed_mps: float | None
-    """How fast the gap shrinks; None where place or velocity are unknown."""
+    """How fast the gap shrinks; None if position or velocity is unknown."""
     ttc_s: float | None
     """Time to collision; None while the gap does not shrink."""
     reason: str
@@ -78,14 +78,14 @@ class Rejection:
 
 @dataclass(frozen=True)
 class AccCommand:
-    """What ACC and emergency braking ask of the car."""
+    """What ACC and emergency braking request from the car."""
 
     state: Literal["cruise", "follow", "stop", "warn", "partial_brake", "full_brake"]
     """What it does."""
     desired_speed_mps: float
-    """The speed it steers towards."""
+    """The target speed."""
     accel_mps2: float
-    """The acceleration it asks for; negative: braking."""
+    """The requested acceleration; negative is braking."""
     accelerator: float
     """Pedal, 0–1."""
     brake: float
@@ -93,7 +93,7 @@ class AccCommand:
     reason: str
     """Why, in words."""
     object_id: int | None = None
-    """The object it slows down for; None for nothing."""
+    """The object that it brakes for; None without one."""
 
 
 @dataclass(frozen=True)
@@ -111,11 +111,11 @@ class SensorHealth:
     ego_age_ms: float | None
     """Age of own motion."""
     far_view: PixelWindow | None = None
-    """The part of the image that the detector saw a second time, in native pixels; None when it did not."""
+    """The image region that the detector processed a second time, in native pixels; None without a second pass."""
 
     @staticmethod
     def of(frame: Frame) -> SensorHealth:
-        """The health of the sensors that a frame came from."""
+        """Sensor health of a frame."""
 
         def age_ms(t_ns: int | None) -> float | None:
             return None if t_ns is None else (frame.t_ns - t_ns) / 1e6
@@ -133,41 +133,42 @@ class SensorHealth:
 
 
 GROUND, UNCLUSTERED, DROPPED = -1, -2, -3
-"""Values of ``Layers.kind`` below zero; zero and above is the index of the cluster."""
+"""Values of ``Layers.kind`` below zero; other values are the index of the cluster."""
 
 
 @dataclass(frozen=True)
 class Layers:
-    """What the stages saw, for views only; never part of the JSON."""
+    """Intermediate results of the stages, for views only; never part of the JSON."""
 
     points: F32
     """(N, 4) float32, the sweep before down-sampling."""
     kind: I32
     """(N,) int32: ``GROUND``, ``UNCLUSTERED``, ``DROPPED`` or the cluster's number (``Obstacle.cluster``)."""
     obstacles: tuple[Obstacle, ...] = ()
-    """One a cluster."""
+    """One per cluster."""
     lidar_tracks: tuple[LidarTrack, ...] = ()
     """By id."""
     vision_tracks: tuple[VisionTrack, ...] = ()
     """By id."""
     lidar_boxes: dict[int, Box] = field(default_factory=dict)
-    """By object id: where fusion found the cuboid in the image."""
+    """By object id: the LiDAR cuboid projected into the image by fusion."""
     vision_boxes: dict[int, Box] = field(default_factory=dict)
-    """By object id: the camera's box that fusion compared it with."""
+    """By object id: the camera box that fusion compared it with."""
     lanes: EgoLane | None = None
-    """The ego lane's lines; None where no lane detector runs."""
+    """The ego lane's lines; None without a lane detector."""
     ground: Ground | None = None
-    """The road under the sweep; None without one."""
+    """The fitted road under the sweep; None without one."""
     edges: F64 | None = None
-    """(M, 2) ego x, y of what runs beside the road, where the path is taken from it; None where it is not."""
+    """(M, 2) ego x, y of structures beside the road, if the path uses them; else None."""
     traffic: F64 | None = None
-    """(N, 3) ego x, y and heading in rad of vehicles that show where the road goes, now and before; None without."""
+    """(N, 3) ego x, y and heading in rad of vehicles, current and past, that indicate the course of the road; None
+    without."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What the pipeline concludes at one tick. ``pipeline.types.result_json`` writes it as
-    docs/reference/results.md says."""
+    """The output of the pipeline for one tick. ``pipeline.types.result_json`` writes it as described in
+    docs/reference/results.md."""
 
     frame: str
     """The frame's name in the recording."""
@@ -176,29 +177,29 @@ class Result:
     sensors: SensorHealth
     """How fresh each sensor's data is."""
     ego: EgoState | None
-    """Own motion as measured by its surest source."""
+    """Own motion from its most certain source."""
     objects: tuple[FusedObject, ...]
     """Every object, nearest first."""
     path: Path
     """Where the car is going."""
     cipv: Cipv | None
-    """The closest in-path vehicle."""
+    """The closest in-path vehicle; None without one."""
     rejected: tuple[Rejection, ...]
     """Why each other object is not the CIPV."""
     acc: AccCommand | None
-    """What the car is asked to do; None where own speed is not known."""
+    """The command to the car; None while own speed is unknown."""
     notes: tuple[str, ...]
     """What is missing or wrong, in sentences a user can act on."""
     timing_ms: dict[str, float]
     """How long each stage took, and the ``total``."""
     layers: Layers
-    """What the stages saw, for views."""
+    """Intermediate results of the stages, for views."""
     next_cipv: Cipv | None = None
     """The vehicle that will be the CIPV next."""
     streams: tuple[StreamHealth, ...] = ()
     """Health of each sensor of a live source."""
     own_motion: OwnMotion | None = None
-    """Where own motion is from; None where it is not measured."""
+    """The sources of own motion; None if it is not measured."""
 
     def chosen(self) -> FusedObject | None:
         """The object that is the CIPV; None without one."""

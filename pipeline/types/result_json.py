@@ -68,7 +68,7 @@ def write_line(stream: TextIO, result: Result) -> None:
 
 
 def _sensors(health: SensorHealth, streams: tuple[StreamHealth, ...]) -> dict[str, Any]:
-    """What the frame held of each sensor; of live ones also how their streams do."""
+    """Data of each sensor in the frame; for live sensors also the health of their streams."""
     sensors: dict[str, dict[str, Any]] = {
         "lidar": {"age_ms": _number(health.lidar_age_ms), "points": health.lidar_points},
         "camera": {
@@ -84,7 +84,7 @@ def _sensors(health: SensorHealth, streams: tuple[StreamHealth, ...]) -> dict[st
 
 
 def streams_json(streams: tuple[StreamHealth, ...]) -> dict[str, Any]:
-    """How live sensors do, by sensor."""
+    """Health of live sensors, by sensor."""
     return {
         stream.sensor: {
             "age_ms": _number(stream.age_ms),
@@ -197,7 +197,7 @@ def _acc(acc: AccCommand | None) -> dict[str, Any] | None:
 
 
 def _plain(record: Cipv | AccCommand) -> dict[str, Any]:
-    """A flat record whose field names are those of docs/reference/results.md."""
+    """A flat record as a dict; its field names are those in docs/reference/results.md."""
     values = {field.name: getattr(record, field.name) for field in fields(record)}
     return {name: _number(value) if isinstance(value, float) else value for name, value in values.items()}
 
@@ -207,12 +207,12 @@ def _finite(values: Iterable[float]) -> bool:
 
 
 def _number(value: float | None) -> float | None:
-    """Rounded; null where unknown. Minus zero becomes zero, so that rounding noise does not change a file."""
+    """Rounded; null if unknown. Minus zero becomes zero, so that rounding noise does not change a file."""
     return None if value is None or not math.isfinite(value) else round(float(value), _DECIMALS) + 0.0
 
 
 def _numbers(values: Iterable[float] | None) -> list[float | None] | None:
-    """A point or box; null as a whole when any of its numbers is unknown, since half a place is none."""
+    """A point or box; null as a whole if any of its numbers is unknown."""
     if values is None:
         return None
     rounded = [_number(value) for value in values]
@@ -220,7 +220,7 @@ def _numbers(values: Iterable[float] | None) -> list[float | None] | None:
 
 
 def _points(points: Iterable[Iterable[float]] | None) -> list[Any] | None:
-    """A polygon; null as a whole when any corner is unknown."""
+    """A polygon; null as a whole if any corner is unknown."""
     if points is None:
         return None
     corners = [_numbers(point) for point in points]

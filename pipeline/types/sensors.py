@@ -12,29 +12,29 @@ ObjectSource = Literal["V", "L", "VL"]
 
 OBJECT_SOURCES: tuple[ObjectSource, ...] = get_args(ObjectSource)
 MOST_SENSORS_FIRST: tuple[ObjectSource, ...] = tuple(sorted(OBJECT_SOURCES, key=len, reverse=True))
-"""The order of tables."""
+"""Order of the sources in tables."""
 
 SENSOR_NAMES = {"V": "camera", "L": "LiDAR"}
-"""What people call the sensor of each letter."""
+"""Display name of the sensor for each letter."""
 
 
 def is_camera_in(sensors: str) -> bool:
-    """Whether the camera is one of them."""
+    """Whether the camera is among them."""
     return "V" in sensors
 
 
 def is_ranging_in(sensors: str) -> bool:
-    """Whether a sensor that measures range is one of them; today that is the LiDAR."""
+    """Whether a sensor that measures range is among them; currently only the LiDAR does."""
     return "L" in sensors
 
 
 def is_lidar_in(sensors: str) -> bool:
-    """Whether the LiDAR is one of them."""
+    """Whether the LiDAR is among them."""
     return "L" in sensors
 
 
 def are_several(sensors: str) -> bool:
-    """Whether they are more than one sensor."""
+    """Whether there is more than one sensor."""
     return len(sensors) > 1
 
 
@@ -46,7 +46,8 @@ def sensors_in_words(source: str) -> str:
 
 
 def seeing_sensors_in_words(sensors: str) -> str:
-    """Who sees an object, as the end of a sentence: ``the camera``, ``the LiDAR``, ``both sensors``, ``no sensor``."""
+    """The sensors that see an object, to end a sentence with: ``the camera``, ``the LiDAR``, ``both sensors``, ``no
+    sensor``."""
     if are_several(sensors):
         return sensors_in_words(sensors)
     return "".join(f"the {name}" for name in _names(sensors)) or "no sensor"

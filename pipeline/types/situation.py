@@ -10,16 +10,16 @@ from pipeline.types.result import Cipv, Path
 
 
 class Moment(NamedTuple):
-    """When a frame is, and how the car moves in it."""
+    """Time of a frame, and the car's motion in it."""
 
     t_ns: int
     """The frame's tick."""
     dt_s: float | None
-    """Seconds since the frame before, from the sensors' own stamps; None at the start and after a gap."""
+    """Seconds since the previous frame, from the sensors' timestamps; None at the start and after a gap."""
     motion: EgoState | None
-    """Own motion: measured, or carried on from the last measurement however long ago (``motion.coasting`` says so)."""
+    """Own motion: measured, or predicted from the last measurement, however old (see ``motion.coasting``)."""
     ego: EgoState | None
-    """The same while it is recent enough to drive by; None after that."""
+    """The same while it is recent enough to drive by; then None."""
 
     @property
     def measured(self) -> EgoState | None:
@@ -33,13 +33,13 @@ class Moment(NamedTuple):
 
 
 class Situation(NamedTuple):
-    """What ACC and emergency braking decide from."""
+    """The input of ACC and emergency braking."""
 
     now: Moment
     """This frame's time and own motion."""
     path: Path
     """Where the car is going."""
     objects: tuple[FusedObject, ...]
-    """Every object, each judged against the path (``pipeline.decision.cipv``)."""
+    """All objects, each already judged against the path (``pipeline.decision.cipv``)."""
     lead: Cipv | None
     """The closest in-path vehicle; None without one."""

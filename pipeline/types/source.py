@@ -28,26 +28,26 @@ class TruthObject:
     cuboid: Cuboid
     """In the ego frame."""
     id: int | None = None
-    """Id of the object, stable from frame to frame; None where the labels follow no identity over time."""
+    """Id of the object, stable from frame to frame; None if the labels have no track ids."""
     bbox: Box | None = None
     """Pixels of the raw image; None where the labels have no box."""
     called: str = ""
-    """The labels' own word for the class where it differs from ``label``, so that it can be written again."""
+    """Original class name in the labels if it differs from ``label``, so that it can be written back."""
     truncation: float | None = None
-    """The share of it outside the image, 0–1; None where the labels do not say it."""
+    """Share of the object outside the image, 0–1; None if the labels do not contain it."""
     occlusion: int | None = None
-    """0 visible, 1 partly, 2 largely hidden; None where the labels do not say it."""
+    """0 visible, 1 partly, 2 largely hidden; None if the labels do not contain it."""
 
 
 class Source(Protocol):
     """A recording with random access.
 
-    Reading a frame never raises for what is wrong with that frame's data: the missing branch is None and
-    ``Frame.notes`` says why. Several threads may read at once: playback and background runs share one source.
+    Reading a frame never raises for damaged data in that frame: the missing branch is None and ``Frame.notes`` says
+    why. Several threads may read at once: playback and background runs share one source.
     """
 
     uri: str
-    """What was opened, as the user typed it."""
+    """The address that was opened, as the user typed it."""
     title: str
     """Short, for a heading."""
     rate_hz: float
@@ -58,8 +58,8 @@ class Source(Protocol):
     def __len__(self) -> int: ...
 
     def frame(self, index: int) -> Frame:
-        """Frame ``index`` of 0 … len−1, without ``raw_boxes`` unless detections are given with it. IndexError
-        outside."""
+        """Frame ``index`` of 0 … len−1, without ``raw_boxes`` unless the recording contains detections. IndexError
+        outside this range."""
         ...
 
     def t_ns(self, index: int) -> int:
@@ -67,7 +67,7 @@ class Source(Protocol):
         ...
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
-        """The labelled objects, empty when the frame is labelled and holds none; None when it is not labelled."""
+        """The labelled objects; empty if the frame is labelled and has no objects, None if it is not labelled."""
         ...
 
 
@@ -89,23 +89,23 @@ class Tap(Protocol):
 
 
 class LiveSource(Protocol):
-    """Live sensors. There is no way back: ticks that are not taken in time are dropped and counted."""
+    """Live sensors. They cannot be rewound: ticks that are not taken in time are dropped and counted."""
 
     uri: str
-    """What was opened, as the user typed it."""
+    """The address that was opened, as the user typed it."""
     title: str
     """Short, for a heading."""
     rate_hz: float
     """Nominal ticks per second."""
     notes: tuple[str, ...]
-    """What a user should know about all of it; what is wrong with one tick is in ``Frame.notes``."""
+    """What a user should know about the whole source; problems of one tick are in ``Frame.notes``."""
     camera: CameraCalibration | None
     """Calibration of the images; None without one."""
     dropped: int
     """Ticks that were not taken in time."""
 
     def start(self) -> None:
-        """Open the devices. One that is not available yet is retried in the background."""
+        """Open the devices. A device that is not available yet is retried in the background."""
         ...
 
     def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
@@ -115,19 +115,19 @@ class LiveSource(Protocol):
 
     @property
     def lidar_mount(self) -> tuple[F64, int] | None:
-        """T_ego_lidar (4, 4) and what is added to the LiDAR's timestamps in ns; None without a LiDAR."""
+        """T_ego_lidar (4, 4) and the offset in ns that is added to the LiDAR's timestamps; None without a LiDAR."""
         ...
 
     def tap(self, tap: Tap | None) -> None:
-        """Pass every message to ``tap`` from now on; None ends that."""
+        """Pass every message to ``tap`` from now on; None stops that."""
         ...
 
     def now_ns(self) -> int:
-        """Now on the steady timeline that frames' times are on; setting the host's clock moves nothing on it."""
+        """Current time on the monotonic timeline of the frames' times; changing the host's clock does not affect it."""
         ...
 
     def health(self) -> tuple[StreamHealth, ...]:
-        """Health of each sensor now, also while none delivers."""
+        """Current health of each sensor, also while none delivers data."""
         ...
 
     def close(self) -> None:
@@ -137,31 +137,31 @@ class LiveSource(Protocol):
 
 @runtime_checkable
 class Recorded(Protocol):
-    """A source made from another one."""
+    """A source made from another source."""
 
     origin: str
-    """The other one's URI."""
+    """URI of the original source."""
 
 
 class Mark(NamedTuple):
-    """A moment that someone marked during the recording."""
+    """A moment that a user marked during the recording."""
 
     t_ns: int
     """The tick of the frame."""
     text: str
-    """What they wrote."""
+    """The user's text."""
 
 
 @runtime_checkable
 class Marked(Protocol):
-    """A source with marks of its own."""
+    """A source with its own marks."""
 
     def marks(self) -> tuple[Mark, ...]: ...
 
 
 @runtime_checkable
 class Rectified(Protocol):
-    """A source with a camera frame of its own that its labels are in."""
+    """A source whose labels are in its own camera frame."""
 
     def T_rect_ego(self, index: int) -> F64:
         """(4, 4), takes ego points of a frame to KITTI's rectified camera 0."""
@@ -173,8 +173,8 @@ class InParts(Protocol):
     """A source that can read parts of a frame without reading the rest."""
 
     def outlines(self) -> Iterator[Frame]:
-        """Every frame, in order, without sweep, image, route and given detections, and without the notes that reading
-        them would add."""
+        """Every frame, in order, without sweep, image, route and recorded detections, and without the notes that
+        reading these would add."""
         ...
 
     def sweep(self, index: int) -> Sweep | None:
@@ -184,16 +184,16 @@ class InParts(Protocol):
 
 @runtime_checkable
 class RawPackets(Protocol):
-    """A recording of the LiDAR's own packets."""
+    """A recording of raw LiDAR packets."""
 
     def packets(self) -> Iterator[tuple[int, bytes]]:
-        """Every data and position packet as it was captured: when (unix ns), and its payload."""
+        """Every data and position packet as captured: time (unix ns) and payload."""
         ...
 
 
 @runtime_checkable
 class Mounted(Protocol):
-    """A source whose LiDAR's mount a rig file says."""
+    """A source whose LiDAR mount comes from a rig file."""
 
     @property
     def T_ego_lidar(self) -> F64:
@@ -203,7 +203,8 @@ class Mounted(Protocol):
 
 @runtime_checkable
 class Simulated(Protocol):
-    """A source that knows whether the simulator drew its images, which detectors of real images do worse on."""
+    """A source that knows whether its images are from the simulator; detectors of real images perform worse on
+    these."""
 
     is_simulated: bool
 
@@ -213,19 +214,19 @@ AnySource = Source | LiveSource
 
 @dataclass(frozen=True)
 class Opening:
-    """How a recording is to be opened. Each kind of source takes what concerns it."""
+    """Options for opening a recording. Each kind of source uses those that apply to it."""
 
     rings: int = 16
-    """How many rings to keep of a LiDAR that has more."""
+    """How many rings to keep if the LiDAR has more."""
     progress: Progress = silent
-    """Told how much was read, where a whole file has to be."""
+    """Receives the reading progress if a whole file must be read."""
 
 
 def is_live_source(source: AnySource) -> TypeGuard[LiveSource]:
-    """Whether it is live sensors, which have no frames to choose from."""
+    """Whether these are live sensors, which have no random access."""
     return is_live(source.uri)
 
 
 def is_simulated(source: AnySource) -> bool:
-    """Whether the simulator drew its images, also where they were recorded since."""
+    """Whether the images are from the simulator, including recordings of simulated drives."""
     return isinstance(source, Simulated) and source.is_simulated

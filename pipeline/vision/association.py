@@ -16,22 +16,23 @@ from pipeline.types import VEHICLES, VisionMeasurement, VisionTrack
 
 _NOMINAL_DT_S = 0.1
 _MAX_GROWTH = 3.0
-"""The outer gate is meant for images 0.1 s apart; it widens with the time since the last sighting, thrice at most."""
+"""The outer gate is tuned for images 0.1 s apart; it widens with the time since the last sighting, by this factor at
+most."""
 _ESTABLISHED_HITS = 3
-"""Sightings after which an object's motion is measured rather than assumed."""
+"""Number of sightings after which an object's motion is measured instead of assumed."""
 
 
 class Expected(NamedTuple):
-    """A followed object as it should be seen now."""
+    """A tracked object, predicted to the current image."""
 
     track: VisionTrack
     """With the predicted box."""
     centre_sigma_px: float
-    """Standard deviation of a sighting's centre from the predicted one, along each axis of the image."""
+    """Standard deviation of a measured centre from the predicted one, along each axis of the image."""
     noise_px: float
-    """What of it is the box's own noise: all that remains once the prediction is perfect."""
+    """The part of it due to the box's own noise, which remains even with a perfect prediction."""
     unseen_s: float
-    """Since its last sighting."""
+    """Time since its last sighting."""
 
 
 def match(
@@ -39,8 +40,9 @@ def match(
     measurements: Sequence[VisionMeasurement],
     params: VisionTrackingParams,
 ) -> dict[int, int]:
-    """Index of followed object → index of measurement. A network that draws a second box on a vehicle for a moment
-    starts a track that would take over its number, so doubles choose among what is left."""
+    """Index of tracked object → index of measurement. If a network briefly draws a second box on a vehicle, this starts
+    a duplicate track. So that it cannot take over the vehicle's id, duplicates choose last among the remaining boxes.
+    """
     if params.filter == "queue":
         return _assign(range(len(expected)), range(len(measurements)), expected, measurements, params)
     doubles = _doubles(expected, params)
@@ -52,7 +54,7 @@ def match(
 
 
 def _doubles(expected: Sequence[Expected], params: VisionTrackingParams) -> set[int]:
-    """The objects seen once or twice whose box lies on that of an established one."""
+    """Objects seen only once or twice whose box overlaps that of an established object."""
     young = [row for row, each in enumerate(expected) if each.track.hits < _ESTABLISHED_HITS]
     old = [row for row, each in enumerate(expected) if each.track.hits >= _ESTABLISHED_HITS]
     if not young or not old:
@@ -69,8 +71,8 @@ def _assign(
     measurements: Sequence[VisionMeasurement],
     params: VisionTrackingParams,
 ) -> dict[int, int]:
-    """The one-to-one choice of least total cost, where leaving a pair apart costs as much as a pair at its gate.
-    (Making as many pairs as possible would shift a whole row of cars by one when the first leaves the image.)"""
+    """The one-to-one assignment of least total cost, where an unmatched pair costs as much as a pair at its gate.
+    (Maximising the number of pairs would shift a whole row of cars by one when the first leaves the image.)"""
     if not rows or not columns:
         return {}
     cost = _costs([expected[row] for row in rows], [measurements[column] for column in columns], params)
@@ -79,7 +81,8 @@ def _assign(
 
 
 def same_kind(a: str, b: str) -> bool:
-    """Whether two names may be one object's: a detector mixes up vehicles, not a person and a car."""
+    """Whether two class names may belong to the same object: detectors confuse vehicle classes, but not a person with a
+    car."""
     return a == b or VEHICLES.issuperset((a, b))
 
 
@@ -88,14 +91,16 @@ def _costs(
     measurements: Sequence[VisionMeasurement],
     params: VisionTrackingParams,
 ) -> F64:
-    """(n, m) how unlike each box is to each expected one: 0 the same, 1 at the gate, infinite for another kind.
+    """(n, m) cost of each pair of box and prediction: 0 for equal, 1 at the gate, infinite for another kind of object.
 
-    queue: distance of the centres (print: of the half widths). kalman: how surprising the centre is, and how much width
-    and height changed. The gate is as wide as the prediction is uncertain, so a small box far away, which moves by two
-    or three pixels, cannot become its neighbour 20 pixels aside: a new number is better than a wrong one. A detector
-    that draws half of a vehicle for a moment keeps its number; what its height then says is the place filter's to
-    refuse. A vague prediction makes any box near it unsurprising, its neighbour's too, but none of them likely: it pays
-    the logarithm of its spread, as in a likelihood, which also narrows its gate."""
+    queue: distance of the centres (in print: of the half widths). kalman: Mahalanobis distance of the centre, plus
+    changes of width and height. The gate scales with the uncertainty of the prediction, so that a small box far away,
+    which moves by two or three pixels, cannot be confused with its neighbour 20 pixels aside: a new id is better than a
+    wrong one. If a detector briefly draws half of a vehicle, the vehicle keeps its id; the place filter rejects the
+    resulting distance. With a vague prediction any box nearby has a small Mahalanobis distance, but no box has a high
+    likelihood. The logarithm of the spread is therefore added to the cost, as in a likelihood, which also narrows the
+    gate.
+    """
     old = np.array([each.track.bbox for each in expected])
     new = np.array([seen.detection.bbox for seen in measurements])
     apart = (old[:, None, :2] + old[:, None, 2:] - new[:, :2] - new[:, 2:]) / 2

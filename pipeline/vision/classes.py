@@ -15,7 +15,7 @@ COCO_80 = (
     "tv", "laptop", "mouse", "remote", "keyboard", "cell phone", "microwave", "oven", "toaster", "sink",
     "refrigerator", "book", "clock", "vase", "scissors", "teddy bear", "hair drier", "toothbrush",
 )  # fmt: skip
-"""The 80 classes of COCO 2017, in the order every COCO-trained YOLO numbers them."""
+"""The 80 classes of COCO 2017, in the order used by every COCO-trained YOLO."""
 
 SYNONYMS = {
     "motorbike": "motorcycle",
@@ -25,7 +25,7 @@ SYNONYMS = {
     "cyclist": "bicycle",
     "lorry": "truck",
 }
-"""Names that other data sets have for the classes that matter on a road."""
+"""Names in other data sets for the classes that matter on a road."""
 
 
 def canonical(name: str) -> str:
@@ -35,8 +35,8 @@ def canonical(name: str) -> str:
 
 
 def class_names(count: int, metadata: Mapping[str, str]) -> tuple[str, ...]:
-    """Names of a network's ``count`` classes (0: not known from its shape): from the graph's own property ``names``
-    (v5/v8 exports write a Python mapping of number to name there), else COCO's, else "class 0", "class 1", …"""
+    """Names of a network's ``count`` classes (0: not known from its shape): from the property ``names`` of the graph
+    (v5/v8 exports store a Python mapping of number to name there), else COCO's, else "class 0", "class 1", …"""
     named = _from_metadata(metadata.get("names", ""))
     if named and count in (0, len(named)):
         return named
@@ -46,7 +46,7 @@ def class_names(count: int, metadata: Mapping[str, str]) -> tuple[str, ...]:
 def _from_metadata(text: str) -> tuple[str, ...]:
     try:
         value = ast.literal_eval(text)
-    except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError):  # all that literal_eval may raise
+    except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError):  # all errors that literal_eval may raise
         return ()
     if isinstance(value, dict) and set(value) == set(range(len(value))):
         value = [value[index] for index in range(len(value))]

@@ -33,11 +33,11 @@ from pipeline.vision.classes import class_names
 from pipeline.vision.heads import Decoder, UnknownHead, pick_decoder
 
 FLOOR_SCORE = 0.05
-"""Candidates scored lower are not even kept; ``detection.min_score`` cannot go below it."""
+"""Candidates with a lower score are discarded; ``detection.min_score`` cannot go below it."""
 PADDING = 114
-"""Grey that fills the rest of the input, as the YOLO family is trained."""
+"""Grey value that fills the rest of the input, as in training of the YOLO family."""
 _FREE_SIZE: Size = (384, 640)
-"""Input of a graph without a fixed size when the images are not known yet: 16:9."""
+"""Default input size, 16:9, of a graph without a fixed size if the image size is not known yet."""
 _SIMULATED_ONLY = (
     "using the embedded detector, trained on simulated cars only; get a real one with `cipv models pull yolox_nano`"
 )
@@ -50,9 +50,9 @@ class Detector:
     path: Path
     """Its file."""
     name: str
-    """File, digest, input size and law: equal names give equal boxes, so this is the key of caches."""
+    """File, digest, input size and law: equal names give equal boxes, so this is used as cache key."""
     providers: tuple[str, ...]
-    """Of onnxruntime, in the order in which they are tried for each node."""
+    """Execution providers of onnxruntime, in the order in which they are tried for each node."""
     input_size: Size
     """(height, width)."""
     labels: tuple[str, ...]
@@ -60,28 +60,30 @@ class Detector:
     law: DistanceLaw
     """Distance from the heights of its boxes."""
     head: str
-    """Name of its head."""
+    """Name of its output format (head)."""
     notes: tuple[str, ...]
     """What a user should know about how it was loaded."""
     threads: int
     """How many threads it runs on."""
     sha256: str
-    """Of the file, hexadecimal."""
+    """Hash of the file, hexadecimal."""
     graph: bytes = field(repr=False, compare=False)
-    """The ONNX graph as it runs, at this input size."""
+    """The ONNX graph that runs, at this input size."""
     _session: ort.InferenceSession = field(repr=False, compare=False)
     _decoder: Decoder = field(repr=False, compare=False)
 
     def detect(self, bgr: U8) -> RawBoxes:
-        """Candidates scored at least ``FLOOR_SCORE`` in an image (H, W, 3) uint8, boxes clipped to it, best first.
+        """Candidates with a score of at least ``FLOOR_SCORE`` in an image (H, W, 3) uint8, boxes clipped to it, best
+        first.
 
-        DetectorError for an array that is no such image or a network that fails on it.
+        DetectorError for an array that is not such an image, or if the network fails on it.
         """
         check_image(bgr)
         return self.decode(run_session(self._session, self.blob(bgr)), (bgr.shape[0], bgr.shape[1]))
 
     def blob(self, bgr: U8) -> F32:
-        """The image as the network's input: (1, 3, h, w) float32, scaled to fit the upper left, the rest grey."""
+        """The image as the network's input: (1, 3, h, w) float32, scaled to fit in the top left corner, the rest
+        grey."""
         scale = _scale((bgr.shape[0], bgr.shape[1]), self.input_size)
         height, width = (max(1, min(round(n * scale), m)) for n, m in zip(bgr.shape[:2], self.input_size, strict=True))
         filled = np.full((*self.input_size, 3), PADDING, np.uint8)
@@ -90,7 +92,7 @@ class Detector:
         return np.asarray(blob, dtype=np.float32)
 
     def decode(self, outputs: Sequence[F32], image: Size) -> RawBoxes:
-        """The network's raw outputs for an image of (height, width) as boxes in that image's pixels."""
+        """Converts the network's raw outputs to boxes in pixels of an image of (height, width)."""
         boxes, scores, classes = self._decoder.decode(outputs, self.input_size, FLOOR_SCORE)
         height, width = image
         edges = np.array([width, height, width, height], np.float32)
@@ -107,12 +109,12 @@ def open_detector(
     threads: int = 2,
     input_size: Size | None = None,
 ) -> Detector:
-    """Load a network by name or path. Without one the default (``pipeline.inference.model_registry``), with a note when
-    that is the embedded network.
+    """Load a network by name or path. Without one, load the default (``pipeline.inference.model_registry``), with a
+    note if that is the embedded network.
 
-    image_size (width, height): the input is given the image's aspect where the graph permits. input_size (height,
-    width), multiples of 32: that size instead, or DetectorError. DetectorMissing when there is no file, DetectorError
-    when the file is no YOLO network that can be run.
+    image_size (width, height): the input gets the image's aspect ratio if the graph permits. input_size (height,
+    width), multiples of 32: this size instead, or DetectorError. DetectorMissing if there is no file, DetectorError if
+    the file is not a YOLO network that can be run.
     """
     path = _locate(spec)
     notes = (_SIMULATED_ONLY,) if spec is None and path == model_registry.find(model_registry.EMBEDDED) else ()
@@ -153,7 +155,7 @@ def _own_size(model: onnx.ModelProto, path: Path) -> Size | None:
 def _at_size(
     model: onnx.ModelProto, path: Path, own: Size | None, size: Size, threads: int, notes: tuple[str, ...] = ()
 ) -> Detector:
-    """The detector at one input size, proven by a run on a grey image."""
+    """The detector at one input size, tested by running it on a grey image."""
     try:
         graph = (model if own == size else with_input_size(model, size)).SerializeToString()
     except ValueError as error:
@@ -166,7 +168,7 @@ def _at_size(
     except UnknownHead as error:
         raise DetectorError(f"{path.name}: {error}") from None
     if own is not None and own != size and not decoder.own_grid and own[0] * own[1] == size[0] * size[1]:
-        # The grid inside such a graph may be of the old width: the run cannot fail, and every box would be elsewhere.
+        # The graph may contain a grid of the old width: the run would succeed, but every box would be misplaced.
         raise DetectorError("the graph may contain a grid for a fixed size")
     labels = class_names(decoder.classes, metadata)
     found = find_law(path)
@@ -190,7 +192,7 @@ def _at_size(
 
 
 def _name_of(law: DistanceLaw | None) -> str:
-    """Its part of a detector's name; none for a detector without a law of its own."""
+    """Part of a detector's name for its law; empty for a detector without its own law."""
     return f"-law{hashlib.sha256(repr(law).encode()).hexdigest()[:8]}" if law is not None else ""
 
 

@@ -24,14 +24,15 @@ from pipeline.types import REAL_VEHICLES, Box, CameraCalibration, Detection, Dis
 
 BIN_M, BIN_LOW_M, BIN_HIGH_M = 10.0, 5.0, 60.0
 _BORDER_PX, _BORDER_SHARE = 1.0, 0.02
-"""A box ends at the image's edge when it is nearer than a pixel or this share of its own height: so exact are the
-sides that a network draws."""
+"""A box is at the image's edge if it is closer to it than this many pixels or this share of its own height, which is
+the accuracy of the box sides."""
 _NEAREST_M = 0.5
 _NOISE_SHARE = 0.03
-"""Of a box's height, what a detector changes from image to image however large the box is. Measured on labelled
-KITTI cars within 20 m: 2.9 %."""
+"""Frame-to-frame noise of a box's height as a share of the height, for any box size. Measured on labelled KITTI cars
+within 20 m: 2.9 %."""
 _HUBER = 1.345
-"""Residuals beyond this many standard deviations weigh less: 95 % efficiency on clean data (Huber 1981, section 4)."""
+"""Residuals beyond this many standard deviations get less weight: 95 % efficiency on clean data (Huber 1981, section
+4)."""
 _ROUNDS = 30
 
 
@@ -48,13 +49,13 @@ class PowerLaw:
         return self.coefficient * height_px**self.exponent
 
     def for_taller(self, ratio: float) -> PowerLaw:
-        """The law of objects ``ratio`` times as tall: their boxes are that much taller at the same depth."""
+        """The law for objects ``ratio`` times as tall: their boxes are that much taller at the same depth."""
         return PowerLaw(self.coefficient * ratio**-self.exponent, self.exponent)
 
 
 def fit_power_law(heights_px: npt.ArrayLike, distances_m: npt.ArrayLike, exponent: float | None = None) -> PowerLaw:
-    """The law nearest to (N,) pairs, by least squares in log-log with Huber weights, so that a few wrong pairs do not
-    turn it. ``exponent`` fixed: only the coefficient is fitted (−1 is a pinhole camera, and needs one pair).
+    """Fit a law to (N,) pairs, by least squares in log-log with Huber weights, which limit the effect of outliers. With
+    a fixed ``exponent``, only the coefficient is fitted (−1 is a pinhole camera and needs one pair).
 
     ValueError for pairs that are not positive and finite, or too few different heights.
     """
@@ -79,9 +80,9 @@ def fit_power_law(heights_px: npt.ArrayLike, distances_m: npt.ArrayLike, exponen
 
 
 def binned(distance_m: float) -> float | None:
-    """The paper's binning: the nearest ten metres between 5 and 60 m, nothing outside ("binning data from 5 meters to
-    60 meters with 10 meters incremental process"; the print does not say where a bin's value lies)."""
-    if not BIN_LOW_M <= distance_m <= BIN_HIGH_M:  # NaN too
+    """The paper's binning: the nearest ten metres between 5 and 60 m, None outside ("binning data from 5 meters to 60
+    meters with 10 meters incremental process"; the paper does not specify where a bin's value lies)."""
+    if not BIN_LOW_M <= distance_m <= BIN_HIGH_M:  # also true for NaN
         return None
     return BIN_M * math.floor(distance_m / BIN_M + 0.5)
 
@@ -93,14 +94,13 @@ def measure(
     params: DistanceParams,
     own: DistanceLaw = REAL_VEHICLES,
 ) -> tuple[VisionMeasurement, ...]:
-    """Each detection with its range, its uncertainty and its place; all three None where the box tells none: no law
-    for its class, cut by the image's upper or lower edge (such a height is only a lower bound), or beyond ``max_m``.
-    Without an alignment there is no bearing: the depth stands for the range, and the place is None. own: the
-    detector's law.
-    """
+    """Each detection with its range, uncertainty and position. All three are None if the box gives no distance: no law
+    for its class, cut by the image's upper or lower edge (its height is then only a lower bound), or beyond ``max_m``.
+    Without an alignment there is no bearing: the depth is used as range, and the position is None. own: the detector's
+    law."""
     if not detections:
         return ()
-    # A power law of the box height gives the depth, and the bearing makes a range of it
+    # A power law of the box height gives the depth; with the bearing, this gives the range
     boxes = np.array([detection.bbox for detection in detections], dtype=np.float64)
     law = law_in_use(params, own)
     depth_m = _depths(detections, boxes, _focal_px(alignment, camera), camera, params, law)
@@ -108,14 +108,14 @@ def measure(
     if alignment is not None and params.depth_along_axis:
         range_m = range_at_depth(_centres(boxes), depth_m, alignment, camera)
     range_m = np.where(range_m <= params.max_m, range_m, np.nan)
-    # Two errors: the height of the box changes from image to image; the unknown height of the vehicle lasts
+    # Two errors: box height noise changes from image to image; the unknown vehicle height is constant
     height_px = np.maximum(boxes[:, 3] - boxes[:, 1], 1.0)
     pixel_share = np.abs(law.exponent) * params.height_sigma_px / height_px
     noise_share = np.hypot(pixel_share, _NOISE_SHARE)
     sigma_m = range_m * np.hypot(pixel_share, params.size_spread)
     if params.binning:
         range_m = np.array([binned(float(value)) for value in range_m], dtype=np.float64)
-    # The place is that far along the line of sight through the middle of the box
+    # The position lies at this range along the line of sight through the middle of the box
     place = np.full((len(boxes), 2), np.nan)
     if alignment is not None:
         place = alignment.unproject(_centres(boxes), range_m)[:, :2]
@@ -141,7 +141,7 @@ def measure(
 
 
 def law_in_use(params: DistanceParams, own: DistanceLaw) -> DistanceLaw:
-    """The detector's law at the parameters' focal length, with each number that a parameter gives in its place."""
+    """The detector's law at the parameters' focal length; values set as parameters override it."""
     given = {
         "coefficient": params.coefficient,
         "exponent": params.exponent,
@@ -154,7 +154,7 @@ def law_in_use(params: DistanceParams, own: DistanceLaw) -> DistanceLaw:
 
 
 def _by_class(law: DistanceLaw, per_class: bool) -> Mapping[str, PowerLaw]:
-    """The law of each class that has one, for box heights at the law's focal length."""
+    """The law of each supported class, for box heights at the law's focal length."""
     car = PowerLaw(law.coefficient, law.exponent)
     if not per_class:
         return {"car": car}
@@ -163,20 +163,20 @@ def _by_class(law: DistanceLaw, per_class: bool) -> Mapping[str, PowerLaw]:
 
 
 def height_at_reference(box: Box, focal_px: float | None, params: DistanceParams) -> float:
-    """A box's height in pixels as the camera of the law would see it."""
+    """A box's height in pixels, converted to the focal length of the law."""
     scale = params.reference_focal_px / focal_px if params.scale_to_camera and focal_px else 1.0
     return (box[3] - box[1]) * scale
 
 
 def is_cut(box: Box, camera: CameraCalibration | None) -> bool:
-    """Whether the image's upper or lower edge cuts the box. The lower one is known from the calibration only."""
+    """Whether the image's upper or lower edge cuts the box. The lower edge is known only from the calibration."""
     near_px = max(_BORDER_PX, _BORDER_SHARE * (box[3] - box[1]))
     return box[1] <= near_px or (camera is not None and box[3] >= camera.height - near_px)
 
 
 def range_at_depth(pixels: F64, depth_m: F64, alignment: Alignment, camera: CameraCalibration | None) -> F64:
-    """(N,) horizontal ranges from the ego origin of the points on (N, 2) pixels' rays that lie ``depth_m`` (N,) along
-    the optical axis (along ego x for a camera without calibration). NaN where that point is not ahead.
+    """(N,) horizontal ranges from the ego origin of the points on the rays of (N, 2) pixels that lie ``depth_m`` (N,)
+    along the optical axis (along ego x for a camera without calibration). NaN if that point is not ahead.
 
     Depth is linear along a ray.
     """
@@ -197,7 +197,7 @@ def _depths(
     params: DistanceParams,
     law_of_cars: DistanceLaw,
 ) -> F64:
-    """(N,) depths in metres by each class's law, NaN where the box tells none."""
+    """(N,) depths in metres by each class's law, NaN if the box gives none."""
     by_class = _by_class(law_of_cars, params.per_class)
     depths = np.full(len(boxes), np.nan)
     for row, detection in enumerate(detections):
@@ -209,8 +209,8 @@ def _depths(
 
 
 def _aspects(boxes: F64, camera: CameraCalibration | None) -> F64:
-    """(N,) ln(height / width), NaN where the image's edge or a nearer object may hide part of the width. Of two boxes
-    that overlap, the one that reaches farther down is the nearer object."""
+    """(N,) ln(height / width), NaN if the image's edge or a nearer object may hide part of the width. Of two
+    overlapping boxes, the one that extends farther down is the nearer object."""
     x1, y1, x2, y2 = boxes.T
     beside = (x1[:, None] < x2) & (x1 < x2[:, None]) & (y1[:, None] < y2) & (y1 < y2[:, None]) & (y2[:, None] < y2)
     cut = x1 <= _BORDER_PX
@@ -225,14 +225,15 @@ def _centres(boxes: F64) -> F64:
 
 
 def _focal_px(alignment: Alignment | None, camera: CameraCalibration | None) -> float | None:
-    """Pixels per radian down the image: of the calibration, else of the angular model's own numbers."""
+    """Vertical focal length in pixels per radian: from the calibration, else from the parameters of the angular
+    model."""
     if camera is not None:
         return float(camera.K[1, 1])
     return 1.0 / alignment.v_res_rad if isinstance(alignment, Angular) else None
 
 
 def _weighted_line(x: F64, y: F64, weights: F64, slope: float | None) -> tuple[float, float]:
-    """Intercept and slope of the weighted least-squares line; a given slope is kept."""
+    """Intercept and slope of the weighted least-squares line; a given slope is fixed."""
     mean_x, mean_y = float(np.average(x, weights=weights)), float(np.average(y, weights=weights))
     if slope is None:
         slope = float(np.sum(weights * (x - mean_x) * (y - mean_y)) / np.sum(weights * (x - mean_x) ** 2))

@@ -22,19 +22,19 @@ from pipeline.vision.detector import Detector, open_detector
 WINDOW_PX = 416
 """Side of the window: YOLOX-nano's own input. At 1800 px of focal length ±6.6°, at 720 px ±16°."""
 LOOK_AHEAD_M = 60.0
-"""Where on the bend the window is centred: about where a whole image stops showing vehicles."""
+"""Distance along the curve at which the window is centred: about where vehicles become too small in the whole image."""
 _GRID_PX = 16
-"""The window moves in steps of this, so that the noise of a yaw rate does not move it."""
+"""The window moves in steps of this size, so that yaw rate noise does not move it."""
 _SLOWEST_MPS = 3.0
-"""Below this the yaw rate over the speed says nothing of the road."""
+"""Below this speed, yaw rate over speed says nothing about the road."""
 _WORTH_IT = 0.8
-"""Where the whole image already has this share of the native resolution, a second look adds nothing."""
+"""If the whole image is already processed at this share of the native resolution, a second pass adds nothing."""
 _CUT_PX = 3.0
-"""A box that ends this near to an inner edge of the window goes on beyond it."""
+"""A box this close to an inner edge of the window is considered cut."""
 
 
 class WindowDetector(Protocol):
-    """What looks at the window."""
+    """A detector that runs on the window."""
 
     @property
     def name(self) -> str:
@@ -42,7 +42,7 @@ class WindowDetector(Protocol):
         ...
 
     def detect(self, bgr: U8) -> RawBoxes:
-        """What is in an image (H, W, 3) uint8."""
+        """Candidates in an image (H, W, 3) uint8."""
         ...
 
 
@@ -61,32 +61,32 @@ class FarView:
         return f"{self.detector.name}-far{self.size_px}"
 
     def of(self, frame: Frame | None) -> FarLook:
-        """The look at one frame's image; at the middle of an image of which nothing else is known for None."""
+        """The far view of one frame's image; None uses the middle of an image of which nothing else is known."""
         return FarLook(self, frame)
 
 
 @dataclass(frozen=True)
 class FarLook:
-    """The far view of one frame. Its name is the far view's: which window it is follows from the frame."""
+    """The far view bound to one frame. Its name is the far view's, since the window follows from the frame."""
 
     view: FarView
-    """Which part of the image, and the network that looks at it."""
+    """The detector and the size of the window."""
     frame: Frame | None
-    """Its lanes and calibration place the window; None puts it in the middle of the image."""
+    """Its lanes and calibration define the window's position; None uses the middle of the image."""
 
     @property
     def name(self) -> str:
-        """The far view's."""
+        """Name of the far view."""
         return self.view.name
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Nothing that the detector does not say of the whole image."""
+        """Empty: the detector already reports its notes for the whole image."""
         return ()
 
     def detect(self, bgr: U8) -> RawBoxes:
-        """Candidates in the window of an image (H, W, 3) uint8, in the image's pixels. Those that the window cuts
-        off are left out: the whole image shows them whole."""
+        """Candidates in the window of an image (H, W, 3) uint8, in the image's pixels. Boxes cut by the window are left
+        out: they are complete in the whole image."""
         window = window_of(self.frame, (bgr.shape[1], bgr.shape[0]), self.view.size_px)
         x1, y1, x2, y2 = window
         seen = self.view.detector.detect(np.ascontiguousarray(bgr[y1:y2, x1:x2]))
@@ -105,22 +105,22 @@ class FarLook:
 
 
 def open_far_view(detector: Detector, image_size: tuple[int, int], size_px: int = WINDOW_PX) -> FarView | None:
-    """The far view by the same network as ``detector`` in images of (width, height). None where the whole image
-    already reaches the network at nearly its own resolution."""
+    """The far view with the same network as ``detector`` for images of (width, height). None if the whole image is
+    already processed at nearly native resolution."""
     width, height = image_size
     if min(detector.input_size[0] / height, detector.input_size[1] / width) >= _WORTH_IT:
         return None
     sides = tuple(-(-min(size_px, side) // MULTIPLE) * MULTIPLE for side in (height, width))
     try:
         native = open_detector(str(detector.path), None, detector.threads, (sides[0], sides[1]))
-    except DetectorError:  # the graph has a size of its own; the window is scaled to it
+    except DetectorError:  # the graph has a fixed size; the window is scaled to it
         native = open_detector(str(detector.path), None, detector.threads)
     return FarView(native, size_px)
 
 
 def window_of(frame: Frame | None, image_size: tuple[int, int], size_px: int = WINDOW_PX) -> PixelWindow:
-    """The window in an image of (width, height): around the vanishing point of the way ahead, inside the image. The
-    image's middle where the camera is not known."""
+    """The window in an image of (width, height): around the vanishing point of the road ahead, clipped to the image.
+    The middle of the image if the camera is not known."""
     width, height = image_size
     u, v = width / 2, height / 2
     camera = frame.camera if frame is not None else None
@@ -136,7 +136,7 @@ def window_of(frame: Frame | None, image_size: tuple[int, int], size_px: int = W
 
 
 def _bend_bearing(frame: Frame | None) -> float:
-    """Where a constant turn leads in ``LOOK_AHEAD_M``, radians to the left."""
+    """Bearing of the point ``LOOK_AHEAD_M`` ahead on a constant turn, radians to the left."""
     ego = frame.ego if frame is not None else None
     if ego is None or ego.speed_mps is None or ego.yaw_rate_radps is None or ego.speed_mps < _SLOWEST_MPS:
         return 0.0
@@ -144,7 +144,7 @@ def _bend_bearing(frame: Frame | None) -> float:
 
 
 def _is_whole(boxes: F32, window: PixelWindow, image_size: tuple[int, int]) -> Mask:
-    """(M,) whether the window shows all of each box that the image shows."""
+    """(M,) whether each box lies completely in the window, apart from cuts by the image's own edges."""
     x1, y1, x2, y2 = window
     width, height = image_size
     low = (np.array([x1, y1]) > 0) & (boxes[:, :2] < np.array([x1, y1]) + _CUT_PX)

@@ -13,10 +13,10 @@ from pipeline.types import VEHICLES, Detection, RawBoxes
 
 
 def select(raw: RawBoxes, params: DetectionParams) -> tuple[Detection, ...]:
-    """Detections by falling score (ties: the detector's order).
+    """Detections by descending score (ties: the detector's order).
 
-    Boxes of one class suppress each other, and so do all vehicle classes: what the network calls car in one candidate
-    and truck in the next is one object. Its box and score are the best candidate's, its name as ``_name`` decides.
+    Boxes of one class suppress each other, and so do boxes of all vehicle classes: candidates labelled car and truck at
+    one place are one object. Its box and score are those of the best candidate, its class is decided by ``_name``.
     """
     raw = raw if params.far_view else raw.without_far()
     candidates = np.flatnonzero(raw.scores >= params.min_score)
@@ -40,9 +40,9 @@ def select(raw: RawBoxes, params: DetectionParams) -> tuple[Detection, ...]:
 
 
 def _name(members: list[tuple[str, float]], car_prior: float) -> str:
-    """Of one object's candidates, best first: the best one's class, except that a vehicle is a car unless the other
-    class scores ``car_prior`` times the car candidate: on a road cars are commoner than in COCO, on which the network
-    learned how common they are, and a car taken for a bus is placed twice as far away as it is."""
+    """Class of one object from its candidates, best first: the best candidate's class, except that a vehicle is a car
+    unless the other class scores ``car_prior`` times as high as the car candidate. Cars are more common on roads than
+    in COCO, from which the network learned its prior, and a car classified as a bus is placed at twice its distance."""
     label, score = members[0]
     as_car = max((each for name, each in members if name == "car"), default=0.0)
     return "car" if label in VEHICLES and as_car * car_prior > score else label

@@ -23,25 +23,27 @@ from pipeline.common.kalman import CvState
 from pipeline.types import Point2
 
 _MOST_ITERATIONS, _SETTLED_M = 5, 0.01
-"""The logarithm bends: one linear step from 77 ± 19 m to a sighting at 43 m ends at 32 m. The update is repeated at the
-place that it found until that stays."""
+"""The logarithm is nonlinear: one linearised step from 77 ± 19 m to a measurement at 43 m ends at 32 m. The update is
+therefore iterated from its own result until it converges."""
 
 
 class PlaceMeasurement(NamedTuple):
-    """One measured place."""
+    """One measured position."""
 
     range_m: float
     """Horizontal range from the ego origin."""
     bearing_rad: float
     """Counter-clockwise from straight ahead."""
     range_share: float
-    """Standard deviation of ln(range): of what changes from image to image, not of the law's lasting error."""
+    """Standard deviation of ln(range): only the part that changes from image to image, without the constant error of
+    the law."""
     bearing_sigma_rad: float
     """Standard deviation of the bearing."""
 
 
 def start(seen: PlaceMeasurement, along_mps: float, speed_sigma_mps: float) -> CvState:
-    """A place sighted once, its velocity ``along_mps`` along ego x, uncertain by ``speed_sigma_mps`` on each axis."""
+    """State of an object after its first sighting, with velocity ``along_mps`` along ego x and standard deviation
+    ``speed_sigma_mps`` on each axis."""
     c, s = math.cos(seen.bearing_rad), math.sin(seen.bearing_rad)
     along = (seen.range_share * seen.range_m) ** 2
     across = (seen.bearing_sigma_rad * seen.range_m) ** 2
@@ -53,31 +55,31 @@ def start(seen: PlaceMeasurement, along_mps: float, speed_sigma_mps: float) -> C
 
 
 def surprise(state: CvState, seen: PlaceMeasurement) -> float:
-    """The NIS of a sighting: χ² with 2 degrees of freedom while the model holds."""
+    """The NIS of a measurement: χ² with 2 degrees of freedom if the model holds."""
     return float(_innovate(state.mean, state.cov, *seen)[2])
 
 
 def update(state: CvState, seen: PlaceMeasurement) -> CvState:
-    """The state with a sighting taken in."""
+    """The state updated by a measurement."""
     mean, cov, _ = _innovate(state.mean, state.cov, *seen)
     return CvState(mean, cov)
 
 
 def scaled(state: CvState, factor: float) -> CvState:
-    """The state with its place ``factor`` times as far away along the same ray; its velocity grows with it, because it
-    was read off the same distances."""
+    """The state with its position ``factor`` times as far away along the same ray. Its velocity scales as well, because
+    it was derived from the same distances."""
     return CvState(state.mean * factor, state.cov * factor**2)
 
 
 def range_sigma_m(state: CvState) -> float:
-    """Standard deviation along the ray."""
+    """Standard deviation of the range."""
     x, y = state.mean[:2].tolist()
     (xx, xy), (_, yy) = state.cov[:2, :2].tolist()
     return math.sqrt(max(x * x * xx + 2 * x * y * xy + y * y * yy, 0.0)) / math.hypot(x, y)
 
 
 def speed_sigma_mps(state: CvState) -> float:
-    """Standard deviation of the velocity along the ray."""
+    """Standard deviation of the radial velocity."""
     x, y = state.mean[:2].tolist()
     (xx, xy), (_, yy) = state.cov[2:, 2:].tolist()
     return math.sqrt(max(x * x * xx + 2 * x * y * xy + y * y * yy, 0.0)) / math.hypot(x, y)

@@ -27,25 +27,25 @@ from pipeline.vision.association import Expected, match, same_kind
 from pipeline.vision.followed import Followed, SpeedGuess, learned, predict_place, renamed, take_place, with_place
 
 SPEED_SIGMA_MPS = 8.0
-"""How fast a new object may be closing in or away, before a second sighting tells."""
+"""Standard deviation of a new object's relative speed before a second sighting."""
 _CAR_WIDTH_M = 1.8
-"""Turns box widths into metres, so that a box's motion in the image is as lively as its object's on the road."""
+"""Converts box widths to metres, so that process noise in the image corresponds to that on the road."""
 _CENTRE_NOISE = 0.04
-"""Noise of a box's centre, in box widths."""
+"""Noise of a box's centre, as a share of the box width."""
 _EDGE_PX = 2.0
-"""Noise of a box's edges, however small it is."""
+"""Minimum noise of a box's edges."""
 _TURN_PXPS2 = 150.0
-"""How hard the image may begin to turn: 0.2 rad/s² of the car through a lens of 720 px."""
+"""Angular acceleration of the image when the car starts to turn: 0.2 rad/s² through a lens of 720 px."""
 
 
 @dataclass(frozen=True)
 class VisionTrackerState:
-    """All that one image leaves to the next."""
+    """State from one image to the next."""
 
     next_id: int = 1
-    """Number of the next new track; numbers are never given twice."""
+    """Number of the next new track; numbers are never reused."""
     followed: tuple[Followed, ...] = field(default=())
-    """Every track that is still alive."""
+    """All live tracks."""
 
 
 def track(
@@ -55,16 +55,15 @@ def track(
     params: VisionTrackingParams,
     ego_speed_mps: float | None = None,
 ) -> tuple[VisionTrackerState, tuple[VisionTrack, ...]]:
-    """One tick. ``measurements`` None: the camera gave nothing, which counts as time but not as an image in which the
-    object was missing. ``dt_s`` None: the first tick. ``ego_speed_mps``: what a new object's speed is guessed from.
-    Tracks come by id."""
-    # Every track is predicted to now; without an image it is carried by that alone
+    """One tick. ``measurements`` None: no image; time passes, but the objects do not count as missed. ``dt_s`` None:
+    the first tick. ``ego_speed_mps``: used to guess the speed of a new object. Tracks are returned by id."""
+    # Predict every track to now; without an image that is all
     guess = _first_guess(ego_speed_mps)
     expected = [_predict(followed, dt_s or 0.0, params) for followed in state.followed]
     if measurements is None:
         kept = tuple(followed for followed in expected if followed.unseen_s <= params.max_missed_s)
         return evolve(state, followed=kept), tuple(followed.track for followed in kept)
-    # Tracks and boxes are matched one-to-one; a track without a box has missed this image
+    # Match tracks and boxes one-to-one; a track without a box was missed in this image
     partner = match([_expected(followed, params) for followed in expected], measurements, params)
     kept_list = [
         _seen(followed, measurements[partner[row]], guess, ego_speed_mps, params)
@@ -72,7 +71,7 @@ def track(
         else _missed(followed)
         for row, followed in enumerate(expected)
     ]
-    # Every box that no track took starts a new one; tracks missed for too long end
+    # Start a new track for every unmatched box; end tracks that were missed for too long
     taken = set(partner.values())
     fresh = [measurement for column, measurement in enumerate(measurements) if column not in taken]
     kept_list += [_new(state.next_id + index, measurement, guess, params) for index, measurement in enumerate(fresh)]
@@ -89,8 +88,8 @@ def track(
 def learn_heights(
     state: VisionTrackerState, ranges: Mapping[int, tuple[float, float]], params: VisionTrackingParams
 ) -> VisionTrackerState:
-    """Take in what the LiDAR measured of the objects that it shares with the camera. What an object's height is learned
-    to be holds from the next image on; its place moves with it, so that it does not seem to approach.
+    """Learn heights from LiDAR distances of objects seen by both sensors. A learned height applies from the next image
+    on; the object's position is scaled with it, so that the change is not mistaken for motion.
 
     ranges: distance and its standard deviation in metres, by id of the vision track.
     """
@@ -106,7 +105,7 @@ def learn_heights(
 
 
 def _expected(followed: Followed, params: VisionTrackingParams) -> Expected:
-    """What the next box of an object is compared with."""
+    """The prediction that the next box of an object is compared with."""
     noise = _box_noise(followed.track.bbox, params)[0, 0]
     return Expected(
         followed.track, math.sqrt(followed.box_filter.cov[0, 0] + noise), math.sqrt(noise), followed.unseen_s
@@ -114,8 +113,8 @@ def _expected(followed: Followed, params: VisionTrackingParams) -> Expected:
 
 
 def _without_ghosts(alive: tuple[Followed, ...], params: VisionTrackingParams) -> tuple[Followed, ...]:
-    """Without carried objects whose expected box lies on one that was seen: that is the same car under a new number, or
-    a car that the nearer one hides, and either way nothing is known of it any more."""
+    """Without carried objects whose predicted box overlaps a seen one. Such an object is the same car under a new id,
+    or is hidden by the nearer car; in both cases its state is no longer known."""
     seen = [followed.track for followed in alive if not followed.track.carried]
     carried = [followed.track for followed in alive if followed.track.carried]
     overlap = iou_matrix(np.array([track.bbox for track in carried]), np.array([track.bbox for track in seen]))
@@ -125,7 +124,7 @@ def _without_ghosts(alive: tuple[Followed, ...], params: VisionTrackingParams) -
 
 
 def _predict(followed: Followed, dt_s: float, params: VisionTrackingParams) -> Followed:
-    """Where the object should be now; carried until a box says that it is there."""
+    """The object predicted to now; it counts as carried until a box confirms it."""
     aged = evolve(followed, unseen_s=followed.unseen_s + dt_s, unplaced_s=followed.unplaced_s + dt_s, seen=None)
     if params.filter == "queue":
         return evolve(aged, track=evolve(followed.track, carried=True, measured=False, returns=0))
@@ -143,8 +142,9 @@ def _predict(followed: Followed, dt_s: float, params: VisionTrackingParams) -> F
 
 
 def _first_guess(ego_speed_mps: float | None) -> SpeedGuess:
-    """What is on a road stands or goes along with us: relative speeds from −v to 0, around −v/2. A guess of 0 ± 8 m/s
-    would take 2 s to believe that a car standing ahead of a fast ego vehicle stands. Without ego speed it must do."""
+    """Objects on a road stand still or move in our direction: relative speeds from −v to 0, around −v/2. Starting from
+    0 ± 8 m/s, it would take 2 s to recognise that a car ahead of a fast ego vehicle stands still. Without ego speed
+    this is the fallback."""
     if ego_speed_mps is None:
         return SpeedGuess(0.0, SPEED_SIGMA_MPS)
     return SpeedGuess(-ego_speed_mps / 2, max(SPEED_SIGMA_MPS, ego_speed_mps / 2))
@@ -181,7 +181,7 @@ def _seen(
     ego_speed_mps: float | None,
     params: VisionTrackingParams,
 ) -> Followed:
-    """The object with this image's box and distance taken in."""
+    """The object updated by this image's box and distance."""
     detection = seen.detection
     label, votes, box_filter, slip = detection.label, followed.votes, followed.box_filter, 0.0
     if params.filter == "kalman":
@@ -215,15 +215,15 @@ def _missed(followed: Followed) -> Followed:
 
 
 def _box_noise(box: Box, params: VisionTrackingParams, expected: Box | None = None) -> F64:
-    """Covariance (2, 2) of a box's centre; with what the size is off the expected one, where that is known."""
+    """Covariance (2, 2) of a box's centre, including the deviation of its size from the expected size, if known."""
     variance = max(_CENTRE_NOISE * _width(box), _EDGE_PX) ** 2 + params.shift_px**2
     slips = [_slip_px(box, expected, axis) if expected is not None else 0.0 for axis in (0, 1)]
     return np.diag([variance + slip**2 for slip in slips])
 
 
 def _slip_px(box: Box, expected: Box, axis: int) -> float:
-    """How far the centre may be off because only a part of the object was drawn, or more than it: one edge is right
-    then, and the centre off by half of what the size (axis 0: width, 1: height) is."""
+    """How far the centre may be off because the box covers only a part of the object, or more than the object: one edge
+    is then correct, and the centre is off by half the difference in size (axis 0: width, 1: height)."""
     return abs((box[axis + 2] - box[axis]) - (expected[axis + 2] - expected[axis])) / 2
 
 

@@ -22,7 +22,7 @@ FINDERS: list[EventFinder] = [
 
 
 def event_kinds() -> tuple[str, ...]:
-    """Every kind of event; marks are made by people, not found."""
+    """Every kind of event. Marks are not included, because users make them."""
     return (*(kind for finder in FINDERS for kind in finder.kinds), "mark")
 
 

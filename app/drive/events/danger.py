@@ -8,15 +8,16 @@ from app.drive.events.event import Event, EventFinder, RunRows, Severity, ids
 from app.drive.frame_rows import Row
 
 APPROACH_TTC_S = 8.0
-"""A time to collision above this is no approach."""
+"""A longer time to collision does not count as an approach."""
 APPROACH_GAP_FRAMES = 5
-"""Frames without a TTC that do not end an approach."""
+"""Number of frames without a TTC that do not end an approach."""
 HARD_BRAKE = 0.3
-"""Share of the brake pedal from which ACC's braking is told."""
+"""Brake pedal position from which ACC's braking is reported."""
 
 
 def ttc_minima(run: RunRows) -> Iterator[Event]:
-    """The shortest time to collision of each approach: frames of one CIPV whose TTC is short, with short holes."""
+    """The shortest time to collision of each approach: consecutive frames of one CIPV with a short TTC, allowing short
+    gaps."""
     approach: list[int] = []
     for index, row in enumerate(run.rows):
         close = row.ttc_s is not None and row.ttc_s < APPROACH_TTC_S
@@ -41,7 +42,7 @@ def _ttc_minimum(run: RunRows, approach: Sequence[int]) -> Event:
 
 
 def braking(run: RunRows) -> Iterator[Event]:
-    """Where a warning or an emergency braking begins or grows, and where ACC begins to brake hard."""
+    """Where a warning or an emergency braking starts or increases, and where ACC starts to brake hard."""
     stages = {"warn": 1, "partial_brake": 2, "full_brake": 3}
     texts = {1: "collision warning", 2: "partial braking", 3: "full braking"}
     last_stage, last_hard = 0, False

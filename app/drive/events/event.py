@@ -15,20 +15,20 @@ Severity = Literal["info", "notice", "warning", "alarm"]
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened on a drive. Object numbers are those of the run."""
+    """Something that happened on a drive. Object ids are those of the run."""
 
     kind: str
     """One of ``app.drive.events.event_kinds()``."""
     index: int
     """The frame at which it happened."""
     text: str
-    """What changed, in a sentence."""
+    """What changed, as a sentence."""
     ids: tuple[int, ...] = ()
-    """The objects it is about, the most important first."""
+    """The objects involved, the most important first."""
     severity: Severity = "info"
-    """Decides colour and order in the list."""
+    """Defines colour and order in the list."""
     mark: int | None = None
-    """Number of a person's mark; None for other events and for marks that are part of the recording, which cannot be
+    """Number of a user's mark; None for other events and for marks that are part of the recording, which cannot be
     removed."""
 
     def to_json(self, t_s: float) -> dict[str, Any]:
@@ -49,9 +49,9 @@ class RunRows(NamedTuple):
     rows: Sequence[Row]
     """One per frame."""
     objects: Sequence[Objects]
-    """Of each frame, by object id."""
+    """Objects of each frame, by object id."""
     params: Params
-    """Whose limits the events are about."""
+    """Parameters whose limits the events use."""
 
     def starts_anew(self, index: int) -> bool:
         """Whether all trackers were reset at a frame, as after a gap in the recording."""
@@ -65,9 +65,9 @@ class EventFinder(NamedTuple):
     kinds: tuple[str, ...]
     """The kinds of event that it can find."""
     find: Callable[[RunRows], Iterable[Event]]
-    """Goes through a run once."""
+    """Processes a run and returns its events."""
 
 
 def ids(*numbers: int | None) -> tuple[int, ...]:
-    """The object numbers that there are."""
+    """The given object ids that are not None."""
     return tuple(number for number in numbers if number is not None)

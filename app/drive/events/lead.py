@@ -11,13 +11,13 @@ from app.drive.frame_rows import Objects
 from pipeline.types import seeing_sensors_in_words
 
 LONGEST_LOOK_BACK = 30
-"""Frames before a change in which an object's place in or out of the path is looked for."""
+"""Number of frames before a change that are searched for an object's earlier position inside or outside the path."""
 BESIDE_FRAMES = 3
-"""An object must have been seen beside the path in this many frames to have cut in from there."""
+"""To count as a cut-in, an object must have been seen beside the path in this many frames before."""
 
 
 def lead_changes(run: RunRows) -> Iterator[Event]:
-    """Each frame whose CIPV is another than the frame's before, as the most that is known of it."""
+    """Each frame whose CIPV differs from the previous frame's, as the most specific kind of event."""
     seen: set[int] = set()
     last: int | None = None
     for index, row in enumerate(run.rows):
@@ -54,7 +54,7 @@ def _lead_change(run: RunRows, index: int, last: int | None, now: int | None, se
 
 
 def _left_the_path(run: RunRows, index: int, object_id: int) -> bool:
-    """Whether an object is still there, and beside the path now."""
+    """Whether an object still exists and is now beside the path."""
     record = _record(run.objects[index], object_id)
     return record is not None and not record["in_path"] and not np.isnan(record["path_offset_m"])
 
@@ -70,7 +70,7 @@ def _was_beside(run: RunRows, index: int, object_id: int) -> bool:
 
 
 def _nearer_than_before(run: RunRows, index: int) -> bool:
-    """Whether the CIPV is nearer than the last one was; so when there was none."""
+    """Whether the CIPV is nearer than the last one was; also true if there was none."""
     before, now = run.rows[index - 1].distance_m if index else None, run.rows[index].distance_m
     return before is None or (now is not None and now < before)
 

@@ -12,11 +12,11 @@ from pipeline.types import F64
 DISAGREEMENT_SIGMAS = 3.0
 DISAGREEMENT_FRAMES = 2
 TIME_GAP_PERIODS = 2.5
-"""A step between stamps longer than this many usual ones is a gap in the recording."""
+"""A step between timestamps longer than this many usual periods is a gap in the recording."""
 
 
 def disagreements(run: RunRows) -> Iterator[Event]:
-    """Where camera and LiDAR begin to give one object in the path two distances."""
+    """Where the distances of camera and LiDAR for one object in the path start to disagree."""
     lasting: dict[int, int] = {}
     for index, records in enumerate(run.objects):
         sigmas: F64 = np.nan_to_num(np.asarray(records["vl_gap_sigmas"], np.float64))
@@ -33,7 +33,7 @@ def disagreements(run: RunRows) -> Iterator[Event]:
 
 
 def sensor_gaps(run: RunRows) -> Iterator[Event]:
-    """Where a sensor that the recording has begins to give nothing, and where time jumps."""
+    """Where a sensor of the recording stops delivering data, and where time jumps."""
     absent = [set(row.gaps.split(",")) - {""} for row in run.rows]
     never = set.intersection(*absent) if absent else set()
     for index, now in enumerate(absent):

@@ -12,13 +12,13 @@ from pipeline.labels.headings import Pose, own_poses
 from pipeline.labels.model import LabelTrack, Sighting
 
 _KEPT = 64
-"""Sweeps: neighbouring frames ask for the same ones."""
+"""Number of cached sweeps: neighbouring frames need the same ones."""
 _FRAMES = 4 * MOST_SWEEPS
-"""On each side: farther off no sweep is taken."""
+"""Number of frames on each side in which sweeps are used."""
 
 
 def sweeps_of(recording: OpenRecording) -> Sweeps:
-    """The sweep of a frame with its clusters, None where it has none; the last ones asked for are kept."""
+    """The sweep of a frame with its clusters, None if it has none; recently used ones are cached."""
 
     @lru_cache(_KEPT)
     def of(index: int) -> Clustered | None:
@@ -29,7 +29,7 @@ def sweeps_of(recording: OpenRecording) -> Sweeps:
 
 
 def poses_around(recording: OpenRecording, frame: int, reach: int = _FRAMES) -> dict[int, Pose]:
-    """Own motion as the present run has it, as far as it has come."""
+    """Own motion from the current run, as far as it has progressed."""
     run = recording.runs.current
     if run is None:
         return {}
@@ -39,6 +39,6 @@ def poses_around(recording: OpenRecording, frame: int, reach: int = _FRAMES) -> 
 
 
 def around(recording: OpenRecording, track: LabelTrack, sighting: Sighting, sweeps: Sweeps) -> Aggregate | None:
-    """The points of a labelled vehicle in the sweeps around a frame; None where there are none."""
+    """The points of a labelled vehicle in the sweeps around a frame; None without points."""
     near = [each for each in track.sightings if abs(each.frame - sighting.frame) <= _FRAMES]
     return aggregated(near, sighting.frame, sweeps, poses_around(recording, sighting.frame))

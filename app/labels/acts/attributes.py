@@ -14,7 +14,7 @@ from pipeline.labels.model import Attribute, Sighting
 
 
 def set_attribute(draft: Draft, scope: Scope, act: SetAttribute) -> str:
-    """In place of what was said of these frames by that name. BadAct for what the class list has not."""
+    """Replaces the attribute's values in these frames. BadAct if it is not in the class list."""
     scope.check(act.first, act.last)
     track = track_of(draft, act.track, act.revision)
     values = scope.classes.attributes.get(act.name)
@@ -35,7 +35,7 @@ def set_attribute(draft: Draft, scope: Scope, act: SetAttribute) -> str:
 
 
 def _said(sighting: Sighting, name: str, value: str | None) -> Sighting:
-    """BadAct for a number that is none: the class list may have any text."""
+    """BadAct for an invalid number: the class list may contain any text."""
     try:
         if name == "occlusion":
             return replace(sighting, occlusion=int(value) if value is not None else None)
@@ -45,7 +45,7 @@ def _said(sighting: Sighting, name: str, value: str | None) -> Sighting:
 
 
 def _put(known: tuple[Attribute, ...], act: SetAttribute) -> tuple[Attribute, ...]:
-    """Others of that name are cut; those that touch, and say the same, are one."""
+    """Other values of the attribute are cut; adjacent ranges with the same value are joined."""
     kept: list[Attribute] = []
     first, last = act.first, act.last
     for each in known:

@@ -31,7 +31,7 @@ _ALL = 100
 
 
 def proposing(labels: DriveLabels, recording: OpenRecording, person: str, first: int, last: int) -> TaskWork:
-    """The present run's objects in frames first … last as proposals. ActRefused while the run has not come that far."""
+    """The current run's objects in frames first … last as proposals. ActRefused if the run has not got that far."""
     run = recording.runs.current
     last = min(last, recording.setup.total - 1)
     if run is None or run.done <= last:
@@ -53,8 +53,8 @@ def proposing(labels: DriveLabels, recording: OpenRecording, person: str, first:
 def put_proposals(
     labels: DriveLabels, found: Proposals, person: str, first: int, last: int, progress: Progress = silent
 ) -> str:
-    """Into the labels of a drive, in one act; a sentence of what came of it. Nothing is written when ``progress``
-    raises."""
+    """Store proposals in the labels of a drive, as one act; returns a sentence with the outcome. Nothing is written if
+    ``progress`` raises."""
     counts: list[int] = []
 
     def apply(draft: Draft) -> str:
@@ -75,11 +75,10 @@ def put_proposals(
 def importing(
     labels: DriveLabels, found: LabelSet, person: str, notes: Sequence[str], progress: Progress = silent
 ) -> str:
-    """Labels of this drive from elsewhere, in one act, beside those that are there; a sentence of what came of it. A
-    track whose number is taken gets another; one that is there already, place for place, is not there twice, and is
-    what the file says where nobody here has said anything of it. Who leads, and the path of a frame, are taken over
-    what was there. ActRefused for a lead or an event of a track that is not there. Nothing is written when
-    ``progress`` raises."""
+    """Import labels of this drive from another source, as one act, in addition to existing labels; returns a sentence
+    with the outcome. A track whose id is taken gets a new one. A track that already exists with the same positions is
+    not duplicated, and is overwritten by the file if nobody has edited it here. Leads and paths in the file replace
+    existing ones. ActRefused for a lead or event of a missing track. Nothing is written if ``progress`` raises."""
     known: list[int] = []
 
     def apply(draft: Draft) -> str:
@@ -110,7 +109,7 @@ def importing(
 
 
 def _put_tracks(draft: Draft, tracks: Sequence[LabelTrack], known: list[int]) -> dict[int, int]:
-    """The numbers that they have here, by their own; ``known`` gets those that are here already."""
+    """The tracks' ids here, by their id in the file; ids of existing tracks are added to ``known``."""
     numbers: dict[int, int] = {}
     there = {(each.label, each.sightings): each for each in _as_they_are(draft)}
     for track in tracks:
@@ -128,24 +127,24 @@ def _put_tracks(draft: Draft, tracks: Sequence[LabelTrack], known: list[int]) ->
 
 
 def _numbered(numbers: Mapping[int, int], track: int, what: str) -> int:
-    """The number that a track of the file has here."""
+    """The id here of a track in the file."""
     if track not in numbers:
         raise ActRefused(f"{what} is #{track}: track not found in file or database")
     return numbers[track]
 
 
 def _happening(event: EventLabel) -> tuple[int, str, tuple[int, ...]]:
-    """What tells events apart."""
+    """Key that identifies an event."""
     return event.frame, event.kind, event.tracks
 
 
 def _is_untouched(label: LabelTrack | LeadRange) -> bool:
-    """A proposal of the pipeline that nobody has looked at, nor sent back."""
+    """Whether it is a proposal of the pipeline that nobody has reviewed or sent back."""
     return label.state == "proposed" and label.origin.maker == "pipeline" and not label.comment
 
 
 def _as_they_are(draft: Draft) -> list[LabelTrack]:
-    """Every track, with its sightings."""
+    """Every track in its current state, with its sightings."""
     return [
         replace(cast("LabelTrack", item.value), sightings=tuple(draft.sightings(number).values()))
         for number, item in draft.all("track").items()
@@ -153,7 +152,7 @@ def _as_they_are(draft: Draft) -> list[LabelTrack]:
 
 
 def importing_truth(labels: DriveLabels, recording: OpenRecording, person: str) -> TaskWork:
-    """The truth that comes with the recording."""
+    """Import the truth that comes with the recording."""
 
     def work(progress: Progress) -> str:
         source = recording.setup.source
@@ -184,8 +183,8 @@ def _proposals(recording: OpenRecording, run: DriveRun, first: int, last: int, p
 
 
 def _put_proposals(draft: Draft, found: Proposals, first: int, last: int) -> int:
-    """How many tracks were proposed. One that a person has looked at is not proposed again; one that nobody has is
-    replaced, and keeps its number. Who leads is proposed where nobody has said it."""
+    """Number of proposed tracks. A track that a person has edited is not proposed again; an untouched one is replaced
+    and keeps its id. A lead is proposed where no person has set one."""
     known = [
         replace(cast("LabelTrack", item.value), sightings=tuple(draft.sightings(number, first, last).values()))
         for number, item in draft.all("track").items()

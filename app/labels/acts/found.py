@@ -8,7 +8,7 @@ from app.labels.acts.request_fields import OfTrack, Placed, Word
 
 
 class AddSightings(OfTrack):
-    """What a ``Propagate`` becomes once the track is followed."""
+    """Result of a ``Propagate`` after the track was followed."""
 
     kind: Literal["propagate"]
     sightings: tuple[Placed, ...]
@@ -16,10 +16,10 @@ class AddSightings(OfTrack):
 
 
 class AddMeasured(Placed):
-    """What a ``Lift`` becomes once the vehicle is measured."""
+    """Result of a ``Lift`` after the vehicle was measured."""
 
     kind: Literal["lift"]
     label: Word
     """Class of the vehicle."""
     how: str
-    """What it was measured by, in words."""
+    """How it was measured, in words."""

@@ -14,7 +14,7 @@ from pipeline.labels.model import EventLabel, PathLabel
 
 
 def set_path(draft: Draft, scope: Scope, act: SetPath) -> str:
-    """Draw the ego path of a frame, or replace the one it has."""
+    """Set or replace the ego path of a frame."""
     scope.check(act.frame)
     left, right = act.lines()
     check_seen(draft, "path", act.frame, act.frame, act)
@@ -28,7 +28,7 @@ def set_path(draft: Draft, scope: Scope, act: SetPath) -> str:
 
 
 def remove_path(draft: Draft, scope: Scope, act: RemovePath) -> str:
-    """Remove the ego path of a frame. NoSuchLabel where it has none."""
+    """Remove the ego path of a frame. NoSuchLabel if it has none."""
     check_seen(draft, "path", act.frame, act.frame, act)
     number = _path_at(draft, act.frame)
     if number is None:
@@ -38,7 +38,7 @@ def remove_path(draft: Draft, scope: Scope, act: RemovePath) -> str:
 
 
 def add_event(draft: Draft, scope: Scope, act: AddEvent) -> str:
-    """Mark an event in a frame, with the tracks that take part."""
+    """Add an event to a frame, with the tracks involved."""
     scope.check(act.frame)
     tracks = tuple(dict.fromkeys(act.tracks))
     for number in tracks:

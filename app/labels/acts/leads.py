@@ -16,7 +16,7 @@ from pipeline.labels.model import LeadRange
 
 
 def set_lead(draft: Draft, scope: Scope, act: SetLead) -> str:
-    """Label the lead of a range of frames; it replaces what was labelled there."""
+    """Label the lead in a range of frames; this replaces existing labels there."""
     scope.check(act.first, act.last)
     if isinstance(act.lead, int):
         track_of(draft, act.lead)
@@ -26,7 +26,7 @@ def set_lead(draft: Draft, scope: Scope, act: SetLead) -> str:
 
 
 def clear_lead(draft: Draft, scope: Scope, act: ClearLead) -> str:
-    """Remove the lead from a range of frames. ActRefused where none is labelled."""
+    """Remove the lead from a range of frames. ActRefused if none is labelled."""
     scope.check(act.first, act.last)
     check_seen(draft, "lead", act.first, act.last, act)
     if not clear(draft, act.first, act.last):
@@ -35,7 +35,7 @@ def clear_lead(draft: Draft, scope: Scope, act: ClearLead) -> str:
 
 
 def trim_lead(draft: Draft, scope: Scope, act: TrimLead) -> str:
-    """What a person has painted stays as it was said; what a pipeline or a file said is corrected."""
+    """Ranges that a person set keep their origin; ranges from a pipeline or a file become corrections."""
     scope.check(act.first, act.last)
     old = cast("LeadRange", draft.get("lead", act.range, act.revision).value)
     if old.state == "rejected":
@@ -50,9 +50,8 @@ def trim_lead(draft: Draft, scope: Scope, act: TrimLead) -> str:
 
 
 def paint(draft: Draft, new: LeadRange, number: int | None = None) -> None:
-    """Over what was there: ranges are cut. One that says the same, by the same person, right before or after is
-    lengthened instead, unless it was reviewed or sent back. number: of the range that is to be so, where it is there
-    already."""
+    """Set a lead range and cut existing ranges that overlap it. An adjacent range with the same lead by the same person
+    is extended instead, unless it was reviewed or sent back. number: id of the range to replace, if it exists."""
     clear(draft, new.first, new.last, but=number)
     joined = [number] if number is not None else []
     for other, item in draft.all("lead").items():
@@ -66,7 +65,7 @@ def paint(draft: Draft, new: LeadRange, number: int | None = None) -> None:
 
 
 def clear(draft: Draft, first: int, last: int, *, but: int | None = None) -> bool:
-    """Cut all ranges out of frames first … last, but one; false when there was none."""
+    """Cut frames first … last out of all ranges except ``but``; false if nothing was cut."""
     touched = False
     for number, item in draft.all("lead").items():
         old = cast("LeadRange", item.value)
@@ -81,5 +80,5 @@ def clear(draft: Draft, first: int, last: int, *, but: int | None = None) -> boo
 
 
 def _says(lead: LeadRange) -> tuple[object, ...]:
-    """What two ranges that are one have in common."""
+    """Properties that must be equal for two ranges to be joined."""
     return lead.lead, lead.state, lead.origin.maker, lead.origin.name, lead.comment, lead.reviewer

@@ -29,8 +29,8 @@ _DECIMALS = 4
 def measured(
     labels: DriveLabels, recording: OpenRecording, params: Params, act: Refit | Lift | Propagate
 ) -> tuple[SetSighting | AddMeasured | AddSightings, str]:
-    """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found. BadInput
-    where there is nothing to measure."""
+    """Measures in the sensors' data what a person requested; returns the resulting act and how it was measured.
+    BadInput if there is nothing to measure."""
     if isinstance(act, Propagate):
         return carried_on(labels, recording, act), ""
     Scope(labels.info.t_ns).check(act.frame)
@@ -43,9 +43,10 @@ def measured(
 def refitted(
     labels: DriveLabels, frame: Frame, params: Params, act: Refit, recording: OpenRecording | None = None
 ) -> tuple[SetSighting, str]:
-    """The track's cuboid in a frame laid on the points in and near it, of this sweep and, with a recording, of those
-    around; where only the image shows it, on those seen in its box. ActRefused where it is not, where nothing fits
-    better than what is there, or the image alone would tell how far it is; BadInput where there are too few points."""
+    """The track's cuboid in a frame, fitted to the points in and near it, of this sweep and, with a recording, of the
+    surrounding ones; if it is only visible in the image, to the points inside its box. ActRefused if the track is not
+    in the frame, if nothing fits better than the existing cuboid, or if the distance would come from the image alone;
+    BadInput with too few points."""
     track = labels.track(act.track).value
     assert isinstance(track, LabelTrack)
     sighting = track.at(act.frame)
@@ -80,7 +81,7 @@ def refitted(
 
 
 def carried_on(labels: DriveLabels, recording: OpenRecording, act: Propagate) -> AddSightings:
-    """The frames beyond a track's ends in which it is found. ActRefused where there are none."""
+    """The frames beyond a track's ends in which it is found. ActRefused if there are none."""
     track = labels.track(act.track).value
     assert isinstance(track, LabelTrack)
     placed = [each.frame for each in track.sightings if each.cuboid is not None]
@@ -99,8 +100,8 @@ def carried_on(labels: DriveLabels, recording: OpenRecording, act: Propagate) ->
 
 
 def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddMeasured, str]:
-    """A new track from where something is in the image, with the parameters that are in use. BadInput where neither
-    points nor image tell where it is."""
+    """A new track from a position in the image, with the current parameters. BadInput if neither points nor image give
+    its position."""
     if (act.bbox is None) == (act.pixel is None):
         raise BadAct("provide either a box or a pixel")
     if act.bbox is not None and not (act.bbox[0] < act.bbox[2] and act.bbox[1] < act.bbox[3]):
@@ -111,7 +112,7 @@ def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddMeasured, str]:
 
 
 def _given(cuboid: Cuboid) -> CuboidShape:
-    """ActRefused for one that nobody could have drawn."""
+    """ActRefused for a cuboid that nobody could have drawn."""
     x, y, z = (round(value, _DECIMALS) for value in cuboid.center)
     length, width, height = (round(value, _DECIMALS) for value in cuboid.size)
     try:

@@ -17,13 +17,13 @@ from app.labels.wording import frames_text, lead_text
 from pipeline.labels.model import EventLabel, FrameTag, LeadRange, PathLabel
 
 _Said = dict[int, set[object]]
-"""By frame what is said there."""
+"""Label values by frame."""
 
 
 def check_seen(draft: Draft, kind: ItemKind, first: int, last: int, act: OverFrames, word: str | None = None) -> None:
-    """Stale where somebody else changed what is said in frames first … last since the labels that the person saw, or
-    where a second person has reviewed it and the act does not say that it may be cut. word: of a tag or event; the
-    others do not count."""
+    """Stale if somebody else has changed labels in frames first … last since the revision that the person saw, or if a
+    second person has reviewed them and the act does not permit cutting reviewed labels. word: of a tag or event; other
+    words are ignored."""
     if act.seen is None:
         return
     for change in draft.changes_of_others(kind, act.seen):
@@ -57,7 +57,7 @@ def _said(values: Iterable[Value], first: int, last: int, word: str | None) -> _
 
 
 def _frames(value: Value, first: int, last: int, word: str | None) -> range:
-    """Those of first … last that a label is about; none for a rejected one, and for another word."""
+    """The frames in first … last that a label covers; empty for a rejected label, and for another word."""
     own = value.tag if isinstance(value, FrameTag) else value.kind if isinstance(value, EventLabel) else None
     if own != word or (not isinstance(value, FrameTag) and value.state == "rejected"):
         return range(0)
@@ -68,7 +68,7 @@ def _frames(value: Value, first: int, last: int, word: str | None) -> range:
 
 
 def _word(value: Value) -> object:
-    """What is said in each of its frames."""
+    """The value that applies in each of its frames."""
     if isinstance(value, LeadRange):
         return value.lead
     if isinstance(value, PathLabel):

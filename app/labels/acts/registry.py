@@ -63,5 +63,6 @@ _ACTS: dict[type, Callable[[Draft, Scope, Any], str]] = {
 
 
 def do(draft: Draft, scope: Scope, act: Any) -> str:
-    """Do it in the draft; what was done, in a few words. ActRefused, NoSuchLabel or BadInput when it cannot be."""
+    """Perform the act in the draft; returns a short description of what was done. ActRefused, NoSuchLabel or BadInput
+    if it cannot be done."""
     return _ACTS[type(act)](draft, scope, act)

@@ -21,7 +21,7 @@ _MOST_ITEMS = 10_000
 
 
 def _clean(text: str) -> str:
-    """One line without what a terminal or page would act on."""
+    """The text on one line, without characters that a terminal or page would interpret."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
@@ -43,14 +43,14 @@ Id = Annotated[int, Field(ge=0, le=_LARGEST_ID)]
 Index = Annotated[int, Field(ge=0, le=MOST_FRAMES)]
 Person = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_named)]
 PersonOrNobody = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_clean)]
-"""Cleaned as ``Person`` is, so that both name the same one; empty for nobody in particular."""
+"""Cleaned in the same way as ``Person``, so that both give the same name; empty if anonymous."""
 Word = Annotated[str, Field(max_length=40), AfterValidator(_named)]
 Comment = Annotated[str, Field(max_length=1000), AfterValidator(_commented)]
 Line = Annotated[list[tuple[Finite, Finite]], Field(min_length=2, max_length=_MOST_POINTS)]
 
 
 class Strict(BaseModel):
-    """No key more than is said."""
+    """A model without additional keys."""
 
     model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 

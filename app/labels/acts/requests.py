@@ -221,7 +221,7 @@ class SetPath(OverFrames):
     """From near to far; None where the lane has no right line."""
 
     def lines(self) -> tuple[tuple[Point2, ...] | None, tuple[Point2, ...] | None]:
-        """BadAct when there is neither."""
+        """BadAct if both are missing."""
         if self.left is None and self.right is None:
             raise BadAct("provide a left or a right line")
         return (

@@ -16,7 +16,7 @@ from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, LeadRange, P
 
 
 def accept(draft: Draft, scope: Scope, act: Accept) -> str:
-    """What a person corrected stays a correction. Who made a label does not change: the log knows who accepted it."""
+    """A correction by a person stays a correction. The label keeps its author; the log records who accepted it."""
     done = []
     for ref in act.items:
         value = _answered(stated(draft.get(ref.kind, ref.id, ref.revision)))
@@ -36,7 +36,7 @@ def reject(draft: Draft, scope: Scope, act: Reject) -> str:
 
 
 def review_ok(draft: Draft, scope: Scope, act: ReviewOk) -> str:
-    """By a second person: who made a label as it is, or changed it last, does not review it."""
+    """Approval by a second person: whoever made a label or changed it last cannot review it."""
     done = []
     for ref in act.items:
         value = stated(draft.get(ref.kind, ref.id, ref.revision))
@@ -61,7 +61,7 @@ def send_back(draft: Draft, scope: Scope, act: SendBack) -> str:
 
 
 def remove(draft: Draft, scope: Scope, act: Remove) -> str:
-    """What names a removed track as the lead, or in an event, goes with it: it would name nothing."""
+    """Lead ranges and events that refer to a removed track are removed as well."""
     done = []
     for ref in act.items:
         done.append(draft.get(ref.kind, ref.id, ref.revision).value)
@@ -73,7 +73,7 @@ def remove(draft: Draft, scope: Scope, act: Remove) -> str:
 
 
 def forget_tracks(draft: Draft, gone: set[int]) -> None:
-    """Take tracks that are no more out of ranges and events."""
+    """Remove deleted tracks from ranges and events."""
     for number, item in draft.all("lead").items():
         if cast("LeadRange", item.value).lead in gone:
             draft.put("lead", number, None)
@@ -84,14 +84,15 @@ def forget_tracks(draft: Draft, gone: set[int]) -> None:
 
 
 def _still_proposed(draft: Draft, done: Sequence[Value]) -> str:
-    """Who leads in an accepted range, and has not been looked at: such a lead judges nothing yet."""
+    """A note about tracks that lead in an accepted range but have not been accepted themselves: such a lead is not
+    scored yet."""
     leads = sorted({each.lead for each in done if isinstance(each, LeadRange) and isinstance(each.lead, int)})
     left = [f"#{lead}" for lead in leads if track_of(draft, lead).state == "proposed"]
     return f"; {', '.join(left)} {'is' if len(left) == 1 else 'are'} still proposed" if left else ""
 
 
 def _answered(value: Stated) -> Stated:
-    """Without what a reviewer asked for: it has been looked at."""
+    """The label without a reviewer's comment, because it has been handled."""
     return replace(value, comment="")
 
 
@@ -101,7 +102,7 @@ def _names(values: Sequence[Value]) -> str:
 
 
 def _name(value: Value) -> str:
-    """As people call it: a range of the lead has no number that they know."""
+    """Display name: lead ranges have no number that users know."""
     if isinstance(value, LabelTrack):
         return f"#{value.id}"
     if isinstance(value, FrameTag):

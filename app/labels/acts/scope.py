@@ -18,33 +18,33 @@ S = TypeVar("S", LabelTrack, LeadRange, PathLabel, EventLabel)
 
 @dataclass(frozen=True)
 class Scope:
-    """The drive that an act is on."""
+    """The drive that an act applies to."""
 
     t_ns: tuple[int, ...]
-    """Ticks of all its frames: acts interpolate over time."""
+    """Ticks of all its frames, for interpolation over time."""
     classes: ClassList = field(default_factory=default_classes)
-    """Classes that people choose from."""
+    """Classes available in the project."""
 
     def check(self, first: int, last: int | None = None) -> None:
-        """BadAct for frames that the recording does not have."""
+        """BadAct for frames outside the recording."""
         count, last = len(self.t_ns), first if last is None else last
         if not 0 <= first <= last < count:
             raise BadAct(outside_text(first, last, count))
 
 
 def by_person(draft: Draft, how: str = "") -> Origin:
-    """how: what the person only pointed at was measured by."""
+    """how: the measurement, if the person only pointed at the object."""
     return Origin("person", draft.person, draft.t_unix_ms, how=how)
 
 
 def track_of(draft: Draft, number: int, revision: int | None = None) -> LabelTrack:
-    """A track by its number. NoSuchLabel without it; with ``revision``, a conflict where it has changed since."""
+    """A track by its id. NoSuchLabel if it does not exist; with ``revision``, Stale if it has changed since."""
     return cast("LabelTrack", draft.get("track", number, revision).value)
 
 
 def corrected(draft: Draft, track: LabelTrack, *, placed: bool = False) -> None:
-    """A person changed it: no proposal any more, who says so is that person, and nobody has reviewed that. placed: it
-    was put somewhere by hand. Until then, where it was only pointed at, what was measured stays what it is worth."""
+    """Mark a track as changed by a person: it is no longer a proposal, the person becomes its author, and earlier
+    reviews are void. placed: it was positioned by hand. Until then, a measured position keeps its origin."""
     how = "" if placed else track.origin.how
     state = track.state if how else "corrected"
     draft.put(
@@ -53,7 +53,7 @@ def corrected(draft: Draft, track: LabelTrack, *, placed: bool = False) -> None:
 
 
 def stated(item: Item) -> Stated:
-    """Its value, which has a state. BadAct for a tag."""
+    """Its value, which must have a state. BadAct for a tag."""
     if item.kind == "tag":
         raise BadAct("tags cannot be accepted or rejected")
     return cast("Stated", item.value)

@@ -31,7 +31,7 @@ def set_sighting(draft: Draft, scope: Scope, act: SetSighting) -> str:
 
 
 def drop_keyframe(draft: Draft, scope: Scope, act: DropKeyframe) -> str:
-    """Interpolate a frame again that was set by hand. ActRefused where it is no keyframe."""
+    """Interpolate a frame again that was set by hand. ActRefused if it is not a keyframe."""
     track = track_of(draft, act.track, act.revision)
     old = draft.sightings(track.id)
     if act.frame not in old or not old[act.frame].keyframe:
@@ -42,7 +42,7 @@ def drop_keyframe(draft: Draft, scope: Scope, act: DropKeyframe) -> str:
 
 
 def drop_sightings(draft: Draft, scope: Scope, act: DropSightings) -> str:
-    """Remove a track from a range of frames. ActRefused where it is not in any of them."""
+    """Remove a track from a range of frames. ActRefused if it is in none of them."""
     scope.check(act.first, act.last)
     track = track_of(draft, act.track, act.revision)
     there = draft.sightings(track.id, act.first, act.last)
@@ -69,7 +69,7 @@ def size_along(draft: Draft, scope: Scope, act: SizeAlong) -> str:
 
 
 def add_sightings(draft: Draft, scope: Scope, act: AddSightings) -> str:
-    """Where the track was not before; none of them is a keyframe."""
+    """Add sightings in frames without one; none of them becomes a keyframe."""
     track = track_of(draft, act.track, act.revision)
     old = draft.sightings(track.id)
     new = {each.frame: replace(each.sighting(), keyframe=False) for each in act.sightings if each.frame not in old}
@@ -96,14 +96,15 @@ def flip(draft: Draft, scope: Scope, act: Flip) -> str:
 
 
 def _put(draft: Draft, track: int, old: Mapping[int, Sighting], new: Mapping[int, Sighting]) -> None:
-    """The frames that are others."""
+    """Store the frames that differ."""
     changed: dict[int, Sighting | None] = {frame: each for frame, each in new.items() if old.get(frame) != each}
     changed.update(dict.fromkeys(old.keys() - new.keys()))
     draft.put_sightings(track, changed)
 
 
 def _with_what_was_said(new: Sighting, old: Sighting | None) -> Sighting:
-    """What a hand that moves it says nothing of. A truncation that was read is of the shape that it had."""
+    """Keep the properties that moving the track does not change. An imported truncation applies only to the original
+    shape."""
     if old is None:
         return new
     is_same = (old.cuboid, old.bbox) == (new.cuboid, new.bbox)

@@ -27,8 +27,8 @@ def tag(draft: Draft, scope: Scope, act: Tag) -> str:
 
 
 def put_tag(draft: Draft, new: FrameTag) -> None:
-    """Where it is not said yet: what another said stays theirs. Right before or after what the same person said it is
-    one with that."""
+    """Add a tag to the frames that do not have it yet; tags by others keep their author. Joined with adjacent tags by
+    the same person."""
     said = {frame for old in _ranges(draft, new.tag).values() for frame in range(old.first, old.last + 1)}
     for first, last in free_spans(new.first, new.last, said):
         part = replace(new, first=first, last=last)
@@ -41,7 +41,7 @@ def put_tag(draft: Draft, new: FrameTag) -> None:
 
 
 def _clear(draft: Draft, act: Tag) -> None:
-    """Cut the word's ranges out of the act's frames, whoever said it."""
+    """Cut the act's frames out of all ranges of the tag, whoever set it."""
     for number, old in _ranges(draft, act.tag).items():
         if old.last < act.first or old.first > act.last:
             continue
@@ -52,7 +52,7 @@ def _clear(draft: Draft, act: Tag) -> None:
 
 
 def _ranges(draft: Draft, word: str) -> dict[int, FrameTag]:
-    """Where a word is said, by number."""
+    """Ranges of a tag, by id."""
     tags = {number: cast("FrameTag", item.value) for number, item in draft.all("tag").items()}
     return {number: each for number, each in tags.items() if each.tag == word}
 

@@ -16,7 +16,7 @@ from pipeline.labels.model import Attribute, EventLabel, LabelTrack, LeadRange
 
 
 def add_track(draft: Draft, scope: Scope, act: AddTrack) -> str:
-    """Begin a track at a cuboid or box drawn by hand."""
+    """Start a track with a cuboid or box drawn by hand."""
     scope.check(act.frame)
     number = draft.next_number("track")
     draft.add("track", LabelTrack(number, scope.classes.named(act.label), (), "corrected", by_person(draft)))
@@ -25,7 +25,7 @@ def add_track(draft: Draft, scope: Scope, act: AddTrack) -> str:
 
 
 def add_measured(draft: Draft, scope: Scope, act: AddMeasured) -> str:
-    """Where a person pointed is a vehicle; what was measured there is a proposal until somebody says that it is so."""
+    """Start a track where a person pointed; the measured position is a proposal until somebody accepts it."""
     scope.check(act.frame)
     number = draft.next_number("track")
     draft.add("track", LabelTrack(number, scope.classes.named(act.label), (), "proposed", by_person(draft, act.how)))
@@ -41,7 +41,7 @@ def relabel(draft: Draft, scope: Scope, act: Relabel) -> str:
 
 
 def split(draft: Draft, scope: Scope, act: Split) -> str:
-    """Ranges of the lead and events from that frame on name the new one."""
+    """Split a track. Lead ranges and events from that frame on refer to the new track."""
     scope.check(act.frame)
     track = track_of(draft, act.track, act.revision)
     there = draft.sightings(track.id)
@@ -61,7 +61,7 @@ def split(draft: Draft, scope: Scope, act: Split) -> str:
 
 
 def merge(draft: Draft, scope: Scope, act: Merge) -> str:
-    """Join two tracks of one vehicle under the first number. Where both have a frame, the first one counts."""
+    """Join two tracks of one vehicle under the first id. In frames that both have, the first one's sighting is kept."""
     first, second = (track_of(draft, ref.id, ref.revision) for ref in act.tracks)
     if first.id == second.id:
         raise ActRefused("a track cannot be merged with itself")
@@ -74,7 +74,7 @@ def merge(draft: Draft, scope: Scope, act: Merge) -> str:
 
 
 def _together(first: tuple[Attribute, ...], second: tuple[Attribute, ...]) -> tuple[Attribute, ...]:
-    """The second's where the first says nothing by that name."""
+    """Attributes of both; the second's apply where the first has no value."""
     more = [
         each
         for each in second
@@ -84,7 +84,7 @@ def _together(first: tuple[Attribute, ...], second: tuple[Attribute, ...]) -> tu
 
 
 def _share_attributes(draft: Draft, track: LabelTrack, new: int, frame: int) -> None:
-    """What is said of the frames from one on is said of the new track."""
+    """Attributes from a frame on move to the new track."""
     before = (replace(each, last=min(each.last, frame - 1)) for each in track.attributes if each.first < frame)
     after = (replace(each, first=max(each.first, frame)) for each in track.attributes if each.last >= frame)
     for number, said in ((track.id, tuple(before)), (new, tuple(after))):
@@ -92,7 +92,7 @@ def _share_attributes(draft: Draft, track: LabelTrack, new: int, frame: int) -> 
 
 
 def _rename_from(draft: Draft, old: int, new: int, frame: int) -> None:
-    """Ranges of the lead and events name another track from a frame on."""
+    """Let lead ranges and events refer to another track from a frame on."""
     for number, item in draft.all("lead").items():
         lead = cast("LeadRange", item.value)
         if lead.lead != old or lead.last < frame:

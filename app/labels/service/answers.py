@@ -32,7 +32,7 @@ def changes_json(info: DriveInfo, changes: LabelSetChanges) -> dict[str, Any]:
 
 
 def window_json(labels: DriveLabels, first: int, last: int) -> dict[str, Any]:
-    """The tracks of every frame from first to last that has one."""
+    """The tracks in every frame from first to last that contains one."""
     revision, found = labels.window(first, last)
     return {
         "revision": revision,
@@ -51,12 +51,12 @@ def track_json(item: Item) -> dict[str, Any]:
 
 
 def item_json(item: Item) -> dict[str, Any]:
-    """An item as the API gives it, with its revision."""
+    """An item in the API's format, with its revision."""
     return {"id": item.id, **value_to_json(item.kind, item.value), "revision": item.revision}
 
 
 def placed_json(sighting: Sighting) -> dict[str, Any]:
-    """One frame of a track: cuboid (ego frame, metres), image box (pixels), and what is known of them."""
+    """One frame of a track: cuboid (ego frame, metres), image box (pixels), and their properties."""
     cuboid = sighting.cuboid
     return {
         "cuboid": cuboid._asdict() if cuboid is not None else None,
@@ -69,12 +69,12 @@ def placed_json(sighting: Sighting) -> dict[str, Any]:
 
 
 def history_json(entry: HistoryEntry) -> dict[str, Any]:
-    """One act with the items as they were before and after it."""
+    """One act with the items before and after it."""
     return {**vars(entry), "before": _content_json(entry.before), "after": _content_json(entry.after)}
 
 
 def _content_json(content: dict[str, Any] | None) -> dict[str, Any] | None:
-    """The item as it was, with the sightings that the act touched."""
+    """The stored item, with the sightings that the act changed."""
     if content is None:
         return None
     sightings = []

@@ -20,10 +20,10 @@ from pipeline.params import GroundParams
 from pipeline.types import F32
 
 _NEAR_M = 30.0
-"""Nearer than this a vehicle has points, where there is a sweep."""
+"""Closer than this, a vehicle has points if there is a sweep."""
 _MOST_READ = 200
 _OFF_ROAD_M = 0.5
-"""Planes fitted to a road that bends up or down are off by 0.3 m at 30 m."""
+"""Planes fitted to a road with vertical curvature have an error of 0.3 m at 30 m."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Checked:
     """What the checks found at one revision."""
 
     revision: int
-    """Of the labels that were looked at; newer labels are checked again."""
+    """Revision of the checked labels; newer labels are checked again."""
     problems: tuple[Problem, ...]
     """In order of frames."""
 
@@ -45,7 +45,7 @@ class LabelChecks:
         self._found = Checked(-1, ())
 
     def of(self, labels: DriveLabels, recording: OpenRecording) -> Checked:
-        """What can hardly be so, by frame."""
+        """Implausible labels, by frame."""
         with self._lock:
             revision = labels.revision
             if self._of is not labels or self._found.revision != revision:
@@ -57,8 +57,8 @@ class LabelChecks:
 
 
 def _empty(labels: LabelSet, recording: OpenRecording) -> list[Problem]:
-    """Near cuboids without a single point, or in or over the road: one frame of each track, and only of what people
-    stand behind."""
+    """Near cuboids without a single point, or below or above the road: one frame per track, and only labels accepted by
+    people."""
     found: list[Problem] = []
     for track in [each for each in labels.tracks if each.state in ("accepted", "corrected")][:_MOST_READ]:
         frame = _nearest(track)
@@ -78,14 +78,14 @@ def _empty(labels: LabelSet, recording: OpenRecording) -> list[Problem]:
 
 
 def _above_road_m(points: F32, cuboid: Cuboid) -> float:
-    """How far its bottom is above the ground there; 0 where no ground was found."""
+    """Height of its bottom above the ground there; 0 without a fitted ground."""
     ground = fit_ground(points, np.ones(len(points), dtype=bool), GroundParams())
     height_m = float(ground.height(np.array([cuboid.center[:2]]))[0])
     return cuboid.center[2] - cuboid.size[2] / 2 - height_m if math.isfinite(height_m) else 0.0
 
 
 def _nearest(track: LabelTrack) -> int | None:
-    """The frame in which it is nearest; None where it never is near, ahead of us."""
+    """The frame in which it is nearest; None if it is never near and ahead of us."""
     ahead = [
         (each.cuboid.center[0], each.frame)
         for each in track.sightings

@@ -37,25 +37,25 @@ if TYPE_CHECKING:
 logger = logging.getLogger("cipv.labels")
 
 _LOOK_EVERY_S = 0.4
-"""Others see within a second what was done through another server."""
+"""Changes made through another server become visible within a second."""
 _PATIENCE_S = 10.0
 
 
 @dataclass(frozen=True)
 class ActDone:
-    """An act that is on disk, or changed nothing, and the labels that it was done to: those stay what they are when
-    something else is opened meanwhile."""
+    """An act that is on disk, or changed nothing, and the labels it was applied to; these stay the same if another
+    source is opened meanwhile."""
 
     acted: Acted
-    """What it changed, with its number in the log."""
+    """The change, with its number in the log."""
     labels: DriveLabels
-    """Of the drive that the act was on."""
+    """Labels of the act's drive."""
 
 
 class LabelDesk:
-    """Any thread. database, open_later: as of ``KeptLabels``; it is opened too when what is open is shown. The desk
-    hears of parameters that are settled from ``Control`` and gives them back when they are undone, and wakes it
-    whenever ``state`` is another."""
+    """Any thread. database, open_later: see ``KeptLabels``; the database is also opened when the source is shown. The
+    desk receives final parameter changes from ``Control``, sets parameters there on undo, and wakes it whenever
+    ``state`` changes."""
 
     def __init__(
         self,
@@ -64,7 +64,7 @@ class LabelDesk:
         open_later: Callable[[], Database] | None = None,
         classes: ClassList | None = None,
     ) -> None:
-        """classes: the project's; the program's otherwise."""
+        """classes: classes of the project; None for the defaults."""
         self.classes = classes or default_classes()
         self.kept = KeptLabels(database, open_later)
         self._control = Control(Wish(Params()))
@@ -82,10 +82,10 @@ class LabelDesk:
         self._settling = SettlingQueue(self.refresh)
         self.tasks = Tasks(self.refresh)
 
-    # ------------------------------------------------------------ what is open
+    # ------------------------------------------------------------ open source
 
     def start(self, control: Control) -> None:
-        """control: whose parameters are meant."""
+        """control: source and target of parameter changes."""
         self._control = control
         control.on_settle = self.settle
         self._thread.start()
@@ -101,15 +101,15 @@ class LabelDesk:
         self.kept.close()
 
     def open(self, uri: str, recording: OpenRecording | None) -> None:
-        """Something else was opened; None for what has no frames to label. Its labels are looked for a little later,
-        when it is shown."""
+        """Another source was opened; None if it has no frames to label. Its labels are loaded later, when it is
+        shown."""
         self.tasks.cancel()
         with self._lock:
             self._open = Opened(uri, recording, self.kept)
             self._state = LabelState(labelled=recording is not None)
 
     def shown(self) -> None:
-        """What is open is shown: now is the time for its labels."""
+        """The open source is shown: load its labels now."""
         self._is_shown = True
 
     @property
@@ -118,35 +118,35 @@ class LabelDesk:
 
     @property
     def recording(self) -> OpenRecording:
-        """What can be labelled. NoSuchLabel when nothing can."""
+        """The open recording. NoSuchLabel if there is none to label."""
         return self._open.framed()
 
     @cached_property
     def checks(self) -> LabelChecks:
-        from app.labels.service.checks import LabelChecks  # what it looks with is not needed to drive
+        from app.labels.service.checks import LabelChecks  # the modules for the checks are not needed for driving
 
         return LabelChecks()
 
     @property
     def params(self) -> Params:
-        """Those that are in use."""
+        """The current parameters."""
         return self._control.peek().params
 
     @property
     def labels(self) -> DriveLabels:
-        """Of the open recording. NoSuchLabel when none is open."""
+        """Labels of the open recording. NoSuchLabel if none is open."""
         opened = self._open
         opened.framed()
         return opened.labels
 
     @property
     def drive(self) -> str | None:
-        """The key of the open recording; None for what has no frames to label."""
+        """The key of the open recording; None if the source has no frames to label."""
         return self._open.key
 
     @cached_property
     def scores(self) -> LabelScores:
-        """Runs against labels."""
+        """Scores of runs against labels."""
         from app.labels.service.scoring import LabelScores
 
         return LabelScores(self.classes)
@@ -154,8 +154,8 @@ class LabelDesk:
     # ------------------------------------------------------------ acts
 
     def act(self, person: str, act: Any, drive: str, act_id: str | None = None) -> ActDone:
-        """Do it; on disk when this returns. Whatever refuses it. drive: the key of the recording that is meant.
-        act_id: of who sends it; what was sent before is not done again."""
+        """Perform an act; it is on disk when this returns. Raises the error that refuses it. drive: key of the intended
+        recording. act_id: chosen by the client; an act that was already sent is not repeated."""
         recording, labels = self._open.named(drive)
         done = labels.log.sent_before(act_id, person)
         if done is None:
@@ -174,13 +174,13 @@ class LabelDesk:
         return ActDone(done, labels)
 
     def move(self, way: Way, person: str, drive: str | None, act_id: str | None = None) -> ActDone:
-        """Undo or redo, across labels and parameters; what is only being tried is undone first. ActRefused when there
-        is nothing to, or somebody else is in the way. drive, act_id: as in ``act``; None for what has no frames to
-        label."""
+        """Undo or redo, across labels and parameters; parameters that are only being tried are reverted first.
+        ActRefused if there is nothing to undo, or if it conflicts with another person's change. drive, act_id: see
+        ``act``; None for a source without frames to label."""
         labels = self._open.meant(drive)
         self._settling.finish()
-        with self._control.alone():  # a change that comes between would be lost to what is restored
-            self._settling.finish()  # of what came in between
+        with self._control.alone():  # a concurrent change would be overwritten by the restored values
+            self._settling.finish()  # includes changes that arrived in the meantime
             acted = labels.log.sent_before(act_id, person)
             if acted is None and way == "undo" and self._forget_tried(act_id):
                 from app.labels.store.act_log import Acted
@@ -194,8 +194,8 @@ class LabelDesk:
         return ActDone(acted, labels)
 
     def begin(self, person: str, act: Propose | Import, drive: str, act_id: str | None = None) -> int:
-        """Something that takes a while; its number. ActRefused while another one goes on, or when it cannot be done.
-        drive, act_id: as in ``act``."""
+        """Start a long task; returns its id. ActRefused if another one is running, or if it is not possible. drive,
+        act_id: see ``act``."""
         from app.labels.acts.bulk import importing_truth, proposing
 
         recording, labels = self._open.named(drive)
@@ -210,16 +210,15 @@ class LabelDesk:
             return number
 
     def begin_import(self, person: str, file: Path, name: FormatName, drive: str) -> int:
-        """Labels of a file or folder that was handed in, as another tool made them; it is removed in the end."""
+        """Import labels from an uploaded file or folder of another tool; the file is removed at the end."""
         from app.labels.transfer.files import importing_file
 
         recording, labels = self._open.named(drive)
         return self.tasks.begin("import", importing_file(labels, recording, person, file, name))
 
     def possible(self, person: str) -> tuple[bool, bool]:
-        """(there is something to take back, something to do again) for a person; nothing while the database fails:
-        nobody who changes parameters waits for one that is known to be away. What is on its way there can be taken
-        back: that waits for it."""
+        """(can undo, can redo) for a person; both false while the database fails, so that changing parameters does not
+        wait for a database that is known to be unavailable. Pending changes can be undone: the undo waits for them."""
         if self._settling.has(self._open.uri, person):
             return True, False
         if self._trouble:
@@ -230,8 +229,8 @@ class LabelDesk:
             return False, False
 
     def settle(self, changes: Mapping[str, tuple[Any, Any]], person: str = "", *, merges: bool = False) -> None:
-        """Parameters were changed. A database that is held or fails does not keep anybody from driving: the change is
-        written later, or it is said that it cannot be undone."""
+        """Parameters were changed. A locked or failing database must not block driving: the change is written later, or
+        a message says that it cannot be undone."""
         opened = self._open
         if not changes:
             return
@@ -240,7 +239,7 @@ class LabelDesk:
             self._show(opened, replace(self._state, can_undo=True, can_redo=False))
 
     def refresh(self) -> None:
-        """Look at the database now. What goes wrong there is said once, until it goes right again."""
+        """Poll the database now. A recurring error is reported once, until the next success."""
         opened = self._open
         if not opened.uri:
             return
@@ -249,7 +248,7 @@ class LabelDesk:
             on_its_way = self._settling.has(opened.uri, "")
             can_undo, can_redo = (True, False) if on_its_way else labels.log.possible("")
             revision = labels.revision
-        except Exception as error:  # whatever a database or a recording does, people go on driving
+        except Exception as error:  # errors of a database or a recording must not stop driving
             if str(error) != self._trouble:
                 logger.warning("labels: %s", error)
             self._trouble = str(error)
@@ -258,10 +257,10 @@ class LabelDesk:
         self._trouble = ""
         self._show(opened, LabelState(revision, can_undo, can_redo, opened.recording is not None, self.tasks.state))
 
-    # ------------------------------------------------------------ inside
+    # ------------------------------------------------------------ internal
 
     def _show(self, opened: Opened, new: LabelState) -> None:
-        """To everybody, unless something else is open by now."""
+        """Publish the state, unless another source is open by now."""
         with self._lock:
             if opened is not self._open:
                 return
@@ -271,7 +270,7 @@ class LabelDesk:
             self._control.change()
 
     def _forget_tried(self, act_id: str | None) -> bool:
-        """Whether this took back what was being tried, now or when it was sent before."""
+        """Whether this reverted parameters that were being tried, now or in an earlier request with this id."""
         if act_id is not None and act_id == self._forgot:
             return True
         forgot = self._control.forget_tried()
@@ -279,7 +278,7 @@ class LabelDesk:
         return forgot
 
     def _look(self) -> None:
-        """The thread: what others write to the same database is seen here too."""
+        """The polling thread: shows changes that others make in the same database."""
         while not self._ended:
             self._wake.wait(_LOOK_EVERY_S)
             self._wake.clear()

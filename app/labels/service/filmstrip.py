@@ -18,7 +18,7 @@ from pipeline.params import Params
 _MOST_KEYFRAMES = 8
 _WORST = 4
 _MOST_READ = 60
-"""Frames whose points are looked at: a long track is sampled."""
+"""Maximum frames whose points are read: a long track is sampled."""
 _JPEG_QUALITY = 80
 Why = Literal["keyframe", "end", "fits worst"]
 
@@ -32,12 +32,12 @@ class Still:
     why: Why
     """Why this frame was chosen."""
     fit: Fit | None
-    """How its cuboid lies on the points; None where it has no cuboid, or the frame no points."""
+    """How well its cuboid fits the points; None if it has no cuboid, or the frame has no points."""
 
 
 def filmstrip(track: LabelTrack, recording: OpenRecording) -> list[Still]:
-    """By frame: both ends, keyframes (some, where there are many), and those of the others in which most points lie
-    beside the cuboid."""
+    """By frame: both ends, keyframes (a sample if there are many), and the other frames with the most points beside the
+    cuboid."""
     why: dict[int, Why] = {each.frame: "end" for each in (*track.sightings[:1], *track.sightings[-1:])}
     keys = [each for each in track.sightings if each.keyframe]
     why |= {each.frame: "keyframe" for each in sampled(keys, _MOST_KEYFRAMES)}
@@ -52,13 +52,13 @@ def filmstrip(track: LabelTrack, recording: OpenRecording) -> list[Still]:
 
 
 def sampled(sightings: Sequence[Sighting], most: int) -> list[Sighting]:
-    """First, last and some evenly between."""
+    """First, last and some evenly spaced in between."""
     places = np.unique(np.linspace(0, len(sightings) - 1, min(most, len(sightings))).round().astype(int))
     return [sightings[place] for place in places]
 
 
 def close_up_jpeg(track: LabelTrack, index: int, recording: OpenRecording, params: Params) -> bytes | None:
-    """A track in one frame; None where it is not."""
+    """Image of a track in one frame; None if it is not in the frame."""
     sighting = track.at(index)
     if sighting is None:
         return None

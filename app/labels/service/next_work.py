@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 What = Literal["unlabelled", "asked", "disagreement", "proposed", "sent_back", "unreviewed"]
 LabelKey = tuple[ItemKind, int]
-"""TaskKind and number of a label."""
+"""Kind and id of a label."""
 _NOTHING: dict[What, str] = {
     "unlabelled": "the lead is labelled in every frame there",
     "asked": "no more frames are asked for there",
@@ -36,9 +36,9 @@ class WorkPlace:
     frame: int
     """Of the drive, from 0."""
     why: str
-    """What is to be done there, in words."""
+    """What is to do there, in words."""
     item: LabelKey | None = None
-    """What it is about, where that is one label."""
+    """The label concerned, if it is a single one."""
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,15 @@ class Asked:
     direction: int
     """1 forwards, -1 backwards."""
     person: str = ""
-    """Who asks: nobody reviews their own labels."""
+    """The person who asks, because nobody reviews their own labels."""
     after: LabelKey | None = None
-    """Of several labels in that frame, the one that was looked at; None to go beyond the frame."""
+    """If the frame has several labels, the one that was just handled; None to go beyond the frame."""
 
 
 def where_next(
     labels: DriveLabels, scores: LabelScores, run: DriveRun | None, asked: Asked
 ) -> tuple[WorkPlace | None, str, int]:
-    """(the nearest such place, why it is one or why there is none, how many there are in the drive)."""
+    """(the nearest place, the reason or why there is none, number of such places in the drive)."""
     places = _places(labels, scores, run, asked)
     here, way = _order(WorkPlace(asked.frame, "", asked.after)), 1 if asked.direction > 0 else -1
     ahead = [
@@ -94,7 +94,7 @@ def _places(labels: DriveLabels, scores: LabelScores, run: DriveRun | None, aske
 
 
 def _unlabelled(labels: DriveLabels) -> list[WorkPlace]:
-    """A proposal is nobody's word."""
+    """Frames without a label by a person; proposals do not count."""
     said: set[int] = set()
     proposed: set[int] = set()
     for lead in _leads(labels):
@@ -108,7 +108,7 @@ def _unlabelled(labels: DriveLabels) -> list[WorkPlace]:
 
 
 def _asked(labels: DriveLabels) -> list[WorkPlace]:
-    """Where a range of frames begins that was asked for, and their lead is not labelled."""
+    """Starts of requested frame ranges whose lead is not labelled."""
     unlabelled = {place.frame for place in _unlabelled(labels)}
     tags = sorted((cast("FrameTag", item.value) for item in labels.items("tag").values()), key=lambda tag: tag.first)
     return [
@@ -120,7 +120,7 @@ def _asked(labels: DriveLabels) -> list[WorkPlace]:
 
 
 def _waiting(labels: DriveLabels, *, sent_back: bool) -> list[WorkPlace]:
-    """Where what is proposed, or was sent back, begins."""
+    """Starts of labels that are proposed, or were sent back."""
     places = []
     for frame, item in _begun(labels):
         value = item.value
@@ -132,8 +132,8 @@ def _waiting(labels: DriveLabels, *, sent_back: bool) -> list[WorkPlace]:
 
 
 def _unreviewed(labels: DriveLabels, person: str) -> list[WorkPlace]:
-    """Where what somebody else stands behind begins, and no second person has looked at it. What this person made or
-    changed last is for another."""
+    """Starts of labels accepted by other people that no second person has reviewed. Labels that this person made or
+    changed last are reviewed by others."""
     changed_by = labels.changed_by()
     places = []
     for frame, item in _begun(labels):
@@ -148,7 +148,7 @@ def _unreviewed(labels: DriveLabels, person: str) -> list[WorkPlace]:
 
 
 def _begun(labels: DriveLabels) -> Iterable[tuple[int, Item]]:
-    """Every label that is in a frame, with the first one."""
+    """Every label, with its first frame."""
     found = labels.changes()
     for item in found.items:
         value = item.value
@@ -171,7 +171,7 @@ def _name(item: Item) -> str:
 
 
 def _disagreements(labels: DriveLabels, scores: LabelScores, run: DriveRun | None) -> list[WorkPlace]:
-    from app.labels.service.scoring import disagreements  # what scores is imported with the first question
+    from app.labels.service.scoring import disagreements  # imported with the first request
 
     score = scores.score(labels, run) if run is not None else None
     if run is None or score is None:
@@ -183,7 +183,7 @@ def _disagreements(labels: DriveLabels, scores: LabelScores, run: DriveRun | Non
 
 
 def _unjudged(labels: DriveLabels, scores: LabelScores, run: DriveRun | None) -> str:
-    """Why nothing can disagree; empty where something can."""
+    """Why no disagreements can be found; empty if they can."""
     score = scores.score(labels, run) if run is not None else None
     if score is not None and any(frame.judged is not None for frame in score.frames):
         return ""

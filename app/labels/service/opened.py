@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 
 class KeptLabels:
-    """Any thread. database: where labels are kept. open_later: opens it when they are first asked for; without either
-    it is gone at the end, and made only when somebody asks. station: whose parameters are meant: of this server, and of
-    the same one when it is started again; set before anything is opened."""
+    """Any thread. database: storage of labels. open_later: opens it on first use; without either, a temporary database
+    is created on first use and discarded at the end. station: identifies this server, also after a restart, as the
+    owner of its parameters; set before anything is opened."""
 
     def __init__(self, database: Database | None, open_later: Callable[[], Database] | None) -> None:
         self.station = socket.gethostname()
@@ -34,11 +34,12 @@ class KeptLabels:
 
     @property
     def outlast(self) -> bool:
-        """Whether there may be some from before, and others may change them."""
+        """Whether the database is permanent, so that it may contain earlier labels and others may change them."""
         return self.is_open or self._open_later is not None
 
     def of(self, uri: str, recording: OpenRecording | None) -> DriveLabels:
-        """Of a recording, or of what has no frames to label. BadInput when the database cannot be opened."""
+        """Labels of a recording, or the log of a source without frames to label. BadInput if the database cannot be
+        opened."""
         from app.labels.store.drive_labels import DriveLabels
 
         return DriveLabels(self._opened(), _info(uri, recording), self.station)
@@ -58,20 +59,20 @@ class KeptLabels:
 
 @dataclass(eq=False)
 class Opened:
-    """What is open."""
+    """The open source."""
 
     uri: str
     """As it was opened."""
     recording: OpenRecording | None
-    """None for what has no frames to label."""
+    """None if it has no frames to label."""
     kept: KeptLabels
-    """Where its labels are."""
+    """Storage of its labels."""
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _labels: DriveLabels | None = None
 
     @property
     def labels(self) -> DriveLabels:
-        """Found in the database when first asked for."""
+        """Loaded from the database on first use."""
         with self._lock:
             if self._labels is None:
                 self._labels = self.kept.of(self.uri, self.recording)
@@ -79,24 +80,24 @@ class Opened:
 
     @property
     def key(self) -> str | None:
-        """Of the recording; None for what has no frames to label."""
+        """Key of the recording; None if the source has no frames to label."""
         return self.labels.info.key if self.recording is not None else None
 
     def framed(self) -> OpenRecording:
-        """What can be labelled. NoSuchLabel when nothing can."""
+        """The recording to label. NoSuchLabel if there is none."""
         if self.recording is None:
             raise NoSuchLabel("no recording is open")
         return self.recording
 
     def meant(self, drive: str | None) -> DriveLabels:
-        """The labels of what has this key. ActRefused when another recording is open, or one at all where none is
-        meant."""
+        """The labels of the source with this key. ActRefused if another recording is open, or a recording is open and
+        ``drive`` is None."""
         if drive != self.key:
             raise ActRefused("another recording is open now")
         return self.labels
 
     def named(self, drive: str) -> tuple[OpenRecording, DriveLabels]:
-        """ActRefused when it is not the recording with this key, NoSuchLabel when it has no frames to label."""
+        """ActRefused if the recording with this key is not open, NoSuchLabel if it has no frames to label."""
         return self.framed(), self.meant(drive)
 
 

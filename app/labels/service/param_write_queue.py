@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger("cipv.labels")
 
 _MOMENT_S = 0.1
-"""A database that nobody holds takes some milliseconds: who changes a parameter then hears of it when it is on disk."""
+"""An unlocked database needs some milliseconds, so a parameter change is normally on disk when the call returns."""
 _PATIENCE_S = 30.0
 _MOST = 1000
 
@@ -34,8 +34,9 @@ class _Change:
 
 
 class SettlingQueue:
-    """Writes them one after the other, on a thread of its own. Any thread. written: called after each, and after a
-    failure. What was not written is not kept: ``trouble`` says so until a change is written again."""
+    """Writes changes one after the other, on its own thread. Any thread. written: called after each write, and after a
+    failure. Changes that could not be written are discarded; ``trouble`` reports this until the next successful
+    write."""
 
     def __init__(self, written: Callable[[], object]) -> None:
         self.trouble = ""
@@ -48,7 +49,7 @@ class SettlingQueue:
     def put(
         self, uri: str, log: Callable[[], Log], changes: Mapping[str, tuple[Any, Any]], person: str, *, merges: bool
     ) -> None:
-        """On disk when this returns, if that takes a moment only; else later. uri, log: of what is open."""
+        """Written when this returns if that takes only a moment; else later. uri, log: of the open source."""
         change = _Change(uri, log, changes, person, merges)
         with self._changed:
             if len(self._waiting) >= _MOST:
@@ -61,18 +62,19 @@ class SettlingQueue:
         change.over.wait(_MOMENT_S)
 
     def has(self, uri: str, person: str) -> bool:
-        """Whether a change there that this person could take back is on its way."""
+        """Whether a change that this person could undo is pending."""
         with self._changed:
             return any(change.uri == uri and change.person in ("", person) for change in self._waiting)
 
     def finish(self) -> None:
-        """Wait until all are written, so that what comes next comes after them. ActRefused when that takes too long."""
+        """Wait until all are written, so that the next operation is later in the log. ActRefused if that takes too
+        long."""
         with self._changed:
             if not self._changed.wait_for(lambda: not self._waiting, _PATIENCE_S):
                 raise ActRefused("an earlier parameter change is still being saved")
 
     def stop(self) -> None:
-        """What is on its way is written first, if the database lets it."""
+        """Pending changes are written first, if the database permits."""
         with self._changed:
             self._ended = True
             self._changed.notify_all()
@@ -92,7 +94,7 @@ class SettlingQueue:
                 if trouble is None:
                     self._waiting.popleft()
                     self.trouble = ""
-                else:  # each of the others would wait as long, to be refused as well
+                else:  # each of the others would wait as long and fail as well
                     self._waiting.clear()
                     self._failed(len(over), trouble)
                 self._changed.notify_all()
@@ -107,12 +109,12 @@ class SettlingQueue:
 
 
 def _written(change: _Change) -> str | None:
-    """Why it was not; None when it was."""
+    """The reason of a failure; None if it was written."""
     try:
         change.log().settle(change.changes, change.person, merges=change.merges)
     except BadInput as error:
         return str(error)
-    except Exception as error:  # a person goes on driving whatever a database does, and hears of it
+    except Exception as error:  # whatever a database does, the user continues driving and is informed
         logger.exception("a change of parameters")
         return str(error)
     return None

@@ -31,14 +31,14 @@ _MOST_HELD = 8
 
 @dataclass(frozen=True)
 class Standing:
-    """A run against the labels."""
+    """Score of a run against the labels."""
 
     judged: int
-    """Frames in which the labels say who leads."""
+    """Number of frames with a labelled lead."""
     metrics: tuple[Metric, ...]
-    """Every figure that this or the other run has."""
+    """All metrics that this or the other run has."""
     notes: tuple[str, ...]
-    """What does not count, and why."""
+    """What is not counted, and why."""
     errors: tuple[tuple[Cell, ...], ...]
     """Rows of ``error_rows``."""
     worst: tuple[Bad, ...]
@@ -46,10 +46,10 @@ class Standing:
 
 
 class LabelScores:
-    """Any thread. What was judged is kept until labels or runs are others."""
+    """Any thread. Scores are cached until labels or runs change."""
 
     def __init__(self, classes: ClassList | None = None) -> None:
-        """classes: sub-classes are scored as the class that they are of."""
+        """classes: sub-classes are scored as their parent class."""
         self._classes = classes or default_classes()
         self._lock = threading.Lock()
         self._of: tuple[DriveLabels, int] | None = None
@@ -57,7 +57,7 @@ class LabelScores:
         self._scores: dict[tuple[int, int], DriveScore | None] = {}
 
     def truth(self, labels: DriveLabels) -> tuple[int, DriveTruth | None]:
-        """(revision, what people stand behind; None while that is nothing)."""
+        """(revision, labels accepted by people; None without any)."""
         with self._lock:
             revision = labels.revision
             if self._of is None or self._of[0] is not labels or self._of[1] != revision:
@@ -69,7 +69,7 @@ class LabelScores:
             return revision, self._truth
 
     def score(self, labels: DriveLabels, run: DriveRun) -> DriveScore | None:
-        """One run's; None where no labelled frame has a result yet."""
+        """Score of one run; None if no labelled frame has a result yet."""
         revision, truth = self.truth(labels)
         key = (run.number, run.done)
         with self._lock:
@@ -82,7 +82,7 @@ class LabelScores:
             return self._scores[key]
 
     def standing(self, labels: DriveLabels, base: DriveRun, run: DriveRun) -> Standing:
-        """A run beside another, and what does not count; without figures where nothing is judged."""
+        """Scores of a run compared with another, and what is not counted; without metrics if nothing is labelled."""
         _, truth = self.truth(labels)
         old, new = self.score(labels, base), self.score(labels, run)
         if new is None:
@@ -100,8 +100,8 @@ class LabelScores:
         )
 
     def judged_rows(self, labels: DriveLabels, run: DriveRun) -> list[Row] | None:
-        """A run's rows, judged by labels instead of what the recording came with; None where they judge nothing. Asked
-        for while a run goes on: only who leads is looked at."""
+        """A run's rows, judged by labels instead of the recording's truth; None if there are no labels. Used while a
+        run is in progress, so only the lead is evaluated."""
         _, truth = self.truth(labels)
         rows = run.rows()
         found = _judged(run, truth) if truth is not None else {}
@@ -109,17 +109,17 @@ class LabelScores:
 
 
 def judged_by_index(score: DriveScore) -> dict[int, Judged]:
-    """The frames in which it is known who leads."""
+    """The frames in which the true lead is known."""
     return {frame.index: frame.judged for frame in score.frames if frame.judged is not None}
 
 
 def disagreements(score: DriveScore) -> Sequence[tuple[int, Judged]]:
-    """Frames in which the CIPV is not who leads, in order."""
+    """Frames in which the CIPV differs from the true lead, in order."""
     return [(index, each) for index, each in judged_by_index(score).items() if each.verdict not in ("correct", "none")]
 
 
 def _judged(run: DriveRun, truth: DriveTruth) -> dict[int, Judged]:
-    """By tick."""
+    """Verdicts by tick."""
     rules, found = Rules(RULE), {}
     for result in results_of(run, leads_only=True):
         known = truth.frames.get(result.t_ns)

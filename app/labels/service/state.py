@@ -10,23 +10,23 @@ from app.labels.service.tasks import TaskState
 
 @dataclass(frozen=True)
 class LabelState:
-    """What everybody is told of the labels of what is open."""
+    """Published state of the labels of the open source."""
 
     revision: int = 0
     """Number of the newest act."""
     can_undo: bool = False
-    """Of changes of parameters that nobody put a name to; what a person can take back is for that person to ask."""
+    """For anonymous parameter changes; a person's own undo is requested separately."""
     can_redo: bool = False
-    """The same, for what was taken back."""
+    """The same for redo."""
     labelled: bool = False
-    """Whether it is a recording; else only parameters are changed."""
+    """Whether it is a recording; otherwise only parameters are changed."""
     task: TaskState | None = None
     """Work in progress, or how the last one ended; None before the first."""
     trouble: str = ""
-    """What is wrong with the database, or went wrong with changes of parameters; empty for nothing."""
+    """A problem with the database or with writing parameter changes; empty if there is none."""
 
     def to_json(self) -> dict[str, Any] | None:
-        """None for what cannot be labelled."""
+        """None if the source cannot be labelled."""
         if not self.labelled:
             return None
         return {

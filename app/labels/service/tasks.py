@@ -16,7 +16,7 @@ _PATIENCE_S = 10.0
 _TELL_EVERY_S = 0.1
 
 TaskWork = Callable[[Progress], str]
-"""Does the work, and returns one sentence that says what came of it."""
+"""Does the work and returns one sentence with the outcome."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class TaskState:
     """A task at one moment. It stays until the next one begins, or until its recording is closed."""
 
     id: int
-    """Its number, as whoever began it was told."""
+    """Its number, as returned when it was started."""
     what: TaskKind
     """Kind of work."""
     done: int = 0
@@ -32,7 +32,7 @@ class TaskState:
     total: int = 0
     """Units of work in all; 0 until the work first reports."""
     note: str = ""
-    """What came of it, once it is done."""
+    """The outcome, once it is done."""
     error: str | None = None
     """Why it failed."""
     running: bool = True
@@ -51,7 +51,7 @@ class _Task:
 
 
 class Tasks:
-    """Any thread. ``on_change`` is called when ``state`` has changed, at most ten times a second while a task runs."""
+    """Any thread. ``on_change`` is called after changes of ``state``, at most ten times a second while a task runs."""
 
     def __init__(self, on_change: Callable[[], object]) -> None:
         self._on_change = on_change
@@ -62,7 +62,7 @@ class Tasks:
 
     @property
     def state(self) -> TaskState | None:
-        """None while there is no task to tell of."""
+        """None if there is no task."""
         task = self._task
         if task is None:
             return None
@@ -86,14 +86,14 @@ class Tasks:
         return number
 
     def cancel(self) -> None:
-        """Drop the task; what it has not written yet is never written."""
+        """Cancel the task; results not yet written are discarded."""
         with self._lock:
             if self._task is not None:
                 self._task.job.cancel()
             self._task = None
 
     def stop(self) -> None:
-        """Drop the task and wait for its thread, but not for ever."""
+        """Cancel the task and wait for its thread, for a limited time."""
         self.cancel()
         thread = self._last_thread
         if thread is not None and thread.is_alive() and thread is not threading.current_thread():

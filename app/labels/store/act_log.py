@@ -29,23 +29,23 @@ _LONGEST_HISTORY = 200
 
 @dataclass(frozen=True)
 class Acted:
-    """What was done."""
+    """Result of an act."""
 
     revision: int
-    """Of the drive, after the act."""
+    """Revision of the drive after the act."""
     act: int | None
     """Its number; None when nothing changed."""
     what: str
     """The act in words, for undo and history."""
     note: str = ""
-    """What else there is to say about it."""
+    """Additional information."""
     params: Mapping[str, Any] = field(default_factory=dict)
-    """What parameters of this program are to be now, by name."""
+    """New values of this program's parameters, by name."""
 
 
 @dataclass
 class _Turn:
-    """An act under way. is_logged: its row is written."""
+    """An act in progress. is_logged: its row is written."""
 
     connection: Connection
     draft: Draft
@@ -53,11 +53,11 @@ class _Turn:
 
 
 Apply = Callable[[Draft], str]
-"""Changes labels in a draft and says in a few words what it did: ``moved #7 in frame 12``."""
+"""Changes labels in a draft and returns a short description: ``moved #7 in frame 12``."""
 
 
 class Log:
-    """Of one drive. Any thread."""
+    """The act log of one drive. Any thread."""
 
     def __init__(self, database: Database, drive_id: int, station: str | None = None) -> None:
         self._database, self._drive_id = database, drive_id
@@ -67,8 +67,8 @@ class Log:
     # ------------------------------------------------------------ doing
 
     def act(self, kind: str, person: str, apply: Apply, *, act_id: str | None = None, note: str = "") -> Acted:
-        """Do it; on disk when this returns. What ``apply`` raises leaves everything as it was. With the ``act_id`` of
-        one that is done already, that one is answered."""
+        """Perform an act; it is on disk when this returns. If ``apply`` raises, nothing changes. If an act with this
+        ``act_id`` exists, its result is returned."""
         with self._turn(person) as turn:
             connection, draft = turn.connection, turn.draft
             done = self._sent_before(connection, act_id, person)
@@ -83,14 +83,13 @@ class Log:
             return Acted(draft.number, draft.number, what, note)
 
     def sent_before(self, act_id: str | None, person: str) -> Acted | None:
-        """What was answered to the act that was sent with this id; None when there is none. ActRefused when it is
-        another person's."""
+        """The result of an earlier act with this id; None if there is none. ActRefused if it is another person's."""
         with self._database.reading() as connection:
             return self._sent_before(connection, act_id, person)
 
     def settle(self, changes: Mapping[str, tuple[Any, Any]], person: str = "", *, merges: bool = False) -> None:
-        """Parameters that were changed, by name: before and after. merges: one step with the change before it, when
-        that was of the same parameters, and merged too."""
+        """Log changed parameters, by name: before and after. merges: undone together with the previous change, if that
+        changed the same parameters and was merging, too."""
         if not changes:
             return
         with self._turn(person) as turn:
@@ -105,7 +104,7 @@ class Log:
             more = f" and {len(changes) - 3} more" if len(changes) > 3 else ""
             self._write(turn, "nudge" if merges else "params", named + more, step=step)
 
-    # ------------------------------------------------------------ going back and forth
+    # ------------------------------------------------------------ undo and redo
 
     def move(
         self,
@@ -115,9 +114,8 @@ class Log:
         *,
         act_id: str | None = None,
     ) -> Acted:
-        """Take back the person's newest act, or do again the one taken back last. ActRefused when there is none, or
-        when somebody else changed the same label or parameter since. check: raises for parameters that cannot be.
-        act_id: as in ``act``."""
+        """Undo the person's newest act, or redo the one undone last. ActRefused if there is none, or if somebody else
+        has changed the same label or parameter since. check: raises for invalid parameters. act_id: see ``act``."""
         with self._turn(person) as turn:
             connection, draft = turn.connection, turn.draft
             done = self._sent_before(connection, act_id, person)
@@ -144,11 +142,11 @@ class Log:
             return Acted(draft.number, draft.number, what, params=draft.params)
 
     def possible(self, person: str) -> tuple[bool, bool]:
-        """(there is something to take back, something to do again) for a person."""
+        """(can undo, can redo) for a person."""
         with self._database.reading() as connection:
             return self._steps.possible(connection, person)
 
-    # ------------------------------------------------------------ looking back
+    # ------------------------------------------------------------ history
 
     def history(self, kind: ItemKind, number: int) -> list[HistoryEntry]:
         """The acts that changed an item, newest first."""
@@ -174,12 +172,12 @@ class Log:
             for row in found
         ]
 
-    # ------------------------------------------------------------ the transaction
+    # ------------------------------------------------------------ transaction
 
     @contextmanager
     def _turn(self, person: str) -> Iterator[_Turn]:
-        """The transaction of an act. Its first statement makes acts of one drive wait for each other; nothing stays of
-        one whose row was not written."""
+        """The transaction of an act. Its first statement serialises the acts of one drive; if the act's row was not
+        written, everything is rolled back."""
         with self._database.writing() as connection:
             number = connection.execute(
                 update(DriveRow)
@@ -237,8 +235,8 @@ class Log:
         return Acted(row.number, row.number, what, row.note)
 
     def _put(self, connection: Connection, draft: Draft, act: int, way: Way) -> None:
-        """What an act found (undo) or left (redo), again. ActRefused when anything does not stand as the act left it
-        (undo) or found it (redo): that would take back what somebody else did since."""
+        """Restore the state before an act (undo) or after it (redo). ActRefused if an item differs from the state after
+        the act (undo) or before it (redo), because that would revert another person's change."""
         rows = connection.execute(
             select(ChangeRow).where(ChangeRow.drive_id == self._drive_id, ChangeRow.act == act)
         ).all()

@@ -34,16 +34,16 @@ FILE = SESSIONS / "labels.db"
 _BUSY_S = 30.0
 _AGAIN_S = 0.02
 _CONNECT_S = 3
-"""A server that is away must not keep anybody waiting: parameters are changed while driving."""
+"""An unavailable server must not block: parameters are changed while driving."""
 _MIGRATION_LOCK = 0x63697076
-"""Any number that only this program takes in PostgreSQL."""
+"""Arbitrary lock number that only this program uses in PostgreSQL."""
 
 
 class Database:
-    """Open, and at the newest schema. Any thread, any number of processes."""
+    """An open database with the newest schema. Any thread, any number of processes."""
 
     def __init__(self, url: str | URL) -> None:
-        """DatabaseError when it cannot be opened or is newer than this program."""
+        """DatabaseError if it cannot be opened or is newer than this program."""
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         try:
             self.url = make_url(url)
@@ -61,7 +61,7 @@ class Database:
 
     @staticmethod
     def in_file(file: Path) -> Database:
-        """SQLite; the folder is made. DatabaseError when it cannot be."""
+        """SQLite; the folder is created. DatabaseError if it cannot be opened."""
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -70,7 +70,7 @@ class Database:
 
     @staticmethod
     def temporary() -> Database:
-        """One that is gone when it is closed."""
+        """A database that is deleted on closing."""
         folder = tempfile.TemporaryDirectory(prefix="cipv-labels-", ignore_cleanup_errors=True)
         database = Database.in_file(Path(folder.name) / "labels.db")
         database._folder = folder
@@ -78,27 +78,27 @@ class Database:
 
     @property
     def name(self) -> str:
-        """For people: the file, or the address without its password."""
+        """Display name: the file, or the address without its password."""
         return str(self.url.database) if self.is_sqlite else self.url.render_as_string(hide_password=True)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """One view, from the first question to the last, whatever others write meanwhile. DatabaseError for whatever
-        the database says."""
+        """A consistent snapshot for all queries in the block, whatever others write meanwhile. DatabaseError for any
+        database error."""
         with self._speaking(), self._engine.connect() as connection:
-            if not self.is_sqlite:  # SQLite's readers have it
+            if not self.is_sqlite:  # SQLite's readers always have a snapshot
                 connection.execution_options(isolation_level="REPEATABLE READ")
             with connection.begin():
                 yield connection
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
-        """A transaction: on disk when the block has ended, and not at all when it raised."""
+        """A transaction: committed at the end of the block, rolled back if it raises."""
         with self._speaking(), self._engine.connect().execution_options(writes=True) as connection, connection.begin():
             yield connection
 
     def insert_new(self, connection: Connection, table: type[Base], values: Mapping[str, Any]) -> bool:
-        """A row, unless one with its key is there already; whether it was written."""
+        """Insert a row unless one with its key exists; returns whether it was inserted."""
         insert = sqlite.insert if self.is_sqlite else postgresql.insert
         made = insert(table).values(values).on_conflict_do_nothing().returning(*table.__table__.primary_key)
         return connection.execute(made).first() is not None
@@ -117,7 +117,7 @@ class Database:
             raise DatabaseError(f"labels, {self.name}: {first_line(error.orig or error)}") from None
 
     def _migrate(self, connection: Connection) -> None:
-        """To the newest schema, in the transaction."""
+        """Upgrade to the newest schema, in the transaction."""
         at = None
         if inspect(connection).has_table("alembic_version"):
             at = connection.scalar(text("SELECT version_num FROM alembic_version"))
@@ -126,14 +126,15 @@ class Database:
 
 
 def open_database(url: str | None = None) -> Database:
-    """The one at ``url`` (or of the environment), else the file of this machine. DatabaseError when it cannot be."""
+    """The database at ``url`` (or from the environment), else this machine's file. DatabaseError if it cannot be
+    opened."""
     wanted = url or os.environ.get(URL_VARIABLE)
     return Database(wanted) if wanted else Database.in_file(FILE)
 
 
 def migrate(connection: Connection, at: str | None, name: str) -> None:
-    """From revision ``at``, None for an empty database. DatabaseError when nobody here knows that revision."""
-    from alembic import command  # half a second to import, which only the first start pays
+    """Upgrade from revision ``at``, None for an empty database. DatabaseError for an unknown revision."""
+    from alembic import command  # takes half a second to import, only needed at the first start
     from alembic.config import Config
     from alembic.script import ScriptDirectory
 
@@ -161,15 +162,15 @@ def _engine(url: URL) -> Engine:
 
 
 def _as_sqlite(connection: Any, _: Any) -> None:
-    connection.isolation_level = None  # we say BEGIN ourselves: the driver would let a transaction begin too late
+    connection.isolation_level = None  # BEGIN is issued explicitly: the driver would start the transaction too late
     _write_ahead(connection)
     connection.execute("PRAGMA synchronous=FULL")
     connection.execute("PRAGMA foreign_keys=ON")
 
 
 def _write_ahead(connection: Any) -> None:
-    """Switch to the write-ahead log. While another connection switches a new file, SQLite refuses at once instead of
-    waiting: then it is tried again, for as long as a writer would wait."""
+    """Switch to the write-ahead log. While another connection switches a new file, SQLite fails immediately instead of
+    waiting, so it is retried for as long as a writer would wait."""
     until_s = time.monotonic() + _BUSY_S
     while True:
         try:

@@ -30,12 +30,12 @@ _Key = tuple[ItemKind, int]
 
 
 def name_of(kind: ItemKind, number: int) -> str:
-    """As people call it."""
+    """Display name."""
     return f"#{number}" if kind == "track" else f"{kind} {number}"
 
 
 class Draft:
-    """number: the act's. What is put is seen by what is read afterwards."""
+    """Changes of one act, before they are written. number: number of the act. Reads include earlier changes."""
 
     def __init__(self, connection: Connection, drive_id: int, number: int, person: str, t_unix_ms: int) -> None:
         self.number, self.person, self.t_unix_ms = number, person, t_unix_ms
@@ -47,12 +47,12 @@ class Draft:
         self._params: dict[str, tuple[Any, Any]] = {}
         self._given: dict[ItemKind, int] = {}
         self._tracks: set[int] | None = None
-        """Numbers of all that ever were; None until somebody asks."""
+        """Ids of all tracks that ever existed; None until needed."""
 
     # ------------------------------------------------------------ reading
 
     def find(self, kind: ItemKind, number: int) -> Item | None:
-        """As it stands; None when it is not there."""
+        """The current item; None if it does not exist."""
         key = (kind, number)
         if key not in self._before:
             self._before[key] = read_item(self._connection, self._drive_id, kind, number)
@@ -63,8 +63,8 @@ class Draft:
         return Item(kind, number, before.revision if before is not None else 0, value) if value is not None else None
 
     def get(self, kind: ItemKind, number: int, revision: int | None = None) -> Item:
-        """As it stands. Stale when ``revision`` is given and somebody changed or removed it since; NoSuchLabel when it
-        never was."""
+        """The current item. Stale if ``revision`` is given and somebody has changed or removed it since; NoSuchLabel if
+        it never existed."""
         found = self.find(kind, number)
         if revision is None and found is not None:
             return found
@@ -96,7 +96,7 @@ class Draft:
         return {number: item for number, item in found.items() if item is not None}
 
     def sightings(self, track: int, first: int | None = None, last: int | None = None) -> dict[int, Sighting]:
-        """Of a track, by ascending frame."""
+        """Sightings of a track, by ascending frame."""
         found: dict[int, Sighting | None] = {}
         found.update(read_track(self._connection, self._drive_id, track, first, last))
         for frame, sighting in self._frames_after.get(track, {}).items():
@@ -105,7 +105,7 @@ class Draft:
         return {frame: sighting for frame in sorted(found) if (sighting := found[frame]) is not None}
 
     def stands(self, kind: ItemKind, number: int, content: Content) -> bool:
-        """Whether an item is exactly so: its value, and of a track where it is in those frames."""
+        """Whether an item's current state is exactly this: its value, and for a track its sightings in those frames."""
         item, frames = self.find(kind, number), content.frames
         if (item.value if item is not None else None) != content.value:
             return False
@@ -114,20 +114,20 @@ class Draft:
 
     @property
     def touched(self) -> Set[tuple[ItemKind, int]]:
-        """Kind and number of every item that was put or removed."""
+        """Kind and id of every item that was changed or removed."""
         return self._after.keys()
 
     # ------------------------------------------------------------ changing
 
     def put(self, kind: ItemKind, number: int, value: Value | None) -> None:
-        """Change an item, make it, or with None remove it; a removed track's sightings go with it."""
+        """Change or create an item, or remove it with None; a removed track's sightings are removed as well."""
         self.find(kind, number)
         self._after[(kind, number)] = value
         if kind == "track" and value is None:
             self.put_sightings(number, dict.fromkeys(self.sightings(number)))
 
     def put_as_one(self, kind: ItemKind, numbers: Sequence[int], value: Value) -> None:
-        """One item instead of these, under the first one's number; a new one where there are none."""
+        """Replace these items by one, under the first one's id; a new item if there are none."""
         if not numbers:
             self.add(kind, value)
             return
@@ -136,7 +136,7 @@ class Draft:
         self.put(kind, numbers[0], value)
 
     def add(self, kind: ItemKind, value: Value) -> int:
-        """Make an item; its number, which no other had before."""
+        """Create an item; returns its id, which was never used before."""
         following = self.next_number(kind)
         number = value.id if isinstance(value, LabelTrack) else following
         self._given[kind] = max(following - 1, number)
@@ -144,7 +144,7 @@ class Draft:
         return number
 
     def next_number(self, kind: ItemKind) -> int:
-        """The first that was never given."""
+        """The first unused id."""
         if kind not in self._given:
             self._given[kind] = (
                 self._connection.scalar(
@@ -155,7 +155,7 @@ class Draft:
         return self._given[kind] + 1
 
     def number_for(self, track: LabelTrack) -> int:
-        """A track's own number, unless another one has it, or had: its history is not this one's."""
+        """A track's own id, unless another track has or had it, because the history would be mixed up."""
         if self._tracks is None:
             wanted = select(ItemRow.id).where(ItemRow.drive_id == self._drive_id, ItemRow.kind == "track")
             self._tracks = set(self._connection.scalars(wanted))
@@ -163,7 +163,7 @@ class Draft:
         return self.next_number("track") if is_given or track.id == 0 else track.id
 
     def put_sightings(self, track: int, frames: Frames) -> None:
-        """Change some of a track's sightings; None takes one away. The track itself counts as changed."""
+        """Change some of a track's sightings; None removes one. The track itself counts as changed."""
         if not frames:
             return
         self.find("track", track)
@@ -175,18 +175,18 @@ class Draft:
         self._frames_after.setdefault(track, {}).update(frames)
 
     def put_param(self, name: str, before: Any, after: Any) -> None:
-        """A parameter of this program was, or is to be, changed."""
+        """Record a change of one of this program's parameters."""
         self._params[name] = (self._params.get(name, (before, None))[0], after)
 
     @property
     def params(self) -> Mapping[str, Any]:
-        """What parameters are to be, by name."""
+        """New values of parameters, by name."""
         return {name: after for name, (_, after) in self._params.items()}
 
     # ------------------------------------------------------------ writing
 
     def write(self) -> bool:
-        """Everything that is another than before, with its changes. False when nothing is."""
+        """Write everything that differs, with its changes. False if nothing differs."""
         items = {key: self._content(key) for key in {*self._after, *(("track", n) for n in self._frames_after)}}
         changed = {key: pair for key, pair in items.items() if pair[0] != pair[1]}
         self._write_items(changed)
@@ -213,8 +213,7 @@ class Draft:
         )
 
     def changed_by(self, kind: ItemKind, number: int) -> str | None:
-        """Who did the last act on an item that is in force: what was taken back, and taking back, are not. None when
-        there is none."""
+        """Person of the last effective act on an item; undone acts and undos do not count. None if there is none."""
         return self._connection.scalars(
             select(ActRow.person)
             .join(ChangeRow, and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act))
@@ -230,7 +229,7 @@ class Draft:
         ).first()
 
     def changes_of_others(self, kind: ItemKind, since: int) -> Iterator[Change]:
-        """What other persons' acts after ``since`` did to items of a kind, act by act."""
+        """Changes by other persons' acts after ``since`` to items of a kind, by act."""
         return read_changes_of_others(self._connection, self._drive_id, kind, since, self.person)
 
     def who(self, act: int) -> str:
@@ -241,7 +240,7 @@ class Draft:
         return person or "somebody"
 
     def _content(self, key: _Key) -> tuple[Content, Content]:
-        """Before and after, with the frames that are others."""
+        """Before and after, with the frames that differ."""
         kind, number = key
         item = self._before[key]
         before = item.value if item is not None else None
@@ -273,7 +272,7 @@ class Draft:
         self._connection.execute(insert(ItemRow), [dict(zip(names, row, strict=True)) for row in rows])
 
     def _write_sightings(self, changed: Mapping[_Key, tuple[Content, Content]]) -> None:
-        """Of all tracks at once: a statement for each would be what an import spends its time on."""
+        """For all tracks at once: with one statement per track, this would dominate the time of an import."""
         gone, rows = [], []
         for (kind, track), (before, after) in changed.items():
             if kind == "track":

@@ -39,7 +39,7 @@ class DriveInfo:
     """A recording that labels belong to."""
 
     key: str
-    """Made from its content, so that a moved file keeps its labels."""
+    """Derived from its content, so that a moved file keeps its labels."""
     uri: str
     """As it was opened."""
     title: str
@@ -47,18 +47,18 @@ class DriveInfo:
     t_ns: tuple[int, ...]
     """Ticks of its frames."""
     names: Callable[[], tuple[str, ...]]
-    """Gives the names of its frames, which may mean to read them all."""
+    """Returns the names of its frames; may read all frames."""
 
 
 def info_of(source: Source, names: Callable[[], tuple[str, ...]]) -> DriveInfo:
-    """What a recording is, wherever it lies: three of its frames are read."""
+    """Identifies a recording independently of its location: three of its frames are read."""
     t_ns = tuple(source.t_ns(index) for index in range(len(source)))
     return DriveInfo(content_key(t_ns, source.frame), source.uri, source.title, t_ns, names)
 
 
 def info_of_uri(uri: str) -> DriveInfo:
-    """Of what has no frames, as live sensors, and no content to know it by. The key is short enough for the database;
-    two addresses never share one."""
+    """For a source without frames, such as live sensors, which has no content to identify it. The key is short enough
+    for the database; two addresses never share one."""
     key = f"uri {uri}"
     short = key if len(key) <= LONGEST_ITEM else f"uri sha256 {hashlib.sha256(uri.encode()).hexdigest()}"
     return DriveInfo(short, uri, uri, (), tuple)
@@ -73,34 +73,34 @@ class Version:
     person: str
     """Who froze it."""
     t_unix_ms: int
-    """When, in Unix milliseconds, by the clock of the program that wrote it."""
+    """When, in Unix milliseconds, by the clock of the writing program."""
     tracks: int
     """Number of labelled vehicles."""
     frames: int
-    """Number of frames that have a label."""
+    """Number of labelled frames."""
     signed_by: str = ""
     """The public key that it is signed with, 64 hexadecimal digits; empty where it is not signed."""
 
 
 @dataclass(frozen=True)
 class LabelSetChanges:
-    """What acts after a revision changed."""
+    """Changes by the acts after a revision."""
 
     revision: int
-    """The newest, which to ask from next time."""
+    """The newest revision; the start of the next request."""
     items: list[Item]
-    """Added or changed, as they are now."""
+    """Added or changed items, in their current state."""
     removed: list[tuple[ItemKind, int]]
-    """Kind and number of each."""
+    """Kind and id of each removed item."""
     extents: dict[int, tuple[int, int, int, list[int]]]
     """By track: first and last frame, number of sightings, keyframes."""
 
 
 class DriveLabels:
-    """Any thread. Everything is read from the database at the moment of asking: others write there too."""
+    """Any thread. Everything is read from the database on each call, because others write to it as well."""
 
     def __init__(self, database: Database, info: DriveInfo, station: str | None = None) -> None:
-        """Finds the recording by its content, or begins with no labels."""
+        """Finds the recording by its content, or adds it without labels."""
         self.info, self._database = info, database
         self._id = _drive_row(database, info)
         self.log = Log(database, self._id, station)
@@ -120,7 +120,7 @@ class DriveLabels:
         return LabelSetChanges(revision, items, removed if since else [], extents)
 
     def window(self, first: int, last: int) -> tuple[int, dict[int, list[tuple[int, Sighting]]]]:
-        """(revision, by frame the tracks in it and where they are)."""
+        """(revision, for each frame its tracks and their sightings)."""
         found: dict[int, list[tuple[int, Sighting]]] = {}
         with self._database.reading() as connection:
             revision = connection.scalars(select(DriveRow.revision).where(DriveRow.id == self._id)).one()
@@ -133,12 +133,12 @@ class DriveLabels:
             return read_items(connection, self._id, kind)
 
     def changed_by(self) -> dict[tuple[ItemKind, int], str]:
-        """Who changed each item last, by kind and number."""
+        """The last person who changed each item, by kind and id."""
         with self._database.reading() as connection:
             return read_changers(connection, self._id)
 
     def track(self, number: int) -> Item:
-        """With its sightings. NoSuchLabel when it is not there."""
+        """With its sightings. NoSuchLabel if it does not exist."""
         with self._database.reading() as connection:
             found = read_item(connection, self._id, "track", number)
             if found is None:
@@ -147,23 +147,23 @@ class DriveLabels:
         return replace(found, value=replace(cast("LabelTrack", found.value), sightings=sightings))
 
     def label_set(self, version: str = WORKING) -> LabelSet:
-        """All labels, as they are now or were frozen. NoSuchLabel for a version that is not there."""
+        """All labels, current or of a frozen version. NoSuchLabel if the version does not exist."""
         if version != WORKING:
             return from_json(self.version_json(version), f"version {version}")
         return self._now(self.info.names())
 
     def unnamed_set(self) -> LabelSet:
-        """The same as they are now, frames called by their numbers: no frame is read for it."""
+        """The current labels with frame numbers as names, so that no frame is read."""
         return self._now(tuple(map(str, range(len(self.info.t_ns)))))
 
     def has_labels(self) -> bool:
-        """Whether anything was ever labelled here and is there still."""
+        """Whether there are any labels."""
         return any(self.items(kind) for kind in KINDS)
 
     # ------------------------------------------------------------ versions
 
     def versions(self) -> list[Version]:
-        """The oldest first."""
+        """All versions, oldest first."""
         with self._database.reading() as connection:
             found = connection.execute(
                 select(*(getattr(VersionRow, each.name) for each in fields(Version)))
@@ -173,7 +173,7 @@ class DriveLabels:
         return [Version(*row) for row in found]
 
     def freeze(self, name: str, person: str) -> Version:
-        """Keep all labels as they are now under a name. ActRefused when it is taken."""
+        """Store all current labels under a name. ActRefused if it is taken."""
         taken = f"version {name!r} already exists; versions are never overwritten"
         if name == WORKING or any(version.name == name for version in self.versions()):
             raise ActRefused(taken)
@@ -193,12 +193,11 @@ class DriveLabels:
         with self._database.writing() as connection:
             row = chained(connection, values)
             if not self._database.insert_new(connection, VersionRow, row):
-                raise ActRefused(taken)  # somebody else froze under it at the same moment
+                raise ActRefused(taken)  # somebody else used the name at the same moment
         return Version(**{each.name: row[each.name] for each in fields(Version)})
 
     def version_json(self, name: str) -> bytes:
-        """The native file of a frozen version. NoSuchLabel when it is not there, ActRefused when it is not as it was
-        frozen."""
+        """The native file of a frozen version. NoSuchLabel if it does not exist, ActRefused if it has been altered."""
         with self._database.reading() as connection:
             row = connection.execute(
                 select(VersionRow.__table__).where(VersionRow.drive_id == self._id, VersionRow.name == name)
@@ -208,7 +207,7 @@ class DriveLabels:
             check(connection, row)
         return zlib.decompress(row.labels)
 
-    # ------------------------------------------------------------ inside
+    # ------------------------------------------------------------ internal
 
     def _now(self, names: tuple[str, ...]) -> LabelSet:
         by_track: dict[int, list[Sighting]] = {}
@@ -234,7 +233,7 @@ class DriveLabels:
 
 
 def known_drives(database: Database) -> list[dict[str, Any]]:
-    """Every recording that has labels: its uri, title, count of frames and of tracks, and newest act."""
+    """Every recording with labels: its uri, title, number of frames and tracks, and newest act."""
     tracks = func.count(ItemRow.id).filter(ItemRow.kind == "track")
     with database.reading() as connection:
         found = connection.execute(
@@ -248,7 +247,7 @@ def known_drives(database: Database) -> list[dict[str, Any]]:
 
 
 def _drive_row(database: Database, info: DriveInfo) -> int:
-    """Its id; made when there is none. Two at once make one."""
+    """Its id; created if it does not exist. Concurrent calls create only one."""
     values = {
         "key": info.key,
         "uri": info.uri,

@@ -13,24 +13,24 @@ from app.labels.store.database import Database
 from app.labels.store.tables import ActRow, DriveRow
 
 _PAUSE_S = 120.0
-"""Whoever does nothing for longer does something else."""
+"""A longer pause does not count as work."""
 _NO_ACTS = ("params", "nudge")
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Of one person on one recording."""
+    """Work of one person on one recording."""
 
     title: str
     """The recording."""
     frames: int
-    """Its length."""
+    """Its number of frames."""
     person: str
-    """Who."""
+    """Name of the person."""
     acts: int
-    """Changes of labels; undo and redo count too: they are work."""
+    """Changes of labels, including undo and redo."""
     active_s: float
-    """Time from act to act, without pauses of more than two minutes."""
+    """Total time between acts, without pauses of more than two minutes."""
 
     @property
     def acts_per_frame(self) -> float:
@@ -42,7 +42,7 @@ class Effort:
 
 
 def efforts(database: Database) -> list[Effort]:
-    """By recording and person, in order."""
+    """Sorted by recording and person."""
     with database.reading() as connection:
         rows = connection.execute(
             select(DriveRow.id, DriveRow.title, DriveRow.count, ActRow.person, ActRow.t_unix_ms)

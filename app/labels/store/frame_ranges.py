@@ -12,7 +12,7 @@ S = TypeVar("S", LeadRange, FrameTag)
 
 
 def free_spans(first: int, last: int, said: Collection[int]) -> list[tuple[int, int]]:
-    """The parts of a range of which nothing is said. said: frames of which something is."""
+    """The unlabelled parts of a range. said: labelled frames."""
     parts: list[tuple[int, int]] = []
     for frame in range(first, last + 1):
         if frame in said:
@@ -25,7 +25,7 @@ def free_spans(first: int, last: int, said: Collection[int]) -> list[tuple[int, 
 
 
 def outside(span: S, first: int, last: int) -> list[S]:
-    """What is left of a range when frames first … last are cut out of it."""
+    """The parts of a range that remain after frames first … last are cut out of it."""
     before = [replace(span, last=first - 1)] if span.first < first else []
     after = [replace(span, first=last + 1)] if span.last > last else []
     return before + after

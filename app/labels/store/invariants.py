@@ -14,8 +14,8 @@ from pipeline.labels.model import EventLabel, FrameTag, LeadRange, PathLabel
 
 
 def check_whole(draft: Draft) -> None:
-    """ActRefused when what the draft changes does not go together with what is there. Two people's acts can each be
-    right, and one of them taken back be wrong beside the other."""
+    """ActRefused if the draft's changes are inconsistent with the existing labels. Two people's acts can each be valid,
+    while undoing one of them would be inconsistent with the other."""
     touched = draft.touched
     kinds = {kind for kind, _ in touched}
     if "lead" in kinds:
@@ -34,7 +34,7 @@ def check_whole(draft: Draft) -> None:
 
 
 def _check_apart(draft: Draft, items: Iterable[Item]) -> None:
-    """Ranges by their beginning, each beside the one before it that goes farthest."""
+    """Ranges are sorted by start; each is compared with the earlier one that extends farthest."""
     farthest: Item | None = None
     for item in sorted(items, key=lambda item: cast("LeadRange | FrameTag", item.value).first):
         here = cast("LeadRange | FrameTag", item.value)
@@ -55,7 +55,7 @@ def _check_paths(draft: Draft) -> None:
 
 
 def _clash(draft: Draft, one: Item, other: Item, where: str) -> None:
-    """What was so before is nobody's fault now."""
+    """An overlap that existed before is not refused."""
     if (one.kind, one.id) in draft.touched:
         one, other = other, one
     if (other.kind, other.id) in draft.touched:
@@ -64,7 +64,7 @@ def _clash(draft: Draft, one: Item, other: Item, where: str) -> None:
 
 
 def _check_named(draft: Draft, gone: set[int]) -> None:
-    """gone: the tracks that the draft removes."""
+    """gone: the tracks removed by the draft."""
     for kind in ("lead", "event"):
         for item in _all(draft, kind):
             names = _tracks_of(item)

@@ -18,11 +18,11 @@ from pipeline.labels.model import Sighting
 SIGHTINGS = tuple(SightingRow.__table__.columns)
 """In the table's order, which is that of ``values.row_of``."""
 _MOST_NAMED = 500
-"""Numbers in one question: databases have limits on that."""
+"""Maximum ids in one query: databases limit this."""
 
 
 def read_items(connection: Connection, drive_id: int, kind: ItemKind) -> dict[int, Item]:
-    """Every item of a kind that is there, by its number."""
+    """Every existing item of a kind, by its id."""
     found = connection.execute(
         select(ItemRow.id, ItemRow.revision, ItemRow.value)
         .where(ItemRow.drive_id == drive_id, ItemRow.kind == kind, ItemRow.removed.is_(False))
@@ -32,7 +32,7 @@ def read_items(connection: Connection, drive_id: int, kind: ItemKind) -> dict[in
 
 
 def read_item(connection: Connection, drive_id: int, kind: ItemKind, number: int) -> Item | None:
-    """None when it is not, or no longer, there."""
+    """None if it does not exist, or no longer does."""
     row = connection.execute(
         select(ItemRow.id, ItemRow.revision, ItemRow.value).where(
             ItemRow.drive_id == drive_id, ItemRow.kind == kind, ItemRow.id == number, ItemRow.removed.is_(False)
@@ -42,7 +42,7 @@ def read_item(connection: Connection, drive_id: int, kind: ItemKind, number: int
 
 
 def read_changed(connection: Connection, drive_id: int, since: int) -> tuple[list[Item], list[tuple[ItemKind, int]]]:
-    """(items that are there, kinds and numbers of removed ones) of all that acts after ``since`` changed."""
+    """(existing items, kind and id of removed items) changed by acts after ``since``."""
     found = connection.execute(
         select(ItemRow.kind, ItemRow.id, ItemRow.revision, ItemRow.removed, ItemRow.value)
         .where(ItemRow.drive_id == drive_id, ItemRow.revision > since)
@@ -55,7 +55,7 @@ def read_changed(connection: Connection, drive_id: int, since: int) -> tuple[lis
 def read_track(
     connection: Connection, drive_id: int, track: int, first: int | None = None, last: int | None = None
 ) -> dict[int, Sighting]:
-    """A track's sightings by ascending frame, from ``first`` to ``last`` where they are given."""
+    """A track's sightings by ascending frame, limited to ``first`` … ``last`` if given."""
     wanted = select(*SIGHTINGS).where(SightingRow.drive_id == drive_id, SightingRow.track == track)
     if first is not None:
         wanted = wanted.where(SightingRow.frame >= first)
@@ -79,7 +79,7 @@ def read_window(connection: Connection, drive_id: int, first: int, last: int) ->
 def read_extents(
     connection: Connection, drive_id: int, tracks: Iterable[int]
 ) -> dict[int, tuple[int, int, int, list[int]]]:
-    """Of each track that has sightings: first frame, last frame, how many, and its keyframes."""
+    """For each track with sightings: first frame, last frame, number of sightings, and its keyframes."""
     wanted = list(tracks)
     whole = len(wanted) > _MOST_NAMED
     extent = select(SightingRow.track, func.min(SightingRow.frame), func.max(SightingRow.frame), func.count()).where(
@@ -99,7 +99,7 @@ def read_extents(
 
 
 def read_changers(connection: Connection, drive_id: int) -> dict[tuple[ItemKind, int], str]:
-    """Who did the last act in force on each item, by kind and number: what was taken back, and taking back, are not."""
+    """Person of the last effective act on each item, by kind and id; undone acts and undos do not count."""
     of_act = and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act)
     last = (
         select(ChangeRow.kind, ChangeRow.item, func.max(ChangeRow.act).label("act"))
@@ -119,20 +119,20 @@ def read_changers(connection: Connection, drive_id: int) -> dict[tuple[ItemKind,
 
 @dataclass(frozen=True)
 class Change:
-    """What an act did to items of one kind."""
+    """Changes by one act to items of one kind."""
 
     person: str
-    """Who did it."""
+    """Person of the act."""
     before: list[Value]
-    """Those that it changed or removed, as they were."""
+    """Changed or removed items, before the act."""
     after: list[Value]
-    """Those it left, as they are."""
+    """Changed or added items, after the act."""
 
 
 def read_changes_of_others(
     connection: Connection, drive_id: int, kind: ItemKind, since: int, person: str
 ) -> Iterator[Change]:
-    """What the acts after ``since`` of everybody but a person did to items of a kind, act by act."""
+    """Changes by the acts of all other persons after ``since`` to items of a kind, by act."""
     rows = connection.execute(
         select(ActRow.number, ActRow.person, ChangeRow.before, ChangeRow.after)
         .join(ChangeRow, and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act))

@@ -13,12 +13,12 @@ from app.labels.store.values import LONGEST_ITEM, LONGEST_NAME
 
 
 class Base(DeclarativeBase):
-    """Every table."""
+    """Base class of all tables."""
 
 
 class DriveRow(Base):
-    """A recording that was labelled, or driven with. key: its content's. count: of its frames, 0 for what has none, as
-    live sensors. revision: the number of its newest act."""
+    """A recording that was labelled or opened. key: derived from its content. count: number of frames, 0 for a source
+    without frames, such as live sensors. revision: the number of its newest act."""
 
     __tablename__ = "drive"
     id: Mapped[int] = mapped_column(Integer, primary_key=True)
@@ -30,8 +30,8 @@ class DriveRow(Base):
 
 
 class ItemRow(Base):
-    """A track (without its sightings), range of the lead, path, event or range of a tag. revision: the act that changed
-    it last. removed ones stay, so that others hear of it and their number is not given again."""
+    """A track (without its sightings), lead range, path, event or tag range. revision: the last act that changed it.
+    Removed items keep their rows, so that others see the removal and ids are not reused."""
 
     __tablename__ = "item"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
@@ -44,8 +44,8 @@ class ItemRow(Base):
 
 
 class SightingRow(Base):
-    """A track in one frame. Ego frame, metres, radians; box in pixels; None where there is none. The rest is as of a
-    ``Sighting``."""
+    """A track in one frame. Ego frame, metres, radians; box in pixels; None if there is none. The other columns are
+    those of a ``Sighting``."""
 
     __tablename__ = "sighting"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
@@ -70,10 +70,10 @@ class SightingRow(Base):
 
 
 class ActRow(Base):
-    """What a person did. number: from 1, by drive. step: the act that this one goes on with, else itself; they are
-    taken back together. station: the server whose parameters it changed. status: done, undone (can be redone) or
-    dropped (was undone, and something else was done since). target: of an undo or redo, the step that it is about.
-    act_id: who sent it made it, so that what is sent again is not done again. note: what was said of it besides."""
+    """An act of a person. number: from 1, per drive. step: the act that this one continues, else itself; they are
+    undone together. station: the server whose parameters it changed. status: done, undone (can be redone) or dropped
+    (undone, followed by another act). target: for an undo or redo, the step concerned. act_id: chosen by the client, so
+    that a repeated request is not executed twice. note: additional information."""
 
     __tablename__ = "act"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
@@ -95,8 +95,8 @@ class ActRow(Base):
 
 
 class ChangeRow(Base):
-    """One item in one act: compressed JSON before and after, null where it was not there. item: the number of an item,
-    or a parameter's name."""
+    """One item in one act: compressed JSON before and after, null if it did not exist. item: the id of an item, or a
+    parameter's name."""
 
     __tablename__ = "change"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
@@ -109,9 +109,9 @@ class ChangeRow(Base):
 
 
 class VersionRow(Base):
-    """A label set that was frozen under a name: the native file, compressed. sha256: of all that and of the version
-    before (``previous``), empty for one from before there was a chain; signature: of that by the public key
-    ``signed_by``, both empty for one that is not signed; see ``version_chain``."""
+    """A label set that was frozen under a name: the native file, compressed. sha256: digest of all columns and of the
+    previous version (``previous``), empty for versions from before the chain existed; signature: signature of the
+    digest by the public key ``signed_by``, both empty if it is not signed; see ``version_chain``."""
 
     __tablename__ = "version"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
@@ -128,8 +128,8 @@ class VersionRow(Base):
 
 
 class WorkRow(Base):
-    """Who labels a recording (empty for nobody yet), and how far that is; see ``work.State``. t_unix_ms: when that was
-    said last."""
+    """Who labels a recording (empty if unassigned), and its state; see ``work.State``. t_unix_ms: time of the last
+    change."""
 
     __tablename__ = "work"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)

@@ -26,8 +26,8 @@ _OF_PARAMS = ("params", "nudge")
 
 
 class Steps:
-    """Of one drive, in whatever transaction is asked. station: whose parameters are meant. What is asked with every
-    move of a slider is put into words once: that takes longer than the answer."""
+    """Undo steps of one drive, in the given transaction. station: owner of the parameters. Queries needed for every
+    move of a slider are compiled once, because compiling takes longer than executing them."""
 
     def __init__(self, drive_id: int, station: str) -> None:
         self._drive_id, self._station = drive_id, station
@@ -35,7 +35,7 @@ class Steps:
         self._possible = select(*(self._following[way].scalar_subquery() for way in WAYS))
 
     def _mine(self, person: str | BindParameter[str]) -> ColumnElement[bool]:
-        """The acts that a person can take back or do again."""
+        """The acts that a person can undo or redo."""
         of_params = and_(ActRow.kind.in_(_OF_PARAMS), ActRow.station == self._station, ActRow.person.in_(("", person)))
         of_labels = and_(ActRow.kind.not_in((*_OF_PARAMS, *WAYS)), ActRow.person == person)
         return and_(ActRow.drive_id == self._drive_id, or_(of_params, of_labels))
@@ -47,11 +47,11 @@ class Steps:
         return select(func.min(ActRow.step)).where(mine, ActRow.status == "undone")
 
     def following(self, connection: Connection, way: Way, person: str) -> int | None:
-        """The step that is next to be taken back or done again."""
+        """The next step to undo or redo."""
         return connection.scalar(self._following[way], {"person": person})
 
     def possible(self, connection: Connection, person: str) -> tuple[bool, bool]:
-        """(there is something to take back, something to do again) for a person: one question."""
+        """(can undo, can redo) for a person, in one query."""
         undo, redo = connection.execute(self._possible, {"person": person}).one()
         return undo is not None, redo is not None
 
@@ -64,11 +64,11 @@ class Steps:
         return [(row.number, row.what) for row in found]
 
     def drop_redo(self, connection: Connection, person: str) -> None:
-        """Who does something else does not do again what was taken back."""
+        """A new act discards the acts that could be redone."""
         connection.execute(update(ActRow).where(self._mine(person), ActRow.status == "undone").values(status="dropped"))
 
     def before(self, connection: Connection, number: int, person: str, names: set[str]) -> int | None:
-        """The step of act ``number``, when it nudged the same parameters; else None."""
+        """The step of act ``number`` if it changed the same parameters; else None."""
         row = connection.execute(
             select(ActRow.step, ActRow.kind, ActRow.person, ActRow.station, ActRow.status).where(
                 ActRow.drive_id == self._drive_id, ActRow.number == number
@@ -82,8 +82,8 @@ class Steps:
         return row.step if set(before) == names else None
 
     def changed_since(self, connection: Connection, change: Any, person: str) -> str | None:
-        """Who else changed the same thing after ``change``, the last one; None when nobody did. A parameter is changed
-        by acts in force on this station alone, and by who has a name."""
+        """The last other person who changed the same item after ``change``; None if nobody did. For parameters, only
+        effective acts on this station by named persons count."""
         wanted = [
             ChangeRow.drive_id == self._drive_id,
             ChangeRow.kind == change.kind,

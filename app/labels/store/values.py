@@ -14,14 +14,14 @@ from pipeline.common.geometry import Cuboid
 from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel, Sighting
 
 LONGEST_NAME = 80
-"""Of a person, and of a version."""
+"""Maximum length of a person's name and of a version's name."""
 LONGEST_ITEM = 120
-"""Of a parameter, and of a recording's key."""
+"""Maximum length of a parameter's name and of a recording's key."""
 ItemKind = Literal["track", "lead", "path", "event", "tag"]
 KINDS: tuple[ItemKind, ...] = get_args(ItemKind)
 Value = LabelTrack | LeadRange | PathLabel | EventLabel | FrameTag
 Frames = Mapping[int, Sighting | None]
-"""Sightings of one track by frame; None where there is none (any more)."""
+"""Sightings of one track by frame; None if there is none (any more)."""
 
 _ADAPTERS: dict[ItemKind, TypeAdapter[Any]] = {
     "track": TypeAdapter(LabelTrack),
@@ -32,38 +32,38 @@ _ADAPTERS: dict[ItemKind, TypeAdapter[Any]] = {
 }
 _SIGHTINGS = TypeAdapter(tuple[Sighting, ...])
 _QUICK = 1
-"""Compression of large changes: a third of the size at once, little more with patience."""
+"""Compression level of large changes: already reduces them to a third; higher levels gain little."""
 
 
 @dataclass(frozen=True)
 class Item:
-    """One label as it stands."""
+    """The current state of one label."""
 
     kind: ItemKind
     """Numbers are unique within a kind only."""
     id: int
-    """Among those of its kind."""
+    """Unique among items of its kind."""
     revision: int
     """Number of the act that changed it last."""
     value: Value
-    """Its content; a track is without its sightings, which are rows of their own."""
+    """Its content; a track comes without its sightings, which have separate rows."""
 
 
 @dataclass(frozen=True)
 class Content:
-    """What an act found or left of an item."""
+    """Content of an item before or after an act."""
 
     value: Value | None
-    """None where it was not there."""
+    """None if it did not exist."""
     frames: Frames
-    """Of a track: sightings in the frames that the act changed."""
+    """For a track: sightings in the frames that the act changed."""
 
 
 @dataclass(frozen=True)
 class HistoryEntry:
     """One act in an item's life."""
 
-    __pydantic_config__ = ConfigDict(use_attribute_docstrings=True)  # the API answers it as it is
+    __pydantic_config__ = ConfigDict(use_attribute_docstrings=True)  # the API returns it unchanged
 
     act: int
     """Number of the act in the log."""
@@ -84,7 +84,7 @@ class HistoryEntry:
 
 
 def value_to_json(kind: ItemKind, value: Value) -> dict[str, Any]:
-    """Plain values, as the native file has them; a track without its sightings."""
+    """Plain values in the format of the native file; a track without its sightings."""
     if isinstance(value, LabelTrack):
         value = replace(value, sightings=())
     found: dict[str, Any] = _ADAPTERS[kind].dump_python(value, mode="json")
@@ -98,7 +98,7 @@ def value_from_json(kind: ItemKind, body: Mapping[str, Any]) -> Value:
 
 
 def sighting_to_json(sighting: Sighting) -> dict[str, Any]:
-    """As the native file has it."""
+    """In the format of the native file."""
     cuboid = sighting.cuboid
     return {
         "frame": sighting.frame,
@@ -112,7 +112,7 @@ def sighting_to_json(sighting: Sighting) -> dict[str, Any]:
 
 
 def row_of(drive_id: int, track: int, sighting: Sighting) -> tuple[Any, ...]:
-    """In the order of the table's columns."""
+    """Values in the order of the table's columns."""
     cuboid, bbox = sighting.cuboid, sighting.bbox
     place = (*cuboid.center, *cuboid.size, cuboid.yaw_rad) if cuboid is not None else (None,) * 7
     sides = bbox if bbox is not None else (None,) * 4
@@ -121,7 +121,7 @@ def row_of(drive_id: int, track: int, sighting: Sighting) -> tuple[Any, ...]:
 
 
 def sighting_of(row: Any) -> Sighting:
-    """row: as ``row_of`` makes it."""
+    """row: in the format of ``row_of``."""
     _, frame, _, keyframe, x, y, z, length, width, height, yaw, x1, y1, x2, y2, box_set, truncation, occlusion = row
     cuboid = Cuboid((x, y, z), (length, width, height), yaw) if x is not None else None
     bbox = (x1, y1, x2, y2) if x1 is not None else None
@@ -129,7 +129,7 @@ def sighting_of(row: Any) -> Sighting:
 
 
 def pack_content(kind: ItemKind, content: Content) -> bytes | None:
-    """None for an item that is not there, and has no frames."""
+    """None for an item that does not exist and has no frames."""
     if content.value is None and not any(content.frames.values()):
         return None
     return pack(
@@ -142,7 +142,7 @@ def pack_content(kind: ItemKind, content: Content) -> bytes | None:
 
 
 def unpack_content(kind: ItemKind, data: bytes | None, frames: Iterable[int] = ()) -> Content:
-    """frames: what else the act touched, that was not there."""
+    """frames: further frames of the act, in which there was no sighting."""
     if data is None:
         return Content(None, dict.fromkeys(frames))
     body = unpack(data)
@@ -154,7 +154,7 @@ def unpack_content(kind: ItemKind, data: bytes | None, frames: Iterable[int] = (
 
 
 def unpack_pair(kind: ItemKind, here: bytes | None, there: bytes | None) -> tuple[Content, Content]:
-    """Both sides of a change, each with every frame that it touched."""
+    """Both sides of a change, each with every frame that it affects."""
     found = unpack_content(kind, here)
     other = unpack_content(kind, there, found.frames)
     return (Content(None, dict.fromkeys(other.frames)) if here is None else found), other
@@ -166,5 +166,5 @@ def pack(body: Any) -> bytes:
 
 
 def unpack(data: bytes) -> Any:
-    """What ``pack`` compressed."""
+    """Inverse of ``pack``."""
     return json.loads(zlib.decompress(data))

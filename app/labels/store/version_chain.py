@@ -21,8 +21,8 @@ _SAID = ("name", "person", "t_unix_ms", "tracks", "frames")
 
 
 def chained(connection: Connection, values: Mapping[str, Any]) -> dict[str, Any]:
-    """A new version's row, after the last one of its drive, signed where a key is configured. BadInput when that key
-    cannot be used."""
+    """A new version's row, chained to the previous one of its drive, and signed if a key is configured. BadInput if
+    that key cannot be used."""
     rows = connection.execute(
         select(VersionRow.previous, VersionRow.sha256).where(VersionRow.drive_id == values["drive_id"])
     ).all()
@@ -34,8 +34,8 @@ def chained(connection: Connection, values: Mapping[str, Any]) -> dict[str, Any]
 
 
 def check(connection: Connection, row: VersionRow | Any) -> None:
-    """ActRefused when a version is not as it was frozen, or not signed with the key of ``CIPV_PUBLIC_KEY`` where that
-    is set. Else one from before there was a chain is taken as it is."""
+    """ActRefused if a version has been altered, or is not signed with the key in ``CIPV_PUBLIC_KEY`` if that is set.
+    Otherwise, versions from before the chain existed are accepted."""
     expected = expected_key()
     signature = Signature(row.signed_by, row.signature) if row.signature else None
     found = check_signature(signature, _signed(row.sha256), expected)
@@ -51,7 +51,7 @@ def check(connection: Connection, row: VersionRow | Any) -> None:
 
 
 def _signed(sha256: str) -> bytes:
-    """What is signed of a version."""
+    """The bytes of a version that are signed."""
     return f"cipv-studio label version\0{sha256}".encode()
 
 

@@ -15,41 +15,41 @@ from app.labels.store.tables import DriveRow, SightingRow, WorkRow
 from pipeline.labels.model import NEXT_TAG, FrameTag, LabelTrack, LeadRange
 
 State = Literal["open", "labeling", "review", "done"]
-"""open: nobody has begun. review: labelled, and a second person looks at it."""
+"""open: not started. review: labelled, waiting for a second person's review."""
 STATES: tuple[State, ...] = get_args(State)
 
 
 @dataclass(frozen=True)
 class Work:
-    """One recording."""
+    """Labeling state of one recording."""
 
     key: str
-    """Of its content."""
+    """Key derived from its content."""
     title: str
-    """For people."""
+    """Display name."""
     uri: str
     """Where it was first opened."""
     frames: int
-    """How many it has."""
+    """Number of frames."""
     person: str
-    """Who labels it; empty for nobody yet."""
+    """Person who labels it; empty if unassigned."""
     state: State
-    """How far it is."""
+    """Its state."""
     labelled: float
-    """Share of its frames in which somebody has said who leads."""
+    """Share of its frames with a lead set by a person."""
     reviewed: float
     """Share of its accepted tracks that a second person has reviewed."""
     proposals: int
-    """Tracks that nobody has looked at."""
+    """Number of untouched proposals."""
     asked: int
-    """Frames that `cipv mine` or a person asked to label next, and whose lead nobody has labelled."""
+    """Frames requested for labeling by `cipv mine` or a person whose lead is not labelled."""
     worth: float
-    """What there is to learn from a label, per frame: proposals that may as well be none, weighted by how unsure they
-    are (1 at a confidence of 0.5, 0 at 0 and 1), frames in which it is unclear who leads, and ``asked``."""
+    """Expected value of a label per frame: uncertain proposals, weighted by their uncertainty (1 at a confidence of
+    0.5, 0 at 0 and 1), frames with an unclear lead, and ``asked``."""
 
 
 def queue(database: Database) -> list[Work]:
-    """What is to do first, then what is done; of each, what is worth most first."""
+    """Unfinished recordings first, then finished ones; each sorted by decreasing ``worth``."""
     with database.reading() as connection:
         rows = connection.execute(
             select(
@@ -63,8 +63,8 @@ def queue(database: Database) -> list[Work]:
 
 
 def put(database: Database, drive: str, by: str, *, person: str | None = None, state: State | None = None) -> Work:
-    """Assign a recording, or say how far it is. drive: its title, address or key. NoSuchLabel for none or several of
-    that name; ActRefused where who labels it would say that it is reviewed, or nothing was labelled."""
+    """Assign a recording, or set its state. drive: its title, address or key. NoSuchLabel if there is none or several;
+    ActRefused if its labeler would mark it as reviewed, or nothing was labelled."""
     with database.reading() as connection:
         matches = or_(DriveRow.key == drive, DriveRow.title == drive, DriveRow.uri == drive)
         rows = connection.execute(select(DriveRow.id, DriveRow.key).where(matches, DriveRow.count > 0)).all()

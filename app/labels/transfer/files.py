@@ -28,9 +28,10 @@ from pipeline.labels.selection import Selection, selected
 _LARGEST_UNPACKED = 512 << 20
 _MOST_PARTS = 100_000
 _ENCRYPTED = 1
-"""Of a file's flags in a .zip (PKWARE's APPNOTE, 4.4.4)."""
+"""Flag of an encrypted file in a .zip (PKWARE's APPNOTE, 4.4.4)."""
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-"""How every tool packs a .zip. The dictionary of an LZMA stream may be as large as the stream says: gigabytes."""
+"""Accepted compression methods, as used by all tools. LZMA is excluded, because its stream may request a dictionary of
+gigabytes."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +39,11 @@ class ExportedLabels:
     """A file ready for download."""
 
     file: Path
-    """To be handed out; it lies in ``folder``."""
+    """The file to send; it is in ``folder``."""
     folder: Path
-    """Temporary: to be removed with the file once it is sent."""
+    """Temporary folder, to be removed after sending."""
     lost: tuple[str, ...]
-    """What the format has no place for, one sentence each."""
+    """What the format cannot express, one sentence each."""
 
 
 def exported(
@@ -52,7 +53,7 @@ def exported(
     only: Selection = "all",
     classes: ClassList | None = None,
 ) -> ExportedLabels:
-    """A file, of a format that makes a folder a .zip of it. BadInput when it cannot be."""
+    """Export to a file, or a .zip for a format that is a folder. BadInput if that is not possible."""
     folder = Path(tempfile.mkdtemp(prefix="cipv-export-"))
     try:
         which = "" if only == "all" else f"-{only}"
@@ -68,7 +69,7 @@ def exported(
 def importing_file(
     labels: DriveLabels, recording: OpenRecording, person: str, file: Path, name: FormatName
 ) -> TaskWork:
-    """Labels of an uploaded file; a format that is a folder comes as a .zip of it."""
+    """Import an uploaded file; a format that is a folder is uploaded as a .zip."""
 
     def work(progress: Progress) -> str:
         with _removed(file), tempfile.TemporaryDirectory(prefix="cipv-import-") as folder:
@@ -77,7 +78,7 @@ def importing_file(
             origin = Origin("import", f"{name} file of {person}", int(time.time() * 1000))
             try:
                 found = import_labels(path, drive, name, origin)
-            except BadInput as error:  # where it lies here is nobody's business
+            except BadInput as error:  # do not reveal its temporary path
                 raise ActRefused(str(error).replace(str(path), "the file")) from None
             return importing(labels, found.labels, person, found.notes, progress)
 
@@ -85,8 +86,8 @@ def importing_file(
 
 
 def drive_for(recording: OpenRecording, progress: Progress = silent) -> LabeledDrive:
-    """What formats must know of the drive: looked for once while it is open, and read from its source only where no
-    run has."""
+    """Description of the drive for label formats: computed once while it is open, and read from its source only if no
+    run has read it."""
     with recording.describing:
         if recording.described is None:
             recording.described = drive_of(recording.setup.source, progress, recording.at_hand)
@@ -103,7 +104,7 @@ def _zipped(folder: Path) -> Path:
 
 
 def _unzipped(file: Path, folder: Path) -> Path:
-    """The folder that was packed. BadAct for what is no .zip, or one that leads out of its folder or swells up."""
+    """The unpacked folder. BadAct if the file is not a .zip, contains paths outside its folder, or expands too much."""
     try:
         with zipfile.ZipFile(file) as packed:
             if any(not each.filename or each.compress_type not in _PACKED for each in packed.infolist()):
@@ -123,14 +124,14 @@ def _unzipped(file: Path, folder: Path) -> Path:
                     _copied(source, out, each.file_size)
     except BadInput:
         raise
-    except Exception as error:  # of a damaged one zipfile and its decompressors raise whatever they stumble over
+    except Exception as error:  # for damaged files, zipfile and its decompressors raise arbitrary errors
         raise ActRefused(f"not a valid .zip: {error}") from None
     inside = list(folder.iterdir())
     return inside[0] if len(inside) == 1 and inside[0].is_dir() and inside[0].name.startswith("labels") else folder
 
 
 def _copied(source: IO[bytes], out: IO[bytes], size: int) -> None:
-    """Never more than the .zip says it holds."""
+    """Copies at most the size declared in the .zip."""
     data = source.read(size + 1)
     if len(data) > size:
         raise ValueError("a file in it is longer than declared")

@@ -15,14 +15,14 @@ from app.views.rerun.view import ReplayError, RerunSink, ViewerAddress
 logger = logging.getLogger("cipv.rerun")
 
 _PATIENCE_S = 2.0
-"""A viewer that takes longer for a frame counts as gone, so that nothing queues up for it."""
+"""If a viewer takes longer than this for a frame, it counts as disconnected, so that no queue builds up."""
 _RETRY_S = 2.0
 _SCHEMES = ("rerun", "rerun+http", "rerun+https")
 
 
 class RerunFeed:
-    """Streams in a ``with`` block. Reconnects when there is no viewer or it leaves; frames are dropped meanwhile.
-    ReplayError when the address is not a viewer's. sent: frames that a viewer has received so far."""
+    """Streams in a ``with`` block. Reconnects if there is no viewer or it disconnects; frames are dropped meanwhile.
+    ReplayError if the address is not that of a viewer. sent: number of frames received by a viewer."""
 
     def __init__(self, engine: Engine, url: str) -> None:
         parts = urlsplit(url)
@@ -76,7 +76,7 @@ class RerunFeed:
             sink.abandon()
 
     def _connect(self, snapshot: Snapshot) -> RerunSink | None:
-        """A sink if a viewer listens; otherwise None after a while, with the frame to try again."""
+        """A sink if a viewer listens; otherwise, after a while, None and the frame to retry with."""
         try:
             socket.create_connection(self._place, _PATIENCE_S).close()
         except OSError:

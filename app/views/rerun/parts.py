@@ -24,7 +24,7 @@ def sides(path: Path) -> dict[str, F64]:
 
 
 def to_bev(points: npt.NDArray[np.floating]) -> F64:
-    """Ego x, y as image axes seen from above, forward up: right is −y, down is −x."""
+    """Ego x, y as axes of an image seen from above, with forward up: right is −y, down is −x."""
     return np.column_stack([-points[:, 1], -points[:, 0]])
 
 
@@ -74,7 +74,7 @@ def labels(objects: list[FusedObject], result: Result, ground_m: float) -> rr.Po
 
 
 def bev_labels(objects: list[FusedObject], result: Result) -> rr.Points2D | None:
-    """A text on each footprint in the view from above; None without any."""
+    """A text on each footprint in the top view; None without any."""
     if not objects:
         return None
     return rr.Points2D(
@@ -102,7 +102,7 @@ def boxes(
 
 
 def encoded(image: CameraImage) -> rr.EncodedImage:
-    """The camera's own JPEG unchanged; a raw image is encoded once."""
+    """The camera's own JPEG unchanged; a raw image is encoded here."""
     if image.encoded is not None and image.encoded.startswith(b"\xff\xd8"):
         return rr.EncodedImage(contents=image.encoded, media_type="image/jpeg")
     jpeg = cv2.imencode(".jpg", image.bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1]

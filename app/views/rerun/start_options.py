@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class RerunStartOptions:
-    """How rerun opens a recording."""
+    """Initial view of a recording in rerun."""
 
     paused: bool = False
-    """At the first frame."""
+    """Whether it is paused at the first frame."""
     compact: bool = False
-    """For a narrow pane: the camera above, and one other view at a time below."""
+    """For a narrow pane: the camera above, and below it one other view at a time."""
 
 
 PLAYING = RerunStartOptions()
-"""How a saved file opens."""
+"""Options for a saved file."""

@@ -29,7 +29,7 @@ APPLICATION = "CIPV Studio"
 _CALIBRATED = AlignmentParams()
 _RING_STEP_M = 20.0
 _ARROW_S = 1.0
-"""Velocity arrows reach as far as the object moves, relative to ego, in this time."""
+"""Velocity arrows show the object's motion relative to ego in this time."""
 
 
 class ReplayError(BadInput):
@@ -38,19 +38,19 @@ class ReplayError(BadInput):
 
 @dataclass(frozen=True)
 class ViewerAddress:
-    """A running viewer, by the address it prints: ``rerun+http://127.0.0.1:9876/proxy``."""
+    """Address of a running viewer: ``rerun+http://127.0.0.1:9876/proxy``."""
 
     url: str
-    """As the viewer prints it."""
+    """As printed by the viewer."""
 
 
 class RerunSink:
     """Writes each frame and its result to ``target``: a file's path, an open binary stream, which stays open and
-    gets the whole recording on closing, or a running viewer.
+    receives the whole recording on closing, or a running viewer.
 
-    ``title`` names the recording in the viewer; ``params`` says which model projects the points into the image.
-    Timelines: ``frame`` (index) and ``sensor_time`` (the frame's tick), never the time of writing. ReplayError when the
-    file cannot be made. Use it in a ``with`` block: a recording is complete once closed. One thread at a time.
+    ``title`` names the recording in the viewer; ``params`` selects the model that projects the points into the image.
+    Timelines: ``frame`` (index) and ``sensor_time`` (the frame's tick), never the time of writing. ReplayError if the
+    file cannot be created. Use it in a ``with`` block: a recording is complete once closed. One thread at a time.
     """
 
     def __init__(
@@ -99,8 +99,8 @@ class RerunSink:
         self._log_reasons(result)
 
     def flush(self, timeout_s: float) -> bool:
-        """Wait until everything shown is written or sent; false when that takes longer, for example because the viewer
-        is gone."""
+        """Wait until everything shown is written or sent; false on timeout, for example because the viewer has
+        disconnected."""
         try:
             self._rec.flush(timeout_sec=timeout_s)
         except (RuntimeError, ValueError):
@@ -108,7 +108,7 @@ class RerunSink:
         return True
 
     def abandon(self) -> None:
-        """Close without waiting for a viewer that does not answer."""
+        """Close without waiting for a viewer that does not respond."""
         self._rec.disconnect()
 
     def close(self) -> None:
@@ -128,10 +128,10 @@ class RerunSink:
         self.close()
 
     def _put(self, entity: str, what: rr.AsComponents | None) -> None:
-        """Log, or clear what an earlier frame left there."""
+        """Log an entity, or clear it if there is nothing to show."""
         self._rec.log(entity, rr.Clear(recursive=False) if what is None else what)
 
-    # ------------------------------------------------------------ what never changes
+    # ------------------------------------------------------------ static content
 
     def _log_static(self) -> None:
         self._rec.log("world", rr.ViewCoordinates.FLU, static=True)
@@ -249,7 +249,7 @@ class RerunSink:
             self._scalar(f"timing/{stage}", value)
 
     def _scalar(self, name: str, value: float | None) -> None:
-        """None interrupts the curve instead of drawing a value that was not measured."""
+        """None interrupts the curve, so that no unmeasured value is drawn."""
         self._put(f"curves/{name}", None if value is None else rr.Scalars(value))
 
     def _log_reasons(self, result: Result) -> None:
@@ -266,5 +266,5 @@ class RerunSink:
 
 
 def _cause(error: RuntimeError) -> str:
-    """The operating system's message, without the library's wrapping."""
+    """The operating system's message, extracted from the library's message."""
     return str(error).removeprefix("Failed to create file: ").partition(" (os error")[0].lower()

@@ -29,7 +29,7 @@ _BLOCK = 1 << 20
 
 
 class NoViewer(BadInput):
-    """This installation has no web viewer; the message says why."""
+    """This installation has no web viewer; the message gives the reason."""
 
 
 class ViewerFiles:
@@ -41,7 +41,7 @@ class ViewerFiles:
         self._folder: Path | None = None
 
     def path(self, name: str) -> Path:
-        """The path of one of ``FILES``. NoViewer when the viewer is not available."""
+        """The path of one of ``FILES``. NoViewer if the viewer is not available."""
         if name not in FILES:
             raise NoViewer(f"the viewer has no file {name}")
         with self._lock:
@@ -58,7 +58,7 @@ class ViewerFiles:
 
 
 def _installed() -> Path:
-    """The program itself, not the wrapper script around it."""
+    """Path of the program itself, not of the wrapper script around it."""
     package = importlib.util.find_spec("rerun_cli")
     folders = package.submodule_search_locations if package is not None else None
     for folder in folders or ():
@@ -120,7 +120,7 @@ def _wait_for(server: subprocess.Popen[bytes], port: int) -> None:
 
 
 def _get(port: int, name: str) -> IO[bytes]:
-    """An open response from the program; no proxy is asked."""
+    """An open response from the program; proxies are bypassed."""
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     response: IO[bytes] = opener.open(f"http://127.0.0.1:{port}/{name}", timeout=_READ_S)
     return response

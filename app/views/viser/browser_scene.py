@@ -19,17 +19,17 @@ from pipeline.types import F64, Point3, Result
 
 LABELS = "/own"
 OBJECTS = ("/cuboids", "/footprints", "/rays", "/velocities", "/cipv", "/next_cipv", "/labels")
-"""What everybody sees of the pipeline's objects."""
+"""Nodes of the pipeline's objects, shared by all browsers."""
 _LIFT_M = 0.3
 _WIDTH_PX = {False: 2.0, True: 4.0}
 _BACK, _LEAST_BACK_M = 2.5, 9.0
-"""How far from a selected label the camera goes, in its longest sides, and at least."""
+"""Distance of the camera from a selected label, as a multiple of its longest side, and the minimum distance."""
 _UP = 0.5
-"""How far above it, in that distance."""
+"""Height of the camera above it, as a share of that distance."""
 
 
 class BrowserScene:
-    """Draws into the scene of one browser. ``on_drag`` as of ``CuboidGizmo``."""
+    """Draws into the scene of one browser. ``on_drag``: see ``CuboidGizmo``."""
 
     def __init__(self, client: viser.ClientHandle, on_drag: OnDrag) -> None:
         self._client, self._scene = client, client.scene
@@ -40,11 +40,11 @@ class BrowserScene:
         self._followed: int | None = None
 
     def leave(self) -> None:
-        """The browser is gone."""
+        """The browser has disconnected."""
         self._gizmo.leave(self._client.client_id)
 
     def draw(self, view: PageView, result: Result, floor_m: float) -> None:
-        """What the page wants to see. While the recording plays, its labels come a moment after the frame."""
+        """Draw the page's view state. During playback, its labels follow a moment after the frame."""
         found = next((each for each in result.objects if each.id == view.selected), None)
         viser_nodes.filled(self._scene, "/selection", found, rgb("ego"), 0.2, floor_m)
         at = scene.top_of(found, floor_m) if found is not None and found.bev is not None else None
@@ -58,7 +58,7 @@ class BrowserScene:
         self._follow(view)
 
     def _hide_objects(self, hides: bool) -> None:
-        """A browser shows its own node rather than everybody's of that name: an empty one hides it."""
+        """In a browser, its own node overrides the shared node of the same name: an empty one hides it."""
         if hides and not self._covers:
             self._covers = [self._scene.add_frame(name, show_axes=False, visible=False) for name in OBJECTS]
         elif not hides:
@@ -80,7 +80,7 @@ class BrowserScene:
         self._names = max(len(labels), self._names)
 
     def _follow(self, view: PageView) -> None:
-        """The camera goes to a label when it is selected; after that it is the user's."""
+        """Move the camera to a label when it is selected; afterwards the user controls it."""
         track = None if view.held is None else view.held.track
         if track is not None and track != self._followed and view.held is not None:
             eye, target = looking_at(view.held.cuboid)
@@ -91,7 +91,7 @@ class BrowserScene:
 
 
 def looking_at(cuboid: Cuboid) -> tuple[Point3, Point3]:
-    """Where the camera goes to see a cuboid, and what it looks at: from the ego car's side of it, from above."""
+    """Camera position and target to see a cuboid: from above, on the side towards the ego car."""
     x, y, z = cuboid.center
     away_m = math.hypot(x, y)
     toward = (x / away_m, y / away_m) if away_m > 1.0 else (1.0, 0.0)
@@ -100,7 +100,7 @@ def looking_at(cuboid: Cuboid) -> tuple[Point3, Point3]:
 
 
 def _outline(label: LabelInView) -> F64:
-    """(12 or 13, 2, 3) edges, and where the front is known a line to it on the roof."""
+    """(12 or 13, 2, 3) edges, and if the front is known, a line to it on the roof."""
     edges = scene.cuboid_edges(label.cuboid)
     if not label.facing:
         return edges

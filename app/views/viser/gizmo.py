@@ -19,17 +19,17 @@ from pipeline.types import F64
 
 NODE = "/held"
 FACES = {"front": (0, 1), "rear": (0, -1), "left": (1, 1), "right": (1, -1), "top": (2, 1)}
-"""Axis of the cuboid and side of it: length forwards, width to the left, height up."""
+"""Axis of each face and its sign: length forwards, width to the left, height up."""
 _SMALLEST_M = 0.2
 _KNOB_M = 0.8
 _UPRIGHT = ((0.0, 0.0), (0.0, 0.0), (-1000.0, 1000.0))
-"""A cuboid is upright: it turns about z only."""
+"""A cuboid is upright: it rotates about z only."""
 _COLOR = (255, 255, 255)
 
 
 class CuboidGizmo:
     """Shown while a cuboid is edited. Thread-safe; ``on_drag`` is called on viser's event loop and must be quick. A
-    drag belongs to the label that it started on, even if another one is selected meanwhile."""
+    drag belongs to the label on which it started, even if another one is selected meanwhile."""
 
     def __init__(self, scene: viser.SceneApi, on_drag: OnDrag) -> None:
         self._scene, self._on_drag = scene, on_drag
@@ -41,14 +41,14 @@ class CuboidGizmo:
         self._handles: dict[str, viser.TransformControlsHandle] = {}
 
     def hold(self, held: HeldCuboid | None) -> None:
-        """Show it here; None removes it. During a drag the user's handle takes precedence."""
+        """Show it at this cuboid; None removes it. During a drag, the user's handle takes precedence."""
         with self._lock:
             self._wanted = held
             if self._before is None:
                 self._show(held)
 
     def leave(self, client: int) -> None:
-        """This browser disconnected: what it dragged stays where it is."""
+        """This browser disconnected: the cuboid that it dragged stays where it is."""
         with self._lock:
             held = self._held
             if self._before is None or held is None or client != self._hand:
@@ -85,7 +85,8 @@ class CuboidGizmo:
             handle.on_update(self._follower(name))
 
     def _follower(self, name: str) -> Callable[[viser.TransformControlsEvent], Coroutine[Any, Any, None]]:
-        async def follow(event: viser.TransformControlsEvent) -> None:  # on the loop, so that they come in order
+        # on the event loop, so that events arrive in order
+        async def follow(event: viser.TransformControlsEvent) -> None:
             ended = event.phase == "end"
             with self._lock:
                 if self._held is None or (self._before is not None and event.client_id != self._hand):
@@ -102,13 +103,13 @@ class CuboidGizmo:
         return follow
 
     def _let_go(self, held: HeldCuboid) -> None:
-        """The drag is over. From now on the page says where it is; a label selected meanwhile is shown."""
+        """The drag has ended. From now on the page controls the position; a label selected meanwhile is shown."""
         self._before = self._hand = None
         if not held.is_of(self._wanted):
             self._show(self._wanted)
 
     def _place(self, cuboid: Cuboid, held: str | None) -> None:
-        """Draw it, and place every handle except the dragged one."""
+        """Draw it, and position every handle except the dragged one."""
         edges = cuboid_edges(cuboid)
         self._scene.add_line_segments(f"{NODE}/edges", edges, _COLOR, thickness=3.0, thickness_units="screen")
         turn = (math.cos(cuboid.yaw_rad / 2), 0.0, 0.0, math.sin(cuboid.yaw_rad / 2))
@@ -126,7 +127,7 @@ class CuboidGizmo:
 
 
 def moved(before: Cuboid, name: str, position: F64, wxyz: F64) -> Cuboid:
-    """What a cuboid becomes when the handle ``name`` is dragged to a (3,) position and a (4,) turn, a quaternion."""
+    """The cuboid after the handle ``name`` was dragged to a (3,) position and a (4,) quaternion."""
     if name not in FACES:
         x, y, z = (float(value) for value in position)
         return Cuboid((x, y, z), before.size, 2.0 * math.atan2(float(wxyz[3]), float(wxyz[0])))
@@ -140,12 +141,12 @@ def moved(before: Cuboid, name: str, position: F64, wxyz: F64) -> Cuboid:
 
 
 def _outward(cuboid: Cuboid, face: str) -> F64:
-    """(3,) unit vector out of a face."""
+    """(3,) outward unit normal of a face."""
     axis, side = FACES[face]
     c, s = math.cos(cuboid.yaw_rad), math.sin(cuboid.yaw_rad)
     return side * np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)][axis])
 
 
 def _to_face(cuboid: Cuboid, face: str) -> F64:
-    """(3,) from the middle of the cuboid to the middle of a face."""
+    """(3,) vector from the centre of the cuboid to the centre of a face."""
     return _outward(cuboid, face) * cuboid.size[FACES[face][0]] / 2

@@ -14,8 +14,7 @@ OnChange = Callable[[str, Any], None]
 
 class ParamsGui:
     """One folder per section, all closed at first; a parameter that may be None has an "auto" switch before its slider.
-    ``on_change(name, value)`` is called with a dotted name when the user changes something, never for ``set``.
-    """
+    ``on_change(name, value)`` is called with a dotted name when the user changes something, but not by ``set``."""
 
     def __init__(self, gui: viser.GuiApi, params: Params, on_change: OnChange) -> None:
         self._gui = gui
@@ -34,11 +33,11 @@ class ParamsGui:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The dotted names that have an input."""
+        """The dotted names of all parameters with an input."""
         return tuple(self._inputs)
 
     def set(self, params: Params) -> None:
-        """Show these values to everybody, without calling ``on_change``. Only differences are written: otherwise a
+        """Show these values in all browsers, without calling ``on_change``. Only differences are written: otherwise a
         slider that the user has just moved, whose ``on_change`` is still pending, would jump back and the change would
         be lost."""
         for section, values in params.model_dump().items():
@@ -107,7 +106,7 @@ def _words(name: str) -> str:
 
 
 def _label(name: str, spec: Mapping[str, Any]) -> str:
-    """``path.half_width_m`` → ``Half width (m)``: the unit as people write it, once."""
+    """``path.half_width_m`` → ``Half width (m)``: with the unit in its usual notation."""
     key, unit = name.partition(".")[2], spec.get("unit", "")
     stem, _, last = key.rpartition("_")
     return f"{_words(stem if stem and last in _UNIT_SUFFIXES else key)} ({unit})" if unit else _words(key)

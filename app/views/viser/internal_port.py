@@ -24,19 +24,19 @@ from websockets.http11 import Request, Response
 
 _NAME = "x-cipv-internal"
 HEADERS = {_NAME: secrets.token_urlsafe(32)}
-"""What the proxy sends with every request."""
+"""Headers that the proxy sends with every request."""
 PAGE_HEADER = "x-cipv-page"
-"""With which the proxy says whose page the 3D view is in."""
+"""Header with which the proxy identifies the page that contains the 3D view."""
 PAGE: ContextVar[str] = ContextVar("page", default="")
-"""That page's name, in whatever viser runs on its event loop for this browser; empty where nobody said."""
+"""That page's name, in everything that viser runs on its event loop for this browser; empty if unknown."""
 _starting = threading.Lock()
 Respond = Callable[[ServerConnection, Request], Response | None]
 
 
 @contextmanager
 def demanding_the_secret() -> Iterator[None]:
-    """viser's server that is started in the block demands it, from its first connection on. RuntimeError when none was
-    started the way we know."""
+    """A viser server started in the block requires the secret for all connections. RuntimeError if no server was
+    started in the expected way."""
     with _starting:
         usual, guarded = websockets.asyncio.server.serve, False
 

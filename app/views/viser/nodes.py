@@ -80,7 +80,7 @@ def arrows(scene: viser.SceneApi, strokes: Strokes) -> None:
 def filled(
     scene: viser.SceneApi, name: str, each: FusedObject | None, color: Rgb, opacity: float, floor_m: float
 ) -> None:
-    """An object as a solid box, whichever sensor gave its place."""
+    """An object as a solid box, for all sources."""
     if each is None or each.bev is None:
         return _hide(scene, name)
     corners = np.asarray(each.bev)
@@ -116,7 +116,7 @@ def name_tag(scene: viser.SceneApi, name: str, text: str, position: Point3 | Non
 
 
 def path(scene: viser.SceneApi, corridor: Path, floor_m: float) -> None:
-    """The corridor as a ribbon, its two sides and the dotted middle."""
+    """The corridor as a ribbon, with its two sides and a dotted centre line."""
     vertices, faces = outlines.ribbon(corridor, floor_m + 0.02)
     if len(faces):
         scene.add_mesh_simple(
@@ -150,7 +150,7 @@ def floor(scene: viser.SceneApi, floor_m: float) -> None:
 
 
 def camera_position(frame: Frame) -> Point3:
-    """Where the camera sits in the ego frame; the ego origin when that is unknown."""
+    """Position of the camera in the ego frame; the ego origin if it is unknown."""
     if frame.camera is None:
         return 0.0, 0.0, 0.0
     x, y, z = inverse(frame.camera.T_camera_ego)[:3, 3]
@@ -158,7 +158,7 @@ def camera_position(frame: Frame) -> Point3:
 
 
 def image(scene: viser.SceneApi, frame: Frame, wanted: bool) -> None:
-    """The camera image in its frustum, true to K. Distortion is not removed."""
+    """The camera image in its frustum, with the field of view of K. Distortion is not removed."""
     if not wanted or frame.image is None or frame.camera is None:
         _hide(scene, "/camera/image")
         return _hide(scene, "/camera/edges")
@@ -191,7 +191,8 @@ def image(scene: viser.SceneApi, frame: Frame, wanted: bool) -> None:
 
 
 def _linear(colors: Sequence[Rgb]) -> outlines.U8:
-    """sRGB to linear light: the client interprets the colours of line ends as linear, and would show them too pale."""
+    """sRGB to linear light: the client interprets the colours of line ends as linear and would otherwise show them too
+    pale."""
     level = np.asarray(colors, dtype=np.float64) / 255.0
     light = np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
     return np.rint(light * 255.0).astype(np.uint8)
@@ -203,7 +204,7 @@ def _segments(line: F64) -> F64:
 
 
 def _stand_at(handle: viser.SceneNodeHandle, position: Point3) -> None:
-    """Moving an existing node costs a tenth of creating it again."""
+    """Move a node: this costs a tenth of creating it again."""
     handle.position = position
     handle.visible = True
 

@@ -32,9 +32,10 @@ POLICY = (
     "img-src data: blob:; connect-src 'self' data:; worker-src blob:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
-"""What viser's page needs, each part tried: it is one file that unpacks its own script and style with WebAssembly,
-reads its scene in a worker made from a blob, and fetches a light map and a decoder from inside itself (data:). Without
-'unsafe-eval' its sorter of Gaussian splats fails, with one message in the console; nothing here draws any."""
+"""Minimum permissions that viser's page needs, each verified: it is one file that unpacks its own script and style with
+WebAssembly, reads its scene in a worker made from a blob, and fetches a light map and a decoder from inside itself
+(data:). Without 'unsafe-eval' its sorter of Gaussian splats fails, with one message in the console; splats are not used
+here."""
 _OWN_HEADERS = {"content-security-policy": POLICY, "x-content-type-options": "nosniff", "cache-control": "no-cache"}
 _PASSED_ON = ("content-type", "content-encoding")
 _TIMEOUT_S = 5.0
@@ -43,12 +44,12 @@ _GONE = "The 3D view is not running."
 
 
 def viser_router(get_port: Callable[[], int | None], allowed: Callable[[HTTPConnection], bool]) -> APIRouter:
-    """Routes for ``/viser/``. ``get_port``: viser's current port on loopback, None when it does not run; it may take a
+    """Routes for ``/viser/``. ``get_port``: viser's current port on loopback, None if it does not run; it may take a
     while, and is called on any thread. ``allowed``: the application's own rule; a WebSocket must also come from a page
     of the same host and port.
 
-    HTTP: 403 not allowed, 502 with one sentence when viser is not there. WebSocket: refused before it opens (HTTP 403)
-    when not allowed, closed with 1011 when viser is not there.
+    HTTP: 403 if not allowed, 502 with one sentence if viser is not available. WebSocket: refused before it opens (HTTP
+    403) if not allowed, closed with 1011 if viser is not available.
     """
     router = APIRouter()
 
@@ -83,8 +84,8 @@ def viser_router(get_port: Callable[[], int | None], allowed: Callable[[HTTPConn
 
 
 def _same_origin(browser: WebSocket) -> bool:
-    """Browsers always send the origin of the page that opens a WebSocket; programs send none and are left to
-    ``allowed``."""
+    """Browsers always send the origin of the page that opens a WebSocket; other programs send none and are checked only
+    by ``allowed``."""
     origin = browser.headers.get("origin")
     return origin is None or urlsplit(origin).netloc.lower() == browser.headers.get("host", "").lower()
 
@@ -103,8 +104,8 @@ def _fetch(port: int, path: str, accept_encoding: str) -> Response:
 
 
 async def _bridge(browser: WebSocket, port: int | None, page: str) -> None:
-    """Connect the browser to viser until either leaves. Each direction waits for its receiver, so nothing queues up.
-    page: the name of the page that shows it."""
+    """Connect the browser to viser until either disconnects. Each direction waits for its receiver, so nothing queues
+    up. page: the name of the page that shows it."""
     offered = [Subprotocol(name) for name in browser.scope.get("subprotocols", [])]
     try:
         if port is None:
@@ -113,7 +114,7 @@ async def _bridge(browser: WebSocket, port: int | None, page: str) -> None:
             f"ws://127.0.0.1:{port}",
             subprotocols=offered or None,
             additional_headers=HEADERS | ({PAGE_HEADER: page} if _NAME.fullmatch(page) else {}),
-            compression=None,  # the scene is compressed already; deflating it again costs 4 ms a frame
+            compression=None,  # the scene is already compressed; deflating it again costs 4 ms a frame
             max_size=None,
             proxy=None,
             open_timeout=_TIMEOUT_S,
@@ -160,9 +161,9 @@ async def _to_browser(viser: ClientConnection, browser: WebSocket) -> None:
             else:
                 await browser.send_bytes(data)
     except (ConnectionClosed, WebSocketDisconnect, RuntimeError):
-        return  # starlette raises RuntimeError for a send after the browser left
+        return  # starlette raises RuntimeError for a send after the browser disconnected
 
 
 def _sendable(code: int | None) -> int:
-    """A close code that may be sent: "none given" and "connection lost" may not."""
+    """A close code that may be sent; the codes for "none given" and "connection lost" may not."""
     return CloseCode.GOING_AWAY if code in (None, CloseCode.NO_STATUS_RCVD, CloseCode.ABNORMAL_CLOSURE) else int(code)

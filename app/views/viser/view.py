@@ -40,11 +40,11 @@ class ViewPose(NamedTuple):
     """Position, look-at point and up direction of a view. Ego frame, metres."""
 
     eye: Point3
-    """Where the camera is."""
+    """Position of the camera."""
     target: Point3
-    """Where it looks."""
+    """The point it looks at."""
     up: Point3
-    """Which way is up in the view."""
+    """The up direction of the view."""
 
 
 POSES = {
@@ -57,7 +57,7 @@ POSES = {
 
 @dataclass(frozen=True)
 class _Display:
-    """What the user has chosen."""
+    """The user's display options."""
 
     color_by: scene.ColorBy = "kind"
     point_size_m: float = 0.06
@@ -66,11 +66,10 @@ class _Display:
 
 
 class ViserView:
-    """Starts the server at once. ``port`` 0 takes a free one; an occupied port silently becomes the next: read
-    ``port``. Callbacks, on a thread of viser: ``on_change(name, value)`` for every slider that the user moves,
-    ``on_drag(held, ended)`` for a dragged cuboid, ``on_pick(page, id)`` for every click into the scene, with the object
-    that was hit or None. Pages go by their names; ``view_of(page)`` says what one of them wants to see.
-    """
+    """Starts the server at once. ``port`` 0 selects a free one; if a port is occupied, the next one is used without a
+    message: read ``port``. Callbacks, on a thread of viser: ``on_change(name, value)`` for every slider that the user
+    moves, ``on_drag(held, ended)`` for a dragged cuboid, ``on_pick(page, id)`` for every click into the scene, with the
+    object that was hit or None. Pages are identified by name; ``view_of(page)`` returns the view state of a page."""
 
     def __init__(
         self,
@@ -92,7 +91,7 @@ class ViserView:
         self._server.gui.configure_theme(
             dark_mode=True, show_logo=False, show_share_button=False, control_width="small"
         )
-        self._server.gui.main_panel.minimize()  # the scene first: a pane of the dashboard is small
+        self._server.gui.main_panel.minimize()  # give space to the scene: a pane of the dashboard is small
         camera = self._server.initial_camera
         camera.position, camera.look_at, camera.up = POSES["Follow"]
         camera.fov = math.radians(CAMERA_FOV_DEG)
@@ -116,7 +115,7 @@ class ViserView:
 
     @property
     def port(self) -> int:
-        """The port it listens on, on loopback."""
+        """Its port on loopback."""
         return self._server.get_port()
 
     def show(self, frame: Frame, result: Result) -> None:
@@ -126,7 +125,7 @@ class ViserView:
             self._draw()
 
     def look(self) -> None:
-        """Draw what pages want to see by now."""
+        """Draw the current view state of the pages."""
         with self._lock:
             self._draw_browsers()
 
@@ -135,17 +134,18 @@ class ViserView:
         self._params.set(params)
 
     def close(self) -> None:
-        """Stop the server and disconnect everybody."""
+        """Stop the server and disconnect all browsers."""
         with _silent():
             self._server.stop()
 
     async def _came(self, client: viser.ClientHandle) -> None:
-        """On the loop, where ``PAGE`` tells whose page it is in."""
+        """On the event loop, where ``PAGE`` identifies the page."""
         with self._lock:
             self._browsers[client.client_id] = PAGE.get(), BrowserScene(client, self._on_drag)
             self._draw_browsers()
 
-    async def _left(self, client: viser.ClientHandle) -> None:  # on the loop: after whatever it said before
+    # on the event loop: after all messages that it sent before
+    async def _left(self, client: viser.ClientHandle) -> None:
         with self._lock:
             _, browser = self._browsers.pop(client.client_id, (None, None))
         if browser is not None:
@@ -157,14 +157,14 @@ class ViserView:
         self._on_pick(page, self._met(click.ray_origin, click.ray_direction))
 
     def _met(self, origin: Point3, direction: Point3) -> int | None:
-        """The object that a click's ray hits."""
+        """The object hit by a click's ray."""
         with self._lock:
             shown = self._shown
         if shown is None:
             return None
         return object_on_ray(shown[1].objects, origin, direction, scene.ground_height_m(shown[1]) or 0.0)
 
-    # ------------------------------------------------------------ what never changes
+    # ------------------------------------------------------------ static content
 
     def _add_static(self) -> None:
         viser_nodes.floor(self._scene, 0.0)
@@ -261,7 +261,8 @@ class ViserView:
             viser_nodes.filled(self._scene, name, found, rgb(role), opacity, floor_m)
 
     def _draw_labels(self, result: Result, floor_m: float) -> None:
-        """Labels are numbered slots that objects reuse, not one node per object: new ids never stop coming."""
+        """Labels are numbered slots that objects reuse, instead of one node per object: the number of ids is
+        unlimited."""
         named = [each for each in result.objects if self._has_label(each, result) and each.bev is not None]
         for place in range(max(len(named), self._labels)):
             if place < len(named):
@@ -280,7 +281,7 @@ class ViserView:
 
 
 class _silent:
-    """viser prints its own address, which is not the one to open."""
+    """Suppresses viser's own output of its address, which is not the one to open."""
 
     def __enter__(self) -> None:
         self._was = rich.get_console().quiet

@@ -63,7 +63,7 @@ class Score(ApiModel):
 
 
 def alignment_router(engine: Engine, scenes: AlignmentScenes) -> APIRouter:
-    """The score's route; what it looks at is found once a recording."""
+    """The score's route; the evaluated frames are determined once per recording."""
     router = APIRouter(prefix="/api/alignment", tags=["alignment"])
 
     @router.get("/score")
@@ -79,7 +79,7 @@ def alignment_router(engine: Engine, scenes: AlignmentScenes) -> APIRouter:
 
 
 def seen_now(engine: Engine, scenes: AlignmentScenes) -> list[Seen]:
-    """The frames to score the present alignment by; 404 when nothing is shown."""
+    """The frames to score the current alignment with; 404 if nothing is shown."""
     recording, shown = engine.drives.recording, engine.snapshot
     if recording is not None:
         return scenes.of_recording(recording)
@@ -89,7 +89,7 @@ def seen_now(engine: Engine, scenes: AlignmentScenes) -> list[Seen]:
 
 
 def _json(found: EdgeScore, local: LocalMatch, frames: int) -> Score:
-    """frames: how many were looked at."""
+    """frames: number of evaluated frames."""
     text = f"{_sentence(found)} ({found.borders} depth edges in {frames} frame{'' if frames == 1 else 's'})"
     return Score(
         score=found.score,
@@ -127,7 +127,7 @@ def _sentence(found: EdgeScore) -> str:
 
 
 def _words(better: Mapping[str, float]) -> str:
-    """As a person would change the parameters."""
+    """As instructions for changing the parameters."""
     units = {"deg": "°", "px": " px"}
     if "h_res_deg" in better:
         return f"h_res and v_res × {better['h_res_deg']:g}"

@@ -62,7 +62,7 @@ class FitJson(ApiModel):
 
 
 def alignment_fit_router(engine: Engine, fitting: AlignmentFitting) -> APIRouter:
-    """Routes over the one fit."""
+    """Routes for the alignment fit."""
     router = APIRouter(prefix="/api/alignment", tags=["alignment"])
 
     @router.post("/fit", status_code=202)

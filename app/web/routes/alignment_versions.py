@@ -52,7 +52,7 @@ class AlignmentVersionJson(ApiModel):
 def alignment_versions_router(
     engine: Engine, versions: AlignmentVersions, scenes: AlignmentScenes, fitting: AlignmentFitting
 ) -> APIRouter:
-    """Routes over the kept alignments."""
+    """Routes for saved alignments."""
     router = APIRouter(prefix="/api/alignment/versions", tags=["alignment"])
 
     def listed(version: AlignmentVersion) -> AlignmentVersionJson:

@@ -62,7 +62,7 @@ class JobList(ApiModel):
 
 
 def clips_router(engine: Engine, jobs: ExportQueue) -> APIRouter:
-    """Routes over exports."""
+    """Routes for exports."""
     router = APIRouter(prefix="/api", tags=["clips"])
 
     @router.post("/clip", status_code=202)
@@ -103,7 +103,7 @@ def clips_router(engine: Engine, jobs: ExportQueue) -> APIRouter:
 
 
 def clip_of(engine: Engine, first: int, last: int) -> Clip:
-    """A part of the open recording with the parameters as they stand."""
+    """A part of the open recording with the current parameters."""
     shown = engine.snapshot
     recording = open_recording(engine.drives)
     return Clip(recording, engine.control.peek().params, first, last, engine.drives.turn, shown.title, shown.rate_hz)

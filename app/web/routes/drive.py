@@ -128,7 +128,7 @@ class MarkJson(ApiModel):
 
 
 def drive_router(engine: Engine, drives: BackgroundRuns, marks: Marks) -> APIRouter:
-    """Routes over the whole-drive runs."""
+    """Routes for the whole-drive runs."""
     router = APIRouter(prefix="/api", tags=["drive"])
     known = _EventsOnce()
 
@@ -203,7 +203,7 @@ def drive_router(engine: Engine, drives: BackgroundRuns, marks: Marks) -> APIRou
 
 
 def _marks_of(shown: Snapshot) -> str:
-    """Under which name what is shown has its marks."""
+    """Key under which the marks of the shown recording or sensors are stored."""
     return LIVE if shown.live else shown.uri or ""
 
 
@@ -213,7 +213,7 @@ def _time_s(drives: BackgroundRuns, index: int) -> float:
 
 
 def _live_marks(shown: Snapshot, marks: Marks) -> list[EventJson]:
-    """Those made since the sensors were opened, by time."""
+    """Marks made since the sensors were opened, by time."""
     if not shown.live or shown.processed is None:
         return []
     opened_ns = shown.processed.frame.t_ns - round(shown.time_s * 1e9)
@@ -225,7 +225,7 @@ def _live_marks(shown: Snapshot, marks: Marks) -> list[EventJson]:
 
 
 def current(recording: OpenRecording) -> DriveRun:
-    """The run of the present parameters; 404 while there is none."""
+    """The run with the current parameters; 404 if there is none."""
     run = recording.runs.current
     if run is None:
         raise HTTPException(404, "no run has started yet")
@@ -233,7 +233,7 @@ def current(recording: OpenRecording) -> DriveRun:
 
 
 def columns_of(recording: OpenRecording, run: DriveRun, first: int) -> Columns:
-    """Get the columns of a run from a frame on."""
+    """The columns of a run from a frame on."""
     rows = run.rows(first)
     return Columns(
         run=run.number,
@@ -248,7 +248,7 @@ def columns_of(recording: OpenRecording, run: DriveRun, first: int) -> Columns:
 
 
 class _EventsOnce:
-    """The events of the run that was asked for last, found again only when it has come further."""
+    """Events of the last requested run; recomputed only after it has progressed."""
 
     def __init__(self) -> None:
         self._held: tuple[DriveRun, int, list[Event]] | None = None

@@ -64,7 +64,7 @@ class FleetCount(ApiModel):
 
 
 def fleet_router(fleet: FleetDesk | None) -> APIRouter:
-    """Routes over the tables of a fleet; None: the dashboard was started without one."""
+    """Routes for the tables of a fleet; None: the dashboard was started without one."""
     router = APIRouter(prefix="/api/fleet", tags=["fleet"])
 
     def desk() -> FleetDesk:

@@ -9,7 +9,7 @@ from app.web import help_pages
 
 _IMAGES = {".svg": "image/svg+xml", ".png": "image/png", ".jpg": "image/jpeg"}
 _FRESH = {"cache-control": "no-cache"}
-"""The browser asks again each time, so that an update of the program is seen at once."""
+"""The browser revalidates each time, so that an update of the program is visible at once."""
 
 
 def help_router() -> APIRouter:

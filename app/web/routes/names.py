@@ -10,8 +10,8 @@ from pydantic_core import PydanticCustomError
 
 
 def one_of(names: Iterable[str]) -> tuple[Any, Any]:
-    """For ``Annotated[str, *one_of(REGISTRY)]``: what a ``Literal`` of these names would do, for names that are only
-    known when the program starts."""
+    """For ``Annotated[str, *one_of(REGISTRY)]``: the equivalent of a ``Literal`` for names that are only known at
+    runtime."""
     known = list(names)
 
     def check(name: str) -> str:

@@ -56,7 +56,7 @@ class PresetChoice(Step):
 
 
 def params_router(engine: Engine) -> APIRouter:
-    """Routes over the engine's parameters."""
+    """Routes for the engine's parameters."""
     router = APIRouter(prefix="/api", tags=["parameters"])
 
     @router.get("/params", responses=_ANSWER)
@@ -118,7 +118,7 @@ def params_router(engine: Engine) -> APIRouter:
 
 
 def describe() -> list[dict[str, Any]]:
-    """Every section: name, help and its parameters, in the order in which they are declared."""
+    """Every section: name, help and its parameters, in order of declaration."""
     return [
         {
             "name": name,
@@ -130,7 +130,8 @@ def describe() -> list[dict[str, Any]]:
 
 
 def effective(frame: Frame | None, params: Params) -> dict[str, float]:
-    """What None stands for in each parameter, from the shown frame's calibration and its detector's distance law."""
+    """The value that None stands for in each parameter, from the shown frame's calibration and its detector's distance
+    law."""
     boxes = frame.raw_boxes if frame is not None else None
     law = (boxes.law if boxes is not None else REAL_VEHICLES).at_focal(params.distance.reference_focal_px)
     answer = {
@@ -152,7 +153,7 @@ def effective(frame: Frame | None, params: Params) -> dict[str, float]:
 
 
 def _params_json(engine: Engine, person: str = "") -> Response:
-    """Built while a person waits for the rerun of the shown frame, so the constant part is encoded once only."""
+    """Built while the user waits for the rerun of the shown frame, so the constant part is encoded only once."""
     wish, processed = engine.control.peek(), engine.snapshot.processed
     can_undo, can_redo = engine.labels.possible(person)
     answer = {

@@ -38,7 +38,7 @@ class SourceChoice(ApiModel):
 
 
 def playback_router(engine: Engine, stream: Stream) -> APIRouter:
-    """Routes over the engine's playback."""
+    """Routes for the engine's playback."""
     router = APIRouter(prefix="/api", tags=["playback"])
 
     @router.get("/state", responses={200: {"model": StateJson}})

@@ -53,7 +53,7 @@ class Ray(ApiModel):
 
 
 def project_router(engine: Engine) -> APIRouter:
-    """The route over the shown frame's camera and the present alignment."""
+    """Routes for the shown frame's camera and the current alignment."""
     router = APIRouter(prefix="/api", tags=["alignment"])
 
     @router.post("/project")

@@ -23,7 +23,7 @@ class RecordingChoice(ApiModel):
 
 
 def recording_router(engine: Engine) -> APIRouter:
-    """Routes over the engine's recording."""
+    """Routes for the engine's recording."""
     router = APIRouter(prefix="/api", tags=["recording"])
 
     @router.get("/recording")

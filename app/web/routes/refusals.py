@@ -16,8 +16,8 @@ from pipeline.common.errors import BadInput
 
 @contextmanager
 def refusing() -> Iterator[None]:
-    """404 for what is not there, 409 for what is refused, 422 for what makes no sense, 503 for a database that fails.
-    Stale goes through: who asks is to get both versions."""
+    """404 for missing items, 409 for refused changes, 422 for invalid input, 503 for a failing database. Stale passes
+    through: the client must receive both versions."""
     try:
         yield
     except Stale:
@@ -33,7 +33,7 @@ def refusing() -> Iterator[None]:
 
 
 def open_recording(drives: BackgroundRuns) -> OpenRecording:
-    """The recording whose whole drive is computed; 404 when there is none, as with live sensors."""
+    """The recording whose whole drive is computed; 404 if there is none, as with live sensors."""
     if drives.recording is None:
         raise HTTPException(404, "no recording is open; for live sensors, record a session and open it")
     return drives.recording

@@ -24,17 +24,17 @@ from app.web.routes.shapes.common import ApiModel, file_of
 from pipeline.common.progress import Progress
 
 AROUND = 50
-"""Frames before and behind the shown one that are opened by default."""
+"""Frames before and after the shown one that are opened by default."""
 MOST_FRAMES = 600
 _AT_ONCE = 2
-"""Replays that are written; more wait, and go when who asked for them does."""
+"""Maximum replays written at a time; further requests wait, and are dropped when the client disconnects."""
 
 _POLICY = (
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; img-src 'self' blob: "
     "data:; font-src 'self' data:; connect-src 'self' blob: data:; worker-src 'self' blob:; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'self'"
 )
-"""What the viewer needs: WebAssembly, and styles that it sets itself. It may talk to nobody but us."""
+"""What the viewer needs: WebAssembly, and styles that it sets itself. It may connect only to this server."""
 _TYPES = {"re_viewer.js": "text/javascript", "re_viewer_bg.wasm": "application/wasm"}
 _PAGE = Path(__file__).resolve().parents[3] / "static" / "rerun" / "index.html"
 
@@ -51,7 +51,7 @@ class Address(ApiModel):
 
 
 def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
-    """Routes to the viewer and what it shows."""
+    """Routes for the viewer and its content."""
     router = APIRouter(tags=["rerun"])
     threads = ThreadPoolExecutor(_AT_ONCE, "cipv-rerun")
 
@@ -101,7 +101,7 @@ def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
 
     @router.get("/rerun/", response_class=FileResponse, include_in_schema=False)
     def page() -> FileResponse:
-        """The page that the viewer is in."""
+        """The page that contains the viewer."""
         headers = {"content-security-policy": _POLICY, "cache-control": "no-cache"}
         return FileResponse(_PAGE, headers=headers)
 
@@ -109,7 +109,7 @@ def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
 
 
 def _written(engine: Engine, span: tuple[int, int], start: RerunStartOptions, progress: Progress) -> Path:
-    """A new file; none is left when it cannot be written, or nobody waits for it."""
+    """A new file; it is removed if it cannot be written or the client disconnects."""
     progress(0, 1)
     with refusing(), tempfile.NamedTemporaryFile(prefix="cipv-", suffix=".rrd", delete=False) as file:
         path = Path(file.name)
@@ -122,7 +122,7 @@ def _written(engine: Engine, span: tuple[int, int], start: RerunStartOptions, pr
 
 
 def _span(engine: Engine, first: int | None, last: int | None) -> tuple[int, int]:
-    """The frames to open; 422 when they are none."""
+    """The frames to open; 422 for an invalid range."""
     shown = engine.snapshot
     end = max(shown.count - 1, 0)
     start = max(0, shown.index - AROUND) if first is None else first

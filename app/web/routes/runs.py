@@ -100,7 +100,7 @@ class ComparisonJson(ApiModel):
 
 
 def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:
-    """Routes over the runs of the open recording."""
+    """Routes for the runs of the open recording."""
     router = APIRouter(prefix="/api", tags=["what if"])
 
     @router.get("/runs")
@@ -186,12 +186,12 @@ def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:
 
 
 def _judged_by_labels(desk: LabelDesk, base: DriveRun, run: DriveRun) -> tuple[list[Row], list[Row]] | None:
-    """The rows of both, judged by labels made here; None where no label is accepted, or while the label database is
-    unavailable: then the truth that comes with the recording judges."""
+    """The rows of both runs, judged by labels made here; None if no label is accepted, or while the label database is
+    unavailable: then the recording's own truth is used."""
     try:
         labels = desk.labels
         first, second = desk.scores.judged_rows(labels, base), desk.scores.judged_rows(labels, run)
-    except DatabaseError as error:  # two runs are compared without labels as well
+    except DatabaseError as error:  # runs can be compared without labels as well
         logger.warning("compared without labels: %s", error)
         return None
     return (first, second) if first is not None and second is not None else None

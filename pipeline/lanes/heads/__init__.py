@@ -21,11 +21,11 @@ HEADS: tuple[Callable[[LaneOutputs], LaneHead | None], ...] = (
     row_grid.recognise,
     classes.recognise,
 )
-"""Each gives the head, if an answer is of its form. The first that does is taken."""
+"""Each returns its head if it recognises the outputs. The first match is used."""
 
 
 def pick_head(outputs: Sequence[F32], names: Sequence[str]) -> LaneHead:
-    """The head of a network, by the shapes and the names of its outputs. UnknownLaneHead when none recognises them."""
+    """The head of a network, from the shapes and names of its outputs. UnknownLaneHead if none recognises them."""
     answer = LaneOutputs([np.asarray(output).shape for output in outputs], names)
     for recognise in HEADS:
         head = recognise(answer)

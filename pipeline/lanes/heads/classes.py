@@ -8,11 +8,11 @@ from pipeline.lanes.heads.masks import from_masks
 
 _CULANE = ((0.3598, 0.3653, 0.3662), (0.2573, 0.2663, 0.2756))
 _CUT_ASPECT = 4.0
-"""An input wider than this is for images whose sky was cut off (CULane at 976×208)."""
+"""A wider input is for images with the sky cut off (CULane at 976×208)."""
 
 
 def recognise(answer: LaneOutputs) -> LaneHead | None:
-    """A single map of some classes, too large for a grid of cells."""
+    """A single map with several classes, too large for a grid of cells."""
     index = answer.only_map()
     if index is None:
         return None

@@ -16,23 +16,23 @@ from pipeline.lanes.heads.head import IMAGENET, LaneHead, LaneOutputs, Points
 from pipeline.types import F32
 
 _SAMPLES = 60
-"""A line of half an image's height is then read every three rows."""
+"""Gives a sample every three rows for a line of half an image's height."""
 _TUSIMPLE_HORIZON = 0.33
-"""The network has learnt it: where an image's horizon lies lower, its lines are too high by as much. Measured on 11
-photographs with the horizon at 0.57: lines lie 3.4 % of the width off, and 0.4 % with that much sky cut off."""
+"""Learned by the network: if an image's horizon is lower, its lines are too high by the difference. Measured on 11
+photographs with the horizon at 0.57: lines are off by 3.4 % of the width, and by 0.4 % with that much sky cut off."""
 _HORIZON = 1e-3
-"""Nearer to the horizon than this share of the image the curve runs to infinity."""
+"""Closer to the horizon than this share of the image, the curve diverges."""
 
 
 @dataclass(frozen=True)
 class CurveHead(LaneHead):
-    """Its lines are there by their own scores."""
+    """Whether its lines exist is decided by their own scores."""
 
     scores: int = 0
-    """Which output holds them."""
+    """Index of the output with the scores."""
 
     def points(self, outputs: Sequence[F32]) -> Points:
-        """The points on lines in the network's answer."""
+        """Points on lines from the network's outputs."""
         logits = np.asarray(outputs[self.scores][0], np.float64)
         there = 1.0 / (1.0 + np.exp(np.clip(logits[:, 0] - logits[:, 1], -50.0, 50.0)))
         found = self.read(np.asarray(outputs[self.output][0], np.float32))
@@ -42,7 +42,7 @@ class CurveHead(LaneHead):
 
 
 def from_curves(values: F32) -> Points:
-    """(n, 8) curves → points from end to end of each, every one with the score 1."""
+    """(n, 8) curves → points from end to end of each, all with score 1."""
     upper, lower, k, f, m, n, b, c = np.asarray(values, np.float64).T[:, :, None]
     y = upper + (lower - upper) * np.linspace(0.0, 1.0, _SAMPLES)
     from_horizon = y - f
@@ -55,7 +55,8 @@ def from_curves(values: F32) -> Points:
 
 
 def recognise(answer: LaneOutputs) -> LaneHead | None:
-    """Curves of eight numbers and as many pairs of scores; the first of each, since training leaves others behind."""
+    """Curves with eight numbers each and as many pairs of scores; the first output of each kind, since training leaves
+    auxiliary ones."""
     curves = next((i for i, shape in enumerate(answer.shapes) if len(shape) == 3 and shape[2] == 8), None)
     if curves is None:
         return None

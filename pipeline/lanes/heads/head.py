@@ -11,16 +11,17 @@ import numpy as np
 from pipeline.types import F32, F64, I32
 
 InputFit = Literal["stretch", "letterbox", "lower"]
-"""How an image is fitted to the input: stretched; scaled whole onto grey; its lower part, in the input's aspect."""
+"""How an image is fitted to the input: stretched; scaled as a whole, with grey borders; its lower part, with the
+input's aspect ratio."""
 PerChannel = tuple[float, float, float]
 IMAGENET: tuple[PerChannel, PerChannel] = ((0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
-"""Mean and spread of the images that most networks were first trained on."""
+"""Mean and standard deviation of the images that most networks were pretrained on."""
 _THERE = 0.5
-"""A line is there when its probability is higher."""
+"""Minimum probability of a line."""
 
 
 class UnknownLaneHead(ValueError):
-    """Outputs that no head recognises; the text says what they are."""
+    """Outputs that no head recognises; the text describes them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,51 +29,52 @@ class Points:
     """Points on painted lines."""
 
     uv: F64
-    """(M, 2) in shares of the network's input, 0–1 from its left and upper edge."""
+    """(M, 2) as fractions of the network's input, 0–1 from its left and upper edge."""
     score: F32
     """(M,) 0–1."""
     line: I32
-    """(M,) which line each is of; −1 where the network does not say."""
+    """(M,) line of each point; −1 if the network does not tell."""
 
 
 class LaneOutputs(NamedTuple):
-    """The outputs of a network, to recognise its head by."""
+    """Properties of a network's outputs, used to recognise its head."""
 
     shapes: Sequence[tuple[int, ...]]
-    """Of each output, in the network's order."""
+    """Shape of each output, in the network's order."""
     names: Sequence[str]
-    """Of each output, as the file has them."""
+    """Name of each output in the file."""
 
     def only_map(self) -> int | None:
-        """The index of the one output that is a map, (1, channels, rows, columns); None when there are none or more."""
+        """The index of the only output that is a map, (1, channels, rows, columns); None if there are none or
+        several."""
         maps = [i for i, shape in enumerate(self.shapes) if len(shape) == 4 and shape[0] == 1]
         return maps[0] if len(maps) == 1 else None
 
 
 @dataclass(frozen=True)
 class LaneHead:
-    """How one family of networks takes its image (RGB), and how its answer is read."""
+    """How one family of networks expects its image (RGB), and how its outputs are decoded."""
 
     name: str
-    """For people."""
+    """Display name."""
     output: int
-    """Which output holds the lines."""
+    """Index of the output with the lines."""
     read: Callable[[F32], Points]
-    """That output without its batch axis → points."""
+    """Decodes that output, without its batch axis, to points."""
     fit: InputFit = "stretch"
-    """How the image is brought to the network's input size."""
+    """How the image is fitted to the network's input size."""
     exists: int | None = None
-    """Which output holds the probability that each line is there; None: no output does."""
+    """Index of the output with the probability that each line exists; None without one."""
     mean: PerChannel = (0.0, 0.0, 0.0)
-    """Taken from the image's 0–1."""
+    """Subtracted from the image, scaled to 0–1."""
     spread: PerChannel = (1.0, 1.0, 1.0)
-    """What the difference is divided by."""
+    """Divisor of the difference."""
     horizon: float | None = None
-    """Where its training images had the horizon, as a share of their height: so much sky is cut off that the input
-    has it there too. None: it does not care."""
+    """The horizon in its training images as a share of their height: the sky is cut off so that the input has the same
+    horizon. None: the horizon does not matter."""
 
     def points(self, outputs: Sequence[F32]) -> Points:
-        """The points on lines in the network's answer."""
+        """Points on lines from the network's outputs."""
         found = self.read(np.asarray(outputs[self.output][0], np.float32))
         if self.exists is None:
             return found

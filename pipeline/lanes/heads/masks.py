@@ -9,14 +9,14 @@ from pipeline.lanes.heads.head import Points
 from pipeline.types import F32
 
 _ROWS = 180
-"""A mask is read in about so many of its rows: finer adds nothing a fit would notice."""
+"""About this many rows of a mask are sampled: more would not improve the fit."""
 _WIDEST = 1 / 8
-"""A run of lane pixels wider than this share of the mask is no line seen along the road."""
+"""A run of lane pixels wider than this share of the mask is not a line along the road."""
 
 
 def from_masks(values: F32) -> Points:
-    """(C, h, w) scores of nothing and of C − 1 kinds of line → the middles of their runs in every few rows. Two
-    channels do not say which line a pixel is of."""
+    """(C, h, w) scores of background and C − 1 classes of line → the middles of their runs, sampled every few rows.
+    With two channels, the points are not assigned to lines."""
     channels, height, width = values.shape
     rows = np.arange(0, height, max(1, height // _ROWS))
     chosen = values[:, rows]
@@ -35,7 +35,7 @@ def from_masks(values: F32) -> Points:
 
 
 def _sureness(values: F32) -> F32:
-    """Probability of the best class: a softmax, unless the network has made probabilities already."""
+    """Probability of the best class: a softmax, unless the network's outputs already are probabilities."""
     low, high = float(values.min()), float(values.max())
     if low >= 0.0 and high <= 1.0:
         return np.asarray(values.max(axis=0) / np.maximum(values.sum(axis=0), 1e-6), np.float32)
@@ -44,7 +44,7 @@ def _sureness(values: F32) -> F32:
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Row, first column and first column beyond of every run of true values in the rows of (R, w)."""
+    """Row, first column and end column (exclusive) of every run of true values in the rows of (R, w)."""
     edged = np.zeros((mask.shape[0], mask.shape[1] + 2), np.int8)
     edged[:, 1:-1] = mask
     steps = np.diff(edged, axis=1)

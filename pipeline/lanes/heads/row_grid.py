@@ -17,7 +17,7 @@ _MOST_LINES, _FEWEST_CELLS = 8, 50
 
 
 def recognise(answer: LaneOutputs) -> LaneHead | None:
-    """A single map of many cells, with the rows of one of the two data sets."""
+    """A single map with many cells, and the number of rows of one of the two data sets."""
     index = answer.only_map()
     if index is None:
         return None
@@ -29,8 +29,8 @@ def recognise(answer: LaneOutputs) -> LaneHead | None:
 
 
 def from_rows(values: F32) -> Points:
-    """(cells + 1, rows, lines) → the expected cell in each row for each line (Qin et al., "Ultra Fast
-    Structure-aware Deep Lane Detection", ECCV 2020, Eq. 3), where "no line" is not the best answer."""
+    """(cells + 1, rows, lines) → the expected cell in each row for each line (Qin et al., "Ultra Fast Structure-aware
+    Deep Lane Detection", ECCV 2020, Eq. 3), unless "no line" has the highest score."""
     cells, rows = values.shape[0] - 1, values.shape[1]
     anchors = _CULANE_ROWS if rows == len(_CULANE_ROWS) else _TUSIMPLE_ROWS
     weight = np.exp(values[:-1] - values[:-1].max(axis=0))

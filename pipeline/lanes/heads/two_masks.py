@@ -8,7 +8,7 @@ from pipeline.lanes.heads.masks import from_masks
 
 
 def recognise(answer: LaneOutputs) -> LaneHead | None:
-    """The lane mask is the one whose name says so, else the second."""
+    """The lane mask is identified by its name, else it is the second output."""
     masks = [i for i, shape in enumerate(answer.shapes) if len(shape) == 4 and shape[:2] == (1, 2)]
     if len(masks) != 2:
         return None

@@ -14,16 +14,16 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 @dataclass(frozen=True)
 class Files:
-    """Where a recording keeps what; files by frame name, stamps by frame number."""
+    """Files of a recording by type and frame name; timestamps by frame number."""
 
     images: dict[str, Path]
     """Images by frame name."""
     sweeps: dict[str, Path]
     """Point clouds by frame name."""
     lidar_stamps: tuple[int, ...] = ()
-    """Nanoseconds; empty where the layout has none."""
+    """Nanoseconds; empty if the layout has none."""
     camera_stamps: tuple[int, ...] = ()
-    """Nanoseconds; empty where the layout has none."""
+    """Nanoseconds; empty if the layout has none."""
     oxts: dict[str, Path] = field(default_factory=dict)
     """Records of the inertial unit, by frame name."""
     labels: dict[str, Path] = field(default_factory=dict)
@@ -33,13 +33,13 @@ class Files:
     raw_calibration: tuple[Path, Path] | None = None
     """Raw drives: of the cameras, and of the Velodyne."""
     sequence_calibration: Path | None = None
-    """Odometry sequences: one file for all."""
+    """Odometry sequences: one file for all frames."""
     poses: Path | None = None
-    """Odometry sequences: where the left camera was, a line a frame."""
+    """Odometry sequences: poses of the left camera, one line per frame."""
     calibration_360: tuple[Path, Path] | None = None
     """KITTI-360: of the Velodyne, and of the cameras."""
     camera_poses: Path | None = None
-    """KITTI-360: where the left camera was, by frame number."""
+    """KITTI-360: poses of the left camera, by frame number."""
 
     @property
     def names(self) -> list[str]:
@@ -48,7 +48,7 @@ class Files:
 
 
 def read_stamps(path: Path) -> tuple[int, ...]:
-    """Nanoseconds of each line of ``timestamps.txt``; empty when there is no such file."""
+    """Nanoseconds from each line of ``timestamps.txt``; empty if there is no such file."""
     try:
         return parse_timestamps(read_bytes(path))
     except SourceError:

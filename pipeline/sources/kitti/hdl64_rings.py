@@ -21,16 +21,16 @@ RINGS = 64
 NOMINAL_ELEVATIONS_DEG: F64 = np.concatenate([2.0 - np.arange(32) / 3.0, -8.83 - 0.5 * np.arange(32)])
 """(64,) highest first: 32 lasers from +2° in steps of 1/3°, 32 from −8.83° in steps of 1/2° (HDL-64E user's manual)."""
 _ORDER_SLACK_DEG = 0.5
-"""How far a ring may lie above the one before it and the file still count as in order: the median of a ring that is
-mostly hidden is that uncertain."""
+"""How far a ring may lie above the previous one for the file to count as ordered: this is the uncertainty of the median
+of a mostly occluded ring."""
 
 Turns = npt.NDArray[np.int64]
 
 
 def turns(points: F32) -> Turns:
-    """(N,) int64: how many rings lie before each of (N, 4) points in the file's order, 0 = the highest ring.
+    """(N,) int64: number of rings before each of (N, 4) points in the file's order, 0 = the highest ring.
 
-    Counted up and down, so that jitter at straight ahead (a step back over 0) makes no ring of its own.
+    A step back over straight ahead counts backwards, so that jitter there does not create a ring.
     """
     azimuth = np.arctan2(points[:, 1], points[:, 0])
     azimuth = np.where(azimuth < 0.0, azimuth + 2.0 * np.pi, azimuth)
@@ -42,10 +42,10 @@ def turns(points: F32) -> Turns:
 
 
 def ring_elevations_deg(points: F32, turn: Turns, count: int) -> F64:
-    """(count,) median elevation of each ring in degrees, NaN where it has no point.
+    """(count,) median elevation of each ring in degrees, NaN if it has no point.
 
-    The HDL-64's lasers sit up to 0.2 m apart, which near returns show as a wrong angle: points beyond 10 m decide
-    where there are enough of them.
+    The HDL-64's lasers sit up to 0.2 m apart, which distorts the angles of near returns, so only points beyond 10 m are
+    used if there are enough.
     """
     range_m = np.hypot(points[:, 0], points[:, 1])
     elevation = np.degrees(np.arctan2(points[:, 2], range_m))
@@ -60,20 +60,22 @@ def ring_elevations_deg(points: F32, turn: Turns, count: int) -> F64:
 
 
 def is_in_order(elevations_deg: F64) -> bool:
-    """Whether counted rings are rings: as many as the HDL-64 has lasers, or fewer, and each below the one before it."""
+    """Whether the counted rings are plausible: at most as many as the HDL-64 has lasers, and each below the previous
+    one."""
     seen = elevations_deg[np.isfinite(elevations_deg)]
     return len(elevations_deg) <= RINGS and bool(np.all(np.diff(seen) <= _ORDER_SLACK_DEG))
 
 
 def rings_by_elevation(points: F32, elevations_deg: F64) -> Turns:
-    """(N,) int64: for each of (N, 4) points the ring of (R,) elevations, highest first, that is nearest to its own."""
+    """(N,) int64: for each of (N, 4) points the nearest ring of (R,) elevations, highest first."""
     elevation = np.degrees(np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1])))
     between = (elevations_deg[1:] + elevations_deg[:-1]) / 2
     return np.searchsorted(-between, -elevation).astype(np.int64, copy=False)
 
 
 def match_vlp16(elevations_deg: F64) -> dict[int, int]:
-    """Recorded ring → VLP-16 channel (0 = −15°): for each channel the nearest recorded ring within 1°, each once."""
+    """Recorded ring → VLP-16 channel (0 = −15°): for each channel the nearest recorded ring within 1°, each used
+    once."""
     matched: dict[int, int] = {}
     for channel, wanted in enumerate(VLP16_ELEVATIONS_DEG):
         away = np.abs(elevations_deg - wanted)

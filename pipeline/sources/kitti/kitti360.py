@@ -23,7 +23,7 @@ _SWEEPS, _IMAGES = "data_3d_raw", "data_2d_raw"
 
 
 def root_of(folder: Path) -> tuple[Path, str | None] | None:
-    """The data set's folder and the drive that a path names, None for the whole; None for a path of anything else."""
+    """The data set's folder and the drive named by a path, None for the whole data set; None for any other path."""
     if any((folder / part).is_dir() for part in (_SWEEPS, _IMAGES)):
         drives = drives_in(folder)
         return folder, drives[0] if len(drives) == 1 else None
@@ -32,12 +32,12 @@ def root_of(folder: Path) -> tuple[Path, str | None] | None:
 
 
 def drives_in(root: Path) -> list[str]:
-    """Names of the drives of which there are sweeps or images."""
+    """Names of the drives with sweeps or images."""
     return sorted({each.name for part in (_SWEEPS, _IMAGES) for each in (root / part).glob("*") if each.is_dir()})
 
 
 def files_of_drive(root: Path, drive: str) -> Files:
-    """What lies in the data set of a drive."""
+    """Files of a drive in the data set."""
     velodyne, camera = root / _SWEEPS / drive / "velodyne_points", root / _IMAGES / drive / "image_00"
     poses = root / "data_poses" / drive
     camera_poses = poses / "cam0_to_world.txt"
@@ -53,8 +53,8 @@ def files_of_drive(root: Path, drive: str) -> Files:
 
 
 def motion_of_camera(path: Path, stamps: Sequence[int], T_rect_ego: F64) -> list[EgoState | None]:
-    """Own motion in each frame from ``cam0_to_world.txt``: a frame's number and 16 numbers of T_map_rect a line. Frames
-    without a pose have the motion between those around them. SourceError for a file that is none."""
+    """Own motion in each frame from ``cam0_to_world.txt``: a frame number and 16 numbers of T_map_rect per line. Frames
+    without a pose get the motion between the poses around them. SourceError for an invalid file."""
     rows = parse_number_lines(read_bytes(path), 17)
     rows = rows[(np.abs(rows) < 1e8).all(axis=1)]
     number = rows[:, 0].astype(np.int64)

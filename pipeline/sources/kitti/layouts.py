@@ -22,13 +22,13 @@ from pipeline.types import EgoState
 from pipeline.types.source import SourceError
 
 _BEGIN_NS = 1_000_000_000
-"""Odometry sequences count seconds from 0, which elsewhere means that there is no stamp."""
+"""Odometry sequences count seconds from 0, which elsewhere means a missing timestamp."""
 _LONGEST_S = 1e7
-"""Of a drive: four months."""
+"""Maximum duration of a drive: four months."""
 
 
 def files_of(folder: Path) -> Files:
-    """What lies in a recording's folder."""
+    """Files in a recording's folder."""
     named = kitti360.root_of(folder)
     if named is not None:
         root, drive = named
@@ -74,8 +74,8 @@ def _sequence(folder: Path) -> Files:
 
 
 def motion_of(files: Files, calibration: KittiCalibration) -> list[EgoState | None]:
-    """Own motion in each frame of a sequence from its poses, over the frames before and after it; empty without any.
-    SourceError for poses that are none."""
+    """Own motion in each frame of a sequence from its poses, over the neighbouring frames; empty without poses.
+    SourceError for invalid poses."""
     if files.camera_poses is not None and len(files.lidar_stamps) > 1:
         return kitti360.motion_of_camera(files.camera_poses, files.lidar_stamps, calibration.T_rect_ego)
     if files.poses is None or len(files.lidar_stamps) < 2:
@@ -92,12 +92,12 @@ def motion_of(files: Files, calibration: KittiCalibration) -> list[EgoState | No
 
 
 def sequence_calibration(path: Path, size: tuple[int, int]) -> KittiCalibration:
-    """Of a sequence. SourceError names the file and what is wrong."""
+    """Calibration of a sequence. SourceError names the file and what is wrong."""
     return parse_odometry_calibration(read_bytes(path), path.name, size)
 
 
 def _read_seconds(path: Path) -> tuple[int, ...]:
-    """Nanoseconds of each line; empty where there is no such file or a line is no time."""
+    """Nanoseconds from each line; empty if there is no such file or a line is not a time."""
     try:
         seconds = [float(line) for line in read_bytes(path).split()]
     except (SourceError, ValueError):

@@ -44,12 +44,12 @@ _NOMINAL_SIZE = (1242, 375)
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> KittiSource:
-    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    """Loaded by name from ``pipeline.source_kinds``. SourceError if it cannot be opened."""
     return KittiSource(uri, rest, how.rings)
 
 
 class KittiSource:
-    """A KITTI drive. rings: 16 keeps the rings that a VLP-16 would have, 64 keeps all."""
+    """A KITTI drive. rings: 16 keeps the rings closest to those of a VLP-16, 64 keeps all."""
 
     def __init__(self, uri: str, path: str, rings: int = 16) -> None:
         if rings not in (16, RINGS):
@@ -60,7 +60,7 @@ class KittiSource:
         self._names = self._files.names
         if not self._names:
             raise SourceError(f"{path}: not a KITTI recording: {_what_it_holds(folder)}")
-        # object calibration files do not say how large the images are
+        # object calibration files do not contain the image size
         self._size = image_size(self._files.images.values()) or _NOMINAL_SIZE
         self._calibration = self._first_calibration(path)
         self._ticks = _ticks(self._names, self._files)
@@ -73,7 +73,7 @@ class KittiSource:
         return len(self._names)
 
     def t_ns(self, index: int) -> int:
-        """The moment the LiDAR faces ahead, which is when KITTI triggers its cameras; 10 Hz where no stamps are."""
+        """The time at which the LiDAR faces ahead, when KITTI triggers its cameras; 10 Hz without timestamps."""
         self._name(index)
         return self._ticks[index]
 
@@ -110,7 +110,7 @@ class KittiSource:
             return None
 
     def T_rect_ego(self, index: int) -> F64:
-        """(4, 4), takes ego points to the rectified camera 0, where labels are."""
+        """(4, 4), takes ego points to the rectified camera 0, the frame of the labels."""
         return self._calibration_of(self._name(index), []).T_rect_ego
 
     def _name(self, index: int) -> str:
@@ -138,7 +138,7 @@ class KittiSource:
         return Sweep(tick, kept, ring, 16)
 
     def _rings(self, points: F32, file: str, notes: list[str]) -> tuple[Turns, dict[int, int] | None]:
-        """The ring of each point, 0 the highest, and which rings stand for a VLP-16's channels when those of the drive
+        """The ring of each point, 0 the highest, and the rings that replace a VLP-16's channels if those of the drive
         do not fit this sweep."""
         turn = turns(points)
         count = int(turn.max()) + 1
@@ -152,7 +152,7 @@ class KittiSource:
         return turn, None
 
     def _own_motion(self, name: str, tick: int, notes: list[str]) -> tuple[EgoState | None, GnssFix | None]:
-        """Own speed and place, of the inertial unit, whose record belongs to the frame of its number."""
+        """Own speed and position from the inertial unit; its records are matched by frame number."""
         path = self._files.oxts.get(name)
         if path is None:
             number = int(name) if name.isdecimal() else -1
@@ -197,8 +197,8 @@ class KittiSource:
         return parse_object_calibration(read_bytes(first), first.name, self._size)
 
     def _ring_elevations(self) -> F64:
-        """(64,) elevations of the rings in degrees, highest first, from the first whole sweep, because the laser mounts
-        do not move within a drive; without one those of the manual."""
+        """(64,) elevations of the rings in degrees, highest first, from the first complete sweep, because the laser
+        mounts do not move within a drive; without one, those of the manual."""
         for path in self._files.sweeps.values():
             try:
                 points = parse_velodyne(read_bytes(path), path.name, [])
@@ -232,7 +232,7 @@ def parse_velodyne(data: bytes, file: str, notes: list[str]) -> F32:
 
 
 def _ticks(names: list[str], files: Files) -> list[int]:
-    """The tick of every frame; one without a stamp follows the frame before it by 0.1 s."""
+    """The tick of every frame; one without a timestamp follows the previous frame by 0.1 s."""
     ticks: list[int] = []
     for name in names:
         stamp = _stamp(files.lidar_stamps, name) or _stamp(files.camera_stamps, name)
@@ -241,7 +241,7 @@ def _ticks(names: list[str], files: Files) -> list[int]:
 
 
 def _stamp(stamps: tuple[int, ...], name: str) -> int | None:
-    """The stamp of the frame of this number: lines are counted over the drive, also where a file is missing."""
+    """The timestamp of the frame with this number: lines are counted over the drive, also where a file is missing."""
     number = int(name) if name.isdecimal() else -1
     return stamps[number] if 0 <= number < len(stamps) and stamps[number] else None
 

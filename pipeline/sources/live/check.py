@@ -11,28 +11,28 @@ from pipeline.sources.live.source import LiveSensors
 from pipeline.types import StreamHealth
 
 _LATE_S, _LOOK_S = 2.0, 0.1
-"""How long a late sensor is waited for in the end, and how often it is looked at."""
+"""How long a late sensor is waited for at the end, and how often it is polled."""
 _ENOUGH_HZ = 5.0
-"""Own motion that comes so often is fresh enough for anything here."""
+"""Own motion at this rate is recent enough for every use."""
 
 
 @dataclass(frozen=True)
 class SensorReport:
-    """How one sensor does."""
+    """State of one sensor."""
 
     health: StreamHealth
     """Rate, age and errors of its stream."""
     clock_offset_ms: float | None = None
-    """Host time less the sensor's, the shortest delay on the way included; of a VLP-16, which counts from the full
-    hour, at most half an hour either way. None where the sensor sends no time."""
+    """Host time minus the sensor's, including the shortest transmission delay; for a VLP-16, whose clock counts from
+    the full hour, at most half an hour either way. None if the sensor sends no time."""
     refused: int = 0
     """Messages that could not be used."""
     pps: str | None = None
-    """What the LiDAR says of the pulse per second; None where it says nothing."""
+    """State of the pulse per second reported by the LiDAR; None if it reports none."""
     skew_ms: float | None = None
-    """Median of image less sweep, over the ticks; None without both."""
+    """Median of image time minus sweep time, over the ticks; None without both."""
     cost: str | None = None
-    """What it costs that a receiver whose speed is the ego speed sends so seldom; None where it costs nothing."""
+    """Effect of a receiver's low rate if it provides the ego speed; None if there is none."""
 
     @property
     def is_good(self) -> bool:
@@ -40,8 +40,8 @@ class SensorReport:
 
 
 def check(source: LiveSensors, seconds: float) -> list[SensorReport]:
-    """Open the sensors, take ticks for so long as they come, and report. One that is late just then is waited for, 2 s
-    at most. The sensors are given back."""
+    """Open the sensors, process ticks for this time, and report. A sensor that is late at the end is waited for, 2 s at
+    most. The sensors are released."""
     source.start()
     skews_ms = []
     end_s = time.monotonic() + seconds
@@ -56,7 +56,7 @@ def check(source: LiveSensors, seconds: float) -> list[SensorReport]:
 
 
 def _is_one_late(source: LiveSensors) -> bool:
-    """Whether a sensor that delivered has not done so lately, and is not silent yet."""
+    """Whether a sensor that has delivered data is overdue, but not silent yet."""
     return any(health.state == "stale" for health in source.health())
 
 
@@ -74,7 +74,7 @@ def _report(source: LiveSensors, health: StreamHealth, skews_ms: list[float]) ->
 
 
 def _cost(ego: StreamHealth) -> str | None:
-    """Of own motion that a receiver gives."""
+    """Effect of own motion from a receiver."""
     if ego.state != "ok":
         return None
     if ego.rate_hz is None:

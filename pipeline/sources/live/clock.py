@@ -16,7 +16,7 @@ _SET_AFTER_NS = 400_000_000
 
 
 class HostClock:
-    """Nanoseconds since 1970, steady."""
+    """Monotonic time in nanoseconds since 1970."""
 
     def __init__(self) -> None:
         self._unix_ns = time.time_ns() - time.monotonic_ns()
@@ -25,32 +25,33 @@ class HostClock:
         return time.monotonic_ns() + self._unix_ns
 
     def of_wall_ns(self, wall_ns: int) -> int:
-        """A stamp that the system's clock gave within the last second, on this timeline; now where it did not."""
+        """Converts a timestamp of the system's clock from the last second to this timeline; the current time for
+        others."""
         age_ns = time.time_ns() - wall_ns
         return self.now_ns() - (age_ns if 0 <= age_ns <= _LONGEST_AGE_NS else 0)
 
     def ahead_ns(self) -> int:
-        """How far the system's clock is ahead of this timeline by now: it was set in between."""
+        """How far the system's clock is ahead of this timeline, because it was set in the meantime."""
         return time.time_ns() - self.now_ns()
 
 
 class FollowedClock:
-    """A sensor's own clock, followed by when its messages arrive, also when it is set anew."""
+    """Tracks a sensor's own clock from the arrival times of its messages, also when the clock is set."""
 
     def __init__(self) -> None:
         self._own = SensorClock()
         self.jumps = 0
-        """How often it was set anew."""
+        """Number of times that it was set."""
         self._off_since_ns: int | None = None
 
     @property
     def offset_ms(self) -> float | None:
-        """Host time less the sensor's, the shortest delay on the way included; None before the first message."""
+        """Host time minus the sensor's, including the shortest transmission delay; None before the first message."""
         return None if self._own.offset_ns is None else self._own.offset_ns / 1e6
 
     def to_host_ns(self, stamp_ns: int, arrived_ns: int) -> int:
-        """When a message that has just arrived was measured. What comes before it was made, or more than 100 ms late,
-        for 0.4 s on end, was not held up: its clock was set."""
+        """Measurement time of a message that has just arrived. If messages arrive before they were made, or more than
+        100 ms late, for 0.4 s continuously, they were not delayed; the sensor's clock was set."""
         self._own.observe(stamp_ns // 1000, arrived_ns)
         t_ns = self._own.to_ns(stamp_ns / 1000)
         if -_EARLIEST_NS <= arrived_ns - t_ns <= _LATEST_NS:

@@ -12,7 +12,7 @@ from pipeline.formats.velodyne import say_refused
 from pipeline.types import StreamHealth
 
 _SILENT_NS, _STALE_NS, _MISSED = 1_000_000_000, 250_000_000, 3
-"""Nothing for this long, and for so many of its periods: the sensor is silent, or stale before that."""
+"""Without messages for this time and this many of its periods, a sensor is silent, or before that stale."""
 _WINDOW_NS = 3_000_000_000
 _FEWEST = 3
 _KEPT = 1024
@@ -21,10 +21,9 @@ Sensor = Literal["lidar", "camera", "gnss", "ego"]
 
 
 class StreamStats:
-    """Counts one sensor's messages. Times are of the host's timeline. note: what its reader has to say (why a device
-    cannot be opened, where its times come from). hung: how often its driver or decoder hung and was restarted.
-    refused: packets by reason. remarks: each is asked what else there is to say of it, and answers with an empty text
-    when nothing is."""
+    """Counts one sensor's messages. Times are on the host's timeline. note: message of its reader (why a device cannot
+    be opened, source of its times). hung: how often its driver or decoder hung and was restarted. refused: packets by
+    reason. remarks: functions that return additional messages, or an empty text."""
 
     def __init__(self, sensor: Sensor) -> None:
         self.sensor: Sensor = sensor
@@ -36,25 +35,26 @@ class StreamStats:
         self._newest_ns: int | None = None
 
     def arrived(self, now_ns: int, t_ns: int) -> None:
-        """A message came now, measured at ``t_ns``."""
+        """A message arrived now, measured at ``t_ns``."""
         self._arrived.append(now_ns)
         self._newest_ns = t_ns
 
     def since_ns(self, now_ns: int) -> int | None:
-        """How long ago the last message came; None before the first."""
+        """Time since the last message; None before the first."""
         return now_ns - self._arrived[-1] if self._arrived else None
 
     def period_ns(self) -> int | None:
-        """Middle of the last gaps between messages; None until enough came."""
+        """Median of the last intervals between messages; None until there are enough."""
         times = np.array(list(self._arrived)[-16:])
         return int(np.median(np.diff(times))) if len(times) >= _FEWEST else None
 
     def health(self, now_ns: int, impossible: int = 0) -> StreamHealth:
-        """As of now. impossible: messages refused because they were measured long ago, or are yet to be.
+        """Current health. impossible: messages refused because their timestamps are too old or in the future.
 
-        Rate and jitter are over the last three seconds and None while fewer than three messages came in them; jitter is
-        the standard deviation of the gaps between arrivals."""
-        arrived = list(self._arrived)  # at once: a reader's thread may add to it meanwhile
+        Rate and jitter are computed over the last three seconds and are None with fewer than three messages; jitter is
+        the standard deviation of the intervals between arrivals.
+        """
+        arrived = list(self._arrived)  # copied, because a reader thread may append meanwhile
         times = np.array([t for t in arrived if now_ns - t <= _WINDOW_NS], dtype=np.int64)
         gaps_ms = np.diff(times) / 1e6
         enough = len(times) >= _FEWEST and gaps_ms.sum() > 0
@@ -78,14 +78,14 @@ class StreamStats:
         return "stale" if since >= max(_STALE_NS, missed_ns) else "ok"
 
     def _said(self, impossible: int) -> str:
-        refused = say_refused(self.refused.copy())  # at once: a reader's thread may meet a new reason meanwhile
+        refused = say_refused(self.refused.copy())  # copied, because a reader thread may add a reason meanwhile
         times = f"{impossible} refused: impossible time stamp" if impossible else ""
         again = f"hung {self.hung} {'time' if self.hung == 1 else 'times'} and was restarted" if self.hung else ""
         return "; ".join(text for text in (self.note, again, *(ask() for ask in self.remarks), times, refused) if text)
 
 
 def not_delivering(streams: Iterable[StreamHealth]) -> str:
-    """``lidar absent (no data on UDP port 2368 yet), camera silent``: who does not deliver, in a sentence that stays
-    the same while it is so; empty when all do."""
+    """``lidar absent (no data on UDP port 2368 yet), camera silent``: the sensors that do not deliver, in a sentence
+    that stays the same as long as this does not change; empty if all deliver."""
     bad = (each for each in streams if each.state != "ok")
     return ", ".join(f"{each.sensor} {each.state}" + (f" ({each.note})" if each.note else "") for each in bad)

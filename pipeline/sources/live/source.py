@@ -30,18 +30,19 @@ from pipeline.types.source import Opening, Tap
 T = TypeVar("T")
 
 _LOOK_AGAIN_S = 0.005
-"""How often a tick that waits for its image, or for the LiDAR's silence, is looked at when nothing arrives."""
+"""Polling interval while a tick waits for its image, or for the LiDAR to count as silent."""
 
 
 def open_sensors(uri: str, rest: str, how: Opening) -> LiveSensors:
-    """Called by name, from ``pipeline.source_kinds``. SourceError when the config file cannot be used."""
+    """Loaded by name from ``pipeline.source_kinds``. SourceError if the config file cannot be used."""
     return LiveSensors(uri, load(rest))
 
 
 class LiveSensors:
-    """See ``pipeline.types.source.LiveSource``. SourceError when a DBC file does not hold what the config names.
+    """See ``pipeline.types.source.LiveSource``. SourceError if a DBC file does not contain what the config names.
 
-    A frame's index counts the ticks, those that nobody took in time too, so a gap in it is a drop."""
+    A frame's index counts all ticks, including those not taken in time, so a gap in it is a drop.
+    """
 
     def __init__(self, uri: str, config: LiveConfig, clock: HostClock | None = None) -> None:
         self.uri, self.title = uri, config.title
@@ -57,7 +58,7 @@ class LiveSensors:
         self.notes = _about(config)
 
     def _wire(self, config: LiveConfig) -> None:
-        """An input for each sensor of the config, each delivering to its own stream."""
+        """Create an input for each configured sensor, each delivering to its own stream."""
         self.inputs: dict[str, Input] = {}
         sync = self._sync
         self._streams: dict[str, SensorBuffer[Any]] = {
@@ -87,14 +88,14 @@ class LiveSensors:
             self._ego_offset_ns = round(config.ego.time_offset_ms * 1e6)
 
     def start(self) -> None:
-        """Open the devices; one that is not there yet is tried again until it is."""
+        """Open the devices; a device that is not available yet is retried."""
         self._is_open = True
         for each in self.inputs.values():
             for reader in each.readers:
                 reader.start()
 
     def close(self) -> None:
-        """Give the devices back. Safe to call twice."""
+        """Release the devices. Safe to call twice."""
         if not self._is_open:
             return
         self._is_open = False
@@ -106,28 +107,29 @@ class LiveSensors:
 
     @property
     def lidar_mount(self) -> tuple[F64, int] | None:
-        """T_ego_lidar (4, 4) and what is added to the LiDAR's stamps in ns; None when there is none."""
+        """T_ego_lidar (4, 4) and the offset in ns that is added to the LiDAR's timestamps; None without a LiDAR."""
         lidar = self.inputs.get("lidar")
         return (lidar.T_ego_lidar, lidar.offset_ns) if isinstance(lidar, LidarInput) else None
 
     def tap(self, tap: Tap | None) -> None:
-        """Have what comes told from now on; None ends that. What is told twice or at an impossible time is not."""
+        """Pass messages to ``tap`` from now on; None stops that. Duplicates and messages with impossible times are not
+        passed on."""
         self._tap = tap
         lidar = self.inputs.get("lidar")
         if isinstance(lidar, LidarInput):
             lidar.on_packet = tap.packet if tap is not None else None
 
     def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
-        """The newest tick not given yet; None when none came in time."""
+        """The newest tick not returned yet; None if none arrives in time."""
         together = self._wait(timeout_s, params or SyncParams())
         return self._frame(together) if together is not None else None
 
     def now_ns(self) -> int:
-        """Now on the timeline of the ticks."""
+        """Current time on the timeline of the ticks."""
         return self._clock.now_ns()
 
     def health(self) -> tuple[StreamHealth, ...]:
-        """How each configured sensor does now. One whose driver or decoder hangs is started anew."""
+        """Current health of each configured sensor. A sensor whose driver or decoder hangs is restarted."""
         for each in self.inputs.values():
             for reader in each.readers:
                 reader.look(time.monotonic())
@@ -151,7 +153,7 @@ class LiveSensors:
                 self._came.wait(min(left_s, _LOOK_AGAIN_S))
 
     def _add(self, stream: SensorBuffer[T], t_ns: int, value: T, arrived_ns: int) -> bool:
-        """What comes, into its stream; false when it was refused."""
+        """Add a message to its stream; false if it was refused."""
         with self._came:
             was_taken = stream.add(t_ns, value, arrived_ns)
             self._came.notify_all()
@@ -223,7 +225,7 @@ class LiveSensors:
 
 
 def _about(config: LiveConfig) -> tuple[str, ...]:
-    """What a person should know about this set of sensors."""
+    """What a user should know about this set of sensors."""
     notes = []
     if config.lidar is None:
         notes.append("no LiDAR: frames follow the camera")

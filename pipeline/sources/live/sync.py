@@ -19,14 +19,15 @@ T = TypeVar("T")
 P = TypeVar("P")
 
 _PAST_NS, _FUTURE_NS = 2_000_000_000, 200_000_000
-"""A message stamped outside these bounds around now is of a clock that was set, or damaged."""
+"""A message with a timestamp outside these bounds around now is damaged, or the sensor's clock was set."""
 _PATIENCE_NS, _LONGEST_PATIENCE_NS = 250_000_000, 1_000_000_000
-"""The LiDAR is waited for three of its periods, within these bounds, before the camera ticks instead."""
+"""The LiDAR is waited for during three of its periods, within these bounds, before the camera triggers ticks
+instead."""
 _KEPT, _IMAGES_KEPT = 64, 24
-"""Images are large; so many are 0.4 s of a 60 Hz camera, and a sweep is 0.05 s old when it is whole."""
+"""Images are large; this many are 0.4 s of a 60 Hz camera, and a sweep is 0.05 s old when it is complete."""
 _HELD_PERIODS, _HELD_AT_LEAST_NS, _HELD_UNKNOWN_NS = 1.5, 500_000_000, 1_500_000_000
-"""Own motion holds for so many periods of who tells it; a receiver that sends once a second is a second late before
-its next word. The last is for one that has spoken once."""
+"""Own motion is valid for this many periods of its source; a receiver that sends once a second is a second old before
+its next message. The last is for a source with only one message so far."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,8 @@ class Stamped(Generic[T]):
 
 
 class SensorBuffer(Generic[T]):
-    """What one sensor gave lately, in order of time. taken: messages kept, of them ``late`` ones that were overtaken.
-    duplicates, implausible: messages refused, by reason."""
+    """Recent messages of one sensor, in order of time. taken: accepted messages, including ``late`` ones that arrived
+    out of order. duplicates, implausible: refused messages, by reason."""
 
     def __init__(self, keep: int = _KEPT) -> None:
         self._keep = keep
@@ -51,8 +52,8 @@ class SensorBuffer(Generic[T]):
         self.taken = self.late = self.duplicates = self.implausible = 0
 
     def add(self, t_ns: int, value: T, now_ns: int) -> bool:
-        """Take a message; false when it was there already or its time cannot be. One that was overtaken on the way is
-        put where it belongs."""
+        """Add a message; false if it is a duplicate or its time is impossible. A message that arrived out of order is
+        inserted at its position."""
         if not now_ns - _PAST_NS <= t_ns <= now_ns + _FUTURE_NS:
             self.implausible += 1
             return False
@@ -72,13 +73,13 @@ class SensorBuffer(Generic[T]):
         return self._kept[-1] if self._kept else None
 
     def nearest(self, t_ns: int) -> Stamped[T] | None:
-        """The message whose time is nearest; of two as near the later."""
+        """The message whose time is nearest; of two equally near, the later one."""
         place = bisect_left(self._kept, t_ns, key=lambda item: item.t_ns)
         around = self._kept[max(0, place - 1) : place + 1]
         return min(reversed(around), key=lambda item: abs(item.t_ns - t_ns), default=None)
 
     def period_ns(self) -> int | None:
-        """The usual step from one message to the next; None while there is one at most."""
+        """The usual interval between messages; None with fewer than two."""
         steps = sorted(later.t_ns - earlier.t_ns for earlier, later in pairwise(self._kept))
         return steps[len(steps) // 2] if steps else None
 
@@ -88,7 +89,7 @@ class Together(Generic[P]):
     """The messages of one tick."""
 
     t_ns: int
-    """Of the message that ticks."""
+    """Time of the message that triggers the tick."""
     arrived_ns: int
     """When that message was complete."""
     sweep: Stamped[Sweep] | None
@@ -102,13 +103,13 @@ class Together(Generic[P]):
     gnss: GnssFix | None
     """The newest fix; None when too old."""
     replaced: int
-    """Ticks before it that nobody took in time."""
+    """Number of earlier ticks that were not taken in time."""
     notes: tuple[str, ...]
     """What is missing and why."""
 
 
 class Synchroniser(Generic[P]):
-    """``P`` is what an image is here: anything. A sensor that is not configured is simply never added."""
+    """``P`` is the type of an image. A sensor that is not configured is simply never added."""
 
     def __init__(self) -> None:
         self.sweeps: SensorBuffer[Sweep] = SensorBuffer()
@@ -119,7 +120,7 @@ class Synchroniser(Generic[P]):
         self._taken = (0, 0)
 
     def tick(self, now_ns: int, params: SyncParams) -> Together[P] | None:
-        """The newest tick not given yet; None when there is none, or its image is still on the way."""
+        """The newest tick not returned yet; None if there is none, or its image is still pending."""
         sweep = self._newer(self.sweeps.newest())
         if sweep is not None:
             if self._image_is_coming(sweep, now_ns, params):
@@ -132,7 +133,7 @@ class Synchroniser(Generic[P]):
         return None
 
     def lidar_is_silent(self, now_ns: int) -> bool:
-        """No sweep for three of its periods, or never one."""
+        """Whether there was no sweep for three of its periods, or never one."""
         last = self.sweeps.newest()
         if last is None:
             return True
@@ -141,12 +142,13 @@ class Synchroniser(Generic[P]):
         return now_ns - last.arrived_ns > min(max(3 * period_ns, _PATIENCE_NS), _LONGEST_PATIENCE_NS)
 
     def _newer(self, item: Stamped[T] | None) -> Stamped[T] | None:
-        """The message if it is later than the last tick: time never runs back."""
+        """The message if it is later than the last tick: time never goes back."""
         is_new = item is not None and (self._ticked_ns is None or item.t_ns > self._ticked_ns)
         return item if is_new else None
 
     def _image_is_coming(self, sweep: Stamped[Sweep], now_ns: int, params: SyncParams) -> bool:
-        """The camera delivers, and none of its images is from after the sweep yet; worth a short wait."""
+        """Whether the camera delivers, but none of its images is later than the sweep yet; then a short wait is
+        worthwhile."""
         newest = self._shifted(self.images.newest(), params)
         if newest is None or newest.t_ns >= sweep.t_ns or now_ns - newest.arrived_ns > _PATIENCE_NS:
             return False
@@ -184,14 +186,14 @@ class Synchroniser(Generic[P]):
         )
 
     def _count_replaced(self, leader_is_sweep: bool) -> int:
-        """How many of what ticks came since the last tick and were not taken in time. Remembers where it counted."""
+        """Number of triggering messages since the last tick that were not taken in time. Remembers its position."""
         sweeps, images = self._taken
         self._taken = (self.sweeps.taken, self.images.taken)
         return max(0, self.sweeps.taken - sweeps - 1 if leader_is_sweep else self.images.taken - images - 1)
 
 
 def _own_motion_at(stream: SensorBuffer[T], t_ns: int, offset_ms: float) -> T | None:
-    """What a speedometer or receiver said nearest to a moment; None when that is further away than it holds."""
+    """Own motion nearest to a time; None if it is not valid that long."""
     at_ns = t_ns - round(offset_ms * 1e6)
     item = stream.nearest(at_ns)
     return item.value if item is not None and abs(item.t_ns - at_ns) <= _holds_for_ns(stream.period_ns()) else None

@@ -20,9 +20,9 @@ from pipeline.common.user_files import open_regular
 from pipeline.types.source import SourceError
 
 _MAX_RECORD = 1 << 18
-"""libpcap's own limit; a longer record is damage."""
+"""libpcap's own limit; a longer record is damaged."""
 _END_OF_TIME_NS = 1 << 63
-"""In the year 2262 nanoseconds since 1970 leave 64 bits; a later packet is damage."""
+"""From the year 2262, nanoseconds since 1970 do not fit into 64 bits; a later packet is damaged."""
 _CLASSIC = {
     b"\xd4\xc3\xb2\xa1": ("<", 1000),
     b"\xa1\xb2\xc3\xd4": (">", 1000),
@@ -41,17 +41,17 @@ class Datagram(NamedTuple):
     """One UDP datagram of a capture."""
 
     origin: int
-    """Where its record begins in the file."""
+    """Offset of its record in the file."""
     t_ns: int
-    """When it was captured, Unix time."""
+    """Capture time, Unix time."""
     port: int
-    """To which it was sent: tells data from position packets."""
+    """Destination port: distinguishes data from position packets."""
     payload: bytes
-    """Without UDP's header."""
+    """Without the UDP header."""
 
 
 class _Interface(NamedTuple):
-    """origin: where it is described in the file; no packet before is of it. link: its type."""
+    """origin: offset of its description in the file; earlier packets do not belong to it. link: its type."""
 
     origin: int
     link: int
@@ -59,7 +59,7 @@ class _Interface(NamedTuple):
 
 
 class _Section(NamedTuple):
-    """A stretch of a pcapng file with a byte order and interfaces of its own. origin: where it begins."""
+    """A section of a pcapng file with its own byte order and interfaces. origin: its offset."""
 
     origin: int
     order: str
@@ -67,7 +67,7 @@ class _Section(NamedTuple):
 
 
 class Capture:
-    """One file. size: in bytes. damage: why reading ended before the file did, None while it has not."""
+    """One file. size: in bytes. damage: why reading ended before the end of the file, None if it did not."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -82,9 +82,9 @@ class Capture:
             raise SourceError(f"{path.name}: neither a pcap nor a pcapng file")
 
     def datagrams(self, begin: int = 0, end: int | None = None) -> Iterator[Datagram]:
-        """Every whole UDP datagram whose record begins at ``begin`` (0: the first) to ``end``, both included.
+        """Every complete UDP datagram whose record begins at ``begin`` (0: the first) to ``end``, both included.
 
-        SourceError when the file cannot be read any more.
+        SourceError if the file can no longer be read.
         """
         with self._open() as file:
             records = self._classic(file, begin) if self._magic in _CLASSIC else self._pcapng(file, begin)
@@ -96,9 +96,9 @@ class Capture:
                     yield Datagram(origin, t_ns, *found)
 
     def beginnings(self) -> Iterator[tuple[int, int, bytes]]:
-        """(destination port, length, beginning of the payload) of every UDP datagram, also of those that came in parts.
+        """(destination port, length, beginning of the payload) of every UDP datagram, including fragmented ones.
 
-        SourceError when the file cannot be read any more.
+        SourceError if the file can no longer be read.
         """
         with self._open() as file:
             records = self._classic(file, 0) if self._magic in _CLASSIC else self._pcapng(file, 0)
@@ -142,8 +142,8 @@ class Capture:
             origin += 16 + length
 
     def _pcapng(self, file: BinaryIO, begin: int) -> Iterator[tuple[int, int, int, bytes]]:
-        """Packets from ``begin`` on. Which sections and interfaces come before is kept from the first time the file was
-        read that far; what has not been read yet is gone through."""
+        """Packets from ``begin`` on. Earlier sections and interfaces are known from the first pass over the file; parts
+        that have not been read yet are scanned."""
         origin = min(begin, self._described_to)
         file.seek(origin)
         while head := file.read(12):
@@ -181,7 +181,7 @@ class Capture:
 
 
 def _resolution_ns(options: bytes, order: str) -> float | int:
-    """Nanoseconds a tick of an interface's time stamps: option if_tsresol, µs without it."""
+    """Nanoseconds per tick of an interface's timestamps: option if_tsresol, µs without it."""
     at = 0
     while at + 4 <= len(options):
         code, length = struct.unpack_from(order + "HH", options, at)
@@ -196,7 +196,7 @@ def _resolution_ns(options: bytes, order: str) -> float | int:
 
 
 def _udp(data: bytes, link: int) -> tuple[int, bytes] | None:
-    """(destination port, payload) of a frame that holds one whole UDP datagram; None when it does not."""
+    """(destination port, payload) of a frame with one complete UDP datagram; None for others."""
     found = _udp_header(data, link)
     if found is None or found[1]:
         return None
@@ -208,8 +208,8 @@ def _udp(data: bytes, link: int) -> tuple[int, bytes] | None:
 
 
 def _udp_header(data: bytes, link: int) -> tuple[int, bool] | None:
-    """Where the header of a UDP datagram begins in a frame, and whether more frames hold the rest of it; None of a
-    frame without one."""
+    """Offset of a UDP datagram's header in a frame, and whether the datagram is fragmented; None for a frame without
+    one."""
     at = _LINK_BYTES.get(link)
     if at is None or len(data) < at + 28:
         return None

@@ -41,14 +41,14 @@ from pipeline.types.source import Opening, SourceError, TruthObject
 
 _DATA_PORT = 2368
 _LOOK_AT = 2000
-"""Datagrams at the beginning that show to which port a LiDAR sends."""
+"""Number of datagrams at the beginning used to detect the LiDAR's port."""
 _TELL_EVERY = 4 << 20
-"""Bytes between two words of progress."""
+"""Bytes between two progress reports."""
 _NMEA = slice(0xCA, 0x14E)  # PPS state and sentence of a position packet
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> PcapSource:
-    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    """Loaded by name from ``pipeline.source_kinds``. SourceError if it cannot be opened."""
     return PcapSource(uri, rest, how.progress)
 
 
@@ -75,7 +75,8 @@ class PcapSource:
         return len(self._index)
 
     def t_ns(self, index: int) -> int:
-        """When the head looked straight ahead: UTC where the sensor follows GPS, else by the capturing host's clock."""
+        """When the sensor head faced straight ahead: UTC if the sensor follows GPS, else by the capturing host's
+        clock."""
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")
         return self._index.times_ns[index]
@@ -93,7 +94,7 @@ class PcapSource:
         return self._sweep(index, [])
 
     def packets(self) -> Iterator[tuple[int, bytes]]:
-        """Every data and position packet of the LiDAR as it was captured: when (unix ns), and its payload."""
+        """Every data and position packet of the LiDAR as captured: time (unix ns) and payload."""
         for datagram in self._capture.datagrams():
             if datagram.port == self._port or len(datagram.payload) == POSITION_BYTES:
                 yield datagram.t_ns, datagram.payload
@@ -103,7 +104,7 @@ class PcapSource:
         return None
 
     def _sweep(self, index: int, notes: list[str]) -> Sweep | None:
-        """Decoded anew from its stretch of the file, in which the ends of its neighbours may lie too."""
+        """Decoded from its part of the file, which may also contain the ends of neighbouring sweeps."""
         decoder = VelodyneDecoder(self.T_ego_lidar, keeps_partial=True, model=self._model)
         found = list[Sweep | None]()
         try:
@@ -125,8 +126,8 @@ class PcapSource:
 
 
 class _Index:
-    """Where every whole sweep lies. first, last: of each, where the records of its packets begin. fixes: what the
-    position packets say."""
+    """Positions of all complete sweeps. first, last: offsets of the first and last record of each. fixes: from the
+    position packets."""
 
     def __init__(self, capture: Capture, port: int, T_ego_lidar: F64, model: VelodyneModel, progress: Progress) -> None:
         self.first, self.last, self.times_ns = array("q"), array("q"), array("q")
@@ -157,7 +158,7 @@ class _Index:
         return round(1e9 / float(np.median(steps)), 2) if len(steps) and np.median(steps) > 0 else 10.0
 
     def about(self) -> list[str]:
-        """What a person should know of the whole."""
+        """What a user should know about the whole file."""
         counts = self._cutter.counts
         says = {
             "gps": "LiDAR times are UTC: the sensor is synchronised to GPS",
@@ -172,7 +173,7 @@ class _Index:
         return notes
 
     def about_nothing(self, port: int) -> str:
-        """Why there is no sweep in it."""
+        """Why it contains no sweep."""
         counts = self._cutter.counts
         if counts.models:
             return about_other_models(counts.models)
@@ -197,7 +198,7 @@ class _Index:
         self.times_ns.append(max(rotation.t_ns, self.times_ns[-1] + 1 if self.times_ns else rotation.t_ns))
 
     def _position(self, datagram: Datagram) -> None:
-        """A position packet that says something new: what the clock follows, and where the sensor is."""
+        """Process a position packet with new content: the clock's reference, and the sensor's position."""
         self._said = datagram.payload[_NMEA]
         try:
             position = read_position(datagram.payload)
@@ -207,13 +208,14 @@ class _Index:
         self._keep(self._sentences.push(position.nmea, datagram.t_ns), datagram.t_ns)
 
     def _keep(self, fix: GnssFix | None, t_host_ns: int) -> None:
-        """A fix is UTC; where the LiDAR's times are the host's, it is put at when the host had it."""
+        """A fix has UTC time; if the LiDAR's times are the host's, the time at which the host received it is used."""
         if fix is not None:
             self.fixes.append(fix if self._clock.reference == "gps" else evolve(fix, t_ns=t_host_ns))
 
 
 def _lidar_port(capture: Capture) -> int:
-    """The port to which most datagrams of a LiDAR packet's length are sent; the usual one when there are none."""
+    """The port to which most datagrams with the length of a LiDAR packet are sent; the default port if there are
+    none."""
     ports: Counter[int] = Counter()
     for count, datagram in enumerate(capture.datagrams()):
         if len(datagram.payload) == PACKET_BYTES:

@@ -22,21 +22,21 @@ class Topic(NamedTuple):
     """One topic of a bag."""
 
     name: str
-    """With its slashes."""
+    """Including its slashes."""
     kind: str
     """The message type without its package path, as ``PointCloud2``."""
     held: int
     """Number of messages."""
     is_defined: bool
-    """Whether the bag, or ROS where it holds no definitions, says how its messages are read."""
+    """Whether the message definition is known, from the bag or, if it contains no definitions, from ROS."""
 
 
 class BagError(Exception):
-    """A bag or a message that cannot be read; the text is why."""
+    """A bag or a message that cannot be read; the text is the reason."""
 
 
 class Bag:
-    """Open for reading as long as somebody holds it. SourceError when it is none."""
+    """Open for reading while it is in use. SourceError if it is not a bag."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -46,16 +46,16 @@ class Bag:
             self._reader.open()
             finalize(self, self._reader.close)
             self.topics = _topics(self._reader)
-        except Exception as error:  # damaged files make the library raise whatever they like
+        except Exception as error:  # for damaged files, the library raises arbitrary errors
             raise SourceError(f"{path.name}: cannot be read as a bag: {_in_words(error)}") from None
 
     def messages(
         self, topics: list[str], at_ns: int | None = None, onward: bool = False
     ) -> Generator[tuple[str, int, Any], None, None]:
-        """(topic, when it was recorded, message) of all messages, or of those recorded at that very moment (onward: or
+        """(topic, recording time, message) of all messages, or of those recorded at exactly this time (onward: or
         later), in order.
 
-        BagError when the bag is damaged there.
+        BagError if the bag is damaged there.
         """
         connections = [each for each in self._reader.connections if each.topic in topics]
         if not connections:
@@ -71,7 +71,7 @@ class Bag:
 
 
 def bag_path(path: str) -> Path:
-    """The file or folder a person typed. SourceError when there is none, or one that is no bag's."""
+    """The file or folder given by the user. SourceError if it does not exist or is not a bag."""
     if not path:
         raise SourceError("no bag given after the colon")
     try:
@@ -103,6 +103,6 @@ def _topics(reader: AnyReader) -> dict[str, Topic]:
 
 
 def _in_words(error: Exception) -> str:
-    """What a library says; what its own code stumbled over, which it puts after a colon, helps nobody."""
+    """A library's message, without the internal error that it appends after a colon."""
     text = (str(error).strip().splitlines() or [type(error).__name__])[0]
     return (text.partition(": ")[0] if error.__context__ is not None else text)[:200].rstrip(".")

@@ -18,11 +18,12 @@ from pipeline.sources.rosbag.topics import TopicMap
 from pipeline.types import EgoState, GnssFix
 
 _TELL_EVERY = 64
-"""Messages between two words of progress."""
+"""Messages between two progress reports."""
 
 
 class TopicIndex:
-    """times_ns: (N,) ascending, of each message's header. recorded_ns: (N,), when it was written, which finds it."""
+    """times_ns: (N,) ascending, from each message's header. recorded_ns: (N,), recording times, used to find the
+    messages."""
 
     def __init__(self, topic: str) -> None:
         self.topic = topic
@@ -31,7 +32,7 @@ class TopicIndex:
         self._times, self._recorded = array("q"), array("q")
 
     def add(self, message: Any, recorded_ns: int) -> None:
-        """A message, by its own time."""
+        """Add a message by its own time."""
         t_ns, has_one = messages.stamp_ns(message, recorded_ns)
         self.without_header += not has_one
         self.frame_id = self.frame_id or str(getattr(getattr(message, "header", None), "frame_id", ""))
@@ -50,7 +51,7 @@ class TopicIndex:
 
 
 class BagIndex:
-    """What the pass found. damage: why it ended before the bag did, None when it did not."""
+    """Results of the pass. damage: why it ended before the end of the bag, None if it did not."""
 
     def __init__(self, bag: Bag, topics: TopicMap, progress: Progress = silent) -> None:
         self.damage: str | None = None
@@ -109,7 +110,7 @@ class BagIndex:
                 return
 
     def _add_packets(self, message: Any, recorded_ns: int) -> None:
-        """Scans are cut anew behind the car: each sweep is found by the message that holds its first packet."""
+        """Sweeps are cut behind the car again: each is found by the message that contains its first packet."""
         assert self.lidar is not None
         if self._cutter is None:
             self.lidar.frame_id = str(message.header.frame_id)

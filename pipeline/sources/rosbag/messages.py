@@ -35,11 +35,11 @@ _CHANNELS = {"bgr8": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4, "yuv422": 2, "uyvy": 
 
 
 class BadMessage(Exception):
-    """The text is why."""
+    """The text is the reason."""
 
 
 def stamp_ns(message: Any, recorded_ns: int) -> tuple[int, bool]:
-    """The header's time, and whether there is one; else when the message was recorded."""
+    """The header's time, and whether there is one; otherwise the recording time."""
     header = getattr(message, "header", None)
     stamp = getattr(header, "stamp", None)
     t_ns = int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec) if stamp is not None else 0
@@ -47,7 +47,7 @@ def stamp_ns(message: Any, recorded_ns: int) -> tuple[int, bool]:
 
 
 def cloud(message: Any, t_ns: int, notes: list[str]) -> Cloud:
-    """A PointCloud2's points by field, whatever fields it has besides x, y, z."""
+    """A PointCloud2's points by field; additional fields besides x, y, z are permitted."""
     count, step = int(message.width) * int(message.height), int(message.point_step)
     data = np.asarray(message.data, dtype=np.uint8)
     if not 0 < step <= 4096 or count > _MAX_POINTS:
@@ -79,7 +79,7 @@ def cloud(message: Any, t_ns: int, notes: list[str]) -> Cloud:
 
 
 def packets(message: Any) -> list[tuple[bytes, int]]:
-    """A VelodyneScan's packets, each with when the driver received it (ns)."""
+    """A VelodyneScan's packets, each with the time at which the driver received it (ns)."""
     return [
         (np.asarray(packet.data, dtype=np.uint8).tobytes(), int(packet.stamp.sec) * 10**9 + int(packet.stamp.nanosec))
         for packet in message.packets
@@ -87,7 +87,7 @@ def packets(message: Any) -> list[tuple[bytes, int]]:
 
 
 def image(message: Any, t_ns: int) -> CameraImage:
-    """An Image or a CompressedImage; of the latter a JPEG is kept as it is."""
+    """An Image or a CompressedImage; a JPEG in the latter is kept unchanged."""
     data = np.asarray(message.data, dtype=np.uint8)
     if not hasattr(message, "encoding"):
         try:
@@ -117,7 +117,8 @@ def _raw_image(message: Any, data: npt.NDArray[np.uint8]) -> U8:
 
 
 def fix(message: Any, t_ns: int, before: GnssFix | None) -> GnssFix | None:
-    """A NavSatFix; speed and course, which it does not say, follow from the fix before. None without a fix."""
+    """A NavSatFix; speed and course, which it does not contain, are derived from the previous fix. None without a
+    fix."""
     status = int(message.status.status)
     lat_deg, lon_deg, alt_m = (float(value) for value in (message.latitude, message.longitude, message.altitude))
     if status < 0 or not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):

@@ -25,7 +25,7 @@ class TransformTree:
         self._neighbours: dict[str, dict[str, F64]] = {}
 
     def add(self, message: Any) -> None:
-        """A TFMessage. Transforms that are none are passed over."""
+        """Add a TFMessage. Invalid transforms are skipped."""
         for each in message.transforms:
             try:
                 T_parent_child = rigid_transform(_matrix(each.transform), "a transform")
@@ -51,7 +51,7 @@ class TransformTree:
         return None
 
     def T_ego_lidar(self, lidar: str) -> F64:
-        """(4, 4) the LiDAR's place, turned level with the car: its base's axes where the bag has them."""
+        """(4, 4) the LiDAR's position, with the axes of the car's base frame if the bag has it."""
         for base in _BASES:
             T_base_lidar = self.find(base, lidar)
             if T_base_lidar is not None:
@@ -64,7 +64,8 @@ class TransformTree:
 def calibration(
     info: Any, tree: TransformTree, lidar: str, T_ego_lidar: F64, notes: list[str]
 ) -> CameraCalibration | None:
-    """The camera of a CameraInfo, seen from the ego frame. None, and ``notes`` says why, when the bag does not say."""
+    """The camera of a CameraInfo, relative to the ego frame. None, with the reason in ``notes``, if the bag does not
+    contain it."""
     camera = _name(str(info.header.frame_id))
     T_camera_lidar = tree.find(camera, lidar)
     if T_camera_lidar is None:
@@ -86,7 +87,7 @@ def calibration(
 
 
 def _looking_ahead(K: F64, distortion: F64, T_camera_ego: F64, size: tuple[int, int]) -> CameraCalibration:
-    """Its frame is the optical one by REP 103; many bags give the body's, x forward, instead."""
+    """By REP 103 its frame is the optical one; many bags use the body's, x forward, instead."""
     given = CameraCalibration(K, distortion, T_camera_ego, *size)
     try:
         check_looks_ahead(given, "the transform to the camera")

@@ -33,13 +33,13 @@ _MESSAGES_A_SWEEP = 3
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> RosbagSource:
-    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    """Loaded by name from ``pipeline.source_kinds``. SourceError if it cannot be opened."""
     return RosbagSource(uri, rest, how.progress)
 
 
 class RosbagSource:
-    """``<bag>?lidar=/topic&camera=/topic&camera_info=/topic&gnss=/topic&odometry=/topic&rig=file.yaml``: all optional,
-    ``none`` for a topic leaves it out."""
+    """``<bag>?lidar=/topic&camera=/topic&camera_info=/topic&gnss=/topic&odometry=/topic&rig=file.yaml``: all optional;
+    ``none`` disables a topic."""
 
     def __init__(self, uri: str, rest: str, progress: Progress = silent) -> None:
         path, options = split_options(rest, (*ROLES, "rig"))
@@ -82,7 +82,7 @@ class RosbagSource:
         return evolve(self._outline(index, camera), sweep=sweep, image=image, notes=tuple(notes))
 
     def outlines(self) -> Iterator[Frame]:
-        """A camera's images are of one size: the first one tells whether the calibration is theirs."""
+        """All images of a camera have one size: the first one shows whether the calibration matches."""
         images = self._index.camera
         first = self._image(int(images.times_ns[0]), []) if images is not None and len(images.times_ns) else None
         camera = rig_files.calibration_for(self._camera, first, [])
@@ -101,7 +101,7 @@ class RosbagSource:
         return None
 
     def _ticking(self, path: str) -> TopicIndex:
-        """The LiDAR's messages; the camera's where it has none."""
+        """The LiDAR's messages; the camera's if it has none."""
         for stream in (self._index.lidar, self._index.camera):
             if stream is not None and len(stream.times_ns):
                 return stream
@@ -112,7 +112,7 @@ class RosbagSource:
         raise SourceError(f"{path}: no complete sweep or image{'; ' + why if why else ''}")
 
     def _place(self, rig: rig_files.Rig, notes: list[str]) -> None:
-        """Where sensors sit: by a rig file, else by what the bag says."""
+        """Mounts of the sensors: from a rig file, else from the bag."""
         index, lidar = self._index, self._index.lidar
         frame_id = lidar.frame_id if lidar is not None else ""
         mounted = rig.lidar.mount.T_ego_sensor()
@@ -173,7 +173,7 @@ class RosbagSource:
         return None
 
     def _packets_sweep(self, recorded_ns: int, t_ns: int, notes: list[str]) -> Sweep | None:
-        """The sweep of the packets in the message that holds its first, and in those after it."""
+        """The sweep from the packets in the message that contains its first packet, and in those after it."""
         lidar = self._index.lidar
         assert lidar is not None
         decoder, found = VelodyneDecoder(self.T_ego_lidar, keeps_partial=True, model=self._index.model), list[Sweep]()
@@ -211,9 +211,9 @@ class RosbagSource:
         return None
 
     def _message(self, stream: TopicIndex, recorded_ns: int, t_ns: int) -> Any:
-        """The message that was written then and is of that time; None when there is none. BagError when the bag is
-        damaged there."""
-        # a bag is read at one place at a time
+        """The message recorded at this time with this timestamp; None if there is none. BagError if the bag is damaged
+        there."""
+        # a bag can be read at only one position at a time
         with self._lock, closing(self._bag.messages([stream.topic], recorded_ns)) as found:
             for _, at_ns, message in found:
                 if messages.stamp_ns(message, at_ns)[0] == t_ns:

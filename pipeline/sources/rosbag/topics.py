@@ -16,7 +16,7 @@ ROLES: dict[str, tuple[str, ...]] = {
     "gnss": ("NavSatFix",),
     "odometry": ("Odometry",),
 }
-"""Role → message types that can play it."""
+"""Role → accepted message types."""
 _LIKELY: dict[str, tuple[str, ...]] = {
     "lidar": ("velodyne", "lidar", "points_raw", "points"),
     "camera": ("front", "center", "image_raw", "color", "rgb"),
@@ -27,7 +27,7 @@ _UNLIKELY = ("depth", "thermal", "ir", "mask", "debug", "rear", "back", "left", 
 
 
 class TopicMap(NamedTuple):
-    """Topic of each role; None where the bag has none."""
+    """Topic of each role; None if the bag has none."""
 
     lidar: str | None
     """Point clouds."""
@@ -47,8 +47,8 @@ class TopicMap(NamedTuple):
 
 
 def map_topics(topics: Mapping[str, Topic], wanted: Mapping[str, str]) -> TopicMap:
-    """Each role's topic: the one a person named, else the likeliest. SourceError for a name that is not there or is no
-    such sensor's."""
+    """Each role's topic: the one given by the user, else the most likely one. SourceError for a topic that does not
+    exist or has another type."""
     chosen: dict[str, str | None] = {}
     for role, kinds in ROLES.items():
         if role in wanted:
@@ -62,8 +62,8 @@ def map_topics(topics: Mapping[str, Topic], wanted: Mapping[str, str]) -> TopicM
 
 
 def why_missing(role: str, topics: Mapping[str, Topic]) -> str | None:
-    """Why a role has no topic, in a bag that may hold its messages: those of its types have none, or nothing defines
-    what a topic's messages are, as where the bag's metadata is damaged. None for a bag without such topics."""
+    """Why a role has no topic although the bag has topics of its types: they have no messages, or the message
+    definition is missing, as with damaged metadata. None for a bag without such topics."""
     empty = sorted(topic.name for topic in topics.values() if topic.kind in ROLES[role] and not topic.held)
     unknown = sorted(f"{topic.name} ({topic.kind})" for topic in topics.values() if topic.held and not topic.is_defined)
     why = [f"no messages on {', '.join(empty)}"] if empty else []
@@ -80,7 +80,7 @@ def _checked(role: str, name: str, topics: Mapping[str, Topic]) -> str:
 
 
 def _rank(role: str, topic: Topic) -> tuple[int, int, int, int, str]:
-    """Likely words in the name, no unlikely ones, the type listed first, most messages; the name ends a draw."""
+    """Likely words in the name, no unlikely ones, order of types, number of messages; ties are resolved by name."""
     name = topic.name.lower()
     likely = sum(word in name for word in _LIKELY.get(role, ()))
     unlikely = sum(word in name.replace("_", "/").split("/") for word in _UNLIKELY)
@@ -88,7 +88,7 @@ def _rank(role: str, topic: Topic) -> tuple[int, int, int, int, str]:
 
 
 def _info_of(camera: str | None, topics: Mapping[str, Topic]) -> str | None:
-    """The ``CameraInfo`` beside the images: ROS puts it into the same namespace."""
+    """The ``CameraInfo`` for the images: ROS puts it into the same namespace."""
     infos = sorted(topic.name for topic in topics.values() if topic.kind == "CameraInfo" and topic.held)
     if camera is None or not infos:
         return None

@@ -18,18 +18,18 @@ from rosbags.rosbag2 import storage_mcap
 from pipeline.recording.mcap.chunk import LARGEST_CHUNK_BYTES
 
 _LARGEST_FILE_BYTES, _LARGEST_RATIO = 1 << 30, 50
-"""Of a bag that is compressed as one file: what it may unpack to whatever its size, and how many times its size. Clouds
-and images shrink to a third, logs to a twentieth."""
+"""Limits for a bag that is compressed as one file: always permitted unpacked size, and unpacked size relative to the
+file. Clouds and images compress to a third, logs to a twentieth."""
 
 Unpack = Callable[[bytes], bytes]
 
 
 class TooLarge(ValueError):
-    """What unpacks to more than it may."""
+    """Data that unpacks to more than permitted."""
 
 
 class Decompressor(Protocol):
-    """As of bz2, lz4 and zstd."""
+    """Interface of the decompressors of bz2, lz4 and zstd."""
 
     @property
     def eof(self) -> bool: ...
@@ -38,8 +38,8 @@ class Decompressor(Protocol):
 
 
 def bounded(new: Callable[[], Any], largest: int = LARGEST_CHUNK_BYTES) -> Unpack:
-    """Unpacks all of some bytes. TooLarge for more than ``largest``, of which no more than that was unpacked;
-    ValueError when they are cut off."""
+    """Returns a function that unpacks bytes completely. TooLarge for more than ``largest``, of which no more than that
+    is unpacked; ValueError for truncated data."""
 
     def unpack(data: bytes) -> bytes:
         decompressor: Decompressor = new()
@@ -86,7 +86,7 @@ class _Zstd:
 
 
 def install() -> None:
-    """Put the bounded ones in the library's place. Safe to call twice."""
+    """Replace the library's decompressors by the bounded ones. Safe to call twice."""
     library: Any = rosbag2
     if isinstance(library.zstd, _Zstd):
         return

@@ -26,21 +26,21 @@ HEADS: tuple[Head, ...] = (
     yolov8.COLUMNS,
     end_to_end.ROWS,
 )
-"""The heads in the order in which they are tried: the first that recognises an answer is taken, so a head comes before
-those that would take its answers for theirs."""
+"""The heads in the order in which they are tried. The first one that recognises an output is used, so a specific head
+must come before heads that would also accept its outputs."""
 
 
 def pick_decoder(outputs: Sequence[F32], size: Size, metadata: Mapping[str, str] | None = None) -> Decoder:
-    """The decoder for a network, by what the network gave for any image.
+    """Select the decoder for a network from its outputs for any image.
 
     Args:
-        outputs: the network's raw outputs. Their values are needed beside their shapes: YOLOX and its variant decoded
-            in the graph differ in nothing else.
+        outputs: the network's raw outputs. Their values are needed as well as their shapes: YOLOX with and without
+            decoding in the graph differs only in these.
         size: the network's input (height, width).
-        metadata: the graph's own properties; exports of the v8 family say ``end2end`` there.
+        metadata: properties of the graph; exports of the v8 family set ``end2end`` there.
 
     Raises:
-        UnknownHead: no head recognises the outputs; the text names their shapes.
+        UnknownHead: no head recognises the outputs; the text lists their shapes.
     """
     answer = BoxOutputs(outputs, size, metadata or {})
     for head in HEADS:

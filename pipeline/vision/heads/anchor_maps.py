@@ -15,12 +15,13 @@ ANCHORS: Mapping[int, tuple[Size, ...]] = {
     16: ((30, 61), (62, 45), (59, 119)),
     32: ((116, 90), (156, 198), (373, 326)),
 }
-"""Anchor widths and heights in input pixels by stride, of YOLOv3 on COCO (Redmon 2018, section 2.3); v5 kept them."""
+"""Anchor widths and heights in input pixels by stride, of YOLOv3 on COCO (Redmon 2018, section 2.3); also used by v5.
+"""
 
 
 def are_maps(answer: BoxOutputs, axes: tuple[int, int], dims: int) -> bool:
-    """Whether the outputs are one map a stride, each with three anchors of the same number of channels. axes: of rows
-    and columns. dims: of each map; with 4 the anchors lie side by side in the channels."""
+    """Whether the outputs are one map per stride, each with three anchors with the same number of channels. axes: of
+    rows and columns. dims: number of dimensions of each map; with 4, the anchors are stacked in the channels."""
     shapes = [output.shape for output in answer.outputs]
     if len(shapes) != len(STRIDES) or any(len(shape) != dims or shape[0] != 1 for shape in shapes):
         return False
@@ -38,7 +39,8 @@ def decode_maps(
     centre_of: Callable[[F32, F32, int], F32],
     extent_of: Callable[[F32, F32], F32],
 ) -> Decoded:
-    """Maps, each (3, rows, columns, 5+C) of logits, finest stride first whatever the outputs' order."""
+    """Decode maps, each (3, rows, columns, 5+C) of logits; returned finest stride first for any order of the
+    outputs."""
     parts = []
     for rows in sorted(maps, key=lambda m: -m.shape[1] * m.shape[2]):
         stride = size[0] // rows.shape[1]
@@ -56,5 +58,5 @@ def decode_maps(
 
 
 def sigmoid(t: F32) -> F32:
-    """1 / (1 + e^−t), of logits that may be huge."""
+    """1 / (1 + e^−t), without overflow for large logits."""
     return (1.0 / (1.0 + np.exp(-np.clip(t, -60.0, 60.0)))).astype(np.float32)

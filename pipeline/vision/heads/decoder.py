@@ -19,61 +19,62 @@ from pipeline.types import F32, I64
 Decoded = tuple[F32, F32, I64]
 
 STRIDES = (8, 16, 32)
-"""Input pixels a grid cell, of the usual three maps."""
+"""Input pixels per grid cell of the usual three maps."""
 STRIDE_SETS = (STRIDES, (8, 16, 32, 64), (16, 32))
-"""Those that exports come with."""
+"""Combinations of strides that occur in exports."""
 
 
 class UnknownHead(ValueError):
-    """Outputs that no head recognises; the text names their shapes."""
+    """Outputs that no head recognises; the text lists their shapes."""
 
 
 @dataclass(frozen=True)
 class Decoder:
-    """What a network's outputs mean, and what image it was trained on."""
+    """How to decode a network's outputs, and what input it expects."""
 
     name: str
-    """The head's name, for people."""
+    """The head's display name."""
     classes: int
-    """How many classes it tells apart; 0: its shapes do not say."""
+    """Number of classes; 0 if its shapes do not tell."""
     rgb: bool
-    """Its input is RGB; otherwise BGR."""
+    """Whether its input is RGB instead of BGR."""
     scale: float
     """Pixel values 0–255 are multiplied by this."""
     own_grid: bool
-    """The decoder lays the grid itself, so the graph holds none that another input size would break."""
+    """Whether the decoder applies the grid itself. Otherwise the graph contains a grid that another input size would
+    break."""
     decode: Callable[[Sequence[F32], Size, float], Decoded]
     """(outputs, input size, lowest score) → candidates."""
 
 
 class BoxOutputs(NamedTuple):
-    """What a network gave for some image, to recognise its head by."""
+    """A network's outputs for some image, used to recognise its head."""
 
     outputs: Sequence[F32]
     """In the network's order."""
     size: Size
     """Height, width of its input in pixels."""
     metadata: Mapping[str, str]
-    """Of the file: some exporters write down the family there."""
+    """Metadata of the file: some exporters store the model family there."""
 
     @property
     def single(self) -> F32 | None:
-        """(rows, columns) of a network whose first output is one table; None for any other."""
+        """The first output as (rows, columns) if it is a single table; else None."""
         first = self.outputs[0] if self.outputs else None
         return first[0] if first is not None and first.ndim == 3 and first.shape[0] == 1 else None
 
     def cells(self, strides: Sequence[int] = STRIDES) -> int:
-        """How many grid cells the input has at these strides together."""
+        """Total number of grid cells of the input at these strides."""
         return sum((self.size[0] // s) * (self.size[1] // s) for s in strides)
 
 
 class Head(NamedTuple):
-    """One form that YOLO networks give their answer in."""
+    """One output format of YOLO networks."""
 
     family: str
-    """What people call the networks that have it."""
+    """Display name of the networks that use it."""
     recognise: Callable[[BoxOutputs], Decoder | None]
-    """The decoder, if an answer is of this form."""
+    """Returns the decoder if the outputs have this format, else None."""
 
 
 def grid_centres(size: Size, strides: Sequence[int] = STRIDES) -> tuple[F32, F32]:
@@ -88,14 +89,14 @@ def grid_centres(size: Size, strides: Sequence[int] = STRIDES) -> tuple[F32, F32
 
 
 def decode_objectness(outputs: Sequence[F32], size: Size, floor: float) -> Decoded:
-    """(1, N, 5+C) with centre and size in pixels: v3/v5/v7 concatenated exports, v6, YOLOX decoded in the graph."""
+    """(1, N, 5+C) with centre and size in pixels: concatenated exports of v3/v5/v7, v6, YOLOX decoded in the graph."""
     rows = outputs[0][0]
     rows = rows[rows[:, 4] >= floor]
     return above(rows[:, :2], rows[:, 2:4], rows[:, 4:5] * rows[:, 5:], floor)
 
 
 def above(centre: F32, extent: F32, class_scores: F32, floor: float) -> Decoded:
-    """Corner boxes of the candidates whose best class reaches the floor; what is not finite is no candidate."""
+    """Corner boxes of the candidates whose best class reaches the floor; non-finite candidates are dropped."""
     if not len(class_scores):
         return np.zeros((0, 4), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int64)
     classes = np.argmax(class_scores, axis=1)

@@ -15,11 +15,11 @@ from pipeline.types import F32
 from pipeline.vision.heads.decoder import BoxOutputs, Decoded, Decoder, Head
 
 _CLASSES = 80
-"""Labels number COCO's classes from 0."""
+"""Labels are COCO class numbers, starting at 0."""
 
 
 def decode(outputs: Sequence[F32], size: Size, floor: float) -> Decoded:
-    """(1, N) integer labels, (1, N, 4) ``x1 y1 x2 y2`` as shares, (1, N) scores, in any order."""
+    """(1, N) integer labels, (1, N, 4) ``x1 y1 x2 y2`` as fractions of the image, (1, N) scores, in any order."""
     labels, boxes, scores = _parts(outputs)
     keep = (scores >= floor) & np.isfinite(boxes).all(axis=1)
     pixels = boxes[keep] * np.array([size[1], size[0], size[1], size[0]], np.float32)

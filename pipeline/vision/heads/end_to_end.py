@@ -21,7 +21,7 @@ def decode(outputs: Sequence[F32], size: Size, floor: float) -> Decoded:
 
 
 def _marked(answer: BoxOutputs) -> Decoder | None:
-    """The graph itself says so."""
+    """Recognised by metadata in the graph."""
     return _by_shape(answer) if answer.metadata.get("end2end") == "True" else None
 
 
@@ -33,7 +33,7 @@ def _by_shape(answer: BoxOutputs) -> Decoder | None:
 
 
 def _few_rows(answer: BoxOutputs) -> Decoder | None:
-    """Six columns, and no more rows than an export keeps."""
+    """Recognised by six columns, and no more rows than an export keeps."""
     table = answer.single
     return _by_shape(answer) if table is not None and len(table) <= _MOST_ROWS else None
 

@@ -28,7 +28,7 @@ def _maps(answer: BoxOutputs) -> Decoder | None:
 
 
 def _rows(answer: BoxOutputs) -> Decoder | None:
-    """Three anchors in each cell, a row each."""
+    """Three anchors in each cell, one row each."""
     table = answer.single
     if table is None or table.shape[1] <= 5 or len(table) not in {3 * answer.cells(each) for each in STRIDE_SETS}:
         return None

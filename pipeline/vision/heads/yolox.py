@@ -21,7 +21,7 @@ from pipeline.vision.heads.decoder import (
 
 
 def decode_yolox(outputs: Sequence[F32], size: Size, floor: float) -> Decoded:
-    """As exported by default: (1, N, 5+C), centres and log sizes relative to the grid, probabilities final."""
+    """Default export: (1, N, 5+C), centres and log sizes relative to the grid, scores already probabilities."""
     rows = outputs[0][0]
     keep = np.flatnonzero(rows[:, 4] >= floor)
     cells, steps = (part[keep] for part in grid_centres(size))
@@ -32,7 +32,7 @@ def decode_yolox(outputs: Sequence[F32], size: Size, floor: float) -> Decoded:
 
 
 def _raw(answer: BoxOutputs) -> Decoder | None:
-    """Centres are offsets of about a cell, where pixels would be hundreds."""
+    """Recognised by centres that are offsets of about one cell, where pixels would be hundreds."""
     table = _one_row_a_cell(answer)
     if table is None or float(np.median(np.abs(table[:, :2]))) >= STRIDES[0]:
         return None

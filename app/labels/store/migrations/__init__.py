@@ -1,4 +1,4 @@
 """The history of the database schema."""
 
 HEAD = "0007"
-"""The revision that this program works with."""
+"""The schema revision of this program."""

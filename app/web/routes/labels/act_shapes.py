@@ -25,7 +25,7 @@ class Sent(Strict):
 
     @property
     def sent_as(self) -> str | None:
-        """The id as the log keeps it."""
+        """The id as stored in the log."""
         return str(self.act_id) if self.act_id is not None else None
 
 

@@ -62,7 +62,7 @@ def label_acts_router(desk: LabelDesk) -> APIRouter:
 
 
 def _answer(done: ActDone) -> Response:
-    """changed: null for what has no frames to label."""
+    """changed: null if the open source has no frames to label."""
     acted, labels = done.acted, done.labels
     changed = None
     if labels.info.t_ns:

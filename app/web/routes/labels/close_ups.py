@@ -16,7 +16,7 @@ from pipeline.labels.model import LabelTrack
 
 
 def label_close_ups_router(desk: LabelDesk) -> APIRouter:
-    """Routes that look at frames, so that each takes some milliseconds a frame."""
+    """Routes that read frames, which takes some milliseconds per frame."""
     router = APIRouter(prefix="/api/labels/tracks", tags=["labels"])
 
     @router.get("/{number}/filmstrip")

@@ -11,7 +11,7 @@ from app.labels.store.values import LONGEST_NAME
 from app.web.routes.shapes.common import ApiModel
 
 VERSION_NAME = r"^[A-Za-z0-9][A-Za-z0-9._ -]*$"
-"""A version's name is shown and asked for in addresses; it is never a path."""
+"""A version's name is displayed and used in URLs; it is never a path."""
 
 
 class VersionJson(ApiModel):

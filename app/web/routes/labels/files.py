@@ -32,12 +32,12 @@ _FILE = file_of(_BYTES)
 _TAKES_A_FILE = {
     "requestBody": {"required": True, "content": {_BYTES: {"schema": {"type": "string", "format": "binary"}}}}
 }
-"""In OpenAPI's words: the body is read piece by piece, so the framework does not see that there is one."""
+"""OpenAPI description of the body, which the framework cannot infer because it is read in chunks."""
 VersionName = Annotated[str, Query(max_length=LONGEST_NAME, pattern=VERSION_NAME)]
 
 
 def label_files_router(desk: LabelDesk) -> APIRouter:
-    """Routes over files of labels."""
+    """Routes for label files."""
     router = APIRouter(prefix="/api/labels", tags=["labels"])
 
     @router.post("/import", status_code=202, responses={202: {"model": TaskBegun}}, openapi_extra=_TAKES_A_FILE)
@@ -59,7 +59,8 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
                 number = await asyncio.to_thread(desk.begin_import, person, path, format, drive)
         except BaseException as error:
             path.unlink(missing_ok=True)
-            if isinstance(error, ClientDisconnect):  # nobody hears it, but it is no trouble of this program
+            # nobody receives the response, but it is not an error of this program
+            if isinstance(error, ClientDisconnect):
                 raise HTTPException(400, "the upload was incomplete") from None
             raise
         return JSONResponse({"status": "begun", "what": "import", "task": number}, 202)
@@ -74,7 +75,8 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         """Download labels as a file, or as a .zip for a format that is a folder. only: those that are accepted, or
         reviewed; the file's name and the set's say which. The header X-Cipv-Lost counts the
         kinds of information that the format cannot express; /api/labels/export/notes lists them."""
-        from app.labels.transfer.files import exported  # the formats' libraries: only who exchanges labels pays
+        # imports the libraries of the formats, so only when labels are exchanged
+        from app.labels.transfer.files import exported
 
         with refusing():
             made = exported(desk.recording, desk.labels.label_set(version), format, only, desk.classes)
@@ -118,7 +120,7 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
 
 
 def _new_file() -> Path:
-    """An empty temporary file that only this user can read; the caller removes it."""
+    """An empty temporary file that only this user can read; the caller must remove it."""
     handle, name = tempfile.mkstemp(prefix="cipv-upload-")
     os.close(handle)
     return Path(name)

@@ -72,7 +72,7 @@ class ScoreJson(ApiModel):
 
 
 def errors_json(row: Sequence[Cell]) -> ErrorsJson:
-    """One of ``error_rows``."""
+    """One row of ``error_rows``."""
     vehicles, seen_by, count, *figures = row
     sizes = [
         {"min": figures[n], "max": figures[n + 1], "mae": figures[n + 2]} if figures[n] is not None else None

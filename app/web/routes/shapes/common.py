@@ -10,18 +10,18 @@ Point = tuple[float, float]
 
 
 def file_of(media_type: str) -> dict[int | str, dict[str, Any]]:
-    """What OpenAPI says of an answer that is a file."""
+    """OpenAPI description of a response that is a file."""
     return {200: {"content": {media_type: {}}, "description": "The file"}}
 
 
 class ApiModel(BaseModel):
-    """What OpenAPI describes: the line under each field is its description there."""
+    """Base of models in OpenAPI: the docstring of each field becomes its description there."""
 
     model_config = ConfigDict(use_attribute_docstrings=True)
 
 
 class Exact(ApiModel):
-    """No key more than is said."""
+    """A model without additional keys."""
 
     model_config = ConfigDict(extra="forbid")
 

@@ -14,7 +14,7 @@ _ARRIVAL = "sends no time stamps: images are stamped on arrival"
 
 
 class CameraInput:
-    """A camera that stamps its images is followed by its own clock; of others, an image's time is when it came."""
+    """If a camera timestamps its images, its clock is tracked; otherwise an image's time is its arrival time."""
 
     def __init__(self, config: CameraConfig, clock: HostClock, deliver: Deliver[Shot]) -> None:
         self.stats = StreamStats("camera")
@@ -37,7 +37,7 @@ class CameraInput:
         return lambda stop: video_stream.read_device(device, self._shot, stop)
 
     def receive(self, data: bytes, stamp_us: int | None) -> None:
-        """Take a JPEG and its own stamp, µs since 1970, if it has one. One that is cut off is counted as lost."""
+        """Take a JPEG and its timestamp, µs since 1970, if it has one. A truncated JPEG is counted as lost."""
         if not is_whole_jpeg(data):
             self.stats.lost += 1
             return
@@ -61,7 +61,7 @@ class CameraInput:
 
 
 class _HttpOrVideo:
-    """An address: MJPEG where it gives that, else video. What it gave once it is taken to give again."""
+    """An address: MJPEG if it serves that, else video. The detected type is used again on reconnect."""
 
     def __init__(self, url: str, jpeg: mjpeg.ReceiveImage, shot: video_stream.ReceiveShot) -> None:
         self._url, self._jpeg, self._shot = url, jpeg, shot

@@ -26,14 +26,14 @@ _LIMITS = (
     (re.compile(r"^\s*SG_[^:\n]*:\s*(\d+)\s*\|", re.MULTILINE), 511),
     (re.compile(r"^\s*SG_[^:\n]*:\s*\d+\s*\|\s*(\d+)\s*@", re.MULTILINE), 512),
 )
-"""Of a message's bytes, a signal's first bit and its bits: cantools lays out every bit up to there. CAN FD has 64
-bytes; a J1939 message in packets has more, and is not read here."""
+"""Limits of a message's bytes, a signal's first bit and its length: cantools allocates every bit up to there. CAN FD
+has 64 bytes; a J1939 message in packets has more, and is not supported."""
 _FASTEST_MPS, _FASTEST_RADPS = 120.0, 5.0
 
 
 class CanInput:
-    """Gives an ``EgoState`` with every message that holds the speed, with the yaw rate as it was last said. SourceError
-    when the DBC file does not know the signals."""
+    """Delivers an ``EgoState`` for every message that contains the speed, with the last known yaw rate. SourceError if
+    the DBC file does not define the signals."""
 
     def __init__(self, config: CanConfig, time_offset_ms: float, clock: HostClock, deliver: Deliver[EgoState]) -> None:
         self.stats = StreamStats("ego")
@@ -59,14 +59,14 @@ class CanInput:
             raise DeviceLost(f"CAN {config.channel}: {str(error).splitlines()[0] if str(error) else error!r}") from None
 
     def receive(self, message: can.Message) -> None:
-        """Take a CAN frame; of another arbitration id than the wanted ones it is nothing to us."""
+        """Process a CAN frame; frames with other arbitration ids are ignored."""
         known = self._messages.get(message.arbitration_id)
         if known is None or message.is_error_frame or message.is_remote_frame:
             return
         now_ns = self._clock.now_ns()
         try:
             values = known.decode(bytes(message.data), decode_choices=False)
-        except Exception:  # cantools raises what its codec happens to: a message that is cut, or not of this DBC
+        except Exception:  # cantools' codec raises various errors for a message that is truncated or not of this DBC
             self.stats.lost += 1
             return
         self._take(known.name, values, self._clock.of_wall_ns(round(message.timestamp * 1e9)), now_ns)
@@ -91,7 +91,7 @@ class CanInput:
 
 
 def load_dbc(path: Path) -> Any:
-    """cantools' database. SourceError when the file is none."""
+    """cantools' database. SourceError if the file is not valid."""
     try:
         text = read_regular(path, LARGEST_TEXT_BYTES).decode("cp1252", "replace")
     except OSError as error:
@@ -100,14 +100,14 @@ def load_dbc(path: Path) -> Any:
         raise SourceError(f"{path}: not a DBC file: a message or a signal beyond the 64 bytes of CAN FD")
     try:
         return cantools.database.load_string(text, "dbc")
-    except Exception as error:  # cantools has an error class for each of its parsers, whose text shows the file's
+    except Exception as error:  # each of cantools' parsers has its own error class, whose text quotes the file
         line = re.search(r"\bline (\d+)", str(error))
         where = f" in line {line[1]}" if line else ""
         raise SourceError(f"{path}: not a DBC file{where}") from None
 
 
 def _messages(config: CanConfig) -> dict[int, Any]:
-    """The DBC's messages that are wanted, by arbitration id."""
+    """The required messages of the DBC, by arbitration id."""
     database, found = load_dbc(config.dbc), {}
     for wanted in (config.speed_mps, config.yaw_rate_radps):
         if wanted is None:
@@ -122,7 +122,7 @@ def _messages(config: CanConfig) -> dict[int, Any]:
 
 
 def _value(wanted: SignalConfig | None, name: str, values: dict[str, Any], largest: float) -> float | None:
-    """The signal in SI units, where this message holds it and it is possible."""
+    """The signal in SI units, if this message contains it and its value is possible."""
     if wanted is None or wanted.message != name or wanted.signal not in values:
         return None
     value = float(values[wanted.signal]) * wanted.factor

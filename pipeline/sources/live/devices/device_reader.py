@@ -10,24 +10,24 @@ from collections.abc import Callable
 logger = logging.getLogger("cipv.live")
 
 RETRY_S = 0.2
-"""Between two tries to open a device: one that comes back is there again within a second."""
+"""Interval between attempts to open a device, so that one that returns is open within a second."""
 POLL_S = 0.2
-"""Longest wait inside a read before it looks whether it is still wanted."""
+"""Longest wait inside a read before it checks whether it should stop."""
 CONNECT_S = 0.5
 SILENCE_S = 1.5
-"""A connection that says nothing for so long is opened anew: its other end may have been unplugged."""
+"""A connection without data for this long is reopened: the other end may have been unplugged."""
 _PATIENCE_S = 2.0
 HANGS_S = 11.0
-"""A reading that has not asked so long whether it is still wanted hangs in a driver or a decoder: the longest that one
-may take by itself is OpenCV's wait for a camera, 10 s, and a second more."""
+"""If a reader has not checked for this long whether it should stop, it hangs in a driver or a decoder: the longest wait
+in normal operation is OpenCV's for a camera, 10 s, plus a second."""
 
 
 class DeviceLost(Exception):
-    """A device that cannot be opened or read any more; the text says which and why, for a person."""
+    """A device that can no longer be opened or read; the text says which one and why, for the user."""
 
 
 class ReaderStop:
-    """Asked by whoever reads, set when the reading shall end. asked_s: when it was asked last."""
+    """Polled by the reader; set to stop it. asked_s: time of the last poll."""
 
     def __init__(self) -> None:
         self._event = threading.Event()
@@ -46,11 +46,11 @@ class ReaderStop:
 
 
 ReadDevice = Callable[[ReaderStop], None]
-"""Opens a device and reads it until it is lost (``DeviceLost``, ``OSError``), ends, or ``ReaderStop`` is set."""
+"""Opens a device and reads until it is lost (``DeviceLost``, ``OSError``), ends, or ``ReaderStop`` is set."""
 
 
 class Reader:
-    """``read`` in a thread, again and again. ``say`` is told why it cannot, and an empty text when it can."""
+    """Runs ``read`` in a thread, repeatedly. ``say`` receives the reason of a failure, and an empty text on success."""
 
     def __init__(self, name: str, read: ReadDevice, say: Callable[[str], None]) -> None:
         self._read, self._say = read, say
@@ -58,7 +58,7 @@ class Reader:
         self._logged = ""
         self._name = f"cipv-{name}"
         self.hung = 0
-        """How often it was started anew because it hung."""
+        """Number of restarts after a hang."""
         self._thread = self._fresh()
 
     def start(self) -> None:
@@ -66,8 +66,8 @@ class Reader:
         self._thread.start()
 
     def look(self, now_s: float) -> None:
-        """Start it anew if it hangs. The thread that does cannot be ended; it ends by itself should it ever come
-        back, and says nothing more."""
+        """Restart the reader if it hangs. The hung thread cannot be terminated; if it ever continues, it ends without
+        reporting anything."""
         hangs_s = now_s - self._stop.asked_s
         if not self._thread.is_alive() or hangs_s <= HANGS_S or self._stop:
             return
@@ -85,12 +85,12 @@ class Reader:
         self._stop.set()
 
     def join(self) -> None:
-        """Wait a little until it has ended: a driver that hangs must not hang the program."""
+        """Wait briefly until it has ended: a driver that hangs must not hang the program."""
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_PATIENCE_S)
 
     def _log_once(self, error: Exception) -> None:
-        """With its traceback, but not five times a second."""
+        """With its traceback, but only once for a repeated error."""
         text = repr(error)
         if text != self._logged:
             logger.exception("while reading %s", self._thread.name)
@@ -104,14 +104,14 @@ class Reader:
             stop.wait(RETRY_S)
 
     def _tried(self, stop: ReaderStop) -> str:
-        """Why the reading ended."""
+        """The reason why reading ended."""
         try:
             self._read(stop)
         except DeviceLost as lost:
             return str(lost)
         except OSError as error:
             return error.strerror or str(error)
-        except Exception as error:  # whatever a driver throws, the other sensors go on and this one is tried again
+        except Exception as error:  # whatever a driver raises, the other sensors continue and this one is retried
             self._log_once(error)
             return f"{type(error).__name__}: {error}"
         return ""

@@ -21,15 +21,15 @@ from pipeline.sources.live.health import StreamStats
 from pipeline.types import GnssFix
 
 _SILENT_POLLS = 10
-"""Polls of a TCP connection without a byte, two seconds, before it is opened anew; receivers send once a second."""
+"""Polls of a TCP connection without data, two seconds, before it is reopened; receivers send once a second."""
 _LONGEST = 4096
 _MOST_LINES = 8
 _SILENT_S = 3.0
-"""Of a receiver that sends once a second, three of its periods, as the stream's health has it."""
+"""Three periods of a receiver that sends once a second, as in the stream's health."""
 
 
 class GnssInput:
-    """utc_to_host_ns: a better way from UTC to the host's timeline than this receiver's delays, while there is one: a
+    """utc_to_host_ns: a better conversion from UTC to the host's timeline than this receiver's delays, if available: a
     LiDAR that follows GPS."""
 
     def __init__(
@@ -68,11 +68,11 @@ class GnssInput:
         return lambda stop: _read_serial(device, config.baud, self._bytes, stop)
 
     def receive(self, data: bytes, wall_ns: int) -> None:
-        """Take a datagram of whole sentences, received at ``wall_ns`` of the system's clock."""
+        """Take a datagram of complete sentences, received at ``wall_ns`` of the system's clock."""
         self._lines(data.splitlines(), self._clock.of_wall_ns(wall_ns))
 
     def _bytes(self, data: bytes) -> None:
-        """A piece of a stream: whole lines are read, the rest waits for its end; a rest that grows is garbage."""
+        """Part of a stream: complete lines are processed, the rest is buffered; if it grows too long, it is garbage."""
         *lines, rest = (self._rest + data).split(b"\n")
         self._rest = rest if len(rest) < _LONGEST else b""
         self._lines(lines, self._clock.now_ns())
@@ -94,7 +94,7 @@ class GnssInput:
         self.stats.note = "" if self._has_fix is not False else self._without_fix(arrived_ns)
 
     def _without_fix(self, arrived_ns: int) -> str:
-        """The receiver talks, and says that it does not know where it is."""
+        """A message if the receiver sends data but has no fix."""
         return "no fix yet" if self.stats.since_ns(arrived_ns) is None else "no fix: the receiver has lost its position"
 
     def _give(self, fix: GnssFix, arrived_ns: int) -> None:
@@ -112,7 +112,7 @@ class GnssInput:
 
 
 def _is_nmea(data: bytes) -> bool:
-    """Whether a sentence is in it that a receiver may have sent."""
+    """Whether the data contains a valid sentence of a receiver."""
     for line in data.splitlines()[:_MOST_LINES]:
         with contextlib.suppress(BadSentence):
             parse_sentence(line.decode("ascii", errors="replace"))

@@ -16,16 +16,16 @@ from pipeline.sources.live.health import StreamStats
 from pipeline.types import Sweep
 
 _SILENT_S = 1.0
-"""A VLP-16 sends 754 packets a second; the stream's health calls it silent after as long."""
+"""A VLP-16 sends 754 packets a second; the stream's health calls it silent after the same time."""
 _LOOK_EVERY, _MIXED_SHARE = 512, 0.3
-"""Of so many packets, this share that does not fit to the others: those of another sensor, which sends as many. One
-that was set anew costs one packet, and a bad network hardly one in a thousand."""
+"""If this share of this many packets is inconsistent with the others, another sensor is sending as well, since that
+sends as many packets. A sensor whose clock was set costs one packet, a bad network less than one in a thousand."""
 
 
 class LidarInput:
-    """pps: what the last position packet said of the pulse per second; None before one came. follows_gps: the sensor's
-    time is UTC past the hour. T_ego_lidar: (4, 4), where it sits. offset_ns: what is added to its stamps. on_packet:
-    told each data packet and when it arrived."""
+    """pps: state of the pulse per second in the last position packet; None before the first. follows_gps: the sensor's
+    time is UTC past the hour. T_ego_lidar: (4, 4), its mount. offset_ns: added to its timestamps. on_packet: receives
+    each data packet and its arrival time."""
 
     def __init__(self, config: LidarConfig, clock: HostClock, deliver: Deliver[Sweep]) -> None:
         self.stats = StreamStats("lidar")
@@ -37,7 +37,7 @@ class LidarInput:
         self.T_ego_lidar = config.mount.T_ego_sensor()
         self.on_packet: Callable[[bytes, int], object] | None = None
         self._decoder = VelodyneDecoder(self.T_ego_lidar)
-        self.stats.refused = self._decoder.counts.refused  # by the decoder; those of the position port are added
+        self.stats.refused = self._decoder.counts.refused  # counts of the decoder; those of the position port are added
         self._pin = SenderPin("LiDAR", config.sender, _is_data, self.stats.refused, by_port=True, silent_s=_SILENT_S)
         self._looked, self._misfits, self._mixed = 0, 0, False
         self.stats.remarks = (self._pin.said, self._about_clock)
@@ -56,15 +56,15 @@ class LidarInput:
         return None if offset_ns is None else whole_hours_off(offset_ns)
 
     def utc_to_host_ns(self, utc_ns: int, near_ns: int) -> int | None:
-        """UTC on the host's timeline, by the LiDAR's clock; None while that does not follow GPS."""
+        """Converts UTC to the host's timeline by the LiDAR's clock; None if that does not follow GPS."""
         offset_ns = self._decoder.clock.offset_ns
         if not self.follows_gps or offset_ns is None:
             return None
         return near_ns + round(whole_hours_off(utc_ns + offset_ns - near_ns) * 1e6)
 
     def receive(self, packet: bytes, wall_ns: int) -> None:
-        """Take a data packet, received at ``wall_ns`` of the system's clock. The decoder's own clock maps to the host's
-        timeline; it is not told of GPS, whose time is not the host's."""
+        """Take a data packet, received at ``wall_ns`` of the system's clock. The decoder's clock is mapped to the
+        host's timeline; GPS is not used there, because its time is not the host's."""
         arrived_ns = self._clock.of_wall_ns(wall_ns)
         on_packet = self.on_packet
         if on_packet is not None:
@@ -94,7 +94,7 @@ class LidarInput:
         self.pps, self.follows_gps = position.pps, position.locked
 
     def _about_clock(self) -> str:
-        """What was wrong with the stamps of its packets."""
+        """Problems with the timestamps of its packets."""
         if self._mixed:
             return "many packets do not match the others: does a second LiDAR have the same address?"
         jumps, last_s = self._decoder.counts.jumps, self._decoder.counts.jump_s
@@ -114,5 +114,5 @@ def _is_data(data: bytes) -> bool:
 
 
 def _until_stopped(read: Callable[..., None]) -> ReadDevice:
-    """A reading whose ``stop`` is given last."""
+    """Adapts a read function that takes ``stop`` as its last argument."""
     return lambda stop: read(stop=stop)

@@ -12,28 +12,28 @@ from pipeline.sources.live.devices.device_reader import CONNECT_S, SILENCE_S, De
 _LARGEST = 32 << 20
 _LONGEST_LINE = 8192
 _MOST_LINES = 100
-"""Between two images: a part's headers are a handful."""
+"""Maximum lines between two images: a part has a handful of headers."""
 _STAMPS = ("x-timestamp", "x-sendtimestamp")
-"""Seconds since 1970, as mjpg-streamer, µStreamer and others send it."""
+"""Headers with seconds since 1970, as sent by mjpg-streamer, µStreamer and others."""
 
 _END_OF_TIME_US = (1 << 63) // 1000
-"""Later than that, in the year 2262, nanoseconds leave 64 bits."""
+"""Later times, from the year 2262, do not fit into 64 bits of nanoseconds."""
 
 ReceiveImage = Callable[[bytes, int | None], None]
-"""Takes a JPEG and its own stamp, µs since 1970, if it has one."""
+"""Takes a JPEG and its timestamp, µs since 1970, if it has one."""
 
 
 class _Stopped(Exception):
-    """Asked to end in the middle of a part."""
+    """Asked to stop in the middle of a part."""
 
 
 class NotMjpeg(Exception):
-    """The address answers, with something else."""
+    """The address responds with something other than MJPEG."""
 
 
 def read_mjpeg(url: str, receive: ReceiveImage, stop: ReaderStop) -> None:
-    """Read until ``stop``. DeviceLost when the camera cannot be reached, ends or falls silent; NotMjpeg when the
-    address gives no MJPEG."""
+    """Read until ``stop``. DeviceLost if the camera cannot be reached, disconnects or falls silent; NotMjpeg if the
+    address does not serve MJPEG."""
     connection = _connection(url)
     try:
         parts = urlsplit(url)
@@ -69,7 +69,7 @@ def _connection(url: str) -> http.client.HTTPConnection:
 
 
 def _next_part(response: http.client.HTTPResponse, url: str, stop: ReaderStop) -> tuple[bytes, int | None]:
-    """One JPEG: its headers say how long it is; of a camera that does not say, up to the JPEG's end."""
+    """One JPEG: its headers contain its length; otherwise it is read up to the JPEG's end marker."""
     headers = _headers(response, url, stop)
     length = headers.get("content-length", "")
     if length.isdecimal() and 0 < int(length) <= _LARGEST:
@@ -81,7 +81,7 @@ def _next_part(response: http.client.HTTPResponse, url: str, stop: ReaderStop) -
 
 
 def _headers(response: http.client.HTTPResponse, url: str, stop: ReaderStop) -> Mapping[str, str]:
-    """Of the next part: lines after its boundary, up to an empty one. DeviceLost when they do not end."""
+    """Headers of the next part: lines after its boundary, up to an empty one. DeviceLost if they do not end."""
     headers: dict[str, str] = {}
     for _ in range(_MOST_LINES):
         line = _line(response, url, stop)
@@ -107,7 +107,7 @@ def _until_jpeg_end(response: http.client.HTTPResponse, url: str, stop: ReaderSt
 
 
 def _line(response: http.client.HTTPResponse, url: str, stop: ReaderStop) -> bytes:
-    """The next one with its end, or as much as a line may have."""
+    """The next line with its end, or as much of it as is permitted."""
     if stop:
         raise _Stopped
     line = response.readline(_LONGEST_LINE)

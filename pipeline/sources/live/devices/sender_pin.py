@@ -15,22 +15,22 @@ SocketAddress = tuple[str, int]
 """A sender's IPv4 address and port."""
 
 _NAMED_S = 3.0
-"""Others are named for so long after they were heard last."""
+"""Other senders are reported for this long after their last datagram."""
 _MOST_NAMED = 3
 OTHERS = "from another sender"
-"""Under which their datagrams are counted."""
+"""Reason under which their datagrams are counted."""
 
 
 class SenderPin:
-    """What one port lets in. For one thread; ``said`` for any.
+    """Accepts datagrams of one sender on a port. For one thread; ``said`` for any.
 
     Args:
-        what: the kind of sensor, for people, as ``LiDAR``.
+        what: display name of the sensor type, such as ``LiDAR``.
         allowed: the only address that may send; None for the first that sends something valid.
-        is_valid: whether a datagram is one of such a sensor. What is not chooses no sender.
-        refused: where datagrams of others are counted.
-        by_port: the sensor sends all from one port, so another port of its address is another sender.
-        silent_s: a sender that has said nothing for so long is gone, and another may take its place.
+        is_valid: whether a datagram comes from such a sensor. Others do not select a sender.
+        refused: counter of datagrams of others.
+        by_port: the sensor sends everything from one port, so another port of its address is another sender.
+        silent_s: a sender without data for this long is gone, and another may take its place.
     """
 
     def __init__(
@@ -47,15 +47,15 @@ class SenderPin:
         self._what, self._allowed, self._is_valid, self._refused = what, allowed, is_valid, refused
         self._by_port, self._silent_s, self._now_s = by_port, silent_s, now_s
         self.sender: SocketAddress | None = None
-        """Who sends; port 0 stands for any. None before the first, and once it has fallen silent."""
+        """The current sender; port 0 stands for any. None before the first, and after it has fallen silent."""
         self._heard_s, self._sent_ns = 0.0, 0
         self._last: SocketAddress | None = None
         self._before: str | None = None
         self._others: dict[str, tuple[float, bool]] = {}
 
     def takes(self, data: bytes, sender: SocketAddress, at_ns: int) -> bool:
-        """Whether to read a datagram that came at ``at_ns``. While there is no sender everything of an allowed address
-        is read, so that the reader can say what is wrong with it."""
+        """Whether to accept a datagram that arrived at ``at_ns``. While there is no sender, everything from an allowed
+        address is accepted, so that the reader can report what is wrong with it."""
         host, port = sender
         who = (host, port if self._by_port else 0)
         if who != self.sender:
@@ -70,12 +70,13 @@ class SenderPin:
         return True
 
     def nothing_came(self) -> None:
-        """Nobody has sent anything lately."""
+        """There were no datagrams lately."""
         if self.sender is not None and self._now_s() - self._heard_s > self._silent_s:
             self._last, self.sender = self.sender, None
 
     def said(self) -> str:
-        """Who else sends to the port, and whether the sender has changed; empty while there is nothing to say."""
+        """A message about other senders on the port, and about a change of the sender; empty if there is nothing to
+        report."""
         now_s, sender = self._now_s(), self.sender
         lately = {host: valid for host, (at_s, valid) in tuple(self._others.items()) if now_s - at_s <= _NAMED_S}
         second = [host for host, valid in lately.items() if valid]
@@ -108,8 +109,8 @@ class SenderPin:
 
 
 class BesidePin:
-    """What a sensor's second port lets in: datagrams of the address that its first one has chosen, or of the allowed
-    one before that."""
+    """Accepts datagrams on a sensor's second port: those of the address selected by its first port, or before that of
+    the allowed one."""
 
     def __init__(self, first: SenderPin, allowed: str | None) -> None:
         self._first, self._allowed = first, allowed
@@ -120,12 +121,12 @@ class BesidePin:
         return (first[0], 0) if first is not None else None
 
     def takes(self, data: bytes, sender: SocketAddress, at_ns: int) -> bool:
-        """As of ``SenderPin``. Others are counted where the sweeps come from, not here."""
+        """See ``SenderPin``. Datagrams of others are counted on the first port, not here."""
         first = self._first.sender
         return sender[0] == first[0] if first is not None else self._allowed in (None, sender[0])
 
     def nothing_came(self) -> None:
-        """The first port says whether the sensor is silent."""
+        """The first port decides whether the sensor is silent."""
 
 
 def _named(hosts: list[str]) -> str:

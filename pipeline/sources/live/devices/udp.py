@@ -20,22 +20,23 @@ from pipeline.sources.live.devices.device_reader import POLL_S, DeviceLost, Read
 from pipeline.sources.live.devices.sender_pin import SocketAddress
 
 _SO_TIMESTAMPNS = 35
-"""Linux: receive times with every datagram (socket(7)); Python has no name for it, nor for the next."""
+"""Linux: receive timestamps for every datagram (socket(7)); Python defines no name for this constant, nor for the
+next."""
 _SO_ATTACH_FILTER = 26
 _TIMESPEC = struct.Struct("qq")
 _BUFFER_BYTES = 4 << 20
-"""About four seconds of a VLP-16."""
+"""Buffer size: about four seconds of a VLP-16."""
 _LARGEST = 65_535
 _ONE_OF = 32
-"""So many of others' datagrams are turned away for one that is looked at; a power of two. A second LiDAR sends 754 a
+"""Of other senders' datagrams, one in this many is accepted for inspection; a power of two. A second LiDAR sends 754 a
 second and is noticed at once; a flood of 100,000 a second costs as much as four LiDARs."""
 
 ReceiveDatagram = Callable[[bytes, int], None]
-"""Takes a datagram and the system's clock when it came, nanoseconds since 1970."""
+"""Takes a datagram and the system's time of its arrival, nanoseconds since 1970."""
 
 
 class Pin(Protocol):
-    """Whose datagrams are read. See ``sender_pin``."""
+    """Decides whose datagrams are read. See ``sender_pin``."""
 
     @property
     def sender(self) -> SocketAddress | None: ...
@@ -48,7 +49,7 @@ class Pin(Protocol):
 def read_datagrams(
     port: int, interface: str, group: str | None, receive: ReceiveDatagram, pin: Pin, stop: ReaderStop
 ) -> None:
-    """Listen until ``stop``. DeviceLost names the port when it cannot be listened on."""
+    """Listen until ``stop``. DeviceLost names the port if it cannot be opened."""
     let_in: SocketAddress | None = None
     with _listening(port, interface, group) as bound:
         while not stop:
@@ -89,8 +90,8 @@ def _listening(port: int, interface: str, group: str | None) -> socket.socket:
 
 
 def _let_in(bound: socket.socket, sender: SocketAddress | None) -> None:
-    """Have the system turn away what others send, but one of ``_ONE_OF``; None lets in everybody. Where it cannot,
-    ``Pin.takes`` alone decides."""
+    """Let the kernel drop datagrams of other senders, except one of ``_ONE_OF``; None accepts all senders. If that is
+    not supported, ``Pin.takes`` alone decides."""
     if sys.platform != "linux":
         return
     program = _program(sender)
@@ -101,8 +102,8 @@ def _let_in(bound: socket.socket, sender: SocketAddress | None) -> None:
 
 
 def _program(sender: SocketAddress | None) -> list[tuple[int, int, int, int]]:
-    """In the classic BPF (linux/Documentation/networking/filter.rst): operation, lines to skip if true and if false,
-    operand. A datagram begins with its UDP header; the IP header is at an offset of its own."""
+    """The filter in classic BPF (linux/Documentation/networking/filter.rst): operation, lines to skip if true and if
+    false, operand. A datagram begins with its UDP header; the IP header has a separate offset."""
     load, load_half, masked, if_equal, end = 0x20, 0x28, 0x54, 0x15, 0x06
     source_host, source_port, random = 0xFFF0_0000 + 12, 0, 0xFFFF_F000 + 56
     whole, nothing = (end, 0, 0, 0xFFFF_FFFF), (end, 0, 0, 0)

@@ -25,7 +25,7 @@ ReceiveShot = Callable[[Shot], None]
 
 
 def read_stream(url: str, receive: ReceiveShot, stop: ReaderStop) -> None:
-    """RTSP or video over HTTP. DeviceLost when it cannot be opened, ends or falls silent."""
+    """RTSP or video over HTTP. DeviceLost if it cannot be opened, ends or falls silent."""
     options = _RTSP if url.startswith("rtsp") else {"fflags": "nobuffer"}
     try:
         with av.open(url, timeout=(_OPEN_S, SILENCE_S), options=options) as container:
@@ -40,7 +40,7 @@ def read_stream(url: str, receive: ReceiveShot, stop: ReaderStop) -> None:
 
 
 def play_file(path: Path, receive: ReceiveShot, stop: ReaderStop) -> None:
-    """A video at its own rate, again and again. DeviceLost when it is none."""
+    """A video at its own rate, in a loop. DeviceLost if it is not a video."""
     while not stop:
         begun, shown = time.monotonic(), 0
         try:
@@ -58,9 +58,9 @@ def play_file(path: Path, receive: ReceiveShot, stop: ReaderStop) -> None:
 
 
 def read_device(device: int | str, receive: ReceiveShot, stop: ReaderStop) -> None:
-    """A camera plugged in, by number or path. DeviceLost when there is none or it was pulled out."""
+    """A local camera, by number or path. DeviceLost if there is none or it was unplugged."""
     number = device_number(device)
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)  # what is wrong is said once, and by us
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)  # errors are reported once, by this program
     capture = cv2.VideoCapture(number)
     try:
         if not capture.isOpened():
@@ -76,8 +76,8 @@ def read_device(device: int | str, receive: ReceiveShot, stop: ReaderStop) -> No
 
 
 def device_number(device: int | str) -> int:
-    """A camera's number, which OpenCV knows it by. A path, such as /dev/v4l/by-id/…, is a link to where the camera is
-    now: it has another number when it is plugged in anew. DeviceLost when it leads to no camera."""
+    """A camera's number for OpenCV. A path such as /dev/v4l/by-id/… is a link to the camera's current number, which
+    changes when it is plugged in again. DeviceLost if it leads to no camera."""
     if isinstance(device, int):
         return device
     found = re.fullmatch(r"/dev/video(\d+)", os.path.realpath(device))
@@ -87,7 +87,7 @@ def device_number(device: int | str) -> int:
 
 
 def _shots(container: av.container.InputContainer) -> Iterator[tuple[Shot, float]]:
-    """Each image with its time in the video, seconds. JPEGs are handed on as they are."""
+    """Each image with its time in the video, seconds. JPEGs are passed on unchanged."""
     if not container.streams.video:
         raise ValueError("no video stream")
     stream = container.streams.video[0]

@@ -21,7 +21,7 @@ def _number(name: str, kind: type[sa.Integer] = sa.BigInteger) -> sa.Column[int]
 
 
 def upgrade() -> None:
-    """Everything, from nothing."""
+    """Create all tables."""
     op.create_table(
         "drive",
         sa.Column("id", sa.Integer, primary_key=True),

@@ -10,7 +10,7 @@ down_revision = "0001"
 
 
 def upgrade() -> None:
-    """Servers so far were nearly all at the port that is taken without being asked for one."""
+    """So far, nearly all servers used the default port."""
     op.add_column("act", sa.Column("act_id", sa.String(36)))
     op.add_column("act", sa.Column("note", sa.Text, nullable=False, server_default=""))
     op.create_index("act_by_id", "act", ["drive_id", "act_id"], unique=True)

@@ -21,7 +21,7 @@ _CHANGE = sa.table("change", *map(sa.column, ("drive_id", "act", "kind", "item")
 
 
 def upgrade() -> None:
-    """What stands, and what every act found and left."""
+    """Migrates current items, and the contents before and after every act."""
     _rewrite(_ITEM, ("drive_id", "kind", "id"), {"value": lambda value: json.dumps(as_range(json.loads(value)))})
     _rewrite(_CHANGE, ("drive_id", "act", "kind", "item"), {"before": _content, "after": _content})
 
@@ -35,7 +35,7 @@ def _rewrite(table: sa.TableClause, key: tuple[str, ...], how: dict[str, Callabl
 
 
 def _content(data: bytes | None) -> bytes | None:
-    """None where the tag was not there."""
+    """None if the tag did not exist."""
     if data is None:
         return None
     body = unpack(data)

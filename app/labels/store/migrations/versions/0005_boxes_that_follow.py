@@ -10,7 +10,7 @@ down_revision = "0004"
 
 
 def upgrade() -> None:
-    """Boxes that came with imported labels were set; of others nobody knows, and they follow."""
+    """Boxes of imported labels count as set; for others this is unknown, and they follow the cuboid."""
     op.add_column("sighting", sa.Column("box_set", sa.Boolean, nullable=False, server_default=sa.false()))
     op.add_column("sighting", sa.Column("truncation", sa.Double))
     op.add_column("sighting", sa.Column("occlusion", sa.Integer))

@@ -10,7 +10,7 @@ down_revision = "0005"
 
 
 def upgrade() -> None:
-    """A recording without a row is open, and nobody's."""
+    """A recording without a row is open and unassigned."""
     op.create_table(
         "work",
         sa.Column("drive_id", sa.Integer, sa.ForeignKey("drive.id"), primary_key=True),
