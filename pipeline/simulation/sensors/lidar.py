@@ -26,12 +26,13 @@ from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, World
 from pipeline.types import F32, F64, I64, Sweep
 
 _SECANT_M = 20.0
-"""Over a crest the road is cast as a plane, which is right here: as far as the road returns rays."""
+"""On a crest, the road is approximated by a plane that is correct at this distance, which is as far as the road returns
+rays."""
 
 
 @dataclass(frozen=True)
 class _Beams:
-    """Rays of one mount in ego axes, where they start, and by how many columns the mount turns them."""
+    """Rays of one mount in ego axes, their origin, and by how many columns the mount rotates them."""
 
     rays: F64
     start: F64
