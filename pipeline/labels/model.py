@@ -207,7 +207,7 @@ class LabelSet:
     tracks: tuple[LabelTrack, ...] = ()
     """Vehicles and persons."""
     leads: tuple[LeadRange, ...] = ()
-    """The leads."""
+    """Which vehicle leads, by ranges of frames."""
     paths: tuple[PathLabel, ...] = ()
     """Corrected ego paths."""
     events: tuple[EventLabel, ...] = ()
