@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from app.fleet.find import FleetTables
 
 MOST_S = 20.0
-"""A question of a page that takes longer is stopped."""
+"""Time limit of a query from a page."""
 
 
 class FleetDesk:
-    """The folder of a batch, open for questions. One question at a time: each uses all cores.
+    """The folder of a batch, open for queries. One query at a time: each uses all cores.
 
     Raises:
         BadInput: there are no tables there.

@@ -42,9 +42,9 @@ class QueryResult:
     columns: tuple[str, ...]
     """Names, in the order of each row's values."""
     rows: tuple[tuple[Any, ...], ...]
-    """At most as many as were asked for; None: unknown."""
+    """Limited to the requested number; None: unknown."""
     total: int
-    """How many there are in all."""
+    """Total number of matching rows."""
 
 
 class FleetTables:
@@ -120,7 +120,7 @@ class FleetTables:
         return [dict(zip(names, row, strict=True)) for row in found.fetchall()]
 
     def ask(self, sql: str) -> Any:
-        """The answer to a whole query, which must not come from outside, as a pyarrow table."""
+        """The result of a complete query, which must not come from outside, as a pyarrow table."""
         return self._duckdb.sql(sql).to_arrow_table()
 
     def arrow(self, table: QueryTable, columns: str) -> Any:
@@ -165,7 +165,7 @@ class FleetTables:
                 stop.cancel()
 
     def _shut_in(self) -> None:
-        """Questions may come from a page: they read the batch's folder only."""
+        """Queries may come from a page, so they can read only the batch's folder."""
         if self.store.folder is None:
             self._duckdb.register_filesystem(self.store.system)
             self._duckdb.execute("SET allowed_directories = [$1]", [f"{self.store.address}/packed/"])
@@ -213,7 +213,7 @@ def _plain(value: Any) -> Any:
 
 
 def _reason(error: Exception) -> str:
-    """What DuckDB says, without the place in the statement that was made of the condition."""
+    """DuckDB's message, without the position in the generated statement."""
     first = str(error).strip().splitlines()[0]
     _, _, said = first.partition(": ")
     return (said or first).rstrip()

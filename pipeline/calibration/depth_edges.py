@@ -17,34 +17,35 @@ import numpy as np
 from pipeline.types import F32, F64, U8, Sweep
 
 JUMP_M, JUMP_SHARE = 0.5, 0.05
-"""A neighbour on the ring that is this much farther, and by this share of the range, is behind a border."""
+"""If a neighbour on the ring is farther by this much and by this share of the range, there is a depth edge in
+between."""
 NEAREST_M, FARTHEST_M = 2.0, 50.0
 WIDEST_STEP_RAD = np.radians(1.0)
-"""Neighbours farther apart than this have returns that were lost between them, as against the sky: both are borders."""
+"""If neighbours are farther apart, returns between them are missing, such as towards the sky: both are depth edges."""
 SPREAD_WIDTHS = 0.0035
-"""An edge is felt this far to its sides, in image widths, with 1/e of its strength: 4 px at 1280."""
+"""Distance from an image edge at which its strength falls to 1/e, in image widths: 4 px at 1280."""
 AROUND_WIDTHS = 0.05
-"""How far around an edge the image's busyness is taken from, in image widths."""
+"""Size of the surroundings used to normalise an edge's strength, in image widths."""
 FLAT = 20.0
-"""A change of brightness (Sobel) no stronger than this is noise of the camera."""
+"""A change of brightness (Sobel) up to this is camera noise."""
 STRONGEST = 4.0
-"""Times as strong as its surroundings an edge can count."""
+"""Maximum strength of an edge relative to its surroundings."""
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeScene:
-    """What of one frame no alignment changes."""
+    """The parts of a frame that do not depend on the alignment."""
 
     points: F64
     """(E, 3) depth edges, ego frame, metres."""
     strength: U8
-    """(H, W) uint8, how near and how strong an upright edge of the image is."""
+    """(H, W) uint8, proximity and strength of a vertical edge of the image."""
     usual: F32
     """(H,) the mean strength of each row."""
 
 
 def edge_scene(sweep: Sweep, bgr: U8) -> EdgeScene:
-    """bgr: (H, W, 3) uint8. Some 40 ms."""
+    """bgr: (H, W, 3) uint8. Takes some 40 ms."""
     return scene_of(depth_edges(sweep), bgr)
 
 
@@ -55,7 +56,7 @@ def scene_of(points: F64, bgr: U8) -> EdgeScene:
 
 
 def depth_edges(sweep: Sweep) -> F64:
-    """(E, 3) points ahead at which something in front ends: the next return on the ring is far behind, or lost."""
+    """(E, 3) points ahead where a foreground object ends: the next return on the ring is far behind it, or missing."""
     ahead = sweep.points[:, 0] > 0.0
     xyz = sweep.points[ahead, :3].astype(np.float64)
     range_m, azimuth = np.hypot(xyz[:, 0], xyz[:, 1]), np.arctan2(xyz[:, 1], xyz[:, 0])
@@ -71,7 +72,7 @@ def depth_edges(sweep: Sweep) -> F64:
 
 
 def upright_edges(bgr: U8) -> U8:
-    """(H, W) uint8: changes of brightness from left to right, relative to those around, spread to both sides."""
+    """(H, W) uint8: horizontal changes of brightness, relative to their surroundings, spread to both sides."""
     width = bgr.shape[1]
     grey = cv2.GaussianBlur(cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY), (5, 5), 0)
     change = np.abs(cv2.Sobel(grey, cv2.CV_32F, 1, 0))
@@ -82,8 +83,8 @@ def upright_edges(bgr: U8) -> U8:
 
 
 def _spread(strength: F32, keeps: float) -> F32:
-    """Each pixel's greatest neighbour in its row, where each step away keeps so much of it (inverse distance transform
-    along rows). (H, W) → (H, W)."""
+    """Maximum over the neighbours of each pixel in its row, attenuated by this factor per step (inverse distance
+    transform along rows). (H, W) → (H, W)."""
     columns = np.ascontiguousarray(strength.T)
     for at in range(1, len(columns)):
         np.maximum(columns[at], columns[at - 1] * np.float32(keeps), out=columns[at])

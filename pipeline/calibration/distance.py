@@ -25,7 +25,7 @@ from pipeline.vision.nms import select
 
 MIN_IOU = 0.4
 MIN_DEPTH_M = 3.0
-"""Nearer than this a face of the object no longer fills the box: its height says little."""
+"""Closer, a face of the object no longer fills the box, so the box height is not usable."""
 
 
 class TooFewPairs(BadInput):
@@ -41,21 +41,21 @@ class Pair:
     label: str
     """Class of the labelled object; each class has its own law."""
     height_px: float
-    """Of the box, as the reference camera would see it."""
+    """Of the box, converted to the reference camera."""
     depth_m: float
     """Of the object's nearest point, along the optical axis."""
     range_m: float
-    """Of the same point from the ego origin, on the ground plane."""
+    """Horizontal range of the same point from the ego origin."""
 
 
 @dataclass(frozen=True)
 class LawFit:
-    """A class's law and how well it fits its own pairs."""
+    """A class's law and its fit to its own pairs."""
 
     law: PowerLaw
     """Distance as a function of box height."""
     pairs: int
-    """That the law was fitted to."""
+    """Number of pairs used for the fit."""
     mean_relative_error: float
     """Mean error as a share of the true depth."""
     p90_relative_error: float
@@ -85,7 +85,7 @@ def collect_pairs(
 def fit_laws(pairs: Iterable[Pair], exponent: float | None = None) -> Mapping[str, LawFit]:
     """A law for each class with pairs at two or more heights (one, with the exponent given), by class name.
 
-    TooFewPairs when no class has.
+    TooFewPairs if there is no such class.
     """
     by_class: dict[str, list[Pair]] = {}
     for pair in pairs:
@@ -102,9 +102,8 @@ def fit_laws(pairs: Iterable[Pair], exponent: float | None = None) -> Mapping[st
 
 
 def as_overrides(fits: Mapping[str, LawFit]) -> dict[str, dict[str, float]]:
-    """The fitted laws as a parameter file's section: the car's law, and how much taller the other classes are.
-
-    TooFewPairs when there is no car, whose law the others are told by."""
+    """The fitted laws as a section of a parameter file: the car's law, and the height ratios of the other classes.
+    TooFewPairs without cars, because the other laws are relative to the car's."""
     if "car" not in fits:
         raise TooFewPairs(
             "no car with a known distance was detected; the laws of other classes are relative to a car's"
@@ -118,13 +117,13 @@ def as_overrides(fits: Mapping[str, LawFit]) -> dict[str, dict[str, float]]:
 
 
 def as_law(fits: Mapping[str, LawFit], focal_px: float) -> DistanceLaw:
-    """The fitted laws as a detector's own, of heights at ``focal_px``. A class that was not seen keeps the height that
-    it has among real vehicles. TooFewPairs when there is no car."""
+    """The fitted laws as a detector's own, for heights at ``focal_px``. A class that was not seen keeps the height
+    ratio of real vehicles. TooFewPairs without cars."""
     return replace(REAL_VEHICLES, focal_px=focal_px, **as_overrides(fits)["distance"])
 
 
 def _height_ratio(car: PowerLaw, other: LawFit) -> float:
-    """How many times taller the class is than a car, from both boxes at 30 m."""
+    """Height of the class relative to a car, from both boxes at 30 m."""
 
     def height_px(law: PowerLaw) -> float:
         return float((30.0 / law.coefficient) ** (1.0 / law.exponent))

@@ -22,21 +22,23 @@ from pipeline.types import F32, F64, I64, U8, CameraCalibration
 Seen = tuple[EdgeScene, CameraCalibration | None]
 
 REACH_DEG, YAW_STEP_DEG, PITCH_STEP_DEG = 3.0, 0.25, 0.5
-"""How far and how finely the mount is turned. An edge is met within 0.3° in yaw, and in pitch within 1°."""
+"""Search range and steps of the mount's rotation. The score responds to an edge within 0.3° in yaw, and within 1° in
+pitch."""
 ROLLS_DEG = (-4.0, -2.0, -1.0, 1.0, 2.0, 4.0)
 ZOOMS = (0.9, 0.95, 1.05, 1.1)
 MARGIN = 0.2
-"""Borders this far outside the image, in its sizes, may come in when the mount is turned."""
+"""Depth edges this far outside the image, in image sizes, are included, because a rotation may bring them in."""
 STANDS_OUT = 4.8
-"""Robust standard deviations that the best must be above the usual one. With 20 frames of Astyx (16 rings) or 12 of
-KITTI, right mounts within reach have 4.86 and more, mounts 6° and more off and other images 4.6 at most."""
+"""Robust standard deviations by which the best alignment must exceed the median. With 20 frames of Astyx (16 rings) or
+12 of KITTI, correct mounts within range have 4.86 and more; mounts 6° and more off and images of other frames 4.6 at
+most."""
 CLEARLY = 1.5
-"""Standard deviations that the best must be above the present one to be told of: less is what edges cannot tell. On
-Astyx and KITTI that is less than 0.5° in yaw and 1° in pitch."""
+"""Standard deviations by which the best alignment must exceed the current one to be reported; smaller differences are
+within the accuracy of edges. On Astyx and KITTI this is less than 0.5° in yaw and 1° in pitch."""
 FEWEST = 100
-"""Borders in the images; with fewer nothing is said."""
+"""Minimum number of depth edges in the images."""
 MOST = 8000
-"""Borders of one camera that are looked at: of more, every second, third …"""
+"""Maximum number of evaluated depth edges of one camera: if there are more, every second, third …"""
 
 
 @dataclass(frozen=True)
@@ -44,23 +46,23 @@ class EdgeScore:
     """How well one alignment matches depth edges to image edges."""
 
     score: float | None
-    """0–1: 1 where no alignment near is better, 0 where the usual one of them is as good. None where too few borders
-    are seen, or where no alignment near stands out."""
+    """0–1: 1 if no nearby alignment is better, 0 if the median of them is as good. None if too few depth edges are
+    visible, or if no nearby alignment stands out."""
     sigmas: float | None
-    """How far the best alignment stands out from its neighbours. None where too few borders are seen."""
+    """How far the best alignment stands out from its neighbours. None if too few depth edges are visible."""
     borders: int
     """Depth edges in the images."""
     better: Mapping[str, float] = field(default_factory=dict)
-    """Changes of parameters (``AlignmentParams``; of h_res_deg and v_res_deg a factor) that lead to the best alignment
-    near; empty unless that one is clearly better."""
+    """Changes of parameters (``AlignmentParams``; a factor for h_res_deg and v_res_deg) that lead to the best nearby
+    alignment; empty unless it is clearly better."""
 
 
 @dataclass(frozen=True)
 class Near:
-    """An alignment near the present one."""
+    """An alignment near the current one."""
 
     change: Mapping[str, float]
-    """What it changes of the parameters, by name, as ``EdgeScore.better`` says it."""
+    """The changed parameters, by name, in the format of ``EdgeScore.better``."""
     aligned: Alignment
     """Projects ego points with these changes applied."""
 
@@ -86,7 +88,7 @@ def edge_score(scenes: Iterable[Seen], params: AlignmentParams) -> EdgeScore:
 
 
 def surroundings(params: AlignmentParams, camera: CameraCalibration | None) -> tuple[Near, ...]:
-    """The present alignment first, then it turned to all sides, rolled, or zoomed; none where nothing aligns."""
+    """The current alignment first, then rotated in all directions, rolled, or zoomed; empty without an alignment."""
     present = resolve(params, camera)
     if present is None:
         return ()
@@ -98,7 +100,7 @@ def surroundings(params: AlignmentParams, camera: CameraCalibration | None) -> t
 
 
 def _placed(strengths: F64, borders: int, near: Sequence[Near]) -> EdgeScore:
-    """Where the first of the surroundings' strengths stands among all."""
+    """Rank of the first of the strengths among all."""
     usual, best = float(np.median(strengths)), int(np.argmax(strengths))
     height = float(strengths[best]) - usual
     sigmas = round(height / max(1.4826 * float(np.median(np.abs(strengths - usual))), 1e-6), 2)
@@ -121,7 +123,7 @@ def _turned(params: AlignmentParams, camera: CameraCalibration | None, turn: Map
 
 
 def _slid(present: Angular, yaw_deg: float, pitch_deg: float) -> Near:
-    """The model that has no mount of its own: the cloud slides over the image instead."""
+    """For the model without a mount: the cloud is shifted over the image instead."""
     u, v = round(np.radians(yaw_deg) / present.h_res_rad), round(np.radians(pitch_deg) / present.v_res_rad)
     change = {name: float(by) for name, by in (("cx_px", u), ("cy_px", v)) if by}
     return Near(change, replace(present, cx=present.cx + u, cy=present.cy + v))
@@ -133,7 +135,7 @@ def _zoomed(present: Angular, by: float) -> Near:
 
 
 def _by_camera(scenes: Iterable[Seen]) -> list[tuple[CameraCalibration | None, list[EdgeScene]]]:
-    """Frames of one camera (the same numbers) and image size together: their borders are projected at once."""
+    """Groups frames with equal calibration and image size: their depth edges are projected at once."""
     groups: dict[object, tuple[CameraCalibration | None, list[EdgeScene]]] = {}
     for scene, camera in scenes:
         numbers = camera and tuple(a.tobytes() for a in (camera.K, camera.distortion, camera.T_camera_ego))
@@ -143,8 +145,8 @@ def _by_camera(scenes: Iterable[Seen]) -> list[tuple[CameraCalibration | None, l
 
 @dataclass(frozen=True, eq=False)
 class _Images:
-    """Images of one camera under each other, and the borders that may fall into them. first_row: (E,) of the border's
-    own image."""
+    """Images of one camera stacked vertically, and the depth edges that may fall into them. first_row: (E,) first row
+    of each depth edge's image."""
 
     points: F64
     first_row: I64
@@ -157,14 +159,16 @@ class _Images:
         height, width = scenes[0].strength.shape
         points = np.concatenate([scene.points for scene in scenes])
         first_row = np.repeat(np.arange(len(scenes)) * height, [len(scene.points) for scene in scenes])
-        within = np.abs(present.project(points) / [width, height] - 0.5) < 0.5 + MARGIN  # NaN, behind, is not
+        # false for NaN, behind the camera
+        within = np.abs(present.project(points) / [width, height] - 0.5) < 0.5 + MARGIN
         near = np.flatnonzero(within.all(axis=1))
         near = near[:: -(-len(near) // MOST) or 1]
         strength, usual = (np.concatenate([getattr(scene, name) for scene in scenes]) for name in ("strength", "usual"))
         return cls(points[near], first_row[near], strength, usual, height)
 
     def under(self, aligned: Alignment) -> tuple[float, float, int]:
-        """Sums of the edges' strengths at the borders and of what is usual in their rows; how many borders are seen."""
+        """Sums of the edge strengths at the depth edges and of the mean strengths of their rows; number of visible
+        depth edges."""
         u, v = aligned.project(self.points).T
         seen = (u >= 0) & (u < self.strength.shape[1]) & (v >= 0) & (v < self.height)
         row = self.first_row[seen] + v[seen].astype(np.int64)

@@ -22,17 +22,17 @@ from pipeline.types import F64, I64, CameraCalibration
 COLUMNS, ROWS = 6, 3
 BANDS_M = (0.0, 12.0, 25.0, np.inf)
 REACH_WIDTHS, STEPS_ACROSS, STEPS_DOWN = 0.035, 12, 4
-"""How far the borders are shifted to each side, in image widths (2.4° at 68°), and in how many steps. Edges are upright
-ones, so steps down are coarser."""
+"""Range of the tested shifts to each side, in image widths (2.4° at 68°), and number of steps. Only vertical edges are
+used, so vertical steps are coarser."""
 STANDS_OUT = 4.5
-"""Robust standard deviations that the best shift must be above the usual one. On KITTI and Astyx 22 of 57 regions with
-enough borders have that, of images of other frames 5 of 285."""
+"""Robust standard deviations by which the best shift must exceed the median. On KITTI and Astyx 22 of 57 regions with
+enough depth edges reach this, with images of other frames 5 of 285."""
 CLEARLY = 1.5
-"""Standard deviations that the best shift must be above none at all to be an arrow."""
+"""Standard deviations by which the best shift must exceed no shift to be shown as an arrow."""
 FEWEST = 25
-"""Borders in a region; with fewer nothing is said."""
+"""Minimum number of depth edges in a region."""
 MOST = 6000
-"""Borders that are looked at: of more, every second, third …"""
+"""Maximum number of evaluated depth edges: if there are more, every second, third …"""
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,10 @@ class Region:
     borders: int
     """Depth borders in it, of all frames."""
     score: float | None
-    """0–1, 1 where no shift is better, 0 where the usual shift is as good; None where it cannot tell."""
+    """0–1, 1 if no shift is better, 0 if the median shift is as good; None if undetermined."""
     shift_px: tuple[float, float] | None
-    """By how much the points should move right and down, pixels; (0, 0) where nothing is clearly better. None where it
-    cannot tell."""
+    """How far the points should move right and down, pixels; (0, 0) if nothing is clearly better. None if
+    undetermined."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ NO_MATCH = LocalMatch(COLUMNS, ROWS, (_NOTHING,) * (COLUMNS * ROWS), (_NOTHING,)
 
 
 def local_match(scenes: Iterable[Seen], params: AlignmentParams) -> LocalMatch:
-    """The match over the frames that have the last frame's camera. Skips frames without an alignment. Takes 50 ms for
-    20 frames."""
+    """The match over the frames with the same camera as the last frame. Skips frames without an alignment. Takes 50 ms
+    for 20 frames."""
     seen = list(scenes)
     if not seen:
         return NO_MATCH
@@ -94,7 +94,8 @@ def local_match(scenes: Iterable[Seen], params: AlignmentParams) -> LocalMatch:
 def _projected(
     members: list[tuple[EdgeScene, CameraCalibration | None]], params: AlignmentParams
 ) -> tuple[F64, F64, I64, F64]:
-    """(E,) column and row in the image, which image, and horizontal distance, of the borders in or near the images."""
+    """(E,) column and row in the image, image index, and horizontal distance, of the depth edges in or near the
+    images."""
     parts = [(np.zeros((0, 2)), np.zeros(0, np.int64), np.zeros(0))]
     for number, (scene, camera) in enumerate(members):
         aligned = resolve(params, camera)
@@ -102,7 +103,7 @@ def _projected(
             continue
         uv = aligned.project(scene.points)
         height, width = scene.strength.shape
-        near = (np.abs(uv / [width, height] - 0.5) < 0.5 + MARGIN).all(axis=1)  # NaN, behind, is not
+        near = (np.abs(uv / [width, height] - 0.5) < 0.5 + MARGIN).all(axis=1)  # false for NaN, behind the camera
         range_m = np.hypot(scene.points[near, 0], scene.points[near, 1])
         parts.append((uv[near], np.full(int(near.sum()), number), range_m))
     uv, image, range_m = (np.concatenate(each) for each in zip(*parts, strict=True))
@@ -112,8 +113,8 @@ def _projected(
 def _shifted(
     scenes: list[EdgeScene], u: F64, v: F64, image: I64, groups: tuple[I64, I64]
 ) -> tuple[F64, tuple[F64, F64]]:
-    """(S, 2) shifts in pixels, and for each of the two groupings (S, G) how much stronger than usual the edges are that
-    the borders of a group then meet, per border."""
+    """(S, 2) shifts in pixels, and for each of the two groupings (S, G) the mean excess strength of image edges at a
+    group's depth edges."""
     height, width = scenes[0].strength.shape
     strength = np.concatenate([scene.strength for scene in scenes])
     usual = np.concatenate([scene.usual for scene in scenes])
@@ -139,7 +140,7 @@ def _shifted(
 
 
 def _regions(shifts: F64, strengths: F64, borders: I64) -> tuple[Region, ...]:
-    """One a group, from (S, G) strengths."""
+    """One region per group, from (S, G) strengths."""
     present = int(np.flatnonzero((shifts == 0.0).all(axis=1))[0])
     return tuple(
         _region(shifts, strengths[:, group], present, int(count)) for group, count in enumerate(borders.tolist())

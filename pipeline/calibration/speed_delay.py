@@ -14,13 +14,13 @@ from pipeline.types import F64
 
 REACH_MS, STEP_MS = 500.0, 20.0
 FEWEST, WINDOW = 40, 7
-"""Pairs without which nothing is said; how many are averaged."""
+"""Minimum number of pairs; number of pairs that are averaged."""
 BLOCK_NS = 1_000_000_000
 BOOTSTRAPS = 60
 TOLD_MS = 45.0
-"""With a larger standard deviation nothing is said."""
+"""With a larger standard deviation no result is given."""
 OFF_MPS = 0.3
-"""Displacements that are off by more count less."""
+"""Displacements with larger residuals get less weight."""
 
 
 class NoDelay(BadInput):
@@ -28,28 +28,28 @@ class NoDelay(BadInput):
 
 
 class SpeedPair(NamedTuple):
-    """Between two sweeps."""
+    """Speeds between two sweeps."""
 
     t_ns: int
-    """Half-way."""
+    """Time half-way."""
     lidar_mps: float
-    """By the displacement of the LiDAR."""
+    """From the displacement of the LiDAR."""
     recorded_mps: float
-    """The car's own speed that the later frame has."""
+    """The car's own speed in the later frame."""
     recorded_ns: int
-    """When that was measured, as it says."""
+    """Its timestamp."""
 
 
 @dataclass(frozen=True)
 class SpeedDelay:
-    """When the car's own speed really was measured, against what it says."""
+    """True measurement time of the car's own speed, relative to its timestamps."""
 
     ego_offset_ms: float
-    """What to add to its times; negative where it is late."""
+    """Offset to add to its timestamps; negative if it is late."""
     sigma_ms: float
     """Standard deviation."""
     scale: float
-    """What the LiDAR drives for each metre of the car's own speed."""
+    """LiDAR distance per metre of the car's own odometry."""
 
 
 def forward_m(before: F64, after: F64) -> float:
@@ -60,7 +60,8 @@ def forward_m(before: F64, after: F64) -> float:
 
 
 def speed_delay(pairs: Sequence[SpeedPair]) -> SpeedDelay:
-    """The shift of the recorded speed that best fits the LiDAR's. Raises NoDelay if the drive does not determine it."""
+    """The time shift of the recorded speed that best matches the LiDAR's. Raises NoDelay if the drive does not
+    determine it."""
     if len(pairs) < FEWEST:
         raise NoDelay("too few ego speeds with LiDAR odometry: their delay is unknown")
     begin_ns = pairs[0].t_ns
@@ -70,11 +71,11 @@ def speed_delay(pairs: Sequence[SpeedPair]) -> SpeedDelay:
     kept = (t_s > at_s[0] + REACH_MS / 1e3) & (t_s < at_s[-1] - REACH_MS / 1e3)
     if np.count_nonzero(kept) < FEWEST:
         raise NoDelay("the drive is too short to determine the delay of ego speed")
-    # recorded at t, had its times been later by the shift
+    # the speed recorded at t if its timestamps were later by the shift
     seen = np.array([np.interp(t_s[kept], at_s + shift, recorded) for shift in shifts_s])
     number = np.array([each.t_ns // BLOCK_NS for each in pairs])
     scale = float(np.sum(lidar[kept]) / max(float(np.sum(np.interp(t_s[kept], at_s, recorded))), 1e-3))
-    # single displacements are noisy, but what one is too long the next is too short
+    # single displacements are noisy, but errors of neighbours cancel
     seen, lidar = _averaged(seen), _averaged(lidar[kept])
     number = number[kept][WINDOW // 2 :][: len(lidar)]
     off = np.abs(lidar - scale * seen)
@@ -96,7 +97,7 @@ def _averaged(values: F64) -> F64:
 
 
 def _lowest(cost: F64, at: F64) -> float:
-    """Where the cost is least, between the steps."""
+    """Position of the minimum cost, interpolated between the steps."""
     k = int(np.argmin(cost))
     low, high = max(k - 2, 0), min(k + 3, len(cost))
     a, b, _ = np.polyfit(at[low:high], cost[low:high], 2)

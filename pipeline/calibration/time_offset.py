@@ -30,21 +30,21 @@ from pipeline.step import State, step
 from pipeline.types import F64, EgoState, Frame
 
 LONGEST, FRAMES = 1200, 150
-"""Frames of which own motion is followed, from the middle of the drive, and those whose images are looked at."""
+"""Number of frames for own motion, from the middle of the drive, and number of frames whose images are evaluated."""
 FEWEST_FRAMES = 12
 SLOWEST_MPS, SLOWEST_RADPS = 2.0, 0.05
-"""Slower and straighter, nothing moves in the image."""
+"""Below these, nothing moves in the image."""
 REACH_MS, STEP_MS = 160.0, 4.0
 YAWS_DEG = tuple(np.arange(-0.9, 0.91, 0.15).round(2).tolist())
 BOOTSTRAPS = 60
 STANDS_OUT = 4.0
-"""Robust standard deviations that the best lag must be above the usual one."""
+"""Robust standard deviations by which the best lag must exceed the median."""
 UNSURE_MS, TOLD_MS = 5.0, 15.0
-"""A larger standard deviation is named; with a still larger one nothing is said."""
+"""Standard deviations from which a warning is given, and from which no result is given."""
 NEAREST_M, FARTHEST_M = 3.0, 30.0
-"""Farther borders hardly move."""
+"""More distant depth edges hardly move."""
 MOST = 500
-"""Borders of one frame that are looked at."""
+"""Maximum number of evaluated depth edges per frame."""
 _DESKEW = DeskewParams(enabled=True)
 _NOT_CLEAR = "no lag between camera and LiDAR stands out as the best match; drive past parked cars"
 
@@ -55,26 +55,26 @@ class NoOffset(BadInput):
 
 @dataclass(frozen=True)
 class TimeOffset:
-    """When the images really were, against what their times say."""
+    """True exposure times of the images, relative to their timestamps."""
 
     camera_offset_ms: float
-    """What to add to the images' times; positive: images are later than they say."""
+    """Offset to add to the images' timestamps; positive: images are later than their timestamps."""
     sigma_ms: float
     """Standard deviation."""
     sigmas: float
-    """How far the best lag stands out of all lags."""
+    """How far the best lag stands out from all lags."""
     frames: int
-    """Frames with own motion, borders and an image."""
+    """Number of frames with own motion, depth edges and an image."""
     warnings: tuple[str, ...] = ()
-    """What the drive cannot tell, in sentences."""
+    """What the drive does not determine, as sentences."""
 
 
 @dataclass(frozen=True, eq=False)
 class MovingScene:
-    """A frame's borders, its image's edges, and own motion."""
+    """A frame's depth edges, its image edges, and own motion."""
 
     edges: EdgeScene
-    """Borders of the deskewed sweep, and edges."""
+    """Depth edges of the deskewed sweep, and image edges."""
     aligned: Alignment
     """Projects them."""
     speed_mps: float
@@ -82,7 +82,7 @@ class MovingScene:
     yaw_rate_radps: float
     """To the left."""
     skew_s: float
-    """By how much the image is later than the sweep, as their times say."""
+    """How much later the image is than the sweep, by their timestamps."""
     t_ns: int
     """The tick."""
 
@@ -90,8 +90,8 @@ class MovingScene:
 def watch(
     frame_of: Callable[[int], Frame], count: int, params: Params, progress: Progress = silent
 ) -> tuple[list[MovingScene], list[SpeedPair]]:
-    """The frames of a drive that can tell a lag, and the speeds of car and LiDAR. An exception of ``progress`` ends
-    it."""
+    """The frames of a drive that help to determine the lag, and the speeds of car and LiDAR. An exception of
+    ``progress`` ends it."""
     first = max(0, (count - LONGEST) // 2)
     looked = range(first, min(count, first + LONGEST))
     every = max(1, len(looked) // FRAMES)
@@ -113,7 +113,7 @@ def watch(
 
 
 def _speeds(before: State, after: State, frame: Frame) -> list[SpeedPair]:
-    """The speeds between two frames; none where either is not known."""
+    """The speeds between two frames; empty if one is not known."""
     old, new = before.measured.odometry.poses, after.measured.odometry.poses
     if not old or len(new) < 2 or old[-1] is not new[-2] or frame.ego is None or before.t_ns is None:
         return []
@@ -174,7 +174,7 @@ def _moves(scene: MovingScene) -> bool:
 
 
 def _strengths(scene: MovingScene, lags_s: F64) -> F64:
-    """(L, Y) how much stronger than usual the edges are under the borders, by lag and yaw."""
+    """(L, Y) excess strength of image edges at the depth edges, by lag and yaw."""
     height, width = scene.edges.strength.shape
     points, found = scene.edges.points, np.zeros((len(lags_s), len(YAWS_DEG)))
     _, rays = scene.aligned.rays(np.array([[width / 2, height / 2], [width / 2 + 1, height / 2]]))
@@ -196,7 +196,7 @@ def _strengths(scene: MovingScene, lags_s: F64) -> F64:
 
 
 def _best(strength: F64, lags_s: F64) -> tuple[float, float]:
-    """The best lag, s, at its best yaw, and how many robust deviations it stands out. strength: (L, Y)."""
+    """The best lag, s, at its best yaw, and by how many robust deviations it stands out. strength: (L, Y)."""
     curve = strength.max(axis=1)
     smooth = np.convolve(np.pad(curve, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
     at = int(np.argmax(smooth))

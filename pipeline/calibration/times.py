@@ -9,7 +9,7 @@ from pipeline.calibration.time_offset import MovingScene, NoOffset, TimeOffset, 
 
 
 class NoTimes(NoOffset):
-    """The drive determines neither; the text says why."""
+    """The drive determines neither offset; the text says why."""
 
 
 def times_of(

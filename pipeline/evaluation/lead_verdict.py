@@ -22,25 +22,25 @@ lead · wrong: a CIPV that is not where the lead is: another vehicle, or the lea
 (`LeadRule`)."""
 
 LABELLED_VEHICLES = VEHICLES | {"van", "tram", "trailer", "other vehicle", "motorcyclist"}
-"""Label names of the recordings that may be a lead, lower case."""
+"""Label names of the recordings that may be a lead, in lower case."""
 
 SAME_BOX_IOU = 0.5
 
 
 @dataclass(frozen=True)
 class LeadRule:
-    """Which labelled vehicle is the lead, and when a CIPV is on it."""
+    """Defines which labelled vehicle is the lead, and when a CIPV matches it."""
 
     half_lane_m: float = 1.5
-    """A vehicle whose centre is nearer to the car's axis than this is in the lane."""
+    """A vehicle whose centre is closer to the car's axis than this is in the lane."""
     max_range_m: float = FARTHEST_LEAD_M
     """Leads beyond this are ignored."""
     lateral_slack_m: float = 0.3
-    """How far to the side of the label a CIPV may lie."""
+    """Permitted lateral distance of a CIPV from the label."""
     range_slack: float = 0.15
-    """How far in front of the label or behind it, as a share of its range."""
+    """Permitted longitudinal distance from the label, as a share of its range."""
     range_slack_m: float = 2.0
-    """The least that ``range_slack`` comes to."""
+    """Minimum of ``range_slack`` in metres."""
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,15 @@ class Judged:
     verdict: Verdict
     """Of the CIPV against the labelled lead."""
     truth_m: float | None
-    """Of the labelled lead; None where nobody leads."""
+    """Range of the labelled lead; None without a lead."""
     distance_m: float | None
-    """Of the CIPV; None where none was chosen."""
+    """Range of the CIPV; None without one."""
     lateral_error_m: float | None
-    """How far the CIPV lies beside the lead, 0 on it; None where one of them is missing."""
+    """Lateral distance of the CIPV from the lead, 0 if it overlaps; None if one of them is missing."""
 
     @property
     def error_m(self) -> float | None:
-        """Estimated minus true distance of every CIPV that matches the lead sideways, including those whose distance
+        """Estimated minus true distance of every CIPV that matches the lead laterally, including those whose distance
         error is too large to count as correct. None otherwise."""
         beside = self.lateral_error_m is None or self.lateral_error_m > 0.0
         if beside or self.truth_m is None or self.distance_m is None:
@@ -92,7 +92,8 @@ def judge(result: Result, truth: Iterable[TruthObject], rule: LeadRule) -> Judge
 
 
 def judge_lead(result: Result, lead: TruthObject | None, rule: LeadRule) -> Judged:
-    """One frame's CIPV against the known lead; None: there is none. A lead beyond the scored range counts as none."""
+    """One frame's CIPV compared with the known lead; None: there is none. A lead beyond the scored range counts as
+    none."""
     if lead is not None and nearest_face_m(lead) > rule.max_range_m:
         lead = None
     chosen = result.chosen()
@@ -120,7 +121,7 @@ def judge_lead_box(result: Result, bbox: Box) -> Judged:
 
 
 def _lateral_error(bev: tuple[Point2, Point2, Point2, Point2], lead: TruthObject) -> float:
-    """How far the middle of the object's nearest face lies beside the label's side-to-side extent; 0 inside it."""
+    """Lateral distance of the middle of the object's nearest face from the label's lateral extent; 0 inside it."""
     y = near_face_middle(bev)[1]
     sides = lead.cuboid.footprint()[:, 1]
     return float(max(sides.min() - y, y - sides.max(), 0.0))
@@ -135,12 +136,12 @@ def switches(pairs: Iterable[tuple[int | None, int | None]]) -> int:
 
 @dataclass(frozen=True)
 class LeadScore:
-    """A drive's figures. Errors are over the frames that have one."""
+    """Metrics of a drive. Errors are over the frames that have one."""
 
     frames: int
-    """That were judged."""
+    """Number of judged frames."""
     correct: int
-    """The CIPV is the lead, or both are none."""
+    """The CIPV is the lead, or there is neither."""
     missed: int
     """There is a lead and no CIPV."""
     false: int
@@ -148,9 +149,9 @@ class LeadScore:
     wrong: int
     """The CIPV is another vehicle than the lead."""
     mean_error_m: float | None
-    """Of the CIPV's distance; None where no frame has both distances."""
+    """Of the CIPV's distance; None if no frame has both distances."""
     max_error_m: float | None
-    """The same, at worst."""
+    """Maximum of the same."""
     mean_relative_error: float | None
     """Mean of the errors as shares of the true distance."""
 

@@ -14,19 +14,19 @@ Cell = str | float | int | None
 
 @dataclass(frozen=True)
 class Coloured:
-    """A cell whose colour has the meaning that the table's caption gives."""
+    """A cell with a colour, whose meaning is given in the table's caption."""
 
     value: Cell
-    """As without colour."""
+    """As for a cell without colour."""
     tone: Tone
     """One of the report's colours."""
     drive: str = ""
-    """Name of the drive it comes from, where one is saved; else empty."""
+    """Name of its saved drive; empty without one."""
 
 
 @dataclass(frozen=True)
 class Driven:
-    """A cell with the name of the drive it comes from."""
+    """A cell with the name of its drive."""
 
     value: Cell
     """As without a drive."""
@@ -49,7 +49,7 @@ AnyCell = Cell | Coloured | Driven | Linked
 
 @dataclass(frozen=True)
 class Table:
-    """Numbers keep their full precision here; None is shown as a dash. decimals: for people."""
+    """Numbers have full precision here; None is shown as a dash. decimals: for display."""
 
     title: str
     """Above the table."""
@@ -58,9 +58,9 @@ class Table:
     rows: tuple[tuple[AnyCell, ...], ...]
     """Numbers with their full precision; None is shown as a dash."""
     caption: str = ""
-    """What the table shows and how; empty for none."""
+    """What the table shows and how to read it; empty for none."""
     decimals: int = 2
-    """That are shown."""
+    """Number of decimals shown."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class Scene:
-    """A moment of a scenario, to be drawn."""
+    """A moment of a scenario, to be rendered."""
 
     title: str
     """Below the drawing."""

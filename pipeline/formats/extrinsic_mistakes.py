@@ -52,7 +52,7 @@ def is_upright(T_camera_ego: F64) -> bool:
 
 
 def likely_mistake(K: F64, T_camera_ego: F64, size: tuple[int, int]) -> str:
-    """What to tell of an extrinsic that does not look ahead, as the end of a sentence."""
+    """The likely cause of an extrinsic that does not look ahead, as the end of a sentence."""
     for text, undo in _MISTAKES:
         undone = undo(T_camera_ego)
         if looks_ahead(K, undone, size) and is_upright(undone):

@@ -20,13 +20,13 @@ from pipeline.types.source import SourceError
 _JPEG_START = b"\xff\xd8"
 _MARKERS = ((_JPEG_START, b"\xff\xd9"), (b"\x89PNG", b"IEND"))
 _LARGEST_FILE_BYTES = 512 << 20
-"""Of one frame: the largest sweeps have some dozen MB."""
+"""Limit for one frame: the largest sweeps have a few dozen MB."""
 _END_BYTES = 64
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 def recording_folder(path: str) -> Path:
-    """The folder a person typed, ``~`` resolved. SourceError when it is none, or an empty one."""
+    """The folder given by the user, with ``~`` resolved. SourceError if it is not a folder, or empty."""
     if not path:
         raise SourceError("no folder given after the colon")
     try:
@@ -44,7 +44,7 @@ def recording_folder(path: str) -> Path:
 
 
 def recording_file(path: str) -> Path:
-    """The file a person typed, ``~`` resolved. SourceError when there is none."""
+    """The file given by the user, with ``~`` resolved. SourceError if it does not exist."""
     if not path:
         raise SourceError("no file given after the colon")
     try:
@@ -60,7 +60,7 @@ def recording_file(path: str) -> Path:
 
 
 def files_by_name(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:
-    """Files of a folder by their name without suffix, which may have two parts (``.ubx.txt``), ``in_order``; empty when
+    """Files of a folder by their name without suffix, which may have two parts (``.ubx.txt``), ``in_order``; empty if
     there is no such folder."""
     found: dict[str, Path] = {}
     try:
@@ -74,7 +74,7 @@ def files_by_name(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:
 
 
 def in_order(names: Iterable[str]) -> list[str]:
-    """Names of frames, by number where all of them are numbers (``2`` before ``10``), else by letter."""
+    """Names of frames, sorted by number if all of them are numbers (``2`` before ``10``), else alphabetically."""
     by_letter = sorted(names)
     return sorted(by_letter, key=Decimal) if all(map(_NUMBER.fullmatch, by_letter)) else by_letter
 
@@ -88,7 +88,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_image(path: Path) -> tuple[U8, bytes | None]:
-    """As ``decode_image``, of a file. SourceError too when it cannot be read."""
+    """``decode_image`` for a file. SourceError also if it cannot be read."""
     return decode_image(read_bytes(path), path.name)
 
 
@@ -104,9 +104,10 @@ def image_size(paths: Iterable[Path]) -> tuple[int, int] | None:
 
 
 def decode_image(data: bytes, name: str) -> tuple[U8, bytes | None]:
-    """(H, W, 3) uint8 blue green red, and the data itself where it is a JPEG. SourceError when it is no whole image.
+    """(H, W, 3) uint8 blue green red, and the data itself if it is a JPEG. SourceError if it is not a complete image.
 
-    A JPEG or PNG without its end marker is refused: its lower part would be a flat grey that a detector takes for road.
+    A JPEG or PNG without its end marker is refused: its lower part would be a flat grey that a detector mistakes for
+    road.
     """
     is_jpeg = data.startswith(_JPEG_START)
     for start, end in _MARKERS:
@@ -122,8 +123,8 @@ def decode_image(data: bytes, name: str) -> tuple[U8, bytes | None]:
 
 
 def image_of(path: Path | None, t_ns: int | None, size: tuple[int, int], notes: list[str]) -> CameraImage | None:
-    """The image of a frame; None, and ``notes`` says why, when there is no file, when it is damaged or when it is not
-    of the size (width, height) of the recording's others."""
+    """The image of a frame; None, with the reason in ``notes``, if there is no file, it is damaged, or its size (width,
+    height) differs from that of the recording's other images."""
     if path is None:
         notes.append("no image for this frame")
         return None
@@ -139,8 +140,8 @@ def image_of(path: Path | None, t_ns: int | None, size: tuple[int, int], notes: 
 
 
 def rigid_transform(values: npt.ArrayLike, what: str) -> F64:
-    """(4, 4) float64 of a (3, 4) or (4, 4) rigid transform. SourceError "… is not a rigid transform" when the numbers
-    are anything else: a wrong shape, not finite, a scaled or mirrored rotation, a last row other than 0 0 0 1."""
+    """(4, 4) float64 from a (3, 4) or (4, 4) rigid transform. SourceError "… is not a rigid transform" for anything
+    else: a wrong shape, not finite, a scaled or mirrored rotation, a last row other than 0 0 0 1."""
     try:
         given = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -177,8 +178,8 @@ def camera_matrix(values: npt.ArrayLike, what: str) -> F64:
 def check_looks_ahead(camera: CameraCalibration, what: str) -> None:
     """SourceError unless ego +x falls inside the image widened by half its size on every side.
 
-    A front camera sees where the car drives. The usual mistake, an extrinsic given the wrong way round, throws ego +x
-    far to the side or behind; the text names the mistake where undoing it helps.
+    A front camera sees where the car drives. With the usual mistake, an inverted extrinsic, ego +x is far to the side
+    or behind; the text names the mistake if undoing it helps.
     """
     size = camera.width, camera.height
     if not looks_ahead(camera.K, camera.T_camera_ego, size):

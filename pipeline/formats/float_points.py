@@ -11,9 +11,9 @@ _FARTHEST_M = 1000.0
 
 
 def parse_points(data: bytes, file: str, columns: int, brightest: float, notes: list[str]) -> F32:
-    """(N, columns) float32 of a file. Points that are not finite, farther than a kilometre or not of an intensity from
-    0 to ``brightest`` are left out and counted in ``notes``, as is a cut last point; a point at the sensor itself is no
-    return and says nothing. SourceError when none is left."""
+    """(N, columns) float32 from a file. Points that are not finite, farther than a kilometre or without an intensity
+    from 0 to ``brightest`` are left out and counted in ``notes``, as is a truncated last point; points at the sensor
+    itself are not returns and are ignored. SourceError if none is left."""
     whole = len(data) // (4 * columns)
     if len(data) % (4 * columns):
         notes.append(f"{file}: truncated in the middle of a point")

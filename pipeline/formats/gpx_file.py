@@ -13,14 +13,13 @@ from pipeline.types import GnssFix
 from pipeline.types.source import SourceError
 
 _SIGMA_M = 5.0
-"""A telephone's or a watch's."""
+"""Accuracy of a phone or watch."""
 _SLOWEST_MPS, _LONGEST_S = 1.0, 5.0
 _EARTH = Geod(ellps="WGS84")
 
 
 def parse_gpx(text: str, file: str) -> list[GnssFix]:
-    """Every point of a GPX 1.0 or 1.1 track that has a time, in order. SourceError names the file where there is
-    none."""
+    """Every point of a GPX 1.0 or 1.1 track that has a time, in order. SourceError names the file if there is none."""
     root = parse_xml(text, file, SourceError)
     places: dict[int, tuple[float, float, float]] = {}
     for point in root.iterfind(".//{*}trkpt"):
@@ -36,7 +35,7 @@ def parse_gpx(text: str, file: str) -> list[GnssFix]:
 
 
 def _fix(times: list[int], places: dict[int, tuple[float, float, float]], k: int) -> GnssFix:
-    """A point, with the speed and course from the point before to the one after it."""
+    """A fix at a point, with speed and course from the previous point to the next one."""
     lat, lon, alt = places[times[k]]
     around = [each for each in times[max(k - 1, 0) : k + 2] if abs(each - times[k]) <= _LONGEST_S * 1e9]
     speed, course = 0.0, None

@@ -14,9 +14,9 @@ from pipeline.types import F64, Box, GnssQuality
 from pipeline.types.source import SourceError, TruthObject
 
 DONT_CARE = "DontCare"
-"""A region of which the labels say nothing."""
+"""KITTI's class of a region without labels."""
 UNLABELLED = "dont care"
-"""What such a region is called here."""
+"""Name of such a region in this program."""
 _LABELS = {
     "dontcare": UNLABELLED,
     "van": "car",
@@ -52,13 +52,13 @@ class LabelRow(NamedTuple):
     """One line of a label file, ego frame."""
 
     kind: str
-    """As KITTI calls it."""
+    """KITTI's own class name."""
     label: str
-    """The same as one of our classes."""
+    """The corresponding class of this program."""
     cuboid: Cuboid | None
-    """None where the line says that it knows none."""
+    """None if the line contains no cuboid."""
     bbox: Box | None
-    """Pixels of the rectified image; None where the line knows none."""
+    """Pixels of the rectified image; None if the line contains no box."""
     truncation: float | None = None
     """0–1 of the object outside the image; None where unknown."""
     occlusion: int | None = None
@@ -66,11 +66,11 @@ class LabelRow(NamedTuple):
 
 
 def parse_labels(data: bytes, T_rect_ego: F64) -> tuple[TruthObject, ...]:
-    """The objects of a ``label_2`` file, brought from the rectified camera to the ego frame.
+    """The objects of a ``label_2`` file, converted from the rectified camera to the ego frame.
 
-    In print: height width length, the middle of the *bottom* face (y points down), and rotation_y about that axis,
-    0 when the length lies along the camera's x. DontCare regions are passed over; vans are cars, as detectors name
-    them. SourceError when a line is none of this, or of an object whose place nobody knows.
+    Fields: height width length, the centre of the *bottom* face (y points down), and rotation_y about that axis, 0 if
+    the length is along the camera's x. DontCare regions are skipped; vans become cars, as in detectors. SourceError for
+    an invalid line, or an object of unknown position.
     """
     T_ego_rect = inverse(T_rect_ego)
     objects = []
@@ -118,7 +118,7 @@ def label_name(kind: str) -> str:
 
 
 def kind_of(label: str) -> str:
-    """KITTI's type of a class; a class that KITTI has not is written with a capital and without spaces."""
+    """KITTI's type for a class; other classes are written with a capital and without spaces."""
     return _KINDS.get(label) or "_".join(label.split()).capitalize() or "Misc"
 
 

@@ -14,22 +14,24 @@ from pipeline.types import GnssFix, GnssQuality
 
 _KNOT_MPS = 1852.0 / 3600.0
 _SLOWEST_COURSE_MPS = 0.5
-"""Slower than this a course is the receiver's noise."""
+"""Below this speed, a course is noise of the receiver."""
 _QUALITY: Mapping[int, GnssQuality] = {1: "single", 2: "dgnss", 3: "single", 4: "rtk_fixed", 5: "rtk_float"}
 """GGA's quality indicator; 0 is no fix, 6 to 8 are dead reckoning, typed in or simulated."""
 _RANGE_ERROR_M: Mapping[GnssQuality, float] = {"single": 3.0, "dgnss": 1.0, "rtk_float": 0.3, "rtk_fixed": 0.015}
-"""Usual error of a range, which times the dilution gives the error of a place where no GST says it."""
+"""Typical range error; multiplied by the dilution of precision it gives the position error if there is no GST
+sentence."""
 _BEARING = frozenset({"GGA", "RMC"})
-"""Sentences that a fix waits for."""
+"""Sentences required for a fix."""
 _LONGEST_SENTENCE = 256
 
 
 class BadSentence(ValueError):
-    """A line that is not a complete sentence; the text is why."""
+    """A line that is not a complete sentence; the text is the reason."""
 
 
 class NmeaReader:
-    """Puts the sentences of one moment together. bad: lines that were no sentence. no_fix: moments without a place."""
+    """Combines the sentences of one moment. bad: number of invalid lines. no_fix: number of moments without a
+    position."""
 
     def __init__(self) -> None:
         self.bad = self.no_fix = 0
@@ -40,10 +42,10 @@ class NmeaReader:
         self._date: date | None = None
 
     def push(self, line: str, near_ns: int) -> GnssFix | None:
-        """Take one line; the fix of a moment once all its sentences are there. Never raises.
+        """Take one line; returns the fix of a moment once all its sentences have arrived. Never raises.
 
-        near_ns: about now, unix; it says the day while no RMC did. The fix's ``t_ns`` is the receiver's own UTC; its
-        height is not a number where the receiver sends no GGA.
+        near_ns: approximate current time, unix; gives the date until an RMC does. The fix's ``t_ns`` is the receiver's
+        own UTC; its height is NaN if the receiver sends no GGA.
         """
         try:
             sentence = parse_sentence(line)
@@ -64,11 +66,11 @@ class NmeaReader:
         return self._give(near_ns) if self._expected <= self._said.keys() else None
 
     def flush(self, near_ns: int) -> GnssFix | None:
-        """At the end of the sentences: the fix of the last moment, if it was not given."""
+        """At the end of the sentences: the fix of the last moment, if it was not returned yet."""
         return self._give(near_ns) if self._said and not self._is_given else None
 
     def _begin(self, moment: time) -> None:
-        """A new moment. What was not said of the last one is not waited for again, until it is said."""
+        """Start a new moment. Sentences missing in the last one are no longer waited for, until they arrive again."""
         if self._said and not self._is_given:
             self._expected = self._said.keys() & _BEARING or set(_BEARING)
         self._moment, self._said, self._is_given = moment, {}, False
@@ -118,8 +120,8 @@ class NmeaReader:
 
 
 def parse_sentence(line: str) -> pynmea2.TalkerSentence | None:
-    """A sentence of the standard; None for a maker's own (``$P…``) and for a query, which a receiver sends among the
-    others. BadSentence when the line is damaged or has no checksum: garbage often looks like text."""
+    """A standard sentence; None for a proprietary one (``$P…``) and for a query, which receivers send as well.
+    BadSentence if the line is damaged or has no checksum: garbage often looks like text."""
     if len(line) > _LONGEST_SENTENCE or "*" not in line:
         raise BadSentence("not a complete sentence")
     try:
@@ -136,7 +138,7 @@ def _quality(gga: Any, rmc: Any) -> GnssQuality | None:
 
 
 def _height_m(gga: Any) -> float:
-    """Above the ellipsoid: above the geoid, plus what lies between."""
+    """Height above the ellipsoid: height above the geoid plus the geoid separation."""
     if gga is None or gga.altitude is None:
         return math.nan
     return float(gga.altitude) + float(gga.geo_sep or 0.0)
@@ -150,7 +152,7 @@ def _sigma_m(gga: Any, gst: Any, quality: GnssQuality) -> float:
 
 
 def _unix_ns(day: date | None, moment: time, near_ns: int) -> int:
-    """The moment on ``day``; without a day, on that which brings it nearest to ``near_ns``."""
+    """The time on ``day``; without a day, on the day that brings it closest to ``near_ns``."""
     near = datetime.fromtimestamp(near_ns / 1e9, UTC)
     at = datetime.combine(day or near.date(), moment.replace(tzinfo=None), UTC)
     if day is None:

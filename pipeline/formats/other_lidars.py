@@ -18,8 +18,8 @@ _PANDAR40_BYTES = (1256, 1262)
 
 
 def maker_of(payload: bytes, port: int, length: int) -> str | None:
-    """Who makes the LiDAR that sent a datagram; None when nobody is known by it. payload: its beginning, where it came
-    in parts; length: of the whole."""
+    """Manufacturer of the LiDAR that sent a datagram; None if unknown. payload: its beginning, if it was fragmented;
+    length: of the whole."""
     if port == _OUSTER_PORT or length in _OUSTER_BYTES:
         return "Ouster"
     if payload[:2] == b"\xff\xee" and length in _PANDAR40_BYTES:

@@ -13,18 +13,18 @@ from typing import Protocol
 
 
 class Stopped(Exception):
-    """The run was cancelled. Nothing is wrong: the network can be asked again."""
+    """The run was cancelled. This is not an error: the network can be run again."""
 
 
 class Terminates(Protocol):
-    """The part of ``onnxruntime.RunOptions`` used here."""
+    """The used part of ``onnxruntime.RunOptions``."""
 
     terminate: bool
 
 
 class Cancellation:
-    """Cancels what another thread runs: ``set`` ends the run under way in that thread's ``here`` block, and refuses
-    further ones."""
+    """Cancels runs of another thread: ``set`` ends the current run in that thread's ``here`` block, and refuses further
+    ones."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -43,7 +43,7 @@ class Cancellation:
 
     @contextmanager
     def here(self) -> Iterator[None]:
-        """Within the block, networks that this thread runs can be cancelled; they raise Stopped then."""
+        """Within the block, networks run by this thread can be cancelled; they then raise Stopped."""
         before, _of_thread.stop = _of_thread.stop, self
         try:
             yield
@@ -52,7 +52,7 @@ class Cancellation:
 
     @contextmanager
     def ends(self, run: Terminates) -> Iterator[None]:
-        """For a runtime: ``run`` is the one to cancel while the block lasts."""
+        """For a runtime: ``run`` is the run to cancel during the block."""
         with self._lock:
             if self._is_set:
                 raise Stopped
@@ -72,5 +72,5 @@ _of_thread = _OfThread()
 
 
 def of_this_thread() -> Cancellation:
-    """What cancels the networks that this thread runs; outside of a ``here`` block nothing does."""
+    """The cancellation of networks run by this thread; outside a ``here`` block it is never set."""
     return _of_thread.stop or Cancellation()

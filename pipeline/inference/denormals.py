@@ -22,7 +22,7 @@ _X86 = ("x86_64", "AMD64")
 _FLUSH_X86 = 0x8040
 """Bits FTZ and DAZ of the register MXCSR."""
 _MXCSR = 7
-"""Its place in ``fenv_t``, in 32-bit words: 28 bytes of x87 state come before it (glibc and musl)."""
+"""Its index in ``fenv_t``, in 32-bit words: 28 bytes of x87 state come before it (glibc and musl)."""
 _FLUSH_ARM = 1 << 24
 """Bit FZ of the register FPCR, the first word of ``fenv_t`` (glibc and musl on aarch64)."""
 _FENV_WORDS = 16
@@ -44,8 +44,8 @@ def flush_weights(model: onnx.ModelProto) -> int:
 
 @contextmanager
 def flush_to_zero() -> Iterator[None]:
-    """This thread computes no denormal number meanwhile. onnxruntime's ``set_denormal_as_zero`` sets that only for its
-    own threads, and the thread that calls a network computes a share of it. Where the system is unknown: no effect."""
+    """Denormal results are flushed to zero on this thread during the block. onnxruntime's ``set_denormal_as_zero``
+    affects only its own threads, but the calling thread does part of the computation. No effect on unknown systems."""
     word = _control_word()
     if word is None:
         yield
@@ -65,7 +65,7 @@ def flush_to_zero() -> Iterator[None]:
 
 @cache
 def _control_word() -> tuple[int, int] | None:
-    """Which word of ``fenv_t`` holds the bits, and the bits; None where that is unknown."""
+    """The word of ``fenv_t`` with the bits, and the bits; None if unknown."""
     if sys.platform != "linux":
         return None
     return {**dict.fromkeys(_X86, (_MXCSR, _FLUSH_X86)), "aarch64": (0, _FLUSH_ARM)}.get(platform.machine())

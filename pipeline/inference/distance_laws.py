@@ -20,16 +20,16 @@ from pipeline.types import DistanceLaw
 
 @dataclass(frozen=True)
 class FoundLaw:
-    """What was found beside a network."""
+    """Result of looking for a law beside a network."""
 
     law: DistanceLaw | None
-    """Its distance law; None when none was measured, or the one that was cannot be used."""
+    """Its distance law; None if none was measured, or it cannot be used."""
     note: str = ""
-    """Why a law that is there is not used; else empty."""
+    """Why an existing law is not used; else empty."""
 
 
 def law_file(network: Path) -> Path:
-    """Where a network's law is kept; the file need not exist."""
+    """Path of a network's law; the file need not exist."""
     return network.with_suffix(".law.json")
 
 
@@ -54,9 +54,9 @@ def find_law(network: Path) -> FoundLaw:
 
 
 def keep_law(network: Path, law: DistanceLaw, fitted: Mapping[str, Any]) -> Path:
-    """Write a network's law. fitted: what it was fitted to and how well, for people; plain JSON values.
+    """Write a network's law. fitted: data and quality of the fit, for information; plain JSON values.
 
-    BadInput where the file cannot be written.
+    BadInput if the file cannot be written.
     """
     path = law_file(network)
     text = json.dumps(
@@ -74,6 +74,6 @@ def keep_law(network: Path, law: DistanceLaw, fitted: Mapping[str, Any]) -> Path
 
 
 def _is_possible(law: DistanceLaw) -> bool:
-    """Whether a taller box means a nearer vehicle, and every number is one that a camera can have."""
+    """Whether a taller box means a nearer vehicle, and all numbers are plausible for a camera."""
     sizes = (law.coefficient, law.focal_px, law.truck_ratio, law.bus_ratio, law.motorcycle_ratio)
     return all(math.isfinite(size) and size > 0.0 for size in sizes) and -10.0 < law.exponent < 0.0

@@ -39,7 +39,7 @@ def fitting_size(image_size: tuple[int, int], own: Size | None) -> Size:
 
 
 def input_size(model: onnx.ModelProto) -> Size | None:
-    """The graph's fixed input (height, width), None when it is free. ValueError when it takes no 1×3×H×W image."""
+    """The graph's fixed input (height, width), None if it is free. ValueError if its input is not a 1×3×H×W image."""
     weights = {tensor.name for tensor in model.graph.initializer}
     inputs = [value for value in model.graph.input if value.name not in weights]
     dims = inputs[0].type.tensor_type.shape.dim if len(inputs) == 1 else []
@@ -52,8 +52,8 @@ def input_size(model: onnx.ModelProto) -> Size | None:
 
 
 def with_unit_image(model: onnx.ModelProto) -> onnx.ModelProto:
-    """A graph whose second input is the size of the original image (N, 2), as DETR exports have it, with that bound
-    to 1 × 1: its boxes become shares of the input's sides. Any other graph as it is."""
+    """A graph whose second input is the size of the original image (N, 2), as in DETR exports, with that input bound to
+    1 × 1, so that its boxes are fractions of the input's sides. Other graphs are returned unchanged."""
     weights = {tensor.name for tensor in model.graph.initializer}
     inputs = [value for value in model.graph.input if value.name not in weights]
     sizes = inputs[1:]
@@ -72,8 +72,8 @@ def with_unit_image(model: onnx.ModelProto) -> onnx.ModelProto:
 
 
 def with_empty_masks(model: onnx.ModelProto) -> onnx.ModelProto:
-    """A copy whose inputs beside the image, of 1×1×height×width, are zeros of its own: masks that say which part of
-    the image is padding, and here none is. The model itself where it has none."""
+    """A copy in which additional inputs of 1×1×height×width are constant zeros: masks of padded areas, of which there
+    are none here. The model itself if it has no such input."""
     weights = {tensor.name for tensor in model.graph.initializer}
     inputs = [value for value in model.graph.input if value.name not in weights]
     shapes = {value.name: [dim.dim_value for dim in value.type.tensor_type.shape.dim] for value in inputs}
@@ -90,9 +90,9 @@ def with_empty_masks(model: onnx.ModelProto) -> onnx.ModelProto:
 
 
 def with_input_size(model: onnx.ModelProto, size: Size) -> onnx.ModelProto:
-    """A copy that takes 1×3×size. Every declared shape after the input is dropped and inferred anew; where the graph
-    holds its old size in constants that leaves contradictions, which the runtime then reports, or, as ValueError, the
-    inference itself."""
+    """A copy that takes 1×3×size. Every declared shape after the input is dropped and inferred again. If the graph
+    contains its old size in constants, this leads to contradictions, which are reported by the runtime or, as
+    ValueError, by the shape inference."""
     changed = onnx.ModelProto()
     changed.CopyFrom(model)
     weights = {tensor.name for tensor in changed.graph.initializer}
@@ -105,7 +105,7 @@ def with_input_size(model: onnx.ModelProto, size: Size) -> onnx.ModelProto:
         value.type.tensor_type.ClearField("shape")
     try:
         return onnx.shape_inference.infer_shapes(changed)
-    except Exception as error:  # the class that it raises is none of Python's own errors
+    except Exception as error:  # its error class has no common base with Python's own errors
         reason = (str(error).splitlines() or ["no reason given"])[0]
         raise ValueError(f"its shapes contradict each other: {reason}") from None
 

@@ -10,7 +10,7 @@ Task = Literal["detector", "lanes"]
 
 @dataclass(frozen=True)
 class KnownModel:
-    """A network that can be downloaded, or a project that has one to export."""
+    """A network that can be downloaded, or that can be exported from a project."""
 
     name: str
     """As in ``cipv models pull NAME``."""
@@ -19,13 +19,13 @@ class KnownModel:
     url: str
     """Of the file, or of the project."""
     size: int | None
-    """Bytes; None where there is no official file: the user downloads or exports one and registers it."""
+    """Bytes; None if there is no official file: the user downloads or exports one and registers it."""
     sha256: str | None
     """Of the official file."""
     licence: str
     """Of the weights."""
     note: str
-    """For people."""
+    """For display."""
 
     @property
     def remedy(self) -> str:

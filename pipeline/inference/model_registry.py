@@ -32,7 +32,7 @@ EMBEDDED = "embedded"
 """Name of the built-in detector."""
 _EMBEDDED_FILE = Path(__file__).parents[1] / "vision" / "embedded" / "simulated_vehicles.onnx"
 _LARGEST_BYTES = 2 << 30
-"""What protobuf can hold."""
+"""Limit of protobuf."""
 _CHUNK = 1 << 16
 _TIMEOUT_S = 30.0
 
@@ -52,15 +52,15 @@ class ModelEntry:
     path: Path | None
     """Its file; None while it is not installed."""
     default: bool
-    """Used when no network is named."""
+    """Used if no network is named."""
     licence: str | None
-    """Of the weights; None where it is not known."""
+    """Licence of the weights; None if unknown."""
     url: str | None
-    """Where it comes from; None where that is not known."""
+    """Origin; None if unknown."""
     note: str
     """For people."""
     law: DistanceLaw | None = None
-    """The distance law measured for it; None: the one for real vehicles is used."""
+    """The distance law measured for it; None: the law for real vehicles is used."""
 
 
 def store() -> Path:
@@ -70,7 +70,7 @@ def store() -> Path:
 
 
 def list_models() -> tuple[ModelEntry, ...]:
-    """Known networks in their order, the embedded one, then registered ones by name."""
+    """Known networks in order, the embedded one, then registered ones by name."""
     defaults = {task: default_model(task) for task in ("detector", "lanes")}
 
     def entry(name: str, task: Task, licence: str | None, url: str | None, note: str) -> ModelEntry:
@@ -93,7 +93,7 @@ def list_models() -> tuple[ModelEntry, ...]:
 
 
 def find(spec: str) -> Path | None:
-    """The file of a network by path or name; None when there is none."""
+    """The file of a network by path or name; None if there is none."""
     path = given_path(spec, ModelError)
     if path.is_file():
         return path
@@ -101,7 +101,7 @@ def find(spec: str) -> Path | None:
 
 
 def default_model(task: Task) -> Path | None:
-    """The network used when none is named; None when none is installed."""
+    """The network used if none is named; None if none is installed."""
     chosen = _read_registry().defaults.get(task)
     names = [chosen] if chosen else []
     names += [known.name for known in KNOWN if known.task == task]
@@ -111,7 +111,7 @@ def default_model(task: Task) -> Path | None:
 
 
 def own_file(path: Path) -> Path:
-    """A file that the user wants to register, ``~`` resolved. ModelError when it does not exist."""
+    """A file to register, with ``~`` resolved. ModelError if it does not exist."""
     given = given_path(path, ModelError)
     if not given.is_file():
         raise ModelError(f"no file at {path}")
@@ -147,9 +147,9 @@ def register(path: Path, name: str, task: Task = "detector", default: bool = Tru
 
 
 def read_verified(path: Path) -> bytes:
-    """A network's file. ModelError when it is not what was installed here: a registered one as it was registered, an
-    official one as its project published it, the embedded one as it came with the program. Of any other file nothing is
-    known. OSError when it cannot be read."""
+    """A network's file. ModelError if it differs from the installed one: a registered file from its registration, an
+    official one from its publication, the embedded one from that of the program. Other files are not checked. OSError
+    if it cannot be read."""
     data, expected = read_regular(path, _LARGEST_BYTES), _expected_sha256(path)
     found = hashlib.sha256(data).hexdigest()
     if expected is not None and found != expected:
@@ -172,7 +172,7 @@ def _expected_sha256(path: Path) -> str | None:
 
 
 def known_model(name: str) -> KnownModel:
-    """The official network of this name. ModelError for any other."""
+    """The official network with this name. ModelError for any other."""
     known = next((model for model in KNOWN if model.name == name), None)
     if known is None:
         raise ModelError(f"no network named {name!r}; known are {', '.join(model.name for model in KNOWN)}")
@@ -180,8 +180,8 @@ def known_model(name: str) -> KnownModel:
 
 
 def pull(name: str, progress: Progress = silent) -> Path:
-    """Download and install a known network, checking size and SHA-256. A correct file that is installed already is
-    kept. ModelError says what went wrong; no part of a failed download remains."""
+    """Download and install a known network, checking size and SHA-256. If a correct file is already installed, it is
+    kept. ModelError gives the reason of a failure; no part of a failed download remains."""
     known = known_model(name)
     if known.size is None or known.sha256 is None:
         raise ModelError(f"{name} has no download with a known checksum: {known.remedy}; see {known.url}")
@@ -251,7 +251,7 @@ class _Registered(BaseModel):
 
 
 class _Registry(BaseModel):
-    """What ``registry.json`` holds."""
+    """The content of ``registry.json``."""
 
     defaults: dict[Task, str] = {}
     models: dict[str, _Registered] = {}

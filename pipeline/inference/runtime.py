@@ -25,15 +25,15 @@ from pipeline.inference.tuning import RunSettings, kept_way
 from pipeline.types import F32, U8
 
 _GIVES_WAY = 5
-"""Niceness added to a network's own threads. At equal priority a step that runs meanwhile may share its core with one
-of them for seconds on end and take twice as long. The calling thread computes too and keeps its priority: with all of
-them nicer, the network would lose to whatever else runs."""
+"""Niceness added to a network's own threads. At equal priority, a pipeline step that runs at the same time may share
+its core with one of them for seconds and take twice as long. The calling thread also computes and keeps its priority:
+with all threads nicer, the network would lose to any other program."""
 _FATAL = 4
-"""Log level: only this is written to standard error; everything else is raised as an exception."""
+"""Log level: only fatal errors are written to standard error; everything else is raised as an exception."""
 
 
 _TUNED_SIZE: Size = (384, 640)
-"""Input of a graph of free size while it is tuned: 16:9."""
+"""Input size for tuning a graph with free size: 16:9."""
 
 
 class DetectorMissing(BadInput):
@@ -45,8 +45,8 @@ class DetectorError(BadInput):
 
 
 def find_graph(spec: str | None, task: Task) -> Path | None:
-    """The file of a network by name or path; without either the task's default. None when it is not installed;
-    DetectorMissing when the folder of networks is damaged."""
+    """The file of a network by name or path; without either, the task's default. None if it is not installed;
+    DetectorMissing if the folder of networks is damaged."""
     try:
         return model_registry.find(spec) if spec else model_registry.default_model(task)
     except model_registry.ModelError as error:
@@ -54,8 +54,8 @@ def find_graph(spec: str | None, task: Task) -> Path | None:
 
 
 def read_graph(path: Path) -> onnx.ModelProto:
-    """The graph in a file, its denormal weights set to zero. DetectorError when it holds none, or is not the file that
-    was installed here."""
+    """The graph in a file, with its denormal weights set to zero. DetectorError if it contains none, or differs from
+    the installed file."""
     try:
         model = onnx.load_from_string(model_registry.read_verified(path))
     except model_registry.ModelError as error:
@@ -67,23 +67,25 @@ def read_graph(path: Path) -> onnx.ModelProto:
 
 
 def open_session(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
-    """The graph as ``cipv models tune`` found best for the file at ``path``; untuned, on the best provider that accepts
-    it: TensorRT, CUDA, CPU."""
-    # Threads inherit niceness, and an unprivileged thread cannot lower its own again: so another thread opens it.
+    """The graph with the settings that ``cipv models tune`` found for the file at ``path``; untuned, on the best
+    provider that accepts it: TensorRT, CUDA, CPU."""
+    # Threads inherit niceness, and an unprivileged thread cannot lower its own again, so a separate thread opens the
+    # network.
     with ThreadPoolExecutor(1, "cipv-open-network", _give_way) as opener:
         return opener.submit(_open, graph, path, threads).result()
 
 
 def _give_way() -> None:
-    """Make this thread and those it starts nicer. Only on Linux: elsewhere niceness belongs to the process."""
+    """Increase the niceness of this thread and of those it starts. Only on Linux: elsewhere niceness applies to the
+    process."""
     if sys.platform == "linux":
         this = threading.get_native_id()
-        with suppress(OSError):  # a sandbox may refuse; then all have equal priority
+        with suppress(OSError):  # a sandbox may refuse this; then all have equal priority
             os.setpriority(os.PRIO_PROCESS, this, os.getpriority(os.PRIO_PROCESS, this) + _GIVES_WAY)
 
 
 def open_as(graph: bytes, way: RunSettings) -> ort.InferenceSession:
-    """The graph on the providers, threads and options of a way. Raises onnxruntime's own errors."""
+    """The graph with these providers, threads and options. Raises onnxruntime's own errors."""
     options = ort.SessionOptions()
     options.intra_op_num_threads = way.threads
     options.inter_op_num_threads = 1
@@ -102,19 +104,19 @@ def _open(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
     for first in range(len(way.providers)):
         try:
             return open_as(graph, evolve(way, providers=way.providers[first:]))
-        except Exception as error:  # onnxruntime raises a class for each status code, without a common base
+        except Exception as error:  # onnxruntime has an error class for each status code, without a common base
             refusal = error
     raise DetectorError(f"{path.name} cannot be run: {first_line(refusal)}")
 
 
 def check_image(bgr: U8) -> None:
-    """DetectorError for an array that is no image (H, W, 3) uint8."""
+    """DetectorError for an array that is not an image (H, W, 3) uint8."""
     if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
         raise DetectorError(f"expected an image of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
 
 
 def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
-    """Every output for one input. DetectorError when the network fails on it, Stopped when the run was cancelled."""
+    """All outputs for one input. DetectorError if the network fails on it, Stopped if the run was cancelled."""
     options, stop = ort.RunOptions(), of_this_thread()
     options.log_severity_level = _FATAL
     with stop.ends(options), flush_to_zero():
@@ -128,9 +130,9 @@ def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
 
 
 def ways_of(path: Path) -> Callable[[RunSettings], Callable[[], Sequence[F32]]]:
-    """For ``pipeline.inference.tuning``: the network in a file on the same noisy image, one way after the other.
-    DetectorError when it takes no image."""
-    model = with_empty_masks(with_unit_image(read_graph(path)))  # each leaves the other's graphs as they are
+    """For ``pipeline.inference.tuning``: runs the network in a file on the same noisy image with different settings.
+    DetectorError if its input is not an image."""
+    model = with_empty_masks(with_unit_image(read_graph(path)))  # each leaves other graphs unchanged
     try:
         own = input_size(model)
     except ValueError as error:

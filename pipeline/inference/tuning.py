@@ -26,23 +26,24 @@ from pipeline.inference.model_registry import store
 from pipeline.types import F32
 
 PROVIDERS = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "OpenVINOExecutionProvider", "CPUExecutionProvider")
-"""Those that may run a network, in the order of preference of an untuned one (which leaves OpenVINO out)."""
+"""Possible providers, in the order of preference without tuning (which excludes OpenVINO)."""
 _UNTUNED = tuple(name for name in PROVIDERS if name != "OpenVINOExecutionProvider")
 _AGREE = 1e-3
-"""Largest difference of an output, in shares of its largest value: another order of summation, no other precision."""
+"""Largest permitted difference of an output, relative to its largest value: allows another order of summation, but no
+lower precision."""
 _WORTH = 0.97
-"""A way must take less than this share of the best one's time to be preferred: the rest is what two tries differ by."""
+"""To be preferred, settings must take less than this share of the best time so far: smaller differences are noise."""
 _ROUNDS = 7
 
 
 @dataclass(frozen=True)
 class RunSettings:
-    """One way of running a network."""
+    """Settings for running a network."""
 
     providers: tuple[str, ...]
-    """Of onnxruntime, in the order in which they are tried for each node."""
+    """Providers of onnxruntime, in the order in which they are tried for each node."""
     threads: int
-    """Of one run."""
+    """Threads per run."""
     optimisation: str = "ORT_ENABLE_ALL"
     """Level of graph optimisation, onnxruntime's name."""
     arena: bool = True
@@ -55,25 +56,24 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class Trial:
-    """What one way took."""
+    """Measurement of one setting."""
 
     way: RunSettings
-    """Providers, threads and options that were tried."""
+    """The tested providers, threads and options."""
     best_ms: float | None
-    """The shortest of its runs: other work on the machine only ever adds. None when it could not run or its outputs
-    differ."""
+    """The shortest of its runs, because other load only adds time. None if it failed or its outputs differ."""
     refused: str = ""
-    """Why."""
+    """The reason if it was refused."""
 
 
 def untuned(threads: int) -> RunSettings:
-    """How a network runs that nobody tuned: on the best provider that is installed."""
+    """Settings without tuning: the best installed provider."""
     there = ort.get_available_providers()
     return RunSettings(tuple(name for name in _UNTUNED if name in there), threads)
 
 
 def kept_way(path: Path, threads: int) -> RunSettings:
-    """The tuned way of a network's file on this machine, or the untuned one."""
+    """The tuned settings for a network's file on this machine, or the default ones."""
     rows, usual = _read(_file()), untuned(threads)
     row = rows.get(_key(path)) if rows else None
     if row is None:
@@ -87,15 +87,15 @@ def kept_way(path: Path, threads: int) -> RunSettings:
 
 
 def keep(path: Path, way: RunSettings) -> None:
-    """Run this file's network this way from now on. OSError when the store cannot be written."""
+    """Use these settings for this file's network from now on. OSError if the store cannot be written."""
     file = _file()
     replace_text(file, json.dumps(_read(file) | {_key(path): asdict(way)}, indent=1, sort_keys=True) + "\n")
 
 
 def tune(run: Callable[[RunSettings], Callable[[], Sequence[F32]]], threads: int) -> Iterator[Trial]:
-    """Try each way, the untuned one first; the best of those before is varied in one thing at a time.
+    """Try all settings, the default first; then the best so far is varied in one setting at a time.
 
-    run: gives for a way a function that runs the network once on a fixed input; either may raise.
+    run: returns for given settings a function that runs the network once on a fixed input; either may raise.
     """
     best, expected = _timed(run, untuned(threads), None)
     yield best
@@ -108,7 +108,7 @@ def tune(run: Callable[[RunSettings], Callable[[], Sequence[F32]]], threads: int
 
 
 def fastest(trials: Sequence[Trial]) -> Trial:
-    """The one to keep: the first of which no later one is faster by more than the spread."""
+    """The trial to keep: the first one that no later one beats by more than the noise."""
     best = trials[0]
     for each in trials[1:]:
         if each.best_ms is not None and best.best_ms is not None and each.best_ms < _WORTH * best.best_ms:
@@ -129,7 +129,7 @@ def _timed(
             start = perf_counter()
             once()
             taken.append(perf_counter() - start)
-    except Exception as error:  # onnxruntime raises a class for each status code, without a common base
+    except Exception as error:  # onnxruntime has an error class for each status code, without a common base
         if expected is None:
             raise
         return Trial(way, None, (str(error).splitlines() or ["no reason given"])[0]), ()
@@ -170,7 +170,7 @@ def _file() -> Path:
 
 
 def _read(file: Path) -> dict[str, dict[str, Any]]:
-    """What is kept; nothing when the file is missing or damaged: then networks run untuned."""
+    """The stored settings; empty if the file is missing or damaged: then networks run untuned."""
     try:
         rows = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -184,7 +184,7 @@ def _key(path: Path) -> str:
 
 
 def _processor() -> str:
-    """Its model's name."""
+    """Model name of the processor."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -16,33 +16,33 @@ from pipeline.common.geometry import Cuboid
 from pipeline.labels.model import LabelSet, LabelTrack, Lead
 
 _SAME_IOU = 0.1
-"""Two cuboids that overlap less, seen from above, are two vehicles."""
+"""Two cuboids with a smaller overlap, seen from above, are different vehicles."""
 _COUNTED = ("accepted", "corrected")
-"""Nobody stands behind a proposal."""
+"""Only these states count; a proposal has not been confirmed by anybody."""
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """Of two label sets. Shares are None where there is nothing to compare."""
+    """Agreement of two label sets. Shares are None if there is nothing to compare."""
 
     frames: int
-    """In which both say who leads."""
+    """Number of frames in which both have a lead label."""
     lead_share: float | None
-    """Of these, the share in which both mean the same vehicle, or both none, or both that it is unclear."""
+    """Share of these in which both give the same vehicle, both none, or both unclear."""
     lead_disagreements: tuple[int, ...]
-    """The frames in which they do not."""
+    """The frames in which they differ."""
     vehicles: int
     """Cuboids that both have, frame by frame."""
     only_first: int
     """Cuboids that only the first set has, in frames in which both have some."""
     only_second: int
-    """And only the second."""
+    """Cuboids that only the second set has, in the same frames."""
     iou: float | None
     """Median overlap of the cuboids that both have, seen from above."""
     class_share: float | None
-    """Of these, the share that both call the same."""
+    """Share of these to which both give the same class."""
     reversed_share: float | None
-    """Of these, the share whose front is the other's rear."""
+    """Share of these with opposite headings."""
 
 
 def agreement(first: LabelSet, second: LabelSet) -> Agreement:
@@ -95,7 +95,7 @@ def _is_same(ours: Lead, theirs: Lead, partners: Mapping[int, int]) -> bool:
 
 
 def _pairs(ours: list[Cuboid], theirs: list[Cuboid]) -> list[tuple[int, int, float]]:
-    """Which cuboids are the same, one to one, with their overlap."""
+    """Matching cuboids, one-to-one, with their overlap."""
     overlaps = np.array([[bev_iou(a, b) for b in theirs] for a in ours])
     rows, columns = linear_sum_assignment(-overlaps)
     return [

@@ -14,9 +14,9 @@ from pipeline.types import Box, CameraCalibration
 
 
 def following(labels: LabelSet, drive: LabeledDrive) -> LabelSet:
-    """The labels with the box of each cuboid where its frame's camera sees it, and how much of it is cut off. Boxes
-    that were set, and truncations that were read, stay; so does everything in frames without a calibrated camera. What
-    is outside the image has no box."""
+    """The labels with each cuboid's box in its frame's image, and the share of it that is cut off. Boxes that were set
+    and truncations that were imported stay unchanged, as does everything in frames without a calibrated camera. Objects
+    outside the image get no box."""
     by_frame: dict[int, list[tuple[int, Sighting]]] = {}
     for track in labels.tracks:
         for each in track.sightings:
@@ -41,8 +41,8 @@ def following(labels: LabelSet, drive: LabeledDrive) -> LabelSet:
 
 
 def boxes_of(cuboids: list[Cuboid], camera: CameraCalibration) -> list[tuple[Box | None, float | None]]:
-    """Of each cuboid the box around it in the raw image, and the share 0–1 of that box that the image cuts off.
-    None for both where it is outside."""
+    """For each cuboid, the box around it in the raw image, and the share 0–1 of that box that the image cuts off. None
+    for both if it is outside."""
     view = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
     corners = corners_of(cuboids)
     clipped = project_cuboids(view, corners, camera.width, camera.height)

@@ -16,31 +16,31 @@ from pipeline.labels.model import LabelSet
 from pipeline.vision.classes import canonical
 
 FILE = Path(__file__).with_name("classes.yaml")
-"""Those of a project that has none of its own."""
+"""Default classes, for a project without its own."""
 EXPORTS = ("kitti", "nuscenes", "coco", "openlabel")
 OF_SIGHTINGS = ("occlusion", "truncation")
-"""Attributes that a sighting has a place for."""
+"""Attributes that are fields of a sighting."""
 _LONGEST_NAME = 40
 _MOST = 200
 
 
 @dataclass(frozen=True)
 class LabelClass:
-    """What a vehicle or person can be."""
+    """Class of a vehicle or person."""
 
     name: str
-    """As people choose it."""
+    """Name shown to users."""
     of: str | None = None
-    """The class that it is a kind of; None for one of its own."""
+    """Parent class; None for a top-level class."""
     size: tuple[float, float, float] | None = None
     """Usual length, width, height in metres."""
     exports: Mapping[str, str] = field(default_factory=dict)
-    """What formats call it, by one of ``EXPORTS``."""
+    """Names in export formats, by one of ``EXPORTS``."""
 
 
 @dataclass(frozen=True)
 class ClassList:
-    """Of a project, in the order in which people choose."""
+    """Classes of a project, in the order in which they are shown."""
 
     classes: Mapping[str, LabelClass]
     """By name."""
@@ -48,24 +48,24 @@ class ClassList:
     """Values by name."""
 
     def named(self, word: str) -> str:
-        """The class that a word means: one of the list, else as detectors call it."""
+        """The class for a name: one of the list, else the name as used by detectors."""
         lowered = word.strip().lower().replace("_", " ")
         return lowered if lowered in self.classes else canonical(word)
 
     def base(self, name: str) -> str:
-        """The class that it is scored as."""
+        """The class as which it is scored."""
         known = self.classes.get(name)
         return known.of or name if known is not None else name
 
     def written(self, name: str, export: str) -> str:
-        """What an export calls it."""
+        """Its name in an export format."""
         known = self.classes.get(name)
         return known.exports.get(export, known.of or name) if known is not None else name
 
 
 @cache
 def default_classes() -> ClassList:
-    """Those that come with the program."""
+    """The built-in classes."""
     return read_classes(FILE)
 
 
@@ -78,13 +78,13 @@ def read_classes(path: Path) -> ClassList:
 
 
 def as_bases(labels: LabelSet, classes: ClassList) -> LabelSet:
-    """Each track as the class that it is scored as."""
+    """Each track with the class as which it is scored."""
     return replace(labels, tracks=tuple(replace(track, label=classes.base(track.label)) for track in labels.tracks))
 
 
 def as_written(labels: LabelSet, classes: ClassList, name: str) -> tuple[LabelSet, tuple[str, ...]]:
-    """The labels with their classes as a format calls them, and a sentence for each that is another. name: of the
-    format; where it holds any class as it is, nothing changes."""
+    """The labels with class names of a format, and a sentence for each name that differs. name: of the format; if it
+    accepts any class, nothing changes."""
     export = "kitti" if name == "kitti-tracking" else name
     if export not in EXPORTS or export == "openlabel":
         return labels, ()

@@ -17,11 +17,11 @@ from pipeline.labels.model import Sighting
 from pipeline.types import F32, F64, U8, Frame
 
 WIDTH_PX, HEIGHT_PX = 160, 110
-"""Of one of the four views."""
+"""Size of one of the four views."""
 _BESIDE_M = 0.6
-"""Points so near to a cuboid are of its vehicle, or of what stands by it."""
+"""Points this close to a cuboid belong to its vehicle or to something beside it."""
 _ROAD_M = 0.2
-"""Points so near to its bottom may be of the road."""
+"""Points this close to its bottom may be road."""
 _SHOWN_M = 1.5
 _IMAGE_MARGIN = 0.4
 _BACK, _POINT, _BESIDE, _EDGE, _TEXT = (24, 20, 17), (235, 225, 215), (90, 150, 255), (140, 220, 120), (190, 190, 190)
@@ -31,16 +31,16 @@ _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4)
 
 @dataclass(frozen=True)
 class Fit:
-    """How a cuboid lies on the points around it. Points of the road do not count."""
+    """How well a cuboid fits the points around it. Road points are not counted."""
 
     inside: int
     """Points in the cuboid."""
     beside: int
-    """Points right outside it: many mean that it is too small or misplaced."""
+    """Points directly outside it: many mean that it is too small or misplaced."""
 
     @property
     def share_beside(self) -> float | None:
-        """0 where all are inside; None without points."""
+        """0 if all points are inside; None without points."""
         count = self.inside + self.beside
         return self.beside / count if count else None
 
@@ -56,8 +56,8 @@ def fit_of(points: F32, cuboid: Cuboid) -> Fit:
 
 
 def close_up(frame: Frame, sighting: Sighting, alignment: Alignment | None) -> U8:
-    """(2·HEIGHT_PX, 2·WIDTH_PX, 3) BGR: image, top and, below, side and rear. What a frame lacks stays empty.
-    alignment: where points lie in the image; None where that is not known."""
+    """(2·HEIGHT_PX, 2·WIDTH_PX, 3) BGR: image, top and, below, side and rear view. Views without data stay empty.
+    alignment: projection of points into the image; None if unknown."""
     views = [_in_image(frame, sighting, alignment)]
     for name, across, up in _VIEWS:
         views.append(_projected(name, frame.sweep.points if frame.sweep is not None else None, sighting, across, up))
@@ -65,15 +65,15 @@ def close_up(frame: Frame, sighting: Sighting, alignment: Alignment | None) -> U
 
 
 def _in_own_frame(points: F32, cuboid: Cuboid) -> F64:
-    """(N, 3) metres from the middle of the cuboid, along its length, width and height."""
+    """(N, 3) metres relative to the centre of the cuboid, along its length, width and height."""
     c, s = math.cos(cuboid.yaw_rad), math.sin(cuboid.yaw_rad)
     away = points[:, :3].astype(np.float64) - cuboid.center
     return np.column_stack([c * away[:, 0] + s * away[:, 1], c * away[:, 1] - s * away[:, 0], away[:, 2]])
 
 
 def _projected(name: str, points: F32 | None, sighting: Sighting, across: int, up: int) -> U8:
-    """The points around a cuboid along two of its axes: length to the right and width up, or height up; from behind,
-    the left side is on the left."""
+    """The points around a cuboid in a plane of two of its axes: length to the right and width or height up; in the rear
+    view, the left side is on the left."""
     view = _empty(name)
     if sighting.cuboid is None:
         return view

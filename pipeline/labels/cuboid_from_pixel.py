@@ -22,36 +22,37 @@ from pipeline.types import F32, I32, REAL_VEHICLES, Box, Detection, Frame, Mask,
 from pipeline.vision.distance import measure
 
 _CLICK_SHARE = 0.015
-"""How near to a click, in widths of the image, a point must fall."""
+"""Maximum distance of a point from a click, in image widths."""
 _CLUSTERS = ClusterParams(front_only=False, min_points=FEWEST_POINTS)
 _OWN_SHARE = 0.5
-"""A cluster that lies mostly outside the box is something behind or before it."""
+"""A cluster with a smaller share inside the box is something behind or in front of it."""
 
 
 class NothingThere(BadInput):
-    """Neither points nor image tell where it is."""
+    """Neither points nor image determine its position."""
 
 
 @dataclass(frozen=True)
 class Lifted:
-    """A cuboid made from a place in the image."""
+    """A cuboid derived from a position in the image."""
 
     cuboid: Cuboid
     """In the ego frame."""
     bbox: Box | None
-    """In image pixels; None when nobody drew one and none was detected there."""
+    """In image pixels; None if none was drawn or detected there."""
     points: int
-    """That the cuboid was laid on; 0 when its distance comes from the image."""
+    """Number of points used to fit the cuboid; 0 if its distance comes from the image."""
     how: str
-    """What the distance was measured by: one sentence."""
+    """How the distance was measured: one sentence."""
 
 
 def lift(
     frame: Frame, params: Params, label: str, bbox: Box | None = None, pixel: tuple[float, float] | None = None
 ) -> Lifted:
-    """What is at ``bbox`` (pixels of the raw image) or at ``pixel``, as a cuboid of a class.
+    """The object at ``bbox`` (pixels of the raw image) or at ``pixel``, as a cuboid of a class.
 
-    A pixel stands for the smallest detection it is in. NothingThere when neither points nor the box tell where it is.
+    A pixel stands for the smallest detection that contains it. NothingThere if neither points nor the box determine the
+    position.
     """
     alignment = resolve(params.alignment, frame.camera)
     if alignment is None:
@@ -92,7 +93,7 @@ def _detected_at(frame: Frame, pixel: tuple[float, float]) -> Box | None:
 def _points_of(
     frame: Frame, alignment: Alignment, bbox: Box | None, pixel: tuple[float, float] | None
 ) -> tuple[F32 | None, Ground | None]:
-    """(the points of what is there, None for too few; the ground, None without a sweep)."""
+    """(points of the object, None if there are too few; the ground, None without a sweep)."""
     if frame.sweep is None:
         return None, None
     sweep = frame.sweep.points
@@ -115,9 +116,9 @@ def _points_of(
 
 
 def _cluster_of(labels: I32, inside: Mask, *, whole: bool) -> int | None:
-    """The cluster with most points inside; those that lie mostly inside come first, unless a click asks for the whole
-    one it fell on. (Leaving out what is far from where the box's height says was tried: it leaves out more cars that
-    are half hidden than it does things before and behind them.)"""
+    """The cluster with the most points inside; those mostly inside have priority, unless a click selects the whole
+    cluster that it hit. (Leaving out clusters far from the distance of the box height was tried: it removed more partly
+    hidden cars than foreground and background objects.)"""
     if not inside.any():
         return None
     within = np.bincount(labels[inside])
@@ -127,13 +128,13 @@ def _cluster_of(labels: I32, inside: Mask, *, whole: bool) -> int | None:
 
 
 def _by_height(frame: Frame, params: Params, alignment: Alignment, label: str, bbox: Box) -> VisionMeasurement:
-    """What the box's height tells of where it is."""
+    """The position according to the box height."""
     law = frame.raw_boxes.law if frame.raw_boxes is not None else REAL_VEHICLES
     return measure((Detection(bbox, label, 1.0),), alignment, frame.camera, params.distance, law)[0]
 
 
 def _at_height(alignment: Alignment, label: str, bbox: Box, found: VisionMeasurement, ground: Ground | None) -> Cuboid:
-    """A cuboid of the class's usual size there. It drives our way."""
+    """A cuboid of the class's usual size at that position, heading in our direction."""
     assert found.distance_m is not None
     (length, width, height) = usual_size_m(label)
     foot = np.array([[(bbox[0] + bbox[2]) / 2, bbox[3]]])

@@ -22,67 +22,68 @@ from pipeline.labels.model import Heading, Sighting
 from pipeline.params import MotionParams
 
 _HELD_S = 1.0
-"""How long own speed stands in for one that is not known: no car's changes by more than some m/s in that time."""
+"""Time for which a known own speed is used in place of an unknown one: no car's speed changes by more than a few m/s in
+that time."""
 _TRAVELLED_M = 2.0
-"""Half a car's length: by so much a box may wander along a parked car as other sides of it come into view."""
+"""Half a car's length: a box may move this far along a parked car as other sides become visible."""
 _OWN_SHARE = 0.1
-"""Of our own way is added to that: an own speed that is off carries everything that stands with it."""
+"""Share of our own way that is added to that: an error of own speed moves all standing objects."""
 _FEWEST_STEPS = 2
-"""One step may be from one vehicle to another under the same number."""
+"""A single step may be a switch between vehicles under the same id."""
 _STEADY_SHARE = 0.8
-"""Of the steps of something that drives go its way; those of a flickering cluster go anywhere."""
+"""For a moving vehicle, this share of the steps is in its direction; those of a flickering cluster are random."""
 _LANE_M = 1.75
-"""Half a lane: nearer to our axis nothing is on either side."""
+"""Half a lane: an object closer to our axis is on neither side."""
 _ALONG = 0.5
-"""Cosine of 60°: what is turned farther stands across the road."""
+"""Cosine of 60°: an object rotated by more than this stands across the road."""
 _MOVING_MPS = MotionParams().moving_mps
 _NEVER_NS = 2**63
 
 
 @dataclass(frozen=True)
 class Moment:
-    """What the car was doing at a frame."""
+    """Own motion at a frame."""
 
     t_ns: int
     """The frame's tick."""
     speed_mps: float | None
-    """Own speed, positive forwards; None where nothing measured it."""
+    """Own speed, positive forwards; None if not measured."""
     yaw_rate_radps: float | None
-    """Own yaw rate, positive to the left; None counts as straight on."""
+    """Own yaw rate, positive to the left; None is treated as driving straight."""
     reach_m: float
     """How far ahead a vehicle in the path would be detected; 0 for not at all."""
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Where the ego frame was, dead reckoned: comparable within one stretch only."""
+    """Pose of the ego frame by dead reckoning: comparable only within one stretch."""
 
     stretch: int
-    """Number of the stretch over which own motion is known without a gap."""
+    """Number of the stretch of uninterrupted own motion."""
     x: float
-    """Metres from the stretch's beginning, along its first heading."""
+    """Metres from the start of the stretch, along its initial heading."""
     y: float
     """Metres to the left of that."""
     yaw_rad: float
-    """Turned to the left since the beginning."""
+    """Rotation to the left since the start."""
     way_m: float
-    """Driven since the beginning."""
+    """Distance driven since the start."""
     t_s: float
-    """Since the beginning."""
+    """Time since the start."""
 
 
 @dataclass(frozen=True)
 class Travelled:
-    """How a track moved over the ground."""
+    """Motion of a track over ground."""
 
     along_m: float
     """Forwards along its own axis; negative for backwards."""
     proven: bool
-    """Whether it moved farther than errors of boxes and ego motion explain, and steadily."""
+    """Whether it moved steadily and farther than errors of boxes and ego motion can explain."""
 
 
 def own_poses(moments: Mapping[int, Moment]) -> dict[int, Pose]:
-    """By frame. A gap of the recording or of own motion begins another stretch."""
+    """By frame. A gap in the recording or in own motion starts another stretch."""
     frames = sorted(moments)
     speeds = _speeds(frames, moments)
     poses: dict[int, Pose] = {}
@@ -115,9 +116,9 @@ def own_poses(moments: Mapping[int, Moment]) -> dict[int, Pose]:
 def faced(
     sightings: Sequence[Sighting], in_lane: Collection[int], poses: Mapping[int, Pose]
 ) -> tuple[tuple[Sighting, ...], Heading]:
-    """The sightings of a track with their cuboids turned to where it faces, and what told that; empty for a track
-    without cuboids. in_lane: the frames in which it is in the ego path. A cuboid's yaw is taken for right but for half
-    turns."""
+    """The sightings of a track with their cuboids rotated to its heading, and the source of the heading; empty for a
+    track without cuboids. in_lane: the frames in which it is in the ego path. A cuboid's yaw is assumed to be correct
+    except for half turns."""
     aligned = _aligned(sightings, poses)
     if all(each.cuboid is None for each in aligned):
         return tuple(aligned), ""
@@ -131,9 +132,10 @@ def faced(
 
 
 def oncoming_side(tracks: Iterable[tuple[Sequence[Sighting], Heading]]) -> int:
-    """1 where oncoming traffic drives on our left, −1 where it does on our right; 1 where nobody was seen to.
+    """1 if oncoming traffic drives on our left, −1 if on our right; 1 if there is none.
 
-    tracks: as ``faced`` gives them."""
+    tracks: as returned by ``faced``.
+    """
     sides = [
         math.copysign(1.0, each.cuboid.center[1])
         for sightings, heading in tracks
@@ -145,8 +147,8 @@ def oncoming_side(tracks: Iterable[tuple[Sequence[Sighting], Heading]]) -> int:
 
 
 def guessed(sightings: Sequence[Sighting], side: int) -> tuple[Sighting, ...]:
-    """A track of unknown heading as its side of the road drives, where it stands along the road. side: of oncoming
-    traffic, as ``oncoming_side`` gives it."""
+    """A track of unknown heading gets the heading of traffic on its side of the road, if it stands along the road.
+    side: of oncoming traffic, as returned by ``oncoming_side``."""
     placed = [each.cuboid for each in sightings if each.cuboid is not None]
     if not placed:
         return tuple(sightings)
@@ -158,7 +160,7 @@ def guessed(sightings: Sequence[Sighting], side: int) -> tuple[Sighting, ...]:
 
 
 def travelled(sightings: Sequence[Sighting], poses: Mapping[int, Pose]) -> Travelled:
-    """Over the ground. sightings: by ascending frame, their cuboids facing one way."""
+    """Motion over ground. sightings: by ascending frame, with consistent headings."""
     along_m = own_m = time_s = 0.0
     steps: list[float] = []
     placed = [each for each in sightings if each.cuboid is not None and each.frame in poses]
@@ -179,7 +181,7 @@ def travelled(sightings: Sequence[Sighting], poses: Mapping[int, Pose]) -> Trave
 
 
 def _speeds(frames: Sequence[int], moments: Mapping[int, Moment]) -> dict[int, float | None]:
-    """Own speed at every frame; where nothing measured it, the one nearest in time within ``_HELD_S``."""
+    """Own speed at every frame; if not measured, the one nearest in time within ``_HELD_S``."""
     found: dict[int, float | None] = {}
     away_ns: dict[int, int] = {}
     for order in (frames, frames[::-1]):
@@ -194,7 +196,8 @@ def _speeds(frames: Sequence[int], moments: Mapping[int, Moment]) -> dict[int, f
 
 
 def _aligned(sightings: Sequence[Sighting], poses: Mapping[int, Pose]) -> list[Sighting]:
-    """Every cuboid turned so that its front is on the side of the one before: nothing turns round between frames."""
+    """Every cuboid rotated so that its front is on the same side as in the previous sighting: nothing reverses between
+    frames."""
     aligned: list[Sighting] = []
     last: Sighting | None = None
     for each in sightings:
@@ -207,8 +210,7 @@ def _aligned(sightings: Sequence[Sighting], poses: Mapping[int, Pose]) -> list[S
 
 
 def _turn_rad(a: Sighting, b: Sighting, poses: Mapping[int, Pose]) -> float:
-    """How much farther left than a sighting a later one faces, over the ground where own motion between them is
-    known."""
+    """Rotation to the left from one sighting to a later one, over ground if own motion between them is known."""
     assert a.cuboid is not None
     assert b.cuboid is not None
     turn_rad = b.cuboid.yaw_rad - a.cuboid.yaw_rad

@@ -31,11 +31,11 @@ Track = Mapping[int, Sighting]
 def put_keyframe(
     track: Track, sighting: Sighting, t_ns: Sequence[int], *, interpolate: bool = True
 ) -> dict[int, Sighting]:
-    """The track with a keyframe where a person put it. t_ns: of every frame of the recording.
+    """The track with a keyframe set by a person. t_ns: of every frame of the recording.
 
-    Frames without a sighting stay so, but for those between a frame that is new and what the track had before or after
-    it. interpolate: others follow; else the one frame changes. BadInput where others would follow over a step back of
-    the clock.
+    Frames without a sighting stay without, except those between a new frame and the nearest existing sightings.
+    interpolate: neighbouring frames follow; otherwise only this frame changes. BadInput if frames would follow across a
+    step back in time.
     """
     frame = sighting.frame
     put = {**track, frame: replace(sighting, keyframe=True)}
@@ -49,24 +49,25 @@ def put_keyframe(
 
 
 def drop_keyframe(track: Track, frame: int, t_ns: Sequence[int]) -> dict[int, Sighting]:
-    """The track with one keyframe less: there it follows the others, or stays as it is when none is beyond it.
-    BadInput where the clock steps back between these."""
+    """The track with one keyframe removed: the frame then follows the others, or stays unchanged if there is none
+    beyond it. BadInput if time steps back between these."""
     return _ordered(_between({**track, frame: replace(track[frame], keyframe=False)}, t_ns))
 
 
 def resized(cuboid: Cuboid, size: tuple[float, float, float]) -> Cuboid:
-    """With another size; its point nearest to the ego origin, as seen from above, and its bottom stay where they are:
-    what the sensors saw is the near side."""
+    """The cuboid with another size; its point nearest to the ego origin, seen from above, and its bottom stay in place,
+    because the sensors saw the near side."""
     (x, y, z), (length, width, height), yaw_rad = cuboid
     c, s = math.cos(yaw_rad), math.sin(yaw_rad)
-    along = _clipped(-(x * c + y * s) / (length / 2))  # where that point is: −1 on the rear or right side, 1 opposite
+    # relative position of that point: −1 on the rear or right side, 1 opposite
+    along = _clipped(-(x * c + y * s) / (length / 2))
     across = _clipped((x * s - y * c) / (width / 2))
     dl, dw = along * (length - size[0]) / 2, across * (width - size[1]) / 2
     return Cuboid((x + dl * c - dw * s, y + dl * s + dw * c, z + (size[2] - height) / 2), size, yaw_rad)
 
 
 def _between(track: dict[int, Sighting], t_ns: Sequence[int]) -> dict[int, Sighting]:
-    """Every cuboid between two keyframes anew. A keyframe that only the image shows ends what is followed."""
+    """Recomputes every cuboid between two keyframes. A keyframe that is only in the image ends the interpolation."""
     for run in _runs(track):
         inside = [f for f in track if run[0] < f < run[-1] and not track[f].keyframe]
         if inside:
@@ -76,7 +77,7 @@ def _between(track: dict[int, Sighting], t_ns: Sequence[int]) -> dict[int, Sight
 
 
 def _runs(track: Track) -> list[list[int]]:
-    """Keyframes with a cuboid, in order, parted where one has none."""
+    """Keyframes with a cuboid, in order, split at keyframes without one."""
     runs: list[list[int]] = [[]]
     for frame in sorted(f for f, each in track.items() if each.keyframe):
         if track[frame].cuboid is None:
@@ -87,7 +88,7 @@ def _runs(track: Track) -> list[list[int]]:
 
 
 def _follow(keys: Sequence[tuple[int, Cuboid]], at_ns: Sequence[int]) -> list[Cuboid]:
-    """Cuboids between given ones, at times within theirs."""
+    """Cuboids interpolated between given ones, at times within their range."""
     _require_forward([t for t, _ in keys])
     start = keys[0][0]
     times = np.array([t - start for t, _ in keys]) / 1e9
@@ -104,7 +105,7 @@ def _follow(keys: Sequence[tuple[int, Cuboid]], at_ns: Sequence[int]) -> list[Cu
 
 
 def _joined(track: dict[int, Sighting], frame: int, t_ns: Sequence[int]) -> dict[int, Sighting]:
-    """The frames between a new sighting and the nearest ones the track has on either side."""
+    """Adds the frames between a new sighting and the track's nearest ones on either side."""
     before = max((f for f in track if f < frame), default=None)
     after = min((f for f in track if f > frame), default=None)
     for first, last in ((before, frame), (frame, after)):
@@ -124,8 +125,8 @@ def _joined(track: dict[int, Sighting], frame: int, t_ns: Sequence[int]) -> dict
 
 
 def _shifted_beyond(track: dict[int, Sighting], old: Sighting, frame: int) -> dict[int, Sighting]:
-    """What lies beyond the outermost keyframe, on each side on which ``frame`` is that, moved, turned and sized as it
-    was."""
+    """If ``frame`` is the outermost keyframe on a side, the frames beyond it are moved, rotated and resized in the same
+    way."""
     new = track[frame].cuboid
     if old.cuboid is None or new is None or old.cuboid == new:
         return track
@@ -144,8 +145,8 @@ def _shifted_beyond(track: dict[int, Sighting], old: Sighting, frame: int) -> di
 
 
 def _boxes_after(track: dict[int, Sighting], old: Sighting, frame: int, t_ns: Sequence[int]) -> dict[int, Sighting]:
-    """Image boxes corrected as the one in ``frame`` was: less and less towards the next keyframe, all the way where
-    there is none."""
+    """Image boxes corrected in the same way as the one in ``frame``: decreasing towards the next keyframe, or
+    completely if there is none."""
     new = track[frame].bbox
     if old.bbox is None or new is None or old.bbox == new:
         return track
@@ -164,7 +165,7 @@ def _boxes_after(track: dict[int, Sighting], old: Sighting, frame: int, t_ns: Se
 
 
 def _share(t_ns: Sequence[int], first: int, frame: int, last: int) -> float:
-    """How far ``frame`` is in time from ``first`` (0) to ``last`` (1)."""
+    """Relative position of ``frame`` in time, from ``first`` (0) to ``last`` (1)."""
     _require_forward([t_ns[f] for f in sorted((first, last))])
     return (t_ns[frame] - t_ns[first]) / (t_ns[last] - t_ns[first])
 
@@ -185,7 +186,7 @@ def _clipped(value: float) -> float:
 
 
 def _wrapped(angle_rad: float) -> float:
-    """In (−π, π]; one that already is stays the very number."""
+    """In (−π, π]; a value in this range is returned unchanged."""
     if -math.pi < angle_rad <= math.pi:
         return angle_rad
     return math.pi - (math.pi - angle_rad) % (2.0 * math.pi)

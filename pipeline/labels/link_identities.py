@@ -19,7 +19,7 @@ from pipeline.types import F64
 from pipeline.types.source import TruthObject
 
 MAX_GAP_S = TimeParams().reset_gap_s
-"""A longer gap begins another clip (``pipeline.common.clips``), so nothing is compared across it."""
+"""A longer gap starts another clip (``pipeline.common.clips``), so nothing is linked across it."""
 _LINK_M, _LINK_MPS = 2.0, 10.0
 _FIRST_MPS, _FIRST_ASIDE_M = 50.0, 1.0
 _NEVER = 1e6
@@ -27,8 +27,7 @@ _STILL = np.zeros(2)
 
 
 def linked(labelled: Mapping[int, tuple[TruthObject, ...]]) -> dict[int, tuple[TruthObject, ...]]:
-    """Labels with an identity over time, by tick, counted from 1. labelled: in recorded order, also where times run
-    back."""
+    """Labels with track ids, by tick; ids start at 1. labelled: in recorded order, even if times go back."""
     given = 0
     before: tuple[TruthObject, ...] = ()
     speeds: dict[int, F64] = {}
@@ -52,11 +51,11 @@ def linked(labelled: Mapping[int, tuple[TruthObject, ...]]) -> dict[int, tuple[T
 def _links(
     before: tuple[TruthObject, ...], now: tuple[TruthObject, ...], speeds: Mapping[int, F64], gap_s: float
 ) -> dict[int, int]:
-    """Places in ``now`` to the ids they go on with. speeds: (2,) m/s by id, of those whose is known."""
+    """Indices in ``now`` to the ids that they continue. speeds: (2,) m/s by id, if known."""
     if not before or not now:
         return {}
     cost = _costs(before, now, speeds, gap_s)
-    from scipy.optimize import linear_sum_assignment  # 0.2 s to import: most labels have tracks already
+    from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import, and most labels already have tracks
 
     rows, columns = linear_sum_assignment(cost)
     return {int(n): before[k].id for k, n in zip(rows, columns, strict=True) if cost[k, n] < _NEVER}  # type: ignore[misc]
@@ -65,7 +64,7 @@ def _links(
 def _costs(
     before: tuple[TruthObject, ...], now: tuple[TruthObject, ...], speeds: Mapping[int, F64], gap_s: float
 ) -> F64:
-    """(before, now) how far, metres, each is from where each should be; ``_NEVER`` where it cannot be that one."""
+    """(before, now) distance of each object from its predicted position, metres; ``_NEVER`` for impossible pairs."""
     were, are = (np.array([_place(each) for each in items]) for items in (before, now))
     moved = np.array([speeds.get(each.id or 0, _STILL) for each in before]) * gap_s
     off = are[None] - were[:, None] - moved[:, None]

@@ -14,16 +14,16 @@ from pipeline.common.geometry import Cuboid
 from pipeline.types import Box, Point2
 
 State = Literal["proposed", "accepted", "corrected", "rejected"]
-"""proposed: nobody has looked yet. corrected: a person changed what was proposed. rejected: a person said it is not so;
-it is kept, so that it is not proposed again."""
+"""proposed: not reviewed yet. corrected: a person changed the proposal. rejected: a person marked it as wrong; it is
+kept, so that it is not proposed again."""
 
 
 Heading = Literal["", "motion", "lane", "unknown"]
-"""What told the front of proposed cuboids from their rear: how the vehicle moved, or the lane it is in. unknown:
-nothing did, and somebody has to look. Empty where a person or a file has said it."""
+"""Source of the heading of proposed cuboids: the vehicle's motion, or its lane. unknown: undetermined, a person must
+check it. Empty if it was set by a person or a file."""
 
 FARTHEST_LEAD_M = 60.0
-"""A vehicle in the path that is farther away is not asked for: ``none`` says that nothing nearer is in the path."""
+"""Vehicles in the path beyond this distance need no label: ``none`` means that nothing nearer is in the path."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Origin:
     """Who made a label."""
 
     maker: Literal["pipeline", "person", "import"]
-    """What kind of maker it is."""
+    """Type of author."""
     name: str
     """The person, or the file or run that it came from."""
     t_unix_ms: int
@@ -41,7 +41,7 @@ class Origin:
     calibration: str | None = None
     """Digest of the calibration that the pipeline ran with; None for the other makers."""
     how: str = ""
-    """What its place was measured by, where a person only pointed at it; empty otherwise."""
+    """How its position was measured if a person only pointed at it; empty otherwise."""
 
 
 @dataclass(frozen=True)
@@ -51,22 +51,23 @@ class Sighting:
     frame: int
     """Which one."""
     cuboid: Cuboid | None
-    """In the ego frame; None where only the image shows it."""
+    """In the ego frame; None if it is only seen in the image."""
     bbox: Box | None = None
-    """Pixels of the raw image; None where only the LiDAR shows it."""
+    """Pixels of the raw image; None if only the LiDAR sees it."""
     keyframe: bool = True
-    """Put there by a person or an import; otherwise interpolated between keyframes."""
+    """Set by a person or an import; otherwise interpolated between keyframes."""
     box_set: bool = False
-    """A person or a file says what the box is; else it follows the cuboid, if there is one (``boxes.following``)."""
+    """Whether a person or a file set the box; otherwise it follows the cuboid, if there is one
+    (``boxes.following``)."""
     truncation: float | None = None
-    """The share of it, 0–1, that lies outside the image; None where nobody said it."""
+    """Share of it, 0–1, outside the image; None if unknown."""
     occlusion: int | None = None
-    """0 visible, 1 partly, 2 largely hidden; None where nobody said it."""
+    """0 visible, 1 partly, 2 largely hidden; None if unknown."""
 
 
 @dataclass(frozen=True)
 class Attribute:
-    """What is said of a track in some frames, by the project's class list."""
+    """An attribute of a track in some frames, as defined by the project's class list."""
 
     first: int
     """First frame."""
@@ -75,7 +76,7 @@ class Attribute:
     name: str
     """``motion``, ``brake lights``, …"""
     value: str
-    """One of those that the list has for it."""
+    """One of the values in the class list."""
 
 
 @dataclass(frozen=True)
@@ -87,24 +88,24 @@ class LabelTrack:
     label: str
     """Class name as in ``pipeline.types.VEHICLES`` and COCO."""
     sightings: tuple[Sighting, ...]
-    """By ascending frame, at most one a frame."""
+    """By ascending frame, at most one per frame."""
     state: State
-    """Whether somebody has looked at it, and what they said."""
+    """State of the review."""
     origin: Origin
     """Who made it."""
     comment: str = ""
-    """What whoever sent it back wants to have looked at."""
+    """Comment of the person who sent it back."""
     reviewer: str = ""
-    """Who approved it, another person than who made it; empty while nobody has, and again once it is changed."""
+    """Who approved it, never its author; empty until then, and after every change."""
     confidence: float | None = None
-    """Of a proposal, 0–1: how sure it is a road user at all; None where that was not asked."""
+    """For a proposal, 0–1: probability that it is a road user; None if not computed."""
     heading: Heading = ""
-    """What told its front from its rear."""
+    """Source of the heading."""
     attributes: tuple[Attribute, ...] = ()
-    """By name and first frame; those of one name do not overlap."""
+    """Sorted by name and first frame; those with the same name do not overlap."""
 
     def at(self, frame: int) -> Sighting | None:
-        """Its sighting in a frame; None where it is not labelled."""
+        """Its sighting in a frame; None if it is not labelled there."""
         return next((each for each in self.sightings if each.frame == frame), None)
 
 
@@ -115,7 +116,7 @@ when it is unclear."""
 
 @dataclass(frozen=True)
 class LeadRange:
-    """Who is the closest in-path vehicle in some frames. Ranges do not overlap."""
+    """The closest in-path vehicle in some frames. Ranges do not overlap."""
 
     first: int
     """First frame."""
@@ -135,14 +136,14 @@ class LeadRange:
 
 @dataclass(frozen=True)
 class PathLabel:
-    """The ego path of one frame where the pipeline's is wrong or missing."""
+    """The ego path of one frame if the pipeline's is wrong or missing."""
 
     frame: int
     """Which one."""
     left: tuple[Point2, ...] | None
-    """Its left edge: ego x, y from the bumper on; None where only the other one was drawn."""
+    """Its left edge: ego x, y, starting at the bumper; None if only the right one was drawn."""
     right: tuple[Point2, ...] | None
-    """Its right edge, likewise."""
+    """Its right edge, in the same form."""
     state: State
     """As of a track."""
     origin: Origin
@@ -162,7 +163,7 @@ class EventLabel:
     kind: str
     """``cut_in``, ``cut_out``, or another word."""
     tracks: tuple[int, ...]
-    """Who takes part."""
+    """Ids of the tracks involved."""
     state: State
     """As of a track."""
     origin: Origin
@@ -174,14 +175,14 @@ class EventLabel:
 
 
 WHOLE_TAG = "all labelled"
-"""By this tag a person says that every vehicle of frames is labelled."""
+"""Tag by which a person confirms that every vehicle in these frames is labelled."""
 NEXT_TAG = "label next"
 """Frames with this tag are in the labeling queue until their lead is labelled."""
 
 
 @dataclass(frozen=True)
 class FrameTag:
-    """A word about some frames."""
+    """A tag of some frames."""
 
     first: int
     """First frame."""
@@ -206,12 +207,12 @@ class LabelSet:
     tracks: tuple[LabelTrack, ...] = ()
     """Vehicles and persons."""
     leads: tuple[LeadRange, ...] = ()
-    """Who the lead is."""
+    """Which vehicle leads, by ranges of frames."""
     paths: tuple[PathLabel, ...] = ()
-    """Where the car goes."""
+    """Corrected ego paths."""
     events: tuple[EventLabel, ...] = ()
     """What happens."""
     tags: tuple[FrameTag, ...] = ()
-    """What is said of frames."""
+    """Tags of frames."""
     name: str = "working"
-    """Of a frozen version, else ``working``."""
+    """Name of a frozen version, else ``working``."""

@@ -16,18 +16,18 @@ from pipeline.labels.formats.base import LabeledDrive
 from pipeline.labels.model import LabelSet, LabelTrack, Sighting
 
 LONGEST_STEP_S = 0.5
-"""Frames farther apart in time say nothing of jumps."""
+"""Jumps are not checked between frames farther apart in time."""
 _MOST_TURN_DEG_S = 60.0
-"""A car at its tightest turns by about 45°/s."""
+"""A car in its tightest turn rotates by about 45°/s."""
 _LEAST_TURN_DEG = 10.0
-"""What a hand is off by."""
+"""Accuracy of manual labels."""
 _MOST_ACCELERATION_MPS2 = 15.0
-"""Between two vehicles that both brake or drive off as hard as they can."""
+"""Maximum relative acceleration, with two vehicles braking or accelerating at their limits."""
 _LEAST_STEP_M = 1.0
-"""By which a centre may be off its way: two cuboids drawn half a metre wrong, to either side."""
+"""Tolerance for a centre's deviation from a smooth path: two cuboids drawn half a metre off in opposite directions."""
 _MOST_GROWTH_M = 0.3
 _MOST_OVERLAP = 0.1
-"""Of the smaller footprint."""
+"""Share of the smaller footprint."""
 _LEAST_BOX_IOU = 0.3
 
 
@@ -36,15 +36,16 @@ class Problem:
     """Something implausible in labels."""
 
     frame: int
-    """Where to look."""
+    """The frame to show."""
     track: int | None
-    """What to select; None where it is about the lead alone."""
+    """The track to select; None if only the lead is concerned."""
     words: str
     """One sentence for the person who labels."""
 
 
 def problems(labels: LabelSet, drive: LabeledDrive) -> list[Problem]:
-    """By frame. Proposals and rejected labels are passed over; so are frames more than ``LONGEST_STEP_S`` apart."""
+    """Problems by frame. Proposals and rejected labels are not checked; nor are frames more than ``LONGEST_STEP_S``
+    apart."""
     tracks = [track for track in labels.tracks if track.state in ("accepted", "corrected")]
     found = [
         *(each for track in tracks for each in _of_track(track, drive.t_ns)),
@@ -72,7 +73,7 @@ def _of_track(track: LabelTrack, t_ns: Sequence[int]) -> Iterator[Problem]:
 
 
 def _jumps(track: LabelTrack, seen: list[tuple[int, Cuboid]], t_ns: Sequence[int]) -> Iterator[Problem]:
-    """Where three frames in a row are no smooth way."""
+    """Positions in three consecutive frames that do not form a smooth path."""
     for (f0, a), (f1, b), (f2, c) in zip(seen, seen[1:], seen[2:], strict=False):
         first_s, second_s = (t_ns[f1] - t_ns[f0]) / 1e9, (t_ns[f2] - t_ns[f1]) / 1e9
         if not (0.0 < first_s <= LONGEST_STEP_S and 0.0 < second_s <= LONGEST_STEP_S):
@@ -99,14 +100,14 @@ def _overlaps(tracks: Sequence[LabelTrack]) -> Iterator[Problem]:
 
 
 def _overlap(a: Cuboid, b: Cuboid) -> float:
-    """The common area of two footprints, as a share of the smaller."""
+    """The common area of two footprints as a share of the smaller one."""
     one, other = (np.asarray(each.footprint(), dtype=np.float32) for each in (a, b))
     common, _ = cv2.intersectConvexConvex(one, other)
     return float(common) / min(each.size[0] * each.size[1] for each in (a, b))
 
 
 def _boxes_apart(tracks: Sequence[LabelTrack], drive: LabeledDrive) -> Iterator[Problem]:
-    """Boxes that somebody set, away from where the cuboid is in the image."""
+    """Manually set boxes that differ from the projected cuboid."""
     for track in tracks:
         for each in track.sightings:
             if each.box_set and each.cuboid is not None and each.bbox is not None and _is_apart(each, drive):

@@ -32,27 +32,27 @@ from pipeline.types import VEHICLES, Box
 
 ROAD_USERS = VEHICLES | {"person", "bicycle"}
 NAMELESS = "car"
-"""What the LiDAR alone has seen is most often that."""
+"""Class of objects seen only by the LiDAR; the most common one."""
 _SAME_M = 2.0
 _SAME_IOU = 0.4
 _SAME_SHARE = 0.5
 _LARGE = 0.9
-"""Of a track's sightings are smaller: single ones take in what stands beside."""
+"""Quantile of a track's sightings used as its size: single ones include neighbouring objects."""
 _FEWEST = 2
-"""Seen once and never again is mostly noise: where it lies is not proposed."""
+"""Objects seen only once are mostly noise and are not proposed."""
 _FEWEST_STEPS = 5
-"""Half a second at 10 Hz: for less, a cluster that flickers along a wall drives as well."""
+"""Half a second at 10 Hz: over a shorter time, even a cluster that flickers along a wall seems to move."""
 _NARROWEST_M, _LOWEST_M = 1.2, 0.5
-"""The rear of the smallest car as it is seen: 1.4 m wide at the bumper (kei cars: 1.48 m), less a beam's spacing."""
+"""Visible rear of the smallest car: 1.4 m wide at the bumper (kei cars: 1.48 m), minus a beam's spacing."""
 _RIGID, _ONE_BODY = 0.25, 0.5
-"""What is seen of a body changes slowly from sweep to sweep. By more than half of it (standard deviation of height or
-longest side, over the median) it is another body under the same number, and its way is none; by less than a quarter it
-is one even without a camera. Measured on Astyx: 0.04 to 0.19 on vehicles seen often, 0.4 and more on flickering walls
-and hedges, 0.8 where a track had jumped from car to car."""
+"""The visible extent of a rigid body changes slowly from sweep to sweep. If it varies by more than half (standard
+deviation of height or longest side over the median), the track switched between bodies and its motion is not valid;
+below a quarter it is one body, even without a camera. Measured on Astyx: 0.04 to 0.19 on vehicles seen often, 0.4 and
+more on flickering walls and hedges, 0.8 for a track that jumped from car to car."""
 _NAMELESS_WEIGHT = 0.5
-"""Something that drives and is called nothing may be a vehicle or not: nothing says more."""
+"""A moving object without a class may or may not be a vehicle; there is no further evidence."""
 _OVER = 1.25
-"""How far, as a factor, a cluster may be wider or taller than the largest of its class: an open door, a branch."""
+"""Factor by which a cluster may be wider or taller than the largest vehicle of its class: an open door, a branch."""
 
 
 @dataclass(frozen=True)
@@ -60,29 +60,29 @@ class Seen:
     """An object of one frame's result."""
 
     id: int
-    """Of the object in the run."""
+    """Object id in the run."""
     label: str | None
-    """The camera's class; None when only the LiDAR has seen it."""
+    """The camera's class; None if only the LiDAR has seen it."""
     cuboid: Cuboid | None
     """In the ego frame; None without a LiDAR cluster."""
     bbox: Box | None
     """In image pixels; None without a camera track."""
     in_path: bool
-    """Whether the run took it to be in the ego path."""
+    """Whether it was in the ego path in the run."""
     carried: bool
-    """Predicted, not seen in this frame."""
+    """Predicted instead of seen in this frame."""
     score: float | None = None
-    """The detector's score of its class, 0–1; None for what the camera does not see."""
+    """The detector's score of its class, 0–1; None if the camera does not see it."""
 
 
 @dataclass(frozen=True)
 class Proposals:
-    """Tracks under the run's own numbers, and who leads."""
+    """Tracks under the run's own ids, and leads."""
 
     tracks: tuple[LabelTrack, ...]
     """Vehicles, one per object that was seen often enough."""
     leads: tuple[LeadRange, ...]
-    """Who the run followed; ranges do not overlap."""
+    """The leads of the run; ranges do not overlap."""
 
 
 def propose(
@@ -91,13 +91,13 @@ def propose(
     origin: Origin,
     moments: Mapping[int, Moment] | None = None,
 ) -> Proposals:
-    """Tracks and who leads, from a run.
+    """Tracks and leads from a run.
 
     Args:
-        frames: what was seen in each, by index.
-        leads: the CIPV's number of each frame, None for none.
-        origin: of what is proposed.
-        moments: what the car was doing at each frame. Without it nothing is known to drive, and no frame to be empty.
+        frames: objects seen in each frame, by index.
+        leads: the CIPV's id in each frame, None for none.
+        origin: of the proposals.
+        moments: own motion at each frame. Without it, no object is known to move, and no frame to be empty.
     """
     by_id: dict[int, dict[int, Seen]] = {}
     for index in sorted(frames):
@@ -118,8 +118,8 @@ def propose(
 
 
 def known_as(proposals: Sequence[LabelTrack], known: Sequence[LabelTrack]) -> dict[int, int]:
-    """Which proposals are vehicles that are labelled already, one to one: their numbers there. Two are the same when
-    they are in the same place, ego frame or image, in half of the frames that both are in."""
+    """Proposals that match labelled vehicles, one-to-one: the ids of these. Two tracks match if they are at the same
+    place, in the ego frame or the image, in half of their common frames."""
     there = {(track.id, each.frame): each for track in known for each in track.sightings}
     by_frame: dict[int, list[int]] = {}
     for number, frame in there:
@@ -145,7 +145,7 @@ def known_as(proposals: Sequence[LabelTrack], known: Sequence[LabelTrack]) -> di
 
 
 def _track(number: int, life: Mapping[int, Seen], poses: Mapping[int, Pose], origin: Origin) -> LabelTrack | None:
-    """None for what is not proposed."""
+    """None if it is not proposed."""
     seen = [index for index, each in life.items() if not each.carried]
     names = [each.label for each in life.values() if each.label in ROAD_USERS]
     if not seen:
@@ -169,8 +169,8 @@ def _track(number: int, life: Mapping[int, Seen], poses: Mapping[int, Pose], ori
 
 
 def _drives(seen: Sequence[Sighting], poses: Mapping[int, Pose]) -> bool:
-    """Whether it surely drove over the ground, and is as large as a vehicle. Clusters of things that are longer than
-    what we see of them seem to drive along with us, but are larger, or crumbs."""
+    """Whether it certainly moved over ground and is as large as a vehicle. Clusters of objects longer than their
+    visible part seem to move along with us, but are larger, or fragments."""
     sizes = np.array([each.cuboid.size for each in seen if each.cuboid is not None]).reshape(-1, 3)
     if len(sizes) <= _FEWEST_STEPS:
         return False
@@ -182,7 +182,7 @@ def _drives(seen: Sequence[Sighting], poses: Mapping[int, Pose]) -> bool:
 
 
 def _spread(seen: Sequence[Sighting]) -> float:
-    """How much the seen height or longest side varies, as a share of its median; 0 for a single cuboid."""
+    """Variation of the visible height or longest side, as a share of its median; 0 for a single cuboid."""
     sizes = np.array([each.cuboid.size for each in seen if each.cuboid is not None]).reshape(-1, 3)
     if not len(sizes):
         return 0.0
@@ -191,8 +191,8 @@ def _spread(seen: Sequence[Sighting]) -> float:
 
 
 def _confidence(seen: Sequence[Seen], *, drives: bool) -> float:
-    """How sure it is a road user, 0–1: the mean score of its sightings, a nameless one counts 0, as if it had been
-    looked for once more and not found (Laplace's rule of succession); and that it drives."""
+    """Probability that it is a road user, 0–1: from the mean score of its sightings, where one without a class counts
+    as 0, with one additional miss (Laplace's rule of succession); and from its motion."""
     scores = [(each.score or 0.0) if each.label in ROAD_USERS else 0.0 for each in seen]
     by_name = sum(scores) / (len(scores) + 1)
     by_motion = _NAMELESS_WEIGHT if drives else 0.0
@@ -200,7 +200,7 @@ def _confidence(seen: Sequence[Seen], *, drives: bool) -> float:
 
 
 def _of_class(cuboid: Cuboid | None, label: str) -> Cuboid | None:
-    """None for one that no vehicle of a class fills."""
+    """None if the cuboid is too large for a vehicle of this class."""
     if cuboid is None:
         return None
     (length, width, height), (longest, widest, tallest) = cuboid.size, largest_size_m(label)
@@ -209,9 +209,9 @@ def _of_class(cuboid: Cuboid | None, label: str) -> Cuboid | None:
 
 
 def _whole(sightings: tuple[Sighting, ...], label: str) -> tuple[Sighting, ...]:
-    """The same track with cuboids of one size, between the usual and the largest one of its class.
+    """The same track with cuboids of one size, between the usual and the largest of its class.
 
-    The pipeline measures what was seen of a vehicle, often its rear alone. The side that was seen stays in place.
+    The pipeline measures the visible part of a vehicle, often only its rear. The visible side stays in place.
     """
     seen = np.array([each.cuboid.size for each in sightings if each.cuboid is not None]).reshape(-1, 3)
     if not len(seen):
@@ -225,7 +225,7 @@ def _whole(sightings: tuple[Sighting, ...], label: str) -> tuple[Sighting, ...]:
 
 
 def _lead(lead: int | None, kept: set[int], seen: Sequence[Seen], moment: Moment | None) -> Lead:
-    """Who is proposed to lead. kept: the tracks that are proposed. seen: in that frame."""
+    """The proposed lead. kept: the proposed tracks. seen: objects in that frame."""
     if lead is not None:
         return lead if lead in kept else "unknown"
     is_free = not any(each.in_path and not each.carried and each.label in VEHICLES for each in seen)
@@ -252,6 +252,6 @@ def _is_same(a: Sighting, b: Sighting) -> bool:
 
 
 def _apart_m(a: Cuboid, b: Cuboid) -> float:
-    """From middle to middle, less half of what their sizes differ by: one may be only what is seen of a car."""
+    """Distance of the centres, minus half the difference of their sizes: one may be only the visible part of a car."""
     slack_m = max(abs(a.size[0] - b.size[0]), abs(a.size[1] - b.size[1])) / 2
     return max(float(np.hypot(a.center[0] - b.center[0], a.center[1] - b.center[1])) - slack_m, 0.0)

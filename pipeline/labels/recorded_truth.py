@@ -19,7 +19,7 @@ def truth_labels(
     origin: Origin,
     progress: Callable[[int, int], object] = lambda done, total: None,
 ) -> tuple[LabelSet, tuple[str, ...]]:
-    """(labels, what is to be said of them). frames: the names of the recording's frames."""
+    """(labels, notes about them). frames: the names of the recording's frames."""
     stamps = tuple(source.t_ns(index) for index in range(len(frames)))
     objects: dict[int, tuple[TruthObject, ...]] = {}
     for index in range(len(frames)):
@@ -34,9 +34,9 @@ def truth_labels(
 def tracks_of(
     objects: Mapping[int, tuple[TruthObject, ...]], t_ns: Sequence[int], origin: Origin
 ) -> tuple[LabelTrack, ...]:
-    """Labelled objects of frames as tracks, accepted. t_ns: of all frames of the recording.
+    """Labelled objects of frames as accepted tracks. t_ns: of all frames of the recording.
 
-    Objects that have an id are a track each over all frames; those without are linked over frames by nearness.
+    Objects with an id become one track over all frames; those without are linked over frames by distance.
     """
     known: dict[int, tuple[str, list[Sighting]]] = {}
     for index, found in sorted(objects.items()):
@@ -55,7 +55,7 @@ def tracks_of(
 
 
 def renamed(kinds: Iterable[tuple[str, str]]) -> list[str]:
-    """A sentence for each word of labels that is another class here. kinds: that word and the class, of each object."""
+    """A sentence for each label name that maps to another class here. kinds: name and class of each object."""
     return [f"{count:,} {kind} are read as class {label!r}" for (kind, label), count in sorted(Counter(kinds).items())]
 
 

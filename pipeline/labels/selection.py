@@ -8,12 +8,12 @@ from typing import Literal
 from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, LeadRange, PathLabel
 
 Selection = Literal["all", "accepted", "reviewed"]
-"""accepted: accepted or corrected by a person or a file. reviewed: found right by a second person, too."""
+"""accepted: accepted or corrected by a person or a file. reviewed: also approved by a second person."""
 
 
 def selected(labels: LabelSet, what: Selection) -> LabelSet:
-    """The set without the others; its name says so. A lead or event of a track that is left out goes with it, since it
-    would name nothing."""
+    """The set without the others; its name includes the selection. Leads and events of removed tracks are removed as
+    well."""
     if what == "all":
         return labels
 

@@ -16,8 +16,8 @@ LARGEST_SIDE_M = 200.0
 
 
 def check(labels: LabelSet, what: str) -> LabelSet:
-    """The set itself. BadInput, beginning with ``what``, for the first thing that cannot be: a number that is not
-    finite or beyond all measure, a frame outside the recording, two tracks of one id, leads that overlap."""
+    """Returns the set. BadInput, beginning with ``what``, for the first invalid value: a number that is not finite or
+    out of bounds, a frame outside the recording, two tracks with the same id, leads that overlap."""
     try:
         _check_frames(labels)
         _check_tracks(labels)
@@ -40,7 +40,7 @@ def check(labels: LabelSet, what: str) -> LabelSet:
 
 
 def check_sighting(sighting: Sighting, what: str) -> Sighting:
-    """The sighting itself. BadInput, beginning with ``what``, when it cannot be."""
+    """Returns the sighting. BadInput, beginning with ``what``, if it is invalid."""
     wrong = _wrong_with(sighting)
     if wrong:
         raise BadInput(f"{what}: {wrong}")
@@ -77,7 +77,7 @@ def _check_track(track: LabelTrack, count: int) -> None:
 
 
 def _wrong_with(sighting: Sighting) -> str:
-    """Empty when nothing is."""
+    """The problem; empty if there is none."""
     if sighting.cuboid is not None:
         center, size, yaw_rad = sighting.cuboid
         if not _below(center, FARTHEST_M):
@@ -120,7 +120,7 @@ def _fits(number: int) -> bool:
 
 
 def _below(values: Iterable[float], limit: float) -> bool:
-    """What is not finite is not."""
+    """False for non-finite values."""
     return all(-limit < value < limit for value in values)
 
 

@@ -4,4 +4,4 @@ from __future__ import annotations
 
 
 class Damaged(Exception):
-    """A message that is not what its topic says; the text is for a frame's notes."""
+    """A message that does not match its topic; the text is added to a frame's notes."""

@@ -16,25 +16,25 @@ from pipeline.recording.session.source import SessionSource
 from pipeline.types.source import Source, SourceError
 
 _GAP_STEPS = 1.5
-"""A gap is a step of more than so many usual ones."""
+"""A gap is a step of more than this many usual steps."""
 
 
 @dataclass(frozen=True)
 class Rhythm:
-    """How something came over time."""
+    """Timing of a sequence of messages."""
 
     count: int
     """Number of messages."""
     first_ns: int | None
     """None for none."""
     last_ns: int | None
-    """None for none."""
+    """Sum of all steps, except those back in time."""
     duration_s: float
     """All steps together, but those back in time."""
     rate_hz: float | None
-    """Over the whole of it; None for fewer than two or all at once."""
+    """Mean rate; None for fewer than two messages or if all have the same time."""
     usual_step_s: float | None
-    """The median step, which is shorter than the mean where there are gaps."""
+    """The median step, which is shorter than the mean if there are gaps."""
     gaps: int
     """Steps of more than 1.5 usual ones."""
     longest_gap_s: float | None
@@ -50,44 +50,44 @@ class TopicInfo:
     schema: str
     """Name of its messages' type."""
     encoding: str
-    """Of its messages, such as ``json`` or ``protobuf``."""
+    """Encoding of its messages, such as ``json`` or ``protobuf``."""
     rhythm: Rhythm
-    """By log time, that is when its messages were received."""
+    """By log time, i.e. when its messages were received."""
 
 
 @dataclass(frozen=True)
 class Info:
-    """One MCAP file, ours or not."""
+    """One MCAP file, recorded by this program or another one."""
 
     path: str
     """As it was given."""
     bytes: int
     """Of the file."""
     profile: str
-    """As the file's header names it; empty for none."""
+    """From the file's header; empty for none."""
     duration_s: float
     """From the first message to the last."""
     about: About | None
-    """None for a file that is no session of ours."""
+    """None if the file is not a session."""
     frames: Rhythm | None
-    """By header time, where there are frames."""
+    """By header time; None without frames."""
     topics: tuple[TopicInfo, ...]
     """One for each channel of the file."""
     chunks: int
-    """In all."""
+    """Total number of chunks."""
     damaged_chunks: int
-    """Whose content cannot be read."""
+    """Number of chunks whose content cannot be read."""
     marks: tuple[str, ...]
-    """Put by a person while recording."""
+    """Made by a user during the recording."""
     problem: str | None
-    """What the file lacks; None for a whole one."""
+    """What is missing in the file; None for a complete one."""
     chain: Chain | None
-    """Whether it is as it was written; None when nobody looked."""
+    """Result of the integrity check; None if it was not performed."""
 
 
 def info(path: Path, *, is_quick: bool = False, key: str | None = None) -> Info:
-    """Of any MCAP file; BadInput when it is none. is_quick: reads message indexes, not messages, and leaves ``chain``
-    out, for which all bytes are read. key: the public one that it must be signed with."""
+    """Info about any MCAP file; BadInput if it is not one. is_quick: reads message indexes instead of messages, and
+    leaves out ``chain``, which requires reading all bytes. key: the public key of the expected signature."""
     with McapFile(path) as file:
         times = file.log_times()
         listed = tuple(
@@ -114,12 +114,12 @@ def info(path: Path, *, is_quick: bool = False, key: str | None = None) -> Info:
 
 
 def info_of_source(source: Source) -> Rhythm:
-    """Of any other recording: its frames by header time."""
+    """Timing of the frames of any other recording, by header time."""
     return rhythm(np.array([source.t_ns(index) for index in range(len(source))], dtype=np.int64))
 
 
 def rhythm(stamps_ns: npt.NDArray[np.int64]) -> Rhythm:
-    """Of (N,) times in ns, in the order in which they came; steps back in time count as no step."""
+    """Timing of (N,) times in ns, in order of arrival; steps back in time are not counted."""
     steps = np.diff(stamps_ns)
     steps = steps[steps > 0]
     usual_ns = float(np.median(steps)) if len(steps) else None

@@ -30,18 +30,18 @@ logger = logging.getLogger("cipv.recording")
 
 FLUSH_S, SYNC_S = 1.0, 5.0
 _QUEUED = 64
-"""Six seconds of frames at 10 Hz; with images of 1280×720 that is 200 MB at worst."""
+"""Six seconds of frames at 10 Hz; with images of 1280×720 at most 200 MB."""
 _QUEUED_BYTES = 200_000_000
-"""Of what comes between frames; the JPEGs and clouds of ten seconds are 120 MB."""
+"""For messages between frames; the JPEGs and clouds of ten seconds are 120 MB."""
 _UNPACKED_BYTES, _SMALL_BYTES = 3_000_000, 500
-"""An image of a camera that sends video, and a sample of own motion or GNSS, as they wait."""
+"""Queue size of an image from a camera that sends video, and of a sample of own motion or GNSS."""
 
 _BATCH = 76
-"""A VLP-16 sends about so many packets a rotation."""
+"""A VLP-16 sends about this many packets per rotation."""
 
 _PATIENCE_S = 15.0
-"""A disk that takes nothing for so long at the end is not waited for; one that takes something, however little, is: a
-loaded machine is slow, and that is not the disk's fault."""
+"""At the end, a disk that writes nothing for this long is not waited for. As long as it makes any progress, it is,
+because a loaded machine may be slow."""
 
 _Do = Callable[[Segments], None]
 _Kind = Literal["frames", "packets", "sweeps", "images", "samples"]
@@ -55,25 +55,25 @@ class _Job(NamedTuple):
 
 @dataclass(frozen=True)
 class RecordingState:
-    """How a recording does."""
+    """State of a recording."""
 
     file: Path
     """The newest of ``files``."""
     files: tuple[Path, ...]
     """In order of time."""
     frames: int
-    """Written so far, over all files."""
+    """Number written so far, over all files."""
     seconds: float
-    """Over all files."""
+    """Duration over all files."""
     bytes: int
-    """Over all files."""
+    """Size over all files."""
     dropped: int
-    """Frames, batches of packets, sweeps, images and samples that did not fit."""
+    """Frames, batches of packets, sweeps, images and samples dropped because the queue was full."""
     error: str | None
-    """Why it ended by itself; None while all is well."""
+    """Why it ended by itself; None without an error."""
 
     def to_json(self) -> dict[str, Any]:
-        """As the page and ``/api/recording`` read it."""
+        """In the format of the page and ``/api/recording``."""
         return {
             "file": str(self.file),
             "frames": self.frames,
@@ -85,9 +85,9 @@ class RecordingState:
 
 
 class Recorder:
-    """Starts at once; a ``Tap`` of live sensors too. BadInput when file already exists, OSError when it cannot
-    be made. ``stop`` it in the end. ``queued``: how many frames may wait for the disk. ``raw_lidar``: packets instead
-    of clouds. hangs: whether ``stop`` has given up on the disk."""
+    """Starts at once; also a ``Tap`` for live sensors. BadInput if the file already exists, OSError if it cannot be
+    created. Call ``stop`` at the end. ``queued``: how many frames may wait for the disk. ``raw_lidar``: record packets
+    instead of clouds. hangs: whether ``stop`` has given up waiting for the disk."""
 
     def __init__(
         self,
@@ -121,19 +121,19 @@ class Recorder:
         *,
         received_ns: int | None = None,
     ) -> bool:
-        """Record a frame, what was believed of it and with which parameters. Returns at once; false when it was
-        dropped. received_ns: when a live frame was made, by its source's clock; None for one from a recording."""
+        """Record a frame, its result and its parameters. Returns at once; false if it was dropped. received_ns: when a
+        live frame was made, by its source's clock; None for one from a recording."""
         return self._put(lambda segments: segments.write(frame, result, params, received_ns=received_ns), "frames")
 
     def put_packets(self, packets: list[tuple[int, bytes]]) -> bool:
-        """Record raw LiDAR packets, (when received in ns, payload) each, oldest first; best a sweep's at a time.
-        Returns at once; false when they were dropped."""
+        """Record raw LiDAR packets, (receive time in ns, payload) each, oldest first; preferably one sweep at a time.
+        Returns at once; false if they were dropped."""
         return self._put(lambda segments: segments.write_packets(packets), "packets")
 
-    # ------------------------------------------------------------ what sensors send, each on its own thread
+    # ------------------------------------------------------------ sensor messages, each on the sensor's thread
 
     def packet(self, payload: bytes, arrived_ns: int) -> None:
-        """Where packets are recorded they are written a sweep's at a time."""
+        """If packets are recorded, they are written one sweep at a time."""
         if not self._takes_packets:
             return
         self._batch.append((arrived_ns, payload))
@@ -142,12 +142,12 @@ class Recorder:
             self.put_packets(batch)
 
     def sweep(self, sweep: Sweep, arrived_ns: int) -> None:
-        """Every sweep, not only those of frames; where packets are recorded they hold it already."""
+        """Records every sweep, not only those of frames; not needed if packets are recorded."""
         if not self._takes_packets:
             self._put(lambda segments: segments.write_sweep(sweep, arrived_ns), "sweeps", _bytes_of(sweep))
 
     def image(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
-        """Every image, not only those of frames."""
+        """Records every image, not only those of frames."""
         size = len(shot.encoded) if shot.encoded is not None else _UNPACKED_BYTES
         self._put(lambda segments: segments.write_image(shot, t_ns, arrived_ns), "images", size)
 
@@ -160,8 +160,7 @@ class Recorder:
     # ------------------------------------------------------------
 
     def mark(self, text: str) -> bool:
-        """ "Something happened here", right after what was put last: never dropped. Returns at once; false when
-        recording has ended by itself."""
+        """A user's mark after the last item: never dropped. Returns at once; false if recording has ended by itself."""
         with self._lock:
             if self._error is not None:
                 return False
@@ -183,8 +182,8 @@ class Recorder:
         )
 
     def stop(self) -> RecordingState:
-        """Write what is queued, close the file, and say how it went. Safe to call twice. A disk that hangs is waited
-        for ``_PATIENCE_S`` after the last that it took, and the error says so."""
+        """Write what is queued, close the file, and return the final state. Safe to call twice. If the disk hangs,
+        gives up ``_PATIENCE_S`` after the last progress, and the error reports this."""
         if self._thread.is_alive() and not self.hangs:
             if self._batch:
                 batch, self._batch = self._batch, []
@@ -198,7 +197,7 @@ class Recorder:
         return self.state
 
     def _ends(self) -> bool:
-        """Wait until all is written, or nothing more has been for ``_PATIENCE_S``."""
+        """Wait until everything is written, or there was no progress for ``_PATIENCE_S``."""
         written = None
         while self._thread.is_alive() and written != (now := (self._done, self._segments.bytes_written)):
             written = now
@@ -206,7 +205,7 @@ class Recorder:
         return not self._thread.is_alive()
 
     def _put(self, do: _Do, kind: _Kind, size: int = 0) -> bool:
-        """Queue it, if there is room for one more of its kind, or for so many bytes of what comes between frames."""
+        """Queue it, if there is room for one more of its kind, or for this many bytes of messages between frames."""
         if self._error is not None:
             return False
         with self._lock:
@@ -230,7 +229,7 @@ class Recorder:
             self._write_all()
             self._segments.close()
         except Exception as error:
-            with suppress(Exception):  # nothing to do for a file that can take no more; any other is closed as usual
+            with suppress(Exception):  # nothing to do for a file whose writes fail; any other is closed as usual
                 self._segments.close()
             self._fail(error)
 
@@ -264,7 +263,7 @@ class Recorder:
         self._done += 1
 
     def _note_dropped(self, noted: Counter[_Kind]) -> Counter[_Kind]:
-        """Say in the session what was dropped since. Returns what has been said by now."""
+        """Write a note about newly dropped items to the session. Returns the counts reported so far."""
         with self._lock:
             dropped = self._dropped.copy()
         since = dropped - noted
@@ -274,17 +273,17 @@ class Recorder:
         return dropped
 
     def _write_marks(self) -> None:
-        """Those whose frame is written."""
+        """Write the marks whose frame is written."""
         while self._marks and self._marks[0][0] <= self._done:
             self._segments.write_mark(self._marks.popleft()[1])
 
     def _fail(self, error: Exception) -> None:
-        """Recording ends here; the pipeline goes on."""
+        """Recording ends here; the pipeline continues."""
         reason = (error.strerror if isinstance(error, OSError) else None) or f"{type(error).__name__}: {error}"
         with self._lock:
             self._error = f"recording stopped: {reason}; the {self._segments.kept_frames} frames before are saved"
         logger.error("%s: %s", self._segments.files[-1], self._error)
-        while not self._jobs.empty():  # the frames that wait hold memory
+        while not self._jobs.empty():  # the waiting frames hold memory
             self._jobs.get_nowait()
 
 

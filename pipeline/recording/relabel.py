@@ -31,7 +31,7 @@ _LABELS = topics.channel(topics.LABELS)
 
 
 class _Chained:
-    """What ``mcap.writer`` writes to, which goes on with the chain of the bytes before."""
+    """Output of ``mcap.writer`` that continues the chain of the previous bytes."""
 
     def __init__(self, file: BinaryIO, previous: str) -> None:
         self.file, self.chain = file, ChainWriter(file, previous, configured_signer())
@@ -55,11 +55,11 @@ def relabel(
     progress: Progress = silent,
     drawn: Sequence[Stored] = (),
 ) -> bool:
-    """Write a new file ``out`` with these labels, of header time ``t_ns``, in place of any that were in it. progress:
-    of bytes. drawn: what viewers show of the labels, at the times of its frames. False, and nothing written, where the
-    file's end does not tell enough for that.
+    """Write a new file ``out`` with these labels, of header time ``t_ns``, replacing existing ones. progress: in bytes.
+    drawn: labels in the form shown by viewers, at the times of its frames. False, and nothing is written, if the file's
+    summary is not sufficient.
 
-    BadInput when ``out`` exists; whatever ends this early leaves no file behind.
+    BadInput if ``out`` exists; if this fails, no file is left behind.
     """
     with file.open_again() as source:
         summary = read_summary(source, file.size)
@@ -87,15 +87,15 @@ def relabel(
 
 
 def _first_with_labels(file: McapFile) -> int:
-    """The place of the first chunk that may hold labels; the number of chunks when none does."""
+    """Index of the first chunk that may contain labels; the number of chunks if there is none."""
     numbers = {number for number, channel in file.directory.channels.items() if channel.topic in topics.OF_LABELS}
     chunks = file.directory.chunks
     return next((i for i, each in enumerate(chunks) if each.channels is None or each.channels & numbers), len(chunks))
 
 
 def _is_in_order(file: McapFile, summary: Summary) -> bool:
-    """Whether the summary names every channel, and numbers are given as the library gives them: what comes anew then
-    has the numbers that it had."""
+    """Whether the summary contains every channel, and ids are assigned as by the library, so that channels keep their
+    ids."""
     known = summary.channels.keys() == file.directory.channels.keys()
     return known and all(sorted(each) == [*range(1, len(each) + 1)] for each in (summary.schemas, summary.channels))
 
@@ -122,8 +122,8 @@ def _write_rest(
     t_ns: int,
     drawn: Sequence[Stored],
 ) -> None:
-    """What comes after byte ``end``: the messages from chunk ``place`` on, the labels, what was attached, the summary.
-    The library writes it as the end of a file that began with it; what lies before it is told of afterwards."""
+    """Writes what follows byte ``end``: the messages from chunk ``place`` on, the labels, attachments, and the summary.
+    The library writes this as the end of a file that starts with it; the part before is added to the summary later."""
     chunks = file.directory.chunks
     passed = [stored for at in range(place, len(chunks)) for stored in file.chunk(at)]
     kept = [stored for stored in passed if stored.channel.topic not in topics.OF_LABELS]
@@ -154,7 +154,7 @@ def _write_rest(
 def _register(
     writer: Writer, file: McapFile, before: Summary, said: Sequence[topics.Channel]
 ) -> dict[topics.Channel, int]:
-    """Schemas and channels under the numbers that they have, and those of labels where there were none."""
+    """Register schemas and channels under their existing ids, and those of labels if missing."""
     for schema in (before.schemas[number] for number in sorted(before.schemas)):
         writer.register_schema(schema.name, schema.encoding, schema.data)
     numbers: dict[topics.Channel, int] = {}
@@ -169,8 +169,8 @@ def _register(
 
 
 def _tell_of_all(target: BinaryIO, before: Summary, end: int, copied: Counter[int]) -> None:
-    """Put the summary of the whole file in the place of that of its last part. copied: messages of each channel in the
-    first ``end`` bytes."""
+    """Replace the summary of the last part by that of the whole file. copied: messages of each channel in the first
+    ``end`` bytes."""
     size = target.seek(0, os.SEEK_END)
     rest = read_summary(target, size)
     assert rest is not None, "what was just written can be read"
@@ -205,8 +205,8 @@ def _tell_of_all(target: BinaryIO, before: Summary, end: int, copied: Counter[in
 
 
 def _summary(groups: Mapping[int, Sequence[McapRecord]], start: int) -> bytes:
-    """The summary section of a file, to be at byte ``start``, with the footer: records by kind, where each kind is, and
-    the checksum over all of that."""
+    """The summary section of a file, at offset ``start``, including the footer: records by kind, the offset of each
+    kind, and the checksum of the section."""
     records, offsets = RecordBuilder(), []
     for kind, group in groups.items():
         first = records.count

@@ -21,28 +21,28 @@ from pipeline.recording.session.velodyne_scan import PACKETS_BEFORE_NS
 
 @dataclass(frozen=True)
 class Recovered:
-    """What was saved."""
+    """Result of a recovery."""
 
     messages: int
-    """Copied."""
+    """Number of messages copied."""
     frames: int
-    """Of these, whole frames."""
+    """Number of complete frames among them."""
     chunks: int
-    """That were read."""
+    """Number of chunks read."""
     lost_chunks: int
-    """Whole in length, damaged in content."""
+    """Chunks with a valid length but damaged content."""
     sound_bytes: int
-    """Up to where the file's records were whole."""
+    """Offset up to which the file's records were complete."""
     size_bytes: int
-    """Of the damaged file."""
+    """Size of the damaged file."""
     is_cut: bool
-    """Whether the file's end was missing."""
+    """Whether the end of the file was missing."""
 
 
 def recover(path: Path, out: Path, progress: Progress = silent) -> Recovered:
-    """Write every message of every complete chunk of ``path`` to a new, whole file ``out``.
+    """Write every message of every complete chunk of ``path`` to a new, complete file ``out``.
 
-    BadInput when ``path`` is no MCAP file or ``out`` exists.
+    BadInput if ``path`` is not an MCAP file or ``out`` exists.
     """
     with McapFile(path, walk=True) as file:
         directory = file.directory
@@ -75,13 +75,12 @@ def clip(
     progress: Progress = silent,
     drawn: Mapping[int, Sequence[Drawn]] = NOTHING_DRAWN,
 ) -> int:
-    """Frames ``first`` to ``last``, both included, as a session of their own, with results, marks and all else that
-    was recorded meanwhile. What these frames refer to from before (calibration, parameters) is moved to right before
-    the first, so that the clip begins where it begins. Labels name the frames that they are of, so they are kept whole;
-    ``labels`` are put in their place, with what viewers show of them (``drawn``, by frame). ``progress`` counts frames.
-    Returns the number of messages."""
+    """Write frames ``first`` to ``last``, both included, as a separate session, with results, marks and everything else
+    recorded in that time. Earlier messages that these frames refer to (calibration, parameters) are moved directly
+    before the first frame. Labels contain frame names, so they are copied completely; ``labels`` replaces them, with
+    the form shown by viewers in ``drawn``, by frame. ``progress`` counts frames. Returns the number of messages."""
     first_ns = source.log_time_ns(first)
-    # a frame's companions (marks, notes) come after it, so the clip goes on to the next frame
+    # related messages of a frame (marks, notes) follow it, so the clip extends to the next frame
     last_ns = source.log_time_ns(last + 1) - 1 if last + 1 < len(source) else 2**63 - 1
     earlier = _referred(source, last, first_ns)
     times = sorted({at_ns for at_ns, _ in earlier})
@@ -118,8 +117,8 @@ def _with_references_moved(stored: Stored, to_ns: Mapping[int, int]) -> Stored:
 
 
 def _referred(source: SessionSource, last: int, first_ns: int) -> list[tuple[int, str]]:
-    """(log time, topic) of the messages from before the clip that its frames need, in order of time. first_ns: the
-    clip's first; last: its last frame."""
+    """(log time, topic) of earlier messages that the clip's frames need, in order of time. first_ns: the clip's start;
+    last: its last frame."""
     found: set[tuple[int, str]] = set()
     for stored in source.file.messages((topics.FRAMES,), first_ns, source.log_time_ns(last)):
         try:
@@ -152,7 +151,7 @@ def _copy(messages: Iterable[Stored], file: McapFile, out: Path) -> tuple[int, i
 
 
 def _record_or_nothing(stored: Stored) -> FrameRecord | None:
-    """With the frame's own time; its message's publish time cannot be before 1970."""
+    """With the frame's own time; a message's publish time cannot be before 1970."""
     try:
         return frame_record_from(stored.data)
     except Damaged:

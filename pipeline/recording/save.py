@@ -28,13 +28,12 @@ def save(
     labels: bytes | None = None,
     drawn: Mapping[int, Sequence[Drawn]] = NOTHING_DRAWN,
 ) -> None:
-    """Write frames ``first`` to ``last`` (both included; None: to the end) to a new file, inputs and labels.
+    """Write the inputs and labels of frames ``first`` to ``last`` (both included; None: to the end) to a new file.
 
-    A part of a session keeps all that is in it: results, marks, parameters, labels. The pipeline gives the same results
-    on either. labels: a file of labels to put in, in place of any that are there. drawn: what viewers
-    show of them, by frame.
+    A part of a session keeps all its content: results, marks, parameters, labels. The pipeline gives the same results
+    for both. labels: a label file that replaces existing labels. drawn: labels in the form shown by viewers, by frame.
 
-    BadInput when ``out`` exists; whatever ends this early leaves no file behind.
+    BadInput if ``out`` exists; if this fails, no file is left behind.
     """
     last = len(source) - 1 if last is None else last
     if isinstance(source, SessionSource):
@@ -63,8 +62,8 @@ def save(
 
 
 def about(source: AnySource, detectors: Detectors | None = None) -> About:
-    """Where a session made of this source came from: in the end from what was recorded first; and, of results, which
-    networks they are of."""
+    """Origin of a session made from this source, which is the original recording for a copy; and for results, the
+    networks used."""
     origin = source.origin if isinstance(source, Recorded) else source.uri
     asked: tuple[object, ...] = ()
     if detectors is not None:

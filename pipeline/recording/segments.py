@@ -19,7 +19,7 @@ from pipeline.types.source import TruthObject
 
 @dataclass(frozen=True)
 class FileRotation:
-    """When a recording goes on in a new file."""
+    """When a recording continues in a new file."""
 
     max_bytes: float | None = None
     """Of one file; None for no limit."""
@@ -29,14 +29,14 @@ class FileRotation:
 
 NEVER = FileRotation()
 _PACKETS_CARRIED = 6
-"""Batches, of about a sweep each."""
+"""Number of batches, each of about one sweep."""
 
 
 class Segments:
-    """Writes to ``path`` and, after rotation, to ``<stem>_001.mcap`` and so on beside it. Not for several threads.
+    """Writes to ``path`` and, after rotation, to ``<stem>_001.mcap`` and so on beside it. Not thread-safe.
 
-    frames, seconds: over all files, seconds by log time. BadInput when a file exists; OSError when one can take no
-    more: nothing can be written after that, and what was written before is whole.
+    frames, seconds: over all files, seconds by log time. BadInput if a file exists; OSError if a file cannot be written
+    any more: after that nothing can be written, and earlier data is complete.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Segments:
 
     @property
     def frames(self) -> int:
-        """Frames given to all files so far."""
+        """Number of frames passed to all files so far."""
         return self._earlier_frames + self._writer.frames
 
     @property
@@ -73,7 +73,7 @@ class Segments:
 
     @property
     def seconds(self) -> float:
-        """Time that the frames in all files span."""
+        """Time span of the frames in all files."""
         return self._earlier_s + self._writer.span_s
 
     def write(
@@ -142,7 +142,7 @@ class Segments:
         self._earlier_frames, self._earlier_bytes, self._earlier_s = self.frames, self.bytes_written, self.seconds
         self._writer = writer
         self.files.append(path)
-        for packets in self._recent_packets:  # of the sweep that the first frame of the new file shows
+        for packets in self._recent_packets:  # packets of the sweep in the first frame of the new file
             self._writer.write_packets(packets)
 
     def _open(self, path: Path) -> SessionWriter:

@@ -34,30 +34,30 @@ NOTES = "/notes"
 HEALTH = "/health"
 LABELS = "/labels"
 LABEL_SCENE, LABEL_IMAGE = "/labels/scene", "/labels/image"
-"""The labels of each frame as viewers draw them, made of ``LABELS`` and read by nobody here."""
+"""The labels of each frame as drawn by viewers, derived from ``LABELS`` and not read by this program."""
 OF_LABELS = frozenset((LABELS, LABEL_SCENE, LABEL_IMAGE))
-"""What other labels take the place of."""
+"""Topics that are replaced when labels are written."""
 
 EGO_FRAME, CAMERA_FRAME = "ego", "camera"
 """Names of the frames of reference: points are in ``ego``; ``camera`` is the optical frame (z ahead, x right)."""
 
 PROFILE = "cipv"
-"""The MCAP header's profile; what tells a session from anyone else's file."""
+"""The MCAP header's profile; identifies a session."""
 
 METADATA = "cipv"
-"""Name of the metadata record that says where a session came from."""
+"""Name of the metadata record with the origin of a session."""
 
 INDEX = "cipv-frames"
 """Name of the attachment that lists all frames: pairs of little-endian int64, log time and header time, in order."""
 
 TICKS = "cipv-ticks"
-"""Name of the attachment with what is small of each frame: lines of ``/frames`` without labels and given detections, a
-frame each, in gzip."""
+"""Name of the attachment with the small data of each frame: lines of ``/frames`` without labels and recorded
+detections, one per frame, in gzip."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """What MCAP wants to know of a topic."""
+    """MCAP's description of a topic."""
 
     topic: str
     """With its slashes."""
@@ -66,7 +66,7 @@ class Channel:
     schema_name: str
     """Of the messages' type."""
     schema_encoding: str
-    """How ``schema_data`` is written."""
+    """Encoding of ``schema_data``."""
     schema_data: bytes
     """The schema itself; empty for none."""
     metadata: tuple[tuple[str, str], ...] = ()
@@ -94,7 +94,7 @@ _SCAN_SCHEMA = f"\n{'=' * 80}\n".join(
         "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
     )
 )
-"""ROS 2's schema for raw packets with all that it is made of, as MCAP wants it."""
+"""ROS 2's schema for raw packets with all its dependencies, in MCAP's format."""
 
 _JSON_TITLES = {
     FRAMES: "cipv.Frame",
@@ -124,7 +124,7 @@ _JSON_NUMBERS: dict[str, dict[str, Any]] = {
         "timing_ms": {"type": "object", "properties": _numbers("total")},
     },
 }
-"""What a person may want to plot, so that viewers offer it."""
+"""Values that a user may want to plot, declared so that viewers offer them."""
 
 
 @cache

@@ -22,6 +22,6 @@ def offers() -> list[tuple[str, str]]:
 
 @cache
 def _title(name: str) -> str:
-    """As its file says; the rest of the file is not read."""
+    """From its file; the rest of the file is not read."""
     with (FOLDER / f"{name}.yaml").open(encoding="utf-8") as lines:
         return next((str(yaml.safe_load(line)["title"]) for line in lines if line.startswith("title:")), name)

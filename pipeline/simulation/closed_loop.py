@@ -35,13 +35,13 @@ STEP_S = 0.005
 
 
 class Eyes(Protocol):
-    """Finds vehicles in the image."""
+    """Detects vehicles in the image."""
 
     @property
     def needs_image(self) -> bool: ...
 
     def look(self, frame: Frame, now: World, seed: int) -> Frame:
-        """The frame with ``raw_boxes`` in it."""
+        """The frame with ``raw_boxes``."""
         ...
 
 
@@ -64,9 +64,9 @@ class NetworkEyes:
     """A real network on the rendered image."""
 
     detector: Detector
-    """On the whole image."""
+    """Runs on the whole image."""
     far: FarView | None = None
-    """On its far part too; None for the whole image alone."""
+    """Runs on the far part of the image; None to use only the whole image."""
     needs_image: bool = True
     """The image is drawn for it."""
 
@@ -79,15 +79,15 @@ class Setup:
     """The setup of a drive."""
 
     params: Params = field(default_factory=Params)
-    """Of the pipeline."""
+    """Parameters of the pipeline."""
     sensors: Sensed = "both"
-    """Those that the pipeline is given."""
+    """Sensors available to the pipeline."""
     eyes: Eyes = TruthEyes()
-    """How vehicles in the image are found."""
+    """How vehicles in the image are detected."""
     model: VehicleModel = VehicleModel()
     """How the car responds to pedals."""
     closed: bool = True
-    """The pipeline's pedals move the car; otherwise it follows its script, and commands are only recorded."""
+    """Whether the pipeline's pedals move the car; otherwise it follows its script, and commands are only recorded."""
 
 
 @dataclass(frozen=True)
@@ -101,9 +101,9 @@ class LoopStep:
     frame: Frame
     """What the sensors measured."""
     result: Result
-    """The pipeline's."""
+    """Result of the pipeline."""
     vehicle: VehicleState
-    """Its state when the sensors measured."""
+    """State of the vehicle when the sensors measured."""
 
     @property
     def t_s(self) -> float:
@@ -161,5 +161,6 @@ def _scripted(scenario: Scenario, t_s: float) -> VehicleState:
 
 
 def _furthest_m(scenario: Scenario) -> float:
-    """A place on the road that the car cannot reach: 1.2 times its fastest scripted speed, for the whole duration."""
+    """A position on the road that the car cannot reach: 1.2 times its fastest scripted speed, for the whole
+    duration."""
     return scenario.ego.start_m + 1.2 * max(scenario.ego.speed_mps.values()) * scenario.duration_s

@@ -22,7 +22,7 @@ def as_driven(scenario: Scenario, motions: Sequence[Motion], title: str | None =
         update={
             "driven": moments,
             "duration_s": len(moments) / scenario.rate_hz,
-            "actors": scenario.cast,  # a gap at which one brakes was reached at a time, which stays
+            "actors": scenario.cast,  # the gap at which an actor brakes was reached at a certain time, which is kept
             "title": title or scenario.title,
         }
     )

@@ -28,14 +28,14 @@ _GAP_STEP_S, _GAP_HALVINGS = 0.25, 10
 
 
 class ScenarioError(BadInput):
-    """A scenario that does not exist or is not valid; the message says what is wrong."""
+    """A scenario that does not exist or is invalid; the message says what is wrong."""
 
 
 class Ego(Script):
     """The ego vehicle's own script."""
 
     start_m: float = 100.0
-    """Where on the road its LiDAR is at time 0."""
+    """Position of its LiDAR along the road at time 0."""
 
 
 DrivenMoment = tuple[float, float, float, float, float, float]
@@ -46,21 +46,21 @@ class Scenario(ScenarioPart):
     """One scenario file."""
 
     title: str
-    """Shown to people."""
+    """Display name."""
     seed: int = Field(default=0, ge=0)
-    """Of everything random: equal seeds give equal bytes."""
+    """Seed of all random values: equal seeds give equal bytes."""
     duration_s: float = Field(gt=0.0, le=3600.0)
-    """After which the drive ends."""
+    """Duration of the drive."""
     rate_hz: float = Field(default=10.0, ge=1.0, le=20.0)
-    """Of the LiDAR's rotation, and so of ticks."""
+    """Rate of the LiDAR's rotation, which is the tick rate."""
     road: Road
-    """What everybody drives on."""
+    """The road that all vehicles use."""
     lidar: LidarModel = VLP16
     """Mount and noise."""
     camera: CameraModel = ORDINARY
     """Lens and noise."""
     gnss: GnssModel = RTK
-    """Place on the Earth and noise of the receiver."""
+    """Position on the Earth and noise of the receiver."""
     odometry: OdometryModel = MEASURED
     """Noise of ego speed and yaw rate."""
     ego: Ego
@@ -70,13 +70,13 @@ class Scenario(ScenarioPart):
     crossing_actors: tuple[CrossingActor, ...] = ()
     """Vehicles that come from a crossing's other arms."""
     sensors: Literal["lidar", "camera", "both"] = "both"
-    """Those that the pipeline is given."""
+    """Sensors available to the pipeline."""
     detections: Detections | None = None
-    """What is found in the images; None leaves that to the detectors."""
+    """Simulated detections in the images; None to run the detectors."""
     faults: Faults = NONE
-    """What is wrong with the sensors."""
+    """Faults of the sensors."""
     driven: tuple[DrivenMoment, ...] = ()
-    """The ego vehicle's motion as a closed loop drove it, one moment a tick; where given, it replaces the script."""
+    """The ego vehicle's motion from a closed-loop drive, one entry per tick; if given, it replaces the script."""
 
     @model_validator(mode="after")
     def _lanes_and_ids(self) -> Scenario:
@@ -98,7 +98,7 @@ class Scenario(ScenarioPart):
         return max(1, round(self.duration_s * self.rate_hz))
 
     def own_motion(self, t_s: float) -> Motion:
-        """Motion of the ego vehicle at time t: as driven, interpolated between two ticks, else by its script."""
+        """Motion of the ego vehicle at time t: as driven, interpolated between two ticks, else from its script."""
         if not self.driven:
             return motion(self.ego, self.road, t_s)
         at = min(max(t_s * self.rate_hz, 0.0), len(self.driven) - 1.0)
@@ -114,7 +114,7 @@ class Scenario(ScenarioPart):
 
     @cached_property
     def parked(self) -> tuple[tuple[Actor, ...], F64, F64]:
-        """The actors that never move, (N,) where on the road they are, and (N, 3) their poses in the world."""
+        """The actors that never move, their (N,) positions along the road, and (N, 3) their poses in the world."""
         still = tuple(each for each in self.cast if not any(each.speed_mps.values()) and not each.lane_changes)
         s_m = np.array([each.place_m(self.road, self.ego.start_m, 0.0) for each in still])
         d_m = np.array([self.road.lane_offset_m(each.lane) + each.offset_m for each in still])
@@ -130,7 +130,7 @@ class Scenario(ScenarioPart):
 
     @cached_property
     def routes(self) -> tuple[CrossingWay, ...]:
-        """The ways of ``crossing_actors``."""
+        """The paths of ``crossing_actors``."""
         return tuple(route(actor, self.road) for actor in self.crossing_actors)
 
 
@@ -157,7 +157,7 @@ def _gap_m(scenario: Scenario, actor: Actor, t_s: float) -> float:
 
 
 def load(name_or_path: str) -> Scenario:
-    """A built-in scenario by its name, or any file that ends in .yaml. ScenarioError says what is wrong."""
+    """A built-in scenario by name, or any file that ends in .yaml. ScenarioError says what is wrong."""
     path = given_path(name_or_path, ScenarioError) if name_or_path.endswith((".yaml", ".yml")) else None
     if path is None:
         if Path(name_or_path).suffix or Path(name_or_path).name != name_or_path:
@@ -169,7 +169,7 @@ def load(name_or_path: str) -> Scenario:
 
 
 def parse(text: str, file: str) -> Scenario:
-    """The scenario of a YAML text. ScenarioError names the file, the key and what is wrong with it."""
+    """The scenario from a YAML text. ScenarioError names the file, the key and what is wrong with it."""
     return _checked(parse_yaml(text, file, ScenarioError), file)
 
 

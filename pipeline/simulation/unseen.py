@@ -13,7 +13,7 @@ from pipeline.types import Frame
 
 
 def frames(scenario: Scenario) -> Iterator[tuple[World, Frame]]:
-    """The truth and what is sensed of it, tick by tick: all but the images is as ``sim:`` gives it."""
+    """The truth and the sensor data, tick by tick: the same as from ``sim:`` except for the images."""
     end_m = world_state.at(scenario, scenario.duration_s).s_m
     sensors, senses = SensorRig(scenario, end_m), Senses(scenario)
     step_ns = round(1e9 / scenario.rate_hz)

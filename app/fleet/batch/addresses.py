@@ -27,13 +27,13 @@ class Recording:
     """One recording of a fleet."""
 
     address: str
-    """What ``open_source`` opens."""
+    """Address for ``open_source``."""
     mark: str
-    """Sixteen characters that are another when its files were edited or replaced."""
+    """Sixteen characters that change if its files are edited or replaced."""
 
     @property
     def drive(self) -> str:
-        """Its name in tables and links: the file's own name, and eight characters of the whole address."""
+        """Its name in tables and links: the file's own name, and eight characters derived from the whole address."""
         _, _, rest = self.address.rpartition(":")
         stem = PurePosixPath(rest.partition("?")[0].rstrip("/")).name.removesuffix(_SESSION)
         slug = re.sub(r"[^A-Za-z0-9]+", "-", stem).strip("-")[-_LONGEST_SLUG:]
@@ -41,7 +41,8 @@ class Recording:
 
 
 def recordings(addresses: Iterable[str]) -> list[Recording]:
-    """Every recording that the addresses name, once each, sorted. Raises BadInput for an address without recordings."""
+    """Every recording at the addresses, without duplicates, sorted. Raises BadInput for an address without
+    recordings."""
     found: dict[str, Recording] = {}
     for address in addresses:
         here = {each.address: each for each in _of(address.strip())}
@@ -86,7 +87,7 @@ def _on_disk(address: str) -> Iterator[Recording]:
 
 
 def _below(place: Path) -> Iterator[Recording]:
-    """The recording at a path; of a folder that is none, all recordings inside."""
+    """The recording at a path; for a folder that is not a recording, all recordings inside."""
     if _is_recording(place):
         yield Recording(str(place), fingerprint(str(place)))
     elif place.is_dir():
@@ -121,14 +122,14 @@ def _in_store(address: str) -> Iterator[Recording]:
 
 
 def _mark(address: str, facts: dict[str, Any]) -> str:
-    """As ``fingerprint`` of an address, from what a listing said already."""
+    """``fingerprint`` of an address, from the result of a listing."""
     digest = hashlib.sha256(address.encode(errors="replace"))
     digest.update(version_of(facts).encode())
     return digest.hexdigest()[:16]
 
 
 def _listed(content: bytes, name: str) -> Iterator[Recording]:
-    """The recordings that a list file names, one address a line; empty lines and those that begin with # are not."""
+    """The recordings in a list file, one address per line; empty lines and those that begin with # are ignored."""
     try:
         lines: Sequence[str] = content.decode("utf-8").splitlines()
     except UnicodeDecodeError:

@@ -15,7 +15,7 @@ from pipeline.detection import Detectors, Detects, Seen, look
 from pipeline.types import U8, DistanceLaw, Frame, RawBoxes, RawLanes
 
 PIECE_FRAMES = 600
-"""Frames whose answers are one file: a minute at 10 Hz."""
+"""Number of frames whose detections are stored in one file: a minute at 10 Hz."""
 _LEVEL = 3
 Answers = dict[tuple[int, str], RawBoxes | RawLanes]
 """By frame and detector."""
@@ -31,7 +31,7 @@ class _Law(msgspec.Struct, array_like=True):
 
 
 class _Answer(msgspec.Struct, array_like=True):
-    """One detector's answer for one image. boxes and what follows it: of ``RawBoxes``; points and line: of
+    """One detector's output for one image. boxes and the following fields: of ``RawBoxes``; points and line: of
     ``RawLanes``. Arrays are bytes, little-endian."""
 
     index: int
@@ -55,7 +55,7 @@ def answers_file(mark: str, detectors: Detectors, first: int, piece_frames: int 
 
 
 class KeptLook:
-    """A ``Look`` that takes known detections from the store, piece by piece, and saves new ones. Frames must come in
+    """A ``Look`` that reads known detections from the store, piece by piece, and saves new ones. Frames must come in
     order and on one thread. Call ``close`` at the end."""
 
     def __init__(self, store: Store, mark: str, detectors: Detectors, piece_frames: int = PIECE_FRAMES) -> None:
@@ -65,7 +65,7 @@ class KeptLook:
         self._known: Answers = {}
         self._has_new = False
         self.asked = 0
-        """How many images a network had to look at."""
+        """Number of images that a network had to process."""
 
     def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
         self._turn_to(frame.index - frame.index % self._piece_frames)
@@ -78,7 +78,7 @@ class KeptLook:
         return cast("Seen", known)
 
     def close(self) -> None:
-        """Write what is new."""
+        """Write new detections."""
         if self._first is not None and self._has_new:
             self._store.write(self._name(self._first), packed(self._known))
         self._has_new = False
@@ -92,7 +92,7 @@ class KeptLook:
 
 
 def packed(answers: Answers) -> bytes:
-    """As one file; equal answers give equal bytes."""
+    """As one file; equal detections give equal bytes."""
     rows = [_row(index, name, answer) for (index, name), answer in sorted(answers.items(), key=lambda each: each[0])]
     return zstandard.ZstdCompressor(level=_LEVEL).compress(msgspec.msgpack.encode(rows))
 

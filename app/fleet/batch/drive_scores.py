@@ -16,7 +16,7 @@ from pipeline.types import Result
 from pipeline.types.source import Source
 
 LABELLED = "labelled."
-"""What the names of scores against labels begin with."""
+"""Prefix of scores that use labels."""
 
 
 def scores_of(history: History, labelled: Sequence[Result], source: Source, params: Params) -> DriveScores:

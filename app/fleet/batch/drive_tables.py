@@ -21,7 +21,7 @@ from pipeline.evaluation.label_free.score import DriveScores
 from pipeline.types import Frame, FusedObject, Result
 
 GROUP_FRAMES = 512
-"""Frames of one row group: what is held in memory before it is written."""
+"""Frames per row group: held in memory before they are written."""
 _AFTER_S, _AROUND_S = 3.0, 2.0
 """Around an event: for the shortest TTC after it, and for the largest gap between the sensors."""
 Values = tuple[Any, ...]
@@ -111,7 +111,8 @@ def write_drive(path: Path, values: Values) -> None:
 
 
 Gap = tuple[float, float]
-"""Camera's minus LiDAR's distance of a frame's CIPV, in metres, and its size in standard deviations; NaN: unknown."""
+"""Camera's minus LiDAR's distance of a frame's CIPV, in metres, and its absolute value in standard deviations; NaN:
+unknown."""
 NO_GAP: Gap = (math.nan, math.nan)
 
 
@@ -219,7 +220,7 @@ def _event(event: Event, rows: Sequence[Row], gaps: Sequence[Gap], t_ns: Sequenc
 
 
 def _near(t_ns: Sequence[int], at: int, before_s: float, after_s: float, gap_s: float) -> range:
-    """Frames of the same clip so many seconds before and after a frame."""
+    """Frames of the same clip within these times before and after a frame."""
     first = last = at
     while first > 0 and t_ns[at] - t_ns[first - 1] <= before_s * 1e9:
         if begins_clip(t_ns[first - 1], t_ns[first], gap_s):

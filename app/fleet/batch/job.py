@@ -16,17 +16,17 @@ class Job:
     """One drive of a batch."""
 
     recording: Recording
-    """What is run, as it was when the batch was planned."""
+    """The recording in its state when the batch was planned."""
     key: RunKey
-    """Parameters, sensors and rings, and the code and networks that a worker must have to run it."""
+    """Parameters, sensors and rings, and the code and networks that a worker must have."""
     choice: DetectorChoice
     """Networks by name, opened by the worker from its own files."""
     store: Store
-    """Where tables, answers of networks and marks of what is done are written."""
+    """Storage of tables, detections and markers of finished drives."""
     keeps_results: bool = False
     """Also write the results as JSON lines."""
     piece_frames: int = PIECE_FRAMES
-    """Images of a longer recording are looked at in pieces of so many frames."""
+    """Images of a longer recording are processed in pieces of this many frames."""
 
     def answers(self, detectors: Detectors, first: int) -> str:
         """Store name of these detectors' detections in the piece that begins with frame ``first``."""
@@ -40,18 +40,18 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a drive."""
+    """Result of one drive."""
 
     drive: str
     """Its name in tables, ``Recording.drive``."""
     frames: int
-    """0 for one that was set aside."""
+    """0 if it was set aside."""
     looked_at: int
-    """Images that networks looked at now."""
+    """Number of images processed by networks in this run."""
     seconds: float
-    """It took."""
+    """Computing time."""
     reason: str = ""
-    """Why it was set aside; empty for one that was run."""
+    """Why it was set aside; empty if it was run."""
 
 
 @dataclass(frozen=True)

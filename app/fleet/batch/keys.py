@@ -24,7 +24,7 @@ _CODE = (
     "app/drive/**/*.py",
     "app/fleet/batch/*.py",
 )
-"""The code that decides what is in a batch's tables."""
+"""The code that determines the content of a batch's tables."""
 _LIBRARIES = ("numpy", "scipy", "numba", "opencv-python-headless", "onnxruntime", "kiss-icp", "pyarrow")
 
 
@@ -70,7 +70,7 @@ def _content(path: Path) -> list[str]:
 
 @dataclass(frozen=True)
 class RunKey:
-    """What all drives of one run have in common."""
+    """Properties shared by all drives of one run."""
 
     code: str
     """``code_digest``."""
@@ -90,7 +90,7 @@ class RunKey:
         return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:12]
 
     def to_json(self, choice: DetectorChoice) -> dict[str, object]:
-        """For people, and to continue it."""
+        """For information, and to continue the run."""
         return {
             "run": self.name,
             "code": self.code,

@@ -25,20 +25,20 @@ class Plan:
     """A batch as requested."""
 
     addresses: tuple[str, ...]
-    """As they were typed."""
+    """As typed by the user."""
     params: Params
     """Of the pipeline, the same for every recording."""
     choice: DetectorChoice
     """Of networks."""
     sensors: Sensors = "both"
-    """An ablation with one of them runs as if the cars had no other."""
+    """With a single sensor, runs as if the cars had no other."""
     rings: int = 16
-    """LiDAR channels that are kept of a recording with more."""
+    """Number of LiDAR channels to keep if a recording has more."""
     keeps_results: bool = False
     """Also write the results as JSON lines."""
 
     def save(self, store: Store) -> None:
-        """For ``--resume``."""
+        """Save the plan for ``--resume``."""
         said = {
             "version": _VERSION,
             "addresses": list(self.addresses),
@@ -77,22 +77,22 @@ class PlannedWork:
     """A plan and its progress."""
 
     store: Store
-    """Where its tables are."""
+    """Storage of its tables."""
     key: RunKey
-    """What the run is made from; names the run in the store."""
+    """Inputs of the run; identifies the run in the store."""
     jobs: tuple[Job, ...]
-    """Drives that are still to be run."""
+    """Drives that have not been run yet."""
     all: tuple[Recording, ...]
     """Every drive of the plan."""
 
     @property
     def done_before(self) -> int:
-        """Drives of the plan that an earlier batch finished."""
+        """Number of drives finished by an earlier batch."""
         return len(self.all) - len(self.jobs)
 
 
 def work_of(plan: Plan, store: Store) -> PlannedWork:
-    """The work that is left. Raises BadInput for an address without recordings."""
+    """The remaining work. Raises BadInput for an address without recordings."""
     key = RunKey(code_digest(), networks_digest(plan.choice), plan.params, plan.sensors, plan.rings)
     found = recordings(plan.addresses)
     done = {*store.names(f"done/run={key.name}"), *store.names(f"aside/run={key.name}")}

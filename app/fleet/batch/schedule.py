@@ -21,12 +21,13 @@ from pipeline.common.errors import BadInput, first_line
 from pipeline.common.user_files import Overloaded
 
 IN_FLIGHT_A_THREAD = 3
-"""Pieces of work that Dask knows of at once, for each thread of its workers: one runs, the next are ready."""
+"""Pieces of work submitted to Dask at once, per worker thread: one runs, the others are ready."""
 TRIES = 2
-"""A piece whose worker died too often for Dask is handed over again, alone in its suspicion, before it is set aside."""
+"""Number of times that a piece is submitted: if its worker died too often for Dask, it is submitted again before it is
+set aside."""
 _SETTINGS = {
     "distributed.scheduler.allowed-failures": 5,
-    # the same number of threads as `cipv run` has: sums in another order would be other bytes
+    # the same number of threads as in `cipv run`: another order of summation would give other bytes
     "distributed.nanny.pre-spawn-environ": {"MALLOC_TRIM_THRESHOLD_": 65536},
     "distributed.scheduler.worker-saturation": 1.0,
     "distributed.comm.timeouts.connect": "60s",
@@ -46,17 +47,17 @@ class Tally:
     total: int
     """Drives of the batch."""
     before: int = 0
-    """Drives that an earlier run of the batch had done."""
+    """Drives finished by an earlier run of the batch."""
     done: int = 0
-    """Drives that were run now."""
+    """Drives finished in this run."""
     frames: int = 0
-    """Of those."""
+    """Number of their frames."""
     looked_at: int = 0
-    """Images that networks looked at."""
+    """Number of images processed by networks."""
     aside: dict[str, str] = field(default_factory=dict)
-    """Address → reason, of recordings that were set aside for good: tried again only once they change."""
+    """Address → reason, of recordings set aside permanently: retried only if they change."""
     failed: dict[str, str] = field(default_factory=dict)
-    """Address → reason, of drives that failed for a reason that may pass: they are tried again by the next batch."""
+    """Address → reason, of drives that failed for a temporary reason: retried by the next batch."""
 
     @property
     def left(self) -> int:
@@ -105,7 +106,7 @@ def client_of(scheduler: str | None, workers: int, memory: str) -> Iterator[Clie
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Without what Dask says of itself: tracebacks of connections that ended, which are told in one line here."""
+    """Suppresses Dask's own messages: tracebacks of closed connections, which are reported here in one line."""
     names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] == "distributed"]
     levels = {name: logging.getLogger(name).level for name in names}
     with warnings.catch_warnings():
@@ -142,7 +143,7 @@ class _Piece:
     job: Job
     first: int | None = None
     is_last_look: bool = False
-    """Of a whole drive: its images have been looked at."""
+    """For a whole drive: whether its images have been processed."""
     tries: int = 1
 
 
@@ -152,7 +153,7 @@ class _Batch:
         self._waiting = deque(_Piece(job) for job in jobs)
         self._at_work: dict[str, _Piece] = {}
         self._looks_left: dict[str, int] = {}
-        """Pieces of long recordings that are still to be looked at, by drive."""
+        """Number of unprocessed pieces of long recordings, by drive."""
 
     def run(self) -> None:
         results = as_completed([], with_results=False, raise_errors=False)
@@ -168,7 +169,7 @@ class _Batch:
             raise SchedulerLost(first_line(error)) from error
 
     def _hand_over(self, results: as_completed) -> None:
-        """Let Dask have as many pieces as keep its workers busy."""
+        """Submit enough pieces to Dask to keep its workers busy."""
         threads = max(1, sum(self._client.nthreads().values()))
         while self._waiting and len(self._at_work) < IN_FLIGHT_A_THREAD * threads:
             piece = self._waiting.popleft()
@@ -178,7 +179,7 @@ class _Batch:
             results.add(future)
 
     def _take(self, piece: _Piece, future: Any) -> None:
-        """What follows from a piece that has ended."""
+        """Handle a finished piece."""
         if future.status == "finished":
             self._finished(piece, future.result())
             return
@@ -213,7 +214,7 @@ class _Batch:
             self._one_look_less(piece)
 
     def _one_look_less(self, piece: _Piece) -> None:
-        """The drive itself follows its last piece."""
+        """After the last piece, the drive itself is submitted."""
         drive = piece.job.recording.drive
         if drive not in self._looks_left:
             return  # another piece has failed
@@ -232,7 +233,7 @@ class _Batch:
             self._tally.failed[piece.job.recording.address] = reason
 
     def _gives_up(self, piece: _Piece) -> bool:
-        """Whether a drive is given up now, and was not before with another of its pieces."""
+        """Whether a drive is set aside now; false if it already was because of another piece."""
         drive = piece.job.recording.drive
         return piece.first is None or self._looks_left.pop(drive, None) is not None
 

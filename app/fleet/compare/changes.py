@@ -11,7 +11,7 @@ from app.drive.compare import SAME_PLACE_M
 from app.fleet.find import FleetTables, QueryTable
 
 EVENT_SLACK_S = 1.0
-"""Events of one kind so near to each other are one."""
+"""Events of one kind within this time count as the same."""
 
 
 @dataclass(frozen=True)

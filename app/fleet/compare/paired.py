@@ -18,12 +18,12 @@ Better = Literal["higher", "lower"]
 ScoreRow = tuple[str, str, float, float]
 """Drive, score, what the drive adds to numerator and denominator."""
 FEW = 5
-"""Fewer drives than this tell nothing about others."""
+"""With fewer drives, the result cannot be generalised."""
 
 
 @dataclass(frozen=True)
 class ScoreInfo:
-    """What is known of a score by its name."""
+    """Metadata of a score."""
 
     name: str
     """In tables, gates and JSON; ``LABELLED`` begins those against labels."""

@@ -13,31 +13,31 @@ from pipeline.types import F64, I64
 
 FEW_PAIRS = 40
 SAME_RANGE = 1.5
-"""Ranges of the pairs (9 in 10 to 1 in 10) that are nearer to each other than this are one distance."""
+"""If the ranges of the pairs (90th to 10th percentile) differ by a smaller factor, they count as one distance."""
 SAME_BEARING_DEG = 4.0
-"""Bearings (standard deviation) that are nearer to each other than this are one direction."""
+"""If the bearings have a smaller standard deviation, they count as one direction."""
 UNSURE = {"yaw_deg": 0.3, "pitch_deg": 0.3, "roll_deg": 1.0, "left_m": 0.1, "up_m": 0.1, "res": 0.03, "origin_deg": 0.3}
-"""Standard deviations beyond which a parameter is named as not told by the drive."""
+"""Standard deviations from which a warning says that the drive does not determine the parameter."""
 AMBIGUOUS = 0.8
-"""Another place that explains this share of what the best one does makes the fit ambiguous."""
+"""If another solution explains at least this share of what the best one explains, the fit is ambiguous."""
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Where one search for the alignment ended."""
+    """Result of one search for the alignment."""
 
     vector: F64
-    """The model's unknowns where a search ended; see ``FitModel``."""
+    """The model's unknowns at the result; see ``FitModel``."""
     rows: I64
-    """Of the pairs that belong together."""
+    """Rows of the matched pairs."""
     explained: float
-    """How many boxes have a cluster where it says, each counted by how well."""
+    """Number of boxes with a matching cluster, weighted by the quality of the match."""
 
 
 def warnings_of(
     table: PairTable, model: FitModel, found: Sequence[Found], sigmas: Mapping[str, float]
 ) -> tuple[str, ...]:
-    """What the drive lacks."""
+    """What is missing in the drive."""
     best, warnings = found[0], []
     cluster = table.cluster[best.rows]
     near, far = np.quantile(table.range_m[cluster], [0.1, 0.9])
@@ -59,7 +59,7 @@ def warnings_of(
 
 
 def _apart(model: FitModel, a: F64, b: F64) -> bool:
-    """Whether two results are different ones."""
+    """Whether two results differ significantly."""
     return bool(np.abs((a - b)[-2:] if model.name == "angular" else (a - b)[:2]).max() > 1.0)
 
 

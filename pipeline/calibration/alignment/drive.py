@@ -14,7 +14,7 @@ from pipeline.params import Params
 from pipeline.types import Frame
 
 FRAMES = 120
-"""Frames that are looked at, over the whole drive: a second of two slow cores for ten of them."""
+"""Number of evaluated frames, over the whole drive: ten of them take a second on two slow cores."""
 
 
 def fit_drive(
@@ -27,8 +27,8 @@ def fit_drive(
 ) -> AlignmentFit:
     """The alignment of a drive of ``count`` frames. An exception of ``progress`` ends it.
 
-    frame_of: a frame by its index, with what a detector saw in its image. offset: fit the camera's place too.
-    NothingToFit where too little is seen.
+    frame_of: returns a frame by its index, with its detections. offset: also fit the camera's position. NothingToFit if
+    too little is visible.
     """
     indices = np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int)).tolist()
     total = len(indices) + STEPS

@@ -26,52 +26,52 @@ from pipeline.params import AlignmentParams
 from pipeline.types import F64, I64
 
 COARSE_FRAMES, FIRST_FRAMES, FIRST_SHARE = 30, 8, 0.1
-"""The coarse search asks the frames with most boxes: a few about the whole grid, then more about its best tenth."""
+"""The coarse search uses the frames with the most boxes: a few for the whole grid, then more for its best tenth."""
 _COARSE_STEPS = 8
 STARTS = 6
-"""Best places of the grid that are refined."""
+"""Number of best grid points that are refined."""
 GATES = ((4.0, 3.0), (2.5, 2.5), (1.5, 2.5), (1.0, 2.5), (1.0, 2.5), (1.0, 2.5))
-"""Rounds of the refinement: how much wider a box's edges are taken to be, and the pairs' gate in deviations."""
+"""Rounds of the refinement: factor on the edge uncertainty, and the pairs' gate in standard deviations."""
 LOSS_SCALE = 1.0
-"""Deviations beyond which an edge pulls no harder (soft L1)."""
+"""Standard deviations from which the loss grows only linearly (soft L1)."""
 ROLL_SIGMA_DEG, OFFSET_SIGMA_M = 5.0, 0.3
-"""What holds roll and the camera's place where the pairs say nothing of them."""
+"""Prior for roll and the camera's position, if the pairs do not determine them."""
 SQUARE_SIGMA = 0.02
-"""How unlike the two resolutions of a camera with square pixels may be (relative)."""
+"""Permitted relative difference of the two resolutions of a camera with square pixels."""
 BOOTSTRAPS = 24
 STEPS = _COARSE_STEPS + STARTS + BOOTSTRAPS
-"""Units of progress that a fit tells."""
+"""Number of progress steps of a fit."""
 CLEAR_SIGMAS = 3.0
-"""Blocks of the drive that differ by chance differ less in sum."""
+"""Random differences between blocks of the drive stay below this many standard deviations in sum."""
 BLOCK_NS = 1_000_000_000
-"""Frames within a second show the same cars, and are drawn together."""
+"""Frames within a second show the same cars and are resampled together."""
 HELD_OUT = 5
-"""Every fifth block is set aside for the score."""
+"""Every fifth block is held out for the score."""
 COVERED_IOU = 0.3
-"""A box that a cluster covers less than this may be of something that only the camera sees."""
+"""A box with a smaller overlap may belong to an object that only the camera sees."""
 FEWEST_PAIRS = 12
-"""Pairs without which nothing is fitted."""
+"""Minimum number of pairs for a fit."""
 
 
 class NothingToFit(BadInput):
-    """A drive that says too little for a fit; the text says what it lacks."""
+    """A drive with too little information for a fit; the text says what is missing."""
 
 
 @dataclass(frozen=True)
 class Overlaps:
-    """How well projected clusters and boxes cover each other, over the frames set aside."""
+    """Overlap of projected clusters and boxes, over the held-out frames."""
 
     mean_iou: float
-    """Over the boxes that some cluster covers, before or after."""
+    """Over the boxes that are covered by a cluster, before or after the fit."""
     paired: int
-    """Of these, the boxes with an IoU of a half and more."""
+    """Number of these boxes with an IoU of at least one half."""
     boxes: int
-    """How many boxes that are."""
+    """Number of these boxes."""
 
 
 @dataclass(frozen=True)
 class AlignmentFit:
-    """A fitted alignment and how far it can be trusted."""
+    """A fitted alignment and its reliability."""
 
     model: ModelName
     """Which of the two projections was fitted."""
@@ -80,26 +80,26 @@ class AlignmentFit:
     sigmas: Mapping[str, float]
     """Standard deviation of each value."""
     frames: int
-    """Frames with boxes and clusters that were fitted to."""
+    """Number of frames with boxes and clusters used for the fit."""
     pairs: int
     """Boxes paired with a cluster."""
     before: Overlaps | None
-    """Of the present alignment; None where there is none."""
+    """With the current alignment; None without one."""
     after: Overlaps
-    """Of the fit."""
+    """With the fit."""
     held_out: bool
-    """Whether the overlaps are of frames set aside; a very short drive has none to spare."""
+    """Whether the overlaps are from held-out frames; a very short drive has too few."""
     warnings: tuple[str, ...] = field(default=())
-    """What the drive cannot tell, in sentences."""
+    """What the drive does not determine, as sentences."""
 
     @property
     def changes(self) -> dict[str, float | str]:
-        """By dotted name, as a step of parameters."""
+        """By dotted name, as a change of parameters."""
         return {"alignment.model": self.model, **{f"alignment.{name}": value for name, value in self.values.items()}}
 
 
 def overlap_sentence(fit: AlignmentFit) -> str:
-    """What the fit gains, for people."""
+    """The improvement by the fit, as a sentence."""
     before = f"{100 * fit.before.mean_iou:.0f} % → " if fit.before is not None else ""
     where = "of held-out frames" if fit.held_out else "of the fitted frames; the drive is too short to hold any out"
     return f"Projected clusters cover {before}{100 * fit.after.mean_iou:.0f} % of {fit.after.boxes} boxes {where}"
@@ -114,8 +114,8 @@ def fit_alignment(
 ) -> AlignmentFit:
     """The model's parameters from frames of one camera.
 
-    present: scored beside the fit, which does not start from it. offset: of a pinhole model, fit the camera's place
-    too. NothingToFit where too little is seen.
+    present: scored for comparison; the fit does not start from it. offset: of a pinhole model, also fit the camera's
+    position. NothingToFit if too little is visible.
     """
     scenes = _of_one_camera(scenes)
     if name == "pinhole" and scenes[0].camera is None:
@@ -148,11 +148,11 @@ def fit_alignment(
     )
 
 
-# ---------------------------------------------------------------- coarse, then fine
+# ---------------------------------------------------------------- coarse and fine search
 
 
 def _search(table: PairTable, model: FitModel, progress: Progress) -> list[Found]:
-    """Refined optima, the best first."""
+    """Refined optima, best first."""
     grid = model.grid()
     slack_px = 0.6 * STEP_DEG * _pixels_per_degree(model)
     scores = np.zeros(len(grid))
@@ -176,13 +176,13 @@ def _pixels_per_degree(model: FitModel) -> float:
 
 
 def _richest(table: PairTable, frames: int) -> PairTable:
-    """Of the frames with most boxes."""
+    """Only the frames with the most boxes."""
     count = np.bincount(table.frame)
     return table.taken(np.sort(np.argsort(-count, kind="stable")[:frames]))
 
 
 def _peaks(model: FitModel, grid: F64, scores: F64) -> list[F64]:
-    """The best places of the grid that are no neighbours of each other."""
+    """The best grid points that are not neighbours of each other."""
     scale = np.array([0.2, 0.2, 4.0, 4.0]) if model.name == "angular" else np.full(grid.shape[1], 2.5)
     chosen: list[F64] = []
     for vector in grid[np.argsort(-scores, kind="stable")]:
@@ -194,7 +194,7 @@ def _peaks(model: FitModel, grid: F64, scores: F64) -> list[F64]:
 
 
 def refine(table: PairTable, model: FitModel, start: F64, gates: Sequence[tuple[float, float]] = GATES) -> Found:
-    """Pair, move, and pair again, from a start within some degrees."""
+    """Repeatedly match pairs and optimise, from a start within some degrees."""
     vector, rows = start, np.zeros(0, np.int64)
     low, high = model.bounds()
     for widen, gate in gates:
@@ -214,24 +214,24 @@ def refine(table: PairTable, model: FitModel, start: F64, gates: Sequence[tuple[
 
 
 def _explained(table: PairTable, model: FitModel, vector: F64) -> float:
-    """How many boxes have a cluster of their own, each counted by how well."""
+    """Number of boxes with a cluster of their own, weighted by the quality of the match."""
     off = table.residuals(model.aligned(vector), 1.5)
     return float(np.exp(-0.5 * np.mean(off[table.matched(off, np.inf)] ** 2, axis=1)).sum())
 
 
 def _prior(model: FitModel, vector: F64) -> F64:
-    """What is known before anything is seen, in standard deviations."""
+    """Residuals of the prior, in standard deviations."""
     if model.name == "pinhole":
         return vector[2:] / [ROLL_SIGMA_DEG, OFFSET_SIGMA_M, OFFSET_SIGMA_M][: len(vector) - 2]
     return np.array([(vector[1] - vector[0]) / SQUARE_SIGMA])
 
 
-# ---------------------------------------------------------------- doubt
+# ---------------------------------------------------------------- uncertainty
 
 
 def looks_undistorted(table: PairTable, model: FitModel, vector: F64, blocks: list[I64]) -> bool:
-    """Whether the boxes lie better on a camera without the calibration's distortion, as in images that were
-    undistorted already: in sum over the blocks of the drive clearly, by what single blocks say."""
+    """Whether the boxes fit clearly better without the calibration's distortion, as with images that are already
+    undistorted: by the sum over the blocks of the drive, relative to their scatter."""
     if model.name != "pinhole" or model.camera is None or not np.any(model.camera.distortion):
         return False
     flat = replace(model, camera=replace(model.camera, distortion=np.zeros(0)))
@@ -242,7 +242,7 @@ def looks_undistorted(table: PairTable, model: FitModel, vector: F64, blocks: li
 
 
 def _bootstrap(table: PairTable, model: FitModel, vector: F64, blocks: list[I64], progress: Progress) -> F64:
-    """(K, P) vectors fitted to blocks of frames drawn with replacement."""
+    """(K, P) vectors fitted to resampled blocks of frames."""
     rng, found = np.random.default_rng(0), []
     for number in range(BOOTSTRAPS):
         progress(_COARSE_STEPS + STARTS + number, STEPS)
@@ -252,13 +252,13 @@ def _bootstrap(table: PairTable, model: FitModel, vector: F64, blocks: list[I64]
 
 
 def _blocks(scenes: Sequence[FitScene]) -> list[I64]:
-    """Frames that show the same, by number."""
+    """Frame numbers grouped into blocks that show the same scene."""
     number = np.array([each.t_ns // BLOCK_NS for each in scenes])
     return [np.flatnonzero(number == block) for block in np.unique(number)]
 
 
 def _split(scenes: Sequence[FitScene]) -> tuple[list[int], list[int]]:
-    """Frames to fit to, and frames set aside, by whole blocks; none set aside of a drive of few blocks."""
+    """Frames used for the fit, and held-out frames, in whole blocks; with few blocks none is held out."""
     blocks = _blocks(scenes)
     if len(blocks) < HELD_OUT:
         return list(range(len(scenes))), []
@@ -267,7 +267,8 @@ def _split(scenes: Sequence[FitScene]) -> tuple[list[int], list[int]]:
 
 
 def _overlaps(table: PairTable, model: FitModel, vectors: Sequence[F64]) -> list[Overlaps]:
-    """Of each vector, over the same boxes: those that both sensors see. Far ones have no cluster under any."""
+    """The overlaps for each vector, over the same boxes: those seen by both sensors. Distant ones have no cluster in
+    any case."""
     best = np.zeros((len(vectors), len(table.boxes)))
     for row, vector in zip(best, vectors, strict=True):
         np.maximum.at(row, table.box, table.overlap(model.aligned(vector)))
@@ -279,7 +280,7 @@ def _overlaps(table: PairTable, model: FitModel, vectors: Sequence[F64]) -> list
 
 
 def _of_one_camera(scenes: Sequence[FitScene]) -> list[FitScene]:
-    """Frames with the image size of most. NothingToFit without any."""
+    """Frames with the most frequent image size. NothingToFit without any."""
     if not scenes:
         raise NothingToFit("no frame has a LiDAR sweep with clusters and an image with vehicles in it")
     sizes = [each.size for each in scenes]

@@ -19,42 +19,43 @@ from pipeline.types import F64, CameraCalibration
 ModelName = Literal["angular", "pinhole"]
 
 REACH_DEG = 10.0
-"""Mounts are searched this far to all sides of the recording's calibration."""
+"""Search range of the mount around the recording's calibration, in all directions."""
 FARTHEST_OFF_M = 1.0
-"""How far the camera's place may be from where the calibration has it."""
+"""Maximum distance of the camera's position from that in the calibration."""
 STEP_DEG = 1.0
-"""Between two mounts of the coarse search; the coarse score still falls off no faster."""
+"""Step of the coarse search over mounts; the coarse score varies slowly enough for it."""
 VIEWS_DEG = (20.0, 130.0)
-"""Horizontal views of lenses that are searched where no calibration tells."""
+"""Range of horizontal fields of view that is searched without a calibration."""
 ZOOM_STEP = 1.12
-"""Between two lenses of the coarse search: the sides of a car move by 6 % of its width."""
+"""Step of the coarse search over focal lengths: the sides of a car move by 6 % of its width."""
 ZOOM_REACH = 1.35
-"""Lenses are searched up to so many times narrower and wider than the calibration's."""
+"""Search range of the focal length, as a factor on the calibration's in both directions."""
 
 
 @dataclass(frozen=True)
 class FitModel:
-    """A model of one camera. A vector of unknowns is in degrees and metres (pinhole), or in logarithms and degrees
+    """A model of one camera. Vectors of unknowns are in degrees and metres (pinhole), or in logarithms and degrees
     (angular)."""
 
     name: ModelName
     """Which of the two projections it is."""
     camera: CameraCalibration | None
-    """The recording's calibration; the angular model does without."""
+    """The recording's calibration; not needed for the angular model."""
     size: tuple[int, int]
     """Width and height of the images."""
     offset: bool = False
-    """Pinhole: the camera's place is fitted too, sideways and in height. Along the optical axis boxes say nothing."""
+    """Pinhole: whether the camera's position is also fitted, laterally and in height. Boxes do not determine it along
+    the optical axis."""
 
     @property
     def unknowns(self) -> tuple[str, ...]:
-        """The parameters that are fitted, in the order of the vector."""
+        """The fitted parameters, in the order of the vector."""
         if self.name == "pinhole":
             return ("yaw_deg", "pitch_deg", "roll_deg", "left_m", "up_m")[: 5 if self.offset else 3]
         return ("h_res_deg", "v_res_deg", "cx_px", "cy_px")
 
     def values(self, vector: F64) -> dict[str, float]:
-        """The vector as values of parameters."""
+        """The vector as parameter values."""
         if self.name == "pinhole":
             return dict(zip(self.unknowns, map(float, vector), strict=True))
         h, v = np.exp(vector[:2])
@@ -66,7 +67,7 @@ class FitModel:
         }
 
     def vector(self, params: AlignmentParams) -> F64 | None:
-        """Present parameters as a vector, where they say enough."""
+        """Current parameters as a vector, if they are complete."""
         if self.name == "pinhole":
             return np.array([getattr(params, name) for name in self.unknowns])
         aligned = resolve(params.model_copy(update={"model": "angular"}), self.camera)
@@ -77,13 +78,13 @@ class FitModel:
         return np.array([np.log(h), np.log(v), cx * h, cy * h])
 
     def params(self, vector: F64) -> AlignmentParams:
-        """As parameters, unrounded and outside of their bounds too, while a search goes on."""
+        """As parameters, not rounded or clipped, for use during the search."""
         return AlignmentParams.model_construct(
             **{**AlignmentParams().model_dump(), "model": self.name, **self.values(vector)}
         )
 
     def aligned(self, vector: F64, camera: CameraCalibration | None = None) -> Alignment:
-        """The projection. camera: of the frame, where frames differ."""
+        """The projection. camera: of the frame, if frames differ."""
         found = resolve(self.params(vector), camera or self.camera)
         assert found is not None
         return found
@@ -119,7 +120,7 @@ class FitModel:
         return grid
 
     def bounds(self) -> tuple[F64, F64]:
-        """Lowest and highest vector that the refinement may reach."""
+        """Lower and upper bounds of the refinement."""
         if self.name == "pinhole":
             reach = np.array([REACH_DEG] * 3 + [FARTHEST_OFF_M] * 2)[: len(self.unknowns)]
             return -reach, reach

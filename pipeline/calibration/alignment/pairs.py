@@ -18,13 +18,13 @@ from pipeline.calibration.alignment.scenes import ENDS, FitScene
 from pipeline.types import F64, I64
 
 BOX_NOISE, EDGE_PX = 0.05, 2.0
-"""A box's edge is off by this share of its side, and by so many pixels where it is small (1 σ)."""
+"""Error of a box's edge as a share of its side, and in pixels for small boxes (1 σ)."""
 _LEFT, _TOP, _RIGHT, _BOTTOM = range(4)
 
 
 @dataclass(frozen=True, eq=False)
 class PairTable:
-    """All boxes (B) and clusters (C) of several frames, and which of them are of one frame (P pairs)."""
+    """All boxes (B) and clusters (C) of several frames, and the pairs within the same frame (P)."""
 
     boxes: F64
     """(B, 4)."""
@@ -43,7 +43,7 @@ class PairTable:
     cluster: I64
     """(P,) the pair's cluster."""
     frame: I64
-    """(B,) which frame the box is of."""
+    """(B,) the frame of each box."""
 
     @classmethod
     def of(cls, scenes: Sequence[FitScene]) -> PairTable:
@@ -64,17 +64,17 @@ class PairTable:
         return cls(**joined, box=box, cluster=cluster, frame=np.repeat(np.arange(len(scenes)), boxes))
 
     def taken(self, frames: I64) -> PairTable:
-        """Only the boxes of these frames; a frame that is named twice counts twice."""
+        """Only the boxes of these frames; a frame given twice counts twice."""
         return self.only(np.concatenate([np.flatnonzero(self.frame[self.box] == frame) for frame in frames]))
 
     def only(self, rows: I64) -> PairTable:
-        """Only these pairs, and what of the clusters they need."""
+        """Only these pairs, with the required data of their clusters."""
         used, cluster = np.unique(self.cluster[rows], return_inverse=True)
         parts = {name: getattr(self, name)[used] for name in ("outline", "roof", "foot", "range_m")}
         return PairTable(**{**vars(self), **parts, "box": self.box[rows], "cluster": cluster})
 
     def extents(self, aligned: Alignment) -> F64:
-        """(C, 5) left, right, roof at its lowest and at its highest (−inf where no ring is above), foot; pixels. NaN
+        """(C, 5) left, right, lowest and highest possible roof (−inf if there is no ring above), foot; pixels. NaN
         behind the camera."""
         count = len(self.outline)
         points = np.concatenate([self.outline, self.roof[:, None], self.foot], axis=1).reshape(-1, 3)
@@ -88,14 +88,15 @@ class PairTable:
         )
 
     def deviations(self, widen: float, slack_px: float) -> tuple[F64, F64]:
-        """(P,) and (P,) standard deviations of a box's upright and lying edges, pixels."""
+        """(P,) and (P,) standard deviations of a box's vertical and horizontal edges, pixels."""
         sides = (self.boxes[:, 2:] - self.boxes[:, :2])[self.box].T
         across, down = np.hypot(np.hypot(BOX_NOISE * sides, EDGE_PX) * widen, slack_px)
         return across, down
 
     def residuals(self, aligned: Alignment, widen: float = 1.0, slack_px: float = 0.0) -> F64:
-        """(P, 4) how far left, top, right and bottom of each pair's cluster are from its box's, in standard deviations;
-        0 where an edge says nothing. widen, slack_px: of the deviation, for a search that is still far away."""
+        """(P, 4) deviation of the left, top, right and bottom of each pair's cluster from its box, in standard
+        deviations; 0 for an edge without information. widen, slack_px: increase the standard deviation, for a search
+        that is still far off."""
         left, right, low, high, foot = self.extents(aligned)[self.cluster].T
         x1, y1, x2, y2 = self.boxes[self.box].T
         across, down = self.deviations(widen, slack_px)
@@ -105,8 +106,8 @@ class PairTable:
         return np.where(np.isfinite(off), off, 1e3)
 
     def matched(self, off: F64, gate: float) -> I64:
-        """Rows of the pairs that belong together: each box's nearest cluster whose nearest box it is, within ``gate``
-        (root mean square of the deviations). off: (P, 4) residuals."""
+        """Rows of the matched pairs: mutually nearest boxes and clusters within ``gate`` (root mean square of the
+        deviations). off: (P, 4) residuals."""
         distance = np.sqrt(np.mean(off**2, axis=1))
         best_of_box = np.full(len(self.boxes), np.inf)
         best_of_cluster = np.full(len(self.outline), np.inf)
@@ -116,7 +117,7 @@ class PairTable:
         return np.flatnonzero(is_best & (distance < gate))
 
     def overlap(self, aligned: Alignment) -> F64:
-        """(P,) IoU of each pair's box and projected cluster. A roof between two rings is where the box has it."""
+        """(P,) IoU of each pair's box and projected cluster. A roof between two rings is taken from the box."""
         left, right, low, high, foot = self.extents(aligned)[self.cluster].T
         x1, y1, x2, y2 = self.boxes[self.box].T
         top = np.clip(y1, high, low)
@@ -127,8 +128,8 @@ class PairTable:
 
 
 def coarse_scores(table: PairTable, model: FitModel, grid: F64, widen: float, slack_px: float) -> F64:
-    """(K,) of each vector: how many boxes have a cluster where it says, each counted by how well. The table's pairs
-    ascend by box."""
+    """(K,) score of each vector: number of boxes with a matching cluster, weighted by the quality of the match. The
+    table's pairs must be sorted by box."""
     corners = replace(table, outline=np.ascontiguousarray(table.outline[:, :ENDS]))
     across, down = table.deviations(widen, slack_px)
     boxes, whole = table.boxes[table.box], table.whole[table.box]
@@ -142,7 +143,7 @@ def coarse_scores(table: PairTable, model: FitModel, grid: F64, widen: float, sl
 
 @numba.njit(cache=True, nogil=True)
 def _covered(extents, box, cluster, boxes, whole, across, down):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Sum over boxes of how well their best cluster lies on them. extents: (C, 5). The rest: (P, …) of each pair."""
+    """Sum over boxes of the overlap with their best cluster. extents: (C, 5). The rest: (P, …) of each pair."""
     total, best = 0.0, 0.0
     for p in range(len(box)):
         if p and box[p] != box[p - 1]:
@@ -159,6 +160,6 @@ def _covered(extents, box, cluster, boxes, whole, across, down):  # type: ignore
         if whole[p, 3]:
             off += ((foot - y2) / down[p]) ** 2
         fits = np.exp(-off / 8)
-        if fits > best:  # not where it is behind the camera: NaN
+        if fits > best:  # false for NaN, behind the camera
             best = fits
     return total + best

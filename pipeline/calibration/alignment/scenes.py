@@ -22,33 +22,33 @@ from pipeline.types import F32, F64, VEHICLES, CameraCalibration, Frame, Sweep
 from pipeline.vision.nms import select
 
 NEAREST_M, FARTHEST_M = 4.0, 60.0
-"""Nearer a car no longer fits the image; farther 16 rings leave one or two of them on it."""
+"""Closer, a car does not fit into the image; farther, only one or two of 16 rings hit it."""
 LONGEST_M, LOWEST_M = 14.0, 0.6
 """Longer clusters are walls and hedges, lower ones kerbs."""
 FEWEST_POINTS = 5
 MIN_SCORE = 0.4
-"""Boxes of lower scores are often of something else."""
+"""Boxes with lower scores are often of other objects."""
 BORDER_PX = 3.0
-"""A box that ends this close to the image's border is cut: its edge there says nothing."""
+"""A box this close to the image's border is cut, and its edge there carries no information."""
 OUTLINE, ENDS = 12, 4
-"""Points that an outline keeps of its hull."""
+"""Number of points of an outline that represent its hull."""
 _WIDEST_GAP_RAD = np.radians(4.0)
-"""Rings farther apart than this have others between them that hit nothing."""
+"""If the gap between rings is larger, there are rings in between that hit nothing."""
 
 
 @dataclass(frozen=True, eq=False)
 class FitScene:
-    """A frame's boxes (n) and clusters (m)."""
+    """Boxes (n) and clusters (m) of a frame."""
 
     boxes: F64
     """(n, 4) x1 y1 x2 y2, pixels of the raw image."""
     whole: np.ndarray
-    """(n, 4) bool, which edges are an object's and not the image's border."""
+    """(n, 4) bool, which edges belong to the object instead of the image's border."""
     outline: F64
-    """(m, OUTLINE, 3) points around what was hit, widened by half a beam to both sides; ego. The first ENDS are its
-    right, left, top and bottom one."""
+    """(m, OUTLINE, 3) points around the hit part, widened by half a beam on both sides; ego. The first ENDS are the
+    rightmost, leftmost, top and bottom points."""
     roof: F64
-    """(m, 3) its highest point, where the next ring above would have been; NaN where there is none."""
+    """(m, 3) its highest possible point, where the next ring above would have hit; NaN if there is none."""
     foot: F64
     """(m, 3, 3) points on the road under its left, nearest and right point; ego."""
     range_m: F64
@@ -62,7 +62,7 @@ class FitScene:
 
 
 def fit_scene(frame: Frame, params: Params) -> FitScene | None:
-    """A frame whose ``raw_boxes`` a detector has filled in. None where a box or a cluster is missing."""
+    """For a frame with detections in ``raw_boxes``. None without boxes or clusters."""
     if frame.sweep is None or frame.raw_boxes is None or frame.image_size is None:
         return None
     detections = [d for d in select(frame.raw_boxes, params.detection) if d.label in VEHICLES and d.score >= MIN_SCORE]
@@ -97,14 +97,14 @@ def _outlines(
             continue
         outline = _outline(own, half_beam) + sweep.origin
         roof = _roof(own, elevations) + sweep.origin
-        if ground.above(roof[None])[0] > params.cluster.max_height_m:  # what is higher was never clustered
+        if ground.above(roof[None])[0] > params.cluster.max_height_m:  # higher points were not clustered
             roof = np.full(3, np.nan)
         found.append((outline, roof, _foot(own + sweep.origin, ground)))
     return found
 
 
 def _may_be_a_vehicle(own: F64, origin: Sequence[float], ground: Ground) -> bool:
-    """own: (K, 3), seen from the sensor."""
+    """own: (K, 3), relative to the sensor."""
     range_m = np.hypot(own[:, 0], own[:, 1])
     if own[:, 0].min() <= 0.0 or not NEAREST_M <= range_m.min() <= FARTHEST_M:
         return False
@@ -114,12 +114,12 @@ def _may_be_a_vehicle(own: F64, origin: Sequence[float], ground: Ground) -> bool
 
 
 def _outline(own: F64, half_beam: float) -> F64:
-    """(OUTLINE, 3) of (K, 3) points seen from the sensor: their hull in angles, the sides half a beam wider."""
+    """(OUTLINE, 3) of (K, 3) points relative to the sensor: their hull in angles, with the sides half a beam wider."""
     azimuth, range_m = np.arctan2(own[:, 1], own[:, 0]), np.hypot(own[:, 0], own[:, 1])
     middle = (azimuth.min() + azimuth.max()) / 2
     try:
         corners = ConvexHull(np.column_stack([azimuth, np.arctan2(own[:, 2], range_m)]), qhull_options="QJ").vertices
-    except (QhullError, ValueError):  # all in one ring
+    except (QhullError, ValueError):  # all points in one ring
         corners = np.array([azimuth.argmin(), azimuth.argmax()])
     ends = np.array([azimuth.argmin(), azimuth.argmax(), own[:, 2].argmax(), own[:, 2].argmin()])
     inner = np.setdiff1d(corners, ends)
@@ -130,8 +130,8 @@ def _outline(own: F64, half_beam: float) -> F64:
 
 
 def _roof(own: F64, elevations: F64) -> F64:
-    """(3,) where the next ring would have met the cluster's highest part; NaN above the topmost ring. own: (K, 3) from
-    the sensor."""
+    """(3,) where the next ring would have hit the cluster's highest part; NaN above the topmost ring. own: (K, 3)
+    relative to the sensor."""
     range_m = np.hypot(own[:, 0], own[:, 1])
     elevation = np.arctan2(own[:, 2], range_m)
     top = int(elevation.argmax())
@@ -142,7 +142,7 @@ def _roof(own: F64, elevations: F64) -> F64:
 
 
 def _foot(own: F64, ground: Ground) -> F64:
-    """(3, 3) on the road: below the leftmost, the nearest and the rightmost of (K, 3) ego points."""
+    """(3, 3) points on the road: below the leftmost, the nearest and the rightmost of (K, 3) ego points."""
     azimuth = np.arctan2(own[:, 1], own[:, 0])
     kept = own[[int(azimuth.argmax()), int(np.hypot(own[:, 0], own[:, 1]).argmin()), int(azimuth.argmin())]].copy()
     kept[:, 2] = ground.height(kept[:, :2])
@@ -150,13 +150,13 @@ def _foot(own: F64, ground: Ground) -> F64:
 
 
 def _ring_elevations(xyz: F64, sweep: Sweep) -> F64:
-    """Elevations of the rings that are there, radians, the lowest first."""
+    """Elevations of the existing rings, radians, lowest first."""
     elevation = np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))
     return np.sort([np.median(elevation[sweep.ring == ring]) for ring in np.unique(sweep.ring)])
 
 
 def _azimuth_step(xyz: F64, sweep: Sweep) -> float:
-    """Radians between one beam of a ring and the next."""
+    """Radians between two beams of a ring."""
     ahead = xyz[:, 0] > 0.0
     azimuth, ring = np.arctan2(xyz[ahead, 1], xyz[ahead, 0]), sweep.ring[ahead]
     order = np.lexsort((azimuth, ring))

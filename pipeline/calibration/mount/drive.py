@@ -16,7 +16,7 @@ from pipeline.params import Params
 from pipeline.types import F64, Frame
 
 STRAIGHT_DEG = 0.3
-"""A yaw that is pulled by less than its deviation."""
+"""Below this yaw, the bias is smaller than the standard deviation."""
 
 
 def fit_mount_drive(
@@ -42,7 +42,7 @@ def fit_mount_drive(
 
 
 def _turned(frame: Frame, turn: F64) -> Frame:
-    """The frame with its sweep in the ego frame turned so."""
+    """The frame with its sweep rotated in the ego frame."""
     if frame.sweep is None:
         return frame
     points = frame.sweep.points.copy()
@@ -52,7 +52,7 @@ def _turned(frame: Frame, turn: F64) -> Frame:
 
 
 def _angles(turn: F64) -> dict[str, float]:
-    """Of a rotation by yaw, then pitch, then roll."""
+    """Yaw, pitch and roll of a rotation, applied in this order."""
     roll, pitch, yaw = (
         np.arctan2(turn[2, 1], turn[2, 2]),
         np.arcsin(-turn[2, 0]),

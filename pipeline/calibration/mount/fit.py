@@ -21,21 +21,21 @@ from pipeline.types import F64, CameraCalibration
 
 FEWEST_ROADS, FEWEST_PIECES = 10, 8
 BLOCK_NS = 3_000_000_000
-"""What is seen within three seconds is one road, and drawn together."""
+"""Observations within three seconds show the same road and are resampled together."""
 BOOTSTRAPS = 100
 PITCH_ROAD_DEG, ROLL_ROAD_DEG, HEIGHT_ROAD_M = 0.15, 0.3, 0.01
-"""By how much roads differ from flat ones, beyond what a drive of one road shows. Between KITTI 0009 and 0052, two
-roads with the same car, pitch differs by 0.16°, roll by 0.53° and height by 1 cm."""
+"""Deviation of roads from flat ones, beyond what a drive on one road shows. Between KITTI 0009 and 0052, two roads with
+the same car, pitch differs by 0.16°, roll by 0.53° and height by 1 cm."""
 YAW_FLOOR_DEG = 0.1
-"""On bare roads in the simulator a yaw of 2° is found up to 0.4° short."""
+"""On bare roads in the simulator, a yaw of 2° is underestimated by up to 0.4°."""
 AXLE_M, AXLE_SIGMA_M = 1.5, 1.5
-"""A LiDAR is between the rear axle and the front bumper: what holds L where the drive is straight."""
+"""A LiDAR is between the rear axle and the front bumper: prior for the distance to the axle on straight drives."""
 TOLD_M = 0.4
-"""Offsets from the axle with a larger standard deviation are not given."""
+"""Offsets from the axle with a larger standard deviation are not reported."""
 UNSURE = {"yaw_deg": 0.3, "pitch_deg": 0.4, "roll_deg": 0.6, "height_m": 0.05}
-"""Standard deviations beyond which a warning names the value."""
+"""Standard deviations from which a warning names the value."""
 ROBUST_M = 0.1
-"""Pieces that are off by more than this count less."""
+"""Pieces with larger residuals get less weight."""
 
 
 class NoMount(BadInput):
@@ -44,26 +44,26 @@ class NoMount(BadInput):
 
 @dataclass(frozen=True)
 class MountFit:
-    """How the recording's ego frame, which is the LiDAR's, sits in the car."""
+    """Pose of the recording's ego frame, which is the LiDAR's, in the car."""
 
     values: Mapping[str, float]
-    """yaw_deg to the left of the direction of travel, pitch_deg downwards and roll_deg clockwise against the road,
-    height_m of the ego origin above it; ahead_of_axle_m and left_of_axle_m of the rear axle's middle. Only those that
-    the drive determines."""
+    """yaw_deg to the left of the direction of travel, pitch_deg downwards and roll_deg clockwise relative to the road,
+    height_m of the ego origin above it; ahead_of_axle_m and left_of_axle_m relative to the middle of the rear axle.
+    Only values that the drive determines."""
     sigmas: Mapping[str, float]
     """Standard deviation of each value."""
     frames: int
-    """Frames with the road."""
+    """Number of frames with a fitted road."""
     driven_m: float
     """Distance driven with reliable odometry."""
     speed_scale: float | None
-    """What the LiDAR drives for each metre of the car's own speed; None without that."""
+    """LiDAR distance per metre of the car's own odometry; None without that."""
     warnings: tuple[str, ...] = ()
     """What the drive does not determine, in sentences."""
 
 
 def fit_mount(record: MountRecord) -> MountFit:
-    """Every value that the drive determines. Raises NoMount if there is none."""
+    """All values that the drive determines. Raises NoMount if there is none."""
     values: dict[str, float] = {}
     sigmas: dict[str, float] = {}
     warnings: list[str] = []
@@ -99,13 +99,13 @@ def fit_mount(record: MountRecord) -> MountFit:
 
 
 def mount_sentence(fit: MountFit) -> str:
-    """What was looked at, for people."""
+    """Summary of the input data, as a sentence."""
     return f"Judging by the road in {fit.frames} frames and {fit.driven_m:.0f} m of LiDAR odometry"
 
 
 def turned(fit: MountFit, T_ego_lidar: F64, camera: CameraCalibration | None) -> tuple[CameraCalibration | None, F64]:
-    """Camera and LiDAR (4, 4) in the ego frame as the fit turns it: level, x along the direction of travel. Values
-    that the drive does not determine stay as they are; the two sensors keep their relative pose."""
+    """Camera and LiDAR (4, 4) in the ego frame corrected by the fit: level, x along the direction of travel. Values
+    that the drive does not determine stay unchanged; the two sensors keep their relative pose."""
     turn = np.eye(4)
     turn[:3, :3] = turn_of(fit.values)
     moved = replace(camera, T_camera_ego=camera.T_camera_ego @ inverse(turn)) if camera is not None else None
@@ -113,7 +113,7 @@ def turned(fit: MountFit, T_ego_lidar: F64, camera: CameraCalibration | None) ->
 
 
 def turn_of(values: Mapping[str, float]) -> F64:
-    """(3, 3), takes points of the ego frame to one that is level, with x along the direction of travel."""
+    """(3, 3), takes points of the ego frame to a level frame with x along the direction of travel."""
     return rotation(*(float(np.radians(values.get(f"{name}_deg", 0.0))) for name in ("roll", "pitch", "yaw")))
 
 
@@ -149,7 +149,7 @@ def _against_travel(pieces: Sequence[Piece]) -> Told:
         return _robust(np.column_stack([-forward, turn]), left, np.array([np.inf, AXLE_SIGMA_M]), [0.0, AXLE_M])
 
     found, spread = _with_spread(rows, [each.t_ns for each in pieces], solved)
-    # what holds the axle is no measurement: its deviation is that of the pieces alone
+    # the prior is not a measurement: the standard deviation is that of the pieces alone
     turned = rows[:, 1] - rows[:, 0] * float(rows[:, 0] @ rows[:, 1]) / float(rows[:, 0] @ rows[:, 0])
     noise = 1.4826 * float(np.median(np.abs(rows[:, 2] + found[0] * rows[:, 0] - found[1] * rows[:, 1])))
     axle_sigma = hypot(spread[1], noise / max(float(np.linalg.norm(turned)), 1e-9))
@@ -176,7 +176,7 @@ def _against_speed(pieces: Sequence[Piece]) -> Told:
 
 
 def _robust(design: F64, seen: F64, prior_sigma: F64, prior: Sequence[float]) -> F64:
-    """(2,) least squares with a prior, in which rows that are far off count less (Huber)."""
+    """(2,) least squares with a prior, in which outliers get less weight (Huber)."""
     held = np.diag((ROBUST_M / prior_sigma) ** 2)
     weight = np.ones(len(seen))
     solved = np.zeros(2)
@@ -188,10 +188,10 @@ def _robust(design: F64, seen: F64, prior_sigma: F64, prior: Sequence[float]) ->
 
 
 def _with_spread(rows: F64, t_ns: Sequence[int], solve: Callable[[F64], F64]) -> tuple[F64, F64]:
-    """The solution, and its standard deviation over blocks of the drive drawn anew (bootstrap)."""
+    """The solution, and its standard deviation over resampled blocks of the drive (bootstrap)."""
     number = np.asarray(t_ns) // BLOCK_NS
     blocks = [np.flatnonzero(number == block) for block in np.unique(number)]
-    if len(blocks) < 4:  # a short drive: rows one by one
+    if len(blocks) < 4:  # in a short drive, resample single rows
         blocks = [np.array([row]) for row in range(len(rows))]
     rng = np.random.default_rng(0)
     drawn = [rng.integers(0, len(blocks), len(blocks)) for _ in range(BOOTSTRAPS)]

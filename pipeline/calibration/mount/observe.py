@@ -19,13 +19,13 @@ from pipeline.step import State, step
 from pipeline.types import F32, F64, EgoState, Frame, Ground
 
 FRAMES = 1200
-"""Frames that are looked at, from the middle of the drive: two minutes at 10 Hz."""
+"""Number of evaluated frames, from the middle of the drive: two minutes at 10 Hz."""
 NEAREST_M, FARTHEST_M, HALF_WIDTH_M = 2.5, 20.0, 2.0
-"""Of the road's returns. Farther to the side there are kerbs and the other half of a crowned road: in a KITTI street
-a strip three times as wide tilts by 2.3° more."""
+"""Bounds of the used road returns. Farther to the side there are kerbs and the other half of a crowned road: in a KITTI
+street, a strip three times as wide tilts by 2.3° more."""
 FEWEST_POINTS = 40
 SEGMENT_M = 3.0
-"""A piece of the way: long enough that its direction is not mostly noise."""
+"""Length of a piece of the way: long enough that its direction is not mostly noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class RoadPlane:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A piece of the LiDAR's way of at least ``SEGMENT_M``, in the ego frame at half of its turn."""
+    """A piece of the LiDAR's way of at least ``SEGMENT_M``, in the ego frame at half of its rotation."""
 
     t_ns: int
     """Its beginning."""
@@ -55,21 +55,21 @@ class Piece:
     up_m: float
     """Along z."""
     turn_rad: float
-    """By how much the heading changes, to the left."""
+    """Change of heading, positive to the left."""
     driven_m: float | None
-    """The same way by the car's own speed; None where that is not known all along."""
+    """The same distance by the car's own speed; None unless it is known throughout."""
 
 
 @dataclass(frozen=True, eq=False)
 class MountRecord:
-    """All of a drive."""
+    """All observations of a drive."""
 
     frames: int
     """Frames with a sweep."""
     roads: tuple[RoadPlane, ...]
-    """Of the frames in which the road was found."""
+    """From the frames in which the road was found."""
     pieces: tuple[Piece, ...]
-    """Of the stretches in which the odometry was sure."""
+    """From the parts in which odometry was reliable."""
 
 
 def observe(frame_of: Callable[[int], Frame], count: int, params: Params, progress: Progress = silent) -> MountRecord:
@@ -95,13 +95,13 @@ def observe(frame_of: Callable[[int], Frame], count: int, params: Params, progre
 
 
 def looked_at(count: int) -> range:
-    """Which frames of a drive of so many."""
+    """The evaluated frames of a drive with this many."""
     first = max(0, (count - FRAMES) // 2)
     return range(first, min(count, first + FRAMES))
 
 
 class _Way:
-    """Poses as they come, cut into pieces."""
+    """Divides the sequence of poses into pieces."""
 
     def __init__(self) -> None:
         self.pieces: list[Piece] = []
@@ -110,7 +110,7 @@ class _Way:
         self._driven_m: float | None = 0.0
 
     def add(self, t_ns: int, pose: F64 | None, begins: bool, ego: EgoState | None) -> None:
-        """pose: (4, 4), T_start_ego; None without one. begins: it belongs to no earlier one."""
+        """pose: (4, 4), T_start_ego; None without one. begins: it is not connected to earlier poses."""
         if pose is None or begins or self._from is None:
             self._begin(t_ns, pose)
             return
@@ -134,7 +134,7 @@ class _Way:
 
 
 def _road(t_ns: int, points: F32, ground: Ground) -> RoadPlane | None:
-    """The plane through the own lane's returns, without what lies beside it; None with too few."""
+    """The plane through the returns of the own lane, without structures beside it; None with too few."""
     near = ground.mask[: len(points)] & (points[:, 0] > NEAREST_M) & (points[:, 0] < FARTHEST_M)
     near &= np.abs(points[:, 1]) < HALF_WIDTH_M
     x, y, z = points[near, :3].astype(np.float64).T
@@ -148,7 +148,7 @@ def _road(t_ns: int, points: F32, ground: Ground) -> RoadPlane | None:
         kept = off <= 2.5 * (1.4826 * float(np.median(off[kept])) + 1e-3)
     if np.count_nonzero(kept) < FEWEST_POINTS:
         return None
-    # more than one ring, or the slope ahead is not told
+    # needs more than one ring to determine the slope ahead
     if np.ptp(x[kept]) < 2.0 or np.ptp(y[kept]) < 0.5 * HALF_WIDTH_M:
         return None
     return RoadPlane(t_ns, float(plane[0]), float(plane[1]), float(-plane[2]))

@@ -15,13 +15,14 @@ from pipeline.types import F64
 ACCEL_MPS2 = 1.5
 """Standard deviation of the acceleration between two vehicles on a road, as white noise."""
 RANGE_SIGMA_M = 0.15
-"""Of a LiDAR distance to the nearest point of a moving vehicle: the point changes from sweep to sweep."""
+"""Standard deviation of a LiDAR distance to the nearest point of a moving vehicle: the point changes from sweep to
+sweep."""
 RATE_SIGMA_MPS = 15.0
-"""Of the rate before two measurements have told it."""
+"""Standard deviation of the rate before two measurements."""
 
 
 class Looked(NamedTuple):
-    """What later measurements say of earlier moments; NaN where they do not say it."""
+    """Estimates at earlier times from later measurements; NaN if unknown."""
 
     distance_m: F64
     """(N,) metres."""
@@ -34,11 +35,11 @@ class Looked(NamedTuple):
 
 
 def look_back(t_s: F64, ranged_m: F64) -> Looked:
-    """The distance at each moment from the measurements at later ones.
+    """The distance at each time, estimated from later measurements.
 
     Args:
-        t_s: (N,) rising times of the object's sightings, seconds.
-        ranged_m: (N,) distance that the LiDAR measured there, metres; NaN where it did not.
+        t_s: (N,) ascending times of the object's sightings, seconds.
+        ranged_m: (N,) distance measured by the LiDAR at these times, metres; NaN without one.
     """
     count = len(t_s)
     looked = Looked(*(np.full(count, np.nan) for _ in range(4)))
@@ -49,7 +50,7 @@ def look_back(t_s: F64, ranged_m: F64) -> Looked:
             dt = float(t_s[at + 1] - t_s[at])
             step = np.array(
                 [[1.0, dt], [0.0, 1.0]]
-            )  # the rate is the closing speed: backwards the distance grows by it
+            )  # the rate is the closing speed: backwards in time, the distance grows by it
             noise = ACCEL_MPS2**2 * np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
             state, covariance = step @ state, step @ covariance @ step.T + noise
             if measured > 1:

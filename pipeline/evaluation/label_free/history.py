@@ -27,8 +27,8 @@ SIGHTING = np.dtype(
         ("closing_mps", "f4"),
     ]
 )
-"""One object in one frame. ``ranged``: its distance was measured by LiDAR in this frame; ``by_camera``: it is known to
-the camera alone, and its distance was measured by its image box in this frame. NaN: unknown."""
+"""One object in one frame. ``ranged``: its distance was measured by LiDAR in this frame; ``by_camera``: only the camera
+sees it, and its distance was measured from its image box in this frame. NaN: unknown."""
 SightingRecords = npt.NDArray[np.void]
 
 
@@ -41,7 +41,7 @@ class History:
     _parts: list[SightingRecords] = field(default_factory=list)
 
     def add(self, result: Result) -> None:
-        """The next frame."""
+        """Add the next frame."""
         frame = len(self._t_ns)
         part = np.zeros(len(result.objects), SIGHTING)
         for place, item in enumerate(result.objects):

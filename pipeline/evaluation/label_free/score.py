@@ -19,23 +19,23 @@ from pipeline.evaluation.scores.figures import Sums
 from pipeline.types import F64, I64
 
 DriveScores = dict[str, Sums]
-"""By name of the score: what the drive adds to its numerator and its denominator."""
+"""By name of the score: the drive's contribution to its numerator and its denominator."""
 
 SURE_SHARE, SURE_M = 0.1, 0.5
-"""An earlier distance is judged where the later ones tell it to this share of it, or to this much."""
+"""An earlier distance is judged if later measurements determine it to this share of it, or to this value."""
 PROOFS = 3
-"""Sightings by both sensors that measure an object before the camera's earlier distances are judged by them."""
+"""Sightings by both sensors that must measure an object before the camera's earlier distances are judged."""
 FARTHEST_M, LARGEST_SHARE = 60.0, 0.35
-"""As against labels: vehicles are judged up to this distance, and an error of the camera counts no more than this share
-of it, which is as far as an object may be from the label that it matches."""
+"""As in scoring with labels: vehicles are judged up to this distance, and the camera's error is capped at this share of
+it, which is the maximum distance of an object from its matching label."""
 SURE_MPS = 2.0
-"""The same of a closing speed."""
+"""The same for a closing speed."""
 PROOF_S = 2.0
-"""A lead must have proved to be one so long after it was chosen."""
+"""Time after which a lead must have been confirmed."""
 PHANTOM_SHARE = 0.5
-"""A lead is a phantom if it was sure to be in the path in less than this share of the time after it was chosen."""
+"""A lead is a phantom if it was certainly in the path for less than this share of the time after it was chosen."""
 LATE_S = 3.0
-"""Before a lead was chosen, it is looked for so far back."""
+"""How far before its selection a lead is searched."""
 LONGEST_CLOSING_MPS = 70.0
 
 
@@ -47,7 +47,7 @@ class ScoredClip(NamedTuple):
     lead: I64
     """(N,) id of the CIPV, ``NONE`` without one."""
     objects: dict[int, SightingRecords]
-    """By id: its sightings, ``frame`` counted from the clip's first."""
+    """Sightings by id; ``frame`` is counted from the clip's start."""
 
 
 @dataclass(frozen=True)
@@ -55,21 +55,21 @@ class LabelFreeScore:
     """One score without labels."""
 
     name: str
-    """In tables and rules."""
+    """Name in tables and rules."""
     title: str
-    """For people."""
+    """Display name."""
     unit: str
-    """Of numerator over denominator, e.g. ``%`` or ``m/s``."""
+    """Unit of the ratio, e.g. ``%`` or ``m/s``."""
     better: Literal["higher", "lower"]
     """Which direction is an improvement."""
     of: Callable[[ScoredClip], Sums]
-    """What a clip adds to numerator and denominator."""
+    """Contribution of a clip to numerator and denominator."""
     counterpart: str
-    """The figure against labels that it stands for."""
+    """The corresponding metric that uses labels."""
 
 
 def label_free_scores(history: History, gap_s: float) -> DriveScores:
-    """Every score of a drive. gap_s: longest time between two frames of one clip."""
+    """All scores of a drive. gap_s: longest time between two frames of one clip."""
     clips = list(clips_of(history, gap_s))
     return {score.name: _sum(score.of(clip) for clip in clips) for score in SCORES}
 
@@ -93,12 +93,12 @@ def clips_of(history: History, gap_s: float) -> Iterator[ScoredClip]:
         yield ScoredClip(t_s[first:end], lead[first:end], objects)
 
 
-# ---------------------------------------------------------------- camera alone, judged once the LiDAR has measured
+# ---------------------------------------------------------------- camera distances, judged by later LiDAR measurements
 
 
 def _hindsight(clip: ScoredClip) -> Iterator[tuple[SightingRecords, F64, F64, F64]]:
-    """Of each object: sightings by the camera alone, and distance, closing speed and the latter's standard deviation as
-    later sightings tell them."""
+    """For each object: camera-only sightings, and distance, closing speed and the latter's standard deviation from
+    later measurements."""
     for seen in clip.objects.values():
         proved = seen["ranged"] & seen["two_sensors"]
         if not seen["by_camera"].any() or proved.sum() < PROOFS:
@@ -112,7 +112,7 @@ def _hindsight(clip: ScoredClip) -> Iterator[tuple[SightingRecords, F64, F64, F6
 
 
 def camera_distance(clip: ScoredClip) -> Sums:
-    """Mean size of the camera's error, as a share of the distance that the LiDAR told later."""
+    """Mean absolute error of the camera, relative to the distance from later LiDAR measurements."""
     over = under = 0.0
     for seen, distance_m, *_ in _hindsight(clip):
         over += float(np.minimum(np.abs(seen["distance_m"] - distance_m) / distance_m, LARGEST_SHARE).sum())
@@ -121,7 +121,7 @@ def camera_distance(clip: ScoredClip) -> Sums:
 
 
 def camera_speed(clip: ScoredClip) -> Sums:
-    """Mean size of the camera's error of the closing speed."""
+    """Mean absolute error of the camera's closing speed."""
     over = under = 0.0
     for seen, _, closing, sigma in _hindsight(clip):
         known = np.isfinite(seen["closing_mps"]) & (sigma <= SURE_MPS) & (np.abs(closing) < LONGEST_CLOSING_MPS)
@@ -134,26 +134,25 @@ def camera_speed(clip: ScoredClip) -> Sums:
 
 
 class Episode(NamedTuple):
-    """Frames in a row with the same lead."""
+    """Consecutive frames with the same lead."""
 
     lead: int
     """Id of the object that is the CIPV; never ``NONE``."""
     first: int
     """Index of the first frame, counted from the clip's first."""
     last: int
-    """Index of the last one, which belongs to it."""
+    """Index of the last frame, inclusive."""
 
 
 def episodes(lead: I64) -> list[Episode]:
-    """Every one of a clip, in order."""
+    """All episodes of a clip, in order."""
     changes = np.flatnonzero(np.diff(lead)) + 1
     bounds = [0, *changes.tolist(), len(lead)] if len(lead) else [0]
     return [Episode(int(lead[first]), first, end - 1) for first, end in pairwise(bounds) if lead[first] != NONE]
 
 
 def _sure(clip: ScoredClip, number: int) -> np.ndarray:
-    """(N,) frames in which an object was in the path, and there without doubt: measured by the LiDAR, or followed by
-    both sensors."""
+    """(N,) frames in which an object was certainly in the path: measured by the LiDAR, or tracked by both sensors."""
     found = np.zeros(len(clip.t_s), bool)
     seen = clip.objects.get(number, np.zeros(0, SIGHTING))
     found[seen["frame"]] = seen["in_path"] & ~seen["carried"] & (seen["ranged"] | seen["two_sensors"])
@@ -161,7 +160,7 @@ def _sure(clip: ScoredClip, number: int) -> np.ndarray:
 
 
 def _there(clip: ScoredClip, number: int) -> np.ndarray:
-    """(N,) frames in which an object was in the path and seen by anything."""
+    """(N,) frames in which an object was in the path and seen by any sensor."""
     found = np.zeros(len(clip.t_s), bool)
     seen = clip.objects.get(number, np.zeros(0, SIGHTING))
     found[seen["frame"]] = seen["in_path"] & ~seen["carried"]
@@ -169,13 +168,13 @@ def _there(clip: ScoredClip, number: int) -> np.ndarray:
 
 
 def phantom_frames(clip: ScoredClip) -> np.ndarray:
-    """(N,) frames whose lead later proved to be nothing, or beside the path."""
+    """(N,) frames whose lead later turned out not to exist, or to be beside the path."""
     phantom = np.zeros(len(clip.t_s), bool)
     for episode in episodes(clip.lead):
         there = _there(clip, episode.lead)
         until = int(np.searchsorted(clip.t_s, clip.t_s[episode.first] + PROOF_S, side="right"))
         if clip.t_s[-1] - clip.t_s[episode.first] < PROOF_S / 2.0:
-            continue  # nobody knows what it would have proved to be
+            continue  # unknown what it would have turned out to be
         after = there[episode.first : until]
         if after.mean() < PHANTOM_SHARE:
             phantom[episode.first : episode.last + 1] = True
@@ -183,12 +182,12 @@ def phantom_frames(clip: ScoredClip) -> np.ndarray:
 
 
 def phantom_leads(clip: ScoredClip) -> Sums:
-    """Share of the frames with a lead that later proved to be nothing, or beside the path."""
+    """Share of the frames with a lead that later turned out not to exist, or to be beside the path."""
     return 100.0 * float(phantom_frames(clip).sum()), float(len(clip.t_s))
 
 
 def late_frames(clip: ScoredClip) -> np.ndarray:
-    """(N,) frames in which a lead was not chosen yet, or no longer, that was in the path already and nearer than any
+    """(N,) frames in which a lead was not chosen yet, or no longer, although it was in the path and nearer than any
     other."""
     late = np.zeros(len(clip.t_s), bool)
     for episode in episodes(clip.lead):
@@ -209,17 +208,17 @@ def late_frames(clip: ScoredClip) -> np.ndarray:
 
 
 def late_leads(clip: ScoredClip) -> Sums:
-    """Share of the frames in which the lead was there, and was not chosen."""
+    """Share of the frames in which the lead existed but was not chosen."""
     return 100.0 * float(late_frames(clip).sum()), float(len(clip.t_s))
 
 
 def lead_doubted(clip: ScoredClip) -> Sums:
-    """Share of the frames whose choice the next seconds contradict."""
+    """Share of the frames whose choice is contradicted by the following seconds."""
     return 100.0 * float((phantom_frames(clip) | late_frames(clip)).sum()), float(len(clip.t_s))
 
 
 def switches(clip: ScoredClip) -> Sums:
-    """Changes of the lead per minute, other than to or from none."""
+    """Changes of the lead per minute, except to or from none."""
     both = (clip.lead[1:] != NONE) & (clip.lead[:-1] != NONE)
     return float((both & (clip.lead[1:] != clip.lead[:-1])).sum()), _minutes(clip)
 
@@ -228,11 +227,11 @@ def _minutes(clip: ScoredClip) -> float:
     return float(clip.t_s[-1] - clip.t_s[0]) / 60.0 if len(clip.t_s) else 0.0
 
 
-# ---------------------------------------------------------------- distances among themselves
+# ---------------------------------------------------------------- consistency of distances
 
 
 def jitter(clip: ScoredClip) -> Sums:
-    """How far the lead's distance departs from the middle of its neighbours', in metres."""
+    """Deviation of the lead's distance from the median of its neighbours, in metres."""
     over = under = 0.0
     for episode in episodes(clip.lead):
         seen = clip.objects.get(episode.lead, np.zeros(0, SIGHTING))

@@ -34,22 +34,22 @@ class Alarm:
     kind: AlarmKind
     """Warning or braking."""
     due_ns: int | None
-    """When the labels say it was due; None for a false alarm."""
+    """When it was due according to the labels; None for a false alarm."""
     acted_ns: int | None
-    """When the pipeline acted; None when it did not."""
+    """When the pipeline acted; None if it did not."""
     true_ttc_s: float | None
-    """Of the true lead when the pipeline acted; None where it had none."""
+    """TTC of the true lead when the pipeline acted; None without one."""
 
     @property
     def delay_s(self) -> float | None:
-        """Seconds from when it was due until the pipeline acted; None for a missed or a false alarm."""
+        """Seconds from the due time until the pipeline acted; None for a missed or a false alarm."""
         if self.due_ns is None or self.acted_ns is None:
             return None
         return (self.acted_ns - self.due_ns) / 1e9
 
     @property
     def t_ns(self) -> int:
-        """The moment to show for it."""
+        """The time at which to show it."""
         return (self.due_ns if self.due_ns is not None else self.acted_ns) or 0
 
 
@@ -62,8 +62,8 @@ class _Moment:
 
 
 def alarms(frames: Sequence[tuple[Result, FrameTruth]], params: AebParams) -> list[Alarm]:
-    """Every warning and braking that was due or given, in frames with a known lead at a known place. None without ego
-    speed."""
+    """Every warning and braking that was due or given, in frames in which the lead and its position are known. Empty
+    without ego speed."""
     moments = [
         _Moment(truth.t_ns, *_danger(truth, params), result.acc)
         for result, truth in frames
@@ -75,7 +75,7 @@ def alarms(frames: Sequence[tuple[Result, FrameTruth]], params: AebParams) -> li
 
 
 def _danger(truth: FrameTruth, params: AebParams) -> tuple[float, float]:
-    """The true lead's TTC in s and the deceleration it requires; infinity and 0 where it does not come nearer."""
+    """The true lead's TTC in s and the required deceleration; infinity and 0 if it does not come nearer."""
     lead = truth.lead
     velocity = (truth.velocity_mps or {}).get(lead.id) if lead is not None and lead.id is not None else None
     if lead is None or velocity is None:
@@ -93,7 +93,7 @@ def _due(ttc_s: float, needed_mps2: float) -> Callable[[_Moment], bool]:
 
 
 def _of_kind(kind: AlarmKind, moments: Sequence[_Moment], is_due: Callable[[_Moment], bool]) -> list[Alarm]:
-    """Each dangerous moment with the first alarm that overlaps it, then the alarms that overlap none."""
+    """Each dangerous period with the first alarm that overlaps it, then the alarms without overlap."""
     dangers = _runs(moments, is_due)
     acts = _runs(moments, lambda moment: moment.acc.state in _ACTING[kind])
     found, used = [], set()
@@ -113,7 +113,7 @@ def _alarm(kind: AlarmKind, due_ns: int | None, acted: _Moment | None) -> Alarm:
 
 
 def _runs(moments: Sequence[_Moment], holds: Callable[[_Moment], bool]) -> list[tuple[int, int]]:
-    """First and last of each run of moments that hold, none across a gap."""
+    """First and last of each run of moments that meet the condition, interrupted by gaps."""
     broken = set(first_frames([moment.t_ns for moment in moments], MAX_GAP_S))
     runs: list[tuple[int, int]] = []
     for n, moment in enumerate(moments):

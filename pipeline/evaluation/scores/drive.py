@@ -31,9 +31,9 @@ class Rules:
     """The rules of scoring: which vehicle is the lead, and when the emergency brake is due."""
 
     lead: LeadRule = field(default_factory=LeadRule)
-    """Which labelled vehicle leads, and how near to it a CIPV must be."""
+    """Which labelled vehicle is the lead, and how near to it a CIPV must be."""
     aeb: AebParams = field(default_factory=AebParams)
-    """By whose thresholds warning and braking are due."""
+    """Thresholds of warning and braking."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class FrameScore:
     """One labelled frame."""
 
     index: int
-    """In the recording."""
+    """Index in the recording."""
     t_ns: int
     """Its tick."""
     name: str
@@ -61,23 +61,23 @@ class DriveScore:
     frames: tuple[FrameScore, ...]
     """The labelled ones."""
     judged_s: float
-    """How long the lead was judged."""
+    """Total time in which the lead was judged."""
     clips: int
-    """How many it is made of, each judged as a drive of its own."""
+    """Number of clips, each judged as a separate drive."""
     guarded_s: float
-    """For how much of ``judged_s`` ego speed was known, and with it warning and braking."""
+    """Part of ``judged_s`` with known ego speed, for which warning and braking are judged."""
     switches: int
-    """How often the CIPV changed while the lead did not."""
+    """How often the CIPV changed while the lead stayed the same."""
     acquisitions: tuple[Acquisition, ...]
-    """Every lead, from when it leads."""
+    """Every lead, from the time it becomes the lead."""
     cut_ins: tuple[CutIn, ...]
-    """Labelled ones, or those that follow from the true leads."""
+    """Labelled cut-ins, or those derived from the true leads."""
     alarms: tuple[Alarm, ...]
     """Due, given, or both."""
     tracking: tracking.Counts | None
     """None without trackeval."""
     notes: tuple[str, ...] = ()
-    """What a reader of the figures should know, one sentence each."""
+    """What a reader of the metrics should know, one sentence each."""
 
     def index_of(self, t_ns: int) -> int:
         """The judged frame nearest to a tick."""
@@ -85,12 +85,12 @@ class DriveScore:
 
 
 def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> DriveScore:
-    """Judge the results of one run. Frames are matched by their ticks; BadInput when no labelled frame has a result."""
+    """Judge the results of one run. Frames are matched by their ticks; BadInput if no labelled frame has a result."""
     pairs = [(result, truth.frames[result.t_ns]) for result in results if result.t_ns in truth.frames]
     if not pairs:
         raise BadInput(f"{truth.uri}: no labelled frame has a result: these are results of another recording")
     index = {tick: n for n, tick in enumerate(truth.ticks)}
-    pairs.sort(key=lambda pair: index[pair[0].t_ns])  # times may run back from one clip to the next
+    pairs.sort(key=lambda pair: index[pair[0].t_ns])  # times may go back from one clip to the next
     frames, moments, guarded = [], [], []
     for result, known in pairs:
         verdict = judged(result, known, rules)

@@ -28,20 +28,20 @@ class LeadFrame:
 
 @dataclass(frozen=True)
 class Acquisition:
-    """One lead from when it leads."""
+    """One lead, from the time it becomes the lead."""
 
     lead: int
     """Id in the truth."""
     t_ns: int
-    """When it began to lead."""
+    """When it became the lead."""
     range_m: float | None
-    """Its range in the first frame in which it was correctly chosen; None when it never was."""
+    """Its range in the first frame in which it was correctly chosen; None if it never was."""
     after_s: float | None
-    """How long that took; None when it never was."""
+    """Time until then; None if it never was."""
     from_start: bool
-    """Whether it was the lead when the recording began, so that its start is unknown."""
+    """Whether it was already the lead at the start of the recording, so that its start is unknown."""
     drop_outs: int
-    """How often it was lost again, with no CIPV."""
+    """How often it was lost again, without any CIPV."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,11 @@ class CutIn:
     t_ns: int
     """When it becomes the lead."""
     latency_s: float | None
-    """From then until it is the CIPV; None when it never was."""
+    """Time until it becomes the CIPV; None if it never does."""
 
 
 def stretches(moments: Sequence[LeadFrame]) -> list[list[LeadFrame]]:
-    """Each clip's own part."""
+    """The frames of each clip."""
     parts: list[list[LeadFrame]] = []
     for moment in moments:
         if parts and not begins_clip(parts[-1][-1].t_ns, moment.t_ns, MAX_GAP_S):
@@ -68,7 +68,7 @@ def stretches(moments: Sequence[LeadFrame]) -> list[list[LeadFrame]]:
 
 
 def judged_s(moments: Sequence[LeadFrame]) -> float:
-    """How long the lead was judged, gaps left out."""
+    """Total time in which the lead was judged, without gaps."""
     return sum((part[-1].t_ns - part[0].t_ns) / 1e9 for part in stretches(moments))
 
 
@@ -78,8 +78,7 @@ def count_switches(moments: Sequence[LeadFrame]) -> int:
 
 
 def _reigns(moments: Sequence[LeadFrame]) -> list[tuple[list[LeadFrame], bool]]:
-    """Each lead's frames from when it becomes the lead until it no longer is, and whether a stretch begins with
-    them."""
+    """Each lead's frames from the time it becomes the lead until it no longer is, and whether they start a clip."""
     found: list[tuple[list[LeadFrame], bool]] = []
     for part in stretches(moments):
         last: int | None = None
@@ -93,7 +92,7 @@ def _reigns(moments: Sequence[LeadFrame]) -> list[tuple[list[LeadFrame], bool]]:
 
 
 def acquisitions(moments: Sequence[LeadFrame]) -> list[Acquisition]:
-    """One per lead, in order of time."""
+    """One per lead, ordered by time."""
     found = []
     for reign, from_start in _reigns(moments):
         first = next((n for n, m in enumerate(reign) if m.judged.verdict == "correct"), None)
@@ -114,8 +113,8 @@ def acquisitions(moments: Sequence[LeadFrame]) -> list[Acquisition]:
 def cut_ins(
     moments: Sequence[LeadFrame], truth: Mapping[int, FrameTruth], labelled: Sequence[tuple[int, int]] | None
 ) -> list[CutIn]:
-    """``labelled``: tick and object of each, as people labelled them. Without them: each lead that was labelled outside
-    the lane in the frame before, nearer than the lead of that frame."""
+    """``labelled``: tick and object of each cut-in labelled by people. Without them: each lead that in the previous
+    frame was labelled outside the lane and nearer than that frame's lead."""
     reigns = [reign for reign, _ in _reigns(moments)]
     if labelled is not None:
         return [cut_in for tick, lead in labelled if (cut_in := _labelled(reigns, tick, lead)) is not None]
@@ -129,8 +128,8 @@ def cut_ins(
 
 
 def _labelled(reigns: Sequence[Sequence[LeadFrame]], tick: int, lead: int) -> CutIn | None:
-    """Of an event: the next episode in which it is the lead, or the one that the event falls into. None where the lead
-    is not known then."""
+    """For a labelled event: the next episode in which the vehicle is the lead, or the one that contains the event. None
+    if the lead is not known then."""
     reign = next((each for each in reigns if each[0].lead == lead and each[-1].t_ns >= tick), None)
     if reign is None:
         return None

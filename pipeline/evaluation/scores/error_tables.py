@@ -73,7 +73,7 @@ def _scatter(title: str, unit: str, name: str, errors: Sequence[Error]) -> Chart
 
 
 def error_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:
-    """By sensor over all ranges, then for each range bin in total and by sensor. Empty groups are left out."""
+    """By sensor over all ranges, then for each range bin in total and by sensor. Empty groups are omitted."""
     every = _all_errors(run)
     groups: list[tuple[str, str, list[Error]]] = [("all", "any", every)]
     groups += [("all", source, [e for e in every if e.source == source]) for source in MOST_SENSORS_FIRST]
@@ -87,7 +87,7 @@ def error_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:
 
 def sigma_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:
     """The share of distance errors within 1, 2 and 3 of their sigmas, in %: by sensor over all ranges, then by range
-    and sensor. Empty groups are left out."""
+    and sensor. Empty groups are omitted."""
     every = [error for error in _all_errors(run) if error.distance_sigma_m]
     groups = [("all", source, [e for e in every if e.source == source]) for source in MOST_SENSORS_FIRST]
     for low in range(0, int(MAX_RANGE_M), SIGMA_BIN_M):

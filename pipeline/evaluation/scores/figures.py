@@ -19,13 +19,13 @@ from pipeline.evaluation.scores.drive import DriveScore
 from pipeline.evaluation.scores.tracking import Counts, hota_of, idf1_sums, mota_sums, precision_sums, recall_sums
 
 Sums = tuple[float, float]
-"""What a drive adds to a numerator and a denominator."""
+"""Contribution of a drive to numerator and denominator."""
 Drives = Sequence[DriveScore]
 RESAMPLES, CONFIDENCE, SEED = 1000, 0.95, 0
 
 
 def ratio(parts: Sequence[Sums]) -> float | None:
-    """Sums over drives, divided; None when there is nothing to divide by."""
+    """Ratio of the sums over drives; None if the denominator is zero."""
     over, under = sum(part[0] for part in parts), sum(part[1] for part in parts)
     return over / under if under else None
 
@@ -116,8 +116,8 @@ def _difference(figure: Figure, pairs: Sequence[tuple[Any, Any]]) -> float | Non
 
 
 def bootstrap(parts: Sequence[Any], whole: Callable[[Sequence[Any]], float | None]) -> Interval | None:
-    """Where a figure lies with 95 % confidence when drives are resampled with replacement, always with the same
-    seed. None where fewer than two drives have the figure."""
+    """95 % confidence interval of a metric from resampling drives with replacement, with a fixed seed. None if fewer
+    than two drives have the metric."""
     if sum(whole([part]) is not None for part in parts) < 2:
         return None
     draws = np.sort(np.random.default_rng(SEED).integers(len(parts), size=(RESAMPLES, len(parts))), axis=1)
@@ -127,11 +127,11 @@ def bootstrap(parts: Sequence[Any], whole: Callable[[Sequence[Any]], float | Non
     return Interval(float(low), float(high))
 
 
-# ---------------------------------------------------------------- what a drive contributes
+# ---------------------------------------------------------------- contribution of a drive
 
 
 def _sums(values: Iterable[float | None]) -> Sums:
-    """For a mean over the known values."""
+    """For the mean of the known values."""
     known = [value for value in values if value is not None]
     return float(sum(known)), float(len(known))
 
@@ -171,7 +171,7 @@ def _mae(name: str, drive: DriveScore) -> Sums:
 
 
 def _counted(sums: Callable[[Counts], Sums], drive: DriveScore) -> Sums:
-    """A fraction of trackeval's counts, in percent."""
+    """A ratio of trackeval's counts, in percent."""
     over, under = sums(drive.tracking) if drive.tracking is not None else (0.0, 0.0)
     return 100.0 * float(over), float(under)
 

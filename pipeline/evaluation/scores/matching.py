@@ -18,12 +18,12 @@ from pipeline.types.source import TruthObject
 
 MAX_RANGE_M = 60.0
 HALF_ANGLE_RAD = np.radians(35.0)
-"""Vehicles are scored ahead up to this range and this angle to either side: about the view of a front camera."""
+"""Vehicles are scored up to this range and this angle to either side: about the field of view of a front camera."""
 SIDE_M, LEAST_M = 2.5, 2.0
 RANGED_SHARE, UNRANGED_SHARE = 0.15, 0.35
-"""An object may match a vehicle up to ``SIDE_M`` sideways, and lengthwise up to this share of its range: one for
-objects whose range was measured, one for those whose range comes from the box height. A measured range is either right
-or that of something else; one from a box height may be off by a third."""
+"""An object may match a vehicle up to ``SIDE_M`` laterally, and longitudinally up to this share of its range: the first
+for objects with measured range, the second for those with range from the box height. A measured range is either correct
+or of another object; one from a box height may be off by a third."""
 CONFIRM_HITS = CipvParams().confirm_hits
 _NEVER = 1e6
 
@@ -42,9 +42,9 @@ class Error(NamedTuple):
     longitudinal_m: float
     """Error along it."""
     speed_mps: float | None
-    """Error of the velocity along it; None where either is unknown."""
+    """Error of the longitudinal velocity; None if either is unknown."""
     distance_sigma_m: float | None = None
-    """Standard deviation that was given with the distance; None where none was."""
+    """Reported standard deviation of the distance; None without one."""
 
 
 def vehicles(objects: Iterable[TruthObject]) -> list[TruthObject]:
@@ -107,13 +107,13 @@ def _error(item: FusedObject, true: TruthObject, truth: FrameTruth) -> Error:
 def claims(
     result: Result, wanted: Sequence[TruthObject], within_m: float, unplaced: Sequence[Box] = ()
 ) -> list[FusedObject]:
-    """The objects to be scored as detections of vehicles: those of a vehicle's class, in the scored field, seen in this
-    frame, and by both sensors or often enough (as for a lead).
+    """The objects to be scored as vehicle detections: those of a vehicle class, in the scored field of view, seen in
+    this frame, and by both sensors or often enough (as for a lead).
 
-    A LiDAR object without a class does not claim to be a vehicle: it counts where it lies within ``within_m`` of a
-    labelled vehicle that no classified object matches, and is otherwise ignored, like roadside returns. Also ignored is
-    an object far from every labelled position whose image box matches one of ``unplaced``: there is a vehicle, but
-    its distance is unknown.
+    A LiDAR object without a class is not reported as a vehicle: it counts if it lies within ``within_m`` of a labelled
+    vehicle that no classified object matches, and is otherwise ignored, like roadside returns. An object far from every
+    labelled position whose image box matches one of ``unplaced`` is also ignored: there is a vehicle, but its distance
+    is unknown.
     """
     placed = [item for item in result.objects if item.bev is not None and item.distance_m is not None]
     field = [item for item in placed if not item.carried and _is_confirmed(item) and _in_field(item)]

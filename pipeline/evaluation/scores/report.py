@@ -15,21 +15,21 @@ from pipeline.evaluation.scores.matching import MAX_RANGE_M
 from pipeline.evaluation.scores.worst import Bad, changed, worst
 
 LinkTo = Callable[[str, int], str]
-"""The address that opens a recording's URI at a frame."""
+"""Returns the address that opens a recording's URI at a frame."""
 FEW = 5
-"""With fewer drives a bootstrap interval says little: two drives have but three draws."""
+"""With fewer drives, bootstrap intervals are not meaningful: two drives have only three distinct samples."""
 MOST = 20
-"""Rows of a list of frames."""
+"""Maximum rows of a list of frames."""
 
 
 def sections(run: Drives, link: LinkTo, base: Drives | None = None) -> list[ReportSection]:
-    """The report of a run over some drives; with ``base``, another run over the same ones, of how the two differ."""
+    """The report of a run over some drives; with ``base``, another run over the same drives, of the differences."""
     found = [_scores(run), errors_section(run), _moments(run, link), _worst(run, link)]
     return [_comparison(base, run, link), *found] if base is not None else found
 
 
 def as_json(run: Drives, base: Drives | None = None) -> dict[str, Any]:
-    """Every figure, and every error table's row, for scripts."""
+    """All metrics and rows of the error tables, for scripts."""
     out: dict[str, Any] = {
         "drives": [
             {
@@ -136,7 +136,7 @@ def _many(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
-# ---------------------------------------------------------------- what happened when
+# ---------------------------------------------------------------- events
 
 
 def _moments(run: Drives, link: LinkTo) -> ReportSection:
@@ -182,7 +182,7 @@ def _moments(run: Drives, link: LinkTo) -> ReportSection:
     return ReportSection("moments", "Timeline of events", (), tuple(table for table in tables if table.rows))
 
 
-# ---------------------------------------------------------------- frames to look at
+# ---------------------------------------------------------------- worst frames
 
 
 def _worst(run: Drives, link: LinkTo) -> ReportSection:
@@ -242,7 +242,7 @@ def _comparison(base: Drives, run: Drives, link: LinkTo) -> ReportSection:
 
 
 def _word(each: Compared, drives: int) -> str:
-    """Better or worse, where the drives agree so far and are enough to say so."""
+    """Better or worse, if there are enough drives and they agree."""
     if each.interval is None or drives < FEW or each.interval.low <= 0.0 <= each.interval.high:
         return ""
     return "better" if (each.interval.low > 0.0) == (each.figure.better == "higher") else "worse"

@@ -24,9 +24,9 @@ NO_PATH = Path("straight", _NO_LINE, _NO_LINE, _NO_LINE, 0.0, {}, {})
 
 
 def read_results(path: FilePath) -> list[Result]:
-    """The results of ``cipv run --out``, in order of time; ``score_drive`` puts them in the recording's. What is not
-    judged (path, gates, health, pedals) is not read and stays empty. BadInput names the line that is no result, or the
-    frame that has two."""
+    """The results of ``cipv run --out``, in order of time; ``score_drive`` reorders them as in the recording. Parts
+    that are not scored (path, gates, health, pedals) are not read and stay empty. BadInput names the invalid line, or
+    the frame with two results."""
     try:
         with open_regular(path) as file:
             text = file.read().decode("utf-8")

@@ -19,7 +19,7 @@ from pipeline.evaluation.scores.truth import FrameTruth
 from pipeline.types import I64, Point2, Result
 
 ZERO_M = 4.0
-"""From this distance on, the similarity is 0."""
+"""Distance from which the similarity is 0."""
 MATCH_M = 0.5 * ZERO_M
 MISSING = "Detection and tracking scores need trackeval, which `make install` installs."
 NamedPositions = list[tuple[int, Point2]]
@@ -44,8 +44,9 @@ def is_available() -> bool:
 
 
 def of_frames(frames: Sequence[tuple[Result, FrameTruth]]) -> Counts | None:
-    """A drive's labelled frames, in order. Frames that are not fully labelled are left out: an object without a label
-    may be right there. None where no vehicle's position is labelled in the other frames, and without trackeval."""
+    """Counts of a drive's labelled frames, in order. Frames that are not completely labelled are left out, because an
+    object without a label may be correct there. None if the other frames contain no vehicle with a labelled position,
+    and without trackeval."""
     truths, believed = [], []
     for result, truth in frames:
         if not truth.whole:
@@ -58,7 +59,7 @@ def of_frames(frames: Sequence[tuple[Result, FrameTruth]]) -> Counts | None:
 
 
 def count(truths: Sequence[NamedPositions], believed: Sequence[NamedPositions]) -> Counts | None:
-    """Frame by frame: the true vehicles, and the claimed ones."""
+    """Counts from the true vehicles and the reported ones, frame by frame."""
     metrics = _metrics()
     if metrics is None:
         return None
@@ -67,7 +68,7 @@ def count(truths: Sequence[NamedPositions], believed: Sequence[NamedPositions]) 
 
 
 def precision_sums(counts: Counts) -> tuple[int, int]:
-    """Precision: correctly claimed vehicles over all claimed ones."""
+    """Precision: correctly reported vehicles over all reported ones."""
     clear = counts.clear
     return clear["CLR_TP"], clear["CLR_TP"] + clear["CLR_FP"]
 
@@ -79,19 +80,19 @@ def recall_sums(counts: Counts) -> tuple[int, int]:
 
 
 def mota_sums(counts: Counts) -> tuple[int, int]:
-    """(Found − falsely claimed − switched) over all true ones (CLEAR MOT)."""
+    """(Found − falsely reported − switched) over all true ones (CLEAR MOT)."""
     clear = counts.clear
     return clear["CLR_TP"] - clear["CLR_FP"] - clear["IDSW"], clear["CLR_TP"] + clear["CLR_FN"]
 
 
 def idf1_sums(counts: Counts) -> tuple[int, int]:
-    """Twice the correctly identified over the true plus the claimed."""
+    """Twice the correctly identified over the sum of true and reported ones."""
     named = counts.identity
     return 2 * named["IDTP"], 2 * named["IDTP"] + named["IDFN"] + named["IDFP"]
 
 
 def hota_of(drives: Sequence[Counts]) -> float | None:
-    """HOTA of several drives as one, 0–1; None without vehicles."""
+    """HOTA over several drives together, 0–1; None without vehicles."""
     metrics = _metrics()
     if metrics is None or not any(recall_sums(drive)[1] for drive in drives):
         return None
@@ -101,7 +102,7 @@ def hota_of(drives: Sequence[Counts]) -> float | None:
 
 @cache
 def _metrics() -> tuple[Any, Any, Any] | None:
-    """CLEAR, Identity and HOTA; imported when first asked for, which takes a second."""
+    """CLEAR, Identity and HOTA; imported on first use, which takes a second."""
     try:
         from trackeval.metrics import CLEAR, HOTA, Identity
     except ImportError:
@@ -111,7 +112,7 @@ def _metrics() -> tuple[Any, Any, Any] | None:
 
 
 def _sequence(truths: Sequence[NamedPositions], believed: Sequence[NamedPositions]) -> dict[str, Any]:
-    """What trackeval asks of a sequence: ids counted from 0, and similarities (truth, believed) of each frame."""
+    """The input of trackeval for a sequence: ids counted from 0, and similarities (truth, reported) of each frame."""
     gt_ids, gt_count = _from_zero(truths)
     tracker_ids, tracker_count = _from_zero(believed)
     return {

@@ -41,14 +41,14 @@ class FrameTruth:
     lead: TruthObject | None
     """None where there is none."""
     lead_known: bool = True
-    """False where the lead is unclear, or its position is not labelled."""
+    """False if the lead is unclear, or its position is not labelled."""
     velocity_mps: Mapping[int, Point2] | None = None
-    """Relative to ego in the turning ego frame, by object id, for those that neighbouring frames show; None where not
-    computed."""
+    """Relative to ego in the rotating ego frame, by object id, if it can be derived from neighbouring frames; None if
+    not computed."""
     lead_box: tuple[int, Box] | None = None
-    """The lead's id and image box where it is labelled in the image only; ``lead`` is None then."""
+    """The lead's id and image box if it is labelled only in the image; then ``lead`` is None."""
     whole: bool = True
-    """Whether every vehicle in it is labelled: only then is a surplus object false."""
+    """Whether every vehicle in it is labelled: only then does an additional object count as false."""
     unplaced: tuple[Box, ...] = ()
     """Image boxes of labelled vehicles whose position is unknown."""
 
@@ -64,15 +64,15 @@ class DriveTruth:
     frames: Mapping[int, FrameTruth]
     """The labelled ones, by tick."""
     cut_ins: tuple[tuple[int, int], ...] | None = None
-    """Tick and object of each labelled cut-in; None where they are not labelled and follow from the true leads."""
+    """Tick and object of each labelled cut-in; None if they are not labelled and must be derived from the true
+    leads."""
     notes: tuple[str, ...] = ()
     """What a user should know."""
 
 
 def of_source(source: Source, rule: LeadRule) -> DriveTruth:
     """A recording's own labels. The lead is the nearest vehicle in the lane, which is assumed to be straight. NoTruth
-    when no frame is labelled. Labels without identities are linked from frame to frame by distance.
-    """
+    if no frame is labelled. Labels without ids are linked from frame to frame by distance."""
     ticks = tuple(source.t_ns(index) for index in range(len(source)))
     labelled = {tick: truth for index, tick in enumerate(ticks) if (truth := source.truth(index)) is not None}
     if not labelled:
@@ -84,8 +84,8 @@ def of_source(source: Source, rule: LeadRule) -> DriveTruth:
 
 
 def _over_time(frames: Mapping[int, FrameTruth], followed: bool) -> tuple[dict[int, FrameTruth], tuple[str, ...]]:
-    """The frames with velocities, and sentences on velocities that do not count. Labels without identities are linked
-    by distance first."""
+    """The frames with velocities, and sentences about velocities that are not scored. Labels without ids are linked by
+    distance first."""
     if not followed:
         objects = linked({tick: frame.objects for tick, frame in frames.items()})
         frames = {tick: _renamed(frame, objects[tick]) for tick, frame in frames.items()}
@@ -117,11 +117,10 @@ def _only_the_leads(frame: FrameTruth) -> FrameTruth:
 
 
 def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
-    """Labels made by people. Only labels that a person accepted or an import brought count: an unreviewed proposal is
+    """Labels made by people. Only labels that were accepted by a person or imported count: an unreviewed proposal is
     the pipeline's own output. If no lead is labelled at all, it is the nearest vehicle in the lane, which is assumed to
-    be straight, in frames that are labelled whole. NoTruth when nothing counts. If each track is in one frame only,
-    tracks are linked by distance.
-    """
+    be straight, in completely labelled frames. NoTruth if nothing counts. If all tracks have only one frame, they are
+    linked by distance."""
     tracks = {track.id: track for track in labels.tracks if track.state in _COUNTED}
     ranges = [each for each in labels.leads if each.state in _COUNTED]
     objects, unplaced = _objects_by_frame(tracks), _unplaced_by_frame(tracks)
@@ -152,7 +151,7 @@ def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
 
 
 def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, FrameTruth], left: int) -> list[str]:
-    """What does not count, and why. left: frames with a vehicle that is only proposed."""
+    """What is not counted, and why. left: frames with a vehicle that is only proposed."""
     proposed = {track.id for track in labels.tracks if track.state == "proposed"}
     notes = []
     for lead in sorted({each.lead for each in ranges if isinstance(each.lead, int) and each.lead in proposed}):
@@ -182,14 +181,14 @@ def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, F
 
 
 def _as_proposed(labels: LabelSet) -> tuple[int, int]:
-    """(cuboids accepted unchanged from the pipeline, all that count)."""
+    """(cuboids accepted unchanged from the pipeline, all cuboids that count)."""
     counted = [track for track in labels.tracks if track.state in _COUNTED]
     placed = {track.id: sum(each.cuboid is not None for each in track.sightings) for track in counted}
     return sum(placed[track.id] for track in counted if track.origin.maker == "pipeline"), sum(placed.values())
 
 
 def _said_whole(labels: LabelSet) -> set[int]:
-    """The frames for which something confirms that every vehicle is labelled."""
+    """The frames that are confirmed to be completely labelled."""
     asked = {frame for tag in labels.tags if tag.tag == WHOLE_TAG for frame in range(tag.first, tag.last + 1)}
     for lead in labels.leads:
         if lead.origin.maker == "pipeline":
@@ -221,7 +220,7 @@ def _objects_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[Truth
 
 
 def _unplaced_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[Box, ...]]:
-    """Boxes of vehicles that are labelled in the image only."""
+    """Boxes of vehicles labelled only in the image."""
     found: dict[int, tuple[Box, ...]] = {}
     for track in tracks.values():
         for seen in track.sightings:

@@ -22,10 +22,10 @@ from pipeline.types import F64, I64, Mask, Point2
 _HALF_S = 0.3
 _JUMP_M = 0.3
 _ACCEL_MPS2 = 4.0
-"""Relative to ego: the deviation that an unmodelled acceleration may cause in a line fit."""
+"""Relative acceleration, which limits the permitted deviation from a line fit."""
 _PARABOLA = 4
 _MOST_BESIDE = 10
-"""At most this many positions before and after a frame are used."""
+"""Maximum number of positions before and after a frame that are used."""
 
 TickPositions = Iterable[tuple[int, Mapping[int, Point2]]]
 """Labelled frames in order: the tick, and each vehicle's position by id; ego frame, metres."""
@@ -33,16 +33,16 @@ TickPositions = Iterable[tuple[int, Mapping[int, Point2]]]
 
 @dataclass(frozen=True)
 class Velocities:
-    """What neighbouring frames say of motion."""
+    """Velocities derived from neighbouring frames."""
 
     mps: Mapping[int, Mapping[int, Point2]]
-    """By tick and id, relative to ego in the turning ego frame."""
+    """By tick and id, relative to ego in the rotating ego frame."""
     jumps: frozenset[tuple[int, int]]
-    """Tick and id of implausible moves."""
+    """Tick and id of implausible movements."""
 
 
 def velocities(sightings: TickPositions) -> Velocities:
-    """One-sided where a vehicle appears or disappears; none across a gap."""
+    """One-sided where a vehicle appears or disappears; not computed across a gap."""
     rows = [(key, n, t_ns, *place) for n, (t_ns, places) in enumerate(sightings) for key, place in places.items()]
     rows.sort(key=lambda row: row[:2])
     if not rows:
@@ -64,15 +64,15 @@ def velocities(sightings: TickPositions) -> Velocities:
 
 
 def _runs(keys: I64, frames: I64, ticks: I64) -> I64:
-    """(N,) a number for each stretch of one vehicle in labelled frames that follow each other."""
+    """(N,) a number for each run of one vehicle in consecutive labelled frames."""
     is_new = (np.diff(keys) != 0) | (np.diff(frames) != 1)
     is_new |= np.array([begins_clip(a, b, MAX_GAP_S) for a, b in pairwise(ticks.tolist())], dtype=bool)
     return np.concatenate(([0], np.cumsum(is_new)))
 
 
 def _fitted(runs: I64, ticks: I64, places: F64) -> tuple[F64, F64, F64]:
-    """((N, 2) slopes at each place, NaN of single ones; (N,) how far the farthest place lies beside the curve, m; (N,)
-    how far it may)."""
+    """((N, 2) slopes at each position, NaN for single ones; (N,) maximum distance of a position from the curve, m; (N,)
+    its limit)."""
     count = len(runs)
     sums, values, used = np.zeros((count, 3, 3)), np.zeros((count, 3, 2)), np.zeros(count, dtype=np.int64)
     for here, there, tau in _pairs(runs, ticks):
@@ -96,7 +96,8 @@ def _fitted(runs: I64, ticks: I64, places: F64) -> tuple[F64, F64, F64]:
 
 
 def _pairs(runs: I64, ticks: I64) -> Iterable[tuple[Mask, I64, F64]]:
-    """Of each step along the rows: (which rows have one there, that one's row, s after theirs)."""
+    """For each offset along the rows: (which rows have a partner there, the partner's row, its time difference in
+    s)."""
     rows = np.arange(len(runs))
     for step in range(-_MOST_BESIDE, _MOST_BESIDE + 1):
         other = np.clip(rows + step, 0, len(runs) - 1)

@@ -14,7 +14,7 @@ _WEIGHT: dict[Verdict, int] = {"none": 0, "correct": 0, "missed": 1, "wrong": 2,
 
 @dataclass(frozen=True)
 class Bad:
-    """One frame. Metres; None where not available."""
+    """One frame. Metres; None if not available."""
 
     uri: str
     """Of its recording."""
@@ -31,19 +31,19 @@ class Bad:
     error_m: float | None
     """Of the distance."""
     before: str = ""
-    """The other run's verdict, where two runs are compared; else empty."""
+    """The other run's verdict if two runs are compared; else empty."""
 
 
 def worst(drives: Sequence[DriveScore], most: int) -> list[Bad]:
-    """By verdict, then by the lead's absolute distance error; at most ``most``. Frames without any error are left
-    out."""
+    """Sorted by verdict, then by the lead's absolute distance error; at most ``most``. Frames without any error are
+    left out."""
     every = [bad for drive in drives for frame in drive.frames if (bad := _bad(drive.uri, frame)) is not None]
     every = [bad for bad in every if _weight(bad) > 0 or bad.error_m]
     return sorted(every, key=lambda bad: (-_weight(bad), -abs(bad.error_m or 0.0)))[:most]
 
 
 def changed(base: Sequence[DriveScore], run: Sequence[DriveScore], most: int) -> list[Bad]:
-    """Frames whose verdict differs between two runs: those that got worse first."""
+    """Frames whose verdict differs between two runs: those that became worse first."""
     found: list[tuple[int, Bad]] = []
     for a, b in zip(base, run, strict=True):
         before = {frame.t_ns: frame for frame in a.frames}

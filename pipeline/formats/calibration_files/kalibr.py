@@ -50,7 +50,7 @@ def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
 
 
 def write(path: Path, camera: CameraCalibration) -> None:
-    """SourceError for a lens that radtan's four numbers cannot say."""
+    """SourceError for a lens that radtan's four numbers cannot represent."""
     if camera.distortion.size > 4 and np.any(camera.distortion[4:]):
         raise SourceError("Kalibr's radtan has four distortion coefficients; this camera has more")
     K, lens = camera.K, np.zeros(4)

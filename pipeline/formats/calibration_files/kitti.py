@@ -20,7 +20,7 @@ def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
 
 
 def write(path: Path, camera: CameraCalibration) -> None:
-    """SourceError for a lens with distortion, which the format cannot say."""
+    """SourceError for a lens with distortion, which the format cannot represent."""
     if np.any(camera.distortion):
         raise SourceError("KITTI's calibration is for undistorted images; this camera has distortion")
     projection = np.hstack([camera.K, np.zeros((3, 1))])

@@ -20,7 +20,7 @@ from pipeline.types.source import SourceError
 _LENGTHS = (0, 4, 5, 8)
 _TAG = "!!opencv-matrix"
 _VERSION = "%YAML:1.0"
-"""What OpenCV begins its files with, which is no directive of YAML."""
+"""First line of OpenCV's files, which is not a valid YAML directive."""
 _MOST_NUMBERS = 1000
 
 
@@ -72,5 +72,5 @@ def _matrix(loaded: dict[Any, Any], name: str, path: Path) -> F64:
 
 
 def _pixels(value: Any) -> int:
-    """0 for what is no number of pixels."""
+    """0 for anything but a number of pixels."""
     return value if isinstance(value, int) else 0

@@ -23,54 +23,55 @@ from pipeline.labels.model import Sighting
 from pipeline.types import F32, F64
 
 MOST_SWEEPS = 12
-"""More blur the outline: what is laid on what was laid before drifts."""
+"""More sweeps blur the outline, because registration errors accumulate."""
 _FEWEST_POINTS = 6
-"""In a sweep, to be registered."""
+"""Minimum points of a sweep for registration."""
 _MOST_REGISTERED = 150
-"""Of a sweep's points; a car near by has a thousand, which say no more."""
+"""Maximum points of a sweep that are used; a nearby car has a thousand, which add nothing."""
 _REACHES_M = (0.5, 0.35)
-"""Where a sweep shows a side that those before did not, its points must not be drawn to the corner of theirs: only
-those count in the end that are near."""
+"""Matching radii. If a sweep shows a side that previous ones did not, its points must not be pulled to the corner of
+theirs: in the last pass only close points count."""
 _CARRIED_REACHES_M = (0.3,)
-"""Own motion is so near at once."""
+"""With own motion, the initial guess is already this close."""
 _ICP_STEPS, _ICP_STILL = 30, 1e-4
-"""Steps at most; metres and radians that a step no longer changes."""
+"""Maximum number of steps; change of a step, in metres and radians, below which it has converged."""
 _CAP_M = 0.5
 _MOST_MOVED_M, _MOST_TURNED_RAD = 0.8, math.radians(8.0)
-"""A registration that says more than this has slid along a side."""
+"""A registration with a larger correction has slid along a side."""
 _TIGHTER = 0.95
-"""A standing vehicle's points lie closer together over own motion than along its track, if it stands."""
+"""If a vehicle stands still, its points are more compact when aligned by own motion than when aligned by its track;
+required ratio."""
 
 Planar = tuple[float, float, float]
-"""x, y, yaw of one frame in another one, seen from above."""
+"""x, y, yaw of one frame relative to another, seen from above."""
 Sweeps = Callable[[int], Clustered | None]
-"""The sweep of a frame; None where there is none."""
+"""The sweep of a frame; None if there is none."""
 
 
 @dataclass(frozen=True)
 class Aggregate:
-    """A vehicle's points of several sweeps."""
+    """A vehicle's points from several sweeps."""
 
     frame: int
-    """The frame in whose ego frame everything is."""
+    """The frame whose ego frame is used for all data."""
     points: F32
     """(N, 4) x y z intensity."""
     eyes: F64
-    """(K, 2) where the ego origin was at each sweep, as seen from the vehicle."""
+    """(K, 2) positions of the ego origin at each sweep, relative to the vehicle."""
     placed: Mapping[int, Planar]
-    """How each sweep's ego frame lies in this one, so that the vehicle is in one place."""
+    """Transform of each sweep's ego frame into this one that aligns the vehicle."""
 
 
 def aggregated(
     sightings: Sequence[Sighting], frame: int, sweeps: Sweeps, poses: Mapping[int, Pose] | None = None
 ) -> Aggregate | None:
-    """The points of a vehicle in the ego frame of a frame in which it has a cuboid; None where there are no points.
+    """The points of a vehicle in the ego frame of a frame in which it has a cuboid; None without points.
 
     Args:
-        sightings: of one track. Those without a cuboid count for nothing.
+        sightings: of one track. Those without a cuboid are ignored.
         frame: the frame.
-        sweeps: asked for the frames that are taken.
-        poses: own motion, where it is known.
+        sweeps: called for the frames that are used.
+        poses: own motion, if known.
     """
     cuboids = {each.frame: each.cuboid for each in sightings if each.cuboid is not None}
     clouds: dict[int, F32] = {}
@@ -93,7 +94,7 @@ def aggregated(
 
 
 class _Laid(dict[int, Planar]):
-    """Planar transforms by frame, with the clouds that they move."""
+    """Planar transforms by frame, and the clouds they apply to."""
 
     def __init__(self, clouds: Mapping[int, F32], poses: Mapping[int, Planar]) -> None:
         super().__init__(poses)
@@ -105,7 +106,7 @@ class _Laid(dict[int, Planar]):
 
 
 def _chosen(frames: Sequence[int], frame: int) -> list[int]:
-    """The nearest in time on both sides."""
+    """The frames nearest in time on both sides."""
     return sorted(sorted(frames, key=lambda each: abs(each - frame))[:MOST_SWEEPS])
 
 
@@ -122,7 +123,7 @@ def _laid(frame: int, clouds: Mapping[int, F32], guesses: Mapping[int, Planar], 
 
 
 def _registered(points: F64, model: F64, guess: Planar, reaches_m: Sequence[float]) -> Planar:
-    """A cloud onto others, seen from above; the guess where that says nothing certain."""
+    """Registers a cloud to others, seen from above; returns the guess if the result is not reliable."""
     moved, target = _turned(_some(points), guess), cKDTree(_some(model, MOST_SWEEPS))
     by: Planar = (0.0, 0.0, 0.0)
     for reach_m in reaches_m:
@@ -136,8 +137,8 @@ def _registered(points: F64, model: F64, guess: Planar, reaches_m: Sequence[floa
 
 
 def _icp(points: F64, target: cKDTree, reach_m: float, by: Planar) -> Planar:
-    """Point-to-point ICP in the plane, from a first transform on; points farther than the reach from the target count
-    for nothing."""
+    """Point-to-point ICP in the plane from an initial transform; points farther than ``reach_m`` from the target are
+    ignored."""
     for _ in range(_ICP_STEPS):
         moved = _turned(points, by)
         apart, nearest = target.query(moved, distance_upper_bound=reach_m)
@@ -158,7 +159,7 @@ def _icp(points: F64, target: cKDTree, reach_m: float, by: Planar) -> Planar:
 
 
 def _by_own_motion(frame: int, clouds: Mapping[int, F32], poses: Mapping[int, Pose]) -> dict[int, Planar] | None:
-    """Where each frame was as seen from the first one, if own motion is known between all of them."""
+    """Pose of each frame relative to the first one, if own motion is known between all of them."""
     here = poses.get(frame)
     there = {at: poses[at] for at in clouds if at in poses}
     if here is None or len(there) < len(clouds) or any(each.stretch != here.stretch for each in there.values()):
@@ -175,7 +176,7 @@ def _by_own_motion(frame: int, clouds: Mapping[int, F32], poses: Mapping[int, Po
 
 
 def _between(here: Cuboid, there: Cuboid) -> Planar:
-    """What carries a cuboid of another frame onto this one's."""
+    """The transform from a cuboid of another frame to this frame's."""
     turn_rad = math.remainder(here.yaw_rad - there.yaw_rad, math.tau)
     c, s = math.cos(turn_rad), math.sin(turn_rad)
     x, y = there.center[:2]
@@ -183,7 +184,7 @@ def _between(here: Cuboid, there: Cuboid) -> Planar:
 
 
 def _looseness_m(laid: _Laid) -> float:
-    """How far points of a sweep are from those of the others, in the mean."""
+    """Mean distance of a sweep's points from those of the others."""
     moved = [_moved(laid.clouds[at], laid[at])[:, :2] for at in laid]
     apart = []
     for index, each in enumerate(moved):
@@ -204,5 +205,5 @@ def _moved(points: F32, by: Planar) -> F64:
 
 
 def _some(points: F64, sweeps: int = 1) -> F64:
-    """Every so many of them, where there are more than are needed."""
+    """A subsample if there are more points than needed."""
     return points[:: -(-len(points) // (sweeps * _MOST_REGISTERED)) or 1]

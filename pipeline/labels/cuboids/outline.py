@@ -14,34 +14,36 @@ from pipeline.common.geometry import Cuboid
 from pipeline.types import F32, F64
 
 _EDGE = 0.02
-"""Of the points lie outside: single ones beside the vehicle."""
+"""Share of the points that may lie outside: single points beside the vehicle."""
 _ON_SIDE_M = 0.12
 _FEWEST_ON_SIDE = 5
 _SHARE_OF_EYES = 0.3
-"""Of the sweeps must have seen a side that a cuboid is laid on: from the others it was hidden by the vehicle itself."""
+"""Share of the sweeps that must have seen a side for it to be used: in the others it was hidden by the vehicle
+itself."""
 _MOST_OF_IT = 0.75
-"""A rear that we see from behind over so much of its width is seen between its edges: its middle is the vehicle's."""
+"""If a rear is seen from behind over at least this share of its width, both its edges are visible, so its middle is the
+vehicle's."""
 _CAP_M = 0.4
-"""Points farther off than this are of something else: how much farther says nothing."""
+"""Points farther off belong to something else, so their distance is capped."""
 
 EndsSeen = Literal["low", "high", "both", "none"]
-"""Which end of an axis was turned to us."""
+"""Which end of an axis faced the sensor."""
 
 
 @dataclass(frozen=True)
 class Outline:
-    """Along length and width of a cuboid, from the ego origin of its frame."""
+    """Extent along length and width of a cuboid, relative to the ego origin of its frame."""
 
     axes: F64
     """(2, 2) unit vectors of length and width, as rows."""
     low: F64
-    """(2,) where the points begin."""
+    """(2,) minimum of the points."""
     high: F64
-    """(2,) where they end."""
+    """(2,) maximum of the points."""
     seen: tuple[EndsSeen, EndsSeen]
-    """Ends that were turned to the sensor in one sweep at least."""
+    """Ends that faced the sensor in at least one sweep."""
     firm: tuple[EndsSeen, EndsSeen]
-    """Those that many sweeps saw and that have points along them: a cuboid can be laid on these."""
+    """Ends that were seen in many sweeps and have points along them, so that a cuboid can be fitted to them."""
 
     @property
     def span(self) -> F64:
@@ -50,7 +52,7 @@ class Outline:
 
 
 def outline(points: F32, eyes: F64, yaw_rad: float) -> Outline:
-    """points: (N, 4) of a vehicle. eyes: (K, 2) where they were seen from."""
+    """points: (N, 4) of a vehicle. eyes: (K, 2) sensor positions."""
     axes = np.array([[math.cos(yaw_rad), math.sin(yaw_rad)], [-math.sin(yaw_rad), math.cos(yaw_rad)]])
     flat, from_where = points[:, :2].astype(np.float64) @ axes.T, eyes @ axes.T
     low, high = np.quantile(flat, [_EDGE, 1.0 - _EDGE], axis=0)
@@ -68,9 +70,9 @@ def outline(points: F32, eyes: F64, yaw_rad: float) -> Outline:
 def placed(
     found: Outline, cuboid: Cuboid, size: Sequence[float], ends: tuple[EndsSeen, EndsSeen]
 ) -> tuple[float, float]:
-    """x, y of the middle of a footprint of this length and width: the ends that were seen are laid on the points; a
-    side that was seen between both its ends is centred; else it is moved just as far as it must be to hold them. ends:
-    which are believed."""
+    """x, y of the centre of a footprint with this length and width: visible ends are aligned with the points; a side
+    with both ends visible is centred; otherwise it is moved as little as needed to contain the points. ends: ends to be
+    used."""
     middle = found.axes @ np.array(cuboid.center[:2])
     for axis in range(2):
         low, high, side = found.low[axis], found.high[axis], size[axis]
@@ -88,7 +90,7 @@ def placed(
 
 
 def misfit_m(points: F32, eyes: F64, cuboid: Cuboid) -> float:
-    """How far points are, in the mean, from the nearest side of a cuboid that was turned to us, and outside of it."""
+    """Mean distance of the points from the nearest side of the cuboid that faced the sensor, and outside of it."""
     c, s = math.cos(cuboid.yaw_rad), math.sin(cuboid.yaw_rad)
     axes = np.array([[c, s], [-s, c]])
     flat = (points[:, :2].astype(np.float64) - cuboid.center[:2]) @ axes.T

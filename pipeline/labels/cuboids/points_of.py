@@ -15,10 +15,11 @@ from pipeline.types import F32, I32
 
 FEWEST_POINTS = 5
 MARGIN_M = 0.6
-"""How far beside the vehicle a hand may have put it."""
+"""Position tolerance of a cuboid drawn by hand."""
 _INSIDE_M = 0.15
 _LONGEST_M = 2.0
-"""A cluster that goes on farther beside the cuboid is the vehicle and what stands by it: only what is near counts."""
+"""A cluster that extends farther beyond the cuboid contains the vehicle and something beside it: only the near part is
+used."""
 _CLUSTERS = ClusterParams(front_only=False, min_points=FEWEST_POINTS)
 
 
@@ -29,9 +30,9 @@ class Clustered:
     points: F32
     """(N, 4) float32 x y z intensity, ego frame."""
     ground: Ground
-    """Of it."""
+    """Ground of the sweep."""
     labels: I32
-    """(N,) cluster of each point, −1 where none."""
+    """(N,) cluster of each point, −1 for none."""
 
 
 def clustered(sweep: F32) -> Clustered:
@@ -42,7 +43,7 @@ def clustered(sweep: F32) -> Clustered:
 
 
 def points_of(sweep: Clustered, cuboid: Cuboid) -> F32 | None:
-    """(M, 4) of the cluster with most points in the cuboid, else near it; None where there is none."""
+    """(M, 4) points of the cluster with the most points in the cuboid, else near it; None without one."""
     near = inside(sweep.points, cuboid, MARGIN_M)
     found = sweep.labels[inside(sweep.points, cuboid, _INSIDE_M) & (sweep.labels >= 0)]
     if len(found) == 0:
@@ -55,7 +56,7 @@ def points_of(sweep: Clustered, cuboid: Cuboid) -> F32 | None:
 
 
 def inside(points: F32, cuboid: Cuboid, margin_m: float) -> np.ndarray:
-    """(N,) bool: points in the cuboid grown on every side, from the ground up."""
+    """(N,) bool: points in the cuboid enlarged on every side, from the ground up."""
     c, s = math.cos(cuboid.yaw_rad), math.sin(cuboid.yaw_rad)
     dx, dy = points[:, 0] - cuboid.center[0], points[:, 1] - cuboid.center[1]
     along, across = np.abs(c * dx + s * dy), np.abs(c * dy - s * dx)

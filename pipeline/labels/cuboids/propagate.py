@@ -25,28 +25,29 @@ from pipeline.labels.model import Sighting
 from pipeline.types import F32, F64
 
 MOST_FRAMES = 100
-"""At once, on each side: a person looks at what came of it."""
+"""Maximum frames per call and direction: a person reviews the result."""
 FARTHEST_M = 60.0
-"""Farther off, sixteen beams touch no car often enough to follow it."""
+"""Farther away, sixteen beams hit a car too rarely to track it."""
 _FEWEST_POINTS = 6
 _BLIND_S = 1.0
 _NEAR_M, _NEAR_MPS = 0.6, 1.0
-"""What is found farther from where the vehicle was foreseen is another one; the farther, the longer since the last."""
+"""A cuboid found farther from the predicted position is a different vehicle; the limit increases with the time since
+the last one."""
 _LONGER_M = 0.9
 _LOOSEST_M = 0.45
-"""Points that lie farther off its sides, in the mean, are of no vehicle of its size."""
+"""If points are farther from its sides on average, they do not belong to a vehicle of its size."""
 _GAIN = 0.6
-"""Of what was found against what was foreseen: points on a bumper wander by 10 cm."""
+"""Weight of the measured position relative to the prediction: points on a bumper vary by 10 cm."""
 _STEPS = 6
-"""The last frames that tell the velocity."""
+"""Number of last frames used for the velocity."""
 _HELD_M = 0.4
-"""How far a hand's cuboid may lie off the points, and stay so."""
+"""Maximum offset of a hand-drawn cuboid from the points that is preserved."""
 _ORIGIN = np.zeros((1, 2))
 
 
 @dataclass(frozen=True)
 class _At:
-    """The vehicle over the ground at a time."""
+    """Position of the vehicle over ground at a time."""
 
     t_s: float
     xy: F64
@@ -55,7 +56,7 @@ class _At:
 
 @dataclass(frozen=True)
 class _Run:
-    """What was found, and how far, in the mean, from where it was foreseen."""
+    """Result of tracking, and the mean deviation from the prediction."""
 
     found: tuple[Sighting, ...]
     off_m: float
@@ -64,13 +65,13 @@ class _Run:
 def propagated(
     sightings: Sequence[Sighting], t_ns: Sequence[int], sweeps: Sweeps, poses: Mapping[int, Pose], *, forward: bool
 ) -> tuple[Sighting, ...]:
-    """The frames after the last cuboid of a track, or before the first, in which it was found: none of them a keyframe.
+    """The frames after the last cuboid of a track, or before the first, in which it was found; none is a keyframe.
 
     Args:
         sightings: of the track, by ascending frame.
         t_ns: of every frame of the recording.
         sweeps: of every frame.
-        poses: own motion, where it is known; elsewhere what stands is taken to keep its place before us.
+        poses: own motion, if known; otherwise standing objects are assumed to keep their position relative to us.
         forward: in time.
     """
     cuboids = [(each.frame, each.cuboid) for each in sightings if each.cuboid is not None]
@@ -102,7 +103,7 @@ def _carried(
     sweeps: Sweeps,
     poses: Mapping[int, Pose],
 ) -> _Run:
-    """past: where it was, oldest first; one that is ahead in time is where it would be."""
+    """past: earlier positions, oldest first; a position ahead in time is a prediction."""
     foreseen_by = sorted(past, key=lambda each: abs(each.t_s - t_ns[start] / 1e9), reverse=True)
     held = _held_off(cuboid, sweeps(start))
     found: list[Sighting] = []
@@ -129,7 +130,7 @@ def _carried(
 
 
 def _laid(expected: Cuboid, points: F32 | None, held: F64, near_m: float) -> Cuboid | None:
-    """On its points; None where these are too few or of something else."""
+    """The cuboid fitted to its points; None if they are too few or belong to something else."""
     if points is None or len(points) < _FEWEST_POINTS:
         return None
     found = outline(points, _ORIGIN, expected.yaw_rad)
@@ -143,7 +144,7 @@ def _laid(expected: Cuboid, points: F32 | None, held: F64, near_m: float) -> Cub
 
 
 def _held_off(cuboid: Cuboid, sweep: Clustered | None) -> F64:
-    """(2,) how far along its axes a cuboid was put off its points."""
+    """(2,) offset of a cuboid from its points along its axes."""
     points = points_of(sweep, cuboid) if sweep is not None else None
     if points is None or len(points) < _FEWEST_POINTS:
         return np.zeros(2)
@@ -153,7 +154,7 @@ def _held_off(cuboid: Cuboid, sweep: Clustered | None) -> F64:
 
 
 def _foreseen(track: Sequence[_At], t_s: float) -> _At:
-    """Straight on, as the last places were driven through."""
+    """Linear extrapolation of the last positions."""
     last = track[-1]
     if len(track) < 2:
         return _At(t_s, last.xy, last.yaw_rad)
@@ -165,7 +166,7 @@ def _foreseen(track: Sequence[_At], t_s: float) -> _At:
 
 
 def _reachable(start: int, step: int, t_ns: Sequence[int], poses: Mapping[int, Pose]) -> list[int]:
-    """The frames beyond one, as far as the same clip goes."""
+    """The frames beyond a frame in the same clip."""
     frames: list[int] = []
     at = start
     while len(frames) < MOST_FRAMES and 0 <= at + step < len(t_ns) and _joins(at + step, at, t_ns, poses):
@@ -175,7 +176,7 @@ def _reachable(start: int, step: int, t_ns: Sequence[int], poses: Mapping[int, P
 
 
 def _joins(a: int, b: int, t_ns: Sequence[int], poses: Mapping[int, Pose]) -> bool:
-    """Whether two frames are of one clip, and comparable over the ground."""
+    """Whether two frames are in one clip and their positions over ground are comparable."""
     first, last = sorted((a, b))
     if any(begins_clip(t_ns[at], t_ns[at + 1], MAX_GAP_S) for at in range(first, last)):
         return False
@@ -186,7 +187,7 @@ def _joins(a: int, b: int, t_ns: Sequence[int], poses: Mapping[int, Pose]) -> bo
 def _along_with_us(
     cuboid: Cuboid, start: int, frames: Sequence[int], t_ns: Sequence[int], poses: Mapping[int, Pose]
 ) -> _At:
-    """Where it would be in the next frame if it kept its distance."""
+    """Its position in the next frame if it kept its distance."""
     at = frames[0] if frames else start
     return _over_ground(cuboid, _pose(poses, at), t_ns[at])
 
@@ -214,7 +215,7 @@ def _mixed(a: Cuboid, b: Cuboid, share: float) -> Cuboid:
 
 
 def _stood(cuboid: Cuboid, sweep: Clustered | None) -> Cuboid:
-    """On the road there, where that is known."""
+    """Placed on the road, if the road is known there."""
     if sweep is None:
         return cuboid
     x, y, _ = cuboid.center

@@ -23,20 +23,21 @@ from pipeline.labels.headings import Pose
 from pipeline.labels.model import LabelTrack, Sighting
 
 _STRIDE = 3
-"""Neighbouring frames share an aggregate: it is of the same sweeps."""
+"""Neighbouring frames share an aggregate, because it consists of the same sweeps."""
 _WHOLE = 0.8
-"""A side that was seen and is at least so long, as a share of the usual, was seen whole."""
+"""A visible side with at least this share of the usual length is considered completely visible."""
 _MEAN_M: dict[str, tuple[float, float]] = {"car": (4.1, 1.8)}
-"""Length and width of labelled vehicles where they differ from what fusion takes for usual: the mean of 560 cars in
-other Astyx drives than those measured above."""
+"""Length and width of labelled vehicles if they differ from the usual sizes in fusion: the mean of 560 cars in Astyx
+drives other than those used for the measurements above."""
 
 
 def refined(
     tracks: Sequence[LabelTrack], sweeps: Sweeps, poses: Mapping[int, Pose], progress: Progress = silent
 ) -> tuple[LabelTrack, ...]:
-    """Proposed tracks with their cuboids along the road and on the points. Those without points keep their place.
+    """Proposed tracks with their cuboids aligned with the road and the points. Those without points keep their
+    position.
 
-    sweeps: of every frame. poses: own motion by frame, as far as it is known.
+    sweeps: of every frame. poses: own motion by frame, if known.
     """
     out = []
     turned = along_road(tracks, poses)
@@ -71,13 +72,13 @@ def _on_points(track: LabelTrack, sweeps: Sweeps, poses: Mapping[int, Pose]) -> 
 
 
 def _footprint(aggregate: Aggregate, cuboid: Cuboid, label: str) -> Cuboid:
-    """As long and wide as it was seen to be, else as it mostly is; its height stays."""
+    """Length and width as observed, else the usual ones; the height stays."""
     found = outline(aggregate.points, aggregate.eyes, cuboid.yaw_rad)
     usual, largest = _MEAN_M.get(label, usual_size_m(label)[:2]), largest_size_m(label)
     size = []
     for axis in range(2):
         span = float(found.span[axis])
-        # the end of a side that is round, or partly hidden, is farther than its last point
+        # the end of a side that is round or partly hidden is beyond its last point
         was_seen = found.seen[1 - axis] != "none" and span >= _WHOLE * usual[axis]
         size.append(min(max(span, (span + usual[axis]) / 2 if was_seen else usual[axis]), largest[axis]))
     x, y = placed(found, cuboid, size, found.seen)
@@ -85,7 +86,7 @@ def _footprint(aggregate: Aggregate, cuboid: Cuboid, label: str) -> Cuboid:
 
 
 def _back(cuboid: Cuboid, frame: Planar) -> tuple[float, float]:
-    """Its middle in the frame that lies so in the aggregate's."""
+    """Its centre, transformed from the aggregate's frame back to its own frame."""
     away = np.array(cuboid.center[:2]) - frame[:2]
     c, s = math.cos(frame[2]), math.sin(frame[2])
     return float(c * away[0] + s * away[1]), float(c * away[1] - s * away[0])

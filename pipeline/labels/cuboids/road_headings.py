@@ -17,19 +17,19 @@ from pipeline.labels.headings import Pose
 from pipeline.labels.model import LabelTrack, Sighting
 
 _ALONG_RAD = math.radians(15.0)
-"""What is turned farther stands across the road, or turns."""
+"""Cuboids rotated by more than this stand across the road or turn."""
 _OFFSET_RAD = math.radians(10.0)
 _FEW = 50
-"""So many sightings say half of by how much the sensors are turned against the car."""
+"""With this many sightings, half of the measured rotation of the sensors relative to the car is applied."""
 _OWN_SHARE = 0.15
-"""Of what a track's boxes say is kept: lanes are not exactly parallel."""
+"""Share of the track's own heading that is kept: lanes are not exactly parallel."""
 
 
 def along_road(tracks: Sequence[LabelTrack], poses: Mapping[int, Pose]) -> tuple[LabelTrack, ...]:
-    """The tracks with their cuboids along the road, which keep facing their way. poses: own motion by frame."""
+    """The tracks with their cuboids aligned with the road, keeping their direction. poses: own motion by frame."""
     every = [_beside_road(each, poses) for track in tracks for each in track.sightings if each.cuboid is not None]
     near = [turn for turn in every if abs(turn) < _OFFSET_RAD]
-    # how the sensors are turned against the car's way is common to all that is seen
+    # the rotation of the sensors relative to the car affects all sightings equally
     offset = median(near) * len(near) / (len(near) + _FEW) if near else 0.0
     return tuple(replace(track, sightings=_turned(track.sightings, poses, offset)) for track in tracks)
 
@@ -50,14 +50,14 @@ def _turned(sightings: Sequence[Sighting], poses: Mapping[int, Pose], offset: fl
 
 
 def _beside_road(sighting: Sighting, poses: Mapping[int, Pose]) -> float:
-    """How far left of the road's direction a cuboid is turned, in (−90°, 90°]: it may face either way."""
+    """Rotation of a cuboid to the left of the road's direction, in (−90°, 90°]: it may face either way."""
     assert sighting.cuboid is not None
     road_rad = _road_rad(sighting.cuboid, poses.get(sighting.frame), poses)
     return (sighting.cuboid.yaw_rad - road_rad + math.pi / 2) % math.pi - math.pi / 2
 
 
 def _road_rad(cuboid: Cuboid, here: Pose | None, poses: Mapping[int, Pose]) -> float:
-    """Where the road goes at a cuboid, in the ego frame of its sighting; straight on without own motion."""
+    """Direction of the road at a cuboid, in the ego frame of its sighting; straight ahead without own motion."""
     if here is None:
         return 0.0
     c, s = math.cos(here.yaw_rad), math.sin(here.yaw_rad)

@@ -30,47 +30,49 @@ from pipeline.params import BoxParams
 from pipeline.types import F32
 
 _ENOUGH_POINTS = 12
-"""Fewer do not show where a side is: laid on them, more boxes of labelled cars got worse than better."""
+"""With fewer points, the position of a side is uncertain: fitting made more boxes of labelled cars worse than
+better."""
 _BETTER_M, _BETTER_AROUND_M = 0.05, 0.02
-"""By so much a placement must fit better, in this sweep and over all: less is no better than a hand."""
+"""A placement must improve the fit by this much, in this sweep and over all sweeps; otherwise it is no better than the
+hand-drawn one."""
 _TURN_COSTS_M = 0.02
-"""By so much more must a placement fit that turns the cuboid."""
+"""Additional improvement required if the cuboid is rotated."""
 _GROWN_M = 0.1
-"""Points must reach this far beyond a side to lengthen it."""
+"""Points must extend this far beyond a side to lengthen it."""
 _RAISED_M = 0.1
-"""A smaller change of height is not worth a change."""
+"""Smaller changes of height are not applied."""
 _MOST_MOVED_M, _MOST_RESIZED_M, _MOST_TURN_RAD = 1.2, 1.0, math.radians(25.0)
-"""Points that disagree with the person by more than this belong to something else."""
+"""If points differ from the hand-drawn cuboid by more than this, they belong to something else."""
 _TWO_SIDES_M = 0.6
-"""A shorter side seen is the depth of a bumper, and says nothing of the turn."""
+"""A shorter second side is just the depth of a bumper and does not determine the yaw."""
 _GROUND_GAP_M = 0.6
 
 
 class TooFewPoints(BadInput):
-    """There are too few points to fit a cuboid to."""
+    """There are not enough points to fit a cuboid."""
 
 
 @dataclass(frozen=True)
 class Refitted:
-    """A cuboid after its snap."""
+    """A cuboid after fitting."""
 
     cuboid: Cuboid
-    """Where it is now: the hand's own where nothing fits better."""
+    """The result; the hand-drawn cuboid if nothing fits better."""
     points: int
-    """How many of this sweep it was laid on."""
+    """Number of points of this sweep used for the fit."""
     turned: bool
-    """Whether they decided its yaw."""
+    """Whether the points determined its yaw."""
     sweeps: int = 1
-    """How many sweeps were looked at."""
+    """Number of sweeps used."""
     is_better: bool = True
-    """False where the hand's cuboid was left as it is."""
+    """False if the hand-drawn cuboid was left unchanged."""
 
 
 def refit(sweep: F32 | Clustered, cuboid: Cuboid, around: Aggregate | None = None) -> Refitted:
-    """Fit a cuboid to the points in and near it, if that is better than where it is.
+    """Fit a cuboid to the points in and near it, if that is better than its current position.
 
     sweep: (N, 4) float32 ``x y z intensity``, ego frame. around: the same vehicle's points of several sweeps.
-    TooFewPoints, with how many there are, for fewer than five.
+    TooFewPoints, with their number, for fewer than five.
     """
     known = sweep if isinstance(sweep, Clustered) else clustered(sweep)
     points = points_of(known, cuboid)
@@ -99,7 +101,7 @@ def refit(sweep: F32 | Clustered, cuboid: Cuboid, around: Aggregate | None = Non
 
 
 def _laid_on(one: Aggregate, cuboid: Cuboid, yaw_rad: float) -> Cuboid:
-    """The firm sides of a cuboid on the points, at a yaw."""
+    """The cuboid with its firm sides aligned with the points, for a given yaw."""
     found = outline(one.points, one.eyes, yaw_rad)
     size = [
         float(span if ends == "both" or span > side + _GROWN_M else side)
@@ -110,13 +112,13 @@ def _laid_on(one: Aggregate, cuboid: Cuboid, yaw_rad: float) -> Cuboid:
 
 
 def _is_near(tried: Cuboid, cuboid: Cuboid) -> bool:
-    """Whether it is still the vehicle that the hand meant."""
+    """Whether it is still the vehicle that the person meant."""
     resized_m = max(abs(a - b) for a, b in zip(tried.size[:2], cuboid.size[:2], strict=True))
     return math.dist(tried.center[:2], cuboid.center[:2]) <= _MOST_MOVED_M and resized_m <= _MOST_RESIZED_M
 
 
 def _shape_turn_rad(points: F32, ground: Ground, cuboid: Cuboid) -> float:
-    """By how much the points say that it is turned; 0 where they do not show two sides."""
+    """Rotation according to the points; 0 if they do not show two sides."""
     seen = _around(points, ground)
     turn_rad = _quarter(seen.yaw_rad - cuboid.yaw_rad)
     is_told = min(seen.size[:2]) >= _TWO_SIDES_M and abs(turn_rad) <= _MOST_TURN_RAD
@@ -124,7 +126,7 @@ def _shape_turn_rad(points: F32, ground: Ground, cuboid: Cuboid) -> float:
 
 
 def onto_points(points: F32, ground: Ground, cuboid: Cuboid) -> Refitted:
-    """Fit a cuboid that nobody has placed to (M, 4) points, all of them its vehicle's."""
+    """Fit a cuboid that nobody has positioned to (M, 4) points, all belonging to its vehicle."""
     turn_rad = _shape_turn_rad(points, ground, cuboid)
     yaw_rad = cuboid.yaw_rad + turn_rad
     found = outline(points, np.zeros((1, 2)), yaw_rad)
@@ -135,7 +137,7 @@ def onto_points(points: F32, ground: Ground, cuboid: Cuboid) -> Refitted:
 
 
 def _stood(cuboid: Cuboid, points: F32, ground: Ground) -> Cuboid:
-    """On the ground, and as high as its points at least."""
+    """Placed on the ground, and at least as high as its points."""
     x, y = cuboid.center[:2]
     bottom = float(ground.height(np.array([[x, y]]))[0])
     lowest, top = float(points[:, 2].min()), float(points[:, 2].max())
@@ -150,7 +152,7 @@ def _around(points: F32, ground: Ground) -> Cuboid:
 
 
 def _quarter(angle_rad: float) -> float:
-    """In [−45°, 45°]: boxes look the same after a quarter turn."""
+    """In [−45°, 45°]: boxes are symmetric under quarter turns."""
     return (angle_rad + math.pi / 4) % (math.pi / 2) - math.pi / 4
 
 

@@ -21,14 +21,14 @@ _FEWEST_PAIRS = 3
 
 @dataclass(frozen=True)
 class FrameInfo:
-    """One frame, without its data."""
+    """Metadata of one frame."""
 
     name: str
     """The frame's name in the recording."""
     t_ns: int
     """Of the tick."""
     camera: CameraCalibration | None = None
-    """None where the camera has no calibration."""
+    """None if the camera has no calibration."""
     size: tuple[int, int] | None = None
     """Width and height of its image in pixels."""
     T_rect_ego: F64 | None = None
@@ -51,7 +51,7 @@ class LabeledDrive:
     shots: tuple[FrameInfo, ...]
     """Every frame, in order."""
     points: Callable[[int], F32 | None] = field(default=_no_points, compare=False)
-    """Gives the (N, 4) float32 x y z intensity of a frame's sweep, None without one; read on demand."""
+    """Returns the (N, 4) float32 x y z intensity of a frame's sweep, None without one; read on demand."""
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -69,7 +69,7 @@ class LabeledDrive:
         return tuple(f"{index:06d}" for index in range(len(names)))
 
     def empty(self) -> LabelSet:
-        """Labels of this drive that say nothing yet."""
+        """An empty label set for this drive."""
         return LabelSet(self.uri, self.frames, self.t_ns)
 
 
@@ -78,8 +78,8 @@ def drive_of(
     progress: Progress = silent,
     frame_of: Callable[[int], Frame] | None = None,
 ) -> LabeledDrive:
-    """What is known of every frame, without points and images where the source can tell it so. frame_of: who may
-    have whole frames already; an image's pixels are not asked for."""
+    """Metadata of every frame, without points and images if the source supports that. frame_of: returns complete frames
+    if they are already available; pixels of images are not needed."""
     read = frame_of or source.frame
     shots = []
     for index, frame in enumerate(source.outlines() if isinstance(source, InParts) else map(read, range(len(source)))):
@@ -99,31 +99,31 @@ def drive_of(
 
 
 def _size(frame: Frame) -> tuple[int, int] | None:
-    """Of the image, where no calibration tells it."""
+    """From the image, if no calibration gives it."""
     return (frame.image.bgr.shape[1], frame.image.bgr.shape[0]) if frame.image is not None else None
 
 
 @dataclass(frozen=True)
 class Imported:
-    """What was read from a file of labels."""
+    """The content of a label file."""
 
     labels: LabelSet
-    """In the frames of the drive that they were read for."""
+    """Assigned to the frames of the drive."""
     notes: tuple[str, ...] = ()
-    """What the file says that labels cannot hold, and what it does not say."""
+    """What the file contains that labels cannot represent, and what is missing in it."""
 
 
 Write = Callable[[LabelSet, LabeledDrive, Path], tuple[str, ...]]
-"""Labels that hold nothing but what the format can, the drive, where to. Gives sentences about what was written
-otherwise than it was."""
+"""Writes labels that contain only what the format supports; arguments are labels, drive, and output path. Returns
+sentences about changed content."""
 
 ReadLabels = Callable[[Path, LabeledDrive, Origin], Imported]
-"""The file or folder, the drive, and who made labels of which the file does not say that."""
+"""Arguments are the file or folder, the drive, and the default origin of labels."""
 
 
 def check_extrinsic(labels: LabelSet, drive: LabeledDrive, what: str) -> None:
     """Raise BadInput if cuboids and boxes of the same sightings do not overlap in the image: a sign of an inverted
-    extrinsic, or of labels of another recording."""
+    extrinsic, or of labels for another recording."""
     count, apart = 0, 0
     for frame, pairs in _pairs(labels).items():
         camera = drive.shots[frame].camera

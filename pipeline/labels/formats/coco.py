@@ -51,7 +51,7 @@ _FILE = TypeAdapter(_Coco)
 
 
 def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
-    """BadInput when the recording has no images, whose size the format wants."""
+    """BadInput if the recording has no images, whose size the format requires."""
     categories = {name: place for place, name in enumerate(sorted({track.label for track in labels.tracks}), start=1)}
     size = next((shot.size for shot in drive.shots if shot.size is not None), None)
     if size is None:
@@ -85,7 +85,7 @@ def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
 
 
 def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
-    """Boxes without ``track_id`` are tracks of their own."""
+    """Boxes without ``track_id`` become separate tracks."""
     coco = parse_as(_FILE, read_bytes(path), str(path))
     frames = _frames(coco.images, drive, str(path))
     categories = {each.id: canonical(each.name) for each in coco.categories}
@@ -141,7 +141,7 @@ def _annotations(labels: LabelSet, categories: dict[str, int]) -> list[dict[str,
 
 
 def _frames(images: list[_Image], drive: LabeledDrive, what: str) -> dict[int, int]:
-    """Image id → frame: by ``frame_index`` where it is said, else by the file's name without its ending."""
+    """Image id → frame: by ``frame_index`` if given, else by the file's name without its suffix."""
     by_name = {name: index for index, name in enumerate(drive.file_names())}
     frames: dict[int, int] = {}
     for image in images:

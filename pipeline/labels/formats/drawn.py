@@ -21,8 +21,8 @@ _THICK_PX, _TEXT_PX = 2.0, 14.0
 
 
 def drawn(labels: LabelSet) -> dict[int, list[Drawn]]:
-    """By frame, from the first that has a label to the one after the last, so that nothing stays in view. What was
-    rejected is not drawn. labels: with their boxes."""
+    """By frame, from the first labelled frame to the one after the last, which clears the view. Rejected labels are not
+    drawn. labels: including their boxes."""
     by_frame: dict[int, list[tuple[LabelTrack, Sighting]]] = {}
     for track in labels.tracks:
         if track.state != "rejected":

@@ -74,7 +74,7 @@ def _said(lead: LeadRange | None) -> tuple[str | int, ...]:
 
 
 def _seen(labels: LabelSet, lead: LeadRange | None, index: int) -> tuple[str, ...]:
-    """Class, distance and place of the lead in a frame; empty where they are not known."""
+    """Class, distance and position of the lead in a frame; empty if unknown."""
     track = next((each for each in labels.tracks if lead is not None and each.id == lead.lead), None)
     sighting = track.at(index) if track is not None else None
     if track is None or sighting is None or sighting.cuboid is None:
@@ -94,7 +94,7 @@ def _frame(row: dict[str, str], drive: LabeledDrive, what: str) -> int:
 
 
 def _range(row: dict[str, str], frame: int, origin: Origin, what: str) -> LeadRange | None:
-    """What one row says, as a range of one frame; None where nobody has said who leads."""
+    """One row as a range of one frame; None if no lead is labelled."""
     text = (row["lead"] or "").strip()
     if not text:
         return None
@@ -118,7 +118,7 @@ def _origin(row: dict[str, str], what: str) -> Origin:
 
 
 def _joined(leads: list[LeadRange]) -> list[LeadRange]:
-    """Ranges side by side that say the same, as one."""
+    """Adjacent ranges with the same lead are merged."""
     joined: list[LeadRange] = []
     for each in leads:
         before = joined[-1] if joined else None

@@ -28,7 +28,7 @@ _Range = TypeVar("_Range", LeadRange, FrameTag, Attribute)
 
 
 def to_json(labels: LabelSet) -> bytes:
-    """The file's bytes; the same labels give the same bytes. BadInput when the labels cannot be."""
+    """The file's bytes; equal labels give equal bytes. BadInput if the labels are invalid."""
     return _bytes(check(labels, "these labels"))
 
 
@@ -38,7 +38,7 @@ def _bytes(labels: LabelSet) -> bytes:
 
 
 def from_json(data: bytes, what: str) -> LabelSet:
-    """The labels as they were written. BadInput, beginning with ``what``, when these are none."""
+    """The labels from a file. BadInput, beginning with ``what``, if it is invalid."""
     outer: Any = parse_json(data, what)
     if not isinstance(outer, dict) or outer.get("format") != KIND:
         raise BadInput(f"{what}: not a {KIND} file")
@@ -55,7 +55,7 @@ def from_json(data: bytes, what: str) -> LabelSet:
 
 
 def as_range(tag: Mapping[str, Any]) -> dict[str, Any]:
-    """A tag of one frame, as version 1 has it, as one of a range of frames."""
+    """Converts a tag of one frame, as in version 1, to a tag of a range of frames."""
     body = dict(tag)
     frame = body.pop("frame", None)
     return body | {"first": frame, "last": frame}
@@ -71,9 +71,10 @@ def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
 
 
 def onto(labels: LabelSet, drive: LabeledDrive, what: str) -> Imported:
-    """Labels of this drive, or of one that it is a clip of or that is a clip of it, counted by this drive's frames.
+    """Labels of this drive, or of a drive that contains this clip or is a clip of it, converted to this drive's frame
+    numbers.
 
-    Frames are known by their name and time. BadInput when the two have no frame in common.
+    Frames are matched by name and time. BadInput if the two have no frame in common.
     """
     if (labels.frames, labels.t_ns) == (drive.frames, drive.t_ns):
         return Imported(replace(labels, source=drive.uri))
@@ -105,7 +106,7 @@ def _moved_track(track: LabelTrack, to: dict[int, int]) -> LabelTrack:
 
 
 def _moved_range(label: _Range, to: dict[int, int]) -> list[_Range]:
-    """The range's frames in this drive, as ranges: they need not be in one piece there."""
+    """The range's frames in this drive, as ranges: they may not be contiguous there."""
     frames = sorted(to[frame] for frame in range(label.first, label.last + 1) if frame in to)
     runs: list[list[int]] = []
     for frame in frames:

@@ -11,23 +11,23 @@ Part = Literal[
     "cuboids", "boxes", "identities", "leads", "paths", "events", "tags", "states", "origins", "comments",
     "reviews", "keyframes", "name", "attributes",
 ]  # fmt: skip
-"""identities: that sightings in several frames are the same track. states: proposed, accepted, corrected, rejected.
-origins: who made a label, when, how, with which parameters. reviews: who found it right. keyframes: which sightings
-were interpolated. name: of a frozen version. attributes: what is said of tracks besides their class."""
+"""identities: links between sightings of the same track in several frames. states: proposed, accepted, corrected,
+rejected. origins: who made a label, when, how, with which parameters. reviews: who approved it. keyframes: which
+sightings were interpolated. name: of a frozen version. attributes: properties of tracks other than their class."""
 
 EVERYTHING: frozenset[Part] = frozenset(get_args(Part))
 
 _SIGHTING: frozenset[Part] = frozenset(("cuboids", "boxes", "keyframes"))
-"""Where all of these have a place, so has a sighting of neither shape, and a track that was never seen."""
+"""A format that supports all of these can also represent a sighting without a shape, and a track without sightings."""
 
 _Marked = LabelTrack | LeadRange | PathLabel | EventLabel
 
 
 def reduce(labels: LabelSet, holds: frozenset[Part]) -> tuple[LabelSet, tuple[str, ...]]:
-    """The labels without what cannot be held, and a sentence for each kind of thing that is lost.
+    """The labels without unsupported content, and a sentence for each kind of content that is lost.
 
-    Where there is no place for a state, what a person rejected is left out: it would be read as true. Tracks stay as
-    they are where neither cuboids nor boxes are held: a table may still name them.
+    If states are not supported, rejected labels are left out, because they would be read as true. Tracks stay unchanged
+    if neither cuboids nor boxes are supported: a table may still refer to them.
     """
     lost = [sentence for sentence in _lost(labels, holds) if sentence]
     if "states" not in holds:
@@ -54,14 +54,14 @@ def _with_reduced_sightings(track: LabelTrack, holds: frozenset[Part]) -> LabelT
 
 
 def _has_place(sighting: Sighting, holds: frozenset[Part]) -> bool:
-    """Whether anything of it can be held."""
+    """Whether any of it can be represented."""
     if holds >= _SIGHTING:
         return True
     return ("cuboids" in holds and sighting.cuboid is not None) or ("boxes" in holds and sighting.bbox is not None)
 
 
 def _reduced(sighting: Sighting, holds: frozenset[Part]) -> Sighting:
-    """The sighting with what can be held of it."""
+    """The sighting without unsupported content."""
     cuboid = sighting.cuboid if "cuboids" in holds else None
     bbox = sighting.bbox if "boxes" in holds else None
     is_whole = cuboid is sighting.cuboid and bbox is sighting.bbox
@@ -136,6 +136,6 @@ def _marked(labels: LabelSet) -> tuple[_Marked, ...]:
 
 
 def _count(count: int, sentence: str, one: str, many: str = "") -> str:
-    """The sentence with a number and its noun; empty for none."""
+    """The sentence with a number and its noun; empty if the number is zero."""
     plural = many or (f"{one}es" if one.endswith("x") else f"{one}s")
     return sentence.format(f"{count:,} {one if count == 1 else plural}") if count else ""

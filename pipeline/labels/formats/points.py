@@ -14,9 +14,9 @@ from pipeline.labels.model import LabelSet
 from pipeline.types import F32, F64, I64
 
 _READERS = 2
-"""Unpacking and counting leave Python's lock alone."""
+"""Unpacking and counting release the GIL."""
 _TOGETHER = 16
-"""Frames that a reader takes at once: neighbours lie in one chunk of a session, which is then unpacked once."""
+"""Frames per task: neighbours are in one chunk of a session, which is then unpacked once."""
 
 
 def points_inside(labels: LabelSet, drive: LabeledDrive) -> dict[tuple[int, int], int]:
@@ -44,11 +44,11 @@ def points_inside(labels: LabelSet, drive: LabeledDrive) -> dict[tuple[int, int]
 
 
 def count_inside(points: F32, cuboids: Sequence[Cuboid]) -> I64:
-    """(M,) how many of (N, 3 or more) ego points are in each of M cuboids, their faces included."""
+    """(M,) number of (N, 3 or more) ego points in each of M cuboids, including their faces."""
     numbers = np.array([(*each.center, *each.size, each.yaw_rad) for each in cuboids], dtype=np.float64)
     numbers = numbers.reshape(-1, 7)
     turns = np.column_stack([np.cos(numbers[:, 6]), np.sin(numbers[:, 6])])
-    reach_m = np.hypot(numbers[:, 3:4], numbers[:, 4:5]) / 2 + 1e-3  # a millimetre more, for rounding
+    reach_m = np.hypot(numbers[:, 3:4], numbers[:, 4:5]) / 2 + 1e-3  # plus a millimetre for rounding
     reach = np.hstack([numbers[:, :2] - reach_m, numbers[:, :2] + reach_m])
     counts: I64 = _counted(points, numbers[:, :3], numbers[:, 3:6] / 2, turns, reach)
     return counts
@@ -56,7 +56,7 @@ def count_inside(points: F32, cuboids: Sequence[Cuboid]) -> I64:
 
 @numba.njit(cache=True, nogil=True)
 def _counted(points: F32, centers: F64, halves: F64, turns: F64, reach: F64) -> I64:  # pragma: no cover
-    """turns: (M, 2) cosine and sine of yaw. reach: (M, 4) least x y and most x y that a cuboid can have."""
+    """turns: (M, 2) cosine and sine of yaw. reach: (M, 4) minimum x y and maximum x y of each cuboid."""
     counts = np.zeros(len(centers), dtype=np.int64)
     if len(centers) == 0:
         return counts

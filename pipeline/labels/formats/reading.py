@@ -24,7 +24,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def parse_json(data: bytes, what: str) -> Any:
-    """JSON without NaN and infinity. BadInput, beginning with ``what``, when it is none or nested too deep."""
+    """JSON without NaN and infinity. BadInput, beginning with ``what``, if it is invalid or nested too deeply."""
     try:
         return json.loads(data.decode("utf-8"), parse_constant=_refuse)
     except (ValueError, RecursionError) as error:
@@ -33,12 +33,12 @@ def parse_json(data: bytes, what: str) -> Any:
 
 
 def parse_as(adapter: TypeAdapter[T], data: bytes, what: str) -> T:
-    """JSON of a known form. BadInput, beginning with ``what``, names the first field that is wrong."""
+    """Parse and validate JSON. BadInput, beginning with ``what``, names the first invalid field."""
     return fit(adapter, parse_json(data, what), what)
 
 
 def fit(adapter: TypeAdapter[T], value: Any, what: str) -> T:
-    """A value that JSON gave, as a known form. BadInput as of ``parse_as``."""
+    """Validate a value parsed from JSON. Raises the same error as ``parse_as``."""
     try:
         return adapter.validate_python(value)
     except ValidationError as error:

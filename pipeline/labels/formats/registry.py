@@ -22,34 +22,33 @@ from pipeline.labels.validate import check
 
 @dataclass(frozen=True)
 class LabelFormat:
-    """One kind of file or folder that holds labels."""
+    """One file or folder format for labels."""
 
     name: str
-    """As commands, the API and stored choices call it."""
+    """Name in commands, the API and stored choices."""
     title: str
-    """As people call it."""
+    """Display name."""
     about: str
-    """What it is, in a few words."""
+    """Short description."""
     suffix: str
-    """Of the file; empty where the format is a folder, which is sent and taken as a .zip."""
+    """File suffix; empty if the format is a folder, which is transferred as a .zip."""
     holds: frozenset[Part]
-    """What it has a place for; the rest of a label set is left out, and said."""
+    """Supported content; the rest of a label set is left out, with a note."""
     writer: str
     """``module:function`` that writes labels, see ``base.Write``."""
     reader: str
     """``module:function`` that reads them back, see ``base.Read``."""
     as_stored: bool = False
-    """Our own: boxes that follow cuboids are left to whoever reads it."""
+    """Own format: boxes that follow cuboids are computed by the reader."""
 
     def write(self, labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
-        """Write labels that hold nothing but what the format can. Returns sentences about what was written otherwise
-        than it was."""
+        """Write labels that contain only supported content. Returns sentences about changed content."""
         write: Write = _imported(self.writer)
         return write(labels, drive, out)
 
     def read(self, path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
-        """Read the file or folder; ``origin`` is taken where the file does not say who made a label. BadInput in one
-        sentence when it cannot be read."""
+        """Read the file or folder; ``origin`` is used if the file does not say who made a label. BadInput in one
+        sentence if it cannot be read."""
         read: ReadLabels = _imported(self.reader)
         return read(path, drive, origin)
 
@@ -86,23 +85,23 @@ FORMATS: dict[str, LabelFormat] = {
                f"{_OURS}.lead_csv:write", f"{_OURS}.lead_csv:read"),
     )
 }  # fmt: skip
-"""By name, in the order in which the page lists them."""
+"""By name, in the order shown on the page."""
 
 if TYPE_CHECKING:
     FormatName = str
 else:
     FormatName = Literal[tuple(FORMATS)]
-"""The names as a type, for the choices of commands and of the API."""
+"""The names as a type, for the choices of commands and the API."""
 
 
 def export_labels(
     labels: LabelSet, drive: LabeledDrive, name: FormatName, out: Path, classes: ClassList | None = None
 ) -> tuple[str, ...]:
-    """Write labels of a drive as a new file or folder. Returns a sentence for each thing that the format cannot hold,
-    or calls otherwise. classes: the project's; those of the program otherwise.
+    """Write labels of a drive to a new file or folder. Returns a sentence for everything that the format cannot
+    represent, or names differently. classes: the project's; None for the defaults.
 
-    BadInput when the labels are of another recording or are not valid, when ``out`` exists, or when the format needs
-    what the recording does not have (KITTI: a camera).
+    BadInput if the labels belong to another recording or are invalid, if ``out`` exists, or if the recording lacks
+    something that the format requires (KITTI: a camera).
     """
     from pipeline.labels.boxes import following
     from pipeline.labels.formats.native import onto  # pydantic's adapter of a whole label set
@@ -118,8 +117,8 @@ def export_labels(
 
 
 def import_labels(path: Path, drive: LabeledDrive, name: FormatName, origin: Origin) -> Imported:
-    """Read a file or folder as labels of a drive. BadInput in one sentence when it is not a file of this format, or not
-    of this drive."""
+    """Read a file or folder as labels of a drive. BadInput in one sentence if it does not have this format, or belongs
+    to another drive."""
     kind = FORMATS[name]
     if not path.exists():
         raise BadInput(f"{path}: no such file")

@@ -14,9 +14,9 @@ from pipeline.sources import open_source
 
 
 def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
-    """The whole recording as a new session, with these labels in place of any that it had."""
+    """The whole recording as a new session, with these labels instead of existing ones."""
     from pipeline.labels.formats.drawn import drawn
-    from pipeline.recording.save import save  # half a second of imports: only who writes a session pays
+    from pipeline.recording.save import save  # takes half a second to import, only needed to write a session
 
     out.parent.mkdir(parents=True, exist_ok=True)
     save(open_source(drive.uri), out, labels=to_json(labels), drawn=drawn(following(labels, drive)))
@@ -24,7 +24,7 @@ def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
 
 
 def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
-    """Of this session, a clip of it, or one that it is a clip of. BadInput when there are no labels in it."""
+    """Labels in this session, a clip of it, or a session that contains this clip. BadInput if it contains no labels."""
     from pipeline.recording.session.source import SessionSource
 
     session = SessionSource(str(path), str(path))

@@ -29,7 +29,7 @@ from pipeline.recording.mcap.index import MAGIC, RECORD_HEAD, Directory, Unreada
 
 NAME = "cipv-studio/chain"
 BEGINNING = ""
-"""The hash before the first."""
+"""The previous hash of the first link."""
 _PIECE_BYTES = 1 << 20
 _LONGEST_LINK = 1024
 
@@ -37,23 +37,23 @@ ChainState = Literal["not chained", "intact", "cut off", "changed"]
 
 
 class Link(NamedTuple):
-    """A record of the chain."""
+    """One record of the hash chain."""
 
     previous: str
-    """The hash in the record before."""
+    """The hash in the previous record."""
     sha256: str
-    """Of that text and all bytes since that record."""
+    """SHA-256 of that text and all bytes since that record."""
     is_last: bool
-    """No message follows: without it the file's end was cut off."""
+    """Whether no messages follow; if no link has this, the end of the file is missing."""
     signature: Signature | None = None
-    """Of all of this."""
+    """Signature of all other fields."""
 
     def said(self) -> bytes:
-        """What is signed."""
+        """The bytes to sign."""
         return f"cipv-studio session\0{self.previous}\0{self.sha256}\0{int(self.is_last)}".encode()
 
     def record(self) -> bytes:
-        """As it is in the file."""
+        """The record's bytes in the file."""
         values = {"previous": self.previous, "sha256": self.sha256, "last": str(int(self.is_last))}
         if self.signature is not None:
             values |= {"key": self.signature.key, "signature": self.signature.value}
@@ -64,29 +64,29 @@ class Link(NamedTuple):
 
 @dataclass(frozen=True)
 class Chain:
-    """What the chain of a file says."""
+    """Result of checking the chain of a file."""
 
     state: ChainState
-    """``cut off``: intact as far as it goes, and it does not go to the end."""
+    """``cut off``: intact up to its end, but the end of the file is missing."""
     changed: tuple[str, ...] = ()
-    """Where the file is not as it was written, in words."""
+    """Where the file has been altered, in words."""
     signature: SignatureCheck = SignatureCheck()
-    """Of its last part."""
+    """Signature of the last link."""
 
     def is_signed_whole(self) -> bool:
-        """Whether it is as it was signed, to its end."""
+        """Whether the file is unaltered and signed up to its end."""
         return self.state == "intact" and self.signature.state == "signed"
 
 
 class Writes(Protocol):
-    """Where a file's bytes go."""
+    """Output for a file's bytes."""
 
     def write(self, data: bytes, /) -> int: ...
 
 
 class ChainWriter:
-    """Hashes what is written, and puts a link behind it when asked to. previous: the last link's hash in a file that is
-    gone on with. signer: signs each link."""
+    """Hashes what is written, and appends a link on request. previous: the last link's hash if a file is continued.
+    signer: signs each link."""
 
     def __init__(self, stream: Writes, previous: str = BEGINNING, signer: Signer | None = None) -> None:
         self._stream, self._previous, self._signer = stream, previous, signer
@@ -94,12 +94,12 @@ class ChainWriter:
         self._has_more = False
 
     def wrote(self, data: bytes) -> None:
-        """These bytes were written."""
+        """Add bytes that were written."""
         self._hash.update(data)
         self._has_more = True
 
     def link(self, *, is_last: bool = False) -> None:
-        """A record over everything since the one before; none when that is nothing."""
+        """Write a link over everything since the previous one; nothing if there are no new bytes."""
         if not self._has_more and not is_last:
             return
         link = Link(self._previous, self._hash.hexdigest(), is_last)
@@ -111,8 +111,8 @@ class ChainWriter:
 
 
 def verify(path: Path, progress: Progress = silent, key: str | None = None) -> Chain:
-    """Read the whole file. progress: of bytes. key: the public one that its signature must be of. OSError when it
-    cannot be read."""
+    """Check the whole file. progress: in bytes. key: the public key of the expected signature. OSError if it cannot be
+    read."""
     with open_regular(path) as file:
         size = file.seek(0, io.SEEK_END)
         walk = _Walk(file, size, progress)
@@ -121,7 +121,7 @@ def verify(path: Path, progress: Progress = silent, key: str | None = None) -> C
 
 
 def link_at(file: BinaryIO, offset: int) -> tuple[Link, int] | None:
-    """The link at a place of a file and how long its record is; None when there is none."""
+    """The link at an offset of a file and the length of its record; None if there is none."""
     file.seek(offset)
     head = file.read(RECORD_HEAD.size)
     if len(head) < RECORD_HEAD.size:
@@ -129,13 +129,14 @@ def link_at(file: BinaryIO, offset: int) -> tuple[Link, int] | None:
     opcode, length = RECORD_HEAD.unpack(head)
     content = file.read(length) if opcode == Opcode.METADATA and length <= _LONGEST_LINK else b""
     link = _link(content) if content else None
-    if link is None or link.record() != head + content:  # no hash is over these bytes: they can be written in one way
+    # these bytes are not hashed, so only their canonical form is accepted
+    if link is None or link.record() != head + content:
         return None
     return link, RECORD_HEAD.size + length
 
 
 class _Walk:
-    """Record by record."""
+    """Traverses the file record by record."""
 
     def __init__(self, file: BinaryIO, size: int, progress: Progress) -> None:
         self._file, self._size, self._progress = file, size, progress
@@ -144,7 +145,7 @@ class _Walk:
         self._last: Link | None = None
 
     def signature(self, key: str | None) -> SignatureCheck:
-        """Of the last link. One of a file that was changed is of another content."""
+        """Check of the last link's signature. If the file was altered, it does not match."""
         if self._last is None:
             return SignatureCheck()
         found = check_signature(self._last.signature, self._last.said(), key)
@@ -166,7 +167,7 @@ class _Walk:
         return b"".join(self._pieces(max(0, self._size - len(MAGIC)), len(MAGIC))) == MAGIC
 
     def _names_a_link(self) -> bool:
-        """Whether the file was chained, though no link can be come to."""
+        """Whether the file has a chain, although no link can be reached."""
         before = b""
         for piece in self._pieces(0, self._size):
             if NAME.encode() in before + piece:
@@ -175,7 +176,7 @@ class _Walk:
         return False
 
     def _follow(self) -> int:
-        """Check link by link. Returns where it cannot go on."""
+        """Check link by link. Returns the offset at which the check cannot continue."""
         part, previous = hashlib.sha256(BEGINNING.encode()), BEGINNING
         begin = offset = 0
         offset += self._hashed(0, len(MAGIC), part)
@@ -216,7 +217,7 @@ class _Walk:
         return part
 
     def _head(self, offset: int) -> tuple[int, int] | None:
-        """Operation and length, with its head, of a record that is whole."""
+        """Opcode and total length of a complete record."""
         self._file.seek(offset)
         head = self._file.read(RECORD_HEAD.size)
         if len(head) < RECORD_HEAD.size:
@@ -237,18 +238,18 @@ class _Walk:
             yield piece
 
     def _meet_channels(self, directory: Directory) -> frozenset[int]:
-        """Those that messages are of, by the chunks that name them first: a summary could call them otherwise."""
+        """Channels with messages, as defined first in the chunks: a summary could redefine them."""
         mentioned = frozenset[int]()
         for entry in directory.chunks:
             mentioned |= entry.channels or frozenset()
             if not mentioned <= directory.channels.keys():
-                with suppress(Exception):  # of a damaged one the library raises whatever it likes
+                with suppress(Exception):  # for damaged files, the library raises arbitrary errors
                     for record in unpack(record_at(self._file, entry.offset, entry.length, self._size)).named:
                         directory.know(record)
         return mentioned
 
     def _differences_of_summary(self) -> list[str]:
-        """The index at the file's end is made from what the chain covers, and must say the same."""
+        """The index at the file's end is derived from the chained data and must agree with it."""
         try:
             by_index = read_directory(self._file, self._size)
         except Unreadable as error:
@@ -267,7 +268,7 @@ class _Walk:
 
 
 def _data_end() -> bytes:
-    """The record behind the data, as it is written here: without a checksum."""
+    """The data end record as written here: without a checksum."""
     builder = RecordBuilder()
     DataEnd(0).write(builder)
     return builder.end()
@@ -284,5 +285,5 @@ def _link(content: bytes) -> Link | None:
         values = record.metadata
         signature = Signature(values["key"], values["signature"]) if "signature" in values else None
         return Link(values["previous"], values["sha256"], values["last"] == "1", signature)
-    except Exception:  # damaged bytes make the library raise whatever they like
+    except Exception:  # damaged bytes make the library raise arbitrary errors
         return None

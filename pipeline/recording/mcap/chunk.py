@@ -19,19 +19,19 @@ from pipeline.recording.errors import Damaged
 from pipeline.recording.mcap.index import RECORD_HEAD
 
 LARGEST_CHUNK_BYTES = 256 << 20
-"""Unpacked. Recorders begin a new chunk after one to some dozen MB."""
+"""Uncompressed size. Recorders start a new chunk after one to a few dozen MB."""
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
 class MessagePlace(NamedTuple):
-    """Where a message lies in ``UnpackedChunk.data``."""
+    """Position of a message in ``UnpackedChunk.data``."""
 
     channel_id: int
     """Topic of the message."""
     log_time_ns: int
     """When it was received."""
     publish_time_ns: int
-    """As the sender stamped it."""
+    """Timestamp set by the sender."""
     start: int
     """First byte of its data."""
     end: int
@@ -40,7 +40,7 @@ class MessagePlace(NamedTuple):
 
 @dataclass(frozen=True)
 class UnpackedChunk:
-    """messages: in the order of the file. named: the schemas and channels that it tells of, a channel's schema before
+    """messages: in the order of the file. named: the schemas and channels in the chunk; a channel's schema comes before
     it."""
 
     data: bytes
@@ -48,16 +48,16 @@ class UnpackedChunk:
     messages: tuple[MessagePlace, ...]
     """In the order of the file."""
     named: tuple[Schema | Channel, ...]
-    """Schemas and channels that it tells of, a channel's schema before it."""
+    """Schemas and channels in the chunk; a channel's schema comes before it."""
 
 
 NOTHING = UnpackedChunk(b"", (), ())
-"""What a chunk holds that cannot be read."""
+"""Stands for a chunk that cannot be read."""
 
 
 def unpack(content: bytes) -> UnpackedChunk:
-    """content: of the chunk's record. Damaged bytes make the decompressors and the library raise whatever they like;
-    Damaged for what they do not see."""
+    """content: of the chunk's record. Damaged bytes make the decompressors and the library raise arbitrary errors;
+    Damaged for problems they do not detect."""
     chunk = Chunk.read(ReadDataStream(io.BytesIO(content)))
     if chunk.uncompressed_size > LARGEST_CHUNK_BYTES:
         raise Damaged("a chunk of an invalid size")
@@ -81,8 +81,8 @@ def unpack(content: bytes) -> UnpackedChunk:
 
 
 def _decompressed(chunk: Chunk) -> bytes:
-    """The chunk's bytes, never more than it says: some kilobytes can unpack to terabytes, and both formats have a size
-    of their own that the decompressors would make room for."""
+    """The chunk's uncompressed bytes, at most as many as it declares: a few kilobytes can unpack to terabytes, and both
+    formats contain a size of their own for which the decompressors would allocate memory."""
     size = chunk.uncompressed_size
     if chunk.compression == "zstd":
         if zstandard.frame_content_size(chunk.data) > size:

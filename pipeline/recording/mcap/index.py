@@ -28,23 +28,23 @@ _FOOTER = struct.Struct("<QQI")  # start of the summary, start of its offsets, c
 
 
 class Unreadable(Exception):
-    """Not an MCAP file; the text says why."""
+    """Not an MCAP file; the text gives the reason."""
 
 
 @dataclass(frozen=True)
 class ChunkEntry:
-    """Where a chunk is and what is in it."""
+    """Position and content of a chunk."""
 
     offset: int
-    """Of its record in the file."""
+    """Offset of its record in the file."""
     length: int
-    """Bytes of the record, its head included."""
+    """Bytes of the record, including its header."""
     start_ns: int
     """Earliest log time in it."""
     end_ns: int
     """Latest log time in it."""
     channels: frozenset[int] | None = None
-    """Ids of its messages' channels; None when the file does not say for sure."""
+    """Channel ids of its messages; None if the file does not state them reliably."""
     index_length: int = 0
     """Bytes of the message indexes that follow the chunk."""
 
@@ -54,7 +54,7 @@ class Directory:
     """The contents of a file."""
 
     profile: str
-    """As its header names it."""
+    """From its header."""
     chunks: list[ChunkEntry] = field(default_factory=list)
     """In the order of the file."""
     channels: dict[int, topics.Channel] = field(default_factory=dict)
@@ -66,14 +66,14 @@ class Directory:
     metadata: dict[str, tuple[int, int]] = field(default_factory=dict)
     """Name → offset, length."""
     problem: str | None = None
-    """None for a whole file; else what it lacks."""
+    """What is missing; None for a complete file."""
     is_cut: bool = False
     """Whether its end is missing."""
     sound_bytes: int = 0
-    """Up to where records are whole."""
+    """Offset up to which records are complete."""
 
     def know(self, record: Schema | Channel) -> None:
-        """A channel or the schema of channels to come, met in the summary or in a chunk."""
+        """Add a channel, or a schema of later channels, from the summary or a chunk."""
         if isinstance(record, Schema):
             self.schemas[record.id] = record
             return
@@ -85,14 +85,14 @@ class Directory:
 
 
 def read_directory(file: BinaryIO, size: int, *, walk: bool = False) -> Directory:
-    """Of an open file of ``size`` bytes. walk: do not trust the summary. Unreadable when it is no MCAP file."""
+    """Read an open file of ``size`` bytes. walk: do not use the summary. Unreadable if it is not an MCAP file."""
     profile = _read_profile(file)
     found = None if walk else _from_summary(file, size, profile)
     return found or _Walk(file, size, profile).directory
 
 
 def record_at(file: BinaryIO, offset: int, length: int, size: int) -> bytes:
-    """The content of a record at ``offset`` that is ``length`` long with its head; empty outside the file."""
+    """The content of a record at ``offset`` with a total length of ``length``; empty outside the file."""
     if offset >= size:
         return b""
     file.seek(offset + RECORD_HEAD.size)
@@ -119,15 +119,15 @@ def _read_profile(file: BinaryIO) -> str:
 
 
 def read_summary(file: BinaryIO, size: int) -> Summary | None:
-    """The library's reading of the file's end. None when there is none, or none that fits the file."""
+    """The summary as read by the library. None if there is none that matches the file."""
     try:
         if not _is_sound(file, size):
             return None
         file.seek(0)
         summary = SeekingReader(file, record_size_limit=size).get_summary()
-    except Overloaded:  # of a store, not of the file
+    except Overloaded:  # a problem of the store, not of the file
         raise
-    except Exception:  # damaged bytes make the library raise whatever they like; such a summary is as good as none
+    except Exception:  # damaged bytes make the library raise arbitrary errors; such a summary is treated as missing
         return None
     if summary is None or summary.statistics is None:
         return None
@@ -139,12 +139,12 @@ def read_summary(file: BinaryIO, size: int) -> Summary | None:
 
 
 def summary_start(file: BinaryIO, size: int) -> int:
-    """Where the summary of a whole file begins; 0 when it has none."""
+    """Offset of the summary of a complete file; 0 without one."""
     return int(_footer(file, size)[1][0])
 
 
 def _from_summary(file: BinaryIO, size: int, profile: str) -> Directory | None:
-    """None when there is no summary."""
+    """None without a summary."""
     summary = read_summary(file, size)
     if summary is None:
         return None
@@ -173,7 +173,7 @@ def _from_summary(file: BinaryIO, size: int, profile: str) -> Directory | None:
 
 
 def _is_sound(file: BinaryIO, size: int) -> bool:
-    """Whether the summary's checksum is right, or there is none: it covers the summary and the footer up to itself."""
+    """Whether the summary's checksum is correct or missing: it covers the summary and the footer up to itself."""
     footer_offset, (start, _, crc) = _footer(file, size)
     if start == 0 or crc == 0:
         return True
@@ -182,14 +182,14 @@ def _is_sound(file: BinaryIO, size: int) -> bool:
 
 
 def _footer(file: BinaryIO, size: int) -> tuple[int, tuple[int, int, int]]:
-    """Where it is, and what it says."""
+    """Its offset and its fields."""
     offset = size - len(MAGIC) - RECORD_HEAD.size - _FOOTER.size
     start, offsets_start, crc = _FOOTER.unpack(record_at(file, offset, RECORD_HEAD.size + _FOOTER.size, size))
     return offset, (start, offsets_start, crc)
 
 
 class _Walk:
-    """Record by record to the end of the data, or to where the file is cut off."""
+    """Reads record by record to the end of the data, or to where the file is truncated."""
 
     def __init__(self, file: BinaryIO, size: int, profile: str) -> None:
         self._file, self._size = file, size
@@ -221,7 +221,7 @@ class _Walk:
             places = self.directory.attachments if opcode == Opcode.ATTACHMENT else self.directory.metadata
             try:
                 places[stream.read_prefixed_string()] = offset, length
-            except Exception:  # a damaged name; nobody will ask for it
+            except Exception:  # a damaged name; it will not be requested
                 return
 
     def _conclude(self, offset: int, has_ended: bool) -> None:
@@ -231,5 +231,5 @@ class _Walk:
         if not has_ended:
             found.is_cut = True
             found.problem = f"it is cut off after {offset / 1e6:.1f} MB"
-            if found.chunks:  # its message indexes may be cut off too
+            if found.chunks:  # its message indexes may be truncated as well
                 found.chunks[-1] = replace(found.chunks[-1], channels=None)

@@ -19,20 +19,20 @@ from pipeline.recording.mcap.chain import ChainWriter
 from pipeline.recording.topics import PROFILE, Channel
 
 CHUNK_BYTES = 1280 * 1024
-"""A chunk is what a crash can cost and what a seek must unpack. What would make one larger begins the next: a frame of
-a full sweep (0.6 MB) and its image (0.4 MB) is one chunk, and a seek reads nothing else."""
+"""A chunk is what may be lost in a crash and what a seek must unpack. A message that would exceed this size starts a
+new chunk: a frame with a full sweep (0.6 MB) and its image (0.4 MB) is one chunk, and a seek reads nothing else."""
 _NEVER = 2**62
-"""The library's own limit, which counts after the message: ours alone decides."""
+"""Disables the library's own limit, which is checked after each message."""
 
 Compression = Literal["lz4", "zstd"]
 _COMPRESSION = {"lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}
 
 
 class _Stream:
-    """What ``mcap.writer`` writes to: straight to the system, all that it is given, chained by hash."""
+    """Output of ``mcap.writer``: written directly to the system and chained by hash."""
 
     def __init__(self, path: Path) -> None:
-        signer = configured_signer()  # where that fails there is no file yet
+        signer = configured_signer()  # if this fails, no file has been created yet
         self.file = path.open("xb", buffering=0)
         self.chain = ChainWriter(self.file, signer=signer)
 
@@ -47,17 +47,18 @@ class _Stream:
         return self.file.tell()
 
     def flush(self) -> None:
-        """Nothing is held back."""
+        """Nothing is buffered."""
 
 
 class Output:
-    """A new MCAP file. ``add`` messages, ``flush`` now and then, ``close`` in the end.
+    """A new MCAP file. ``add`` messages, ``flush`` periodically, finally ``close``.
 
-    Nothing is buffered below the chunk: when it is closed, by size or by ``flush``, its bytes are with the system, and
-    survive the death of this process. ``flush(to_disk=True)`` waits until they survive the machine's, too.
+    Only the current chunk is buffered: when it is closed, by size or by ``flush``, its bytes have been passed to the
+    system and survive a crash of this process. ``flush(to_disk=True)`` waits until they also survive a crash of the
+    machine.
 
-    When the file can take no more, ``add``, ``flush`` and ``close`` raise OSError with the file's name, after they cut
-    it back to its last whole chunk and ended it there: it stays a file that any reader opens.
+    If nothing more can be written, ``add``, ``flush`` and ``close`` raise OSError with the file's name, after
+    truncating the file to its last complete chunk and ending it there: any reader can still open it.
     """
 
     def __init__(self, path: Path, compression: Compression = "zstd", profile: str = PROFILE) -> None:
@@ -78,21 +79,22 @@ class Output:
 
     @property
     def is_open(self) -> bool:
-        """False once it was closed or could take no more."""
+        """False after it was closed or a write failed."""
         return self._is_open
 
     @property
     def bytes_written(self) -> int:
-        """Size of the file, without the chunk in progress."""
+        """Size of the file, without the current chunk."""
         return self._sound_bytes
 
     @property
     def is_pending(self) -> bool:
-        """Whether a chunk is in progress."""
+        """Whether there is a current chunk."""
         return self._pending_bytes > 0
 
     def add(self, channel: Channel, log_time_ns: int, publish_time_ns: int, data: bytes) -> None:
-        """Append a message. publish_time_ns: the header's time; before 1970 it becomes 0, MCAP knows no earlier."""
+        """Append a message. publish_time_ns: the header's time; times before 1970 become 0, the earliest time in
+        MCAP."""
         if self.is_pending and self._pending_bytes + len(data) > CHUNK_BYTES:
             self.flush()
         with self._failing_neatly():
@@ -109,7 +111,7 @@ class Output:
             self._writer.add_metadata(name, values)
 
     def add_attachment(self, name: str, media_type: str, data: bytes, log_time_ns: int = 0) -> None:
-        """After every message so far: the chunk in progress is closed first."""
+        """Add an attachment after all messages so far; closes the current chunk first."""
         with self._failing_neatly():
             self._writer.flush()
             self._stream.chain.link()
@@ -117,7 +119,7 @@ class Output:
             self._writer.add_attachment(log_time_ns, log_time_ns, name, media_type, data)
 
     def flush(self, *, to_disk: bool = False) -> None:
-        """Close the chunk in progress."""
+        """Close the current chunk."""
         with self._failing_neatly():
             self._writer.flush()
             self._stream.chain.link()
@@ -138,7 +140,7 @@ class Output:
         self._stream.file.close()
 
     def discard(self) -> None:
-        """Close the file and remove it: what it was to hold could not be made."""
+        """Close the file and remove it, because its content could not be produced."""
         self._is_open = False
         self._stream.file.close()
         self.path.unlink(missing_ok=True)
@@ -155,7 +157,7 @@ class Output:
 
     @contextmanager
     def _failing_neatly(self) -> Iterator[None]:
-        """Each call of the writer leaves whole records behind, or is undone."""
+        """Each call of the writer leaves complete records, or is undone."""
         if not self._is_open:
             raise ValueError(f"{self.path} is closed")
         try:
@@ -167,7 +169,7 @@ class Output:
             raise OSError(error.errno, error.strerror, str(self.path)) from None
 
     def _cut_back(self) -> None:
-        """End the file after its last whole chunk, without a summary: 50 bytes in the place of what did not fit."""
+        """End the file after its last complete chunk, without a summary: 50 bytes replace what did not fit."""
         end = RecordBuilder()
         DataEnd(0).write(end)
         Footer(0, 0, 0).write(end)

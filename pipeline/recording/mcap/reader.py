@@ -27,35 +27,35 @@ from pipeline.recording.mcap.chunk import NOTHING, UnpackedChunk, unpack
 from pipeline.recording.mcap.index import RECORD_HEAD, ChunkEntry, Unreadable, read_directory, record_at
 
 _CHUNKS_HELD = 8
-"""For two places that are read by turns, what is shown and what is computed beside it; a frame may lie in three."""
+"""Enough for two alternating read positions, the shown frame and the background run; a frame may span three chunks."""
 
 
 class NotMcap(BadInput):
-    """The file is none, or cannot be read; the text names it."""
+    """The file is not an MCAP file, or cannot be read; the text names it."""
 
 
 class Stored(NamedTuple):
-    """A message as it is in the file."""
+    """A message as stored in the file."""
 
     channel: topics.Channel
     """Topic, schema and encoding."""
     log_time_ns: int
     """When it was received."""
     publish_time_ns: int
-    """As the sender stamped it."""
+    """Timestamp set by the sender."""
     data: bytes
-    """Encoded as the channel says."""
+    """Encoded as defined by the channel."""
 
 
 class McapFile:
-    """Open for reading, by several threads if need be. NotMcap when it is no MCAP file.
+    """Open for reading, by several threads if necessary. NotMcap if it is not an MCAP file.
 
-    size: bytes. directory: what is where. damaged: places in ``directory.chunks`` found unreadable so far.
-    walk: do not trust the summary.
+    size: bytes. directory: positions of all content. damaged: indices in ``directory.chunks`` found unreadable so far.
+    walk: do not use the summary.
     """
 
     def __init__(self, path: Path | str, *, walk: bool = False) -> None:
-        """path: of a file, or the address of one in a store, which is read in place by range requests."""
+        """path: of a file, or the address of a file in a store, which is read by range requests."""
         self.path = path
         self.damaged: set[int] = set()
         self._held: OrderedDict[int, Future[UnpackedChunk]] = OrderedDict()
@@ -70,7 +70,7 @@ class McapFile:
         except (OSError, Unreadable) as error:
             self._file.close()
             raise NotMcap(f"{path}: {error}") from None
-        weakref.finalize(self, self._file.close)  # nobody closes a ``Source``; its file goes with it
+        weakref.finalize(self, self._file.close)  # a ``Source`` is never closed explicitly; its file is closed with it
         spans = [(entry.start_ns, entry.end_ns) for entry in self.directory.chunks]
         self._spans = np.array(spans, dtype=np.uint64).reshape(-1, 2)
         self._meet_channels()
@@ -85,7 +85,7 @@ class McapFile:
         self._file.close()
 
     def open_again(self) -> BinaryIO:
-        """The file's bytes, open a second time. Raises what opening it raises."""
+        """The file opened a second time. Raises the same errors as opening it."""
         path = self.path
         return open_remote(path) if isinstance(path, str) and is_remote(path) else open_regular(Path(path))
 
@@ -96,8 +96,8 @@ class McapFile:
         last_ns: int = 2**64 - 1,
         progress: Progress = silent,
     ) -> Iterator[Stored]:
-        """Messages in the order of the file, of these topics, with log times from ``first_ns`` to ``last_ns``, both
-        included. A chunk that cannot be read is left out, and noted in ``damaged``. progress: of chunks."""
+        """Messages of these topics in the order of the file, with log times from ``first_ns`` to ``last_ns``, both
+        included. An unreadable chunk is skipped and added to ``damaged``. progress: in chunks."""
         places = self._chunks_between(first_ns, last_ns)
         for done, place in enumerate(places):
             progress(done, len(places))
@@ -106,17 +106,17 @@ class McapFile:
             yield from self._stored(self._unpacked(place), wanted, first_ns, last_ns)
 
     def message(self, topic: str, log_time_ns: int) -> Stored:
-        """The message of a topic at a log time. Damaged when there is none, or its chunk cannot be read."""
+        """The message of a topic at a log time. Damaged if there is none, or its chunk cannot be read."""
         for stored in self.messages((topic,), log_time_ns, log_time_ns):
             return stored
         raise Damaged(f"the session lacks a message of {topic}")
 
     def chunk(self, place: int) -> list[Stored]:
-        """All messages of the chunk at this place of ``directory.chunks``, none when it cannot be read."""
+        """All messages of the chunk with this index in ``directory.chunks``; empty if it cannot be read."""
         return list(self._stored(self._unpacked(place)))
 
     def log_times(self) -> dict[topics.Channel, npt.NDArray[np.int64]]:
-        """Sorted log times of all messages, from the message indexes alone: no chunk is unpacked but those without."""
+        """Sorted log times of all messages, from the message indexes; only chunks without an index are unpacked."""
         found: dict[int, list[int]] = {}
         for place, entry in enumerate(self.directory.chunks):
             pairs = self._indexed_times(entry)
@@ -128,7 +128,7 @@ class McapFile:
         return {channels[i]: np.sort(np.array(times)) for i, times in sorted(found.items()) if i in channels}
 
     def attachment(self, name: str) -> bytes | None:
-        """The data of an attachment, None when there is none that can be read."""
+        """The data of an attachment, None if there is none that can be read."""
         record = self._record(*self.directory.attachments.get(name, (0, 0)))
         try:
             return Attachment.read(ReadDataStream(io.BytesIO(record))).data if record else None
@@ -136,7 +136,7 @@ class McapFile:
             return None
 
     def metadata(self, name: str) -> dict[str, str] | None:
-        """A metadata record, None when there is none that can be read."""
+        """A metadata record, None if there is none that can be read."""
         record = self._record(*self.directory.metadata.get(name, (0, 0)))
         try:
             return Metadata.read(ReadDataStream(io.BytesIO(record))).metadata if record else None
@@ -144,7 +144,7 @@ class McapFile:
             return None
 
     def _meet_channels(self) -> None:
-        """A file without a summary names its channels in its chunks only: those that mention a new one are read."""
+        """A file without a summary defines its channels only in its chunks: those that define a new one are read."""
         for place, entry in enumerate(self.directory.chunks):
             if entry.channels is None or not entry.channels <= self.directory.channels.keys():
                 self._unpacked(place)
@@ -160,7 +160,7 @@ class McapFile:
     def _stored(
         self, chunk: UnpackedChunk, wanted: Collection[str] | None = None, first_ns: int = 0, last_ns: int = 2**64 - 1
     ) -> Iterator[Stored]:
-        """As of ``messages``, of one chunk."""
+        """Like ``messages``, for one chunk."""
         for channel_id, log_time_ns, publish_time_ns, start, end in chunk.messages:
             channel = self.directory.channels.get(channel_id)
             if channel is None or not first_ns <= log_time_ns <= last_ns:
@@ -169,8 +169,8 @@ class McapFile:
                 yield Stored(channel, log_time_ns, publish_time_ns, chunk.data[start:end])
 
     def _unpacked(self, place: int) -> UnpackedChunk:
-        """A chunk, ``NOTHING`` when it cannot be read. The newest few are held; who asks for one that another thread is
-        unpacking waits for that."""
+        """A chunk, ``NOTHING`` if it cannot be read. The most recent ones are cached; a thread that requests a chunk
+        which another one is unpacking waits for it."""
         with self._lock:
             found, is_mine = self._held.get(place), False
             if found is None:
@@ -183,9 +183,9 @@ class McapFile:
         if is_mine:
             try:
                 found.set_result(self._read_chunk(place))
-            except BaseException as end:  # of this thread; who waits must not wait for ever
+            except BaseException as end:  # also on KeyboardInterrupt, so that waiting threads do not wait forever
                 with self._lock:
-                    self._held.pop(place, None)  # a store that failed now is asked again
+                    self._held.pop(place, None)  # after a temporary failure of a store, read it again
                 found.set_exception(end)
         return found.result()
 
@@ -195,7 +195,7 @@ class McapFile:
         entry = self.directory.chunks[place]
         try:
             chunk = unpack(self._record(entry.offset, entry.length))
-        except Overloaded:  # says nothing of the file
+        except Overloaded:  # not a problem of the file
             raise
         except Exception:  # see ``unpack``
             self.damaged.add(place)

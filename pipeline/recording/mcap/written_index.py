@@ -6,8 +6,8 @@ from collections import deque
 
 
 class WrittenIndex:
-    """The last ``keep`` values of one kind, each with the log time under which it was written. A value is known by
-    what it is, not by what it equals: a sensor may say the same twice."""
+    """The last ``keep`` values of one kind, each with the log time at which it was written. Values are compared by
+    identity, because a sensor may send equal values twice."""
 
     def __init__(self, keep: int) -> None:
         self._values: deque[tuple[object, int]] = deque(maxlen=keep)
@@ -16,5 +16,5 @@ class WrittenIndex:
         self._values.append((value, at_ns))
 
     def log_time(self, value: object) -> int | None:
-        """None when it was not written, or too long ago."""
+        """None if it was not written, or too long ago."""
         return next((at_ns for each, at_ns in reversed(self._values) if each is value), None)

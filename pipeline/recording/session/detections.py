@@ -13,21 +13,21 @@ from pipeline.types import DistanceLaw, Frame, RawBoxes, RawLanes
 
 @dataclass(frozen=True)
 class BoxesRecord:
-    """``RawBoxes``, its arrays as rows of numbers."""
+    """``RawBoxes`` with arrays as rows of numbers."""
 
     model: str
     """Name of the detector that found them."""
     boxes: tuple[tuple[float, float, float, float], ...]
     """x1 y1 x2 y2 in pixels."""
     scores: tuple[float, ...]
-    """0–1, one a box."""
+    """0–1, one per box."""
     labels: tuple[str, ...]
-    """Class names, one a box."""
+    """Class names, one per box."""
     law: DistanceLaw
-    """Which distances are computed from these boxes."""
+    """Law for computing distances from these boxes."""
 
     def raw(self) -> RawBoxes:
-        """Damaged when a box lacks its score or its class."""
+        """Damaged if scores or classes are missing for boxes."""
         if not len(self.boxes) == len(self.scores) == len(self.labels):
             raise Damaged("the given boxes cannot be read")
         boxes = np.array(self.boxes, np.float32).reshape(-1, 4)
@@ -36,19 +36,19 @@ class BoxesRecord:
 
 @dataclass(frozen=True)
 class LanesRecord:
-    """``RawLanes``, its arrays as rows of numbers."""
+    """``RawLanes`` with arrays as rows of numbers."""
 
     model: str
     """Name of the detector that found them."""
     points: tuple[tuple[float, float], ...]
     """x, y in pixels."""
     scores: tuple[float, ...]
-    """0–1, one a point."""
+    """0–1, one per point."""
     line: tuple[int, ...]
     """Number of the line that each point is on."""
 
     def raw(self) -> RawLanes:
-        """Damaged when a point lacks its score or its line."""
+        """Damaged if scores or lines are missing for points."""
         if not len(self.points) == len(self.scores) == len(self.line):
             raise Damaged("the given lane lines cannot be read")
         points = np.array(self.points, np.float32).reshape(-1, 2)
@@ -57,16 +57,16 @@ class LanesRecord:
 
 @dataclass(frozen=True)
 class Given:
-    """The detections that a frame came with."""
+    """The detections contained in a frame."""
 
     boxes: BoxesRecord | None = None
-    """None where no vehicles were looked for."""
+    """None if there was no vehicle detection."""
     lanes: LanesRecord | None = None
-    """None where no lane lines were looked for."""
+    """None if there was no lane detection."""
 
 
 def given_of(frame: Frame) -> Given | None:
-    """None for a frame whose detections are for networks to find."""
+    """None for a frame without recorded detections."""
     if not frame.detections_given:
         return None
     return Given(

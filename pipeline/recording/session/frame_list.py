@@ -24,7 +24,8 @@ _NO_TICK = b"null"
 
 
 class FrameList:
-    """Of a session that is being written. A tick without labels and given detections is some 100 bytes, packed."""
+    """List of the frames of a session that is being written. A tick without labels and recorded detections takes some
+    100 bytes, compressed."""
 
     def __init__(self) -> None:
         self._times: list[tuple[int, int]] = []
@@ -40,13 +41,13 @@ class FrameList:
         return (self._times[-1][0] - self._times[0][0]) / 1e9 if self._times else 0.0
 
     def add(self, log_time_ns: int, t_ns: int, tick: FrameRecord | None) -> None:
-        """tick: None for one that cannot be read."""
+        """tick: None if it cannot be read."""
         self._times.append((log_time_ns, t_ns))
         line = frame_record_message(replace(tick, truth=None, given=None)) if tick is not None else _NO_TICK
         self._lines.write(line + b"\n")
 
     def attach(self, output: Output) -> None:
-        """To the end of the session; the list takes no more then."""
+        """Append the list to the session; nothing can be added afterwards."""
         self._lines.close()
         times = np.array(self._times, dtype="<i8").tobytes()
         output.add_attachment(topics.INDEX, "application/octet-stream", times)
@@ -54,7 +55,7 @@ class FrameList:
 
 
 def listed_times(file: McapFile) -> tuple[I64, I64] | None:
-    """(N,) log times and (N,) header times of all frames, None where there is no list."""
+    """(N,) log times and (N,) header times of all frames, None without a list."""
     data = file.attachment(topics.INDEX)
     if data is None or len(data) % 16:
         return None
@@ -63,8 +64,8 @@ def listed_times(file: McapFile) -> tuple[I64, I64] | None:
 
 
 def listed_records(file: McapFile) -> Iterator[FrameRecord | None]:
-    """Each frame's tick without ``truth`` and ``given``, in order; None for one that could not be read. It ends early
-    where the list is damaged, and at once where there is none."""
+    """Each frame's tick without ``truth`` and ``given``, in order; None for one that could not be read. Ends early if
+    the list is damaged, and is empty without a list."""
     lines = gzip.GzipFile(fileobj=io.BytesIO(file.attachment(topics.TICKS) or b""))
     while True:
         try:

@@ -29,7 +29,7 @@ _DISTORTIONS = (0, 4, 5, 8)
 
 @dataclass(frozen=True)
 class SweepRef:
-    """A point cloud stored as a message of its own."""
+    """Reference to a point cloud stored as a separate message."""
 
     at_ns: Nanoseconds
     """Log time of the message."""
@@ -38,27 +38,27 @@ class SweepRef:
     channels: Annotated[int, Field(ge=1, le=255)]
     """Rings of the sensor."""
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Of the rays, ego x y z."""
+    """Origin of the rays, ego x y z."""
 
 
 @dataclass(frozen=True)
 class ImageRef:
-    """An image stored as a message of its own."""
+    """Reference to an image stored as a separate message."""
 
     at_ns: Nanoseconds
     """Log time of the message."""
     t_ns: Nanoseconds | None
-    """When it was exposed; None where the camera gave no stamp."""
+    """Time of exposure; None if the camera gave no timestamp."""
 
 
 @dataclass(frozen=True)
 class PacketsRef:
-    """A sweep that is stored as the sensor's packets, received shortly before the tick."""
+    """A sweep stored as the sensor's packets, received shortly before the tick."""
 
     t_ns: Nanoseconds
-    """The sweep's stamp: the decoder's and ``offset_ns``."""
+    """The sweep's timestamp: that of the decoder plus ``offset_ns``."""
     offset_ns: Nanoseconds
-    """Added to the decoder's stamps."""
+    """Added to the decoder's timestamps."""
     T_ego_lidar: tuple[float, ...]
     """(4, 4), row by row."""
 
@@ -74,7 +74,7 @@ class CameraRecord:
     """``CameraCalibration`` with its matrices row by row."""
 
     at_ns: Nanoseconds
-    """Where ``/camera/calibration`` and ``/tf`` have it: log time."""
+    """Log time of its messages in ``/camera/calibration`` and ``/tf``."""
     K: tuple[float, ...]
     """(3, 3), pixels."""
     distortion: Annotated[tuple[float, ...], AfterValidator(_known_distortion)]
@@ -82,9 +82,9 @@ class CameraRecord:
     T_camera_ego: tuple[float, ...]
     """(4, 4), takes ego points to the camera frame."""
     width: _Size
-    """Of the images, pixels."""
+    """Width of the images, pixels."""
     height: _Size
-    """Of the images, pixels."""
+    """Height of the images, pixels."""
     road_z_m: float | None = None
     """Ego z of the road under the car; None where unknown."""
 
@@ -97,7 +97,7 @@ class CameraRecord:
         return CameraRecord(at_ns, *matrices, camera.width, camera.height, camera.road_z_m)
 
     def calibration(self) -> CameraCalibration:
-        """Damaged when the matrices are none of a camera."""
+        """Damaged if the matrices are not valid for a camera."""
         if len(self.K) != 9 or len(self.T_camera_ego) != 16:
             raise Damaged("the camera's calibration has a wrong shape")
         try:
@@ -122,7 +122,7 @@ class FrameRecord:
     notes: tuple[str, ...] = ()
     """What is missing and why."""
     sweep: SweepRef | None = None
-    """None without one, or when it is stored as packets."""
+    """None without one, or if it is stored as packets."""
     packets: PacketsRef | None = None
     """None unless the sweep is stored as packets."""
     picture: ImageRef | None = None
@@ -130,24 +130,24 @@ class FrameRecord:
     camera: CameraRecord | None = None
     """None without a calibration."""
     ego: EgoState | None = None
-    """None where nothing measured ego motion."""
+    """None if ego motion was not measured."""
     gnss: GnssFix | None = None
     """None without a fix."""
     streams: tuple[StreamHealth, ...] = ()
     """Health of live sensors; empty for a converted recording."""
     timing_ms: dict[str, float] = field(default_factory=dict)
-    """By stage, of the run that recorded it."""
+    """By stage, from the run that recorded it."""
     route_at_ns: Nanoseconds | None = None
-    """Where ``/route`` has the planned route: log time; None without one."""
+    """Log time of the planned route in ``/route``; None without one."""
     params_at_ns: Nanoseconds | None = None
-    """Where ``/params`` has what it was run with; None when a session holds inputs alone."""
+    """Log time of the parameters in ``/params``; None if a session contains only inputs."""
     truth: tuple[TruthObject, ...] | None = None
-    """Its labels; None where nobody labelled it."""
+    """Its labels; None if it is not labelled."""
     given: Given | None = None
-    """Detections it came with; None where networks find them anew."""
+    """Recorded detections; None if networks run again."""
 
     def references(self) -> dict[str, int]:
-        """Topic → log time of every message that this tick needs besides its own."""
+        """Topic → log time of every other message that this tick needs."""
         named = {
             topics.POINTS: self.sweep.at_ns if self.sweep else None,
             topics.IMAGE: self.picture.at_ns if self.picture else None,
@@ -159,7 +159,7 @@ class FrameRecord:
         return {topic: at_ns for topic, at_ns in named.items() if at_ns is not None}
 
     def moved(self, to_ns: Mapping[int, int]) -> FrameRecord:
-        """The same tick after messages it refers to were moved, from log time to log time."""
+        """The same tick after referenced messages were moved to new log times."""
 
         def at(before_ns: int | None) -> int | None:
             return None if before_ns is None else to_ns.get(before_ns, before_ns)
@@ -190,12 +190,12 @@ _EGO, _STREAMS = TypeAdapter(EgoState), TypeAdapter(dict[str, tuple[StreamHealth
 
 
 def frame_record_message(tick: FrameRecord) -> bytes:
-    """JSON. What is not finite becomes null."""
+    """JSON. Non-finite numbers become null."""
     return _FRAME_RECORD.dump_json(tick)
 
 
 def frame_record_from(data: bytes) -> FrameRecord:
-    """Damaged when the message is no tick."""
+    """Damaged if the message is not a tick."""
     try:
         return _FRAME_RECORD.validate_json(data)
     except ValidationError as error:
@@ -219,7 +219,7 @@ def route_message(route: Route) -> bytes:
 
 
 def route_from(data: bytes) -> Route:
-    """Damaged when the message is no route."""
+    """Damaged if the message is not a route."""
     try:
         record = _ROUTE.validate_json(data)
     except ValidationError:

@@ -18,7 +18,7 @@ from pipeline.types.camera_shot import Shot
 _XYZI = ("x", "y", "z", "intensity")
 _POINT: np.dtype[np.void] = np.dtype([*((name, "<f4") for name in _XYZI), ("ring", "<u2")])
 _TIMED_POINT: np.dtype[np.void] = np.dtype([*((name, "<f4") for name in _XYZI), ("ring", "<u2"), ("time", "<f4")])
-"""The fields of ROS's Velodyne driver; ``time`` is seconds after the cloud's stamp."""
+"""The fields of ROS's Velodyne driver; ``time`` is seconds after the cloud's timestamp."""
 
 _NUMERIC_TYPE = {np.dtype("<f4"): 7, np.dtype("<u2"): 3}
 """``foxglove.PackedElementField.NumericType``: FLOAT32, UINT16."""
@@ -30,7 +30,7 @@ _IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 def points_message(sweep: Sweep) -> bytes:
-    """``foxglove.PointCloud`` in the ego frame: x y z intensity float32, ring uint16, time float32 where known."""
+    """``foxglove.PointCloud`` in the ego frame: x y z intensity float32, ring uint16, time float32 if known."""
     packed = np.empty(len(sweep.points), dtype=_POINT if sweep.time_s is None else _TIMED_POINT)
     for column, name in enumerate(_XYZI):
         packed[name] = sweep.points[:, column]
@@ -52,7 +52,7 @@ def points_message(sweep: Sweep) -> bytes:
 
 
 def sweep_from(data: bytes, t_ns: int, channels: int, origin: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Sweep:
-    """The sweep of a message of ``points_message``. Damaged when it is none."""
+    """The sweep from a message of ``points_message``. Damaged if it is invalid."""
     message = _parse(topics.POINTS, data)
     given = [(field.name, field.offset, field.type) for field in message.fields]
     layout = next((layout for layout in (_POINT, _TIMED_POINT) if _packed_fields(layout) == given), None)
@@ -67,13 +67,14 @@ def sweep_from(data: bytes, t_ns: int, channels: int, origin: tuple[float, float
 
 
 def _first_of(layout: np.dtype[np.void]) -> np.dtype[np.void]:
-    """x, y, z and intensity of each point as one piece: copied together, they take an eighth of the time."""
+    """Layout with x, y, z and intensity of each point as one field: copying them together takes an eighth of the
+    time."""
     return np.dtype({"names": ["xyzi"], "formats": ["V16"], "offsets": [0], "itemsize": layout.itemsize})
 
 
 def image_message(image: CameraImage, t_ns: int) -> bytes:
-    """``foxglove.CompressedImage``: the camera's JPEG as it came, else a PNG. t_ns: the tick, for a camera without
-    stamps of its own."""
+    """``foxglove.CompressedImage``: the camera's own JPEG, else a PNG. t_ns: the tick, for a camera without
+    timestamps."""
     taken_ns = t_ns if image.t_ns is None else image.t_ns
     if image.encoded is not None:
         return jpeg_message(image.encoded, taken_ns)
@@ -81,12 +82,12 @@ def image_message(image: CameraImage, t_ns: int) -> bytes:
 
 
 def jpeg_message(data: bytes, t_ns: int) -> bytes:
-    """``foxglove.CompressedImage`` of a JPEG that was taken at ``t_ns``."""
+    """``foxglove.CompressedImage`` of a JPEG taken at ``t_ns``."""
     return _compressed(data, "jpeg", t_ns)
 
 
 def jpeg_of(shot: Shot) -> bytes | None:
-    """An image that came as none; None when it is damaged."""
+    """A JPEG of an image that was not received as one; None if it is damaged."""
     bgr = shot.bgr()
     return None if bgr is None else cv2.imencode(".jpg", bgr, _JPEG_GOOD)[1].tobytes()
 
@@ -97,7 +98,7 @@ def _compressed(data: bytes, kind: Literal["jpeg", "png"], t_ns: int) -> bytes:
 
 
 def image_from(data: bytes, t_ns: int | None) -> CameraImage:
-    """The image of a message of ``image_message``. Damaged when it cannot be decoded."""
+    """The image from a message of ``image_message``. Damaged if it cannot be decoded."""
     message = _parse(topics.IMAGE, data)
     try:
         pixels = decode_within_budget(message.data)
@@ -109,7 +110,7 @@ def image_from(data: bytes, t_ns: int | None) -> CameraImage:
 
 
 def calibration_message(camera: CameraCalibration, t_ns: int) -> bytes:
-    """``foxglove.CameraCalibration``. Its D has 5 or 8 numbers, so shorter distortions are filled up with zeros."""
+    """``foxglove.CameraCalibration``. Its D has 5 or 8 numbers, so shorter distortions are padded with zeros."""
     distortion = [float(value) for value in camera.distortion]
     model = "rational_polynomial" if len(distortion) > 5 else "plumb_bob"
     distortion += [0.0] * ((8 if len(distortion) > 5 else 5) - len(distortion))
@@ -129,13 +130,13 @@ def calibration_message(camera: CameraCalibration, t_ns: int) -> bytes:
 
 
 def transform_messages(camera: CameraCalibration | None, t_ns: int) -> list[bytes]:
-    """``foxglove.FrameTransform`` of the LiDAR, whose points are in the ego frame already, and of the camera.
+    """``foxglove.FrameTransform`` of the LiDAR, whose points are already in the ego frame, and of the camera.
 
-    Viewers draw nothing in a frame that no transform names, so the LiDAR's identity is written too.
+    Viewers do not draw data in a frame without a transform, so the LiDAR's identity is written too.
     """
     transforms = [("lidar", (0.0, 0.0, 0.0), _IDENTITY)]
     if camera is not None:
-        from scipy.spatial.transform import Rotation  # 0.2 s to import: only who writes a camera's place pays
+        from scipy.spatial.transform import Rotation  # takes 0.2 s to import, only needed to write a camera's pose
 
         T_ego_camera = inverse(camera.T_camera_ego)
         x, y, z = (float(value) for value in T_ego_camera[:3, 3])
@@ -203,7 +204,7 @@ def to_bytes(message: Any) -> bytes:
 
 
 def _parse(topic: str, data: bytes) -> Any:
-    """The message; protobuf's own DecodeError is not part of its public interface in every version."""
+    """The parsed message; protobuf's own DecodeError is not public in all versions."""
     try:
         return topics.message_class(topic).FromString(data)
     except Exception as error:

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pydantic import TypeAdapter, ValidationError
 
 VERSION = 1
-"""Of the sessions that are written; those of a later one cannot be read."""
+"""Version of written sessions; later versions cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -22,24 +22,24 @@ class About:
     rate_hz: float
     """Nominal frames per second."""
     notes: tuple[str, ...] = ()
-    """What a person should know about the whole recording."""
+    """What a user should know about the whole recording."""
     networks: dict[str, str] = field(default_factory=dict)
-    """SHA-256 of the file of each network that looked at the images, by its name."""
+    """SHA-256 of the file of each network used for the images, by its name."""
     version: int = VERSION
-    """Of the session's form."""
+    """Version of the session format."""
 
     @property
     def is_of_simulator(self) -> bool:
-        """Whether it was recorded from a drive through the simulator."""
+        """Whether it was recorded from a simulated drive."""
         return self.origin.startswith("sim:")
 
     def to_metadata(self) -> dict[str, str]:
-        """As MCAP keeps it: text to text."""
+        """In MCAP's format: text to text."""
         return {key: json.dumps(value, ensure_ascii=False) for key, value in asdict(self).items()}
 
     @staticmethod
     def from_metadata(metadata: dict[str, str]) -> About:
-        """ValueError when it is no such metadata."""
+        """ValueError if it is invalid."""
         try:
             return _ABOUT.validate_python({key: json.loads(value) for key, value in metadata.items()})
         except (ValidationError, RecursionError) as error:

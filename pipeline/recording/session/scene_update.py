@@ -14,12 +14,12 @@ _COLOR = {"V": "#22d3ee", "L": "#ff4dd8", "VL": "#c4b5fd"}
 """Camera, LiDAR, both, as on the dashboard."""
 _OPACITY = 0.45
 _FLAT_M = 0.1
-"""Height drawn for an object of which only the place on the ground is known."""
+"""Height used to draw an object for which only the footprint is known."""
 
 
 def objects_message(result: dict[str, Any], t_ns: int) -> bytes:
-    """The boxes of a result (as JSON, docs/reference/results.md) in the ego frame. They replace those of the frame
-    before."""
+    """The boxes of a result (as JSON, docs/reference/results.md) in the ego frame. They replace those of the previous
+    frame."""
     lead = (result.get("cipv") or {}).get("id")
     entities = [
         _entity(each, box, is_lead=each.get("id") == lead, t_ns=t_ns)
@@ -30,7 +30,7 @@ def objects_message(result: dict[str, Any], t_ns: int) -> bytes:
 
 
 def _box(each: dict[str, Any]) -> tuple[list[float], list[float], float] | None:
-    """Center, size and yaw; None for an object whose place nobody knows."""
+    """Center, size and yaw; None for an object of unknown position."""
     cuboid, bev = each.get("cuboid"), each.get("bev")
     if cuboid is not None:
         return cuboid["center"], cuboid["size"], cuboid["yaw_rad"]
@@ -52,7 +52,7 @@ def _entity(
 
 
 def scene_message(topic: str, entities: list[dict[str, Any]], t_ns: int) -> bytes:
-    """``foxglove.SceneUpdate`` of these entities, in place of all that the topic showed before."""
+    """``foxglove.SceneUpdate`` of these entities, replacing everything that the topic showed before."""
     message = topics.message_class(topic)
     return to_bytes(message(deletions=[{"timestamp": stamp(t_ns), "type": _DELETE_ALL}], entities=entities))
 

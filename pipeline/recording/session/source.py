@@ -28,14 +28,14 @@ _T = TypeVar("_T")
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> SessionSource:
-    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    """Loaded by name from ``pipeline.source_kinds``. SourceError if it cannot be opened."""
     return SessionSource(uri, rest, how.progress)
 
 
 class SessionSource:
-    """An MCAP session. SourceError when the file cannot be read, is none, or holds no frames.
+    """An MCAP session. SourceError if the file cannot be read, is not a session, or contains no frames.
 
-    origin: the URI of what was recorded. is_simulated: whether that was a drive through the simulator.
+    origin: the URI of the original source. is_simulated: whether that was a simulated drive.
     """
 
     def __init__(self, uri: str, path: str, progress: Progress = silent) -> None:
@@ -65,7 +65,7 @@ class SessionSource:
         return int(self._t_ns[self._checked(index)])
 
     def log_time_ns(self, index: int) -> int:
-        """When the frame was received, by the recorder's clock; also what its messages are found by."""
+        """When the frame was received, by the recorder's clock; also used to find its messages."""
         return int(self._log_ns[self._checked(index)])
 
     def frame(self, index: int) -> Frame:
@@ -97,7 +97,7 @@ class SessionSource:
             streams=tick.streams,
             timing_ms=tick.timing_ms,
             **_given(tick, notes),
-            notes=(*tick.notes, *notes),  # last: reading the parts adds to them
+            notes=(*tick.notes, *notes),  # evaluated last, because reading the parts adds notes
         )
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
@@ -105,7 +105,7 @@ class SessionSource:
         return tick.truth if tick is not None else None
 
     def params(self, index: int) -> Params | None:
-        """What the frame was run with when it was recorded; None when a session holds inputs alone."""
+        """Parameters of the frame when it was recorded; None if a session contains only inputs."""
         tick = self._read_record(index, [])
         if tick is None or tick.params_at_ns is None:
             return None
@@ -123,7 +123,7 @@ class SessionSource:
         return found if isinstance(found, dict) else None
 
     def marks(self) -> tuple[Mark, ...]:
-        """Every moment that was marked while it was recorded."""
+        """Every mark made during the recording."""
         found = []
         for stored in self.file.messages((topics.MARKS,)):
             try:
@@ -133,12 +133,12 @@ class SessionSource:
         return tuple(found)
 
     def fixes(self) -> tuple[GnssFix, ...]:
-        """Where the car was, frame by frame; points and images are left packed."""
+        """Position of the car, frame by frame; points and images are not unpacked."""
         ticks = (tick or self._read_record(index, []) for index, tick in self._listed())
         return tuple(tick.gnss for tick in ticks if tick is not None and tick.gnss is not None)
 
     def labels(self) -> bytes | None:
-        """The newest file of labels in it, None when there is none."""
+        """The newest label file in it, None if there is none."""
         newest = None
         for stored in self.file.messages((topics.LABELS,)):
             newest = stored.data
@@ -193,7 +193,7 @@ class SessionSource:
         return index
 
     def _listed(self) -> Iterator[tuple[int, FrameRecord | None]]:
-        """Every frame with its tick of the list at the file's end, None where that does not tell."""
+        """Every frame with its tick from the list at the file's end, None if it is not listed."""
         listed = chain(listed_records(self.file), repeat(None))
         for index, (t_ns, tick) in enumerate(zip(self._t_ns, listed, strict=False)):
             yield index, tick if tick is not None and tick.t_ns == t_ns else None
@@ -211,7 +211,7 @@ class SessionSource:
         return sweep_from(self.file.message(topics.POINTS, ref.at_ns).data, ref.t_ns, ref.channels, ref.origin)
 
     def _read_image(self, ref: ImageRef | None) -> CameraImage | None:
-        """One image may serve several ticks, and is the same object then."""
+        """An image shared by several ticks is returned as the same object."""
         if ref is None:
             return None
         held = self._image
@@ -220,7 +220,7 @@ class SessionSource:
         return held[1]
 
     def _read_camera(self, record: CameraRecord | None) -> CameraCalibration | None:
-        """One calibration serves every tick until another is set."""
+        """A calibration is valid until it changes and is shared by all ticks."""
         if record is None:
             return None
         held = self._camera
@@ -238,7 +238,7 @@ class SessionSource:
 
 
 def _params_from(data: bytes) -> Params:
-    """A parameter that did not exist yet has its default."""
+    """A parameter that did not exist when it was recorded gets its default."""
     sections = json.loads(data).items()
     return with_changes(
         Params(), {f"{name}.{key}": value for name, values in sections for key, value in values.items()}
@@ -246,7 +246,7 @@ def _params_from(data: bytes) -> Params:
 
 
 def _given(tick: FrameRecord, notes: list[str]) -> dict[str, Any]:
-    """The fields of a frame that brings its detections."""
+    """The fields of a frame with recorded detections."""
     if tick.given is None:
         return {}
     boxes, lanes = tick.given.boxes, tick.given.lanes
@@ -258,7 +258,7 @@ def _given(tick: FrameRecord, notes: list[str]) -> dict[str, Any]:
 
 
 def _or_note(read: Callable[[], _T], notes: list[str]) -> _T | None:
-    """What ``read`` gives; None, and a note, when it is damaged."""
+    """The result of ``read``; None, with a note, if it is damaged."""
     try:
         return read()
     except Damaged as damage:

@@ -18,29 +18,30 @@ from pipeline.types import F64, Sweep
 from pipeline.types.source import SourceError
 
 _USUALLY_BEFORE_NS, PACKETS_BEFORE_NS, _PACKETS_AFTER_NS = 800_000_000, 4_000_000_000, 200_000_000
-"""How long before the tick the packets of its sweep were usually received, and may have been at most: a tick is stored
-when the pipeline is done with it, which on a busy machine is late. How long after it they may have been written."""
+"""How long before the tick the packets of its sweep are usually received, and at most: a tick is stored when the
+pipeline has processed it, which on a busy machine is late. The last is how long after the tick they may have been
+written."""
 _SAME_SWEEP_NS = 40_000_000
-"""Stamps of a sweep decoded with and without what came long before differ by far less; sweeps lie 100 ms apart."""
+"""Timestamps of a sweep decoded with and without much earlier packets differ by far less; sweeps are 100 ms apart."""
 _HEADER, _TIME = "std_msgs/msg/Header", "builtin_interfaces/msg/Time"
 
 
 @dataclass(frozen=True)
 class RawLidar:
-    """What it takes to make sweeps of a sensor's packets."""
+    """What is needed to decode sweeps from a sensor's packets."""
 
     T_ego_lidar: F64
-    """(4, 4), where the sensor sits."""
+    """(4, 4), the sensor's mount."""
     offset_ns: int = 0
-    """Added to its stamps."""
+    """Added to its timestamps."""
 
     def reference(self, sweep: Sweep) -> PacketsRef:
-        """What a tick says of a sweep that is not stored itself."""
+        """The tick's reference to a sweep that is not stored itself."""
         return PacketsRef(sweep.t_ns, self.offset_ns, tuple(float(value) for value in self.T_ego_lidar.ravel()))
 
 
 def sweep_of_packets(ref: PacketsRef, at_ns: int, file: McapFile) -> Sweep:
-    """The sweep of a tick stored at log time ``at_ns``, decoded anew. Damaged when its packets are not there."""
+    """The sweep of a tick stored at log time ``at_ns``, decoded from its packets. Damaged if they are missing."""
     try:
         mount = rigid_transform(np.reshape(ref.T_ego_lidar, (4, 4)), "T_ego_lidar")
     except (SourceError, ValueError):
@@ -55,7 +56,7 @@ def sweep_of_packets(ref: PacketsRef, at_ns: int, file: McapFile) -> Sweep:
 
 
 def _sweeps(mount: F64, file: McapFile, from_ns: int, to_ns: int) -> list[Sweep]:
-    """What the packets stored between two log times make. mount: T_ego_lidar."""
+    """Sweeps from the packets stored between two log times. mount: T_ego_lidar."""
     scans = file.messages((PACKETS,), from_ns, to_ns)
     packets = [packet for stored in scans for packet in packets_from(stored.data)]
     decoder = VelodyneDecoder(mount, model=model_of(payload for _, payload in packets))
@@ -64,8 +65,8 @@ def _sweeps(mount: F64, file: McapFile, from_ns: int, to_ns: int) -> list[Sweep]
 
 
 def scan_message(packets: list[tuple[int, bytes]]) -> bytes:
-    """CDR of (when received in ns, payload) each, oldest first. Payloads of another length than a Velodyne's are left
-    out: the message has no room for them."""
+    """CDR of (receive time in ns, payload) each, oldest first. Payloads without the length of a Velodyne packet are
+    left out, since the message type cannot contain them."""
     types = typestore().types
     stamp, header, packet = types[_TIME], types[_HEADER], types[PACKET]
     whole = [(t_ns, payload) for t_ns, payload in packets if len(payload) == PACKET_BYTES]
@@ -78,9 +79,9 @@ def scan_message(packets: list[tuple[int, bytes]]) -> bytes:
 
 
 def packets_from(data: bytes) -> list[tuple[int, bytes]]:
-    """Back from ``scan_message``. Damaged when it is none."""
+    """Inverse of ``scan_message``. Damaged if it is invalid."""
     try:
         scan: Any = typestore().deserialize_cdr(data, SCAN)
-    except Exception as error:  # damaged bytes make the library raise whatever they like
+    except Exception as error:  # damaged bytes make the library raise arbitrary errors
         raise Damaged(f"a message of /lidar/packets cannot be read: {error}") from None
     return [(each.stamp.sec * 1_000_000_000 + each.stamp.nanosec, each.data.tobytes()) for each in scan.packets]

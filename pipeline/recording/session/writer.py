@@ -43,14 +43,15 @@ from pipeline.types.result_json import to_json
 from pipeline.types.source import TruthObject
 
 _KEPT, _SWEEPS_KEPT = 256, 16
-"""Of what came and a frame may refer to: a second of all that sensors send; of clouds, which are large, less."""
+"""Number of received messages that a frame may refer to: one second of all sensor messages; fewer clouds, which are
+large."""
 
 
 class SessionWriter:
-    """Writes one file. Not for several threads; ``Recorder`` is. OSError when the file can take no more.
+    """Writes one file. Not thread-safe; use ``Recorder`` for that. OSError if the file cannot be written any more.
 
-    raw_lidar: clouds are not stored; their packets are, by ``write_packets``, and make the clouds anew when read.
-    What stays the same from frame to frame (calibration, route, parameters, an image shown twice) is written once.
+    raw_lidar: clouds are not stored, but their packets are, by ``write_packets``, and are decoded on reading. Data that
+    does not change from frame to frame (calibration, route, parameters, an image shown twice) is written once.
     """
 
     def __init__(
@@ -92,7 +93,7 @@ class SessionWriter:
 
     @property
     def kept_frames(self) -> int:
-        """Of ``frames``, those in whole chunks, in the end all: what stays when the file can take no more."""
+        """Number of ``frames`` in complete chunks, finally all: these remain if the file cannot be written any more."""
         return self._kept_frames
 
     @property
@@ -109,9 +110,9 @@ class SessionWriter:
         received_ns: int | None = None,
         truth: tuple[TruthObject, ...] | None = None,
     ) -> None:
-        """Append a frame, with its result if there is one. A result may be JSON already (docs/reference/results.md).
+        """Append a frame, with its result if there is one. A result may already be JSON (docs/reference/results.md).
 
-        received_ns: when the frame was made, by the recorder's clock; None for one that comes from a recording.
+        received_ns: when the frame was made, by the recorder's clock; None for one from a recording.
         """
         at_ns = self._clock.log_time(frame.t_ns, received_ns)
         self._header_ns = frame.t_ns
@@ -140,20 +141,20 @@ class SessionWriter:
         self._tick = tick
 
     def write_packets(self, packets: list[tuple[int, bytes]]) -> None:
-        """Raw LiDAR packets, (when received in ns, payload) each, oldest first, as one ``VelodyneScan``."""
+        """Raw LiDAR packets, (receive time in ns, payload) each, oldest first, as one ``VelodyneScan``."""
         received_ns = packets[-1][0]
         at_ns = self._clock.log_time(received_ns, received_ns)
         self._add(topics.PACKETS, at_ns, scan_message(packets), packets[0][0])
 
     def write_sweep(self, sweep: Sweep, arrived_ns: int) -> None:
-        """A sweep when it came, whether or not a frame shows it. A frame with these very points then refers to it; one
-        that was quicker has written it."""
+        """Write a sweep on arrival, whether or not a frame contains it. A frame with exactly these points then refers
+        to it, unless the frame came first and has written it."""
         if self._sweeps.log_time(sweep.points) is None:
             self._add_sweep(sweep, self._clock.log_time(sweep.t_ns, arrived_ns))
 
     def write_image(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
-        """An image when it came, whether or not a tick shows it: the JPEG as it is; of a camera that gives none, one
-        of good quality. A frame with this very JPEG then refers to it."""
+        """Write an image on arrival, whether or not a tick contains it: the JPEG unchanged, or for a camera without
+        JPEGs one of high quality. A frame with exactly this JPEG then refers to it."""
         data = shot.encoded if shot.encoded is not None else jpeg_of(shot)
         if data is None:
             return
@@ -162,29 +163,29 @@ class SessionWriter:
         self._came.add(data, at_ns)
 
     def write_ego(self, ego: EgoState, arrived_ns: int) -> None:
-        """Own motion when it came."""
+        """Write own motion on arrival."""
         self._add(topics.EGO, self._clock.log_time(ego.t_ns, arrived_ns), ego_message(ego), ego.t_ns)
         self._came.add(ego, 0)
 
     def write_fix(self, fix: GnssFix, arrived_ns: int) -> None:
-        """A fix when it came."""
+        """Write a fix on arrival."""
         self._add(topics.GNSS, self._clock.log_time(fix.t_ns, arrived_ns), location_message(fix), fix.t_ns)
         self._came.add(fix, 0)
 
     def write_mark(self, text: str) -> None:
-        """ "Something happened here", by a person, right after the last frame."""
+        """Write a user's mark after the last frame."""
         self._add(topics.MARKS, self._clock.now(), log_message(topics.MARKS, text, self._header_ns))
 
     def write_note(self, text: str) -> None:
-        """What a person who opens the session should know happened here."""
+        """Write a note for users who open the session."""
         self._add(topics.NOTES, self._clock.now(), log_message(topics.NOTES, text, self._header_ns, warning=True))
 
     def write_labels(self, data: bytes) -> None:
-        """What people say is true of the whole, as a file of labels is; the last one written counts."""
+        """Write a label file for the whole session; the last one written counts."""
         self._add(topics.LABELS, self._clock.now(), data)
 
     def write_drawn(self, topic: str, data: bytes) -> None:
-        """What viewers show of the labels of the last frame."""
+        """Write the labels of the last frame in the form shown by viewers."""
         self._add(topic, self._clock.now(), data)
 
     def flush(self, *, to_disk: bool = False) -> None:
@@ -200,7 +201,7 @@ class SessionWriter:
             self._kept_frames = len(self._frames)
 
     def discard(self) -> None:
-        """Remove the file: what it was to hold could not be made."""
+        """Remove the file, because its content could not be produced."""
         self._output.discard()
 
     def _add(self, topic: str, at_ns: int, data: bytes, t_ns: int | None = None) -> None:
@@ -272,7 +273,7 @@ class SessionWriter:
         return at_ns
 
     def _put_small(self, frame: Frame, at_ns: int) -> None:
-        """What a tick holds itself, once more for viewers, on topics of its own."""
+        """Write parts of the tick again for viewers, on separate topics."""
         if frame.ego is not None and frame.ego is not self._ego and self._came.log_time(frame.ego) is None:
             self._add(topics.EGO, at_ns, ego_message(frame.ego), frame.ego.t_ns)
         if frame.gnss is not None and frame.gnss is not self._gnss and self._came.log_time(frame.gnss) is None:

@@ -79,7 +79,7 @@ def _octaves(rng: np.random.Generator, size: int, steps: tuple[int, ...]) -> F32
 
 
 class GroundTexture:
-    """Texture and haze of a flat ground under a fixed camera; only the place along the road changes."""
+    """Texture and haze of a flat ground under a fixed camera; only the position along the road changes."""
 
     def __init__(self, camera: CameraCalibration, ground_z_m: float, seed: int) -> None:
         self.horizon, x, y, distance = _ground_under(camera, ground_z_m)
@@ -149,6 +149,6 @@ def _wrapped(tile: U8, blur_px: float) -> U8:
 
 
 def _tile_maps(x: F64, y: F64) -> tuple[np.ndarray, np.ndarray]:
-    """Where in the tile each pixel's ground lies, as OpenCV's fixed-point maps."""
+    """Position of each pixel's ground in the tile, as OpenCV's fixed-point maps."""
     rows, columns = (np.mod(way, TILE_M) / TILE_M * _TILE_PX for way in (x, y))
     return cv2.convertMaps(columns.astype(np.float32), rows.astype(np.float32), cv2.CV_16SC2)

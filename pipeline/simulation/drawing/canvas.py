@@ -139,8 +139,8 @@ class Canvas:
 
 
 def clip_near(polygon: F64) -> F64:
-    """The part of a (K, 3) polygon of the camera's axes beyond the near plane (Sutherland and Hodgman 1974); empty
-    when none is."""
+    """The part of a (K, 3) polygon, in camera axes, beyond the near plane (Sutherland and Hodgman 1974); empty if there
+    is none."""
     after = np.roll(polygon, -1, axis=0)
     depth, depth_after = polygon[:, 2], after[:, 2]
     kept = depth >= NEAR_M

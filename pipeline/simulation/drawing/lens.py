@@ -18,7 +18,7 @@ class CameraModel(ScenarioPart):
     """The camera's imperfections; all zero is a perfect pinhole."""
 
     k1: float = Field(default=-0.08, ge=-0.3, le=0.3)
-    """Radial distortion as OpenCV has it: r_d = r·(1 + k1·r² + k2·r⁴)."""
+    """Radial distortion in OpenCV's form: r_d = r·(1 + k1·r² + k2·r⁴)."""
     k2: float = Field(default=0.012, ge=-0.1, le=0.1)
     """The fourth-order term of the same."""
     blur_px: float = Field(default=0.4, ge=0.0, le=8.0)
@@ -43,8 +43,8 @@ ORDINARY = CameraModel()
 
 
 def distorted(flat: F64, distortion: F64) -> F64:
-    """(N, 2) of directions x/z, y/z: where a lens puts them, as OpenCV has it; distortion: k1 and k2 first, or empty.
-    Beyond the modelled angle the distortion stays constant, so that nothing outside folds back inside."""
+    """(N, 2) distorted directions from directions x/z, y/z, as in OpenCV; distortion: k1 and k2 first, or empty. Beyond
+    the modelled angle the distortion stays constant, so that nothing outside folds back inside."""
     if not distortion.size:
         return flat
     k1, k2 = distortion[:2]
@@ -64,7 +64,7 @@ def undistorted(flat: F64, distortion: F64) -> F64:
 
 
 class ImageSensor:
-    """Blur, exposure and noise of one camera. seed: of the noise and of the exposure's phase."""
+    """Blur, exposure and noise of one camera. seed: for the noise and the exposure's phase."""
 
     def __init__(self, camera: CameraCalibration, model: CameraModel, seed: int) -> None:
         self._model, self._seed = model, seed

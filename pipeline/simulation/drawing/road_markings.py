@@ -108,7 +108,8 @@ def _wheel_tracks(road: Road, s_m: F64) -> list[_Strip]:
 
 
 def _edge_lines(road: Road, s_m: F64, open_m: list[tuple[float, float]]) -> list[_Strip]:
-    """Solid lines along both sides of each carriageway, open at junctions; none where two meet without a median."""
+    """Solid lines along both sides of each carriageway, open at junctions; none where two carriageways meet without a
+    median."""
     edges = edge_paint_m(road)
     return [
         _strip(part, edge - _EDGE_M / 2, edge + _EDGE_M / 2, _WHITE) for part in _without(s_m, open_m) for edge in edges

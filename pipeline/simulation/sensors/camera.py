@@ -43,7 +43,8 @@ def calibration(model: CameraModel = ORDINARY) -> CameraCalibration:
 
 @lru_cache(maxsize=2)
 def _prepared(model: CameraModel, seed: int) -> tuple[ImageSensor, backdrop.GroundTexture]:
-    """What no image changes, and takes as long as a dozen of them: who opens a scenario again has it at once."""
+    """Data shared by all images, which takes as long to compute as a dozen of them; cached for scenarios that are
+    opened again."""
     camera = calibration(model)
     return ImageSensor(camera, model, seed), backdrop.GroundTexture(camera, -LIDAR_HEIGHT_M, seed)
 

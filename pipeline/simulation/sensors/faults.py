@@ -20,10 +20,10 @@ _NODS_FOR_S = 0.4
 
 
 class Faults(ScenarioPart):
-    """Of the camera, the LiDAR and the time between them; the LiDAR's own ``dropout`` is in its model."""
+    """Faults of the camera, the LiDAR and their synchronisation; the LiDAR's own ``dropout`` is in its model."""
 
     camera_yaw_deg: float = Field(default=0.0, ge=-5.0, le=5.0)
-    """By how much the camera really looks to the left of what its calibration says."""
+    """Actual rotation of the camera to the left relative to its calibration."""
     camera_pitch_deg: float = Field(default=0.0, ge=-5.0, le=5.0)
     """The same downwards."""
     camera_roll_deg: float = Field(default=0.0, ge=-5.0, le=5.0)
@@ -31,28 +31,28 @@ class Faults(ScenarioPart):
     nods_deg: float = Field(default=0.0, ge=0.0, le=5.0)
     """Standard deviation by which the car, and both sensors with it, nods on bumps and when it brakes."""
     camera_skew_ms: float = Field(default=0.0, ge=-200.0, le=200.0)
-    """Images show the world this much after the tick that they are said to be of."""
+    """Delay of the images after their nominal tick."""
     lost_rings: tuple[Ring, ...] = ()
-    """Rings of the LiDAR that give nothing, 0 the lowest."""
+    """Rings of the LiDAR that return nothing, 0 is the lowest."""
     spurious_clusters: float = Field(default=0.0, ge=0.0, le=10.0)
-    """Clouds of exhaust, spray or snow that a sweep has on average, within 30 m ahead."""
+    """Mean number of clouds of exhaust, spray or snow per sweep, within 30 m ahead."""
     sweeps_lost: float = Field(default=0.0, ge=0.0, le=0.9)
-    """Share of sweeps that do not come."""
+    """Share of missing sweeps."""
     pictures_lost: float = Field(default=0.0, ge=0.0, le=0.9)
-    """Share of images that do not come."""
+    """Share of missing images."""
 
 
 NONE = Faults()
 
 
 def nods_rad(faults: Faults, seed: int, frames: int, rate_hz: float) -> F32:
-    """(frames,) how far the car's nose is down in each frame."""
+    """(frames,) downward pitch of the car in each frame."""
     kept = np.array([np.exp(-1.0 / (_NODS_FOR_S * rate_hz))])
     return np.radians(faults.nods_deg * lasting([seed, 20], frames, kept)[:, 0]).astype(np.float32)
 
 
 def true_camera(camera: CameraCalibration, faults: Faults, nod_rad: float = 0.0) -> CameraCalibration:
-    """The camera as it really looks, where ``camera`` is what its calibration says."""
+    """The camera with its actual orientation, where ``camera`` is its calibration."""
     turned = (faults.camera_roll_deg, faults.camera_pitch_deg, faults.camera_yaw_deg)
     if not any(turned) and not nod_rad:
         return camera
@@ -66,7 +66,7 @@ def true_camera(camera: CameraCalibration, faults: Faults, nod_rad: float = 0.0)
 
 
 def disturb_sweep(sweep: Sweep, faults: Faults, seed: int, index: int, nod_rad: float = 0.0) -> Sweep | None:
-    """The sweep with what the faults take from it, add to it and tilt of it; None where it is lost."""
+    """The sweep with points removed, added and tilted by the faults; None if it is lost."""
     rng = np.random.default_rng([seed, 21, index])
     if rng.random() < faults.sweeps_lost:
         return None

@@ -42,7 +42,7 @@ def fix(world: World, model: GnssModel, seed: int, index: int, t_ns: int) -> Gns
 
 
 def from_local(place: F64, lat_deg: float, lon_deg: float, alt_m: float) -> tuple[float, float, float]:
-    """Latitude, longitude (degrees) and height of a place given as metres east, north and up of an origin."""
+    """Latitude, longitude (degrees) and height of a position given as metres east, north and up of an origin."""
     lat, lon = np.radians(lat_deg), np.radians(lon_deg)
     east = np.array([-np.sin(lon), np.cos(lon), 0.0])
     north = np.array([-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)])
@@ -59,7 +59,7 @@ def from_local(place: F64, lat_deg: float, lon_deg: float, alt_m: float) -> tupl
 
 
 def to_earth(lat_deg: float, lon_deg: float, alt_m: float) -> F64:
-    """(3,) Earth-centred, Earth-fixed metres of a place on WGS 84."""
+    """(3,) Earth-centred, Earth-fixed metres of a position on WGS 84."""
     lat, lon = np.radians(lat_deg), np.radians(lon_deg)
     normal = _A_M / np.sqrt(1.0 - _E2 * np.sin(lat) ** 2)
     flat = (normal + alt_m) * np.cos(lat)

@@ -15,7 +15,7 @@ from pipeline.simulation.world.roads import ScenarioPart
 
 
 class GnssModel(ScenarioPart):
-    """Where the world's origin is, and how good the receiver is (standard deviations)."""
+    """Origin of the world, and accuracy of the receiver (standard deviations)."""
 
     lat_deg: float = Field(default=35.6506, ge=-85.0, le=85.0)
     """Of the origin, WGS 84."""
@@ -24,9 +24,9 @@ class GnssModel(ScenarioPart):
     alt_m: float = Field(default=40.0, ge=-400.0, le=6000.0)
     """Of the origin."""
     x_axis_deg: float = Field(default=90.0, ge=0.0, lt=360.0)
-    """Which way the world's x axis points, clockwise from north."""
+    """Direction of the world's x axis, clockwise from north."""
     sigma_m: float = Field(default=0.01, ge=0.0, le=20.0)
-    """Of the place, along east and north each."""
+    """Of the position, along east and north each."""
     sigma_up_m: float = Field(default=0.02, ge=0.0, le=20.0)
     """Of the height above the ellipsoid."""
     sigma_speed_mps: float = Field(default=0.02, ge=0.0, le=5.0)

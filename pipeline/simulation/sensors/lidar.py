@@ -28,7 +28,7 @@ from pipeline.types import F32, F64, I64, Sweep
 
 @dataclass(frozen=True)
 class _Beams:
-    """Rays of one mount in ego axes, where they start, and by how many columns the mount turns them."""
+    """Rays of one mount in ego axes, their origin, and by how many columns the mount rotates them."""
 
     rays: F64
     start: F64

@@ -11,7 +11,7 @@ from pipeline.types import F64
 
 
 class LidarModel(ScenarioPart):
-    """Mount relative to the ego origin, and noise. Points are given in the level ego frame whatever the mount."""
+    """Mount relative to the ego origin, and noise. Points are in the level ego frame for any mount."""
 
     motion: bool = True
     """Each ray is cast at its own time, so moving objects are distorted as in a raw sweep."""

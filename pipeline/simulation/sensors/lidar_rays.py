@@ -21,10 +21,10 @@ _FIRING_ORDER = np.array([2 * ring if ring < 8 else 2 * ring - 15 for ring in ra
 COLUMNS = round(_ROTATION_S / 2 / _FIRING_S)
 COLUMNS_PER_RAD = (COLUMNS - 1) / np.pi
 
-_BEHIND_M = 3.0  # what is farther behind cannot get ahead within a sweep
+_BEHIND_M = 3.0  # objects farther behind cannot get ahead within a sweep
 BOX_FIELDS = 13
-"""x y z of the middle, half length, width and height, cos and sin of the yaw, material, velocity x and y, yaw rate,
-share of the material's usual range."""
+"""x y z of the centre, half length, width and height, cos and sin of the yaw, material, velocity x and y, yaw rate,
+factor on the material's usual range."""
 
 
 def firing_times_s() -> F64:
@@ -45,10 +45,11 @@ def directions() -> F64:
 def cast(rays: F64, times_s: F64, boxes: F64, ground: F64, spare: int) -> tuple[F64, I64, F64]:
     """The first hit of each ray of a sensor at the origin, every ray at its own time.
 
-    rays: (COLUMNS, 16, 3). times_s: (COLUMNS,) after the moment to which the boxes belong. boxes: (B, 13). ground: z =
-    ground[0] + ground[1]·x + ground[2]·y + ground[3]·x²/2. spare: by how many columns a mount may turn a ray away from
-    where its column looks. Returns (COLUMNS, 16) range (infinity: nothing), index of the box (−1: the ground) and
-    cosine of the angle at which the ray meets the surface."""
+    rays: (COLUMNS, 16, 3). times_s: (COLUMNS,) relative to the time of the boxes. boxes: (B, 13). ground: z = ground[0]
+    + ground[1]·x + ground[2]·y + ground[3]·x²/2. spare: maximum number of columns by which a mount may rotate a ray
+    relative to its column. Returns (COLUMNS, 16) range (infinity: nothing), index of the box (−1: the ground) and
+    cosine of the angle of incidence.
+    """
     columns, channels = rays.shape[0], rays.shape[1]
     range_m = np.full((columns, channels), np.inf)
     met = np.full((columns, channels), -1, dtype=np.int64)
@@ -69,7 +70,7 @@ def cast(rays: F64, times_s: F64, boxes: F64, ground: F64, spare: int) -> tuple[
             y = boxes[b, 1] + boxes[b, 10] * times_s[i]
             turned = boxes[b, 11] * times_s[i]
             c, s = boxes[b, 6] - boxes[b, 7] * turned, boxes[b, 7] + boxes[b, 6] * turned
-            ox, oy = -x * c - y * s, x * s - y * c  # the sensor's place in the box's own axes
+            ox, oy = -x * c - y * s, x * s - y * c  # the sensor's position in the box's own axes
             for j in range(channels):
                 dx = rays[i, j, 0] * c + rays[i, j, 1] * s
                 dy = rays[i, j, 1] * c - rays[i, j, 0] * s
@@ -87,8 +88,8 @@ def cast(rays: F64, times_s: F64, boxes: F64, ground: F64, spare: int) -> tuple[
 
 @numba.njit(cache=True, nogil=True)
 def _columns_of(box: F64, columns: int, spare: int) -> tuple[int, int]:
-    """The columns that can meet a box: all of them, unless it is wholly ahead, wholly on one side or wholly behind, so
-    that the bearings of its corners say where it lies."""
+    """The columns that can hit a box: all of them, unless it is completely ahead, on one side or behind, so that the
+    bearings of its corners bound it."""
     x, y, half_l, half_w, c, s = box[0], box[1], box[3], box[4], box[6], box[7]
     deep, wide = abs(half_l * c) + abs(half_w * s), abs(half_l * s) + abs(half_w * c)
     if x + deep < -_BEHIND_M - abs(y):
@@ -111,7 +112,7 @@ def _columns_of(box: F64, columns: int, spare: int) -> tuple[int, int]:
 
 @numba.njit(cache=True, nogil=True)
 def _slab(start: float, direction: float, half: float, enter: float, leave: float) -> tuple[float, float]:
-    """Cut the stretch enter…leave of a ray down to where it is between two planes at ±half."""
+    """Clip the interval enter…leave of a ray to the part between two planes at ±half."""
     if abs(direction) < 1e-12:
         return (enter, leave) if abs(start) <= half else (1.0, 0.0)
     near, far = (-half - start) / direction, (half - start) / direction

@@ -24,9 +24,9 @@ MATERIALS = np.array(
         [48.0, 70.0, 12.0, 0.0, 1.0],
     ]
 )
-"""Of each: intensity 0–255; range at which half of the returns are lost of rays that meet it squarely (m); width of
-that fall-off (m); roughness (m); share of returns near by, the rest being mirrored away or let through. Paint, glass
-and road are measured, ray by ray, on the labelled cars of real sweeps; the others are chosen."""
+"""For each material: intensity 0–255; range at which half of the returns are lost at normal incidence (m); width of
+that fall-off (m); roughness (m); share of returns at close range, the rest is reflected away or transmitted. Paint,
+glass and road are measured, ray by ray, on the labelled cars of real sweeps; the others are assumed."""
 _DARKEST = 0.35
 
 # The top of bonnet and boot lid slopes and sends light away as glass does.
@@ -93,7 +93,7 @@ def vehicle_boxes(state: ActorState) -> list[tuple[float, ...]]:
 
 
 def _brightness(colour: str) -> float:
-    """0 black … 1 white. How well paint reflects the laser's 903 nm is taken to go with how bright it looks."""
+    """0 black … 1 white. The reflectance of paint at the laser's 903 nm is assumed to follow its visible brightness."""
     red, green, blue = (int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
     return 0.299 * red + 0.587 * green + 0.114 * blue
 

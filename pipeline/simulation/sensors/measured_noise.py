@@ -12,59 +12,61 @@ from pipeline.simulation.world.roads import ScenarioPart
 
 FILE = Path(__file__).with_suffix(".json")
 SHARES = (0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98)
-"""Of which each list of quantiles is."""
+"""Probabilities of the values in each list of quantiles."""
 
 
 class FalseBoxes(ScenarioPart):
     """Boxes of vehicles where none is labelled."""
 
     per_frame: float = Field(ge=0.0)
-    """How many a frame has on average."""
+    """Mean number per frame."""
     lasts: float = Field(ge=0.0, le=1.0)
-    """Share that the next frame, 0.1 s later, has as well."""
+    """Share that is also in the next frame, 0.1 s later."""
     seen: tuple[tuple[float, float, float, float], ...]
-    """Each that was seen: its height in px at a focal length of 907 px, width over height, bearing in degrees to either
-    side, and score."""
+    """All observed false boxes: height in px at a focal length of 907 px, width over height, bearing in degrees to
+    either side, and score."""
     height_share: float = Field(ge=0.0)
-    """Standard deviation of ln height from frame to frame, of those that last."""
+    """Standard deviation of ln height from frame to frame, for those that persist."""
 
 
 class MeasuredNoise(ScenarioPart):
-    """Lists by range have a value for each bin between two of ``ranges_m``; farther than the last: as the last bin."""
+    """Lists by range have one value per bin between two values of ``ranges_m``; beyond the last, the last bin is
+    used."""
 
     measured_on: tuple[str, ...]
     """Recordings and their labels, and the network."""
     ranges_m: tuple[float, ...]
-    """Edges of the bins of range, from the first one's lower to the last one's upper."""
+    """Edges of the range bins, from the lower edge of the first to the upper edge of the last."""
     vehicles: tuple[int, ...]
-    """Labelled vehicles in each bin that nothing hides."""
+    """Number of labelled, unoccluded vehicles in each bin."""
     visible: tuple[float, ...]
-    """Edges of the bins of the share of a vehicle in sight, falling."""
+    """Edges of the bins of a vehicle's visible share, descending."""
     found: tuple[tuple[float, ...], ...]
-    """Share found, by bin of what is in sight and by range."""
+    """Share detected, by bin of visible share and by range."""
     missed_again: float = Field(ge=0.0, le=0.99)
-    """Correlation, from frame to frame 0.1 s apart, of what decides whether a vehicle is missed: bursts."""
+    """Correlation between frames 0.1 s apart of the variable that decides whether a vehicle is missed: misses come in
+    bursts."""
     across_share: float = Field(ge=0.0)
-    """Standard deviation of the left and right edge, share of the box's height: the part that lasts."""
+    """Standard deviation of the left and right edge, share of the box's height: the constant part."""
     up_share: float = Field(ge=0.0)
     """The same of the upper and lower edge."""
     frame_share: float = Field(ge=0.0)
     """Of each edge, share of the height, new in each frame."""
     frame_px: float = Field(ge=0.0)
-    """The least of that, at a focal length of 907 px."""
+    """The minimum of that, at a focal length of 907 px."""
     score: tuple[tuple[float, ...], ...]
-    """Quantiles of the scores of found vehicles, by range."""
+    """Quantiles of the scores of detected vehicles, by range."""
     car_called: dict[str, float]
-    """Share of cars that is called something else, by name."""
+    """Share of cars detected as another class, by name."""
     large_called: dict[str, float]
     """The same of trucks and buses."""
     doubled: float = Field(ge=0.0, le=1.0)
-    """Share of found vehicles with a second box of their own."""
+    """Share of detected vehicles with a second box."""
     false_boxes: FalseBoxes
-    """How often, where and how large they are."""
+    """Frequency, position and size of false boxes."""
 
 
 @cache
 def measured() -> MeasuredNoise:
-    """What was measured."""
+    """The measured values."""
     return MeasuredNoise.model_validate_json(FILE.read_text(encoding="utf-8"))

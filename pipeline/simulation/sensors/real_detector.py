@@ -34,15 +34,15 @@ _COLUMNS = 8
 _LARGE = ("truck", "bus")
 _CAR_HEIGHT_M = 1.48
 _LONGEST_FALSE = 60
-"""Frames after which a false box ends in any case."""
+"""Maximum duration of a false box, in frames."""
 
 
 @dataclass(frozen=True)
 class FalseThing:
-    """Something that is taken for a vehicle."""
+    """An object that is falsely detected as a vehicle."""
 
     number: int
-    """Tells it from other false things of the drive."""
+    """Unique among the false objects of the drive."""
     first: int
     """First frame in which it is seen."""
     last: int
@@ -52,13 +52,13 @@ class FalseThing:
     y: float
     """In the world, metres."""
     height_m: float
-    """Of the box, at its place."""
+    """Of the box, at its position."""
     width: float
     """Of the box, as a share of its height."""
     score: float
     """The detector's, 0–1."""
     label: str
-    """Class that it is taken for."""
+    """Detected class."""
 
 
 class RealDetector:
@@ -73,7 +73,7 @@ class RealDetector:
         self._middles_m = (middles[:-1] + middles[1:]) / 2
 
     def boxes(self, now: World, camera: CameraCalibration, index: int) -> RawBoxes:
-        """What is found in the image that ``camera`` takes of the world ``now``. index: of the frame."""
+        """The detections in the image that ``camera`` takes of the world ``now``. index: of the frame."""
         found, scores, labels = [], [], []
         rng = np.random.default_rng([self._scenario.seed, 13, index])
         for seen in in_image(now, camera):
@@ -117,7 +117,7 @@ class RealDetector:
         return lasting([self._scenario.seed, 12, actor], self._frames, np.array(kept))
 
     def _found(self, seen: VisibleVehicle) -> float:
-        """The chance that a frame has a box of it."""
+        """Probability that a frame contains a box of it."""
         away_m = _range_m(seen)
         bin_of = next((n for n, low in enumerate(self._noise.visible[1:]) if seen.visible > low), None)
         if bin_of is None:
@@ -155,7 +155,7 @@ class RealDetector:
     def _false_box(
         self, thing: FalseThing, now: World, camera: CameraCalibration, rng: np.random.Generator
     ) -> F64 | None:
-        """The box of a thing where it is now; None where it is out of the image."""
+        """The box of a false object at its current position; None outside the image."""
         jitter = rng.standard_normal(4)
         x, y = now.to_ego(np.array([[thing.x, thing.y]]))[0].tolist()
         middle = camera.T_camera_ego @ np.array([x, y, thing.height_m / 2 - LIDAR_HEIGHT_M, 1.0])
@@ -169,7 +169,7 @@ class RealDetector:
 
 
 def _false_things(scenario: Scenario, noise: MeasuredNoise) -> tuple[FalseThing, ...]:
-    """Those of the whole drive: so many begin in each frame that as many as measured are there on average."""
+    """All false objects of the drive: their rate is chosen so that the measured mean number exists at any time."""
     rng = np.random.default_rng([scenario.seed, 15])
     of = noise.false_boxes
     step = 10.0 / scenario.rate_hz
@@ -197,5 +197,5 @@ def _range_m(seen: VisibleVehicle) -> float:
 
 
 def _share_below(z: float) -> float:
-    """Of a standard normal variable, to 2·10⁻³: the logistic curve of Bowling et al. 2009."""
+    """Of a standard normal variable, accurate to 2·10⁻³: the logistic curve of Bowling et al. 2009."""
     return 1.0 / (1.0 + exp(-(0.07056 * z**3 + 1.5976 * z)))

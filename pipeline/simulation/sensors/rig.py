@@ -22,8 +22,8 @@ _BEFORE_M, _BEYOND_M = 100.0, 600.0
 
 
 class SensorRig:
-    """LiDAR, camera, speedometer and GNSS. end_m: how far the ego vehicle gets along the road; the roadside ends 600 m
-    beyond. The same world and index give the same frame."""
+    """LiDAR, camera, speedometer and GNSS. end_m: the farthest position of the ego vehicle along the road; the roadside
+    ends 600 m beyond. The same world and index give the same frame."""
 
     def __init__(self, scenario: Scenario, end_m: float) -> None:
         self._scenario = scenario
@@ -43,7 +43,7 @@ class SensorRig:
         )
 
     def outline(self, now: World, index: int, t_ns: int) -> Frame:
-        """The same without sweep, image and route, which take nearly all the time."""
+        """The same without sweep, image and route, which take almost all the time."""
         return Frame(
             index,
             f"{index:06d}",
@@ -54,7 +54,7 @@ class SensorRig:
         )
 
     def sweep(self, now: World, index: int, t_ns: int) -> Sweep:
-        """The LiDAR's alone."""
+        """Only the LiDAR's sweep."""
         return self._lidar.sweep(now, self._roadside, self._scenario.seed, index, t_ns)
 
     def _odometry(self, now: World, index: int, t_ns: int) -> EgoState:

@@ -23,15 +23,15 @@ from pipeline.types import Frame, Sweep
 
 
 class Senses:
-    """Of one scenario. The same frame and world give the same answer, in any order."""
+    """Simulated sensing of one scenario. The same frame and world give the same result, in any order."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._faults = scenario.faults
 
     def sensed(self, frame: Frame, now: World) -> Frame:
-        """The frame as far as the scenario's car senses it, with the detections that the scenario gives. The image
-        stays where nobody looks at it: people still want to see it."""
+        """The frame as sensed by the scenario's car, with the scenario's detections. The image stays even if it is not
+        processed, so that it can be displayed."""
         scene = self._scenario
         if self._faults != NONE and frame.sweep is not None:
             frame = evolve(frame, sweep=self.disturbed(frame.sweep, frame.index))
@@ -43,7 +43,7 @@ class Senses:
         return self._detected(evolve(frame, detections_given=True), now, scene.detections)
 
     def disturbed(self, sweep: Sweep, index: int) -> Sweep | None:
-        """A sweep with the scenario's faults; None where it is lost."""
+        """A sweep with the scenario's faults; None if it is lost."""
         if self._faults == NONE:
             return sweep
         return disturb_sweep(sweep, self._faults, self._scenario.seed, index, self._nod_rad(index))

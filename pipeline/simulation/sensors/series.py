@@ -13,7 +13,7 @@ from pipeline.types import F64
 
 
 def lasting(seed: list[int], frames: int, correlation: F64) -> F64:
-    """(frames, K) standard normal columns; correlation: (K,) of each with itself a frame later (AR(1))."""
+    """(frames, K) standard normal columns; correlation: (K,) autocorrelation at a lag of one frame (AR(1))."""
     fresh = np.random.default_rng(seed).standard_normal((frames, len(correlation)))
     return _carried(fresh, np.asarray(correlation, dtype=np.float64))
 

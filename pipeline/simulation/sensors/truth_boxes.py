@@ -40,11 +40,11 @@ class VisibleVehicle:
     bbox: Box
     """In pixels, without errors."""
     visible: float
-    """Share of the box that nothing nearer covers."""
+    """Share of the box not covered by nearer vehicles."""
 
 
 def boxes(now: World, camera: CameraCalibration, noise: BoxNoise, seed: int, index: int) -> RawBoxes:
-    """The boxes of one moment. The same seed, index and world give the same boxes, whatever came before."""
+    """The boxes at one moment. The same seed, index and world give the same boxes, independently of earlier calls."""
     found, labels = [], []
     for seen in in_image(now, camera):
         actor = seen.actor.actor

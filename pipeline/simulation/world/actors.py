@@ -22,8 +22,9 @@ SIZES_M: dict[str, tuple[float, float, float]] = {
     "bus": (11.5, 2.5, 3.1),
     "motorcycle": (2.2, 0.8, 1.45),
 }
-"""Length, width and height of each kind as simulated, in metres. Deliberately not ``pipeline.fusion.vehicle_sizes``,
-which the pipeline assumes for what it has not measured: equal values would flatter it."""
+"""Length, width and height of each kind as simulated, in metres. Deliberately different from
+``pipeline.fusion.vehicle_sizes``, which the pipeline assumes for unmeasured sizes: equal values would make results too
+good."""
 
 
 _SLOPE_S = 0.05
@@ -31,13 +32,13 @@ _SLOPE_S = 0.05
 
 class Brake(ScenarioPart):
     """Constant deceleration down to a speed, which is then held. It starts at a time, or when the gap between the ego
-    origin and the vehicle's nearest face has first shrunk to ``at_gap_m``: that is the gap of the drive as scripted, so
+    origin and the vehicle's nearest face has first shrunk to ``at_gap_m``: this is the gap of the drive as scripted, so
     a closed loop meets the same traffic whatever its ego vehicle does."""
 
     at_s: float | None = Field(default=None, ge=0.0, le=3600.0)
-    """When it starts; None when ``at_gap_m`` starts it."""
+    """When it starts; None if ``at_gap_m`` is used."""
     at_gap_m: float | None = Field(default=None, gt=0.0, le=1000.0)
-    """Gap that starts it; None when ``at_s`` does."""
+    """Gap at which it starts; None if ``at_s`` is used."""
     decel_mps2: float = Field(gt=0.0, le=12.0)
     """Positive slows down."""
     to_mps: float = Field(default=0.0, ge=0.0, le=100.0)
@@ -67,8 +68,8 @@ class Speeds(ScenarioPart):
 
     @property
     def corners(self) -> list[tuple[float, float]]:
-        """(time, speed) between which the speed is linear, braking included. A brake whose gap is not yet converted
-        into a time has no effect."""
+        """(time, speed) points with linear speed in between, including braking. A brake whose gap has not been
+        converted to a time yet has no effect."""
         planned = list(self.speed_mps.items())
         if self.brake is None or self.brake.at_s is None:
             return planned
@@ -79,7 +80,7 @@ class Speeds(ScenarioPart):
         return [*(corner for corner in planned if corner[0] < at_s), (at_s, speed), end]
 
     def travelled_m(self, t_s: float) -> float:
-        """Way driven from time 0 to t."""
+        """Distance driven from time 0 to t."""
         return _travelled_m(self.corners, t_s)
 
     def speed_and_accel(self, t_s: float) -> tuple[float, float]:
@@ -92,20 +93,20 @@ class LaneChange(ScenarioPart):
     """One move to another lane."""
 
     start_s: float = Field(ge=0.0)
-    """When it begins."""
+    """When it starts."""
     duration_s: float = Field(gt=0.2, le=30.0)
-    """From lane middle to lane middle."""
+    """From lane centre to lane centre."""
     lane: int
-    """To which; numbered as in OpenDRIVE."""
+    """Target lane; numbered as in OpenDRIVE."""
 
 
 class Script(Speeds):
-    """How something drives along the road."""
+    """Script of a vehicle's motion along the road."""
 
     lane: int
-    """At the start; numbered as in OpenDRIVE."""
+    """Lane at the start; numbered as in OpenDRIVE."""
     offset_m: float = Field(default=0.0, ge=-20.0, le=20.0)
-    """To the road's left of the middle of its lane."""
+    """Offset to the road's left from the centre of its lane."""
     lane_changes: tuple[LaneChange, ...] = ()
     """In order of time."""
 
@@ -123,16 +124,16 @@ class Script(Speeds):
 
 
 class Vehicle(ScenarioPart):
-    """What a vehicle is."""
+    """Properties of a vehicle."""
 
     id: int = Field(ge=1)
-    """Unique in the scenario; labels have the same."""
+    """Unique in the scenario; also used in labels."""
     kind: VehicleKind
-    """Decides shape and usual size."""
+    """Defines shape and usual size."""
     colour: str = Field(default="#8090a0", pattern="^#[0-9a-fA-F]{6}$")
     """#rrggbb."""
     size_m: tuple[Extent, Extent, Extent] | None = None
-    """Length, width, height; None takes the kind's usual size."""
+    """Length, width, height; None uses the kind's usual size."""
 
     def size(self) -> tuple[float, float, float]:
         return self.size_m or SIZES_M[self.kind]
@@ -149,7 +150,7 @@ class Actor(Vehicle, Script):
         return -1.0 if self.lane > 0 else 1.0
 
     def place_m(self, road: Road, ego_start_m: float, travelled_m: float) -> float:
-        """s of its middle after a way driven."""
+        """s of its centre after a driven distance."""
         half = self.size()[0] / 2 if self.ahead_m >= 0.0 else -self.size()[0] / 2
         d_m = road.lane_offset_m(self.lane) + self.offset_m
         return road.line.advance(ego_start_m + self.ahead_m + half, self.direction() * travelled_m, d_m)
@@ -157,24 +158,24 @@ class Actor(Vehicle, Script):
 
 @dataclass(frozen=True)
 class Motion:
-    """A moment of a script."""
+    """State of a script at one moment."""
 
     travelled_m: float
-    """Way driven since time 0."""
+    """Distance driven since time 0."""
     d_m: float
-    """To the left of the reference line."""
+    """Offset to the left of the reference line."""
     speed_mps: float
-    """Along the way driven."""
+    """Longitudinal speed."""
     accel_mps2: float
-    """Along the way driven."""
+    """Longitudinal acceleration."""
     d_rate_mps: float
-    """How fast ``d_m`` grows."""
+    """Rate of change of ``d_m``."""
     d_accel_mps2: float
-    """How fast ``d_rate_mps`` grows."""
+    """Rate of change of ``d_rate_mps``."""
 
 
 def motion(script: Script, road: Road, t_s: float) -> Motion:
-    """Where a script is at time t."""
+    """State of a script at time t."""
     speed, accel = script.speed_and_accel(t_s)
     d_m, d_rate, d_accel = _offset(script, road, t_s)
     return Motion(

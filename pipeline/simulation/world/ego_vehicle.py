@@ -22,7 +22,7 @@ _MAX_DRIFT_RAD = 0.3
 
 @dataclass(frozen=True)
 class Pedals:
-    """0–1 each, as ``AccCommand`` gives them."""
+    """0–1 each, as in ``AccCommand``."""
 
     accelerator: float = 0.0
     """1 is full throttle."""
@@ -35,19 +35,19 @@ class VehicleModel:
     """A passenger car on a dry road. The lags are first order."""
 
     full_accel_mps2: float = 2.0
-    """What the accelerator gives at 1; the scale that ``AccParams`` assumes."""
+    """Acceleration at accelerator 1; the scale that ``AccParams`` assumes."""
     full_brake_mps2: float = 8.0
-    """What the brake gives at 1; the scale that ``AccParams`` assumes."""
+    """Deceleration at brake 1; the scale that ``AccParams`` assumes."""
     dead_time_s: float = 0.1
-    """From the command to the first change at the wheels."""
+    """Delay from the command to the first change at the wheels."""
     drive_lag_s: float = 0.3
     """Time constant of the engine."""
     brake_lag_s: float = 0.08
     """Time constant of the brakes."""
     drive_jerk_mps3: float = 5.0
-    """How fast the engine's force changes at most."""
+    """Maximum rate of change of the engine's acceleration."""
     brake_jerk_mps3: float = 25.0
-    """How fast brake pressure builds up: 0 to 8 m/s² in 0.32 s."""
+    """Rate of brake pressure build-up: 0 to 8 m/s² in 0.32 s."""
     friction: float = 0.9
     """μ of tyre on road."""
 
@@ -59,29 +59,29 @@ class VehicleState:
     t_s: float
     """Since the scenario's start."""
     travelled_m: float
-    """Way driven since time 0."""
+    """Distance driven since time 0."""
     speed_mps: float
-    """Along the way driven."""
+    """Longitudinal speed."""
     accel_mps2: float
-    """Along the way driven."""
+    """Longitudinal acceleration."""
     d_m: float
-    """Left of the road's reference line."""
+    """Offset to the left of the road's reference line."""
     d_rate_mps: float = 0.0
-    """How fast ``d_m`` grows."""
+    """Rate of change of ``d_m``."""
     d_accel_mps2: float = 0.0
-    """How fast ``d_rate_mps`` grows."""
+    """Rate of change of ``d_rate_mps``."""
     pedals: Pedals = Pedals()
-    """The command that acts now."""
+    """The active command."""
     pending: tuple[tuple[float, Pedals], ...] = ()
-    """(time it acts, pedals) of commands still on their way, oldest first."""
+    """(activation time, pedals) of pending commands, oldest first."""
 
     def motion(self) -> Motion:
-        """As the world takes it."""
+        """In the form used by the world."""
         return Motion(self.travelled_m, self.d_m, self.speed_mps, self.accel_mps2, self.d_rate_mps, self.d_accel_mps2)
 
 
 def command(state: VehicleState, pedals: Pedals, model: VehicleModel) -> VehicleState:
-    """Send a pedal command; it acts after the dead time."""
+    """Send a pedal command; it takes effect after the dead time."""
     return evolve(state, pending=(*state.pending, (state.t_s + model.dead_time_s, pedals)))
 
 
@@ -104,7 +104,7 @@ def advance(
 
 
 def _receive(state: VehicleState) -> VehicleState:
-    """The newest command that has arrived takes over."""
+    """Activates the newest command that has arrived."""
     arrived = [pedals for time_s, pedals in state.pending if time_s <= state.t_s]
     if not arrived:
         return state
@@ -119,7 +119,7 @@ def _pedal_accel(pedals: Pedals, model: VehicleModel) -> float:
 
 
 def _steer(state: VehicleState, lane: Motion, grip_mps2: float) -> float:
-    """Sideways acceleration towards the lane's course, within the tyres' grip; none at standstill."""
+    """Lateral acceleration towards the lane's course, limited by the tyres' grip; zero at standstill."""
     if state.speed_mps <= 0.0:
         return 0.0
     wanted = (
@@ -131,7 +131,7 @@ def _steer(state: VehicleState, lane: Motion, grip_mps2: float) -> float:
 
 
 def _move(state: VehicleState, accel: float, d_accel: float, dt_s: float) -> VehicleState:
-    """Exact for a constant acceleration; the moment of standstill falls inside the step."""
+    """Exact for constant acceleration; handles standstill within the step."""
     speed = state.speed_mps + accel * dt_s
     if speed <= 0.0 and accel <= 0.0:
         moving_s = state.speed_mps / -accel if accel < 0.0 else 0.0

@@ -22,14 +22,14 @@ class CrossingActor(Vehicle, Speeds):
     """A vehicle that drives over a crossing."""
 
     crossing: int = Field(default=0, ge=0)
-    """Which one of the road's, from 0."""
+    """Index of the road's crossing, from 0."""
     approach: Approach
-    """The arm it comes from as the ego vehicle sees it (``ahead``: it drives the way the ego vehicle does, in front of
-    it)."""
+    """The arm it comes from, as seen from the ego vehicle (``ahead``: it drives in the ego vehicle's direction, in
+    front of it)."""
     turn: Turn = "straight"
-    """As its own driver sees it."""
+    """As seen by its own driver."""
     arrive_s: float = Field(ge=0.0, le=3600.0)
-    """When its middle is halfway around its turn or, going straight, abreast of the crossing's middle."""
+    """When its centre is halfway through its turn or, going straight, level with the crossing's centre."""
     radius_m: float = Field(default=10.0, ge=4.0, le=60.0)
     """Of its turn."""
     lane: int = Field(default=1, ge=1)
@@ -43,9 +43,9 @@ class CrossingWay:
     line: RoadLine
     """World x, y along the way."""
     arrival_m: float
-    """s of the place that ``arrive_s`` means."""
+    """s of the position at ``arrive_s``."""
     bend_m: tuple[float, float]
-    """From where to where it bends."""
+    """Start and end of the bend."""
     curvature_per_m: float
     """In the bend, positive to the left."""
 
@@ -76,13 +76,13 @@ def route(actor: CrossingActor, road: Road) -> CrossingWay:
 
 
 def _direction_rad(approach: Approach, crossing: Crossing) -> float:
-    """Which way a vehicle from an arm drives; 0 is along the main road."""
+    """Direction of a vehicle from an arm; 0 is along the main road."""
     across = radians(crossing.angle_deg)
     return {"ahead": 0.0, "oncoming": pi, "right": across, "left": across + pi}[approach]
 
 
 def _lane_m(actor: CrossingActor, road: Road, crossing: Crossing) -> float:
-    """How far to the right of the middle line its lane is."""
+    """Offset of its lane to the right of the centre line."""
     if actor.approach in ("left", "right"):
         lanes, inner, width = crossing.lanes_each_way, 0.0, crossing.lane_width_m
     else:
@@ -94,7 +94,7 @@ def _lane_m(actor: CrossingActor, road: Road, crossing: Crossing) -> float:
 
 
 def _exit(actor: CrossingActor, road: Road, crossing: Crossing) -> tuple[float, float]:
-    """The direction in which a turning vehicle leaves, and how far to the right of the middle line."""
+    """The direction in which a turning vehicle leaves, and its offset to the right of the centre line."""
     come = _direction_rad(actor.approach, crossing)
     onto_main = actor.approach in ("left", "right")
     sign = 1.0 if actor.turn == "left" else -1.0
@@ -112,7 +112,7 @@ def _exit(actor: CrossingActor, road: Road, crossing: Crossing) -> tuple[float, 
 
 
 def _meeting(one: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
-    """Where two lines, each (direction, metres to the right of the origin), meet."""
+    """Intersection of two lines, each (direction, metres to the right of the origin)."""
     (a, a_right), (b, b_right) = one, other
     across = sin(b - a)
     along = (b_right - a_right * cos(b - a)) / across
@@ -124,6 +124,6 @@ def _behind(place: tuple[float, float], direction: float, way_m: float) -> World
 
 
 def _moved(pose: WorldPose, x: float, y: float, heading: float) -> WorldPose:
-    """A pose beside the crossing's middle as one in the world."""
+    """Converts a pose relative to the crossing's centre to the world."""
     c, s = cos(heading), sin(heading)
     return x + pose[0] * c - pose[1] * s, y + pose[0] * s + pose[1] * c, heading + pose[2]

@@ -38,7 +38,7 @@ class RoadLine:
         return not np.any(self._curvature)
 
     def to_world(self, s_m: npt.ArrayLike, d_m: npt.ArrayLike) -> F64:
-        """(N, 3) x, y, heading of places (s, d), each (N,) or a number."""
+        """(N, 3) x, y, heading of positions (s, d), each (N,) or a number."""
         s, d = np.broadcast_arrays(np.atleast_1d(np.asarray(s_m, dtype=np.float64)), np.asarray(d_m, dtype=np.float64))
         index = np.clip(np.searchsorted(self._starts, s, side="right") - 1, 0, len(self._starts) - 1)
         x0, y0, heading0 = self._poses[index].T
@@ -49,17 +49,19 @@ class RoadLine:
         return np.column_stack([x - d * np.sin(heading), y + d * np.cos(heading), heading])
 
     def advance(self, s_m: float, way_m: float, d_m: float) -> float:
-        """The s that something reaches from ``s_m`` by driving ``way_m`` (negative: against the line) at a constant d:
-        in a bend the inner way is the shorter one."""
+        """The s reached from ``s_m`` by driving ``way_m`` (negative: against the line) at constant d: in a bend the
+        inner way is shorter."""
         shares = 1.0 - self._curvature * d_m
         ways = np.concatenate([[0.0], np.cumsum(np.diff(self._outer) * shares)])
         return float(np.interp(np.interp(s_m, self._outer, ways) + way_m, ways, self._outer))
 
 
 def _arc(length_m: F64, curvature_per_m: F64) -> tuple[F64, F64, F64]:
-    """Metres ahead, metres to the left and the turn after a way along arcs: sin θ/κ and (1 − cos θ)/κ, θ = κ·s.
+    """Metres ahead, metres to the left and the rotation after a distance along arcs: sin θ/κ and (1 − cos θ)/κ, θ =
+    κ·s.
 
-    Written with sinc, which has no division by zero on a straight."""
+    Uses sinc to avoid a division by zero on a straight.
+    """
     turned = curvature_per_m * length_m
     along = length_m * np.sinc(turned / np.pi)
     sideways = length_m * np.sin(turned / 2) * np.sinc(turned / (2 * np.pi))

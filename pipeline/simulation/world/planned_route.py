@@ -10,13 +10,13 @@ from pipeline.simulation.world import world_state
 from pipeline.types import Route
 
 SIGMA_M = 0.02
-"""A route surveyed with RTK, as the paper's was."""
+"""Accuracy of a route surveyed with RTK, as in the paper."""
 _BEFORE_M, _BEYOND_M, _SPACING_M, _STEP_S = 40.0, 400.0, 2.0, 0.2
 
 
 def planned_route(scenario: Scenario) -> Route:
-    """Along the ego lane from 40 m behind the start to 400 m beyond the script's end, lane changes where the script has
-    them."""
+    """Along the ego lane from 40 m behind the start to 400 m beyond the script's end, including the script's lane
+    changes."""
     alone = scenario.model_copy(update={"actors": (), "crossing_actors": ()})
     drive = [world_state.at(alone, t) for t in np.arange(0.0, scenario.duration_s + _STEP_S, _STEP_S).tolist()]
     s, d = np.array([[now.s_m, now.d_m] for now in drive]).T

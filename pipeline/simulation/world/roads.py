@@ -24,7 +24,7 @@ _CROSSING_REACH_M = 250.0
 
 
 class ScenarioPart(BaseModel):
-    """A part of a scenario file: unknown keys and infinite numbers are refused."""
+    """A part of a scenario file: unknown keys and infinite numbers are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -35,8 +35,8 @@ class ScenarioPart(BaseModel):
 
 
 class Segment(ScenarioPart):
-    """A stretch of road, straight by default; curvature is positive to the left. ``radius_m`` may stand for
-    ``curvature_per_m``. With ``end_curvature_per_m`` the curvature changes evenly along the segment: a transition
+    """A section of road, straight by default; curvature is positive to the left. ``radius_m`` may be used instead of
+    ``curvature_per_m``. With ``end_curvature_per_m`` the curvature changes linearly along the segment: a transition
     (clothoid) between a straight and a bend."""
 
     length_m: float = Field(gt=0.0, le=100_000.0)
@@ -66,8 +66,9 @@ class Segment(ScenarioPart):
         return self
 
     def arcs(self) -> list[tuple[float, float]]:
-        """(length, curvature) of the arcs that make it up. A transition is cut into arcs of at most half a metre, each
-        of the curvature at its middle: headings at the joints are exact, places are within a millimetre or so."""
+        """(length, curvature) of the arcs that approximate it. A transition is divided into arcs of at most half a
+        metre, each with the curvature at its middle: headings at the joints are exact, positions accurate to about a
+        millimetre."""
         if self.end_curvature_per_m is None:
             return [(self.length_m, self.curvature_per_m)]
         count = ceil(self.length_m / _TRANSITION_STEP_M)
@@ -80,9 +81,9 @@ class Crossing(ScenarioPart):
     """Another road, straight and level, across this one."""
 
     s_m: float = Field(ge=0.0, le=100_000.0)
-    """Where the two middle lines meet."""
+    """Intersection of the two centre lines."""
     angle_deg: float = Field(default=90.0, ge=40.0, le=140.0)
-    """By how much its own direction is turned to the left of this road's there; 90 runs from right to left."""
+    """Rotation of its direction to the left of this road's direction there; 90 runs from right to left."""
     lanes_each_way: int = Field(default=1, ge=1, le=3)
     """Of the other road."""
     lane_width_m: float = Field(default=3.5, ge=2.5, le=5.0)
@@ -93,7 +94,7 @@ class Crossing(ScenarioPart):
 
 
 class Beacon(ScenarioPart):
-    """Something that stands on the road, as at roadworks."""
+    """An obstacle on the road, such as at roadworks."""
 
     s_m: float
     """Of its middle, along the road."""
@@ -111,13 +112,13 @@ class Strip(ScenarioPart):
     """A kerb with its pavement, a hedge or a wall along the road."""
 
     kind: Literal["kerb", "hedge", "wall"]
-    """Decides what it looks like."""
+    """Defines its appearance."""
     d_m: float
-    """Where its middle runs, to the left of the reference line."""
+    """Offset of its middle to the left of the reference line."""
     from_m: float = 0.0
-    """Where along the road it begins."""
+    """Start along the road."""
     to_m: float = Field(default=100_000.0, gt=0.0)
-    """Where along the road it ends."""
+    """End along the road."""
     width_m: float = Field(default=0.3, ge=0.05, le=10.0)
     """Across the road."""
     high_m: float = Field(default=1.2, ge=0.03, le=6.0)
@@ -125,7 +126,7 @@ class Strip(ScenarioPart):
 
 
 class Road(ScenarioPart):
-    """A road and what belongs to it."""
+    """A road and its surroundings."""
 
     segments: tuple[Segment, ...] = Field(min_length=1)
     """One after another from s = 0."""
@@ -142,17 +143,17 @@ class Road(ScenarioPart):
     shoulder_m: float = Field(default=2.5, ge=0.0, le=10.0)
     """Beside the outermost lanes."""
     crest_radius_m: float | None = Field(default=None, ge=300.0)
-    """Least vertical radius of its crests and sags; None: it is level."""
+    """Minimum vertical radius of its crests and sags; None: it is level."""
     crests_every_m: float = Field(default=400.0, ge=50.0)
     """Distance from crest to crest."""
     beacons: tuple[Beacon, ...] = ()
     """Obstacles on the road."""
     strips: tuple[Strip, ...] = ()
-    """What runs along the road."""
+    """Structures along the road."""
 
     @model_validator(mode="after")
     def _wide_enough_bends(self) -> Road:
-        """A lane inside a bend that is tighter than its offset would run backwards."""
+        """A lane inside a bend whose radius is smaller than the lane's offset would run backwards."""
         widest = max(abs(edge) for pair in self.edges_m() for edge in pair)
         for segment in self.segments:
             for bend in (segment.curvature_per_m, segment.end_curvature_per_m or 0.0):
@@ -170,7 +171,7 @@ class Road(ScenarioPart):
         return side * (self.median_m / 2 + (abs(lane) - 0.5) * self.lane_width_m)
 
     def hump_per_m(self, s_m: float) -> float:
-        """Vertical curvature at s, positive on a crest. Crests and sags take turns."""
+        """Vertical curvature at s, positive on a crest. Crests and sags alternate."""
         if self.crest_radius_m is None:
             return 0.0
         return float(np.sin(2.0 * np.pi * s_m / self.crests_every_m)) / self.crest_radius_m
@@ -183,7 +184,7 @@ class Road(ScenarioPart):
         return (forward, oncoming) if self.lanes_oncoming else (forward,)
 
     def curvature_per_m(self, s_m: float) -> float:
-        """Curvature of the reference line at s; the first and last segment go on for ever."""
+        """Curvature of the reference line at s; the first and last segment continue indefinitely."""
         ends = np.cumsum([segment.length_m for segment in self.segments])
         index = min(int(np.searchsorted(ends, s_m, side="right")), len(ends) - 1)
         segment = self.segments[index]
@@ -193,7 +194,7 @@ class Road(ScenarioPart):
         return segment.curvature_per_m + float(share) * (segment.end_curvature_per_m - segment.curvature_per_m)
 
     def to_world(self, s_m: npt.ArrayLike, d_m: npt.ArrayLike) -> F64:
-        """(N, 3) x, y, heading of places (s, d), each (N,) or a number."""
+        """(N, 3) x, y, heading of positions (s, d), each (N,) or a number."""
         return self.line.to_world(s_m, d_m)
 
     @cached_property

@@ -21,13 +21,13 @@ _POST_STEP_M = 25.0
 _GANTRY_STEP_M = 450.0
 SIGN_LOW_M, SIGN_HIGH_M = 5.3, 7.6
 STRIP_PIECE_M = 2.0
-"""Strips are made of pieces so long: in a bend of 30 m radius a piece lies 2 cm beside the arc."""
+"""Strips are made of pieces of this length: in a bend of 30 m radius a piece deviates from the arc by 2 cm."""
 _BY_THE_ROAD = frozenset({"rail", "post", "gantry_leg", "gantry_sign", "kerb", "hedge", "wall"})
 """These belong to the road, so only crossings displace them."""
 _COURSE_STEP_M = 4.0
 _CORNER_M = 5.0
 _LEAST_MEDIAN_M = 1.0
-"""A narrower one has no room for rails, nor for a gantry's leg."""
+"""A narrower median has no room for rails or a gantry's leg."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Thing:
     """An upright box beside the road."""
 
     kind: ThingKind
-    """Decides its shape and colour."""
+    """Defines its shape and colour."""
     s_m: float
     """Of its middle, along the road."""
     d_m: float
@@ -53,8 +53,8 @@ class Thing:
 
 
 def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, ...]:
-    """Everything beside the road from s = start to end, in order of s. The items at a place depend on the seed and the
-    start, not on the end: each kind has its own random generator."""
+    """Everything beside the road from s = start to end, in order of s. The items at a position depend on the seed and
+    the start, but not on the end: each kind has its own random generator."""
     right = road.edges_m()[0][0] - road.shoulder_m
     left = road.edges_m()[-1][1] + road.shoulder_m
     things = [
@@ -70,13 +70,13 @@ def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, .
 
 
 def _off_the_road(things: list[Thing], road: Road, start_m: float, end_m: float) -> list[Thing]:
-    """Without what a crossing road or another stretch of the same, winding road runs through."""
+    """Without items in the way of a crossing road or of another section of the same, winding road."""
     s_m, d_m = np.array([thing.s_m for thing in things]), np.array([thing.d_m for thing in things])
     places = road.to_world(s_m, d_m)[:, :2]
     reach_m = np.array([np.hypot(thing.length_m, thing.width_m) / 2 for thing in things])
     clear = np.ones(len(things), dtype=bool)
     if not road.line.straight:
-        from scipy.spatial import cKDTree  # half a second that a straight road need not wait for
+        from scipy.spatial import cKDTree  # takes half a second to import, not needed for straight roads
 
         course = road.to_world(np.arange(start_m - 60.0, end_m + 60.0, _COURSE_STEP_M), 0.0)[:, :2]
         nearest_m, _ = cKDTree(course).query(places)
@@ -97,7 +97,7 @@ class Roadside:
     things: tuple[Thing, ...]
     """In order along the road."""
     s_m: F64
-    """(N,) of the things, to look them up by."""
+    """(N,) positions of the items along the road, for look-up."""
     poses: F64
     """(N, 3) world x, y and heading of the things."""
 
@@ -120,7 +120,7 @@ class Roadside:
 
 
 def _rails(road: Road, start_m: float, end_m: float) -> list[Thing]:
-    """Guard rails along the median, when it is wide enough to hold them."""
+    """Guard rails along the median, if it is wide enough."""
     if road.median_m < _LEAST_MEDIAN_M:
         return []
     middles = np.arange(start_m, end_m, RAIL_LENGTH_M) + RAIL_LENGTH_M / 2
@@ -150,7 +150,7 @@ def _posts(start_m: float, end_m: float, right_m: float, left_m: float) -> list[
 
 
 def _gantries(start_m: float, end_m: float, right_m: float) -> list[Thing]:
-    """A sign gantry over the forward carriageway now and then."""
+    """Sign gantries over the forward carriageway at intervals."""
     things = []
     first = np.ceil(start_m / _GANTRY_STEP_M) * _GANTRY_STEP_M
     for s in np.arange(first, end_m, _GANTRY_STEP_M):
@@ -162,7 +162,7 @@ def _gantries(start_m: float, end_m: float, right_m: float) -> list[Thing]:
 
 
 def _trees(rng: np.random.Generator, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Thing]:
-    """Two loose rows on either side; nearer than 6 m to the shoulder none grow."""
+    """Two loose rows on either side, at least 6 m from the shoulder."""
     things = []
     for s in np.arange(start_m, end_m, 11.0):
         for edge, side in ((right_m, -1.0), (left_m, 1.0)):

@@ -22,8 +22,9 @@ FloatOrArray = TypeVar("FloatOrArray", float, F64)
 LIDAR_HEIGHT_M = 0.5
 _BRAKING_MPS2 = -0.4
 _PARKED_BEHIND_M, _PARKED_AHEAD_M = 120.0, 250.0
-"""Parked vehicles beyond are left out: rows of them would take most of the time, and no sensor finds them there."""
-_SLOWEST_STEER_MPS = 2.0  # slower than this a lane change is a creep to the side, not a turn on the spot
+"""Parked vehicles beyond this range are left out: rows of them would take most of the time, and no sensor detects them
+there."""
+_SLOWEST_STEER_MPS = 2.0  # below this speed a lane change is a slow drift to the side, not a turn on the spot
 
 
 @dataclass(frozen=True)
@@ -31,15 +32,15 @@ class ActorState:
     """An actor at one moment, in the ego frame."""
 
     actor: Vehicle
-    """What it is."""
+    """The actor's properties."""
     cuboid: Cuboid
     """In the ego frame."""
     speed_mps: float
-    """Over ground, the way it points."""
+    """Speed over ground in its direction."""
     braking: bool
     """Whether its brake lights are on."""
     yaw_rate_radps: float
-    """Of its own turning in the world."""
+    """Its yaw rate in the world."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class World:
     """Vertical curvature of the road here, positive on a crest."""
 
     def lift_m(self, x_m: FloatOrArray) -> FloatOrArray:
-        """How much higher the road is, that far ahead, than the plane on which the car stands."""
+        """Height of the road at this distance ahead above the plane on which the car stands."""
         return -self.hump_per_m * x_m * x_m / 2.0
 
     def to_ego(self, world: F64) -> F64:
@@ -76,8 +77,8 @@ class World:
 
 
 def at(scenario: Scenario, t_s: float, ego: Motion | None = None) -> World:
-    """The world at time t; nothing is carried from one moment to the next. ``ego`` given: the ego vehicle moves as
-    that says (closed loop), else as the scenario says. The others follow their scripts either way."""
+    """The world at time t; stateless. ``ego`` given: the ego vehicle's motion in a closed loop, else it follows the
+    scenario. The others always follow their scripts."""
     own = ego if ego is not None else scenario.own_motion(t_s)
     s_m, pose = _ego_place(scenario, own)
     world = World(
@@ -95,7 +96,7 @@ def at(scenario: Scenario, t_s: float, ego: Motion | None = None) -> World:
 
 
 def ego_pose(scenario: Scenario, t_s: float) -> tuple[float, float, float]:
-    """World x, y and heading of the ego vehicle at time t, as the scenario says."""
+    """World x, y and heading of the ego vehicle at time t, according to the scenario."""
     return _ego_place(scenario, scenario.own_motion(t_s))[1]
 
 
@@ -109,7 +110,7 @@ def _ego_place(scenario: Scenario, own: Motion) -> tuple[float, tuple[float, flo
 
 
 def _on_the_road(scenario: Scenario, world: World) -> list[ActorState]:
-    """Those that keep to lanes."""
+    """The actors that follow lanes."""
     return [*_parked(scenario, world), *_driving(scenario, world)]
 
 
@@ -125,7 +126,7 @@ def _parked(scenario: Scenario, world: World) -> list[ActorState]:
 
 
 def _driving(scenario: Scenario, world: World) -> list[ActorState]:
-    """A vehicle that drives against the road is turned by half a circle, and its drift to the road's left is one to its
+    """A vehicle that drives against the road is rotated by half a turn, and its drift to the road's left is to its
     driver's right."""
     road, actors = scenario.road, scenario.driving
     if not actors:
@@ -155,7 +156,7 @@ def _crossing(scenario: Scenario, world: World) -> list[ActorState]:
 
 
 def _state(world: World, actor: Vehicle, pose: F64, speed_mps: float, accel_mps2: float, yaw_rate: float) -> ActorState:
-    """An actor that stands at a pose in the world, as the ego vehicle sees it."""
+    """An actor with a pose in the world, relative to the ego vehicle."""
     x, y = world.to_ego(pose[None])[0].tolist()
     return _placed(world, actor, x, y, float(pose[2]), speed_mps, accel_mps2, yaw_rate)
 
@@ -170,7 +171,7 @@ def _placed(
     accel_mps2: float,
     yaw_rate: float,
 ) -> ActorState:
-    """An actor at ego x, y that points along ``heading`` in the world."""
+    """An actor at ego x, y with direction ``heading`` in the world."""
     length, width, height = actor.size()
     yaw = remainder(heading - world.pose[2], 2 * pi)
     cuboid = Cuboid((x, y, height / 2 - LIDAR_HEIGHT_M + world.lift_m(x)), (length, width, height), yaw)
@@ -178,7 +179,7 @@ def _placed(
 
 
 def _yaw_rate(now: Motion, road: Road, s_m: float, way: float) -> float:
-    """Of something on the road at s; way: +1 along it, −1 against it."""
+    """Yaw rate of an actor on the road at s; way: +1 along it, −1 against it."""
     bend = road.curvature_per_m(s_m)
     return way * (
         now.speed_mps * bend / (1.0 - bend * now.d_m) + now.d_accel_mps2 / max(now.speed_mps, _SLOWEST_STEER_MPS)
@@ -186,5 +187,5 @@ def _yaw_rate(now: Motion, road: Road, s_m: float, way: float) -> float:
 
 
 def _drift_rad(now: Motion) -> float:
-    """How far a vehicle that changes lanes points to the left of the road."""
+    """Angle of a vehicle that changes lanes to the left of the road's direction."""
     return atan2(now.d_rate_mps, max(now.speed_mps, _SLOWEST_STEER_MPS))

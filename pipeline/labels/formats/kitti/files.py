@@ -28,11 +28,11 @@ _SEQUENCE = "0000"
 _USUAL_SIZE = (1242, 375)
 _LARGEST_ID = 2**63
 _NO_TRACK = "-1"
-"""Of a region that belongs to nothing."""
+"""Track id of an ignored region."""
 
 
 def write_objects(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
-    """``label_2/NAME.txt`` and ``calib/NAME.txt`` for each frame with an object in it."""
+    """``label_2/NAME.txt`` and ``calib/NAME.txt`` for each frame with an object."""
     found: dict[int, list[tuple[str, Sighting]]] = {}
     for track, sighting in _sightings(labels):
         found.setdefault(sighting.frame, []).append((track.label, sighting))
@@ -53,7 +53,8 @@ def write_objects(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str
 
 
 def write_tracking(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
-    """``label_02/0000.txt`` and ``calib/0000.txt``; all frames in the first one's calibration, as the format has it."""
+    """``label_02/0000.txt`` and ``calib/0000.txt``; all frames with the first one's calibration, as required by the
+    format."""
     shot = next((each for each in drive.shots if each.camera is not None), None)
     T_rect_ego, camera = _view(shot or FrameInfo("", 0))
     rows = sorted(
@@ -71,8 +72,8 @@ def write_tracking(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[st
 
 
 def read_objects(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
-    """A folder with ``label_2`` in it, such a folder, or one file of it. Who is who over time is as with the labels of
-    a recording that is opened."""
+    """A folder that contains ``label_2``, such a folder itself, or one file of it. Objects are linked over time in the
+    same way as labels of an opened recording."""
     home, files = _files(path, _OBJECT)
     frames = {name: index for index, name in enumerate(drive.file_names())}
     known = {frames[name]: (name, file) for name, file in files.items() if name in frames}
@@ -104,7 +105,7 @@ def read_objects(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
 
 
 def read_tracking(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
-    """A folder with ``label_02`` in it, such a folder with one file, or the file."""
+    """A folder that contains ``label_02``, such a folder with one file, or the file."""
     home, files = _files(path, _TRACKING)
     if len(files) != 1:
         raise BadInput(f"{path}: {len(files)} tracking files; choose one")
@@ -122,7 +123,7 @@ def read_tracking(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
         number = _whole(id_text, _LARGEST_ID, what)
         row = kitti_rows.from_fields(fields, T_rect_ego, camera, what)
         label, sightings = found.setdefault(number, (row.label, {}))
-        if label == UNLABELLED:  # a track may begin where the image alone shows it
+        if label == UNLABELLED:  # a track may begin with sightings only in the image
             label = row.label
             found[number] = label, sightings
         if frame in sightings or row.label not in (label, UNLABELLED):
@@ -155,7 +156,7 @@ def _sightings(labels: LabelSet) -> Iterator[tuple[LabelTrack, Sighting]]:
 
 
 def _view(shot: FrameInfo) -> tuple[F64, CameraCalibration]:
-    """Where labels of a frame are, and its camera. BadInput without one."""
+    """Transform to the frame of the labels, and its camera. BadInput without one."""
     if shot.camera is None or shot.T_rect_ego is None:
         raise BadInput("KITTI labels are in the camera's frame; this recording has no camera calibration")
     check_looks_ahead(shot.camera, "the recording's calibration")
@@ -163,7 +164,7 @@ def _view(shot: FrameInfo) -> tuple[F64, CameraCalibration]:
 
 
 def _view_beside(home: Path, name: str, shot: FrameInfo) -> tuple[F64, CameraCalibration | None]:
-    """As ``_view``, but of the calibration beside the labels where there is one."""
+    """Like ``_view``, but with the calibration beside the labels, if there is one."""
     file = home / _CALIBRATION / f"{name}.txt"
     if not file.is_file():
         return _view(shot)
@@ -173,7 +174,7 @@ def _view_beside(home: Path, name: str, shot: FrameInfo) -> tuple[F64, CameraCal
 
 
 def _files(path: Path, folder: str) -> tuple[Path, dict[str, Path]]:
-    """(where ``calib`` may be, label files by name). BadInput when there are none."""
+    """(folder that may contain ``calib``, label files by name). BadInput without files."""
     if path.is_file():
         return path.parent.parent, {path.stem: path}
     inside = path / folder if (path / folder).is_dir() else path
@@ -184,7 +185,7 @@ def _files(path: Path, folder: str) -> tuple[Path, dict[str, Path]]:
 
 
 def _lines(file: Path, skip: int = 0) -> Iterator[tuple[list[str], str]]:
-    """(fields, where) of each line."""
+    """(fields, position) of each line."""
     for number, line in enumerate(read_bytes(file).decode("utf-8", "replace").splitlines(), start=1):
         fields, what = line.split(), f"{file}, line {number}"
         if 0 < len(fields) <= skip:
@@ -200,7 +201,7 @@ def _whole(text: str, limit: int, what: str) -> int:
 
 
 def _changes(labels: LabelSet, drive: LabeledDrive) -> tuple[str, ...]:
-    """What is written otherwise than it was."""
+    """Content that is changed by the export."""
     found = list(_sightings(labels))
     changes = [
         f"class {label!r} is written as {kind_of(label)} and will be read as another"
@@ -237,7 +238,7 @@ def _object_calibration(T_rect_ego: F64, camera: CameraCalibration) -> str:
 
 
 def _tracking_calibration(T_rect_ego: F64, camera: CameraCalibration) -> str:
-    """The same under the names that the tracking benchmark has for it, two of them without a colon."""
+    """The same with the names of the tracking benchmark, two of them without a colon."""
     names = {"R0_rect:": "R_rect", "Tr_velo_to_cam:": "Tr_velo_cam", "Tr_imu_to_velo:": "Tr_imu_velo"}
     text = _object_calibration(T_rect_ego, camera)
     for ours, theirs in names.items():
@@ -246,7 +247,7 @@ def _tracking_calibration(T_rect_ego: F64, camera: CameraCalibration) -> str:
 
 
 def _projection(T_rect_ego: F64, camera: CameraCalibration) -> F64:
-    """(3, 4) from the labels' frame to pixels."""
+    """(3, 4) from the frame of the labels to pixels."""
     return np.asarray(camera.K @ (camera.T_camera_ego @ np.linalg.inv(T_rect_ego))[:3])
 
 

@@ -31,18 +31,18 @@ from pipeline.types import F64, Box, CameraCalibration
 from pipeline.types.source import SourceError
 
 _UNKNOWN = 3
-"""How far an object is hidden when nobody said it."""
+"""Occlusion value for unknown."""
 _ENOUGH = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
 
 
 def is_kept(label: str) -> bool:
-    """Whether a class is the same after it was written and read."""
+    """Whether a class is preserved when written and read."""
     return label_name(kind_of(label)) == label
 
 
 def to_line(label: str, sighting: Sighting, T_rect_ego: F64, camera: CameraCalibration) -> str:
-    """One line without frame and track. What the image alone shows is a region of which nothing is said: a trainer
-    would take an object without a place for one at −1000 m."""
+    """One line without frame and track. An object seen only in the image becomes a ``DontCare`` region: training code
+    would interpret an object without a position as one at −1000 m."""
     place = cuboid_to_label(sighting.cuboid, T_rect_ego) if sighting.cuboid is not None else NO_CUBOID
     box = straightened(sighting.bbox, camera) if sighting.bbox is not None else NO_BOX
     alpha = _wrapped(place[6] - math.atan2(place[3], place[5])) if sighting.cuboid is not None else -10.0
@@ -55,8 +55,8 @@ def to_line(label: str, sighting: Sighting, T_rect_ego: F64, camera: CameraCalib
 
 
 def from_fields(fields: list[str], T_rect_ego: F64, camera: CameraCalibration | None, what: str) -> LabelRow:
-    """One line that was split at its blanks, its box in the raw image. BadInput, beginning with ``what``, when it is
-    none."""
+    """Parse one line split into fields, with its box in the raw image. BadInput, beginning with ``what``, if it is
+    invalid."""
     try:
         row = parse_row(fields, inverse(T_rect_ego))
     except SourceError as error:
@@ -65,7 +65,7 @@ def from_fields(fields: list[str], T_rect_ego: F64, camera: CameraCalibration | 
 
 
 def straightened(box: Box, camera: CameraCalibration) -> Box:
-    """Two corners of a box in the raw image, where they are in the undistorted one (same K)."""
+    """A box in the raw image, with its two corners converted to the undistorted image (same K)."""
     if not camera.distortion.size:
         return box
     corners = np.array(box, dtype=np.float64).reshape(-1, 1, 2)

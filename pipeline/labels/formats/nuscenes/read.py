@@ -78,9 +78,9 @@ R = TypeVar("R", bound=_Row)
 
 
 def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
-    """A folder with the tables, or one with such a folder. Samples are the frames nearest in time.
+    """A folder with the tables, or one that contains such a folder. Samples are matched to the frames nearest in time.
 
-    Places are in nuScenes' ego frame, as ``ego_pose`` of each sample's LiDAR has it.
+    Positions are in nuScenes' ego frame, as given by ``ego_pose`` of each sample's LiDAR.
     """
     home = _home(path)
     frames = _frames(list(_table(home, "sample", _Sample).values()), drive, str(path))
@@ -116,7 +116,7 @@ def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
 
 
 def _home(path: Path) -> Path:
-    """Where the tables are. BadInput when there are none."""
+    """The folder with the tables. BadInput if there is none."""
     for folder in (path, *sorted(each for each in path.glob("*") if each.is_dir())):
         if (folder / "sample.json").is_file():
             return folder
@@ -131,7 +131,7 @@ def _table(home: Path, name: str, row: type[R]) -> dict[str, R]:
 
 
 def _frames(samples: list[_Sample], drive: LabeledDrive, what: str) -> dict[str, int]:
-    """Sample → frame: the nearest in time, by less than half of the usual step. BadInput when there is none."""
+    """Sample → frame: the nearest in time, within half of the usual step. BadInput if there is none."""
     stamps_us = np.array(drive.t_ns, dtype=np.float64) // 1000
     steps = np.diff(np.sort(stamps_us))
     steps = steps[steps > 0]
@@ -175,7 +175,7 @@ def _poses(home: Path, data: dict[str, _Data], channels: dict[str, tuple[str, _C
 def _check_camera(
     home: Path, data: dict[str, _Data], channels: dict[str, tuple[str, _Calibrated]], drive: LabeledDrive
 ) -> None:
-    """BadInput when the front camera does not look ahead, or not where the recording's does."""
+    """BadInput if the front camera does not look ahead, or not in the direction of the recording's."""
     ours = next((shot.camera for shot in drive.shots if shot.camera is not None), None)
     size = next(((each.width, each.height) for each in data.values() if min(each.width, each.height) > 0), _USUAL_SIZE)
     for channel, calibrated in channels.values():
@@ -211,7 +211,7 @@ def _rigid(pose: _Pose, what: str) -> F64:
 
 
 def _turn(quaternion: Four, what: str) -> F64:
-    """(3, 3) of w x y z; SciPy has w last. BadInput unless it is of length one."""
+    """(3, 3) from w x y z; SciPy has w last. BadInput unless it has unit length."""
     w, x, y, z = quaternion
     length = float(np.linalg.norm(quaternion)) if max(map(abs, quaternion)) < 2.0 else 0.0
     if not abs(length - 1.0) < 1e-3:
@@ -220,7 +220,7 @@ def _turn(quaternion: Four, what: str) -> F64:
 
 
 def _numbers(tokens: list[str]) -> dict[str, int]:
-    """Instance → track: the number that the token is where all of them are ours, else by order."""
+    """Instance → track: the number in the token if all tokens were written by this program, else numbered in order."""
     try:
         numbers = {token: int(token, 16) for token in tokens}
     except ValueError:
@@ -231,7 +231,7 @@ def _numbers(tokens: list[str]) -> dict[str, int]:
 
 
 def _label(category: str) -> str:
-    """Our class of a category; of an unknown one the category's own name."""
+    """The class for a category; for an unknown category, its own name."""
     for label, name in CATEGORIES.items():
         if category == name:
             return label

@@ -36,7 +36,7 @@ CATEGORIES = {
     "trailer": "vehicle.trailer",
     "person": "human.pedestrian.adult",
 }
-"""Class → nuScenes' category; another class keeps its own name."""
+"""Class → nuScenes' category; other classes keep their names."""
 LIDAR, CAMERA = "LIDAR_TOP", "CAM_FRONT"
 _VISIBILITY = ("0-40", "40-60", "60-80", "80-100")
 _NO_TURN = [1.0, 0.0, 0.0, 0.0]
@@ -45,7 +45,7 @@ TableRow = dict[str, Any]
 
 
 def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
-    """The 13 tables in ``v1.0-cipv``, as the development kit opens them."""
+    """The 13 tables in ``v1.0-cipv``, readable by the development kit."""
     poses, is_known = _poses(drive)
     turns = _quaternions(poses)
     annotations = _annotations(labels, drive, poses, turns)
@@ -85,7 +85,7 @@ def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
 
 
 def _json(rows: list[TableRow]) -> str:
-    """A row a line; row by row, which Python does in C, as it does not with an indent."""
+    """One row per line; encoded row by row, which Python does in C, unlike with an indent."""
     lines = map(json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode, rows)
     return "[\n" + ",\n".join(lines) + "\n]\n"
 
@@ -93,8 +93,8 @@ def _json(rows: list[TableRow]) -> str:
 def _annotations(
     labels: LabelSet, drive: LabeledDrive, poses: list[F64], turns: list[list[float]]
 ) -> dict[int, list[TableRow]]:
-    """Rows by track. turns: of the poses, w x y z."""
-    inside = points_inside(labels, drive)  # which the benchmark filters by
+    """Rows by track. turns: rotations of the poses, w x y z."""
+    inside = points_inside(labels, drive)  # used by the benchmark as a filter
     samples = [_token("sample", index) for index in range(len(drive.shots))]
     rows: dict[int, list[TableRow]] = {}
     for track in labels.tracks:
@@ -119,7 +119,7 @@ def _annotations(
 
 
 def _box(sighting: Sighting, T_global_ego: F64, turn: list[float]) -> TableRow:
-    """turn: of the ego frame, w x y z."""
+    """turn: rotation of the ego frame, w x y z."""
     assert sighting.cuboid is not None
     length, width, height = sighting.cuboid.size
     center = T_global_ego[:3, :3] @ sighting.cuboid.center + T_global_ego[:3, 3]
@@ -172,8 +172,8 @@ def _sample(index: int, drive: LabeledDrive) -> TableRow:
 
 
 def _sensor_tables(drive: LabeledDrive) -> dict[str, list[TableRow]]:
-    """``sample_data`` and ``calibrated_sensor``: the LiDAR's points are in the ego frame already; a row for each
-    calibration that the camera has in the drive."""
+    """``sample_data`` and ``calibrated_sensor``: the LiDAR's points are already in the ego frame; one row for each
+    calibration of the camera in the drive."""
     calibrated: dict[str, TableRow] = {}
     sensors: dict[tuple[str, int], TableRow] = {}
     data: list[TableRow] = []
@@ -183,7 +183,7 @@ def _sensor_tables(drive: LabeledDrive) -> dict[str, list[TableRow]]:
         tokens = [_token("data", channel, index) for index, _ in shots]
         folder, ending, kind = _FOLDERS[channel]
         for place, (index, shot) in enumerate(shots):
-            key = channel, id(shot.camera)  # one calibration serves many frames
+            key = channel, id(shot.camera)  # one calibration is shared by many frames
             if key not in sensors:
                 sensors[key] = _calibrated(channel, shot)
             sensor = calibrated.setdefault(sensors[key]["token"], sensors[key])
@@ -226,7 +226,7 @@ class _Motion:
 
 
 def _poses(drive: LabeledDrive) -> tuple[list[F64], bool]:
-    """T_global_ego (4, 4) of every frame, and whether own motion is known in all of them; the identity where not."""
+    """T_global_ego (4, 4) of every frame, and whether own motion is known in all of them; else the identity."""
     motions = [
         _Motion(shot.ego.speed_mps, shot.ego.yaw_rate_radps)
         for shot in drive.shots
@@ -264,7 +264,7 @@ def instance_token(track: int) -> str:
 
 
 def _token(*parts: str | int) -> str:
-    """32 hexadecimal digits that are the same for the same row."""
+    """32 hexadecimal digits, deterministic for each row."""
     return blake2b("/".join(map(str, parts)).encode(), digest_size=16).hexdigest()
 
 

@@ -13,7 +13,7 @@ class FileValue(BaseModel):
     name: str = ""
     """Which attribute this is, such as ``origin``."""
     val: Any = None
-    """Text, number or boolean, by the list that it stands in."""
+    """Text, number or boolean, depending on the list that contains it."""
     coordinate_system: str = ""
     """Unused for plain values."""
 
@@ -22,12 +22,12 @@ class FileShape(BaseModel):
     """One named geometry."""
 
     val: list[float]
-    """Cuboid: centre, rotation and size as 9 or 10 numbers. Box: centre and size in pixels. Polyline: x, y, z in
-    turn."""
+    """Cuboid: centre, rotation and size as 9 or 10 numbers. Box: centre and size in pixels. Polyline: x, y, z
+    repeated."""
     name: str = ""
     """Of the geometry; unique within its object."""
     coordinate_system: str = ""
-    """In which ``val`` is given; empty for the file's default."""
+    """Coordinate system of ``val``; empty for the file's default."""
 
 
 class Data(BaseModel):
@@ -38,7 +38,7 @@ class Data(BaseModel):
     num: list[FileValue] = Field(default_factory=list)
     """Attributes with numbers."""
     boolean: list[FileValue] = Field(default_factory=list)
-    """Attributes that are true or false."""
+    """Boolean attributes."""
     cuboid: list[FileShape] = Field(default_factory=list)
     """3D boxes."""
     bbox: list[FileShape] = Field(default_factory=list)
@@ -47,7 +47,7 @@ class Data(BaseModel):
     """Polylines, such as the ego lane's borders."""
 
     def said(self, name: str) -> Any:
-        """The value of an attribute by its name; None where the file does not give it."""
+        """The value of an attribute by its name; None if the file does not contain it."""
         return next((each.val for each in (*self.text, *self.num, *self.boolean) if each.name == name), None)
 
 
@@ -64,7 +64,7 @@ class Agent(BaseModel):
     """A reference from a relation to an element."""
 
     type: str = "object"
-    """What kind of element ``uid`` refers to."""
+    """Type of the element with key ``uid``."""
     uid: str
     """Key of the element in the file."""
 
@@ -73,13 +73,13 @@ class Element(BaseModel):
     """An object, action, event, context or relation over the whole file."""
 
     name: str = ""
-    """For people to read; elements are identified by their key."""
+    """Display name; elements are identified by their key."""
     type: str = ""
-    """Class of an object, or what an action, event, context or relation says."""
+    """Class of an object, or type of an action, event, context or relation."""
     frame_intervals: list[FileInterval] = Field(default_factory=list)
-    """When it holds; empty for the whole file."""
+    """When it is valid; empty for the whole file."""
     object_data: Data = Field(default_factory=Data)
-    """Attributes and geometry of an object that hold in all its frames."""
+    """Attributes and geometry of an object that are valid in all its frames."""
     action_data: Data = Field(default_factory=Data)
     """Attributes of an action."""
     event_data: Data = Field(default_factory=Data)
@@ -87,20 +87,20 @@ class Element(BaseModel):
     context_data: Data = Field(default_factory=Data)
     """Attributes of a context."""
     rdf_subjects: list[Agent] = Field(default_factory=list)
-    """Whom a relation is said of."""
+    """Subjects of a relation."""
     rdf_objects: list[Agent] = Field(default_factory=list)
-    """To whom it relates them."""
+    """Objects of a relation."""
 
 
 class InFrame(BaseModel):
     """An object in one frame."""
 
     object_data: Data = Field(default_factory=Data)
-    """What holds of the object in this frame alone."""
+    """Attributes and geometry that are valid only in this frame."""
 
 
 class FileProperties(BaseModel):
-    """What a file says of a frame itself."""
+    """Properties of a frame."""
 
     timestamp: str | float | None = None
     """Text or seconds, as the writer chose; None where frames are only numbered."""
@@ -110,13 +110,13 @@ class FileFrame(BaseModel):
     """One frame of the file."""
 
     objects: dict[str, InFrame] = Field(default_factory=dict)
-    """What each object is in this frame, by the object's key."""
+    """Data of each object in this frame, by the object's key."""
     frame_properties: FileProperties = Field(default_factory=FileProperties)
     """Of the frame as a whole."""
 
 
 class FilePose(BaseModel):
-    """Where a coordinate system is in its parent."""
+    """Pose of a coordinate system in its parent."""
 
     matrix4x4: list[float] | None = None
     """16 numbers, row by row: takes points of the system to its parent."""
@@ -128,7 +128,7 @@ class System(BaseModel):
     parent: str = ""
     """Name of the system that the pose refers to; empty for the root."""
     pose_wrt_parent: FilePose | None = None
-    """None where the system has none, or moves."""
+    """None if the system has none, or moves."""
 
 
 class FileContent(BaseModel):
@@ -139,13 +139,13 @@ class FileContent(BaseModel):
     objects: dict[str, Element] = Field(default_factory=dict)
     """Tracks, by key."""
     actions: dict[str, Element] = Field(default_factory=dict)
-    """What somebody does over some frames, by key."""
+    """Actions over some frames, by key."""
     relations: dict[str, Element] = Field(default_factory=dict)
-    """Who leads, among others, by key."""
+    """Leads and other relations, by key."""
     events: dict[str, Element] = Field(default_factory=dict)
-    """What happens at a moment, by key."""
+    """Events at one frame, by key."""
     contexts: dict[str, Element] = Field(default_factory=dict)
-    """Words about ranges of frames, by key."""
+    """Tags of ranges of frames, by key."""
     frames: dict[str, FileFrame] = Field(default_factory=dict)
     """By frame number, as text."""
     coordinate_systems: dict[str, System] = Field(default_factory=dict)
@@ -156,4 +156,4 @@ class File(BaseModel):
     """A whole file."""
 
     openlabel: FileContent
-    """The root that the standard demands."""
+    """The root element required by the standard."""

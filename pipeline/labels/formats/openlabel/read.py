@@ -44,12 +44,12 @@ _FILE = TypeAdapter(File)
 
 
 def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
-    """Frames by their number. BadInput when a file of ours is of another recording."""
+    """Frames are matched by number. BadInput if a file written by this program belongs to another recording."""
     return _Reading(parse_as(_FILE, read_bytes(path), str(path)).openlabel, drive, origin, str(path)).imported()
 
 
 class _Reading:
-    """One file on its way to labels."""
+    """Conversion of one file to labels."""
 
     def __init__(self, content: FileContent, drive: LabeledDrive, origin: Origin, what: str) -> None:
         self.content, self.drive, self.origin, self.what = content, drive, origin, what
@@ -118,7 +118,7 @@ class _Reading:
         )
 
     def _cuboid(self, shape: FileShape) -> Cuboid:
-        """Nine numbers with Euler angles, or ten with a quaternion; only its turn about z is kept."""
+        """Nine numbers with Euler angles, or ten with a quaternion; only the rotation about z is kept."""
         val = _of_length(shape.val, (9, 10), f"{self.what}: a cuboid")
         if len(val) == 10:
             qx, qy, qz, qw = val[3:7]
@@ -134,7 +134,7 @@ class _Reading:
         return Cuboid((x, y, z), (length, width, height), yaw_rad)
 
     def _pose(self, name: str) -> F64:
-        """(4, 4) from a coordinate system to the one that has no parent."""
+        """(4, 4) from a coordinate system to the root system."""
         T = np.eye(4)
         systems = self.content.coordinate_systems
         for _ in range(_DEEPEST):
@@ -149,7 +149,7 @@ class _Reading:
         raise BadInput(f"{self.what}: the coordinate systems form a cycle")
 
     def _leads(self) -> Iterable[LeadRange]:
-        """Actions where they are ours, else the relations alone."""
+        """From actions in files of this program, else from relations alone."""
         if self.is_ours:
             for uid, action in self.content.actions.items():
                 first, last = self._span(action)
@@ -177,7 +177,7 @@ class _Reading:
         return self._number(subjects[0].uid)
 
     def _number(self, uid: str) -> int:
-        """A lead may be a track that has no object in the file."""
+        """A lead may refer to a track without an object in the file."""
         number = self.numbers.get(uid)
         if number is None and self.is_ours:
             number = _as_id(uid)
@@ -223,7 +223,7 @@ class _Reading:
         return self._frame(interval.frame_start), self._frame(interval.frame_end)
 
     def _made(self, data: Data) -> tuple[State, Origin]:
-        """State and origin, where the file says them."""
+        """State and origin, if the file contains them."""
         if data.said("maker") is None:
             return "accepted", self.origin
         state = fit(_STATE, data.said("state") or "accepted", f"{self.what}, state")
@@ -235,7 +235,7 @@ class _Reading:
         return state, Origin(maker, by, at if type(at) is int else 0, params, calibration, how)
 
     def _sureness(self, data: Data) -> tuple[float | None, Heading]:
-        """How sure a track is, and what told its heading, where the file says them."""
+        """Confidence of a track, and the source of its heading, if the file contains them."""
         confidence = data.said("confidence")
         sure = float(confidence) if isinstance(confidence, (int, float)) and not isinstance(confidence, bool) else None
         return sure, fit(_HEADING, data.said("heading") or "", f"{self.what}, heading")
@@ -255,19 +255,19 @@ def _is_track(uid: str, each: Element) -> bool:
 
 
 def _hidden(data: Data) -> tuple[float | None, int | None]:
-    """(truncation, occlusion); None where the file does not say them."""
+    """(truncation, occlusion); None if the file does not contain them."""
     cut, hidden = data.said("truncation"), data.said("occlusion")
     is_cut = isinstance(cut, (int, float)) and not isinstance(cut, bool)
     return (float(cut) if is_cut else None), (hidden if type(hidden) is int else None)
 
 
 def _reviewed(data: Data) -> tuple[str, str]:
-    """(comment, reviewer); empty where the file does not say them."""
+    """(comment, reviewer); empty if the file does not contain them."""
     return str(data.said("comment") or ""), str(data.said("reviewer") or "")
 
 
 def _numbers(uids: list[str]) -> dict[str, int]:
-    """Object → track: its number where it is one, else one after all others."""
+    """Object → track: its key if that is a number, else a new number after all others."""
     numbers = {uid: number for uid in uids if (number := _as_id(uid)) is not None}
     after = max(numbers.values(), default=0) + 1
     rest = (uid for uid in uids if uid not in numbers)

@@ -26,7 +26,7 @@ LEADS, TAKES_PART = "isLeadVehicleOf", "participatesIn"
 LEAD, NO_LEAD, LEAD_UNKNOWN = "lead", "no_lead", "lead_unknown"
 EGO_TYPE, PATH_TYPE, TAG_TYPE = "ego_vehicle", "ego_path", "frame_tag"
 OURS = "cipv"
-"""Key in the metadata by which a file of ours is known."""
+"""Key in the metadata that identifies files of this program."""
 JsonElement = dict[str, Any]
 
 
@@ -59,7 +59,7 @@ def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
 
 
 def _coordinate_systems(drive: LabeledDrive) -> JsonElement:
-    """``ego``, and the first calibration of the camera in it."""
+    """``ego``, and the camera with its first calibration."""
     camera = next((shot.camera for shot in drive.shots if shot.camera is not None), None)
     systems: JsonElement = {EGO: {"type": "local_cs", "parent": "", "children": [CAMERA] if camera is not None else []}}
     if camera is not None:
@@ -97,7 +97,7 @@ def _lead_action(lead: LeadRange) -> JsonElement:
 
 
 def _relations(labels: LabelSet) -> dict[str, JsonElement]:
-    """Leads have the number of their action; events come after them."""
+    """Lead relations have the same number as their action; events come after them."""
     relations: dict[str, JsonElement] = {}
     for place, lead in enumerate(labels.leads):
         if isinstance(lead.lead, int):
@@ -115,7 +115,7 @@ def _relations(labels: LabelSet) -> dict[str, JsonElement]:
 
 
 def _frames(labels: LabelSet, drive: LabeledDrive) -> dict[str, JsonElement]:
-    """Each frame with its objects; what an interval says is pointed to from the frames in it."""
+    """Each frame with its objects; frames refer to the elements whose intervals contain them."""
     frames: list[JsonElement] = [{"frame_properties": {"timestamp": str(shot.t_ns)}} for shot in drive.shots]
     for track in labels.tracks:
         for sighting in track.sightings:
@@ -157,8 +157,7 @@ def _seen(sighting: Sighting) -> JsonElement:
 
 
 def _marks(origin: Origin, marked: LabelTrack | LeadRange | PathLabel | EventLabel | None = None) -> JsonElement:
-    """State, review and origin as the texts and numbers that any element may have. marked: None for what has no
-    state."""
+    """State, review and origin as text and number attributes of any element. marked: None if it has no state."""
     texts: dict[str, str | None] = {"maker": origin.maker, "by": origin.name, "how": origin.how or None}
     texts |= {"params": origin.params, "calibration": origin.calibration}
     if marked is not None:
@@ -182,7 +181,7 @@ def _interval(first: int, last: int) -> JsonElement:
 
 
 def _intervals(frames: Iterable[int]) -> list[JsonElement]:
-    """Ascending frames as intervals without gaps."""
+    """Ascending frames as contiguous intervals."""
     found: list[JsonElement] = []
     for frame in frames:
         if found and found[-1]["frame_end"] == frame - 1:
