@@ -1,10 +1,10 @@
 """The distance of a vehicle by where its box meets the road.
 
-The height of a box gives a distance only as well as the vehicle's own height is known, and a van that is called a car
-is placed a third too near. The lower edge of the box needs no height: it is where the tyres touch the road, whose
-height the LiDAR measures (Stein, Mano, Shashua, IV 2003, from a flat road). The camera's pitch does not matter, because
-both sensors pitch together. What remains is the road's shape beyond its last return (``pipeline.lidar.road_profile``)
-and some pixels of the edge.
+A distance from the height of a box is only as good as the assumed height of the vehicle: a van that is classified as a
+car is placed a third too near. The lower edge of the box needs no such assumption. It is where the tyres touch the
+road, whose height the LiDAR measures (Stein, Mano, Shashua, IV 2003, on a flat road). The pitch of the car does not
+matter, because both sensors pitch with it. The remaining errors are the shape of the road beyond its last return
+(``pipeline.lidar.road_profile``) and the noise of the edge.
 """
 
 from __future__ import annotations
@@ -21,25 +21,27 @@ from pipeline.params import FusionParams
 from pipeline.types import F32, VEHICLES, Ground, Mask, VisionMeasurement
 
 NEAREST_M = 10.0
-"""By the box's height. Nearer, the edge is a shadow as often as a tyre (``pipeline.vision.vehicle_height``)."""
+"""Minimum distance by the box's height. Nearer, the lower edge is as often a shadow as a tyre
+(``pipeline.vision.vehicle_height``)."""
 _EDGE_PX = 2.0
-"""Noise of a box's lower edge."""
+"""Standard deviation of a box's lower edge from image to image."""
 _FLOOR_SHARE = 0.07
-"""What else is wrong, as a share: the edge is drawn under the axle, the bumper or the shadow. With it, one sigma holds
-76 and 79 % of the errors and two hold 94 % on labelled vehicles of Astyx and KITTI 0009 at 20–30 m, where the road is
-known; beyond that 86 and 94 % or more."""
+"""Relative error from the edge being drawn below the axle, the bumper or the shadow. With this value, one sigma covers
+76 and 79 % of the errors, and two sigmas 94 %, of labelled vehicles on Astyx and KITTI 0009 at 20–30 m, where the road
+is known; beyond that, 86 and 94 % or more."""
 _PITCH_SIGMA_RAD = np.radians(0.15)
-"""Of the alignment between the sensors: a fit to traffic finds its pitch to 0.13–0.36° in the median, a target to less
-(docs/reference/accuracy.md)."""
+"""Standard deviation of the alignment between the sensors. A fit to traffic determines its pitch to 0.13–0.36° in the
+median (docs/reference/accuracy.md); a calibration target is more accurate."""
 _HIDDEN_SHARE = 0.3
-"""Of a box's lower edge: with more of it covered, the network draws it where the nearer vehicle begins."""
+"""Covered share of a box's lower edge above which the network draws it where the nearer vehicle begins."""
 _SAME_IOU = 0.5
+"""Boxes that overlap by more than this are of the same vehicle."""
 _WORTHLESS_SHARE = 0.35
-"""A sigma beyond this says less than the class."""
+"""Above this relative sigma, a contact says less than the vehicle's class does."""
 
 
 class SweptRoad(Protocol):
-    """A segmented sweep, as far as its road matters."""
+    """The parts of a segmented sweep that describe the road."""
 
     @property
     def points(self) -> F32:
@@ -53,15 +55,14 @@ class SweptRoad(Protocol):
 
 
 class _Contacts(NamedTuple):
-    """Of (M,) boxes."""
+    """Where the lower edges of (M,) boxes meet the road."""
 
     range_m: F64
-    """Horizontal, from the ego origin; NaN where the line of sight does not meet the road, or beside the strip that
-    is known."""
+    """Horizontal range from the ego origin; NaN if the line of sight does not meet the known strip of road."""
     share: F64
-    """Standard deviation of ln(range) for what lasts from image to image."""
+    """Standard deviation of ln(range) due to errors that persist from image to image."""
     noise_share: F64
-    """The same for the noise of the edge."""
+    """Standard deviation of ln(range) due to the noise of the edge."""
 
 
 def measure_contacts(
@@ -71,8 +72,9 @@ def measure_contacts(
     speed_mps: float | None,
     params: FusionParams,
 ) -> tuple[VisionMeasurement, ...] | None:
-    """The boxes, those of vehicles whose lower edge is in sight with ``contact_m`` and its deviations. speed_mps:
-    own speed; None while unknown."""
+    """The boxes, with ``contact_m`` and its standard deviations for vehicles whose lower edge is visible.
+
+    speed_mps: own speed; None while unknown."""
     if not params.use_ground_contact or not boxes or alignment is None or not alignment.is_metric:
         return boxes
     asked = [each.detection.label in VEHICLES and (each.distance_m or 0.0) >= NEAREST_M for each in boxes]
@@ -98,7 +100,7 @@ def measure_contacts(
 def _hidden_below(bbox: F64) -> Mask:
     """(M,) whether a nearer box covers much of the lower edge of a box (M, 4). Two boxes on one vehicle do not."""
     x1, y1, x2, y2 = bbox.T[:, :, None]
-    covered = (np.minimum(x2, x2.T) - np.maximum(x1, x1.T)) / (x2 - x1)
+    covered = (np.minimum(x2, x2.T) - np.maximum(x1, x1.T)) / np.maximum(x2 - x1, 1.0)
     is_nearer = (y2 + _EDGE_PX < y2.T) & (y2 > y1.T) & (iou_matrix(bbox, bbox) < _SAME_IOU)
     hidden: Mask = (is_nearer & (covered > _HIDDEN_SHARE)).any(axis=1)
     return hidden
@@ -109,16 +111,16 @@ def _contacts(bbox: F64, alignment: Alignment, road: RoadProfile) -> _Contacts:
     middle, lower = (bbox[:, 0] + bbox[:, 2]) / 2.0, bbox[:, 3]
     meets = [_meets(np.column_stack([middle, lower + off]), alignment, road) for off in (0.0, -_EDGE_PX, _EDGE_PX)]
     (x, range_m, closing), (_, far_m, _), (_, near_m, _) = meets
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         by_edge = np.log(far_m / near_m) / 2.0
         by_road = road.height_sigma_m(x) / closing / range_m
-    by_pitch = _PITCH_SIGMA_RAD / closing
+        by_pitch = _PITCH_SIGMA_RAD / closing
     return _Contacts(range_m, np.sqrt(by_road**2 + by_pitch**2 + _FLOOR_SHARE**2), by_edge)
 
 
 def _meets(pixels: F64, alignment: Alignment, road: RoadProfile) -> tuple[F64, F64, F64]:
-    """(M,) ego x, range, and by how much line of sight and road close in per metre, where those of pixels (M, 2) meet;
-    NaN where they do not."""
+    """(M,) ego x and range of the points where the lines of sight of pixels (M, 2) meet the road, and by how much they
+    approach it per metre there; NaN where they do not meet."""
     eye, rays = alignment.rays(pixels)
     along = rays / np.hypot(rays[:, 0], rays[:, 1])[:, None]
     height, slope, curvature, cross = road.mean

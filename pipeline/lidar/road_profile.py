@@ -1,9 +1,9 @@
-"""The height of the road ahead, beyond its last return too, and how sure it is.
+"""The height of the road ahead, also beyond its last return, with its uncertainty.
 
-``ground`` fits planes to segments of the road, to tell obstacles from it; what a plane says beyond its returns has no
-sigma. Here, one curve is fitted to all returns of the road ahead: height, slope, vertical curvature and cross slope, by
-Bayesian linear regression (Bishop 2006, section 3.3) with weights that ignore outliers (Cauchy). The prior of the
-curvature is that of roads driven at this speed, so the sigma grows with the distance as they bend up and down.
+``ground`` fits planes to segments of the road to separate obstacles from it; beyond its returns, a plane has no sigma.
+Here, one curve is fitted to all returns of the road ahead: height, slope, vertical curvature and cross slope, by
+Bayesian linear regression (Bishop 2006, section 3.3) with Cauchy weights against outliers. The prior of the curvature
+is that of roads driven at this speed, so sigma increases with distance as crests and sags do.
 """
 
 from __future__ import annotations
@@ -17,28 +17,29 @@ import numpy as np
 from pipeline.types import F32, F64, Mask
 
 NEAREST_M, FARTHEST_M, ASIDE_M = 3.0, 60.0, 6.0
-"""Which returns count: the road ahead, no farther aside than its own width."""
+"""Bounds of the returns that are used: the road ahead, no farther to the side than its own width."""
 _VERTICAL_MPS2 = 0.2
-"""The sharpest crests and sags of roads take about this acceleration at the speed that they are built for: radii of
-1,000 m at 50 km/h, 2,600 to 3,000 m at 80, 4,500 to 5,200 m at 100 (AASHTO, A Policy on Geometric Design of Highways
-and Streets, 2018, tables 3-35 and 3-37). Many are driven faster, so they are taken for one standard deviation."""
+"""Vertical acceleration on the sharpest crests and sags at a road's design speed: radii of 1,000 m at 50 km/h, 2,600 to
+3,000 m at 80, 4,500 to 5,200 m at 100 (AASHTO, A Policy on Geometric Design of Highways and Streets, 2018, tables 3-35
+and 3-37). Many roads are driven faster, so this is taken as one standard deviation."""
 _SHARPEST_PM, _USUAL_PM = 1.0 / 500.0, 1.0 / 2000.0
-"""Standard deviation of the vertical curvature, 1/m: where the car is slow, and while its speed is unknown."""
+"""Standard deviation of the vertical curvature, 1/m: the most, at low speed, and the value for unknown speed."""
 _SLOPE_SIGMA, _CROSS_SIGMA, _HEIGHT_SIGMA_M = 0.1, 0.05, 1.0
-"""Of the road against the ego frame: wider than any, so that only the returns decide."""
+"""Prior standard deviations of the road relative to the ego frame: so wide that only the returns decide."""
 _NOISE_M = 0.03
-"""Of a return, and of the road's surface."""
+"""Standard deviation of a return, including the roughness of the road."""
 _INDEPENDENT = 12.0
-"""The returns of a ring share the error of its elevation, and about so many rings of a VLP-16 reach the road."""
+"""Number of independent returns: those of one ring share the error of its elevation."""
 _OUTLIER_M = 0.06
-"""Height off the curve at which a return counts half."""
+"""Residual at which a return has half of the weight."""
 _ROUNDS = 5
+"""Iterations of the reweighting."""
 MIN_RETURNS = 50
-"""Fewer are no road."""
+"""Minimum number of returns for a fit."""
 
 
 class RoadProfile(NamedTuple):
-    """Height of the road at ego x and y: m·(1, x, x²/2, y)."""
+    """Height of the road at ego x and y: mean · (1, x, x²/2, y)."""
 
     mean: F64
     """(4,) float64 height m, slope, curvature 1/m, cross slope."""
@@ -53,10 +54,13 @@ class RoadProfile(NamedTuple):
 
 
 def fit_road_profile(points: F32, mask: Mask, speed_mps: float | None = None) -> RoadProfile | None:
-    """The road ahead; None where too little of it returned rays.
+    """The road ahead; None if too little of it returned rays.
 
-    points: (N, 4) float32 ``x y z intensity``, ego frame. mask: (N,) which of them are ground. speed_mps: own speed,
-    which tells how sharply such a road can bend; None while unknown."""
+    Args:
+        points: (N, 4) float32 ``x y z intensity``, ego frame.
+        mask: (N,) which of them are ground.
+        speed_mps: own speed, which limits the vertical curvature of the road; None while unknown.
+    """
     bends_pm = _USUAL_PM if speed_mps is None else _VERTICAL_MPS2 / max(speed_mps**2, 1.0)
     mean, cov, count = _fit(points, mask, min(bends_pm, _SHARPEST_PM))
     return RoadProfile(mean, cov) if count >= MIN_RETURNS and math.isfinite(mean.sum()) else None
@@ -64,7 +68,7 @@ def fit_road_profile(points: F32, mask: Mask, speed_mps: float | None = None) ->
 
 @numba.njit(cache=True, nogil=True)
 def _fit(points, mask, bends_pm):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Mean (4,), covariance (4, 4), and on how many returns they rest."""
+    """Mean (4,), covariance (4, 4) and number of returns."""
     x, y, z = np.empty(len(points)), np.empty(len(points)), np.empty(len(points))
     count, start = 0, np.zeros(4)
     for i in range(len(points)):

@@ -5,9 +5,9 @@ differences, and is constant from image to image. While the LiDAR ranges the veh
 law's distance is a property of the vehicle: a scalar Kalman filter in ln(ratio), whose prior is the spread of heights
 within the class. A lead that moves out of LiDAR range keeps a camera distance as good as its box.
 
-Before any range, two hints are combined. Cars differ less in width than in height, so a box that is tall for its width
-belongs to a van; a box that is low for its width says nothing, because a car that is turned shows part of its side. And
-where the box meets the road, the LiDAR's road tells the distance, hence the height.
+Before the first range, two hints are combined. Cars differ less in width than in height, so a box that is tall for its
+width belongs to a van; a box that is low for its width says nothing, because a car that is turned shows part of its
+side. And the point where the box meets the road gives a distance, and therefore a height.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _LOWEST, _TALLEST = -0.25, 0.45
 """ln(height / usual height of the class): of a sports car (1.2 m) among cars, and of a high van (2.4 m) among cars or a
 lorry (4 m) among trucks."""
 _MAX_SIGMAS = 2.0
-"""A height farther beyond these than so many of its standard deviations is no vehicle's: the road is not known."""
+"""A contact that implies a height more standard deviations beyond these limits than this is rejected."""
 
 
 class BoxShape(NamedTuple):
@@ -71,16 +71,16 @@ class BoxShape(NamedTuple):
 
 
 class RoadContact(NamedTuple):
-    """Where a vehicle's boxes meet the road, averaged."""
+    """The distance at which a vehicle's boxes meet the road, averaged."""
 
     log_ratio: float = 0.0
     """Mean ln(distance by the road / distance by the law)."""
     lasting: float = 0.0
-    """Mean standard deviation of what no number of images averages out: the unknown shape of the road."""
+    """Standard deviation due to errors that do not average out, such as the unknown shape of the road."""
     noise: float = 0.0
-    """The same for what changes from image to image."""
+    """Standard deviation due to errors that change from image to image."""
     sightings: int = 0
-    """How many boxes it rests on."""
+    """Number of boxes it is based on."""
 
     @property
     def variance(self) -> float:
