@@ -236,7 +236,10 @@ def test_everything_is_drawn_and_merged_by_keys_alone(hand: Hand, labels: Labels
     hand.keys("Shift+P", "Enter")
     labels.wait_for(lambda now: len(now.everything["paths"]) == 1)
     ours = labels.everything["paths"][0]
-    is_saved(page)  # until the page knows it too, there is no path that it could go on with
+    page.wait_for_function(  # until the page knows it too, there is no path that it could go on with
+        "async () => (await import('/js/core/store.js')).get('labels')?.paths.length === 1"
+    )
+    is_saved(page)
     hand.keys("Shift+P", "ArrowLeft", "ArrowLeft", "ArrowUp", "Enter")
     labels.wait_for(lambda now: now.everything["paths"][0]["left"] != ours["left"])
     bent = labels.everything["paths"][0]
