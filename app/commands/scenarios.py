@@ -23,7 +23,7 @@ from pipeline.experiments.runner import count_cases, of_suite, run_all
 
 ROBUSTNESS = "robustness"
 _FAILED_DRIVES = Path("robustness-failures")
-"""Where the drives with a failure go unless a folder is named."""
+"""Default folder for drives with a failure."""
 _MOST_KM = 1_000_000
 
 

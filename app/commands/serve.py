@@ -73,14 +73,14 @@ class ServerOptions:
         return FleetDesk(self.fleet)
 
     def label_desk(self) -> LabelDesk:
-        """DatabaseError when a database that was named cannot be opened. The local database is opened once the first
-        image is shown; an error in it is shown in the dashboard."""
+        """The label database. DatabaseError if a database that was named cannot be opened. The local database is opened
+        after the first image is shown; an error in it appears in the dashboard."""
         if self.labels or os.environ.get(URL_VARIABLE):
             return LabelDesk(_open_labels(self.labels), classes=project_classes())
         return LabelDesk(open_later=lambda: _open_labels(None), classes=project_classes())
 
     def serve(self, engine: Engine) -> int:
-        """Until Ctrl-C."""
+        """Serve the dashboard until Ctrl-C. Returns the exit status."""
         if (self.tls_cert is None) != (self.tls_key is None):
             raise BadInput("--tls-cert and --tls-key belong together")
         tls = (self.tls_cert, self.tls_key) if self.tls_cert is not None and self.tls_key is not None else None
@@ -109,7 +109,7 @@ class ServerOptions:
 
 def _open_labels(url: str | None) -> Database:
     from app.labels.store.database import (
-        open_database,  # SQLAlchemy takes most of a second to import: not before an image
+        open_database,  # SQLAlchemy takes most of a second to import, so it is imported after the first image
     )
 
     return open_database(url)
@@ -142,7 +142,7 @@ class Serve:
         return self.server.serve(self.engine())
 
     def engine(self) -> Engine:
-        """The engine for the source, not started yet. BadInput when the source cannot be opened."""
+        """The engine for the source, not started yet. BadInput if the source cannot be opened."""
         params = self.pipeline.parameters()
         route = planned(self.route)
         # opened here, so that a typo is reported in the terminal; a large recording is not opened twice

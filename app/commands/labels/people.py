@@ -20,7 +20,7 @@ from pipeline.labels.formats.reading import read_bytes
 
 _MOST_NAMED = 20
 State = Literal["open", "labeling", "review", "done"]
-"""As of ``app.labels.store.work``, which takes two seconds to import."""
+"""The states of ``app.labels.store.work``, repeated here because its import takes two seconds."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class LabelAgreement:
     """Print the figures as JSON"""
 
     def __call__(self) -> int:
-        from pipeline.labels.agreement import agreement  # SciPy: only who compares pays
+        from pipeline.labels.agreement import agreement  # imports SciPy, which no other command here needs
 
         first, second = (from_json(read_bytes(given_path(file)), str(file)) for file in (self.first, self.second))
         found = agreement(first, second)
@@ -59,8 +59,8 @@ class LabelAgreement:
 
 @dataclass(frozen=True)
 class LabelEffort:
-    """List acts and active time of each person on each recording, also per frame. Pauses of more than two minutes do
-    not count.
+    """List the number of changes and the active time of each person on each recording, in total and per frame. Pauses
+    of more than two minutes do not count.
 
     Example: cipv labels effort --json
     """

@@ -103,7 +103,7 @@ def _cell(found: tuple[EuroNcapCase, CellResult] | None) -> Cell | Coloured:
 
 
 def _r152(done: dict[EuroNcapCase, CellResult]) -> Table:
-    """Standing and moving targets, full overlap, AEB alone, against the Regulation's limits."""
+    """Standing and moving targets at full overlap with AEB alone, compared with the Regulation's limits."""
     rows: list[tuple[Cell | Coloured, ...]] = []
     for test in ("CCRs", "CCRm"):
         for closing in sorted({round(case.closing_mps() / KMH) for case in done if case.test == test}):
@@ -128,8 +128,8 @@ def _passes(case: EuroNcapCase, result: CellResult, limit_kmh: float) -> Coloure
 
 
 def _verdict(done: dict[EuroNcapCase, CellResult]) -> str:
-    """AEB alone: in how many cells the impact is slower with both sensors than with the LiDAR alone, and in how many
-    faster."""
+    """A sentence for AEB alone: in how many cells the impact is slower with both sensors than with the LiDAR alone, and
+    in how many it is faster."""
     pairs = [
         (result, done[other])
         for case, result in done.items()

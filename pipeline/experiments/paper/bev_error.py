@@ -49,11 +49,11 @@ class BevCase:
     layout: str
     """a, b or c."""
     seed: int
-    """Of noise and scenery."""
+    """Seed of noise and scenery."""
     sensors: Sensors = "both"
-    """That the pipeline is given."""
+    """Sensors that the pipeline gets."""
     boxes: Boxes = "truth"
-    """Where the camera's boxes come from."""
+    """Source of the camera's boxes."""
 
     @property
     def kind(self) -> BevVariant:
@@ -69,27 +69,28 @@ class PositionSample:
     """The target in one frame."""
 
     range_m: float
-    """True."""
+    """True distance."""
     error: PositionError | None
-    """Of its estimated place; None when no object matches it."""
+    """Error of its estimated position; None if no object matches it."""
 
 
 @dataclass(frozen=True)
 class PositionError:
-    """Estimated minus true, of the nearest face's middle."""
+    """Estimated minus true position of the middle of the nearest face."""
 
     source: str
     """The object's sensors."""
     distance_m: float
-    """Of the range."""
+    """Error of the distance."""
     lateral_m: float
-    """Across the ego axis."""
+    """Error across the ego axis."""
     longitudinal_m: float
-    """Along the ego axis."""
+    """Error along the ego axis."""
 
 
 def cases(short: bool) -> list[BevCase]:
-    """The network runs in one layout only: rendering an image takes ten times as long as everything else."""
+    """All cases. The network runs in one layout only, since rendering an image takes ten times as long as everything
+    else."""
     given = [BevCase(each.layout, each.seed, sensors) for sensors in COMPARED for each in layouts.cases(short)]
     return given if short else given + [BevCase("a", seed, boxes="network") for seed in range(_BY_NETWORK)]
 
@@ -121,8 +122,8 @@ def _scenario(case: BevCase) -> Scenario:
 
 
 def sighting(tick: LoopStep) -> PositionSample | None:
-    """The errors of the object that matches the target: the one whose image box overlaps the target's most, whatever
-    its distance. Carried objects do not count. None beyond 60 m and beside the car."""
+    """The errors of the object whose image box overlaps the target's most, whatever its distance. Carried objects do
+    not count. None beyond 60 m and beside the car."""
     target, camera = target_of(tick), tick.frame.camera
     assert camera is not None
     truth_m = true_range_m(target)
@@ -183,8 +184,8 @@ def report(cases: Sequence[BevCase], runs: Sequence[list[PositionSample]]) -> Re
 
 
 def _verdict(layout: str, by_kind: dict[BevVariant, list[PositionSample]]) -> str:
-    """Both sensors compared with the LiDAR alone in the same runs: how often each places the car, and the range error
-    where both do."""
+    """A sentence that compares both sensors with the LiDAR alone in the same runs: how often each locates the car, and
+    the distance error if both do."""
     title = LAYOUTS[layout].capitalize()
     fused, lidar = (by_kind.get((layout, sensors, "truth"), []) for sensors in ("both", "lidar"))
     if not fused or not lidar:

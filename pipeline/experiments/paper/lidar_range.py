@@ -32,9 +32,9 @@ class RangeCase:
     """One approach to a standing vehicle."""
 
     kind: VehicleKind
-    """What stands there: larger vehicles are detected farther away."""
+    """Kind of the standing vehicle; larger ones are detected farther away."""
     seed: int
-    """Of noise and scenery."""
+    """Seed of noise and scenery."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class RangeSample:
     """One tick."""
 
     true_m: float
-    """Range of the car."""
+    """True distance of the car."""
     measured_m: float | None
-    """None when the car was not detected in this sweep."""
+    """Measured distance; None if the car was not detected in this sweep."""
 
 
 def cases(short: bool) -> list[RangeCase]:
@@ -84,8 +84,8 @@ def as_drive(case: RangeCase, seen: list[RangeSample]) -> ExperimentDrive:
 
 
 def _measured_m(tick: LoopStep) -> float | None:
-    """The range of the nearest object in the car's lane, where nothing else stands, whatever its error; carried objects
-    do not count."""
+    """Distance of the nearest object in the car's lane, whatever its error, since nothing else stands there. Carried
+    objects do not count."""
     ahead = [
         item.distance_m
         for item in tick.result.objects
@@ -98,7 +98,8 @@ def _measured_m(tick: LoopStep) -> float | None:
 
 
 def recognised_to_m(sightings: Sequence[RangeSample]) -> float | None:
-    """The far edge of the last 5 m bin, coming from near, in which at least half of the sweeps hold the car."""
+    """The far edge of the last 5 m bin, from near to far, in which the car is detected in at least half of the
+    sweeps."""
     reached = None
     edge = _BIN_M
     while edge < _FROM_M:
