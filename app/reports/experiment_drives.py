@@ -54,10 +54,13 @@ class ReplayFolder:
         self._path(drive, ".params.yaml").write_text(params_to_yaml(drive.params), encoding="utf-8")
         self._path(drive, ".html").write_text(_page(drive), encoding="utf-8")
 
-    def list_all(self) -> None:
-        """Write ``index.html``, which links to every drive."""
+    def list_all(self) -> str:
+        """Write ``index.html``, which links to every drive. Returns a sentence that says where it is."""
         body = "".join(section_html(_listed(name, title, drives)) for name, (title, drives) in self._kept.items())
-        (self._folder / "index.html").write_text(page("Drives", body), encoding="utf-8")
+        index = self._folder / "index.html"
+        index.write_text(page("Drives", body), encoding="utf-8")
+        count = sum(len(drives) for _, drives in self._kept.values())
+        return f"{count} drive{'s' if count != 1 else ''} saved: {index}"
 
     def link_from(self, report: Path) -> str:
         """Relative address of this folder for links in a report, ending in a slash."""
