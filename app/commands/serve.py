@@ -136,7 +136,7 @@ class Serve:
     rings: int = 16
     """KITTI: LiDAR channels to keep: 16, like a VLP-16, or 64 for all"""
     route: Annotated[Path | None, option("FILE")] = None
-    """Planned route, on which GNSS places the car: CSV, GPX, an NMEA log or an earlier session"""
+    """Planned route, on which GNSS locates the car: CSV, GPX, an NMEA log or an earlier session"""
 
     def __call__(self) -> int:
         return self.server.serve(self.engine())

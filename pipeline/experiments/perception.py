@@ -23,8 +23,8 @@ COMPARED: tuple[Sensors, ...] = ("lidar", "both")
 """The sensors that most experiments compare: the LiDAR alone, and both."""
 GIVEN = Detections(boxes=BoxNoise())
 GIVEN_SAID = (
-    "The camera's boxes are given: projected truth with assumed errors, near those measured of the embedded detector. "
-    "No network was used."
+    "The camera's boxes are given: projected ground truth with assumed errors close to those measured for the embedded "
+    "detector. No network was used."
 )
 
 

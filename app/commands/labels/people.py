@@ -85,8 +85,8 @@ class LabelEffort:
             return 0
         for each in found:
             print(
-                f"{each.title}: {each.person}: acts {each.acts:,} ({each.acts_per_frame:.2f} a frame), "
-                f"{each.active_s / 60:.0f} min ({each.s_per_frame:.1f} s a frame)"
+                f"{each.title}: {each.person}: changes {each.acts:,} ({each.acts_per_frame:.2f} per frame), "
+                f"{each.active_s / 60:.0f} min ({each.s_per_frame:.1f} s per frame)"
             )
         if not found:
             say("no labels yet")
@@ -134,8 +134,8 @@ class LabelQueue:
         for each in found:
             print(
                 f"{each.title}: {each.state}, {each.person or 'unassigned'}; labelled {_percent(each.labelled)}, "
-                f"reviewed {_percent(each.reviewed)}, proposals {each.proposals:,}, frames asked for {each.asked:,}, "
-                f"worth {each.worth:.2f}"
+                f"reviewed {_percent(each.reviewed)}, proposals {each.proposals:,}, frames to label next {each.asked:,}"
+                f", worth {each.worth:.2f}"
             )
         if not found:
             say("no recordings yet: open one and label it, or run `cipv labels propose`")

@@ -47,7 +47,7 @@ class SourceOptions:
     rings: int = 16
     """KITTI: LiDAR channels to keep: 16, like a VLP-16, or 64 for all"""
     route: Annotated[Path | None, option("FILE")] = None
-    """Planned route, on which GNSS places the car: CSV (degrees, or metres of a UTM zone: r.csv?epsg=32632),
+    """Planned route, on which GNSS locates the car: CSV (degrees, or metres of a UTM zone: r.csv?epsg=32632),
     GPX, an NMEA log or an earlier session"""
 
     def open(self) -> Source:

@@ -140,8 +140,8 @@ def report(cases: Sequence[CurveCase], outcomes: Sequence[CurveOutcome]) -> Repo
         "curves",
         "Curves: the CIPV at up to 3 m/s² lateral, by path source",
         (
-            "Given detections: ground-truth boxes with the errors measured for the embedded detector (3 % of the "
-            "height that stays with a vehicle, 3 % and 0.7 px new in each frame, half missed at 105 m), a simulated "
+            "The detections are given: ground-truth boxes with the errors measured for the embedded detector (3 % of "
+            "the height, constant for a vehicle; 3 % and 0.7 px, new in each frame; half missed at 105 m), a simulated "
             "VLP-16, lane lines with 1.5 px of noise to 55 m, RTK GNSS on a surveyed route with 0.3° of course noise, "
             "yaw rate with 0.0024 rad/s of noise and 0.0005 rad/s of bias. Frames in which the lead has been "
             f"visible for fewer frames than confirmation needs ({CipvParams().confirm_hits}) and is not chosen yet do "
@@ -251,7 +251,7 @@ def _verdict(layout: str, by_source: dict[str, list[SourceFrames]]) -> str:
     better = "better than" if far > alone + 0.005 else "no better than"
     return (
         f"{kind.title}: right in {100 * near:.1f} % to 60 m and {100 * far:.1f} % to {kind.reach_m:.0f} m, "
-        f"{wrong_s:.1f} s on a decoy at most: {held}; {better} the LiDAR alone ({100 * alone:.1f} %)."
+        f"at most {wrong_s:.1f} s on a decoy: {held}; {better} the LiDAR alone ({100 * alone:.1f} %)."
     )
 
 

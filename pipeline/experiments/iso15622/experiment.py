@@ -184,9 +184,9 @@ def report(cases: Sequence[FollowingCase], outcomes: Sequence[FollowingOutcome])
         "iso",
         "ACC, modelled on ISO 15622",
         (
-            f"ACC alone, braking at {ACC_BRAKE_MPS2:g} m/s² at most. Acquisition: the mean range at which the lead "
-            "first becomes the CIPV. Kept: share of the later frames in which it still is. Passed: no contact, kept in "
-            f"{100 * _KEPT:.0f} % of the frames, time gap never under {SMALLEST_TIME_GAP_S} s. Curves are driven at "
+            f"ACC alone, braking at {ACC_BRAKE_MPS2:g} m/s² at most. Acquired: the mean distance at which the lead "
+            "first becomes the CIPV. Kept: share of the later frames in which it is the CIPV. Passed: no contact, kept "
+            f"in {100 * _KEPT:.0f} % of the frames, time gap never under {SMALLEST_TIME_GAP_S} s. Curves are driven at "
             f"{CURVE_LATERAL_MPS2:g} m/s² of lateral acceleration, and kept counts from where the radius is constant, "
             "as in the standard: in the transition before it, the current yaw rate bends the path too little.",
             GIVEN_SAID,

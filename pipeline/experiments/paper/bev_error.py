@@ -108,7 +108,7 @@ def as_drive(case: BevCase, seen: list[PositionSample]) -> ExperimentDrive:
     return ExperimentDrive(
         f"bev_error_{case.layout}_{case.sensors}_{case.boxes}_{case.seed}",
         f"Position of fused objects: {LAYOUTS[case.layout]}, {who}, run {case.seed}",
-        (f"Placed in {len(errors)} of {len(seen)} frames, {far_m:.1f} m off in range at most.",),
+        (f"Located in {len(errors)} of {len(seen)} frames; largest distance error {far_m:.1f} m.",),
         _scenario(case),
         _PARAMS,
         case.sensors,
@@ -164,15 +164,15 @@ def report(cases: Sequence[BevCase], runs: Sequence[list[PositionSample]]) -> Re
         "bev_error",
         "Position of fused objects (Table 4)",
         (
-            "Measured over all ranges up to 60 m. VL is the position by the LiDAR, so it exists within the LiDAR's "
-            "range. V is the position by the camera, mostly beyond that; its error is what a few pixels of box height "
-            "amount to at that range. The published vision rows equal the error of rounding to whole metres and are "
-            "not measurements of a camera.",
-            "The camera's boxes are given: projected truth with assumed errors, near those measured of the embedded "
-            'detector. Rows with "network": the embedded network looked at drawn images of the first '
-            f"{_BY_NETWORK} runs. The object that overlaps the car most in the image is compared with it (IoU over "
-            f'{_SAME_IOU:g}), however wrong its position. "Without" counts the frames without such an object; they '
-            "have no error.",
+            "Measured at all distances up to 60 m. VL is the position measured by the LiDAR, so it exists only in "
+            "the LiDAR's range. V is the position measured by the camera, mostly beyond that; its error corresponds to "
+            "a few pixels of box height at that distance. The published vision rows equal the error of rounding to "
+            "whole metres and are not measurements of a camera.",
+            "The camera's boxes are given: projected ground truth with assumed errors close to those measured for the "
+            'embedded detector. Rows with "network": the embedded network processed rendered images of the first '
+            f"{_BY_NETWORK} runs. The car is compared with the object that overlaps it most in the image (IoU over "
+            f'{_SAME_IOU:g}), however wrong its position. "Without" counts frames without such an object, which have '
+            "no error.",
             "Lateral and longitudinal errors are of the middle of the nearest face. The LiDAR sees a car in another "
             "lane from its corner, so a box fitted to few points may be skewed.",
             *(_verdict(layout, by_kind) for layout in LAYOUTS),
@@ -189,7 +189,7 @@ def _verdict(layout: str, by_kind: dict[BevVariant, list[PositionSample]]) -> st
     title = LAYOUTS[layout].capitalize()
     fused, lidar = (by_kind.get((layout, sensors, "truth"), []) for sensors in ("both", "lidar"))
     if not fused or not lidar:
-        return f"{title}: not driven with both sensor sets."
+        return f"{title}: not driven with both sets of sensors."
     both = [
         (abs(ours.error.distance_m), abs(theirs.error.distance_m))
         for ours, theirs in zip(fused, lidar, strict=True)
@@ -197,14 +197,14 @@ def _verdict(layout: str, by_kind: dict[BevVariant, list[PositionSample]]) -> st
     ]
     placed, alone = (sum(each.error is not None for each in seen) for seen in (fused, lidar))
     verdict = (
-        f"{title}: fused places the car in {placed} of {len(fused)} frames, {_better(placed, alone)} the LiDAR alone, "
-        f"which does in {alone}."
+        f"{title}: fused locates the car in {placed} of {len(fused)} frames, {_better(placed, alone)} the LiDAR alone "
+        f"with {alone} frames."
     )
     if not both:
         return verdict
     ours_m, theirs_m = (mean(pair[n] for pair in both) for n in (0, 1))
     return (
-        f"{verdict} In the {len(both)} frames in which both do, fused is {ours_m:.3f} m off in range on average, "
+        f"{verdict} In the {len(both)} frames in which both do, the mean distance error of fused is {ours_m:.3f} m, "
         f"{_better(theirs_m, ours_m)} the LiDAR alone with {theirs_m:.3f} m."
     )
 

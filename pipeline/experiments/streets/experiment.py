@@ -78,8 +78,8 @@ def report(cases: Sequence[StreetCase], outcomes: Sequence[StreetOutcome]) -> Re
         "streets",
         "Streets without lane markings and without a route",
         (
-            "Given detections and a simulated VLP-16 as in the curves, speed and yaw rate from the car's bus, leads to "
-            f"{REACH_M:.0f} m. With nothing ahead, a frame is right when no lead is chosen.",
+            "Detections are given and the VLP-16 is simulated as in the curves. Speed and yaw rate come from the car's "
+            f"bus; leads count up to {REACH_M:.0f} m. With nothing ahead, a frame is right if no lead is chosen.",
         ),
         (
             Table(
