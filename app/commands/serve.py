@@ -108,9 +108,7 @@ class ServerOptions:
 
 
 def _open_labels(url: str | None) -> Database:
-    from app.labels.store.database import (
-        open_database,  # SQLAlchemy takes most of a second to import, so it is imported after the first image
-    )
+    from app.labels.store.database import open_database  # imports SQLAlchemy, too slow before the first image
 
     return open_database(url)
 
