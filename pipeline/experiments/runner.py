@@ -46,7 +46,7 @@ def of_suite(suite: str) -> tuple[Experiment[Any, Any], ...]:
     ``robustness`` depends on the number of kilometres: see ``robustness.experiment.suite``."""
     found = tuple(each for each in EXPERIMENTS if suite in ("all", each.suite, each.name))
     if not found:
-        names = ", ".join(dict.fromkeys((*SUITES, *(each.name for each in EXPERIMENTS))))
+        names = ", ".join(dict.fromkeys((*SUITES, "robustness", *(each.name for each in EXPERIMENTS))))
         raise NoSuchSuite(f"no suite or experiment named {suite!r}; there are {names}")
     return found
 
