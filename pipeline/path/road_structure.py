@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from pipeline.path import vanished
 from pipeline.path.ground_points import now_at
-from pipeline.types import F32, F64, GROUND, I32, U8, VEHICLES, EgoState, FusedObject, Ground
+from pipeline.types import F32, F64, GROUND, I32, I64, U8, VEHICLES, EgoState, FusedObject, Ground
 from pipeline.types.arrays import Mask
 
 REACH_M, ASIDE_M = 48.0, 24.0
@@ -37,7 +38,7 @@ _DRIVES_MPS = 4.0
 """If only the LiDAR sees an object move, it may be a hedge that becomes visible bit by bit; above this speed it is a
 vehicle."""
 _LONG_M = 6.0
-_MARGIN_M = 0.8
+_MARGIN_M, _SIGMAS = 0.8, 2.0
 _BLOCKED, _PERHAPS_A_LEAD = 4.0, 1.5
 """Log-likelihoods. Nobody drives through a hedge. A car in the way may be parked in a bend or may be a lead; a kerb may
 be the crown of the road."""
@@ -54,9 +55,11 @@ class Cells(NamedTuple):
     """(M,) time since each cell was last seen."""
     stands: Mask
     """(M,) bool, whether it is standing structure; a kerb is not."""
+    z_m: F64
+    """(M,) ego z of the return that each was made of."""
 
 
-NONE = Cells(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
+NONE = Cells(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0, np.bool_), np.zeros(0))
 
 
 def moved(cells: Cells, ego: EgoState, dt_s: float) -> Cells:
@@ -64,7 +67,7 @@ def moved(cells: Cells, ego: EgoState, dt_s: float) -> Cells:
     xy = now_at(cells.xy, ego, dt_s)
     age_s = cells.age_s + dt_s
     keep = (xy[:, 0] > _BEHIND_M) & (age_s <= _KEPT_S)
-    return Cells(xy[keep], cells.blocks[keep], age_s[keep], cells.stands[keep])
+    return _only(cells._replace(xy=xy, age_s=age_s), keep)
 
 
 def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int], height_m: float) -> Cells:
@@ -84,40 +87,56 @@ def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int], 
     standing = (above > _LOW_M) & (above < _HIGH_M) & (kind != GROUND)
     low = (above < _LOW_M) & (points[:, 0] < _KERBS_TO_M)
     kerbs = _kerbs(points[low], ring[low], above[low], height_m)
-    xy = np.vstack([points[standing, :2], kerbs]).astype(np.float64)
-    blocks = np.full(len(xy), _PERHAPS_A_LEAD)
-    blocks[: len(xy) - len(kerbs)][np.isin(kind[standing], np.array(long, dtype=np.int64))] = _BLOCKED
-    return Cells(xy, blocks, np.zeros(len(xy)), np.arange(len(xy)) < len(xy) - len(kerbs))
+    places = np.vstack([points[standing, :3], kerbs]).astype(np.float64)
+    count, stand = len(places), len(places) - len(kerbs)
+    blocks = np.full(count, _PERHAPS_A_LEAD)
+    blocks[:stand][np.isin(kind[standing], np.array(long, dtype=np.int64))] = _BLOCKED
+    return Cells(places[:, :2], blocks, np.zeros(count), np.arange(count) < stand, places[:, 2])
 
 
 def merged(before: Cells, fresh: Cells) -> Cells:
     """All cells, one per square of the grid; fresh cells have priority."""
-    xy, blocks, age_s, stands = (np.concatenate(pair) for pair in zip(fresh, before, strict=True))
-    if not len(xy):
+    both = Cells(*(np.concatenate(pair) for pair in zip(fresh, before, strict=True)))
+    if not len(both.xy):
         return NONE
-    at = np.floor(xy / CELL_M).astype(np.int64)
+    at = np.floor(both.xy / CELL_M).astype(np.int64)
     _, first = np.unique(at[:, 0] * 100_003 + at[:, 1], return_index=True)
-    return Cells(xy[first], blocks[first], age_s[first], stands[first])
+    return _only(both, first)
+
+
+def standing(cells: Cells, points: F32, ring: U8, origin: tuple[float, float, float]) -> Cells:
+    """The cells without those through which rays of this sweep passed. Kerbs are kept: rays pass over them anyway."""
+    gone = vanished.is_gone(cells.xy, cells.z_m, points, ring, origin, CELL_M)
+    return _only(cells, ~(gone & cells.stands)) if gone.any() else cells
 
 
 def without(cells: Cells, objects: Sequence[FusedObject]) -> Cells:
-    """The cells that are not in or directly beside any of the objects."""
+    """The cells that are not in or directly beside any of the objects; a camera-only one may be as much nearer or
+    farther as its distance is uncertain."""
     keep = np.ones(len(cells.xy), np.bool_)
     for item in objects:
-        if item.cuboid is not None:
-            (x, y, _), (length, width, _), yaw = item.cuboid.center, item.cuboid.size, item.cuboid.yaw_rad
-            c, s = np.cos(yaw), np.sin(yaw)
-            dx, dy = cells.xy[:, 0] - x, cells.xy[:, 1] - y
-            along, across = np.abs(dx * c + dy * s), np.abs(dy * c - dx * s)
-            keep &= (along > length / 2 + _MARGIN_M) | (across > width / 2 + _MARGIN_M)
-    return Cells(cells.xy[keep], cells.blocks[keep], cells.age_s[keep], cells.stands[keep])
+        if item.bev is None:
+            continue
+        left, right, _, rear = np.array(item.bev)
+        length, width = np.hypot(*(left - rear)), np.hypot(*(left - right))
+        c, s = (left - rear) / max(length, 1e-6)
+        dx, dy = (cells.xy - np.mean(item.bev, axis=0)).T
+        along, across = np.abs(dx * c + dy * s), np.abs(dy * c - dx * s)
+        spare = _MARGIN_M + (0.0 if item.ranged else _SIGMAS * (item.distance_sigma_m or 0.0))
+        keep &= (along > length / 2 + spare) | (across > width / 2 + _MARGIN_M)
+    return _only(cells, keep)
+
+
+def _only(cells: Cells, keep: Mask | I64) -> Cells:
+    """The cells that a mask or indices select."""
+    return Cells(*(column[keep] for column in cells))
 
 
 def drives(item: FusedObject) -> bool:
     """Whether the object is certainly a moving vehicle."""
-    if not item.moving or item.cuboid is None or (item.speed_over_ground_mps or 0.0) < _DRIVES_MPS:
+    if not item.surely_moving or (item.speed_over_ground_mps or 0.0) < _DRIVES_MPS:
         return False
-    return item.label in VEHICLES or max(item.cuboid.size[:2]) < _LONG_M
+    return item.label in VEHICLES or (item.cuboid is not None and max(item.cuboid.size[:2]) < _LONG_M)
 
 
 def long(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int]:
@@ -133,22 +152,23 @@ def long(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int
 
 
 def _kerbs(points: F32, ring: U8, above: F64, height_m: float) -> F64:
-    """(M, 2) points on kerbs: between a level stretch of a ring and the next one that is higher or lower by a kerb's
+    """(M, 3) points on kerbs: between a level stretch of a ring and the next one that is higher or lower by a kerb's
     height. A ring crosses a kerb at an angle, so the points in between lie along the kerb."""
     if not len(points):
-        return np.zeros((0, 2))
+        return np.zeros((0, 3))
     order = np.argsort(ring, kind="stable")  # within a ring, points stay in the order of measurement
-    xy = points[order, :2].astype(np.float64)
+    places = points[order, :3].astype(np.float64)
     slant = _SLANT / height_m
     on_kerb = _between_levels(
-        xy, ring[order], above[order], _FLAT_M, _FLAT_SHARE, _STEP_M, _STEP_MOST_M, slant, _SLACK_M
+        places, ring[order], above[order], _FLAT_M, _FLAT_SHARE, _STEP_M, _STEP_MOST_M, slant, _SLACK_M
     )
-    return np.asarray(xy[on_kerb])
+    return np.asarray(places[on_kerb])
 
 
 def warm_up() -> None:
-    """Compile the kernel, or load it from numba's cache."""
+    """Compile the kernels, or load them from numba's cache."""
     _kerbs(np.zeros((2, 4), np.float32), np.zeros(2, np.uint8), np.zeros(2), 1.0)
+    vanished.warm_up()
 
 
 @numba.njit(cache=True, nogil=True)
