@@ -14,6 +14,7 @@ import numpy as np
 from pipeline.path.ground_points import now_at
 from pipeline.types import F32, F64, GROUND, I32, U8, VEHICLES, EgoState, FusedObject, Ground
 from pipeline.types.arrays import Mask
+from pipeline.types.ground_planes import height_above
 
 REACH_M, ASIDE_M = 48.0, 24.0
 """Farther ahead or to the side, a 16-channel LiDAR does not resolve a road's edge."""
@@ -78,16 +79,13 @@ def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int], 
         long: clusters that are too long for a car.
         height_m: of the sensor above the road.
     """
-    near = np.flatnonzero((points[:, 0] > 0.0) & (points[:, 0] < REACH_M) & (np.abs(points[:, 1]) < ASIDE_M))
-    points, kind, ring = points[near], kind[near], ring[near]
-    above = ground.above(points)
-    standing = (above > _LOW_M) & (above < _HIGH_M) & (kind != GROUND)
-    low = (above < _LOW_M) & (points[:, 0] < _KERBS_TO_M)
-    kerbs = _kerbs(points[low], ring[low], above[low], height_m)
-    xy = np.vstack([points[standing, :2], kerbs]).astype(np.float64)
-    blocks = np.full(len(xy), _PERHAPS_A_LEAD)
-    blocks[: len(xy) - len(kerbs)][np.isin(kind[standing], np.array(long, dtype=np.int64))] = _BLOCKED
-    return Cells(xy, blocks, np.zeros(len(xy)), np.arange(len(xy)) < len(xy) - len(kerbs))
+    is_long = np.zeros(int(kind.max(initial=0)) + 1, np.bool_)
+    is_long[list(long)] = True
+    standing, blocks, low, low_ring, low_above = _sorted(points, kind, ring, ground.planes, ground.edges, is_long)
+    kerbs = _kerbs(low, low_ring, low_above, height_m)
+    xy = np.concatenate([standing, kerbs])
+    stands = np.arange(len(xy)) < len(standing)
+    return Cells(xy, np.concatenate([blocks, np.full(len(kerbs), _PERHAPS_A_LEAD)]), np.zeros(len(xy)), stands)
 
 
 def merged(before: Cells, fresh: Cells) -> Cells:
@@ -132,23 +130,57 @@ def long(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int
     ]
 
 
-def _kerbs(points: F32, ring: U8, above: F64, height_m: float) -> F64:
+def _kerbs(xy: F64, ring: U8, above: F64, height_m: float) -> F64:
     """(M, 2) points on kerbs: between a level stretch of a ring and the next one that is higher or lower by a kerb's
-    height. A ring crosses a kerb at an angle, so the points in between lie along the kerb."""
-    if not len(points):
-        return np.zeros((0, 2))
-    order = np.argsort(ring, kind="stable")  # within a ring, points stay in the order of measurement
-    xy = points[order, :2].astype(np.float64)
+    height. A ring crosses a kerb at an angle, so the points in between lie along the kerb. xy: (N, 2) points near the
+    ground, ring by ring, within a ring in the order of measurement."""
     slant = _SLANT / height_m
-    on_kerb = _between_levels(
-        xy, ring[order], above[order], _FLAT_M, _FLAT_SHARE, _STEP_M, _STEP_MOST_M, slant, _SLACK_M
-    )
+    on_kerb = _between_levels(xy, ring, above, _FLAT_M, _FLAT_SHARE, _STEP_M, _STEP_MOST_M, slant, _SLACK_M)
     return np.asarray(xy[on_kerb])
 
 
 def warm_up() -> None:
-    """Compile the kernel, or load it from numba's cache."""
-    _kerbs(np.zeros((2, 4), np.float32), np.zeros(2, np.uint8), np.zeros(2), 1.0)
+    """Compile the kernels, or load them from numba's cache."""
+    points, planes, edges = np.zeros((2, 4), np.float32), np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0])
+    kind, ring = np.zeros(2, np.int32), np.zeros(2, np.uint8)
+    _, _, *low = _sorted(points, kind, ring, planes, edges, np.zeros(1, np.bool_))
+    _kerbs(*low, 1.0)
+
+
+@numba.njit(cache=True, nogil=True)
+def _sorted(points, kind, ring, planes, edges, is_long):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """The points near the car that may show an edge. is_long: by number of a cluster, whether it is too long for a car.
+
+    Returns (A, 2) ego x, y of standing points and their log-likelihood that no road leads through them (A,); then
+    (B, 2) ego x, y of points near the ground, their ring (B,) and height (B,), ring by ring.
+    """
+    count, standing, low = len(points), 0, 0
+    xy, blocks = np.empty((count, 2)), np.empty(count)
+    rows, above = np.empty(count, np.int64), np.empty(count)
+    starts = np.zeros(257, np.int64)
+    for n in range(count):
+        x, y = points[n, 0], points[n, 1]
+        if not (x > 0.0 and x < REACH_M and abs(y) < ASIDE_M):
+            continue
+        height_m = height_above(planes, edges, x, y, points[n, 2])
+        if height_m > _LOW_M and height_m < _HIGH_M and kind[n] != GROUND:
+            xy[standing, 0], xy[standing, 1] = x, y
+            blocks[standing] = _BLOCKED if kind[n] >= 0 and is_long[kind[n]] else _PERHAPS_A_LEAD
+            standing += 1
+        elif height_m < _LOW_M and x < _KERBS_TO_M:
+            rows[low], above[low] = n, height_m
+            starts[ring[n] + 1] += 1
+            low += 1
+    for r in range(256):
+        starts[r + 1] += starts[r]
+    low_xy, low_ring, low_above = np.empty((low, 2)), np.empty(low, np.uint8), np.empty(low)
+    for k in range(low):
+        n = rows[k]
+        at = starts[ring[n]]
+        starts[ring[n]] += 1
+        low_xy[at, 0], low_xy[at, 1] = points[n, 0], points[n, 1]
+        low_ring[at], low_above[at] = ring[n], above[k]
+    return xy[:standing].copy(), blocks[:standing].copy(), low_xy, low_ring, low_above
 
 
 @numba.njit(cache=True, nogil=True)
