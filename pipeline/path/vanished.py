@@ -35,7 +35,7 @@ def is_gone(xy: F64, z_m: F64, points: F32, ring: U8, origin: tuple[float, float
 
     Args:
         xy: (M, 2) cells, ego x y.
-        z_m: (M,) ego z of the return that each was made of.
+        z_m: (M,) ego z of the return that each was made of; one of NaN stays.
         points: (N, 4) of the sweep.
         ring: (N,) the channel of each point.
         origin: ego x y z of the sensor.
@@ -83,7 +83,7 @@ def _gone(xy, z, points, ring, origin, half_m, bin_rad, height_m, beyond_m, fewe
         first, last = max(int((at - half) / bin_rad), 0), min(int((at + half) / bin_rad), sectors - 1)
         passed, ended = 0, 0
         for c in range(rings):
-            if count[c] < live or abs(origin[2] + r * total[c] / count[c] - z[n]) > height_m:
+            if count[c] < live or not abs(origin[2] + r * total[c] / count[c] - z[n]) <= height_m:
                 continue
             for k in range(first, last + 1):
                 if nearest[k, c] == np.inf:
