@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.path import vanished
 from pipeline.path.ground_points import now_at
-from pipeline.types import F32, F64, GROUND, I32, I64, U8, VEHICLES, EgoState, FusedObject, Ground
+from pipeline.types import F32, F64, GROUND, I32, I64, U8, VEHICLES, EgoState, FusedObject, Ground, Point3
 from pipeline.types.arrays import Mask
 from pipeline.types.ground_planes import height_above
 
@@ -106,9 +106,10 @@ def merged(before: Cells, fresh: Cells) -> Cells:
     return _only(both, first)
 
 
-def standing(cells: Cells, points: F32, ring: U8, origin: tuple[float, float, float]) -> Cells:
-    """The cells without those through which rays of this sweep passed."""
-    gone = vanished.is_gone(cells.xy, cells.z_m, points, ring, origin, CELL_M)
+def standing(cells: Cells, points: F32, ring: U8, origin: Point3, height_m: float) -> Cells:
+    """The cells without those through which rays of this sweep passed. origin: ego x y z of the sensor, ``height_m``
+    above the road."""
+    gone = vanished.is_gone(cells.xy, cells.z_m, points, ring, origin, height_m, CELL_M)
     return _only(cells, ~gone) if gone.any() else cells
 
 
