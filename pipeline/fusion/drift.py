@@ -25,38 +25,50 @@ from pipeline.params import FusionParams
 from pipeline.types import VEHICLES, Box, FusedObject
 
 BORDER_PX = 3.0
-"""A box this close to the image's border counts as cut."""
+"""A box this close to the image's border counts as cut: its border is where the image ends, not where the vehicle
+does."""
 LIKE_WIDTH, NARROWEST = 0.35, 0.4
-"""If a cluster's width differs from its box's by a larger share than the first, it covers only a part of the vehicle,
-or more than it. Vehicles beside the camera's axis, whose side may be missing in the cluster, are accepted from the
-second share on."""
+"""A cluster whose width differs from that of its box by a larger share than the first covers a part of the vehicle, or
+more than the vehicle. Beside the camera's axis, where the cluster may lack the vehicle's side, a width of at least the
+second share of the box's is accepted."""
 NARROWEST_M = 1.3
-"""Narrower clusters are the visible part of a vehicle behind others; a detector draws the box of the whole vehicle."""
+"""Narrower than any car: such a cluster is the visible part of a vehicle behind others, whereas a detector draws the
+box of the whole vehicle."""
 NEAREST_M, FARTHEST_M = 5.0, 40.0
 """Closer, the two mounts see different sides of a car; farther, only one or two rings hit it."""
 LASTING_SHARE = 0.06
-"""Constant error of the middle or foot of a vehicle's box, as a share of the box height (1 σ)."""
+"""Constant error of the middle or lower edge of a vehicle's box, as a share of the box height (1 σ). Measured on Astyx
+and KITTI with YOLOX-nano: the means of the 10 vehicles seen in at least five frames scatter by 0.063 sideways and 0.025
+vertically (1.48 times the median absolute deviation)."""
 LASTING_DEG = 0.12
-"""Constant error of a cluster whose sides lie between beams 0.2° to 0.4° apart."""
+"""Constant error of a cluster (1 σ): its sides lie between beams 0.2° to 0.4° apart, so each is off by up to that."""
 FRAME_SHARE = 0.08
-"""Additional error in each frame, as a share of the box height."""
+"""Additional error in each frame, as a share of the box height (1 σ). Measured as above: 0.046 sideways and 0.025
+vertically in the median vehicle, 0.14 sideways for parked cars."""
 SMALLEST_DEG = 0.4
-"""Smaller angles move a car 30 m away by about a tenth of its width, which fusion tolerates."""
+"""Smaller angles are not reported: they move a car 30 m away by 0.2 m, about a tenth of its width, which fusion
+tolerates."""
 FEWEST_FRAMES, FEWEST_VEHICLES = 5, 3
-"""A vehicle counts after half a second at 10 Hz; with only two vehicles, both may be wrong pairs."""
+"""A vehicle counts after five frames, half a second at 10 Hz. Three vehicles are needed, since of two both may be wrong
+pairs."""
 REMEMBERED = 20
-"""Frames over which a vehicle's mean is taken, so that a lead followed for minutes is judged by the last seconds."""
+"""Number of frames in a vehicle's running mean, two seconds at 10 Hz, so that a lead followed for minutes is judged by
+its last seconds."""
 FASTEST_DEGPS = 6.0
-"""Faster bearings belong to vehicles that we pass, which are seen from a different side in every frame."""
+"""Vehicles whose bearing changes faster are being passed, so they are seen from another side in every frame."""
 RECENT_SHARE = 0.4
-"""Share of the time window treated as recent, so that vehicles from before a knock do not outvote those after it."""
+"""Share of the time window that is also judged alone, so that vehicles from before a knock do not outvote those after
+it."""
 TIME_SIGMA_S = 0.04
-"""Standard deviation of the time offset between the sensors. For vehicles whose bearing changes fast, such as oncoming
-ones, a time offset looks like an angle; if all vehicles are of this kind, no angle can be determined."""
+"""Expected time offset between the sensors (1 σ): one image of a camera at 25 to 30 Hz. For vehicles whose bearing
+changes fast, such as oncoming ones, a time offset looks like an angle; if all vehicles are of this kind, no angle can
+be determined."""
 HUBER, ROUNDS = 1.5, 10
-"""Number of standard deviations beyond which a vehicle gets less weight; number of re-weighting rounds."""
+"""Number of standard deviations beyond which a vehicle gets less weight (close to Huber's usual 1.345), and number of
+re-weighting rounds."""
 AGREEING_SHARE = 0.7
-"""Share of the vehicles that must each show at least half of the angle."""
+"""Share of the vehicles that must each show at least half of the angle: with three vehicles all of them, with four
+three."""
 
 
 class CuboidOffset(NamedTuple):
