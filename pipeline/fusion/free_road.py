@@ -21,6 +21,7 @@ import numba
 import numpy as np
 
 from pipeline.common.geometry import F64
+from pipeline.common.made_sweeps import made_sweeps
 from pipeline.fusion.vehicle_sizes import usual_size_m
 from pipeline.types import F32, I32, U8, FusedObject, Ground, Point3
 
@@ -174,10 +175,11 @@ def _beams(points: F32, ring: U8, origin: F64) -> _Beams:
 
 def warm_up() -> None:
     """Compile the kernels."""
-    points, ring = np.ones((1, 4), np.float32), np.zeros(1, np.uint8)
     place = np.array([[1.0, 0.0, 1.0, 2.0, 1.0, 0.0, 0.0]])
-    kind = np.zeros(1, np.int32)
-    _count(points, ring, kind, np.zeros(3), place, _slopes(points, ring, np.zeros(3))[0], 0.1, _SILENT_M)
+    kind, origin = np.zeros(2, np.int32), np.zeros(3)
+    for points, ring in made_sweeps():
+        slope, _ = _slopes(points, ring, origin)
+        _count(points, ring, kind, origin, place, slope, 0.1, _SILENT_M)
 
 
 @numba.njit(cache=True, nogil=True)
