@@ -215,7 +215,7 @@ def report_snap(name: str, drive: Drive) -> None:
     gain = np.array(gains)
     print(
         f"{name}: Snap: {len(gain)} cuboids, left as they are {left / len(gain):.0%}, IoU better by 0.02 in "
-        f"{np.mean(gain > 0.02):.0%}, worse by 0.02 in {np.mean(gain < -0.02):.0%}, by 0.1 in {np.mean(gain < -0.1):.0%}"
+        f"{np.mean(gain > 0.02):.0%}, worse in {np.mean(gain < -0.02):.0%}, by 0.1 in {np.mean(gain < -0.1):.0%}"
     )
 
 
