@@ -43,7 +43,10 @@ function follow() {
   if (!get("labels") || state.labels.revision > (get("labels")?.revision ?? 0)) refresh(false);
 }
 
-/** Apply what an act changed, and fetch changes by others; resolves once the page has both. @param {LabelsAnswer} changed */
+/**
+ * Apply what an act changed, and fetch changes by others; resolves once the page has both.
+ * @param {LabelsAnswer} changed
+ */
 export async function accept(changed) {
   const labels = get("labels");
   if (labels && labels.drive === changed.drive.id && changed.revision === labels.revision + 1)
