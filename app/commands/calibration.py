@@ -19,8 +19,8 @@ from pipeline.types import CameraCalibration
 
 @dataclass(frozen=True)
 class ConvertCalibration:
-    """Check the calibration of a recording or of a file, and write it for KITTI, ROS, OpenCV, Kalibr, or
-    as a rig file.
+    """Check the calibration of a recording or of a file, and write it for KITTI, ROS, OpenCV or Kalibr, or as a rig
+    file.
 
     Example: cipv calibration astyx:PATH --params alignment.yaml --to ros --out front_camera
     """

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _MISSED = ("labelled.lead_missed", "late_leads")
 _PHANTOMS = ("labelled.cipv_false", "phantom_leads")
-"""Scores that a set of parameters is judged by: against labels where the fleet has some, else without."""
+"""Scores by which a set of parameters is judged: with labels if the fleet has some, else without."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class ParameterSweep:
 
         sets = self._sets()
         base = self.pipeline.parameters()
-        points = [with_changes(base, changes) for changes in sets]  # all, so that a wrong one is told before the work
+        points = [with_changes(base, changes) for changes in sets]  # before the work, so that all are valid
         plan = Plan(self.addresses, base, self.pipeline.choice(), self.sensors, self.rings)
         store = Store(self.out)
         try:
@@ -98,7 +98,7 @@ class ParameterSweep:
         return latin(axes, self.latin)
 
     def _run(self, plan: Plan, points: list[Params], store: Store) -> list[str]:
-        """The name of the run of each set."""
+        """Run every set; returns the names of their runs."""
         from app.fleet.batch.plan import begin, work_of
         from app.fleet.pack import pack
 
@@ -161,7 +161,7 @@ def _word(each: Tried, best: list[Tried], one: Tried | None) -> str:
 
 
 def _judged(store: Store, runs: list[tuple[str, dict[str, Any]]]) -> tuple[list[Tried], tuple[str, str]]:
-    """Every set with its two scores, and the names of these."""
+    """Every set with its two scores, and the names of the scores."""
     from app.fleet.compare.worth import values_of
     from app.fleet.find import FleetTables
     from app.fleet.sweep import Tried

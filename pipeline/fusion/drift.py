@@ -12,50 +12,63 @@ zero.
 
 from __future__ import annotations
 
-from math import atan2, degrees, hypot
+from math import degrees, hypot
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from pipeline.alignment.projection import Alignment
-from pipeline.common.geometry import Cuboid
+from pipeline.common.geometry import corners_of
 from pipeline.fusion.fuse import Fusion
 from pipeline.params import FusionParams
-from pipeline.types import F64, VEHICLES, Box, FusedObject
+from pipeline.types import VEHICLES, Box, FusedObject
 
 BORDER_PX = 3.0
-"""A box this close to the image's border counts as cut."""
+"""A box this close to the image's border counts as cut: its border is where the image ends, not where the vehicle
+does."""
 LIKE_WIDTH, NARROWEST = 0.35, 0.4
-"""If a cluster's width differs from its box's by a larger share than the first, it covers only a part of the vehicle,
-or more than it. Vehicles beside the camera's axis, whose side may be missing in the cluster, are accepted from the
-second share on."""
+"""A cluster whose width differs from that of its box by a larger share than the first covers a part of the vehicle, or
+more than the vehicle. Beside the camera's axis, where the cluster may lack the vehicle's side, a width of at least the
+second share of the box's is accepted."""
 NARROWEST_M = 1.3
-"""Narrower clusters are the visible part of a vehicle behind others; a detector draws the box of the whole vehicle."""
+"""Narrower than any car: such a cluster is the visible part of a vehicle behind others, whereas a detector draws the
+box of the whole vehicle."""
 NEAREST_M, FARTHEST_M = 5.0, 40.0
 """Closer, the two mounts see different sides of a car; farther, only one or two rings hit it."""
 LASTING_SHARE = 0.06
-"""Constant error of the middle or foot of a vehicle's box, as a share of the box height (1 σ)."""
+"""Constant error of the middle or lower edge of a vehicle's box, as a share of the box height (1 σ). Measured on Astyx
+and KITTI with YOLOX-nano: the means of the 10 vehicles seen in at least five frames scatter by 0.063 sideways and 0.025
+vertically (1.48 times the median absolute deviation)."""
 LASTING_DEG = 0.12
-"""Constant error of a cluster whose sides lie between beams 0.2° to 0.4° apart."""
+"""Constant error of a cluster (1 σ): its sides lie between beams 0.2° to 0.4° apart, so each is off by up to that."""
 FRAME_SHARE = 0.08
-"""Additional error in each frame, as a share of the box height."""
+"""Additional error in each frame, as a share of the box height (1 σ). Measured as above: 0.046 sideways and 0.025
+vertically in the median vehicle, 0.14 sideways for parked cars."""
 SMALLEST_DEG = 0.4
-"""Smaller angles move a car 30 m away by about a tenth of its width, which fusion tolerates."""
+"""Smaller angles are not reported: they move a car 30 m away by 0.2 m, about a tenth of its width, which fusion
+tolerates."""
 FEWEST_FRAMES, FEWEST_VEHICLES = 5, 3
-"""A vehicle counts after half a second at 10 Hz; with only two vehicles, both may be wrong pairs."""
+"""A vehicle counts after five frames, half a second at 10 Hz. Three vehicles are needed, since of two both may be wrong
+pairs."""
 REMEMBERED = 20
-"""Frames over which a vehicle's mean is taken, so that a lead followed for minutes is judged by the last seconds."""
+"""Number of frames in a vehicle's running mean, two seconds at 10 Hz, so that a lead followed for minutes is judged by
+its last seconds."""
 FASTEST_DEGPS = 6.0
-"""Faster bearings belong to vehicles that we pass, which are seen from a different side in every frame."""
+"""Vehicles whose bearing changes faster are being passed, so they are seen from another side in every frame."""
 RECENT_SHARE = 0.4
-"""Share of the time window treated as recent, so that vehicles from before a knock do not outvote those after it."""
+"""Share of the time window that is also judged alone, so that vehicles from before a knock do not outvote those after
+it."""
 TIME_SIGMA_S = 0.04
-"""Standard deviation of the time offset between the sensors. For vehicles whose bearing changes fast, such as oncoming
-ones, a time offset looks like an angle; if all vehicles are of this kind, no angle can be determined."""
+"""Expected time offset between the sensors (1 σ): one image of a camera at 25 to 30 Hz. For vehicles whose bearing
+changes fast, such as oncoming ones, a time offset looks like an angle; if all vehicles are of this kind, no angle can
+be determined."""
 HUBER, ROUNDS = 1.5, 10
-"""Number of standard deviations beyond which a vehicle gets less weight; number of re-weighting rounds."""
+"""Number of standard deviations beyond which a vehicle gets less weight (close to Huber's usual 1.345), and number of
+re-weighting rounds."""
 AGREEING_SHARE = 0.7
-"""Share of the vehicles that must each show at least half of the angle."""
+"""Share of the vehicles that must each show at least half of the angle: with three vehicles all of them, with four
+three."""
 
 
 class CuboidOffset(NamedTuple):
@@ -121,14 +134,10 @@ def follow(
     # Each vehicle gives the angle between its box and its projected cuboid; all vehicles of the last seconds are
     # evaluated together
     known = {each.id: each for each in state.sightings if t_ns - each.t_ns <= params.drift_s * 1e9}
-    for item in fused.objects:
-        box = fused.vision_boxes.get(item.id)
-        if box is not None and _tells(item, box, image_size):
-            assert item.cuboid is not None
-            found = _angles(item.cuboid, box, aligned)
-            rate_degps = _rate_degps(item)
-            if found is not None and abs(rate_degps) < FASTEST_DEGPS:
-                known[item.id] = _with(known.get(item.id), item.id, t_ns, (*found, rate_degps))
+    for item, found in _angles(fused, image_size, aligned):
+        rate_degps = _rate_degps(item)
+        if abs(rate_degps) < FASTEST_DEGPS:
+            known[item.id] = _with(known.get(item.id), item.id, t_ns, (*found, rate_degps))
     sightings = tuple(known.values())
     return DriftState(sightings), judge(sightings, params)
 
@@ -137,7 +146,8 @@ def judge(sightings: tuple[CuboidOffset, ...], params: FusionParams) -> Drift | 
     """The angles estimated from all sightings, or from the newest ones, if they differ significantly from zero."""
     newest_ns = max((each.t_ns for each in sightings), default=0)
     recent = tuple(each for each in sightings if newest_ns - each.t_ns <= RECENT_SHARE * params.drift_s * 1e9)
-    return _judged(sightings, params) or _judged(recent, params)
+    whole = _judged(sightings, params)
+    return whole if whole is not None or len(recent) == len(sightings) else _judged(recent, params)
 
 
 def _judged(sightings: tuple[CuboidOffset, ...], params: FusionParams) -> Drift | None:
@@ -167,35 +177,61 @@ def _tells(item: FusedObject, box: Box, size: tuple[int, int]) -> bool:
     return is_whole and item.distance_m is not None and NEAREST_M <= item.distance_m <= FARTHEST_M
 
 
-def _angles(cuboid: Cuboid, box: Box, aligned: Alignment) -> tuple[float, float, float] | None:
-    """Yaw and pitch between a cuboid and its box, and the box's height, degrees; None if their widths differ.
+def _angles(
+    fused: Fusion, image_size: tuple[int, int], aligned: Alignment
+) -> list[tuple[FusedObject, tuple[float, float, float]]]:
+    """Each object whose cuboid and box tell something, with yaw and pitch between the two and the box's height,
+    degrees."""
+    boxes = fused.vision_boxes
+    asked = [(item, boxes[item.id]) for item in fused.objects if item.id in boxes]
+    asked = [(item, box) for item, box in asked if _tells(item, box, image_size)]
+    if not asked:
+        return []
+    corners = corners_of([item.cuboid for item, _ in asked if item.cuboid is not None])
+    uv = aligned.project(corners.reshape(-1, 3)).reshape(-1, 8, 2)
+    columns = (uv[:, :, 0].min(axis=1), uv[:, :, 0].max(axis=1), uv[:, :4, 1].max(axis=1))
+    sides = (corners[:, :, 1].min(axis=1), corners[:, :, 1].max(axis=1))
+    rows = np.column_stack([*columns, *sides, np.isnan(uv).any(axis=(1, 2))]).tolist()
+    found, pixels = [], []
+    for (item, box), (left, right, foot, low, high, is_behind) in zip(asked, rows, strict=True):
+        edges = _edges(left, right, low, high, box) if not is_behind else None
+        if edges is not None:
+            found.append(item)
+            pixels += [(edges[0], foot), (edges[1], box[3]), (edges[1], box[1])]
+    if not found:
+        return []
+    x, y, z = aligned.rays(np.array(pixels))[1].T
+    azimuth, elevation = np.arctan2(y, x).reshape(-1, 3), np.arctan2(z, np.hypot(x, y)).reshape(-1, 3)
+    angles = np.degrees(
+        np.column_stack(
+            [
+                azimuth[:, 0] - azimuth[:, 1],
+                elevation[:, 1] - elevation[:, 0],
+                elevation[:, 2] - elevation[:, 1],
+            ]
+        )
+    )
+    return [(item, (yaw, pitch, height)) for item, (yaw, pitch, height) in zip(found, angles.tolist(), strict=True)]
+
+
+def _edges(left: float, right: float, low_m: float, high_m: float, box: Box) -> tuple[float, float] | None:
+    """The columns to compare: of the projected cuboid (left, right) and of the box; None if their widths differ. low_m,
+    high_m: ego y of the cuboid's sides.
 
     For a vehicle beside the camera's axis, the inner edge of the box is at the far end of the vehicle's side, which the
     LiDAR rarely hits; the outer edge is at the corner of its near face in both. For such a vehicle, only the outer edge
     is used.
     """
-    uv = aligned.project(cuboid.corners())
-    if np.isnan(uv).any():
-        return None
-    left, right, foot = uv[:, 0].min(), uv[:, 0].max(), uv[:4, 1].max()
     share = (right - left) / (box[2] - box[0])
     if not NARROWEST < share < 1.0 + LIKE_WIDTH:
         return None
-    sides = cuboid.corners()[:, 1]
-    low, high = float(sides.min()), float(sides.max())
-    if high < 0.0:
-        edge, edge_seen = right, box[2]
-    elif low > 0.0:
-        edge, edge_seen = left, box[0]
-    elif share > 1.0 - LIKE_WIDTH:
-        edge, edge_seen = (left + right) / 2, (box[0] + box[2]) / 2
-    else:
-        return None
-    _, rays = aligned.rays(np.array([[edge, foot], [edge_seen, box[3]], [edge_seen, box[1]]]))
-    azimuth = [atan2(y, x) for x, y, _ in rays]
-    elevation = [atan2(z, hypot(x, y)) for x, y, z in rays]
-    yaw, pitch, height = azimuth[0] - azimuth[1], elevation[1] - elevation[0], elevation[2] - elevation[1]
-    return degrees(yaw), degrees(pitch), degrees(height)
+    if high_m < 0.0:
+        return right, box[2]
+    if low_m > 0.0:
+        return left, box[0]
+    if share > 1.0 - LIKE_WIDTH:
+        return (left + right) / 2, (box[0] + box[2]) / 2
+    return None
 
 
 def _rate_degps(item: FusedObject) -> float:
@@ -220,23 +256,37 @@ def _sigma_deg(each: CuboidOffset) -> float:
     return hypot(LASTING_DEG, LASTING_SHARE * each.height_deg, FRAME_SHARE * each.height_deg / each.frames**0.5)
 
 
-def _common(values: F64, sigmas: F64, rates: F64) -> tuple[float, float, bool]:
+@numba.njit(cache=True, nogil=True)
+def _common(values, sigmas, rates):  # type: ignore[no-untyped-def]  # pragma: no cover
     """The angle that all vehicles share besides a common time offset, its standard deviation, and whether most of the
-    vehicles individually confirm it. Robust (Huber), so that a few wrong pairs have little effect."""
-    weight = sigmas**-2
+    vehicles individually confirm it. Robust (Huber), so that a few wrong pairs have little effect. values, sigmas,
+    rates: (N,) float64."""
+    count = len(values)
+    weight, off = sigmas**-2, np.zeros(count)
+    shared, time_s, variance = 0.0, 0.0, 0.0
     for _ in range(ROUNDS):
-        # The normal equations of angle + rate · time are 2 × 2; written out, they take a third less time than a solver
-        w, wr = weight.sum(), weight @ rates
-        wrr = (weight * rates) @ rates + TIME_SIGMA_S**-2
-        right, right_r = weight @ values, (weight * values) @ rates
+        # The normal equations of angle + rate · time
+        w, wr, wrr, right, right_r = 0.0, 0.0, TIME_SIGMA_S**-2, 0.0, 0.0
+        for n in range(count):
+            w += weight[n]
+            wr += weight[n] * rates[n]
+            wrr += weight[n] * rates[n] * rates[n]
+            right += weight[n] * values[n]
+            right_r += weight[n] * values[n] * rates[n]
         determinant = w * wrr - wr * wr
         shared, time_s = (wrr * right - wr * right_r) / determinant, (w * right_r - wr * right) / determinant
         variance = wrr / determinant
-        off = np.abs(values - shared - rates * time_s) / sigmas
-        weight = sigmas**-2 * HUBER / np.maximum(off, HUBER)
-    off = np.minimum(off, 2.0 * HUBER)
-    scatter = float(np.sqrt(np.sum(off**2) / max(len(values) - 1, 1)))
-    angle, sigma = float(shared), float(variance**0.5) * max(scatter, 1.0)
-    alone = values - rates * time_s
-    is_clear = np.count_nonzero(alone * np.sign(angle) > abs(angle) / 2) >= AGREEING_SHARE * len(values)
-    return angle, sigma, bool(is_clear)
+        for n in range(count):
+            off[n] = abs(values[n] - shared - rates[n] * time_s) / sigmas[n]
+            weight[n] = HUBER / max(off[n], HUBER) / sigmas[n] ** 2
+    scatter, confirming = 0.0, 0
+    for n in range(count):
+        scatter += min(off[n], 2.0 * HUBER) ** 2
+        confirming += (values[n] - rates[n] * time_s) * np.sign(shared) > abs(shared) / 2
+    scatter = np.sqrt(scatter / max(count - 1, 1))
+    return shared, np.sqrt(variance) * max(scatter, 1.0), confirming >= AGREEING_SHARE * count
+
+
+def warm_up() -> None:
+    """Compile the kernel, or load it from numba's cache."""
+    _common(np.zeros(3), np.ones(3), np.zeros(3))

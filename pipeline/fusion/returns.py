@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, Protocol
 
+import numba
 import numpy as np
 
 from pipeline.alignment.projection import Alignment
@@ -25,7 +26,8 @@ from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64
 from pipeline.fusion.free_road import SweepRays
 from pipeline.params import FusionParams
-from pipeline.types import I32, VEHICLES, Ground, VisionMeasurement
+from pipeline.types import GROUND, I32, VEHICLES, Ground, VisionMeasurement
+from pipeline.types.ground_planes import ground_z
 
 NEAREST_M = 30.0
 """Minimum distance, measured by the camera. Closer vehicles have a cluster or are occluded."""
@@ -95,14 +97,36 @@ def range_boxes(
 
 
 def _above_the_road(sweep: SweepReturns, ground: Ground, alignment: Alignment) -> _Points:
-    xyz = sweep.points[:, :3].astype(np.float64)
-    range_m = np.hypot(xyz[:, 0], xyz[:, 1])
-    rows = np.flatnonzero((sweep.kind != -1) & (xyz[:, 0] > 0.0) & (range_m > NEAREST_M / 2))
-    height_m = xyz[rows, 2] - ground.height(xyz[rows, :2])
-    rows = rows[(height_m > _LOW_M) & (height_m < _HIGH_M)]
-    seen = xyz[rows] - np.array(sweep.origin)
+    rows, range_m = _far_and_high(sweep.points, sweep.kind, ground.planes, ground.edges, NEAREST_M / 2, _LOW_M, _HIGH_M)
+    xyz = sweep.points[rows, :3].astype(np.float64)
+    seen = xyz - np.array(sweep.origin)
     elevation_deg = np.degrees(np.arctan2(seen[:, 2], np.hypot(seen[:, 0], seen[:, 1])))
-    return _Points(alignment.project(xyz[rows]), range_m[rows], elevation_deg, sweep.kind[rows] >= 0)
+    return _Points(alignment.project(xyz), range_m, elevation_deg, sweep.kind[rows] >= 0)
+
+
+@numba.njit(cache=True, nogil=True)
+def _far_and_high(points, kind, planes, edges, nearest_m, low_m, high_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(M,) rows of the points ahead that are farther than ``nearest_m``, between two heights over the ground and not
+    ground themselves; (M,) their ranges."""
+    rows, ranges_m = np.empty(len(points), np.int64), np.empty(len(points))
+    count = 0
+    for n in range(len(points)):
+        x, y, z = np.float64(points[n, 0]), np.float64(points[n, 1]), np.float64(points[n, 2])
+        if kind[n] == GROUND or not x > 0.0:
+            continue
+        height_m = z - ground_z(planes, edges, x, y)
+        if height_m > low_m and height_m < high_m:
+            range_m = np.hypot(x, y)
+            if range_m > nearest_m:
+                rows[count], ranges_m[count] = n, range_m
+                count += 1
+    return rows[:count].copy(), ranges_m[:count].copy()
+
+
+def warm_up() -> None:
+    """Compile the kernel, or load it from numba's cache."""
+    planes, edges = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0])
+    _far_and_high(np.zeros((1, 4), np.float32), np.zeros(1, np.int32), planes, edges, 1.0, 0.0, 1.0)
 
 
 def _ranged(seen: VisionMeasurement, points: _Points) -> VisionMeasurement:

@@ -41,7 +41,8 @@ IN = f"s3://{BUCKET}/in"
 
 
 def make_fleet(folder: Path, count: int) -> list[Path]:
-    """So many sessions: parts of the real recordings of ``CIPV_DATA``, at most a quarter, and simulated traffic."""
+    """Write ``count`` sessions: parts of the real recordings in ``CIPV_DATA``, at most a quarter, and simulated
+    traffic."""
     folder.mkdir(parents=True, exist_ok=True)
     real = [file for _, file in zip(range(count // 4), _real(folder), strict=False)]
     return [*make_sessions(folder, count - len(real), SECONDS), *real]
@@ -61,7 +62,7 @@ def _real(folder: Path) -> Iterator[Path]:
 
 
 class Cluster:
-    """A scheduler, and workers that are started again when they die, in processes that can be killed."""
+    """A scheduler and workers, which are restarted when they die, in processes that can be killed."""
 
     def __init__(self, workers: int) -> None:
         with listen_socket("127.0.0.1", 0, strict=True) as free:
@@ -97,7 +98,7 @@ def cluster(workers: int) -> Iterator[Cluster]:
 
 
 def plain(workers: int) -> tuple[dict[str, str], dict[str, Any]]:
-    """A batch without faults: (the digests of its files, its figures)."""
+    """Run a batch without faults. Returns the digests of its files, and its figures."""
     out = f"s3://{BUCKET}/out-{workers}"
     work = begun(plan_of(IN, results=True), out)
     tally, memory = Tally(len(work.all)), []
@@ -116,12 +117,12 @@ def plain(workers: int) -> tuple[dict[str, str], dict[str, Any]]:
 
 
 def resident_bytes() -> int:
-    """Of this process."""
+    """Memory of this process."""
     return int(psutil.Process().memory_info().rss)
 
 
 def faulty(endpoint: str) -> tuple[dict[str, str], dict[str, Any]]:
-    """A batch to which everything happens."""
+    """Run a batch with all faults. Returns the digests of its files, and its figures."""
     out = f"s3://{BUCKET}/out-faulty"
     every(endpoint, FAILING)
     killed, schedulers, start = set[int](), 0, time.monotonic()
@@ -157,8 +158,9 @@ def faulty(endpoint: str) -> tuple[dict[str, str], dict[str, Any]]:
 
 
 def every(endpoint: str, number: int) -> tuple[int, int]:
-    """Let every n-th request fail from now on, 0 for none. Returns how many there were, and how many failed."""
-    for _ in range(3):  # this request may be one that fails
+    """Let every n-th request fail from now on; 0 for none. Returns the number of requests so far, and of failed
+    ones."""
+    for _ in range(3):  # this request may itself fail
         try:
             with urllib.request.urlopen(f"{endpoint}/every/{number}") as answer:
                 requests, failed = answer.read().split()
@@ -169,7 +171,7 @@ def every(endpoint: str, number: int) -> tuple[int, int]:
 
 
 def main() -> int:
-    """0 if all batches gave the same bytes."""
+    """Exit status: 0 if all batches gave the same bytes."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--sessions", type=int, default=200)
     parser.add_argument("--folder", type=Path, required=True)
