@@ -1,6 +1,6 @@
 """Proof of batches at scale: makes a fleet, runs it from an S3 on this machine, and compares bytes, times and memory.
 
-    python -m tests.soak.fleet --sessions 200 --folder /tmp/fleet --report build/fleet.json
+    python -m tests.soak.fleet --sessions 2000 --seconds 1 --folder /tmp/fleet --report build/fleet.json
 
 One worker, then two; then two that are killed ten times, on a store that fails every twentieth request, with a
 scheduler that is killed and a batch that is resumed. Sessions that are in the folder already are used again.
@@ -34,17 +34,23 @@ from tests.app.fleet.fleets import begun, contents, plan_of
 from tests.conftest import ROOT
 from tests.soak.fleet_store import BUCKET, ENVIRONMENT, s3_process
 
-SECONDS, REAL_FRAMES, REAL_STEP = 5.0, 12, 3
-REAL = {"astyx": "astyx:{}/astyx", "astyx-more": "astyx:{}/astyx_more", "kitti": "kitti:{}/kitti_0052"}
+REAL_FRAMES, REAL_STEP = 12, 3
+REAL = {
+    "astyx": "astyx:{}/astyx",
+    "astyx-more": "astyx:{}/astyx_more",
+    "kitti": "kitti:{}/kitti_0052",
+    "kitti-0009": "kitti:{}/kitti_0009",
+}
 KILLS, FAILING, MEMORY = 10, 20, "3GB"
 IN = f"s3://{BUCKET}/in"
 
 
-def make_fleet(folder: Path, count: int) -> list[Path]:
-    """So many sessions: parts of the real recordings of ``CIPV_DATA``, at most a quarter, and simulated traffic."""
+def make_fleet(folder: Path, count: int, seconds: float) -> list[Path]:
+    """So many sessions: parts of the real recordings of ``CIPV_DATA``, at most a quarter, and so many seconds each of
+    simulated traffic."""
     folder.mkdir(parents=True, exist_ok=True)
     real = [file for _, file in zip(range(count // 4), _real(folder), strict=False)]
-    return [*make_sessions(folder, count - len(real), SECONDS), *real]
+    return [*make_sessions(folder, count - len(real), seconds), *real]
 
 
 def _real(folder: Path) -> Iterator[Path]:
@@ -172,10 +178,11 @@ def main() -> int:
     """0 if all batches gave the same bytes."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--sessions", type=int, default=200)
+    parser.add_argument("--seconds", type=float, default=5.0, help="length of a simulated session")
     parser.add_argument("--folder", type=Path, required=True)
     parser.add_argument("--report", type=Path, default=ROOT / "build" / "fleet.json")
     asked = parser.parse_args()
-    files = make_fleet(asked.folder, asked.sessions)
+    files = make_fleet(asked.folder, asked.sessions, asked.seconds)
     report: dict[str, Any] = {
         "sessions": len(files),
         "real": sum(file.name.startswith("real-") for file in files),
