@@ -1,7 +1,7 @@
 """The events of a drive, found in its frame rows and objects by pure functions.
 
-To add a kind of event, write one module in this folder with an ``EventFinder`` and register it in ``FINDERS``. If it needs
-another field of the objects, add that to ``OBJECT_FIELDS``.
+To add a kind of event, write one module in this folder with an ``EventFinder`` and register it in ``FINDERS``. If it
+needs another field of the objects, add that to ``OBJECT_FIELDS``.
 """
 
 from __future__ import annotations
