@@ -39,7 +39,7 @@ REAL = {
     "astyx": "astyx:{}/astyx",
     "astyx-more": "astyx:{}/astyx_more",
     "kitti": "kitti:{}/kitti_0052",
-    "kitti-0009": "kitti:{}/kitti_0009",
+    "kitti-0009": "kitti:{}/kitti_0009/2011_09_26/2011_09_26_drive_0009_sync",
 }
 KILLS, FAILING, MEMORY = 10, 20, "3GB"
 IN = f"s3://{BUCKET}/in"
