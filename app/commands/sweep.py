@@ -59,6 +59,7 @@ class ParameterSweep:
 
     def __call__(self) -> int:
         need_extra()
+        from app.fleet.batch.addresses import absolute
         from app.fleet.batch.plan import Plan
         from app.fleet.batch.schedule import SchedulerLost
         from app.fleet.store import Store
@@ -67,7 +68,7 @@ class ParameterSweep:
         sets = self._sets()
         base = self.pipeline.parameters()
         points = [with_changes(base, changes) for changes in sets]  # all, so that a wrong one is told before the work
-        plan = Plan(self.addresses, base, self.pipeline.choice(), self.sensors, self.rings)
+        plan = Plan(tuple(map(absolute, self.addresses)), base, self.pipeline.choice(), self.sensors, self.rings)
         store = Store(self.out)
         try:
             runs = self._run(plan, points, store)
