@@ -12,15 +12,6 @@ from app.fleet.store import Store
 from tests.app.fleet.fleets import plan_of
 
 ODD = ("a b#1.mcap", "q?x.mcap", "pct%20.mcap", "[x].mcap", "star*.mcap", "line\nbreak.mcap", "-dash.mcap", "ü.mcap")
-    "a b#1.mcap",
-    "q?x.mcap",
-    "pct%20.mcap",
-    "[brackets].mcap",
-    "star*.mcap",
-    "line\nbreak.mcap",
-    "-dash.mcap",
-    "ü.mcap",
-)
 
 
 def test_recordings_have_the_same_address_from_any_folder(fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
