@@ -13,10 +13,10 @@ from pipeline.common.garbage_collection import collect_rarely
 from pipeline.common.geometry import iou_matrix
 from pipeline.decision import path_position
 from pipeline.ego_motion import registration, structure
-from pipeline.fusion import drift, free_road, returns
+from pipeline.fusion import free_road, returns
 from pipeline.lanes import road_lines
 from pipeline.path import corridor, road_edges, traffic
-from pipeline.types import ground_planes
+from pipeline.types import ground_planes, lane
 from pipeline.vision import place_filter
 
 _LOCK = threading.Lock()
@@ -38,13 +38,13 @@ def is_warm() -> bool:
 @cache
 def _warm_up() -> None:
     ground_planes.warm_up()
+    lane.warm_up()
     lidar.warm_up()
     one = np.eye(2)
     kalman.update(kalman.predict(kalman.start((0.0, 0.0), one, 1.0), 0.1, 1.0), (0.0, 0.0), one)
     iou_matrix(np.zeros((1, 4)), np.zeros((1, 4)))
     structure.warm_up()
     registration.warm_up()
-    drift.warm_up()
     free_road.warm_up()
     returns.warm_up()
     place_filter.warm_up()

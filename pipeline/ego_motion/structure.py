@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from pipeline.common.made_sweeps import made_sweeps
 from pipeline.types import F32, F64, Ground, LidarTrack, Sweep
 from pipeline.types.ground_planes import height_above
 
@@ -63,8 +64,9 @@ def _vehicles(tracks: tuple[LidarTrack, ...], dt_s: float) -> F64:
 
 def warm_up() -> None:
     """Compile every kernel, or load it from numba's cache."""
-    points, planes, edges = np.zeros((2, 4), np.float32), np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0])
-    support(_standing(points, planes, edges, np.zeros((1, 6)), np.float32(0.0), np.float32(1.0), 0.0))
+    planes, edges, boxes = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0]), np.zeros((1, 6))
+    for points, _ in made_sweeps():
+        support(_standing(points, planes, edges, boxes, np.float32(0.0), np.float32(9.0), 0.0))
 
 
 class Support(NamedTuple):

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from pipeline.common.geometry import F64
@@ -20,6 +19,7 @@ from pipeline.params import PathParams
 from pipeline.path.corridor import nearest
 from pipeline.path.estimates import arc, samples
 from pipeline.path.ground_points import now_at
+from pipeline.path.shape_kernels import weigh_shapes
 from pipeline.types import EgoState
 
 _NODES_M = (20.0, 40.0)
@@ -185,7 +185,7 @@ def _round(line: F64, xy: F64, blocks: F64, grid: Grid, prior: Prior, s: F64) ->
     keep = keep[:: -(-len(keep) // (_MOST_FINE if grid is _FINE else _MOST_CELLS)) or 1]
     heading, bends = _bends(line)
     first, second, turns = (_steps(*each) for each in (grid.first_m, grid.second_m, grid.heading))
-    weights, evidence = _weights(
+    weights, evidence = weigh_shapes(
         along[keep], aside[keep], blocks[keep], first, second, turns, grid.bin_m, _BAND_M, _TEMPER,
         heading, bends, *prior, _CHANCE, _CLEAR_M, _IMPROBABLE,
     )  # fmt: skip
@@ -232,79 +232,3 @@ def _moments(s: F64, first: F64, second: F64, heading: F64, weights: F64) -> tup
     mean = terms @ p
     spread = (terms - mean[:, None]) * p @ (terms - mean[:, None]).T
     return mean @ rows, np.sqrt(np.maximum(np.einsum("ik,ij,jk->k", rows, spread, rows), 0.0))
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz", "contract", "reassoc"})
-def _weights(  # type: ignore[no-untyped-def]
-    s,
-    d,
-    blocks,
-    first,
-    second,
-    heading,
-    bin_m,
-    band_m,
-    temper,
-    heading0,
-    bends,
-    bend_sigma,
-    heading_sigma,
-    own,
-    own_sigma,
-    later_sigma,
-    far_sigma,
-    chance,
-    clear_m,
-    improbable,
-):  # pragma: no cover
-    """(H, U, W) probability of each shape."""
-    bins = int(2.0 * band_m / bin_m) + 3
-    count = np.zeros(bins, np.int32)
-    by_chance = chance * max(len(s) / bins, 1.0)
-    logs = np.log(np.maximum(np.arange(4 * len(s) + 8) / 4.0 - 0.5, 0.0) / by_chance + 1.0)
-    out = np.empty((len(heading), len(first), len(second)))
-    likeliest = np.inf
-    for i in range(len(heading)):
-        for j in range(len(first)):
-            for k in range(len(second)):
-                b = (second[k] - 4.0 * first[j] + 40.0 * heading[i]) / 32000.0
-                a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
-                prior = ((bends[1] + 2.0 * a + 60.0 * b) / bend_sigma) ** 2
-                prior += ((bends[2] + 2.0 * a + 180.0 * b) / bend_sigma) ** 2
-                prior += ((bends[1] + 2.0 * a + 60.0 * b - own) / later_sigma) ** 2
-                prior += ((bends[2] + 2.0 * a + 180.0 * b - own) / far_sigma) ** 2
-                prior += ((heading0 + heading[i]) / heading_sigma) ** 2
-                prior += ((bends[0] + 2.0 * a + 18.0 * b - own) / own_sigma) ** 2
-                out[i, j, k] = 0.5 * prior
-                likeliest = min(likeliest, out[i, j, k])
-    best = -np.inf
-    s2, s3 = s * s, s * s * s
-    per_m, middle, last = 1.0 / bin_m, band_m / bin_m + 1.0, bins - 1.0  # the outer bins collect cells outside the band
-    for i in range(len(heading)):
-        for j in range(len(first)):
-            for k in range(len(second)):
-                prior = out[i, j, k]
-                if prior > likeliest + improbable:
-                    out[i, j, k] = -np.inf
-                    continue
-                b = (second[k] - 4.0 * first[j] + 40.0 * heading[i]) / 32000.0
-                a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
-                count[:] = 0
-                blocked = 0.0
-                for n in range(len(s)):
-                    aside = d[n] - heading[i] * s[n] - a * s2[n] - b * s3[n]
-                    blocked += blocks[n] if abs(aside) < clear_m else 0.0
-                    count[int(min(max(aside * per_m + middle, 0.0), last))] += 1
-                total = -blocked
-                for c in range(1, bins - 1):
-                    if count[c]:
-                        total += count[c] * logs[count[c - 1] + 2 * count[c] + count[c + 1]]
-                out[i, j, k] = temper * total - prior
-                best = max(best, out[i, j, k])
-    whole = 0.0
-    for i in range(len(heading)):
-        for j in range(len(first)):
-            for k in range(len(second)):
-                out[i, j, k] = np.exp(out[i, j, k] - best)
-                whole += out[i, j, k]
-    return out / whole, best + np.log(whole)

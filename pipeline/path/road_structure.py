@@ -6,11 +6,13 @@ Cells of earlier sweeps, moved by ego motion, complete it."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import numba
 import numpy as np
 
+from pipeline.common.made_sweeps import made_sweeps
 from pipeline.path import vanished
 from pipeline.path.ground_points import now_at
 from pipeline.types import F32, F64, GROUND, I32, I64, U8, VEHICLES, EgoState, FusedObject, Ground, Point3
@@ -116,18 +118,14 @@ def standing(cells: Cells, points: F32, ring: U8, origin: Point3, height_m: floa
 def without(cells: Cells, objects: Sequence[FusedObject]) -> Cells:
     """The cells that are not in or directly beside any of the objects; a camera-only one may be as much nearer or
     farther as its distance is uncertain."""
-    keep = np.ones(len(cells.xy), np.bool_)
-    for item in objects:
-        if item.bev is None:
-            continue
-        left, right, _, rear = np.array(item.bev)
-        length, width = np.hypot(*(left - rear)), np.hypot(*(left - right))
-        c, s = (left - rear) / max(length, 1e-6)
-        dx, dy = (cells.xy - np.mean(item.bev, axis=0)).T
-        along, across = np.abs(dx * c + dy * s), np.abs(dy * c - dx * s)
-        spare = _MARGIN_M + (0.0 if item.ranged else _SIGMAS * (item.distance_sigma_m or 0.0))
-        keep &= (along > length / 2 + spare) | (across > width / 2 + _MARGIN_M)
-    return _only(cells, keep)
+    rows = [
+        (*chain(*item.bev), _MARGIN_M + (0.0 if item.ranged else _SIGMAS * (item.distance_sigma_m or 0.0)))
+        for item in objects
+        if item.bev is not None
+    ]
+    if not rows or not len(cells.xy):
+        return cells
+    return _only(cells, _is_beside_none(np.ascontiguousarray(cells.xy), np.array(rows), _MARGIN_M))
 
 
 def _only(cells: Cells, keep: Mask | I64) -> Cells:
@@ -166,11 +164,29 @@ def _kerbs(xy: F64, ring: U8, above: F64, height_m: float) -> F64:
 
 def warm_up() -> None:
     """Compile the kernels, or load them from numba's cache."""
-    points, planes, edges = np.zeros((2, 4), np.float32), np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0])
-    kind, ring = np.zeros(2, np.int32), np.zeros(2, np.uint8)
-    _, _, low, low_ring, low_above = _sorted(points, kind, ring, planes, edges, np.zeros(1, np.bool_))
-    _kerbs(low, low_ring, low_above, 1.0)
+    planes, edges, kind = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0]), np.zeros(2, np.int32)
+    for points, ring in made_sweeps():
+        _, _, low, low_ring, low_above = _sorted(points, kind, ring, planes, edges, np.zeros(1, np.bool_))
+        _kerbs(low, low_ring, low_above, 1.0)
+    _is_beside_none(np.zeros((1, 2)), np.zeros((1, 9)), _MARGIN_M)
     vanished.warm_up()
+
+
+@numba.njit(cache=True, nogil=True)
+def _is_beside_none(xy, rows, margin_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(M,) bool, which of the places (M, 2) are beside and in none of the footprints (N, 9): x y of the four corners,
+    and how far before and behind it a place counts as beside it."""
+    keep = np.ones(len(xy), np.bool_)
+    for row in rows:
+        ahead_x, ahead_y = row[0] - row[6], row[1] - row[7]
+        length, width = np.hypot(ahead_x, ahead_y), np.hypot(row[0] - row[2], row[1] - row[3])
+        c, s = ahead_x / max(length, 1e-6), ahead_y / max(length, 1e-6)
+        x, y = (row[0] + row[2] + row[4] + row[6]) / 4.0, (row[1] + row[3] + row[5] + row[7]) / 4.0
+        for n in range(len(xy)):
+            dx, dy = xy[n, 0] - x, xy[n, 1] - y
+            along, across = abs(dx * c + dy * s), abs(dy * c - dx * s)
+            keep[n] &= along > length / 2 + row[8] or across > width / 2 + margin_m
+    return keep
 
 
 @numba.njit(cache=True, nogil=True)
@@ -185,12 +201,12 @@ def _sorted(points, kind, ring, planes, edges, is_long):  # type: ignore[no-unty
     rows, above = np.empty(count, np.int64), np.empty(count)
     starts = np.zeros(257, np.int64)
     for n in range(count):
-        x, y = points[n, 0], points[n, 1]
+        x, y, z = points[n, 0], points[n, 1], points[n, 2]
         if not (x > 0.0 and x < REACH_M and abs(y) < ASIDE_M):
             continue
-        height_m = height_above(planes, edges, x, y, points[n, 2])
+        height_m = height_above(planes, edges, x, y, z)
         if height_m > _LOW_M and height_m < _HIGH_M and kind[n] != GROUND:
-            places[standing, 0], places[standing, 1], places[standing, 2] = x, y, points[n, 2]
+            places[standing, 0], places[standing, 1], places[standing, 2] = x, y, z
             blocks[standing] = _BLOCKED if kind[n] >= 0 and is_long[kind[n]] else _PERHAPS_A_LEAD
             standing += 1
         elif height_m < _LOW_M and x < _KERBS_TO_M:

@@ -13,6 +13,7 @@ import numba
 import numpy as np
 
 from pipeline.common.geometry import F64
+from pipeline.common.made_sweeps import made_sweeps
 from pipeline.types import F32, U8
 from pipeline.types.arrays import Mask
 
@@ -59,7 +60,8 @@ def is_gone(
 
 def warm_up() -> None:
     """Compile the kernel, or load it from numba's cache."""
-    is_gone(np.ones((1, 2)), np.zeros(1), np.ones((1, 4), np.float32), np.zeros(1, np.uint8), (0.0, 0.0, 0.0), 1.0, 0.5)
+    for points, ring in made_sweeps():
+        is_gone(np.ones((1, 2)), np.zeros(1), points, ring, (0.0, 0.0, 0.0), 1.0, 0.5)
 
 
 @numba.njit(cache=True, nogil=True)

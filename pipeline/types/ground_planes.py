@@ -5,6 +5,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from pipeline.common.made_sweeps import made_sweeps
+
 
 @numba.njit(cache=True, nogil=True)
 def segment_of(edges, x):  # type: ignore[no-untyped-def]
@@ -53,5 +55,6 @@ def warm_up() -> None:
     """Compile the kernels, or load them from numba's cache."""
     planes, edges = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0])
     grounds_z(planes, edges, np.zeros((1, 2)))
-    for points in (np.zeros((1, 3)), np.zeros((1, 4), np.float32)):
+    heights_above(planes, edges, np.zeros((1, 3)))
+    for points, _ in made_sweeps():
         heights_above(planes, edges, points)
