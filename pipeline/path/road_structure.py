@@ -125,7 +125,7 @@ def without(cells: Cells, objects: Sequence[FusedObject]) -> Cells:
 
 def _only(cells: Cells, keep: Mask | I64) -> Cells:
     """The cells that a mask or indices select."""
-    return Cells(*(column[keep] for column in cells))
+    return Cells(cells.xy[keep], cells.blocks[keep], cells.age_s[keep], cells.stands[keep], cells.z_m[keep])
 
 
 def drives(item: FusedObject) -> bool:
@@ -160,8 +160,8 @@ def warm_up() -> None:
     """Compile the kernels, or load them from numba's cache."""
     planes, edges, kind = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0]), np.zeros(2, np.int32)
     for points, ring in made_sweeps():
-        _, _, *low = _sorted(points, kind, ring, planes, edges, np.zeros(1, np.bool_))
-        _kerbs(*low, 1.0)
+        _, _, low, low_ring, above = _sorted(points, kind, ring, planes, edges, np.zeros(1, np.bool_))
+        _kerbs(low, low_ring, above, 1.0)
     _is_beside_none(np.zeros((1, 2)), np.zeros((1, 9)), _MARGIN_M)
     vanished.warm_up()
 
