@@ -13,7 +13,7 @@ from pipeline.common.garbage_collection import collect_rarely
 from pipeline.common.geometry import iou_matrix
 from pipeline.decision import path_position
 from pipeline.ego_motion import registration, structure
-from pipeline.fusion import drift, free_road, returns
+from pipeline.fusion import free_road, returns
 from pipeline.lanes import road_lines
 from pipeline.path import corridor, road_edges, traffic
 from pipeline.types import ground_planes, lane
@@ -45,7 +45,6 @@ def _warm_up() -> None:
     iou_matrix(np.zeros((1, 4)), np.zeros((1, 4)))
     structure.warm_up()
     registration.warm_up()
-    drift.warm_up()
     free_road.warm_up()
     returns.warm_up()
     place_filter.warm_up()

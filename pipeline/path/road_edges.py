@@ -13,7 +13,7 @@ from pipeline.params import PathParams
 from pipeline.path import road_shape, road_structure
 from pipeline.path.estimates import PathEstimate
 from pipeline.path.road_structure import NONE, Cells
-from pipeline.types import F32, I32, U8, EgoState, FusedObject, Ground, LidarTrack, Moment, Point3
+from pipeline.types import F32, I32, U8, VEHICLES, EgoState, FusedObject, Ground, LidarTrack, Moment, Point3
 
 _FEWEST_CELLS = 25
 _ANEW_EVERY = 3
@@ -84,8 +84,8 @@ def follow(
     # Structure beside the road from earlier sweeps, moved by own motion, and from this sweep; without vehicles that
     # drive or drove here, and without the trail that they left
     before = road_structure.moved(state.cells, ego, dt_s) if dt_s else NONE
-    if around.ring is not None:
-        before = road_structure.standing(before, around.points, around.ring, around.origin)
+    if around.ring is not None and around.sensor_height_m > _LOWEST_M:
+        before = road_structure.standing(before, around.points, around.ring, around.origin, around.sensor_height_m)
     cells = road_structure.merged(before, _seen(around))
     drove_s = _drove_s(state.drove_s, around.objects, dt_s or 0.0)
     cells = road_structure.without(cells, [item for item in around.objects if _is_traffic(item, drove_s)])
@@ -110,8 +110,9 @@ def _drove_s(before: Mapping[int, float], objects: tuple[FusedObject, ...], dt_s
 
 
 def _is_traffic(item: FusedObject, drove_s: Mapping[int, float]) -> bool:
-    """Whether it drives or, like a lead that has stopped, drove earlier."""
-    return road_structure.drives(item) or drove_s.get(item.id, 0.0) >= _DROVE_S
+    """Whether it drives or, like a lead that has stopped, drove earlier. Without the camera, what seemed to drive may
+    be a hedge that came into view bit by bit."""
+    return road_structure.drives(item) or (item.label in VEHICLES and drove_s.get(item.id, 0.0) >= _DROVE_S)
 
 
 def _seen(around: Surroundings) -> Cells:

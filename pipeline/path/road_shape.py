@@ -25,21 +25,29 @@ from pipeline.types import EgoState
 _NODES_M = (20.0, 40.0)
 """A shape is a cubic, given by its lateral offset at these two distances and its heading at the car."""
 _TEMPER = 0.2
-"""Cells of one car or one hedge are not independent: five count as one."""
+"""Weight of each cell's log-likelihood: cells of one car or one hedge are not independent, so five count as one. In
+simulated traffic, 0.1 gives errors that fit the sigma better, but it doubles the median error at 30 m in the bends of
+the streets suite (0.31 to 0.63 m), because the prior then straightens them."""
 _BAND_M = 12.0
+"""Cells farther from the line than this share one bin on each side: house fronts and side streets no longer follow the
+road."""
 _IMPROBABLE = 12.0
+"""A shape is not evaluated if its log prior is this much below the largest one: the cells rarely make up for a factor
+of 160,000. This only saves time."""
 _CHANCE = 1.0
-"""Number of cells expected by chance, relative to those that line up."""
+"""Number of cells that a lateral bin holds by chance, as a multiple of the mean over all bins."""
 _EDGE_M, _EDGE_CELLS, _EDGE_SHARE = 0.5, 5, 0.3
 """An edge is a strip beside the road of this width with at least this many cells and this share of the fullest strip's
 cells."""
 _CLEAR_M = 0.9
-"""Half a car's width."""
+"""Half a car's width: cells nearer to the line than this block it."""
 _CHANGES_OVER_M, _MOST_CHANGE_PER_M = (3.0, 10.0, 30.0), (0.01, 0.025, 0.1)
-"""Permitted difference of a road's curvature over the next 6 m, the next 20 m and the 20 m beyond from that of the way
-just driven: limited by lateral jerk up to the middle of each section, and by the curvature of a street corner."""
+"""How much the curvature of the road may differ from that of the way just driven, for the next 6 m, the next 20 m and
+the 20 m beyond (1 σ): the change that ``path.lateral_jerk_mps3`` allows up to these distances, the middle of each
+section, but at most these curvatures in 1/m. The last is a street corner with a radius of 10 m."""
 _MODEL_SIGMA_PER_M2 = 0.0004
-"""Model error, since a street is not exactly a cubic."""
+"""Standard deviation of the lateral offset per squared distance, since a street is not exactly a cubic: 0.16 m at 20 m,
+0.64 m at 40 m. In 840 frames of simulated streets, 70 to 88 % of the errors at 30 to 40 m lie within one sigma."""
 
 
 class Grid(NamedTuple):
@@ -55,11 +63,13 @@ class Grid(NamedTuple):
     """Width of the lateral bins for the votes of the points."""
 
 
+# From coarse to fine: a search from scratch, around an earlier shape or the result of that search, and around the best
 _WIDE = Grid((8.0, 1.0), (24.0, 2.0), (0.0, 1.0), 1.5)
 _USUAL = Grid((4.0, 0.5), (15.0, 1.25), (0.02, 0.02), 1.0)
 _FINE = Grid((1.5, 0.25), (4.5, 0.5), (0.02, 0.02), 0.5)
 _MOST_CELLS, _MOST_FINE = 150, 200
-"""Limits the computing time; a sweep of 16 rings has 100 to 300."""
+"""Most cells used by the two coarser grids and by the finest one, to limit the computing time. A sweep of 16 rings
+gives 100 to 300 cells."""
 
 
 class Prior(NamedTuple):

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.common.made_sweeps import made_sweeps
 from pipeline.path import vanished
 from pipeline.path.ground_points import now_at
-from pipeline.types import F32, F64, GROUND, I32, I64, U8, VEHICLES, EgoState, FusedObject, Ground
+from pipeline.types import F32, F64, GROUND, I32, I64, U8, VEHICLES, EgoState, FusedObject, Ground, Point3
 from pipeline.types.arrays import Mask
 from pipeline.types.ground_planes import height_above
 
@@ -59,7 +59,7 @@ class Cells(NamedTuple):
     stands: Mask
     """(M,) bool, whether it is standing structure; a kerb is not."""
     z_m: F64
-    """(M,) ego z of the return that each was made of."""
+    """(M,) ego z of the return that each was made of; NaN for a kerb, which rays pass over anyway."""
 
 
 NONE = Cells(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0, np.bool_), np.zeros(0))
@@ -88,10 +88,14 @@ def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int], 
     is_long[list(long)] = True
     standing, blocks, low, low_ring, low_above = _sorted(points, kind, ring, ground.planes, ground.edges, is_long)
     kerbs = _kerbs(low, low_ring, low_above, height_m)
-    places = np.concatenate([standing, kerbs])
-    count = len(places)
-    stands, blocks = np.arange(count) < len(standing), np.concatenate([blocks, np.full(len(kerbs), _PERHAPS_A_LEAD)])
-    return Cells(places[:, :2], blocks, np.zeros(count), stands, places[:, 2])
+    count = len(standing) + len(kerbs)
+    return Cells(
+        np.concatenate([standing[:, :2], kerbs]),
+        np.concatenate([blocks, np.full(len(kerbs), _PERHAPS_A_LEAD)]),
+        np.zeros(count),
+        np.arange(count) < len(standing),
+        np.concatenate([standing[:, 2], np.full(len(kerbs), np.nan)]),
+    )
 
 
 def merged(before: Cells, fresh: Cells) -> Cells:
@@ -104,10 +108,11 @@ def merged(before: Cells, fresh: Cells) -> Cells:
     return _only(both, first)
 
 
-def standing(cells: Cells, points: F32, ring: U8, origin: tuple[float, float, float]) -> Cells:
-    """The cells without those through which rays of this sweep passed. Kerbs are kept: rays pass over them anyway."""
-    gone = vanished.is_gone(cells.xy, cells.z_m, points, ring, origin, CELL_M)
-    return _only(cells, ~(gone & cells.stands)) if gone.any() else cells
+def standing(cells: Cells, points: F32, ring: U8, origin: Point3, height_m: float) -> Cells:
+    """The cells without those through which rays of this sweep passed. origin: ego x y z of the sensor, ``height_m``
+    above the road."""
+    gone = vanished.is_gone(cells.xy, cells.z_m, points, ring, origin, height_m, CELL_M)
+    return _only(cells, ~gone) if gone.any() else cells
 
 
 def without(cells: Cells, objects: Sequence[FusedObject]) -> Cells:
@@ -125,7 +130,8 @@ def without(cells: Cells, objects: Sequence[FusedObject]) -> Cells:
 
 def _only(cells: Cells, keep: Mask | I64) -> Cells:
     """The cells that a mask or indices select."""
-    return Cells(cells.xy[keep], cells.blocks[keep], cells.age_s[keep], cells.stands[keep], cells.z_m[keep])
+    xy, blocks, age_s, stands, z_m = cells
+    return Cells(xy[keep], blocks[keep], age_s[keep], stands[keep], z_m[keep])
 
 
 def drives(item: FusedObject) -> bool:
@@ -147,21 +153,21 @@ def long(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int
     ]
 
 
-def _kerbs(places: F64, ring: U8, above: F64, height_m: float) -> F64:
-    """(M, 3) points on kerbs: between a level stretch of a ring and the next one that is higher or lower by a kerb's
-    height. A ring crosses a kerb at an angle, so the points in between lie along the kerb. places: (N, 3) points near
-    the ground, ring by ring, within a ring in the order of measurement."""
+def _kerbs(xy: F64, ring: U8, above: F64, height_m: float) -> F64:
+    """(M, 2) points on kerbs: between a level stretch of a ring and the next one that is higher or lower by a kerb's
+    height. A ring crosses a kerb at an angle, so the points in between lie along the kerb. xy: (N, 2) points near the
+    ground, ring by ring, within a ring in the order of measurement."""
     slant = _SLANT / height_m
-    on_kerb = _between_levels(places, ring, above, _FLAT_M, _FLAT_SHARE, _STEP_M, _STEP_MOST_M, slant, _SLACK_M)
-    return np.asarray(places[on_kerb])
+    on_kerb = _between_levels(xy, ring, above, _FLAT_M, _FLAT_SHARE, _STEP_M, _STEP_MOST_M, slant, _SLACK_M)
+    return np.asarray(xy[on_kerb])
 
 
 def warm_up() -> None:
     """Compile the kernels, or load them from numba's cache."""
     planes, edges, kind = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0]), np.zeros(2, np.int32)
     for points, ring in made_sweeps():
-        _, _, low, low_ring, above = _sorted(points, kind, ring, planes, edges, np.zeros(1, np.bool_))
-        _kerbs(low, low_ring, above, 1.0)
+        _, _, low, low_ring, low_above = _sorted(points, kind, ring, planes, edges, np.zeros(1, np.bool_))
+        _kerbs(low, low_ring, low_above, 1.0)
     _is_beside_none(np.zeros((1, 2)), np.zeros((1, 9)), _MARGIN_M)
     vanished.warm_up()
 
@@ -187,8 +193,8 @@ def _is_beside_none(xy, rows, margin_m):  # type: ignore[no-untyped-def]  # prag
 def _sorted(points, kind, ring, planes, edges, is_long):  # type: ignore[no-untyped-def]  # pragma: no cover
     """The points near the car that may show an edge. is_long: by number of a cluster, whether it is too long for a car.
 
-    Returns (A, 3) standing points and their log-likelihood that no road leads through them (A,); then (B, 3) points
-    near the ground, their ring (B,) and height (B,), ring by ring.
+    Returns (A, 3) ego x, y, z of standing points and their log-likelihood that no road leads through them (A,); then
+    (B, 2) ego x, y of points near the ground, their ring (B,) and height (B,), ring by ring.
     """
     count, standing, low = len(points), 0, 0
     places, blocks = np.empty((count, 3)), np.empty(count)
@@ -209,15 +215,14 @@ def _sorted(points, kind, ring, planes, edges, is_long):  # type: ignore[no-unty
             low += 1
     for r in range(256):
         starts[r + 1] += starts[r]
-    low_places, low_ring, low_above = np.empty((low, 3)), np.empty(low, np.uint8), np.empty(low)
+    low_xy, low_ring, low_above = np.empty((low, 2)), np.empty(low, np.uint8), np.empty(low)
     for k in range(low):
         n = rows[k]
         at = starts[ring[n]]
         starts[ring[n]] += 1
-        for c in range(3):
-            low_places[at, c] = points[n, c]
+        low_xy[at, 0], low_xy[at, 1] = points[n, 0], points[n, 1]
         low_ring[at], low_above[at] = ring[n], above[k]
-    return places[:standing].copy(), blocks[:standing].copy(), low_places, low_ring, low_above
+    return places[:standing].copy(), blocks[:standing].copy(), low_xy, low_ring, low_above
 
 
 @numba.njit(cache=True, nogil=True)

@@ -42,6 +42,10 @@ _TURNED_OFF_RAD = 0.6
 """A vehicle whose direction differs by more than this from the car's, or from that of the arc that leads to it, is
 treated as crossing or leaving the road: a bend of 50 m radius turns by this much over 30 m. At 25 m, a bend of 30 m
 radius that begins half way turns a car in it by 0.2 rad from that arc, one in the next lane by 0.3 rad."""
+_CAMERA_LINK_M = 10.0
+"""The same if only the camera sees it: at 45 m its lateral position is uncertain by 0.2 m, its distance by 3 m."""
+_CAMERA_EXISTS = 0.9
+"""Minimum probability of existing of a vehicle that only the camera sees."""
 _KEPT_S, _BEHIND_M = 20.0, -10.0
 _USUAL_TIME_S = 3.0
 """Time ahead over which the curvature changes as much as the lateral jerk of roads permits."""
@@ -57,7 +61,7 @@ class TrafficState:
     age_s: F64
     """(N,)"""
     vehicle: I64
-    """(N,) LiDAR track."""
+    """(N,) LiDAR track, or minus one minus the vision track while only the camera sees it."""
 
 
 NONE = TrafficState(np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int64))
@@ -82,8 +86,9 @@ def follow(
         return NONE, None
     kept = _moved(state, ego, dt_s) if dt_s else NONE
     for item in objects:
-        if item.label in VEHICLES and item.seen_by_lidar:
-            kept = _with(kept, item, ego)
+        number = _number(item)
+        if number is not None:
+            kept = _with(kept, item, number, ego)
     seen = _headings(kept.xy, kept.age_s, kept.vehicle)
     return kept, Traffic(_along(seen, ego, params), seen) if len(seen) else None
 
@@ -102,16 +107,26 @@ def _moved(state: TrafficState, ego: EgoState, dt_s: float) -> TrafficState:
     return TrafficState(xy[keep], age_s[keep], state.vehicle[keep])
 
 
-def _with(state: TrafficState, item: FusedObject, ego: EgoState) -> TrafficState:
-    """Adds the current position of a vehicle, named by the camera and measured by the LiDAR, if it moves and its
-    velocity agrees with its positions."""
-    if item.lidar_track is None or item.bev is None or item.velocity_mps is None:
+def _number(item: FusedObject) -> int | None:
+    """Of a vehicle whose way shows the road: one named by the camera and measured by the LiDAR, or one that the camera
+    alone has followed for so long that it certainly drives. None for any other object."""
+    if item.label not in VEHICLES:
+        return None
+    if item.seen_by_lidar:
+        return item.lidar_track
+    is_sure = item.seen_by_camera and item.measured and item.surely_moving and (item.existence or 0.0) >= _CAMERA_EXISTS
+    return -1 - item.vision_track if is_sure and not item.ranged and item.vision_track is not None else None
+
+
+def _with(state: TrafficState, item: FusedObject, number: int, ego: EgoState) -> TrafficState:
+    """Adds the current position of a vehicle if it moves and its velocity agrees with its positions."""
+    if item.bev is None or item.velocity_mps is None:
         return state
     (ax, ay), (bx, by), (cx, cy), (dx, dy) = item.bev
     x, y = (ax + bx + cx + dx) / 4.0, (ay + by + cy + dy) / 4.0
     rate = ego.yaw_rate_radps or 0.0
     along_mps, across_mps = item.velocity_mps[0] + ego.speed_mps - rate * y, item.velocity_mps[1] + rate * x
-    mine = state.vehicle == item.lidar_track
+    mine = state.vehicle == number
     rows = np.flatnonzero(mine)
     if len(rows):
         (last_x, last_y), waited_s = state.xy[rows[-1]].tolist(), float(state.age_s[rows[-1]])
@@ -119,13 +134,17 @@ def _with(state: TrafficState, item: FusedObject, ego: EgoState) -> TrafficState
         moved_m = hypot(moved_x, moved_y)
         if moved_m < _POINT_M and hypot(along_mps, across_mps) * waited_s < _LINK_M:
             return state
-        if hypot(moved_x - along_mps * waited_s, moved_y - across_mps * waited_s) > _STRAYS_M + _STRAYS * moved_m:
+        off_x, off_y = moved_x - along_mps * waited_s, moved_y - across_mps * waited_s
+        off_m = hypot(off_x, off_y)
+        if not item.seen_by_lidar:  # the distance of a box wavers by far more than its direction
+            off_m = max(abs(off_y * x - off_x * y) / max(hypot(x, y), 1.0), off_m - (item.distance_sigma_m or 0.0))
+        if off_m > _STRAYS_M + _STRAYS * moved_m:
             others = ~mine  # it is now a different vehicle, or never drove
             state = TrafficState(state.xy[others], state.age_s[others], state.vehicle[others])
     return TrafficState(
         np.concatenate([state.xy, [(x, y)]]),
         np.concatenate([state.age_s, [0.0]]),
-        np.concatenate([state.vehicle, [item.lidar_track]]),
+        np.concatenate([state.vehicle, [number]]),
     )
 
 
@@ -141,7 +160,7 @@ def _headings(xy, age_s, vehicle):  # type: ignore[no-untyped-def]  # pragma: no
         for k in rows[:-1][::-1]:
             dx, dy = xy[last, 0] - xy[k, 0], xy[last, 1] - xy[k, 1]
             way_m = np.hypot(dx, dy)
-            if way_m < _LINK_M:
+            if way_m < (_LINK_M if number >= 0 else _CAMERA_LINK_M):
                 continue
             x, y = 0.5 * (xy[last, 0] + xy[k, 0]), 0.5 * (xy[last, 1] + xy[k, 1])
             heading = np.arctan2(dy, dx)
