@@ -89,10 +89,13 @@ class GateVerdict(NamedTuple):
 
 def judge(who: Candidate) -> GateVerdict:
     """Check one object against every condition of a lead."""
-    answers = [check(who) for check in _CHECKS]
+    answers = [check(who) for _, check, _ in CONDITIONS]
     eligibility = Conditions(*[met for met, _, _ in answers])
     gates = tuple(
-        [_gate((name, value, limit, met)) for name, (met, value, limit) in zip(_SHOWN_AS, answers, strict=True)]
+        [
+            _gate((shown_as, value, limit, met))
+            for (shown_as, _, _), (met, value, limit) in zip(CONDITIONS, answers, strict=True)
+        ]
     )
     why_not = None if all(eligibility) else CONDITIONS[eligibility.index(False)].why_not(who)
     return GateVerdict(eligibility, gates, why_not)
@@ -281,7 +284,6 @@ CONDITIONS = Conditions(
     placed=Condition("path_sigma", _placed, _uncertain),
     probable=Condition("lead_probability", _probable, _improbable),
 )
-_CHECKS = tuple(condition.check for condition in CONDITIONS)
-_SHOWN_AS = tuple(condition.shown_as for condition in CONDITIONS)
+
 _gate: Callable[[tuple[str, float | None, float, bool]], Gate] = partial(tuple.__new__, Gate)
 """``Gate`` without its Python constructor, which takes three times as long: a frame may have a thousand gates."""
