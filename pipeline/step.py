@@ -133,7 +133,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     clock.lap("lanes")
     ring = frame.sweep.ring if frame.sweep is not None else None
     around = road_edges.Surroundings(
-        sweep.points, sweep.kind, ring, sweep.ground, lidar_tracks, objects, sweep.sensor_height_m
+        sweep.points, sweep.kind, ring, sweep.ground, lidar_tracks, objects, sweep.sensor_height_m, sweep.origin
     )
     edge_state, edges = road_edges.follow(state.edges, around, now, params.path, state.path.is_shown)
     clock.lap("edges")

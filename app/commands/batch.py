@@ -89,10 +89,11 @@ class Batch:
         self.cluster.check()
 
     def _plan(self) -> Plan:
+        from app.fleet.batch.addresses import absolute
         from app.fleet.batch.plan import Plan
 
         params, choice = self.pipeline.parameters(), self.pipeline.choice()
-        return Plan(self.addresses, params, choice, self.sensors, self.rings, self.results)
+        return Plan(tuple(map(absolute, self.addresses)), params, choice, self.sensors, self.rings, self.results)
 
     def _tell(self, run: str, tally: Tally, seconds: float) -> None:
         said = {

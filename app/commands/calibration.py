@@ -24,8 +24,8 @@ from pipeline.types import CameraCalibration
 
 @dataclass(frozen=True)
 class ConvertCalibration:
-    """Check the calibration of a recording or of a file, and write it for KITTI, ROS, OpenCV, Kalibr, as a rig file, or
-    as the best fit of the angular model. With an angular alignment in --params, its best pinhole camera is written.
+    """Check the calibration of a recording or of a file, and write it for KITTI, ROS, OpenCV or Kalibr, as a rig file,
+    or as the best fit of the angular model. With an angular alignment in --params, its best pinhole camera is written.
 
     Example: cipv calibration astyx:PATH --params alignment.yaml --to ros --out front_camera
     """

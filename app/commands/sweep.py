@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -16,16 +17,16 @@ from app.commands.support.options import PipelineOptions
 from app.fleet.extra import need_extra
 from pipeline.common.errors import BadInput
 from pipeline.evaluation.report_sections import Chart, ReportSection, Series, Table
-from pipeline.params import Params, to_yaml, with_changes
+from pipeline.params import Params, flat, to_yaml, with_changes
 
 if TYPE_CHECKING:
     from app.fleet.batch.plan import Plan
     from app.fleet.store import Store
-    from app.fleet.sweep import Tried
+    from app.fleet.sweep import Proposer, Tried
 
 _MISSED = ("labelled.lead_missed", "late_leads")
 _PHANTOMS = ("labelled.cipv_false", "phantom_leads")
-"""Scores that a set of parameters is judged by: against labels where the fleet has some, else without."""
+"""Scores by which a set of parameters is judged: with labels if the fleet has some, else without."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ class ParameterSweep:
     """A parameter and its values: NAME=a,b,c or NAME=low:high:count"""
     latin: Annotated[int | None, option("N")] = None
     """Try N sets spread over the space (Latin hypercube) instead of every combination"""
+    search: Annotated[int | None, option("N")] = None
+    """Try N sets, one after another, each near those that scored best (optuna)"""
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     sensors: Literal["lidar", "camera", "both"] = "both"
     """Ablation: run as if the cars had this sensor only"""
@@ -59,63 +62,78 @@ class ParameterSweep:
 
     def __call__(self) -> int:
         need_extra()
+        from app.fleet.batch.addresses import absolute
         from app.fleet.batch.plan import Plan
         from app.fleet.batch.schedule import SchedulerLost
         from app.fleet.store import Store
         from app.fleet.sweep import best_of, front
 
-        sets = self._sets()
         base = self.pipeline.parameters()
-        points = [with_changes(base, changes) for changes in sets]  # all, so that a wrong one is told before the work
-        plan = Plan(self.addresses, base, self.pipeline.choice(), self.sensors, self.rings)
-        store = Store(self.out)
+        propose, count = self._proposer(base)
+        plan = Plan(tuple(map(absolute, self.addresses)), base, self.pipeline.choice(), self.sensors, self.rings)
         try:
-            runs = self._run(plan, points, store)
+            tried, names = self._run(plan, propose, count, Store(self.out))
         except SchedulerLost as lost:
             print(f"cipv: connection to Dask lost: {lost}; run the same command again to continue", file=sys.stderr)
             return 1
-        tried, names = _judged(store, list(zip(runs, sets, strict=True)))
         best = best_of(tried)
         self._tell(tried, front(tried), best, names)
         if self.save is not None and best is not None:
-            self.save.write_text(to_yaml(points[tried.index(best)]), encoding="utf-8")
+            self.save.write_text(to_yaml(with_changes(base, best.changes)), encoding="utf-8")
             print(f"cipv: {self.save}: the set of run {best.run}", file=sys.stderr)
         return 0
 
-    def _sets(self) -> list[dict[str, Any]]:
-        from app.fleet.sweep import MOST_POINTS, grid, latin, parse_axis
+    def _proposer(self, base: Params) -> tuple[Proposer, int]:
+        """What to try, and how many sets. Everything that is wrong is told here, before the work."""
+        from app.fleet.sweep import MOST_POINTS, fixed, grid, latin, parse_axis, searching
 
         if not self.addresses:
             raise BadInput("no recording to sweep over; give at least one")
         if not self.over:
             raise BadInput("--over NAME=VALUES: give at least one parameter")
+        if self.latin is not None and self.search is not None:
+            raise BadInput("--latin and --search: give one of them")
         self.cluster.check()
-        axes = [parse_axis(text) for text in self.over]
-        if self.latin is None:
-            return grid(axes)
-        if not 1 <= self.latin <= MOST_POINTS:
-            raise BadInput(f"--latin {self.latin}: expected 1 to {MOST_POINTS}")
-        return latin(axes, self.latin)
+        current = flat(base)
+        axes = [axis.of_type(current.get(axis.name)) for axis in map(parse_axis, self.over)]
+        for option_name, number in (("--latin", self.latin), ("--search", self.search)):
+            if number is not None and not 1 <= number <= MOST_POINTS:
+                raise BadInput(f"{option_name} {number}: expected 1 to {MOST_POINTS}")
+        for axis in axes:
+            for value in axis.values:
+                with_changes(base, {axis.name: value})
+        if self.search is not None:
+            return searching(axes, self.search), self.search
+        sets = latin(axes, self.latin) if self.latin is not None else grid(axes)
+        for each in sets:
+            with_changes(base, each)
+        return fixed(sets), len(sets)
 
-    def _run(self, plan: Plan, points: list[Params], store: Store) -> list[str]:
-        """The name of the run of each set."""
+    def _run(self, plan: Plan, propose: Proposer, count: int, store: Store) -> tuple[list[Tried], tuple[str, str]]:
+        """Every set with its two scores, and the names of these."""
         from app.fleet.batch.plan import begin, work_of
+        from app.fleet.compare.worth import values_of
+        from app.fleet.find import FleetTables
         from app.fleet.pack import pack
 
-        runs = []
+        runs: list[tuple[str, Mapping[str, Any]]] = []
+        values: dict[str, dict[str, float | None]] = {}
+        tried, names = _judged(runs, values)
         with self.cluster.client(len(work_of(plan, store).all)) as client:
-            for number, params in enumerate(points, 1):
-                this = replace(plan, params=params)
+            while (changes := propose(tried)) is not None:
+                this = replace(plan, params=with_changes(plan.params, changes))
                 work = work_of(this, store)
                 begin(this, work, store)
                 tally = tally_of(work)
                 if work.jobs:
-                    run_with_bar(client, work, tally, f"set {number} of {len(points)}")
-                for address, reason in (tally.aside | tally.failed if number == 1 else tally.failed).items():
+                    run_with_bar(client, work, tally, f"set {len(runs) + 1} of {count}")
+                for address, reason in (tally.failed if runs else tally.aside | tally.failed).items():
                     print(f"cipv: skipped: {address}: {reason}", file=sys.stderr)
                 pack(store, work.key.name)
-                runs.append(work.key.name)
-        return runs
+                runs.append((work.key.name, changes))
+                values[work.key.name] = values_of(FleetTables(store, work.key.name).scores())
+                tried, names = _judged(runs, values)
+        return tried, names
 
     def _tell(self, tried: list[Tried], best: list[Tried], one: Tried | None, names: tuple[str, str]) -> None:
         from app.reports.html import html
@@ -160,16 +178,15 @@ def _word(each: Tried, best: list[Tried], one: Tried | None) -> str:
     return "best" if each is one else "front" if each in best else ""
 
 
-def _judged(store: Store, runs: list[tuple[str, dict[str, Any]]]) -> tuple[list[Tried], tuple[str, str]]:
-    """Every set with its two scores, and the names of these."""
-    from app.fleet.compare.worth import values_of
-    from app.fleet.find import FleetTables
+def _judged(
+    runs: Sequence[tuple[str, Mapping[str, Any]]], values: Mapping[str, Mapping[str, float | None]]
+) -> tuple[list[Tried], tuple[str, str]]:
+    """Every set with its two scores, and the names of these. runs: name and set. values: by run and score."""
     from app.fleet.sweep import Tried
 
-    values = {run: values_of(FleetTables(store, run).scores()) for run, _ in runs}
-    names = tuple(
+    missed, phantoms = (
         next((name for name in pair if any(found.get(name) is not None for found in values.values())), pair[-1])
         for pair in (_MISSED, _PHANTOMS)
     )
-    tried = [Tried(run, changes, values[run].get(names[0]), values[run].get(names[1])) for run, changes in runs]
-    return tried, (names[0], names[1])
+    tried = [Tried(run, changes, values[run].get(missed), values[run].get(phantoms)) for run, changes in runs]
+    return tried, (missed, phantoms)

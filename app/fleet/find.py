@@ -35,6 +35,10 @@ NAMED = {
 """Conditions by name, beside the kinds of event: usable in events like a column."""
 
 
+MOST_BYTES = 2 << 30
+"""Memory that questions with a time limit may take; the usual ones on 10,000 drives take a tenth."""
+
+
 @dataclass(frozen=True)
 class QueryResult:
     """The result of a query."""
@@ -165,7 +169,11 @@ class FleetTables:
                 stop.cancel()
 
     def _shut_in(self) -> None:
-        """Queries may come from a page, so they can read only the batch's folder."""
+        """Queries may come from a page, so they can read only the batch's folder, and can fill neither the memory nor
+        the disk of a server that is recording."""
+        if self._most_s is not None:
+            self._duckdb.execute(f"SET memory_limit = '{MOST_BYTES}B'")
+            self._duckdb.execute("SET temp_directory = ''")
         if self.store.folder is None:
             self._duckdb.register_filesystem(self.store.system)
             self._duckdb.execute("SET allowed_directories = [$1]", [f"{self.store.address}/packed/"])

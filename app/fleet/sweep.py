@@ -1,10 +1,12 @@
-"""Parameter sweeps: which sets to try, and which of those are best."""
+"""Parameter sweeps: which sets to try, and which of those are best.
+
+A sweep asks a ``Proposer`` for one set after another, and tells it the scores of all earlier ones."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +31,15 @@ class Axis:
     """Lower end of a range, in the parameter's unit; None for a list of values."""
     high: float | None = None
     """Upper end, which a grid includes; None for a list of values."""
+    is_whole: bool = False
+    """Whether values are integers."""
+
+    def of_type(self, current: Any) -> Axis:
+        """The same for a parameter whose value is now ``current``: of whole numbers if that is one."""
+        if self.low is None or isinstance(current, bool) or not isinstance(current, int):
+            return self
+        values = sorted({round(value) for value in self.values})
+        return replace(self, values=tuple(values), is_whole=True)
 
 
 def parse_axis(text: str) -> Axis:
@@ -69,6 +80,9 @@ def latin(axes: Sequence[Axis], count: int, seed: int = 0) -> list[dict[str, Any
 def _at(axis: Axis, share: float) -> Any:
     if axis.low is None or axis.high is None:
         return axis.values[min(int(share * len(axis.values)), len(axis.values) - 1)]
+    if axis.is_whole:
+        low, high = axis.values[0], axis.values[-1]
+        return low + min(int(share * (high - low + 1)), high - low)
     return round(axis.low + share * (axis.high - axis.low), 6)
 
 
@@ -84,6 +98,51 @@ class Tried:
     """Missed leads; less is better."""
     phantoms: float | None
     """Phantom leads; less is better."""
+
+
+Proposer = Callable[[Sequence[Tried]], Mapping[str, Any] | None]
+"""The next set to try after those that were tried, in order; None at the end."""
+
+
+def fixed(sets: Sequence[Mapping[str, Any]]) -> Proposer:
+    """These sets, whatever their scores."""
+    return lambda tried: sets[len(tried)] if len(tried) < len(sets) else None
+
+
+def searching(axes: Sequence[Axis], count: int, seed: int = 0) -> Proposer:
+    """``count`` sets, each chosen by the scores of all before: optuna's tree-structured Parzen estimator for several
+    objectives (Bergstra et al. 2011, Ozaki et al. 2022), after ten random ones. The same seed and scores give the
+    same sets. Raises BadInput if optuna is not installed.
+    """
+    try:
+        import optuna  # takes a second to import
+    except ImportError:
+        raise BadInput("--search needs optuna; `make install` installs it with the extra `fleet`") from None
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    study = optuna.create_study(directions=["minimize"] * 2, sampler=optuna.samplers.TPESampler(seed=seed))
+    asked: list[Any] = []
+
+    def propose(tried: Sequence[Tried]) -> Mapping[str, Any] | None:
+        if asked:
+            scores = tried[-1].missed, tried[-1].phantoms
+            if None in scores:
+                study.tell(asked[-1], state=optuna.trial.TrialState.FAIL)
+            else:
+                study.tell(asked[-1], scores)
+        if len(tried) == count:
+            return None
+        asked.append(study.ask())
+        return {axis.name: _suggested(asked[-1], axis) for axis in axes}
+
+    return propose
+
+
+def _suggested(trial: Any, axis: Axis) -> Any:
+    if axis.low is None or axis.high is None:
+        return axis.values[trial.suggest_categorical(axis.name, range(len(axis.values)))]
+    if axis.is_whole:
+        return trial.suggest_int(axis.name, axis.values[0], axis.values[-1])
+    return round(trial.suggest_float(axis.name, axis.low, axis.high), 6)
 
 
 def front(tried: Sequence[Tried]) -> list[Tried]:

@@ -7,6 +7,7 @@ pinhole camera's without distortion in its focal lengths.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -64,7 +65,7 @@ def costs(aligned: Alignment, converted: Alignment, width: int, height: int, roa
     range_m = np.hypot(points[:, 0], points[:, 1])
     apart_m = np.hypot(*(converted.unproject(pixels, range_m) - points)[:, :2].T)
     found = []
-    for low, high in zip(BEARINGS_DEG[:-1], BEARINGS_DEG[1:], strict=True):
+    for low, high in pairwise(BEARINGS_DEG):
         inside = (bearing >= low) & (bearing < high)
         if inside.any():
             found.append(Cost(low, high, float(apart_px[inside].mean()), float(apart_m[inside].mean())))

@@ -15,15 +15,19 @@ from pipeline.params import CipvParams
 from pipeline.types import VEHICLES, Conditions, Eligibility, FusedObject, Gate, Path
 
 ABREAST_M = 1.0
-"""Measured from the bumper: an object that begins nearer than this and to the side is beside the car."""
+"""An object to the side that begins nearer to the bumper than this is beside the car, which cannot be steered onto it
+within a metre."""
 OWN_HALF_WIDTH_M = 1.0
-"""Half width of a passenger car, without mirrors."""
+"""Half the width of a passenger car without mirrors (1.8 to 2 m)."""
 _KNOWN_M = 0.5
-"""A tracked distance with at most this standard deviation counts as measured."""
+"""If the LiDAR has just lost an object, its predicted distance counts as measured up to this standard deviation, which
+is small against any gap that control keeps."""
 ON_A_VAGUE_PATH = 0.25
-"""Factor on the permitted uncertainty if the path is not usable; this leaves one metre."""
+"""Factor on ``max_sigma_m`` if the path is not usable. By default this leaves one metre: an object estimated to be in
+the middle of a lane 3.5 m wide is then in it with 92 %."""
 STAYS_UP_TO = 1.5
-"""Factor on the permitted position uncertainty for the current lead, compared with a new one."""
+"""Factor on ``max_sigma_m`` for the current lead: hysteresis, so that a lead whose uncertainty is close to the limit
+does not come and go."""
 
 
 class Candidate(NamedTuple):

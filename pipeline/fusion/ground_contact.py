@@ -90,8 +90,9 @@ def _hidden_below(bbox: F64) -> Mask:
 def _contacts(bbox: F64, alignment: Alignment, road: RoadProfile) -> _Contacts:
     """Where the lower edges of boxes (M, 4) meet the road."""
     middle, lower = (bbox[:, 0] + bbox[:, 2]) / 2.0, bbox[:, 3]
-    meets = [_meets(np.column_stack([middle, lower + off]), alignment, road) for off in (0.0, -_EDGE_PX, _EDGE_PX)]
-    (x, range_m, closing), (_, far_m, _), (_, near_m, _) = meets
+    edges = np.concatenate([lower, lower - _EDGE_PX, lower + _EDGE_PX])
+    meets = _meets(np.column_stack([np.tile(middle, 3), edges]), alignment, road)
+    (x, _, _), (range_m, far_m, near_m), (closing, _, _) = (each.reshape(3, -1) for each in meets)
     with np.errstate(invalid="ignore", divide="ignore"):
         by_edge = np.log(far_m / near_m) / 2.0
         by_road = road.height_sigma_m(x) / closing / range_m

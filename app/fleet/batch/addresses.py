@@ -52,9 +52,24 @@ def recordings(addresses: Iterable[str]) -> list[Recording]:
     return sorted(found.values())
 
 
+def absolute(address: str) -> str:
+    """An address that means the same in any working folder: of a worker, or of a batch that is resumed elsewhere."""
+    if not address or is_remote(address):
+        return address
+    if not _has_scheme(address):
+        return str(Path(address.removeprefix("file://")).expanduser().absolute())
+    scheme, _, rest = address.partition(":")
+    path, mark, options = rest.partition("?")
+    place = Path(path).expanduser()
+    if not path or not place.exists():
+        return address  # such as a scenario's name
+    return f"{scheme}:{place.absolute()}{mark}{options}"
+
+
 def _of(address: str) -> Iterator[Recording]:
     if not address:
         return
+    address = absolute(address)
     if is_remote(address):
         yield from _in_store(address)
     elif _has_scheme(address):
@@ -62,7 +77,7 @@ def _of(address: str) -> Iterator[Recording]:
             raise BadInput(f"{address}: these are live sensors; recordings are needed here")
         yield Recording(address, fingerprint(address))
     else:
-        yield from _on_disk(address.removeprefix("file://"))
+        yield from _on_disk(address)
 
 
 def _has_scheme(address: str) -> bool:
@@ -72,12 +87,12 @@ def _has_scheme(address: str) -> bool:
 
 def _on_disk(address: str) -> Iterator[Recording]:
     if _GLOB.search(address) and not Path(address).exists():
-        place = Path(address).expanduser()
+        place = Path(address)
         fixed = next(n for n, part in enumerate(place.parts) if _GLOB.search(part))
         for match in sorted(Path(*place.parts[:fixed]).glob(str(Path(*place.parts[fixed:])))):
             yield from _below(match)
         return
-    place = Path(address).expanduser()
+    place = Path(address)
     if not place.exists():
         raise BadInput(f"{address}: no such file or folder")
     if place.suffix in _LIST_ENDINGS:

@@ -13,10 +13,11 @@ import numpy as np
 import zstandard
 
 from app.drive.events import find_events
+from app.drive.events.event import event_fields
 from app.drive.frame_rows import Objects, Row, objects_of, row_of
 from app.fleet.batch.answers import KeptLook
 from app.fleet.batch.drive_scores import scores_of
-from app.fleet.batch.drive_tables import FrameTables, gap_of, write_drive, write_events, write_scores
+from app.fleet.batch.drive_tables import FrameTables, Gap, gap_of, write_drive, write_events, write_scores
 from app.fleet.batch.job import Job, Outcome, TooLong, aside_file
 from app.fleet.batch.keys import code_digest, networks_digest
 from app.fleet.batch.tables import DRIVES, EVENTS, FRAMES, OBJECTS, SCORES, TIMINGS, file_of
@@ -128,6 +129,7 @@ def _run(job: Job, source: Source, detectors: Detectors, folder: Path) -> int:
     run_name, drive = job.key.name, job.recording.drive
     rows: list[Row] = []
     objects: list[Objects] = []
+    gaps: list[Gap] = []
     labelled: list[Result] = []
     history, light = History(), float("nan")
     with FrameTables(folder) as tables, _Lines(folder, job.keeps_results) as lines:
@@ -137,14 +139,14 @@ def _run(job: Job, source: Source, detectors: Detectors, folder: Path) -> int:
             lines.add(result)
             history.add(result)
             rows.append(row)
-            objects.append(records)
+            objects.append(event_fields(records))
+            gaps.append(gap_of(row, records))
             if np.isnan(light):
                 light = _brightness(frame)
             if len(labelled) < MOST_LABELLED and source.truth(frame.index) is not None:
                 labelled.append(replace(result, layers=EMPTY))
     kept.close()
     gap_s = job.key.params.time.reset_gap_s
-    gaps = [gap_of(row, records) for row, records in zip(rows, objects, strict=True)]
     write_events(folder / f"{EVENTS.name}.parquet", find_events(rows, objects, job.key.params), rows, gaps, gap_s)
     write_scores(folder / f"{SCORES.name}.parquet", scores_of(history, labelled, source, job.key.params))
     write_drive(folder / f"{DRIVES.name}.parquet", _drive_values(job, source, rows, len(labelled), light))

@@ -17,6 +17,7 @@ const KINDS = {
   iou: { label: "Box overlap (IoU)", test: "least", param: "fusion.min_iou" },
   range_sigmas: { label: "Range difference", test: "most", unit: "σ", param: "fusion.range_gate_sigmas" },
   cluster_hits: { label: "Detections of the cluster", test: "least", unit: "frames" },
+  same_kind: { label: "Kind of the cluster's box", test: "flag", param: "fusion.keep_partners" },
   class_size: { label: "Length for class", test: "most", unit: "m", param: "fusion.size_gate" },
   free_road: { label: "LiDAR sees through it", test: "most", param: "existence.enabled" },
   own_returns: { label: "LiDAR returns of its own", test: "least", param: "existence.enabled" },

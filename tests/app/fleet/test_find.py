@@ -11,6 +11,7 @@ import pytest
 
 from app.bench.fleet_tables import make_tables
 from app.cli import main
+from app.fleet import find
 from app.fleet.batch.tables import EQUAL_TABLES, EVENTS, FRAMES
 from app.fleet.batch.work import run_drive
 from app.fleet.desk import FleetDesk
@@ -114,6 +115,15 @@ def test_a_question_without_end_is_stopped(batch: Path):
     endless = "(SELECT sum(a.range * b.range) FROM range(10000000) a, range(10000000) b) > 0"
     with pytest.raises(BadInput, match=r"stopped after 0\.2 s"):
         FleetTables(Store(str(batch)), most_s=0.2).find(endless)
+
+
+def test_a_question_fills_neither_the_memory_nor_the_disk(batch: Path, monkeypatch: pytest.MonkeyPatch):
+    large = "(SELECT len(list(hash(range) ORDER BY hash(range))) FROM range(3000000)) > 0"
+    monkeypatch.setattr(find, "MOST_BYTES", 20 << 20)
+    with pytest.raises(BadInput, match="allocate"):
+        FleetTables(Store(str(batch)), most_s=60.0).find(large)
+    no_disk = FleetTables(Store(str(batch)), most_s=60.0).find("current_setting('temp_directory') = ''", "drives")
+    assert no_disk.total == SESSIONS
 
 
 def test_a_desk_finds_what_later_batches_add(fleet: Path, tmp_path: Path):

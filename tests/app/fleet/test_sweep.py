@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.cli import main
-from app.fleet.sweep import Tried, best_of, front, grid, latin, parse_axis
+from app.fleet.sweep import Axis, Tried, best_of, fixed, front, grid, latin, parse_axis, searching
 from pipeline.common.errors import BadInput
 from pipeline.params import Params, from_yaml
 
@@ -28,6 +28,42 @@ def test_a_latin_hypercube_spreads_each_parameter_evenly():
     assert points == latin(axes, 20)
     assert np.histogram([point["a.x"] for point in points], bins=20, range=(0, 10))[0].tolist() == [1] * 20
     assert [sum(point["a.y"] == value for point in points) for value in (1, 2)] == [10, 10]
+
+
+def test_ranges_of_whole_parameters_are_whole_numbers():
+    axis = parse_axis("a.x=2:5:3").of_type(3)
+    assert axis.values == (2, 4, 5)
+    shares = [point["a.x"] for point in latin([axis], 40)]
+    assert {value: shares.count(value) for value in (2, 3, 4, 5)} == dict.fromkeys((2, 3, 4, 5), 10)
+    assert all(isinstance(value, int) for value in shares)
+    assert parse_axis("a.x=2:5:3").of_type(3.0).values == (2.0, 3.5, 5.0)
+
+
+def tried_all(axes: list[Axis], count: int) -> list[Tried]:
+    """A search where both scores are least near x = 0.7, y = b and n = 3; the second set has no scores."""
+    propose, tried = searching(axes, count), list[Tried]()
+    while (found := propose(tried)) is not None:
+        off = abs(found["x"] - 0.7) + (found["y"] != "b") + abs(found["n"] - 3)
+        tried.append(Tried(f"{len(tried)}", found, off, 2.0 * off if len(tried) != 1 else None))
+    return tried
+
+
+def test_a_search_comes_nearer_to_the_best_and_is_the_same_again():
+    axes = [parse_axis("x=0:1:2"), parse_axis("y=a,b,c"), parse_axis("n=0:9:2").of_type(1)]
+    tried = tried_all(axes, 60)
+    assert tried == tried_all(axes, 60)
+    missed = np.array([each.missed for each in tried])
+    assert len(missed) == 60
+    assert missed.min() < 0.1
+    assert np.median(missed[-20:]) < 0.5 * np.median(missed[:10])
+    assert {type(each.changes["n"]) for each in tried} == {int}
+
+
+def test_fixed_sets_come_in_order():
+    propose = fixed([{"a": 1}, {"a": 2}])
+    assert propose([]) == {"a": 1}
+    assert propose([Tried("r", {"a": 1}, None, None)]) == {"a": 2}
+    assert propose([Tried("r", {"a": 1}, None, None)] * 2) is None
 
 
 WRONG = ("cluster.tolerance_m", "=1", "a.x=", "a.x=1:2", "a.x=2:1:3", "a.x=1:2:1", "a.x=1:2:3:4", "a.x=a:b:c")
@@ -69,12 +105,26 @@ def test_a_sweep_saves_the_best_as_a_preset(fleet: Path, tmp_path: Path, capsys:
     assert "<svg" in (tmp_path / "sweep.html").read_text(encoding="utf-8")
 
 
+def test_a_search_runs_every_set_that_it_proposes(fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    typed = ["sweep", str(fleet / "far-0.mcap"), "--out", str(tmp_path / "out"), "--search", "3", "--json"]
+    typed += ["--over", "cluster.min_points=3:50:2", "--sensors", "lidar", "--lanes", "off", "--far-view-px", "0"]
+    assert _cipv(*typed) == 0
+    said = json.loads(capsys.readouterr().out)
+    points = [each["set"]["cluster.min_points"] for each in said["tried"]]
+    assert len(points) == 3
+    assert all(isinstance(point, int) and 3 <= point <= 50 for point in points)
+    assert said["best"] in {each["run"] for each in said["tried"]}
+
+
 def test_what_is_wrong_is_said_before_any_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     for more in (
         (),
         ("--over", "cluster.min_points=500"),
         ("--over", "no.such=1"),
         ("--over", "cluster.min_points=4,5", "--latin", "0"),
+        ("--over", "cluster.min_points=4,5", "--search", "0"),
+        ("--over", "cluster.min_points=4,5", "--search", "2", "--latin", "2"),
+        ("--over", "cluster.min_points=4:500:3", "--search", "2"),
     ):
         assert _cipv("sweep", "sim:straight", "--out", str(tmp_path / "out"), *more) == 2
         assert len(capsys.readouterr().err.strip().splitlines()) == 1
