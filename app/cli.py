@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import tyro
+from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
 from app.core.stop_signals import as_interrupts
 from app.core.terminal import make_safe, one_line
@@ -53,6 +54,8 @@ commands of a group have different dependencies."""
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
 _NAMED_WRONG = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError)
 """A path given by the user cannot be used; other system errors are not caused by the user."""
+_PATHS = ConstructorRegistry()
+"""Resolves ``~`` in arguments of type Path, which shells leave alone after ``--out=``."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -87,7 +90,8 @@ def _parse(arguments: list[str]) -> Callable[[], int]:
     for words in (2, 1):
         name = " ".join(arguments[:words])
         if name in COMMANDS:
-            return tyro.cli(_command(name), args=arguments[words:], prog=f"cipv {name}", config=_CONFIG)
+            with _PATHS:
+                return tyro.cli(_command(name), args=arguments[words:], prog=f"cipv {name}", config=_CONFIG)
     return tyro.extras.subcommand_cli_from_dict(
         {name: _stand_in(name) for name in COMMANDS if " " not in name},
         args=arguments,
@@ -95,6 +99,25 @@ def _parse(arguments: list[str]) -> Callable[[], int]:
         description="CIPV Studio: which vehicle ahead is the closest one in my path, how far, how fast, and why.",
         config=_CONFIG,
     )
+
+
+@_PATHS.primitive_rule
+def _path(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Path] | None:
+    if info.type is not Path:
+        return None
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="PATH",
+        instance_from_str=lambda typed: _given(typed[0]),
+        is_instance=lambda value: isinstance(value, Path),
+        str_from_instance=lambda path: [str(path)],
+    )
+
+
+def _given(text: str) -> Path:
+    from pipeline.common.user_file_errors import given_path  # pydantic, which the list of commands does not need
+
+    return given_path(text)
 
 
 def _command(name: str) -> Any:
@@ -117,3 +140,7 @@ def _stand_in(name: str) -> Callable[[], Callable[[], int]]:
     shown = next(node for node in source.body if isinstance(node, ast.ClassDef) and node.name == attribute)
     command.__doc__ = ast.get_docstring(shown)
     return command
+
+
+if __name__ == "__main__":
+    main()

@@ -18,10 +18,11 @@ from pipeline.common.clips import begins_clip
 from pipeline.common.stopwatch import Stopwatch
 from pipeline.decision import acc, aeb, braking_evidence, cipv, object_motion
 from pipeline.ego_motion import coasting, own_motion
-from pipeline.fusion import agreement, drift, existence, ground_contact, returns
+from pipeline.fusion import agreement, existence, ground_contact, returns
 from pipeline.fusion import fuse as fusion
+from pipeline.fusion.drift import follow as drift
 from pipeline.lanes import road_lines as lanes
-from pipeline.lidar import segmentation
+from pipeline.lidar import road_profile, segmentation
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.params import Params
 from pipeline.path import corridor, road_edges, traffic, yaw_rate
@@ -62,7 +63,7 @@ class State:
     agreement: agreement.AgreementState = agreement.AgreementState()
     """How often camera and LiDAR agree."""
     drift: drift.DriftState = drift.DriftState()
-    """The angle between the two sensors."""
+    """What vehicles have shown of the angle between the two sensors."""
     own: EgoState | None = None
     """Ego motion of the last frame, measured or coasted; None while unknown."""
     measured: own_motion.OwnMotionState = own_motion.OwnMotionState()
@@ -103,7 +104,8 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     # Camera: the detector's boxes, each with a distance from its height, tracked from image to image
     boxes = _measure_boxes(frame, aligned, params)
     boxes = returns.range_boxes(boxes, sweep, aligned, params.fusion)
-    boxes = ground_contact.measure_contacts(boxes, sweep, aligned, now.speed_mps, params.fusion)
+    road = road_profile.road_ahead(sweep.points, sweep.ground, now.speed_mps) if boxes else None
+    boxes = ground_contact.measure_contacts(boxes, road, aligned, params.fusion)
     clock.lap("distance")
     vision_state, vision_tracks = vision_tracking.track(
         state.vision, boxes, now.dt_s, params.vision_tracking, now.speed_mps
@@ -116,7 +118,8 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     )
     vision_state = vision_tracking.learn_heights(vision_state, fused.ranged_boxes(), params.vision_tracking)
     # A knocked mount: both sensors see the same vehicles, but with an angle between them
-    drift_state, turned = drift.follow(state.drift, fused, aligned, frame.image_size, frame.t_ns, params.fusion)
+    shown = drift.Seen(frame.t_ns, frame.name, lidar_tracks, boxes, road, frame.image_size)
+    drift_state, turned = drift.follow(state.drift, shown, aligned, params.alignment, params.fusion)
     clock.lap("fusion")
     # Existence: evidence from each sensor for and against every object being at its reported position
     existence_state, objects = existence.weigh(state.existence, fused.objects, sweep, frame, now, params.existence)
@@ -130,7 +133,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     clock.lap("lanes")
     ring = frame.sweep.ring if frame.sweep is not None else None
     around = road_edges.Surroundings(
-        sweep.points, sweep.kind, ring, sweep.ground, lidar_tracks, objects, sweep.sensor_height_m
+        sweep.points, sweep.kind, ring, sweep.ground, lidar_tracks, objects, sweep.sensor_height_m, sweep.origin
     )
     edge_state, edges = road_edges.follow(state.edges, around, now, params.path, state.path.is_shown)
     clock.lap("edges")

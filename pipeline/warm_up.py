@@ -13,9 +13,10 @@ from pipeline.common.garbage_collection import collect_rarely
 from pipeline.common.geometry import iou_matrix
 from pipeline.decision import path_position
 from pipeline.ego_motion import registration, structure
-from pipeline.fusion import free_road
+from pipeline.fusion import free_road, returns
 from pipeline.lanes import road_lines
 from pipeline.path import corridor, road_edges, traffic
+from pipeline.types import ground_planes, lane
 from pipeline.vision import place_filter
 
 _LOCK = threading.Lock()
@@ -36,6 +37,8 @@ def is_warm() -> bool:
 
 @cache
 def _warm_up() -> None:
+    ground_planes.warm_up()
+    lane.warm_up()
     lidar.warm_up()
     one = np.eye(2)
     kalman.update(kalman.predict(kalman.start((0.0, 0.0), one, 1.0), 0.1, 1.0), (0.0, 0.0), one)
@@ -43,6 +46,7 @@ def _warm_up() -> None:
     structure.warm_up()
     registration.warm_up()
     free_road.warm_up()
+    returns.warm_up()
     place_filter.warm_up()
     road_lines.warm_up()
     corridor.warm_up()

@@ -1,4 +1,4 @@
-"""Detectors that look at each image once: tests that drive the same recording again and again see the same in it."""
+"""Detectors that process each image once, since tests run the same recordings again and again."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pipeline.vision.far_view import FarView, open_far_view
 
 
 class LooksOnce(Generic[Seen_co]):
-    """Answers as another detector did when it saw the same image."""
+    """Wraps a detector and caches its output for each image."""
 
     def __init__(self, detector: Detects[Seen_co]) -> None:
         self.detector = detector
@@ -37,13 +37,13 @@ class LooksOnce(Generic[Seen_co]):
 
 @cache
 def yolox_nano(data_dir: Path, width: int, height: int) -> LooksOnce[RawBoxes]:
-    """The network of the data folder for images of a size, in px."""
+    """The network of the data folder for images of a size in pixels."""
     return LooksOnce(open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (width, height)))
 
 
 @cache
 def far_view(data_dir: Path, width: int, height: int) -> FarView | None:
-    """Its second look, as on the command line."""
+    """Its second pass over the far part of the image, as on the command line."""
     network = open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (width, height))
     far = open_far_view(network, (width, height))
     return FarView(LooksOnce(far.detector), far.size_px) if far is not None else None
@@ -51,6 +51,6 @@ def far_view(data_dir: Path, width: int, height: int) -> FarView | None:
 
 @cache
 def lanes(uri: str, spec: str) -> LooksOnce[RawLanes] | None:
-    """The lane detector for a recording, as on the command line; null when it is off."""
+    """The lane detector for a recording, as on the command line; None if it is off."""
     detector = lanes_for(open_source(uri), spec)
     return None if detector is None else LooksOnce(detector)

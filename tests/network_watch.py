@@ -1,7 +1,8 @@
-"""Every address that a program and its children call, whoever in them calls: Python, a native library, another program.
+"""Records every address that a program and its children connect to, whether from Python, a native library or another
+program.
 
-A seccomp filter on one thread, which starts the program, hands each call that names an address to us before the kernel
-does it (seccomp_unotify(2)). Linux 5.5 or newer, no rights needed.
+A seccomp filter on the thread that starts the program reports each system call with an address before the kernel runs
+it (seccomp_unotify(2)). Needs Linux 5.5 or newer, but no privileges.
 """
 
 from __future__ import annotations
@@ -40,12 +41,12 @@ class Call(NamedTuple):
 
     @property
     def leaves(self) -> bool:
-        """Whether it goes to another machine, or asks a resolver of this one for a name."""
+        """Whether it goes to another machine, or asks a resolver on this one for a name."""
         return self.port == 53 or not ipaddress.ip_address(self.address).is_loopback
 
 
 def cannot_watch() -> str | None:
-    """Why this machine cannot; None when it can."""
+    """Why this machine does not support it; None if it does."""
     if platform.system() != "Linux" or platform.machine() not in _CALLS:
         return "needs Linux on x86-64 or ARM64"
     return None if tuple(map(int, platform.release().split(".")[:2])) >= (5, 5) else "needs Linux 5.5"
@@ -106,7 +107,7 @@ def _watch(listener: int, calls: list[Call], has_ended: threading.Event) -> None
         try:
             ioctl(listener, _RECEIVE, asked)
         except OSError:
-            continue  # the caller has ended meanwhile
+            continue  # the caller has exited meanwhile
         number, process, _, call = struct.unpack_from("QIIi", asked)
         found = _address_of(process, call, struct.unpack_from("6Q", asked, 32))
         if found is not None:

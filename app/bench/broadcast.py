@@ -33,7 +33,7 @@ FRAMES = 20
 
 
 def main() -> None:
-    """Until standard input ends."""
+    """Run until standard input ends."""
     stream, frames = Stream(), _frames()
     app = Starlette(routes=[WebSocketRoute("/", stream.serve)])
     config = uvicorn.Config(app, log_level="warning", access_log=False, ws_per_message_deflate="--deflate" in sys.argv)
@@ -48,7 +48,7 @@ def main() -> None:
 
 
 def _publish(stream: Stream, frames: list[ProcessedFrame]) -> None:
-    """One frame every 0.1 s by the clock; a late frame does not delay the next one."""
+    """Publish a frame every 0.1 s by the clock; a late frame does not delay the next one."""
     start = time.monotonic()
     for sequence in count(1):
         shown = Snapshot(Params(), uri="sim:straight", index=sequence, sequence=sequence, made_unix_s=time.time())

@@ -39,7 +39,7 @@ class ClientRun:
     clients: list[Client]
     """One entry per connection."""
     cpu_s: float
-    """Of the server's process."""
+    """CPU time of the server's process, seconds."""
     spent_s: float
     """Wall-clock time of the measurement."""
 
@@ -71,7 +71,7 @@ def figures(clients: int, each_s: float) -> dict[str, Any]:
 
 
 def _per_frame_ms(one: ClientRun, many: ClientRun) -> float:
-    """Cost of one more client. A frame is encoded once, however many clients there are."""
+    """CPU time that one more client costs per frame. A frame is encoded once, however many clients there are."""
     made = one.cpu_s / one.spent_s
     sent_s = many.cpu_s - made * many.spent_s
     return 1e3 * max(sent_s, 1e-9) / max(1, many.frames - round(one.frames * many.spent_s / one.spent_s))
@@ -84,8 +84,8 @@ def _rate_hz(run: ClientRun) -> dict[str, float]:
 
 
 def _lags(run: ClientRun) -> dict[str, float]:
-    """Over all clients; ``growth`` is the change of the median from the first to the last third of the run, for the
-    client whose median changed most."""
+    """Lags over all clients, in ms. ``growth`` is the change of the median from the first to the last third of the run,
+    for the client whose median changed most."""
     every = np.concatenate([client.lags_s for client in run.clients]) * 1e3
     growth = []
     for client in run.clients:
@@ -101,7 +101,7 @@ class _Server:
     process: subprocess.Popen[str]
 
     def cpu_s(self) -> float:
-        """Its CPU time so far."""
+        """CPU time of the server's process so far."""
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         self.process.stdin.write("\n")
@@ -122,7 +122,7 @@ def _server(*, deflate: bool) -> Iterator[_Server]:
 
 
 async def _measure(server: _Server, number: int, for_s: float, compression: str | None) -> ClientRun:
-    """``number`` clients that read, plus, if there are several, one that does not."""
+    """Run ``number`` clients that read and, if there are several, one more that does not."""
     url, lazy = f"ws://127.0.0.1:{server.port}/", int(number > 1)
     sockets = await asyncio.gather(*(_open(url, compression) for _ in range(number + lazy)))
     clients = [Client() for _ in range(number)]

@@ -16,13 +16,13 @@ class Requirement:
     figure: str
     """Key of the figure in the stage's row."""
     at_most: float | None = None
-    """None when there is no upper limit."""
+    """Upper limit; None without one."""
     at_least: float | None = None
-    """None when there is no lower limit."""
+    """Lower limit; None without one."""
     peer: str | None = None
     """The library that the figure compares with; None for a figure of the stage itself."""
     is_optional: bool = False
-    """Holds only where the stage's recording is available."""
+    """Whether it is skipped if the stage's recording is not available."""
 
     def broken(self, figures: Mapping[str, Mapping[str, Any]]) -> str | None:
         """A sentence when the figure misses its limit or was not measured; None otherwise, or when the peer is not
@@ -47,7 +47,7 @@ class Requirement:
 
 
 def _faster(stage: str, peer: str, times: float) -> tuple[Requirement, Requirement]:
-    """For both recordings that the LiDAR stages are measured on."""
+    """A stage must be ``times`` as fast as the peer, on both recordings that the LiDAR stages are measured on."""
     return (
         Requirement(stage, "ratio", at_least=times, peer=peer),
         Requirement(f"{stage}@kitti", "ratio", at_least=times, peer=peer, is_optional=True),
@@ -73,7 +73,7 @@ PAGE_DEMANDS = tuple(
     for when in ("", " while computed")
     for what, at_most in (("seek", 150.0), ("first view", 2000.0))
 )
-"""For the dashboard in a browser on the same machine."""
+"""Requirements for the dashboard in a browser on the same machine."""
 
 
 def page_rows(figures: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
@@ -88,5 +88,5 @@ def page_rows(figures: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 
 
 def broken(figures: Mapping[str, Mapping[str, Any]], demands: Sequence[Requirement] = DEMANDS) -> Iterator[str]:
-    """One sentence for each requirement that is missed."""
+    """Yield one sentence for each requirement that is missed."""
     return (sentence for demand in demands if (sentence := demand.broken(figures)) is not None)

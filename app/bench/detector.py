@@ -15,9 +15,8 @@ from pipeline.vision.detector import Detector
 
 
 def stages(images: Sequence[U8], detector: Detector, budget_s: float) -> dict[str, dict[str, Any]]:
-    """``{"detector": …}`` as ``cipv bench --json`` prints it, or nothing without an image. images: (H, W, 3) uint8,
-    taken in turn. The peer runs the same graph at the same size with the same number of threads; it is left out where
-    it cannot."""
+    """``{"detector": …}`` as ``cipv bench --json`` prints it; empty without an image. images: (H, W, 3) uint8, used in
+    turn. The peer runs the same graph at the same size with the same number of threads; it is omitted if it cannot."""
     if not images:
         return {}
     ours = _in_turn(detector.detect, images)
@@ -49,7 +48,7 @@ def _in_turn(work: Callable[[U8], object], images: Sequence[U8]) -> Callable[[],
 
 
 def _opencv(detector: Detector, images: Sequence[U8]) -> Callable[[], object] | None:
-    """``cv2.dnn`` on the same graph, pre-processing and decoding ours; None when OpenCV cannot read it."""
+    """``cv2.dnn`` on the same graph with our pre-processing and decoding; None if OpenCV cannot read the graph."""
     try:
         network = cv2.dnn.readNetFromONNX(np.frombuffer(detector.graph, np.uint8))
 

@@ -26,8 +26,8 @@ _DETECTIONS = Detections(boxes=BoxNoise(), lines=LineNoise())
 
 
 def make_sessions(folder: Path, count: int, seconds: float = 20.0, progress: Progress = silent) -> list[Path]:
-    """Write so many sessions, each a part of another drive on straight roads: there a recording's own labels tell the
-    lead. progress: of sessions."""
+    """Write ``count`` sessions, each a part of a different drive. The roads are straight, so that the lead follows from
+    the recording's labels. progress: counts sessions."""
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for done, number in enumerate(islice(_straight(), count)):
@@ -40,7 +40,7 @@ def make_sessions(folder: Path, count: int, seconds: float = 20.0, progress: Pro
 
 
 def _straight() -> Iterator[int]:
-    """Numbers of drives without bends and crossings, in order."""
+    """Yield the numbers of drives without bends and crossings, in order."""
     number = 0
     while True:
         _, layout, _ = layout_of(_SEED, number)

@@ -22,7 +22,7 @@ QUESTIONS = {
 
 
 def figures(drives: int = DRIVES) -> dict[str, Any]:
-    """Median of each question in milliseconds, a new connection each time; sizes of the tables."""
+    """Median time of each query in milliseconds, each on a new connection, and the sizes of the tables."""
     from app.fleet.find import FleetTables
     from app.fleet.store import Store
 
@@ -41,7 +41,7 @@ def figures(drives: int = DRIVES) -> dict[str, Any]:
 
 
 def make_tables(folder: Path, drives: int) -> dict[str, int]:
-    """Packs of made-up drives as `cipv batch` leaves them. Returns the rows of each table."""
+    """Write packs of synthetic drives as `cipv batch` would. Returns the number of rows of each table."""
     import pyarrow as pa
 
     from app.fleet.batch.tables import EQUAL_TABLES
@@ -92,7 +92,7 @@ _SCALES = {
 
 
 def _values(name: str, kind: str, rows: int, a_drive: int, random: np.random.Generator) -> Any:
-    """A column; as unlike from row to row as measured ones, so that it takes as much room."""
+    """A column of random values that vary from row to row like measured ones, so that they compress as badly."""
     import pyarrow as pa
 
     from app.drive.events import event_kinds

@@ -13,7 +13,7 @@ from pipeline.types import F32, F64, Mask
 
 
 def fit_ground_numpy(points: F32, keep: Mask, params: GroundParams) -> Ground:
-    """The same arguments and the same answer as ``pipeline.lidar.ground.fit_ground``."""
+    """Takes the same arguments and returns the same result as ``pipeline.lidar.ground.fit_ground``."""
     xyz = points[:, :3]
     x, y = xyz[:, 0], xyz[:, 1]
     inside = keep & (np.abs(x) < params.fit_range_m) & (np.abs(y) < params.fit_half_width_m)
@@ -28,7 +28,7 @@ def fit_ground_numpy(points: F32, keep: Mask, params: GroundParams) -> Ground:
 
 
 def _edges(x: F32, params: GroundParams) -> F64:
-    """Segment bounds along x with equal point counts, on multiples of the bin."""
+    """Bounds of the segments along x: equal numbers of points, at multiples of the bin."""
     bins = int(np.ceil(2.0 * params.fit_range_m / ground_kernels.X_BIN_M))
     sample = ((x[:: ground_kernels.EDGE_SAMPLE] + params.fit_range_m) / ground_kernels.X_BIN_M).astype(int)
     before = np.concatenate([[0], np.cumsum(np.bincount(sample, minlength=bins + 1))])[:-1]
@@ -38,7 +38,7 @@ def _edges(x: F32, params: GroundParams) -> F64:
 
 
 def _fit(parts: list[F32], edges: F64, params: GroundParams) -> tuple[F64, Mask]:
-    """The planes, fitted from the least ragged segment outwards."""
+    """Fit the planes, from the flattest segment outwards."""
     alone = [_refine(part, np.array([0.0, 0.0, 1.0, 0.0]), params) for part in parts]
     planes = np.array([plane for plane, _ in alone])
     raggedness = np.array([ragged for _, ragged in alone])
@@ -62,7 +62,7 @@ def _meets(plane: F64, neighbour: F64, x: float, params: GroundParams) -> bool:
 
 
 def _refine(part: F32, prior: F64, params: GroundParams) -> tuple[F64, float]:
-    """One segment's plane and its raggedness, infinite where it cannot be the road."""
+    """One segment's plane and its residual, which is infinite if the plane cannot be the road."""
     wanted = max(1, min(params.lowest_points, len(part) // plane_kernels.LOWEST_SHARE))
     raised = _heights(part, prior - [0.0, 0.0, 0.0, plane_kernels.HEIGHT_LOW_M]) * np.float32(plane_kernels.BINS_PER_M)
     levels = np.clip(raised.astype(int), 0, plane_kernels.HEIGHT_BINS - 1)
@@ -89,6 +89,6 @@ def _refine(part: F32, prior: F64, params: GroundParams) -> tuple[F64, float]:
 
 
 def _heights(xyz: F32, planes: F64) -> F32:
-    """Heights in single precision over one plane (4,) or over one plane per point (N, 4)."""
+    """Heights in single precision above one plane (4,), or above one plane per point (N, 4)."""
     a, b, c, d = planes.astype(np.float32).T
     return np.asarray(a * xyz[:, 0] + b * xyz[:, 1] + c * xyz[:, 2] + d)

@@ -17,7 +17,7 @@ from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sight
 
 MOST = 100_000
 _LIFE = 100
-"""Number of frames in which a made-up vehicle is present: 10 s at 10 Hz."""
+"""Number of frames in which each synthetic vehicle is present: 10 s at 10 Hz."""
 _SEEKS, _FAR, _PAUSE_MS, _PATIENCE_MS = 24, 37, 120, 30_000
 _ALL_THERE_WITHIN_S, _ASK_EVERY_S = 300.0, 0.5
 _PERSON = "Bench"
@@ -79,8 +79,8 @@ def labelled(running: Browser, address: str, count: int) -> dict[str, list[float
 
 
 def many(drive: LabelSet, labels: int = MOST) -> LabelSet:
-    """Made-up vehicles over a whole drive, with this many sightings in total; every tenth is a keyframe. The lead
-    changes every ten frames."""
+    """Synthetic vehicles over a whole drive, with ``labels`` labels in total, of which every tenth is a keyframe. The
+    lead changes every ten frames."""
     count = len(drive.frames)
     life, by = min(_LIFE, count), Origin("import", "made up", 1)
     tracks = []
@@ -103,7 +103,8 @@ def many(drive: LabelSet, labels: int = MOST) -> LabelSet:
 
 
 def _fill(address: str) -> int:
-    """Import them as a file of one person. Returns the number of tracks; BadInput when the import fails."""
+    """Import the synthetic labels as a file of one person. Returns the number of tracks; BadInput if the import
+    fails."""
     with urlopen(f"{address}/api/labels/export?format=native") as answer:
         labels = many(from_json(answer.read(), address))
     with urlopen(f"{address}/api/labels") as answer:

@@ -34,23 +34,23 @@ class Prepared:
     """One sweep with the results of the stages before clustering."""
 
     sweep: Sweep
-    """As recorded."""
+    """The sweep as recorded."""
     keep: npt.NDArray[np.bool_]
-    """(N,) points that downsampling leaves."""
+    """(N,) whether downsampling keeps the point."""
     chosen: npt.NDArray[np.bool_]
-    """(N,) the points to cluster."""
+    """(N,) whether the point is to be clustered."""
 
 
 def stages(sweeps: list[Sweep], budget_s: float, params: Params) -> dict[str, dict[str, Any]]:
-    """``ground``, ``cluster`` and ``lidar_chain`` as ``cipv bench --json`` prints them. Every contestant gets every
-    sweep in turn.
+    """``ground``, ``cluster`` and ``lidar_chain`` as ``cipv bench --json`` prints them. Every contestant processes
+    every sweep in turn.
 
     For a peer that cannot be measured, ``absent`` gives the reason instead of figures.
     """
     if not sweeps:
         return {}
     warm_up()
-    params = with_changes(params, {"cluster.front_only": False})  # the whole rotation, as peers' speeds are quoted
+    params = with_changes(params, {"cluster.front_only": False})  # the whole rotation, as in peers' benchmarks
     prepared = [_prepare(sweep, params) for sweep in sweeps]
     open3d, reason = _open3d()
     ground: dict[str, Callable[[], object]] = {
@@ -85,13 +85,13 @@ def _prepare(sweep: Sweep, params: Params) -> Prepared:
 
 
 def _each(prepared: list[Prepared], run: Callable[[Prepared], object]) -> Callable[[], object]:
-    """A contestant: every call takes the next sweep."""
+    """A contestant for ``interleaved``; each call processes the next sweep."""
     turn = cycle(prepared)
     return lambda: run(next(turn))
 
 
 def _chain(prepared: list[Prepared], params: Params) -> Callable[[], object]:
-    """Our stages from points to tracks; the tracker's state is carried from sweep to sweep by their timestamps."""
+    """Our stages from points to tracks. The tracker's state is predicted from sweep to sweep by their timestamps."""
     turn = cycle(prepared)
     state = LidarTrackerState()
 
@@ -109,7 +109,7 @@ def _chain(prepared: list[Prepared], params: Params) -> Callable[[], object]:
 
 
 def obstacles_of(sweep: Sweep, params: Params) -> tuple[Obstacle, ...]:
-    """One sweep through every stage before tracking."""
+    """The obstacles of one sweep, after every stage before tracking."""
     keep = keep_mask(sweep, params.downsample)
     ground = fit_ground(sweep.points, keep, params.ground)
     labels = cluster(sweep.points, candidates(sweep.points, ground, keep, params.cluster), params.cluster)
@@ -117,7 +117,7 @@ def obstacles_of(sweep: Sweep, params: Params) -> tuple[Obstacle, ...]:
 
 
 class Open3dPeer:
-    """The same work with Open3D's functions."""
+    """Does the same work with Open3D's functions."""
 
     def __init__(self, open3d: Any, params: Params) -> None:
         self._open3d = open3d
@@ -126,13 +126,14 @@ class Open3dPeer:
         open3d.utility.random.seed(0)
 
     def cluster(self, prepared: Prepared) -> npt.NDArray[np.int32]:
-        """(M,) labels of the chosen points. With z scaled and a minimum of one point, DBSCAN gives our partition."""
+        """(M,) cluster labels of the chosen points. With z scaled and a minimum of one point, DBSCAN gives the same
+        clusters as ours."""
         return self._dbscan(prepared.sweep.points[prepared.chosen, :3], min_points=1)
 
     def chain(self, prepared: Prepared, voxel_m: float | None) -> list[Any]:
-        """Points to boxes: voxels, RANSAC plane, DBSCAN of the points in range, one box per cluster. This is less than
-        our stages do: boxes are not oriented (Open3D's oriented box prints a warning for every flat cluster) and not
-        tracked."""
+        """From points to boxes: voxels, RANSAC plane, DBSCAN of the points in range, one box per cluster. This is less
+        work than our stages do: boxes are not oriented (Open3D's oriented box prints a warning for every flat cluster)
+        and not tracked."""
         cloud = self._cloud(prepared.sweep.points[:, :3])
         if voxel_m is not None:
             cloud = cloud.voxel_down_sample(voxel_m)
@@ -155,7 +156,7 @@ class Open3dPeer:
 
 
 def _open3d() -> tuple[Any, str]:
-    """The module, or None and the reason why it is not available."""
+    """The module; or None with the reason why it is not available."""
     try:
         import open3d
     except (ImportError, OSError) as error:

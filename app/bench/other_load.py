@@ -8,27 +8,27 @@ from pathlib import Path
 
 _STAT = Path("/proc/stat")
 _IDLE, _IO_WAIT, _STEAL, _GUEST = 3, 4, 7, 8
-"""Columns of /proc/stat's first line, after its name; guest time is counted in user time already."""
+"""Columns of the first line of /proc/stat, counted after its name. User time already includes guest time."""
 NOTICEABLE = 0.10
-"""Share of the machine: on two idle cores, a desktop and its timers take less."""
+"""Share of the machine's CPU time. On two idle cores, a desktop and its timers take less."""
 
 
 @dataclass(frozen=True)
 class CpuTimes:
-    """Seconds since the system began, of all cores together."""
+    """CPU times of all cores together since the system started, in seconds."""
 
     total_s: float
-    """All time, idle too."""
+    """All time, including idle time."""
     busy_s: float
-    """Time in which a core computed for this system."""
+    """Time in which a core was busy for this system."""
     stolen_s: float
-    """Time in which a core wanted to compute and the host computed something else."""
+    """Time in which a core was ready to run but the host ran something else (steal time)."""
     own_s: float
-    """Time that this process and its ended children computed."""
+    """CPU time of this process and its finished children."""
 
 
 def read_cpu_times() -> CpuTimes | None:
-    """The times so far; None where the system does not tell them (it does on Linux)."""
+    """The times so far; None if the system does not provide them (Linux does)."""
     try:
         line = _STAT.read_text(encoding="ascii").splitlines()[0]
     except OSError:
@@ -37,7 +37,7 @@ def read_cpu_times() -> CpuTimes | None:
 
 
 def parse_cpu_times(line: str, ticks_per_s: int, own_s: float) -> CpuTimes:
-    """From the first line of /proc/stat."""
+    """Parse the first line of /proc/stat."""
     ticks = [int(column) for column in line.split()[1:]][:_GUEST]
     total, stolen = sum(ticks), ticks[_STEAL]
     busy = total - ticks[_IDLE] - ticks[_IO_WAIT] - stolen
@@ -45,7 +45,8 @@ def parse_cpu_times(line: str, ticks_per_s: int, own_s: float) -> CpuTimes:
 
 
 def load_warning(before: CpuTimes | None, after: CpuTimes | None) -> str | None:
-    """A sentence when others took a noticeable share of the machine between two readings; None when not, or unknown."""
+    """A sentence if others used a noticeable share of the machine between two readings; None otherwise, or if
+    unknown."""
     if before is None or after is None or after.total_s <= before.total_s:
         return None
     span = after.total_s - before.total_s

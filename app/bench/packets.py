@@ -30,8 +30,8 @@ Rotations = list[list[bytes]]
 
 
 def stages(budget_s: float) -> dict[str, dict[str, Any]]:
-    """``decode`` and ``decode dual`` as ``cipv bench --json`` prints them: one rotation, packet by packet, to a sweep
-    in the ego frame. The first is of a sensor that sends one return of each laser, the second of one that sends two."""
+    """``decode`` and ``decode dual`` as ``cipv bench --json`` prints them: one rotation, packet by packet, decoded to a
+    sweep in the ego frame, from a sensor in single-return and in dual-return mode."""
     packets = _recorded() or _simulated()
     return {
         "decode": _stage(_rotations(packets), budget_s / 2),
@@ -56,7 +56,7 @@ def _stage(rotations: Rotations, budget_s: float) -> dict[str, Any]:
 
 
 def _recorded() -> list[bytes]:
-    """Payloads of a real sensor, stored one after another in a file; empty without that file."""
+    """Payloads of a real sensor, stored back to back in a file; empty without that file."""
     folder = data_dir() / "vlp16_packets"
     for path in sorted(folder.glob(f"*x{PACKET_BYTES}.bin")) if folder.is_dir() else ():
         raw = path.read_bytes()
@@ -65,15 +65,15 @@ def _recorded() -> list[bytes]:
 
 
 def _simulated() -> list[bytes]:
-    """The simulator's sweeps as a sensor would have sent them: the front half turn only, so half as many points."""
+    """The simulator's sweeps as packets. They cover only the front half turn, so they hold half as many points."""
     source = open_source("sim:straight")
     sweeps = (source.frame(index).sweep for index in range(_SIMULATED))
     return [packet for sweep in sweeps if sweep is not None for packet in packets_of(sweep)]
 
 
 def _with_two_returns(packets: list[bytes]) -> list[bytes]:
-    """The same rotations as a sensor in dual-return mode sends them, with twice as many packets: each block is repeated
-    with its returns one metre farther away."""
+    """The same rotations in dual-return mode, with twice as many packets: each block is repeated with its returns one
+    metre farther away."""
     doubled = []
     for packet in packets:
         for half in (0, 6):

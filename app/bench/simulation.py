@@ -29,7 +29,7 @@ def stages(budget_s: float) -> dict[str, dict[str, Any]]:
 def _stage(eyes: Eyes, budget_s: float) -> dict[str, Any]:
     scene = scenario.load(_SCENARIO)
     ticks = (tick for each in cycle([scene]) for tick in drive(each, Setup(eyes=eyes)))
-    next(ticks)  # roads, meshes and kernels are made once
+    next(ticks)  # first run: builds roads, meshes and kernels
     wall_s: list[float] = []
     cpu_s: list[float] = []
     end = perf_counter() + budget_s
@@ -39,7 +39,7 @@ def _stage(eyes: Eyes, budget_s: float) -> dict[str, Any]:
         wall_s.append(perf_counter() - start)
         cpu_s.append(process_time() - start_cpu)
     tick_ms, median_ms = 1e3 / scene.rate_hz, float(np.median(wall_s)) * 1e3
-    cpu_ms = float(np.mean(cpu_s)) * 1e3  # a mean: a processor's clock may tick more slowly than the loop
+    cpu_ms = float(np.mean(cpu_s)) * 1e3  # the CPU clock may be coarser than one tick
     return {
         **figures(wall_s),
         "cpu_ms": round(cpu_ms, 4),

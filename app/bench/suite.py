@@ -50,7 +50,7 @@ def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, An
 
 
 def _source() -> Source:
-    """The first real 16-channel recording, else the simulator."""
+    """The first real 16-channel recording; without one, the simulator."""
     return _recording("astyx:") or open_source("sim:straight")
 
 

@@ -1,4 +1,4 @@
-"""Fair timing of contestants: in one process and in turns, so that any load on the machine slows all of them."""
+"""Times contestants fairly: in one process and in turns, so that other load on the machine slows all of them."""
 
 from __future__ import annotations
 

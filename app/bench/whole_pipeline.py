@@ -22,10 +22,10 @@ from pipeline.warm_up import warm_up
 _ROUNDS = 3
 """The step alone and the step next to the network take turns, so that any load on the machine slows both."""
 _IDLE, _BESIDE = 0.3, 0.45
-"""Shares of the time: next to the network, where the step is slower, the same number of samples takes longer."""
+"""Shares of the time budget. Next to the network, where the step is slower, the same number of samples takes longer."""
 _SETTLE_S = 0.2
-"""A network that has just started is not busy yet: for 0.1 s its threads share the core of the step. A player keeps its
-network running."""
+"""Waiting time after the network starts: for about 0.1 s, its threads share the core of the step. In a player, the
+network never stops."""
 
 
 _NOBODY = Detectors()
@@ -34,8 +34,8 @@ _NOBODY = Detectors()
 def stages(
     source: Source, count: int, params: Params, detectors: Detectors, budget_s: float
 ) -> dict[str, dict[str, Any]]:
-    """Figures for ``step``, and with a detector of vehicles for ``step_beside_network`` and ``line`` (from the
-    recording to the result).
+    """Figures for ``step`` and, with a vehicle detector, for ``step_beside_network`` and ``line`` (the whole pipeline,
+    from the recording to the result).
 
     The network next to it processes one image after another, with as many threads as in the product. The first
     ``count`` frames are repeated. budget_s: total wall time, seconds.
@@ -69,13 +69,13 @@ def _read(source: Source, count: int) -> Iterator[Frame]:
 
 
 def _name(network: object) -> str | None:
-    """None: no network runs."""
+    """Name of a network; None if none runs."""
     return getattr(network, "name", None)
 
 
 class _Laps:
-    """Runs through the frames and times each, from the request to the result. Without detectors only the step is timed,
-    on frames held in memory. times_s: of every frame so far."""
+    """Runs through the frames and times each, from the request to the result. Without detectors, only the step is
+    timed, on frames held in memory. times_s: times of all frames so far."""
 
     def __init__(self, frames: Iterator[Frame], params: Params, detectors: Detectors = _NOBODY) -> None:
         self.times_s: list[float] = []
@@ -83,7 +83,7 @@ class _Laps:
         self._params, self._detectors = params, detectors
 
     def go_on(self, budget_s: float) -> None:
-        """Continue after the last frame until the time is over, for at least one frame."""
+        """Continue after the previous call's last frame until the time is over, for at least one frame."""
         start = perf_counter()
         end = start + budget_s
         while start < end or not self.times_s:
@@ -97,7 +97,7 @@ class _Laps:
 
 
 class _Busy:
-    """Keeps the network running on its own thread, like a player that reads ahead."""
+    """Keeps the network busy on its own thread, like a player that reads ahead."""
 
     def __init__(self, detector: Detects[RawBoxes], frames: list[Frame]) -> None:
         self._ended = threading.Event()

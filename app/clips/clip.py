@@ -27,9 +27,9 @@ class Clip:
     """Frames ``first`` to ``last`` of a recording, both included, run with one set of parameters."""
 
     recording: OpenRecording
-    """With its whole-drive runs, whose states the clip starts from."""
+    """The recording with its whole-drive runs, whose states the clip starts from."""
     params: Params
-    """Of the run whose results it shows."""
+    """Parameters of the run whose results it shows."""
     first: int
     """First frame."""
     last: int
@@ -37,25 +37,26 @@ class Clip:
     scheduler: ComputeScheduler
     """Asked before each frame is computed, so that interactive requests take priority."""
     title: str
-    """Shown in the exported file."""
+    """Title shown in the exported file."""
     rate_hz: float
     """Nominal frame rate of the recording."""
     start: RerunStartOptions = RerunStartOptions()
-    """How the rerun viewer starts with it."""
+    """How the rerun viewer starts with the clip."""
 
     @classmethod
     def of_source(cls, source: Source, params: Params, first: int, last: int, detectors: Detectors) -> Clip:
-        """A clip of a recording that no dashboard has open."""
+        """A clip of a recording that is not open in a dashboard."""
         times_s = timeline_s([source.t_ns(index) for index in range(len(source))], source.rate_hz)
         recording = OpenRecording(RunSetup(source, times_s, detectors, "both"), DetectionCache(), 1)
         return cls(recording, params, first, last, ComputeScheduler(), source.title, source.rate_hz)
 
 
 def clip_frames(clip: Clip, progress: Progress, *, images: bool = True) -> Iterator[tuple[Frame, Result]]:
-    """The clip's frames with their results, in order; without ``images`` their pixels may be missing.
+    """The clip's frames with their results, in order; without ``images``, pixels may be missing.
 
-    The pipeline starts from the last known state of the whole-drive run at or before the clip, and from the beginning
-    of the drive where no such run has been made. ``progress`` counts these frames too."""
+    The pipeline starts from the last known state of the whole-drive run at or before the clip; without such a run, from
+    the beginning of the drive. ``progress`` counts these frames too.
+    """
     recording, params = clip.recording, clip.params
     known = recording.last_known_state(clip.first, params)
     state, total = known.state, clip.last + 1 - known.at
@@ -71,6 +72,6 @@ def clip_frames(clip: Clip, progress: Progress, *, images: bool = True) -> Itera
 
 
 def one_frame(recording: OpenRecording, params: Params, index: int) -> tuple[Frame, Result]:
-    """A frame with its image, and its result in the run over the whole drive."""
+    """A frame with its image, and its result in the whole-drive run."""
     frame = recording.frame(index)
     return frame, step(recording.state_from_start(index, params), frame, params)[1]

@@ -23,12 +23,12 @@ _COLUMNS = (
 
 
 def write(clip: Clip, path: Path, progress: Progress) -> None:
-    """The clip's results as a table."""
+    """Write the clip's results as a table."""
     write_csv((to_json(result) for _, result in clip_frames(clip, progress, images=False)), path)
 
 
 def write_csv(results: Iterable[dict[str, Any] | None], out: Path) -> None:
-    """A row for each object of each result; None for a frame without one."""
+    """Write a row for each object of each result. results: None for a frame without a result."""
     with out.open("w", encoding="utf-8", newline="") as file:
         table = csv.DictWriter(file, _COLUMNS)
         table.writeheader()
@@ -37,7 +37,7 @@ def write_csv(results: Iterable[dict[str, Any] | None], out: Path) -> None:
 
 
 def rows(result: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """A row for each object of a result (docs/reference/results.md), or one row without an object where it has none."""
+    """A row for each object of a result (docs/reference/results.md); one row without an object if it has none."""
     ego, acc, cipv = result.get("ego") or {}, result.get("acc") or {}, result.get("cipv") or {}
     about = {
         "frame": result.get("frame"),
@@ -62,5 +62,5 @@ def rows(result: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _numbers(values: list[float] | None, *names: str) -> dict[str, float | None]:
-    """The first of the values by name; None where there are none."""
+    """The values by name; None for each if there are no values."""
     return dict(zip(names, values, strict=False)) if values else dict.fromkeys(names)

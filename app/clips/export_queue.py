@@ -1,4 +1,4 @@
-"""Runs exports in the background, one at a time. Each ends in a file to download."""
+"""Runs exports in the background, one at a time. Each produces a file to download."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ WriteFile = Callable[[Path, Progress], None]
 
 
 class ExportRefused(BadInput):
-    """An export that cannot be queued; the text says why."""
+    """Raised if an export cannot be queued; the text says why."""
 
 
 @dataclass(frozen=True)
 class ExportStatus:
-    """An export at one moment, as the API answers it."""
+    """The state of an export at one moment, as returned by the API."""
 
     id: str
-    """Its number, as a URL names it."""
+    """Its number, as used in URLs."""
     kind: str
-    """The kind of file."""
+    """Kind of file, a key of ``EXPORTERS``."""
     first: int
     """First frame of the clip."""
     last: int
@@ -42,11 +42,11 @@ class ExportStatus:
     progress: float = 0.0
     """From 0 to 1."""
     note: str = ""
-    """Why it failed."""
+    """The reason of a failure; otherwise empty."""
     file: str | None = None
-    """The download's name; None until it is done."""
+    """Name of the download; None until it is done."""
     bytes: int | None = None
-    """The download's size; None until it is done."""
+    """Size of the download; None until it is done."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +72,8 @@ class _Export:
 class ExportQueue:
     """``submit`` an export, read ``get``, download ``path``; ``close`` removes everything. Any thread.
 
-    Files lie in a temporary folder under names made here, and are deleted together with their export. ``on_end`` is
-    called on the worker's thread whenever an export has ended."""
+    Files are written to a temporary folder under generated names and are deleted together with their export. ``on_end``
+    is called on the worker's thread whenever an export has ended."""
 
     def __init__(self, on_end: Callable[[], object] = lambda: None) -> None:
         self._on_end = on_end
@@ -85,8 +85,8 @@ class ExportQueue:
         self._thread: threading.Thread | None = None
 
     def submit(self, kind: str, first: int, last: int, file: str, write: WriteFile) -> ExportStatus:
-        """Queue an export. With the queue full, the oldest one that has ended is deleted; ExportRefused when all are
-        still under way."""
+        """Queue an export. If the queue is full, the oldest finished one is deleted; ExportRefused if none has
+        finished."""
         with self._condition:
             self._begin()
             self._make_room()
@@ -100,24 +100,24 @@ class ExportQueue:
             return export.status()
 
     def all(self) -> list[ExportStatus]:
-        """The oldest first."""
+        """All exports, oldest first."""
         with self._condition:
             return [export.status() for export in self._exports.values()]
 
     def get(self, number: str) -> ExportStatus | None:
-        """None when there is no such export."""
+        """An export by its number; None if it does not exist."""
         with self._condition:
             export = self._exports.get(number)
             return export.status() if export is not None else None
 
     def path(self, number: str) -> Path | None:
-        """Where the file of a finished export lies; None otherwise."""
+        """Path of the file of a finished export; None otherwise."""
         with self._condition:
             export = self._exports.get(number)
             return export.path if export is not None and export.job.status.state == "done" else None
 
     def cancel(self, number: str) -> bool:
-        """Stop an export, or delete one that has ended; False when there is no such export."""
+        """Cancel an export, or delete a finished one; False if it does not exist."""
         with self._condition:
             export = self._exports.get(number)
             if export is None:
@@ -127,7 +127,7 @@ class ExportQueue:
             return True
 
     def close(self) -> None:
-        """Stop what is under way, and remove every file."""
+        """Cancel running exports and remove every file."""
         with self._condition:
             self._ended = True
             for export in self._exports.values():
@@ -138,7 +138,7 @@ class ExportQueue:
             shutil.rmtree(self._folder, ignore_errors=True)
 
     def _begin(self) -> None:
-        """Folder and thread are made for the first export: most servers never write one."""
+        """Create folder and thread for the first export; most servers never write one."""
         if self._thread is None:
             self._folder = Path(tempfile.mkdtemp(prefix="cipv-clips-"))
             self._thread = threading.Thread(target=self._run, name="cipv-exports", daemon=True)
@@ -165,7 +165,7 @@ class ExportQueue:
             self._on_end()
 
     def _next(self) -> _Export | None:
-        """Wait for an export to begin; None when the queue is closed."""
+        """Wait for the next export to run; None when the queue is closed."""
         with self._condition:
             while not self._ended:
                 for export in self._exports.values():

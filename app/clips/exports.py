@@ -24,7 +24,8 @@ EXPORTERS: dict[str, str] = {
     "html": "app.clips.html_report",
     "ply": "app.clips.point_cloud",
 }
-"""File suffix → the module that writes it, imported when first asked for: films, MCAP and pages together take 0.4 s."""
+"""File suffix → the module that writes it. Modules are imported on first use, since video, MCAP and HTML together take
+0.4 s."""
 
 
 def write_clip(clip: Clip, kind: str, path: Path, progress: Progress) -> None:
@@ -33,7 +34,7 @@ def write_clip(clip: Clip, kind: str, path: Path, progress: Progress) -> None:
 
 
 def submit(queue: ExportQueue, clip: Clip, kind: str) -> ExportStatus:
-    """Queue the export of a clip. BadInput when its frames are not in the recording, or too many."""
+    """Queue the export of a clip. BadInput if its frames are not in the recording, or too many."""
     total = clip.recording.setup.total
     if not 0 <= clip.first <= clip.last < total:
         raise BadInput(f"a clip must start and end within frames 0 to {total - 1}, in this order")

@@ -37,24 +37,24 @@ _WEIGHT = {"alarm": 0, "warning": 1, "notice": 2, "info": 3}
 
 @dataclass(frozen=True)
 class ClipInfo:
-    """Where a clip comes from."""
+    """The origin of a clip."""
 
     title: str
-    """Of the recording."""
+    """Title of the recording."""
     uri: str
-    """As the recording was opened."""
+    """URI with which the recording was opened."""
     first: int
     """First frame of the clip."""
     last: int
     """Last frame of the clip, included."""
     timeline_s: F64
-    """(N,) place of each frame of the whole drive on the playback timeline, in seconds."""
+    """(N,) position of each frame of the whole drive on the playback timeline, in seconds."""
     digest: str
-    """Short digest of all that the run was made from."""
+    """Short digest of the run's inputs: recording, parameters, networks."""
 
 
 def write(clip: Clip, path: Path, progress: Progress) -> None:
-    """The clip as one HTML file."""
+    """Write the clip as one HTML file."""
     recording, params = clip.recording, clip.params
     setup = recording.setup
     info = ClipInfo(clip.title, setup.uri, clip.first, clip.last, setup.timeline_s, recording.digest(params))
@@ -64,8 +64,8 @@ def write(clip: Clip, path: Path, progress: Progress) -> None:
 
 
 def clip_page(run: Iterable[tuple[Frame, Result]], draw: Callable[[int], U8], params: Params, info: ClipInfo) -> str:
-    """The whole file; it loads nothing. ``draw`` gives the image of a frame of the drive with the overlay, BGR; it is
-    asked for the first frame and for those of the weightiest events."""
+    """The whole file, which loads nothing else. ``draw`` returns the BGR image of a frame of the drive with the
+    overlay; it is called for the first frame and for those of the most important events."""
     rows: list[Row] = []
     objects: list[Objects] = []
     names: list[str] = []
@@ -87,7 +87,7 @@ def clip_page(run: Iterable[tuple[Frame, Result]], draw: Callable[[int], U8], pa
 
 
 def worth_an_image(events: Sequence[Event]) -> dict[int, str]:
-    """Place in the clip and what to say below, in order: the beginning, and the weightiest events."""
+    """Index in the clip → caption of the images to show, in order: the first frame and the most important events."""
     weighty = sorted(events, key=lambda event: (_WEIGHT[event.severity], event.index))
     said: dict[int, str] = {}
     for event in weighty:

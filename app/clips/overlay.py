@@ -19,14 +19,14 @@ _BLANK = (720, 1280)
 _BANNER_PX = 58
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-"""Corners of a cuboid that an edge joins: bottom ring, top ring, uprights."""
+"""The edges of a cuboid as pairs of its corners: bottom, top, uprights."""
 _PATH_OPACITY = 0.25
 _STATES = {"warn": "WARNING", "partial_brake": "PARTIAL BRAKING", "full_brake": "FULL BRAKING"}
 
 
 def draw_frame(frame: Frame, result: Result, params: Params) -> U8:
-    """(H, W, 3) uint8 BGR, at most ``WIDTH_PX`` wide, even in both sizes as films need it: path, boxes, cuboids of what
-    stands out, and a banner that names the CIPV. Without an image the banner is over black, which says so."""
+    """(H, W, 3) uint8 BGR, at most ``WIDTH_PX`` wide, with even sides as video codecs require: path, boxes, cuboids of
+    the highlighted objects, and a banner with the CIPV. Without an image, a black background says so."""
     canvas, scale = _background(frame)
     aligned = resolve(params.alignment, frame.camera)
     display = display_json(result, aligned, scale)
@@ -42,7 +42,7 @@ def draw_frame(frame: Frame, result: Result, params: Params) -> U8:
 
 
 def _background(frame: Frame) -> tuple[U8, float]:
-    """A canvas and how many of its pixels one of the image's takes."""
+    """The canvas, and its scale in canvas pixels per image pixel."""
     if frame.image is None:
         return np.zeros((*_BLANK, 3), np.uint8), 1.0
     height, width = frame.image.bgr.shape[:2]
@@ -67,7 +67,7 @@ def _draw_path(canvas: U8, path: dict[str, Any] | None) -> None:
 
 
 def _visible(line: list[list[float] | None], canvas: U8) -> np.ndarray:
-    """(K, 2) int32 the points of a polyline that are not absurdly far outside."""
+    """(K, 2) int32: the points of a polyline that are not far outside the canvas."""
     reach = 4 * max(canvas.shape)
     points = [point for point in line if point is not None and max(map(abs, point)) < reach]
     return np.round(np.array(points, np.float64).reshape(-1, 2)).astype(np.int32)
@@ -87,7 +87,7 @@ def _draw_object(canvas: U8, item: FusedObject, result: Result, display: dict[st
         return
     x1, y1, x2, y2 = (round(value) for value in box)
     cv2.rectangle(canvas, (x1, y1), (x2, y2), _bgr(color), thick, cv2.LINE_AA)
-    # The names of everything that only the camera sees would hide the image.
+    # Captions for all camera-only objects would hide the image.
     if leads or item.in_path or item.tracked_by_two_sensors:
         _text(canvas, object_text(item), (x1, max(y1 - 6, _BANNER_PX + 14)), color, 0.5)
 
@@ -118,7 +118,7 @@ def _lead_text(result: Result) -> str:
 
 
 def _text(canvas: U8, text: str, at: tuple[int, int], color: Rgb, size: float) -> None:
-    """Letters on a darkened plate, readable on any image."""
+    """Draw text on a darkened background, readable on any image."""
     (wide, high), below = cv2.getTextSize(_plain(text), _FONT, size, 1)
     x, y = max(at[0], 0), max(at[1], high)
     plate = canvas[max(y - high - 2, 0) : y + below, max(x - 2, 0) : x + wide + 2]
@@ -127,7 +127,7 @@ def _text(canvas: U8, text: str, at: tuple[int, int], color: Rgb, size: float) -
 
 
 def _plain(text: str) -> str:
-    """In the letters that OpenCV's font has."""
+    """The text with only those characters that OpenCV's font has."""
     return text.replace("²", "2").replace("σ", "sigma").encode("ascii", "replace").decode()
 
 

@@ -18,18 +18,18 @@ from pipeline.types import F32, F64
 
 MOST_SWEEPS = 300
 _VOXEL_M = 0.1
-"""A longer clip meets the same surface in many sweeps; one point a voxel keeps the file small."""
+"""Many sweeps of a longer clip hit the same surface; one point per voxel keeps the file small."""
 _ICP_VOXEL_M = 0.5
 _ICP_REACH_M = 2.0
 _NORMAL_RADIUS_M = 2.0
 _NORMAL_NEIGHBOURS = 30
 _LEAST_FITNESS = 0.3
 _FEWEST_POINTS = 100
-"""With less than this, or with a smaller share of points matched, the motion of the step before is kept."""
+"""With fewer points than this, or a smaller share of matched points, the motion of the previous sweep is assumed."""
 
 
 def load_open3d() -> Any:
-    """Open3D. BadInput, in one sentence, when it or a system library that it needs is missing."""
+    """The Open3D module. BadInput, in one sentence, if it or a system library that it needs is missing."""
     try:
         import open3d
     except (ImportError, OSError) as error:
@@ -41,7 +41,7 @@ def load_open3d() -> Any:
 
 
 def write(clip: Clip, path: Path, progress: Progress) -> None:
-    """Write a clip's sweeps as one cloud. BadInput for a longer clip, one without LiDAR, or when Open3D is missing."""
+    """Write a clip's sweeps as one cloud. BadInput if the clip is too long or has no LiDAR, or if Open3D is missing."""
     total = clip.last + 1 - clip.first
     if total > MOST_SWEEPS:
         raise BadInput(f"a point cloud can have at most {MOST_SWEEPS} frames")
@@ -61,7 +61,7 @@ def write_ply(sweeps: Iterable[F32 | None], path: Path) -> None:
     """Write sweeps as one cloud in the ego frame of the first one.
 
     Each is (N, 4) float32 x y z intensity in its own ego frame. A frame without a sweep is left out.
-    BadInput when no frame has one, or when Open3D cannot be loaded.
+    BadInput if no frame has one, or if Open3D cannot be loaded.
     """
     open3d = load_open3d()
     clouds: list[F32] = []
@@ -70,7 +70,7 @@ def write_ply(sweeps: Iterable[F32 | None], path: Path) -> None:
     for points in sweeps:
         if points is None or not len(points):
             continue
-        # a step begins with the motion of the step before, as a car's speed hardly changes within 0.1 s
+        # start from the motion of the previous sweep, as a car's speed hardly changes within 0.1 s
         guess = np.linalg.inv(poses[-2]) @ poses[-1] if len(poses) > 1 else np.eye(4)
         target, before = before, _thinned(open3d, points)
         moved = np.eye(4) if target is None else _registered(open3d, before, target, guess)
@@ -82,7 +82,7 @@ def write_ply(sweeps: Iterable[F32 | None], path: Path) -> None:
 
 
 def _thinned(open3d: Any, points: F32) -> Any:
-    """A cloud with normals, one point a voxel, as ICP takes it."""
+    """The points as ICP needs them: a cloud with normals and one point per voxel."""
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points[:, :3].astype(np.float64)))
     cloud = cloud.voxel_down_sample(_ICP_VOXEL_M)
     cloud.estimate_normals(open3d.geometry.KDTreeSearchParamHybrid(_NORMAL_RADIUS_M, _NORMAL_NEIGHBOURS))
@@ -90,7 +90,7 @@ def _thinned(open3d: Any, points: F32) -> Any:
 
 
 def _registered(open3d: Any, source: Any, target: Any, guess: F64) -> F64:
-    """T_target_source (4, 4) by point-to-plane ICP (Chen and Medioni 1991); the guess where too little matches."""
+    """T_target_source (4, 4) by point-to-plane ICP (Chen and Medioni 1991); the guess if too few points match."""
     if min(len(source.points), len(target.points)) < _FEWEST_POINTS:
         return guess
     registration = open3d.pipelines.registration

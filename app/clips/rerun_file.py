@@ -9,7 +9,7 @@ from pipeline.common.progress import Progress
 
 
 def write(clip: Clip, path: Path, progress: Progress) -> None:
-    """A ``.rrd`` file. ReplayError when it cannot be written."""
+    """Write a ``.rrd`` file. ReplayError if it cannot be written."""
     from app.views.rerun.view import RerunSink  # takes half a second to import
 
     with RerunSink(path, clip.title, clip.params.alignment, clip.start) as sink:

@@ -9,5 +9,5 @@ from pipeline.common.progress import Progress
 
 
 def write(clip: Clip, path: Path, progress: Progress) -> None:
-    """The frames with all that their source has of them."""
+    """Write the frames with all data that their source has."""
     clip.recording.save(path, clip.first, clip.last, progress)

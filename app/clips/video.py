@@ -19,11 +19,11 @@ from pipeline.types import F64, U8, Frame, Result
 
 _TICKS_PER_S = 1000
 _QUALITY = "20"
-"""x264's constant rate factor: 18 looks as the original, 23 is its default."""
+"""x264's constant rate factor: 18 is visually lossless, 23 is the default."""
 
 
 def write(clip: Clip, path: Path, progress: Progress) -> None:
-    """The clip as an MP4 file."""
+    """Write the clip as an MP4 file."""
     times_s = clip.recording.setup.timeline_s
     write_film(clip_frames(clip, progress), clip.params, times_s, clip.rate_hz, path)
 
@@ -31,9 +31,11 @@ def write(clip: Clip, path: Path, progress: Progress) -> None:
 def write_film(
     run: Iterable[tuple[Frame, Result]], params: Params, timeline_s: F64, rate_hz: float, path: Path
 ) -> None:
-    """Each frame is shown from its own place on the timeline to the next one's: films play as the page does.
+    """Write frames as an MP4 file. Each frame is shown from its own time on the timeline to that of the next one, as on
+    the page.
 
-    timeline_s: (N,) of the whole drive. A frame of another size than the first is fitted into it."""
+    timeline_s: (N,) of the whole drive. A frame whose size differs from the first is fitted into it.
+    """
     with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as film:
         stream = film.add_stream("libx264", rate=Fraction(rate_hz).limit_denominator(1000))
         stream.pix_fmt = "yuv420p"

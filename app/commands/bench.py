@@ -75,7 +75,7 @@ class Bench:
 
 
 def _judge(failures: Iterable[str]) -> int:
-    """Print what failed. Returns the exit status."""
+    """Print each failure. Returns the exit status."""
     status = 0
     for failure in failures:
         print(f"cipv: {failure}", file=sys.stderr)
@@ -96,14 +96,14 @@ def _table(figures: dict[str, dict[str, Any]]) -> Table:
 
 
 def _remark(row: dict[str, Any]) -> tuple[str, str, str]:
-    """The remark on a stage without peers."""
+    """The cells of a stage without peers."""
     if "p99_to_idle_median" in row:
         return f"p99 is {row['p99_to_idle_median']:.1f} × the idle step's median", "", ""
     return (f"{row['rate_hz']:.0f} Hz", "", "") if "rate_hz" in row else ("", "", "")
 
 
 def _peer_cells(name: str, peer: dict[str, Any]) -> tuple[str, str, str]:
-    """The cells of a peer; one that could not be measured says why."""
+    """The cells of a peer; if it could not be measured, they say why."""
     if peer["ratio"] is None:
         return name, "absent", peer["absent"]
     return name, f"{peer['median_ms']:.2f}", f"{peer['ratio']:.1f} ×"

@@ -76,7 +76,7 @@ class Calibrate:
         return (self._fit_distance if self.what == "distance" else self._fit_alignment)(params, source, detector)
 
     def _check(self) -> None:
-        """BadInput for an option of another fit."""
+        """BadInput if an option belongs to another fit."""
         belongs = {
             "--model": (self.model != "pinhole", "alignment"),
             "--offset": (self.offset, "alignment"),
@@ -182,7 +182,7 @@ class Calibrate:
         return 0
 
     def _about(self, source: Source, fits: Mapping[str, LawFit]) -> dict[str, object]:
-        """What a kept law was fitted to, and how well."""
+        """What a stored law was fitted to, and how well."""
         figures = {
             label: {"pairs": fit.pairs, "mean_relative_error": round(fit.mean_relative_error, 4)}
             for label, fit in fits.items()

@@ -6,12 +6,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 import tyro
+import yaml
+from rich.console import Console
+from rich.table import Table
 
 from app.commands.support.arguments import option
 from app.commands.support.open_with_progress import opened_recording
 from app.commands.support.options import PipelineOptions
-from pipeline.alignment.projection import corrected
+from pipeline.alignment.convert import angular_of, costs, pinhole_of
+from pipeline.alignment.projection import Alignment, Angular, Pinhole, corrected, resolve
 from pipeline.common.errors import BadInput
 from pipeline.formats.calibration_files import FORMATS
 from pipeline.types import CameraCalibration
@@ -19,8 +24,8 @@ from pipeline.types import CameraCalibration
 
 @dataclass(frozen=True)
 class ConvertCalibration:
-    """Check the calibration of a recording or of a file, and write it for KITTI, ROS, OpenCV, Kalibr, or
-    as a rig file.
+    """Check the calibration of a recording or of a file, and write it for KITTI, ROS, OpenCV or Kalibr, as a rig file,
+    or as the best fit of the angular model. With an angular alignment in --params, its best pinhole camera is written.
 
     Example: cipv calibration astyx:PATH --params alignment.yaml --to ros --out front_camera
     """
@@ -32,24 +37,71 @@ class ConvertCalibration:
     """File to write; for ROS and Kalibr, a folder"""
     format: Annotated[Literal["kitti", "ros", "opencv", "kalibr"] | None, option("kitti|ros|opencv|kalibr")] = None
     """Format of the file to read. Without it, SOURCE is a recording"""
-    to: Literal["kitti", "ros", "opencv", "kalibr", "rig"] = "rig"
-    """Format to write"""
+    to: Literal["kitti", "ros", "opencv", "kalibr", "rig", "angular"] = "rig"
+    """Format to write; angular: a preset file for `cipv run --params`, and a table of what this model costs"""
     size: Annotated[tuple[int, int] | None, option("WIDTH HEIGHT")] = None
     """Image size, for formats that do not store it: KITTI"""
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
 
     def __call__(self) -> int:
-        camera = corrected(self.pipeline.parameters().alignment, self._read())
-        FORMATS[self.to].write(self.out, camera)
+        params = self.pipeline.parameters().alignment
+        if params.model == "angular":
+            camera, size = self._camera_and_size()
+            aligned = resolve(params, camera)
+            if not isinstance(aligned, Angular):
+                raise BadInput("the angular alignment is incomplete: set h_res_deg, v_res_deg, cx_px and cy_px")
+            camera = pinhole_of(aligned, *size)
+            self._say_cost(aligned, _pinhole(camera), camera)
+        else:
+            camera = corrected(params, self._read())
+        if self.to == "angular":
+            found = angular_of(_pinhole(camera), camera)
+            self._say_cost(_pinhole(camera), found, camera)
+            self.out.write_text(yaml.safe_dump({"alignment": _values(found)}, sort_keys=False), encoding="utf-8")
+        else:
+            FORMATS[self.to].write(self.out, camera)
         print(f"{self.out}: {self.to}, {camera.width}×{camera.height}, f = {camera.K[0, 0]:.1f} px")
         return 0
 
+    def _say_cost(self, aligned: Alignment, converted: Alignment, camera: CameraCalibration) -> None:
+        table = Table("bearing", "image", "plan", title="mean error of the conversion, 10–60 m")
+        for each in costs(aligned, converted, camera.width, camera.height, camera.road_z_m):
+            table.add_row(f"{each.from_deg:.0f}–{each.to_deg:.0f}°", f"{each.mean_px:.1f} px", f"{each.mean_m:.2f} m")
+        Console().print(table)
+
     def _read(self) -> CameraCalibration:
-        if self.format is not None:
-            read = FORMATS[self.format].read
-            assert read is not None
-            return read(Path(self.origin), self.size)
-        camera = opened_recording(self.origin).frame(0).camera
+        camera, _ = self._camera_and_size()
         if camera is None:
             raise BadInput(f"{self.origin}: the recording has no camera calibration")
         return camera
+
+    def _camera_and_size(self) -> tuple[CameraCalibration | None, tuple[int, int]]:
+        """The calibration, and width and height of the images."""
+        if self.format is not None:
+            read = FORMATS[self.format].read
+            assert read is not None
+            camera = read(Path(self.origin), self.size)
+            return camera, (camera.width, camera.height)
+        frame = opened_recording(self.origin).frame(0)
+        if frame.camera is not None:
+            return frame.camera, (frame.camera.width, frame.camera.height)
+        size = self.size or frame.image_size
+        if size is None:
+            raise BadInput(f"{self.origin}: the recording has neither a camera calibration nor images")
+        return None, size
+
+
+def _pinhole(camera: CameraCalibration) -> Pinhole:
+    return Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
+
+
+def _values(angular: Angular) -> dict[str, float | str]:
+    """As alignment parameters."""
+    h_res_deg, v_res_deg = np.degrees([angular.h_res_rad, angular.v_res_rad]).tolist()
+    return {
+        "model": "angular",
+        "h_res_deg": round(h_res_deg, 5),
+        "v_res_deg": round(v_res_deg, 5),
+        "cx_px": round(angular.cx, 1),
+        "cy_px": round(angular.cy, 1),
+    }

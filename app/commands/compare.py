@@ -21,7 +21,7 @@ _CHANGES = 20
 
 @dataclass(frozen=True)
 class Compare:
-    """Compare two runs of `cipv batch`, paired by drive: scores with confidence intervals, events, the largest changes.
+    """Compare two runs of `cipv batch`, paired by drive: scores with confidence intervals, events, largest changes.
     With --gate, exits with 1 if a rule is broken.
 
     Example: cipv compare --out drives --base 0f04b5c90511 --gate rules.yaml
@@ -32,7 +32,7 @@ class Compare:
     base: Annotated[str, tyro.conf.arg(metavar="RUN")]
     """The run to compare against, by the name that `cipv batch` printed"""
     run: Annotated[str | None, option("RUN")] = None
-    """The run to compare; default: the last batch's"""
+    """The run to compare; default: that of the last batch"""
     base_out: Annotated[str | None, option("DIR")] = None
     """Folder of the base run, if it is another one"""
     gate: Annotated[Path | None, option("FILE")] = None

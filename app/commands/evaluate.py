@@ -37,7 +37,7 @@ from pipeline.types.source import Source
 from pipeline.warm_up import warm_up
 
 DASHBOARD = "http://127.0.0.1:8420"
-"""Where `cipv serve` listens unless told otherwise."""
+"""The address on which `cipv serve` listens by default."""
 _PRESETS = ("default", "paper")
 
 
@@ -101,7 +101,7 @@ class Evaluate:
             raise BadInput(f"--max-range-m {self.max_range_m:g}: expected metres, more than 0 and less than 1000")
 
     def _base_preset(self) -> str | None:
-        """The preset that --against names, if it names one."""
+        """The preset named by --against; None if it names a file of results."""
         one = self.against[0] if len(self.against) == 1 else ""
         return one if one in _PRESETS or one.endswith((".yaml", ".yml")) else None
 
@@ -112,7 +112,7 @@ class Evaluate:
         return preset(name) if name in _PRESETS else from_yaml(Path(name), preset("default"))
 
     def _score(self, n: int, params: Params, base: Params | None) -> list[DriveScore]:
-        """One recording's score, and the base's where there is one."""
+        """The score of one recording, followed by that of the base run if there is one."""
         source = SourceOptions(self.sources[n], self.rings).open()
         rules = Rules(LeadRule(max_range_m=self.max_range_m), params.aeb)
         truth = self._truth(n, source, rules)
@@ -162,7 +162,7 @@ class Evaluate:
 def _lines(
     source: Source, wanted: list[Params], detectors: Detectors, sensors: Sensors, done: Callable[[], None]
 ) -> Iterator[list[Result]]:
-    """Each frame's results, one a set of parameters, without their layers."""
+    """Each frame's results, one per set of parameters, without their layers."""
     warm_up()
     states = [State() for _ in wanted]
     for index in range(len(source)):
@@ -176,5 +176,5 @@ def _lines(
 
 
 def dashboard_link(dashboard: str, uri: str, index: int) -> str:
-    """The address that opens a dashboard at a frame."""
+    """The URL that opens a dashboard at a frame."""
     return f"{dashboard.rstrip('/')}/#uri={quote(uri, safe='')}&frame={index}"

@@ -37,7 +37,7 @@ class Find:
     show: Annotated[tuple[str, ...], tyro.conf.arg(metavar="COLUMN")] = ()
     """Columns to print besides drive, address and time; default: the usual ones"""
     run: Annotated[str | None, option("NAME")] = None
-    """The run to search; default: the last batch's"""
+    """The run to search; default: that of the last batch"""
     limit: int = 100
     """Print at most this many rows"""
     dashboard: Annotated[str, tyro.conf.arg(metavar="URL")] = DASHBOARD
@@ -66,7 +66,7 @@ class Find:
 
 
 def _print(rows: list[dict[str, Any]]) -> None:
-    """A table for people; the link is the moment's address in the dashboard."""
+    """Print a table with a dashboard link for each moment."""
     if not rows:
         return
     names = [name for name in rows[0] if name not in ("address", "link")]

@@ -19,9 +19,9 @@ from pipeline.common.user_file_errors import given_path
 from pipeline.recording.info import Info, Rhythm, info, info_of_source
 
 _WIDE = 120
-"""Columns of what is written to a file or another program."""
+"""Width in characters of output to a file or another program."""
 _SAME_RATE = 0.05
-"""Rates that differ less are one."""
+"""Rates that differ by a smaller share are shown as one."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def _topics_table(found: Info) -> Table:
 
 
 def _rate(beat: Rhythm, unit: str = "") -> str:
-    """Over the whole, with what it is between gaps where that is another."""
+    """The rate over the whole recording and, if it differs, the rate between gaps."""
     if beat.rate_hz is None or beat.usual_step_s is None:
         return ""
     usual_hz = 1.0 / beat.usual_step_s
@@ -111,7 +111,7 @@ def _rhythm(frames: Rhythm) -> str:
 
 
 def size_text(count: int) -> str:
-    """Bytes, as people say it."""
+    """A number of bytes in readable units."""
     for unit, name in ((1e9, "GB"), (1e6, "MB")):
         if count >= unit:
             return f"{count / unit:.1f} {name}"

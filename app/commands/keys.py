@@ -33,7 +33,7 @@ class NewKeys:
 
 @dataclass(frozen=True)
 class ShowKey:
-    """Show the digits of a public key, by which signatures name it.
+    """Show the hexadecimal digits of a public key, as `cipv info` shows them for a signed session.
 
     Example: cipv keys show ~/cipv.key.pub
     """

@@ -50,10 +50,10 @@ class Live:
         return 0
 
     def _check(self) -> int:
-        """0 when every sensor delivers, else 1."""
+        """Returns 0 if every sensor delivers data, else 1."""
         if not 0.0 < self.seconds <= _LONGEST_S:
             raise BadInput(f"--seconds {self.seconds:g}: between 0 and {_LONGEST_S:g}")
-        from pipeline.sources.live.check import check  # drivers of sensors: only who has sensors pays for them
+        from pipeline.sources.live.check import check  # sensor drivers, imported only if needed
         from pipeline.sources.live.config import load
         from pipeline.sources.live.source import LiveSensors
 
@@ -67,7 +67,7 @@ class Live:
 
 
 def _plain(report: SensorReport) -> dict[str, Any]:
-    """One flat object a sensor; milliseconds and hertz to three decimals."""
+    """A flat object for one sensor, with milliseconds and hertz to three decimals."""
     values = {**asdict(report.health), **asdict(report)}
     del values["health"], values["sensor"]
     return {name: round(value, 3) if isinstance(value, float) else value for name, value in values.items()}

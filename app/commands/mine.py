@@ -26,9 +26,8 @@ _PIPED_WIDTH = 200
 
 @dataclass(frozen=True)
 class Mine:
-    """Find the seconds of a fleet that are worth labeling next: where camera and LiDAR disagree, where it is close
-    whether an object is in the path, where the lead contradicts its neighbouring frames, and what is unlike all other
-    drives.
+    """Find the seconds of a fleet that are worth labeling next: camera and LiDAR disagree, an object is close to the
+    edge of the path, the lead contradicts neighbouring frames, or the scene is unlike all other drives.
 
     Example: cipv mine --out drives --queue
     """
@@ -38,11 +37,11 @@ class Mine:
     count: int = 50
     """Find at most this many seconds"""
     per_drive: int = 5
-    """At most this many of one drive"""
+    """Find at most this many in one drive"""
     queue: bool = False
     """Put them into the labeling queue; seconds that are labelled or queued already are left out"""
     run: Annotated[str | None, option("NAME")] = None
-    """The run to search; default: the last batch's"""
+    """The run to search; default: that of the last batch"""
     database: Database = None
     """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
     person: Person = field(default_factory=getpass.getuser)

@@ -80,7 +80,7 @@ class RegisterModel:
     def __call__(self) -> int:
         file = own_file(self.path)
         if self.task == "detector":
-            open_detector(str(file), None)  # refuse here what no later run could use
+            open_detector(str(file), None)  # refuse now a file that no later run could use
         else:
             open_lane_network(str(file))
         print(f"{register(file, self.name, self.task, self.default)}: registered as {self.name}")
@@ -136,7 +136,7 @@ class Models:
 
 
 def _listed(entries: tuple[ModelEntry, ...]) -> Iterator[str]:
-    """One paragraph per network, readable with its addresses in a terminal of 80 columns."""
+    """One paragraph per network, readable in a terminal of 80 columns, URLs included."""
     yield f"Networks in {store()} (● default)"
     for entry in entries:
         licence = f"  {entry.licence}" if entry.licence else ""
@@ -148,7 +148,7 @@ def _listed(entries: tuple[ModelEntry, ...]) -> Iterator[str]:
 
 
 def _where(entry: ModelEntry) -> Iterator[str]:
-    """The file, or how to get it."""
+    """The path of the file, or how to get it."""
     if entry.path is not None:
         yield f"installed: {entry.path}"
     elif entry.url is not None:

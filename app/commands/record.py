@@ -63,7 +63,7 @@ class Record:
             return self._offline(cast("Source", source), params, asked)
 
     def _offline(self, source: Source, params: Params, asked: Event) -> int:
-        """A recording waits for the disk, so nothing is dropped."""
+        """Record from a recording, which waits for the disk, so no frame is dropped."""
         detectors = self.pipeline.open_detectors(source)
         segments = Segments(new_session(self.out, source.title), about(source, detectors), self._rotation)
         _say_where(segments.files[0])
@@ -76,7 +76,7 @@ class Record:
         return 0
 
     def _live(self, source: LiveSource, params: Params, asked: Event) -> int:
-        """Sensors do not wait: frames that the disk is too slow for are dropped and counted."""
+        """Record from live sensors, which do not wait: frames are dropped and counted if the disk is too slow."""
         detectors, waiting = self.pipeline.open_detectors(source), Waiting(source)
         recorder = self._recorder(source, detectors)
 
@@ -115,7 +115,7 @@ class Record:
         return 0 if state.error is None else 1
 
     def _recorder(self, source: LiveSource, detectors: Detectors) -> Recorder:
-        """Records point clouds, or the packets that they are made of."""
+        """A recorder of point clouds, or with --packets of raw packets."""
         path, mount = new_session(self.out, source.title), source.lidar_mount
         if not self.packets:
             return Recorder(path, about(source, detectors), self._rotation)
@@ -130,7 +130,8 @@ class Record:
         return FileRotation(max_bytes, max_s)
 
     def _until_enough(self, ran: Iterator[tuple[Frame, Result]], asked: Event) -> Iterator[tuple[Frame, Result]]:
-        """Until ``seconds`` have passed or a stop is requested; either way the file is finished properly."""
+        """The frames until ``seconds`` have passed or a stop is requested; in both cases the file is finished
+        properly."""
         first_ns = None
         with suppress(_Ended):
             for frame, result in ran:
@@ -142,7 +143,7 @@ class Record:
 
 
 class _Ended(Exception):
-    """A stop was requested."""
+    """Raised if a stop was requested."""
 
 
 def _end_if(asked: Event) -> None:

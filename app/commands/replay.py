@@ -19,7 +19,7 @@ from pipeline.types.source import RawPackets
 
 @dataclass(frozen=True)
 class Replay:
-    """Send a recording as VLP-16 packets, MJPEG, NMEA and CAN in real time, to the addresses of a live config.
+    """Send a recording in real time as VLP-16 packets, MJPEG, NMEA and CAN to the addresses of a live config.
 
     Example: cipv replay sim:straight --config car.yaml
     """
@@ -37,7 +37,7 @@ class Replay:
     def __call__(self) -> int:
         if not 0.05 <= self.speed <= 20.0:
             raise BadInput(f"--speed {self.speed:g}: between 0.05 and 20")
-        from pipeline.replay.faults import load as load_faults  # drivers of sensors: only who replays pays for them
+        from pipeline.replay.faults import load as load_faults  # sensor drivers, imported only if needed
         from pipeline.replay.messages import of_recording
         from pipeline.replay.replayer import replay
         from pipeline.replay.senders import open_senders

@@ -72,7 +72,7 @@ class RunPipeline:
         return 0
 
     def _results(self, source: AnySource, params: Params, detectors: Detectors) -> Iterator[tuple[Frame, Result]]:
-        """Frames with their results, as many as are wanted."""
+        """Frames with their results, at most ``frames``."""
         if is_live_source(source):
             every = run_live(source, params, detectors, self.sensors, Waiting(source))
         else:
@@ -81,7 +81,7 @@ class RunPipeline:
 
 
 def _until_interrupted(results: Iterator[tuple[Frame, Result]], is_live: bool) -> Iterator[tuple[Frame, Result]]:
-    """All of them. Live sensors have no end of their own: there Ctrl-C is it, and all is well."""
+    """All results. Live sensors have no end, so Ctrl-C ends them without an error."""
     try:
         yield from results
     except KeyboardInterrupt:
@@ -90,7 +90,7 @@ def _until_interrupted(results: Iterator[tuple[Frame, Result]], is_live: bool) -
 
 
 def _sentence(result: Result) -> str:
-    """One frame in one line, for a person."""
+    """A line of text about one frame."""
     lead = result.cipv
     if lead is None:
         return f"{result.frame}  no vehicle in path"
@@ -102,7 +102,7 @@ def _sentence(result: Result) -> str:
 
 @dataclass
 class _Tally:
-    """What to say at the end."""
+    """Counts for the summary at the end."""
 
     frames: int = 0
     with_lead: int = 0

@@ -23,7 +23,7 @@ from pipeline.experiments.runner import count_cases, of_suite, run_all
 
 ROBUSTNESS = "robustness"
 _FAILED_DRIVES = Path("robustness-failures")
-"""Where the drives with a failure go unless a folder is named."""
+"""Default folder for drives with a failure."""
 _MOST_KM = 1_000_000
 
 
@@ -72,7 +72,7 @@ class Scenarios:
                 experiments, self.short, self.jobs, lambda: progress.advance(bar), folder.keep if folder else None
             )
         if folder is not None:
-            folder.list_all()
+            print(folder.list_all(), file=sys.stderr)
         if self.report is not None:
             link = folder.link_from(self.report) if folder else ""
             self.report.write_text(html(sections, f"Experiments: {self.suite}", link), encoding="utf-8")

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Scores:
-    """Print the scores of a batch's runs that need no labels and, if drives have labels, how well each of them ranks
-    drives and runs as the labels do.
+    """Print the scores of a batch's runs that need no labels. If drives have labels, also print how well each score
+    ranks drives and runs as the labels do.
 
     Example: cipv scores --out drives
     """

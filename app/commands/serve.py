@@ -73,14 +73,14 @@ class ServerOptions:
         return FleetDesk(self.fleet)
 
     def label_desk(self) -> LabelDesk:
-        """DatabaseError when a database that was named cannot be opened. The local database is opened once the first
-        image is shown; an error in it is shown in the dashboard."""
+        """The label database. DatabaseError if a database that was named cannot be opened. The local database is opened
+        after the first image is shown; an error in it appears in the dashboard."""
         if self.labels or os.environ.get(URL_VARIABLE):
             return LabelDesk(_open_labels(self.labels), classes=project_classes())
         return LabelDesk(open_later=lambda: _open_labels(None), classes=project_classes())
 
     def serve(self, engine: Engine) -> int:
-        """Until Ctrl-C."""
+        """Serve the dashboard until Ctrl-C. Returns the exit status."""
         if (self.tls_cert is None) != (self.tls_key is None):
             raise BadInput("--tls-cert and --tls-key belong together")
         tls = (self.tls_cert, self.tls_key) if self.tls_cert is not None and self.tls_key is not None else None
@@ -108,9 +108,7 @@ class ServerOptions:
 
 
 def _open_labels(url: str | None) -> Database:
-    from app.labels.store.database import (
-        open_database,  # SQLAlchemy takes most of a second to import: not before an image
-    )
+    from app.labels.store.database import open_database  # imports SQLAlchemy, too slow before the first image
 
     return open_database(url)
 
@@ -136,13 +134,13 @@ class Serve:
     rings: int = 16
     """KITTI: LiDAR channels to keep: 16, like a VLP-16, or 64 for all"""
     route: Annotated[Path | None, option("FILE")] = None
-    """Planned route, on which GNSS places the car: CSV, GPX, an NMEA log or an earlier session"""
+    """Planned route, on which GNSS locates the car: CSV, GPX, an NMEA log or an earlier session"""
 
     def __call__(self) -> int:
         return self.server.serve(self.engine())
 
     def engine(self) -> Engine:
-        """The engine for the source, not started yet. BadInput when the source cannot be opened."""
+        """The engine for the source, not started yet. BadInput if the source cannot be opened."""
         params = self.pipeline.parameters()
         route = planned(self.route)
         # opened here, so that a typo is reported in the terminal; a large recording is not opened twice

@@ -64,7 +64,7 @@ class Export:
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
 
     def __call__(self) -> int:
-        from app.clips.clip import Clip  # imports the pipeline, which the other commands here do without
+        from app.clips.clip import Clip  # imports the pipeline, which the other commands here do not need
         from app.clips.csv_table import write_csv
         from app.clips.exports import write_clip
 
@@ -114,7 +114,7 @@ class Recover:
 
 
 def _between(source: Source, from_s: float | None, to_s: float | None) -> tuple[int, int]:
-    """First and last frame of a part of the drive, in seconds of playback. BadInput when nothing is in between."""
+    """First and last frame of a part of the drive, given in seconds of playback. BadInput if it contains no frame."""
     times_s = timeline_s([source.t_ns(index) for index in range(len(source))], source.rate_hz)
     first = int(np.searchsorted(times_s, from_s - 1e-9)) if from_s is not None else 0
     last = int(np.searchsorted(times_s, to_s + 1e-9, side="right")) - 1 if to_s is not None else len(source) - 1

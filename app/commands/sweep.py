@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 _MISSED = ("labelled.lead_missed", "late_leads")
 _PHANTOMS = ("labelled.cipv_false", "phantom_leads")
-"""Scores that a set of parameters is judged by: against labels where the fleet has some, else without."""
+"""Scores by which a set of parameters is judged: with labels if the fleet has some, else without."""
 
 
 @dataclass(frozen=True)

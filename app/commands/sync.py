@@ -26,24 +26,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SyncSessions:
-    """Copy finished sessions to a folder or store: clips of events first, then whole sessions, the oldest first. What
-    is there already is not sent again, and an interrupted copy is continued.
+    """Copy finished sessions to a folder or store: clips of events first, then whole sessions, oldest first. Files that
+    are already there are not sent again, and an interrupted copy is continued.
 
     Example: cipv sync s3://fleet/car-7 --limit 1.5
     """
 
     address: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ADDRESS")]
-    """Where to: a folder, or an address in a store (s3://, gs://, az://); one for each car"""
+    """Target: a folder, or an address in a store (s3://, gs://, az://); a different one for each car"""
     folder: Annotated[Path, tyro.conf.arg(name="from", metavar="DIR")] = SESSIONS
     """The folder of sessions"""
     limit: Annotated[float | None, option("MB")] = None
-    """Send at most so many megabytes per second"""
+    """Send at most this many megabytes per second"""
     clips: bool = True
     """Send clips of events first"""
     events: Literal["info", "notice", "warning", "alarm"] = "warning"
-    """The mildest events that get a clip; marks always do"""
+    """Lowest severity of events that get a clip; marks always get one"""
     around: Annotated[float, tyro.conf.arg(metavar="S")] = 5.0
-    """Seconds before and after an event that belong to its clip"""
+    """Length of a clip before and after its event, in seconds"""
     json: bool = False
     """Print what was done as JSON"""
 

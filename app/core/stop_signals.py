@@ -22,12 +22,15 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, *((signal.SIGHUP,) if hasattr(signal,
 def asked_to_stop() -> Iterator[Event]:
     """An event set by the first signal, after which the current work is completed. Only a second Ctrl-C ends
     immediately, with KeyboardInterrupt: systems send SIGTERM followed by SIGHUP for a single request."""
-    asked = Event()
+    asked, is_asked = Event(), False
 
     def ask(number: int, _: object) -> None:
-        if asked.is_set() and number == signal.SIGINT:
+        nonlocal is_asked
+        if not is_asked:
+            is_asked = True  # first: a signal that arrives during ``set``, which holds a lock, must not call it again
+            asked.set()
+        elif number == signal.SIGINT:
             raise KeyboardInterrupt
-        asked.set()
 
     with _handled(ask):
         yield asked

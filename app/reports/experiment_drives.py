@@ -35,11 +35,11 @@ if (location.protocol === "file:") {
   line.hidden = false;
 }
 </script>"""
-"""Where the files lie is known only to who has them open."""
+"""A script makes the link, because the path of the folder is known only once the page is open."""
 
 
 class ReplayFolder:
-    """Where the drives of one run of experiments go. OSError when the folder cannot be made or written to."""
+    """The folder for the drives of one run of experiments. OSError if it cannot be created or written to."""
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -54,13 +54,16 @@ class ReplayFolder:
         self._path(drive, ".params.yaml").write_text(params_to_yaml(drive.params), encoding="utf-8")
         self._path(drive, ".html").write_text(_page(drive), encoding="utf-8")
 
-    def list_all(self) -> None:
-        """Write ``index.html``, which leads to every drive."""
+    def list_all(self) -> str:
+        """Write ``index.html``, which links to every drive. Returns a sentence that says where it is."""
         body = "".join(section_html(_listed(name, title, drives)) for name, (title, drives) in self._kept.items())
-        (self._folder / "index.html").write_text(page("Drives", body), encoding="utf-8")
+        index = self._folder / "index.html"
+        index.write_text(page("Drives", body), encoding="utf-8")
+        count = sum(len(drives) for _, drives in self._kept.values())
+        return f"{count} drive{'s' if count != 1 else ''} saved: {index}"
 
     def link_from(self, report: Path) -> str:
-        """What leads from a report to this folder, ending in a slash."""
+        """Relative address of this folder for links in a report, ending in a slash."""
         between = os.path.relpath(self._folder.resolve(), report.resolve().parent)
         return f"{url_quote(Path(between).as_posix())}/"
 
@@ -74,7 +77,7 @@ def _listed(name: str, title: str, drives: list[ExperimentDrive]) -> ReportSecti
 
 
 def _command(drive: ExperimentDrive) -> str:
-    """To be typed in the folder."""
+    """The command that opens the drive, to be run in the folder."""
     lanes = "" if drive.detections is not None else " --lanes off"
     return f"cipv serve {quote(f'sim:{drive.name}.yaml')} --params {quote(f'{drive.name}.params.yaml')}{lanes}"
 
@@ -91,7 +94,7 @@ def _page(drive: ExperimentDrive) -> str:
 
 
 def _link(drive: ExperimentDrive) -> str:
-    """A link as the dashboard's own *Share* makes it."""
+    """A link to the drive in a running dashboard, as made by *Share*."""
     changed = {name: now for name, (_, now) in changes_of(Params(), drive.params).items()}
     query = urlencode({"preset": "default", "params": json.dumps(changed)}, quote_via=url_quote)
     return (

@@ -45,7 +45,7 @@ td a { color: inherit; text-decoration-style: dotted; } code { font-size: 13px; 
 
 
 def html(sections: Iterable[ReportSection], title: str, folder: str = "") -> str:
-    """The whole report. folder: relative address of the folder with the saved drives, empty without one."""
+    """The whole report. folder: relative address of the folder with the saved drives; empty without one."""
     sections = list(sections)
     links = "".join(f'<a href="#{escape(each.name)}">{escape(each.name)}</a>' for each in sections)
     return page(title, f"<nav>{links}</nav>{''.join(section_html(each, folder) for each in sections)}")
@@ -61,7 +61,7 @@ def page(title: str, body: str) -> str:
 
 
 def section_html(section: ReportSection, folder: str = "") -> str:
-    """One section, for a page of one's own."""
+    """One section, to be embedded in another page."""
     return (
         f'<section id="{escape(section.name)}"><h2>{escape(section.title)}</h2>'
         + "".join(f"<p>{escape(paragraph)}</p>" for paragraph in section.text)
@@ -102,7 +102,7 @@ def _cell(cell: AnyCell, decimals: int, folder: str) -> str:
 
 
 def in_words(value: Cell, decimals: int) -> str:
-    """As people read it: a dash for None, whole numbers whole."""
+    """A cell as text: a dash for None, no decimals for whole numbers."""
     if value is None:
         return "–"
     return f"{value:.{decimals}f}" if isinstance(value, float) else str(value)

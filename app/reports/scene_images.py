@@ -24,7 +24,7 @@ _IMAGE_PX, _JPEG_QUALITY = (640, 360), 75
 
 
 def scene_html(scene: Scene) -> str:
-    """A figure with the plan and, below it, the first camera's image of the same moment."""
+    """A figure with the plan and, below it, the first camera's image at the same moment."""
     now = world_state.at(scene.scenario, scene.t_s)
     title = f"{scene.title}, at {scene.t_s:.1f} s"
     return (
@@ -34,8 +34,8 @@ def scene_html(scene: Scene) -> str:
 
 
 def plan_svg(scenario: Scenario, now: World, title: str) -> str:
-    """Road, vehicles and where they are in the next 4 s, 12 m behind to 108 m ahead of the ego vehicle, which drives to
-    the right."""
+    """Plan of the road, the vehicles and their trajectories over the next 4 s, from 12 m behind to 108 m ahead of the
+    ego vehicle, which drives to the right."""
     parts = [*_road(scenario, now), *_grid(), *_ways(scenario, now), *_vehicles(now)]
     box = f"{-_BEHIND_M:g} {-_ASIDE_M:g} {_BEHIND_M + _AHEAD_M:g} {2 * _ASIDE_M:g}"
     return (
@@ -70,7 +70,7 @@ def _grid() -> Iterable[str]:
 
 
 def _ways(scenario: Scenario, now: World) -> Iterable[str]:
-    """Where each vehicle will be, in the ego frame of now."""
+    """SVG of each vehicle's future trajectory, in the current ego frame."""
     later = [world_state.at(scenario, now.t_s + t_s) for t_s in np.arange(0.0, _WAY_S, _WAY_STEP_S).tolist()]
     yield _open(now.to_ego(np.array([each.pose[:2] for each in later])), "way ego")
     for number in sorted(state.actor.id for state in now.actors):
@@ -106,12 +106,12 @@ def _open(points: F64, kind: str) -> str:
 
 
 def _points(points: F64) -> str:
-    """x to the right, y up."""
+    """Coordinates for SVG: x to the right, y up."""
     return " ".join(f"{x:.2f},{-y:.2f}" for x, y in points[:, :2])
 
 
 def _image(scenario: Scenario, now: World) -> str:
-    """As an address that holds the image itself."""
+    """The camera image as a data URL."""
     sensors = SensorRig(scenario, now.s_m)
     drawn = sensors.frame(now, 0, round(now.t_s * 1e9)).image
     assert drawn is not None

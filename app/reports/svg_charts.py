@@ -13,7 +13,7 @@ _DASHES = ("", "6 3", "2 3", "8 3 2 3")
 
 
 def chart_svg(chart: Chart) -> str:
-    """A figure with axes, one line a series, and a legend below. Empty charts say that there is nothing."""
+    """A figure with axes, one line per series and a legend below; an empty chart says that it has no data."""
     drawn = [line for line in chart.series if line.x]
     if not drawn:
         return f"<figure><figcaption>{escape(chart.title)}: no data</figcaption></figure>"
@@ -33,7 +33,7 @@ def chart_svg(chart: Chart) -> str:
 
 
 def ticks(low: float, high: float, about: int = 6) -> list[float]:
-    """Round numbers that span low…high: steps of 1, 2 or 5 times a power of ten."""
+    """Round numbers that span low to high, in steps of 1, 2 or 5 times a power of ten."""
     size = max(abs(low), abs(high), 1.0)
     span = high - low if high - low > 1e-9 * size else size
     raw = span / about
@@ -45,7 +45,7 @@ def ticks(low: float, high: float, about: int = 6) -> list[float]:
 
 
 class _Scale:
-    """From values to pixels."""
+    """Maps values to pixels."""
 
     def __init__(self, x_ticks: list[float], y_ticks: list[float]) -> None:
         self.x_ticks, self.y_ticks = x_ticks, y_ticks
@@ -87,7 +87,7 @@ def _line(scale: _Scale, line: Series, index: int) -> str:
 
 
 def _sample(line: Series, index: int) -> str:
-    """What the legend shows of a line."""
+    """The legend's sample of a line."""
     if line.points_only:
         return f'<circle cx="13" cy="4" r="2.5" class="fill{index % 6}"/>'
     return f'<line x1="0" y1="4" x2="26" y2="4" {_stroke(index)}/>'

@@ -11,11 +11,11 @@ from app.reports.html import in_words
 from pipeline.evaluation.report_sections import Coloured, Driven, Linked, ReportSection
 
 _FILE_WIDTH = 160
-"""Columns of a table that goes to a file or a pipe."""
+"""Width in characters of a table that is written to a file or a pipe."""
 
 
 def show(sections: Iterable[ReportSection]) -> None:
-    """Print them. Charts are left to the HTML report."""
+    """Print the tables of the sections. Charts are only in the HTML report."""
     console = Console(width=None if Console().is_terminal else _FILE_WIDTH)
     for section in sections:
         console.rule(section.title)

@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.types import FusedObject, Gate, Result
 
-_OF_FUSION = frozenset({"iou", "range_sigmas", "class_size", "cluster_hits"})
+_OF_FUSION = frozenset({"iou", "range_sigmas", "class_size", "cluster_hits", "same_kind"})
 """Gates between the objects of two sensors: failing one splits a pair into two rows, but does not exclude either from
 being the CIPV."""
 BEHIND = "behind"

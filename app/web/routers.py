@@ -32,6 +32,7 @@ from app.web.routes.labels.acts import label_acts_router
 from app.web.routes.labels.close_ups import label_close_ups_router
 from app.web.routes.labels.files import label_files_router
 from app.web.routes.labels.reading import labels_router
+from app.web.routes.labels.work import label_work_router
 from app.web.routes.params import params_router
 from app.web.routes.playback import playback_router
 from app.web.routes.project import project_router
@@ -77,6 +78,7 @@ ROUTERS: list[Callable[[Services], APIRouter]] = [
     lambda on: label_close_ups_router(on.engine.labels),
     lambda on: label_acts_router(on.engine.labels),
     lambda on: label_files_router(on.engine.labels),
+    lambda on: label_work_router(on.engine.labels),
     lambda on: clips_router(on.engine, on.exports),
     lambda on: alignment_router(on.engine, on.scenes),
     lambda on: alignment_fit_router(on.engine, on.fitting),

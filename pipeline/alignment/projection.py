@@ -134,7 +134,20 @@ def angular_from_calibration(camera: CameraCalibration) -> Angular:
 
 def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignment | None:
     """The model to use: parameters if set, the recording's calibration for the rest. None if neither is known; then
-    nothing can be projected. Pinhole needs a calibration; angular does not, if all four values are set."""
+    nothing can be projected. Pinhole needs a calibration; angular does not, if all four values are set.
+
+    The last model is kept, because both arguments stay the same objects from frame to frame."""
+    global _last
+    last = _last
+    if last is None or last[0] is not params or last[1] is not camera:
+        last = _last = (params, camera, _resolved(params, camera))
+    return last[2]
+
+
+_last: tuple[AlignmentParams, CameraCalibration | None, Alignment | None] | None = None
+
+
+def _resolved(params: AlignmentParams, camera: CameraCalibration | None) -> Alignment | None:
     if params.model == "pinhole" and camera is not None:
         return Pinhole(camera.K, camera.distortion, corrected(params, camera).T_camera_ego)
     measured = angular_from_calibration(camera) if camera is not None else None

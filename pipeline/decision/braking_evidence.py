@@ -21,7 +21,11 @@ deliver, the object was not overlooked until now; the track is wrong."""
 
 def judge(objects: tuple[FusedObject, ...], params: ExistenceParams) -> tuple[FusedObject, ...]:
     """Each object with the hardest braking that its evidence justifies."""
-    return tuple(evolve(item, justifies=_justified(item, params)) for item in objects)
+    return tuple([_judged(item, _justified(item, params)) for item in objects])
+
+
+def _judged(item: FusedObject, justifies: Braking) -> FusedObject:
+    return item if item.justifies is justifies else evolve(item, justifies=justifies)
 
 
 def _justified(item: FusedObject, params: ExistenceParams) -> Braking:

@@ -15,15 +15,19 @@ from pipeline.params import CipvParams
 from pipeline.types import VEHICLES, Conditions, Eligibility, FusedObject, Gate, Path
 
 ABREAST_M = 1.0
-"""Measured from the bumper: an object that begins nearer than this and to the side is beside the car."""
+"""An object to the side that begins nearer to the bumper than this is beside the car, which cannot be steered onto it
+within a metre."""
 OWN_HALF_WIDTH_M = 1.0
-"""Half width of a passenger car, without mirrors."""
+"""Half the width of a passenger car without mirrors (1.8 to 2 m)."""
 _KNOWN_M = 0.5
-"""A tracked distance with at most this standard deviation counts as measured."""
+"""If the LiDAR has just lost an object, its predicted distance counts as measured up to this standard deviation, which
+is small against any gap that control keeps."""
 ON_A_VAGUE_PATH = 0.25
-"""Factor on the permitted uncertainty if the path is not usable; this leaves one metre."""
+"""Factor on ``max_sigma_m`` if the path is not usable. By default this leaves one metre: an object estimated to be in
+the middle of a lane 3.5 m wide is then in it with 92 %."""
 STAYS_UP_TO = 1.5
-"""Factor on the permitted position uncertainty for the current lead, compared with a new one."""
+"""Factor on ``max_sigma_m`` for the current lead: hysteresis, so that a lead whose uncertainty is close to the limit
+does not come and go."""
 
 
 class Candidate(NamedTuple):
@@ -43,6 +47,8 @@ class Candidate(NamedTuple):
     """The path ahead."""
     params: CipvParams
     """Limits of the conditions."""
+    clears_path_s: float | None = None
+    """How long before the car arrives it will have left the path that it crosses; None if it does not."""
 
     @property
     def aside_m(self) -> float:
@@ -179,6 +185,11 @@ def _ahead(who: Candidate) -> Answer:
     return who.place.ahead_m > limit_m, who.place.ahead_m, limit_m
 
 
+def _stays(who: Candidate) -> Answer:
+    """What crosses is in the path only if it is still there when the car arrives."""
+    return who.clears_path_s is None, who.clears_path_s, who.params.crossing_margin_s
+
+
 def _in_path(who: Candidate) -> Answer:
     """The running mean of the log-odds, expressed in metres: see ``aside_m``."""
     if who.place is None:
@@ -268,6 +279,7 @@ CONDITIONS = Conditions(
     ahead=Condition(
         "ahead", _ahead, lambda who: "position unknown" if who.place is None else "beside or behind the bumper"
     ),
+    stays=Condition("clears_path_s", _stays, lambda who: f"crosses: gone {who.clears_path_s:.1f} s before we arrive"),
     in_path=Condition("path_offset", _in_path, _out_of_path),
     confirmed=Condition(
         "hits", _confirmed, lambda who: f"seen {_sightings(who.item)} of {who.params.confirm_hits} times"

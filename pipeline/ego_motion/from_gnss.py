@@ -3,9 +3,7 @@ course."""
 
 from __future__ import annotations
 
-from math import ceil
-
-import numpy as np
+from math import ceil, tau
 
 from pipeline.types import EgoState, GnssFix
 
@@ -56,6 +54,9 @@ def _turning_left_radps(courses: Courses) -> float | None:
     short."""
     if not courses or courses[-1][0] - courses[0][0] < _SPAN_NS:
         return None
-    t_s = np.array([(t - courses[0][0]) / 1e9 for t, _ in courses])
-    course = np.unwrap([angle for _, angle in courses])
-    return -float(np.polyfit(t_s, course, 1)[0])
+    t_s, course = [(t - courses[0][0]) / 1e9 for t, _ in courses], [courses[0][1]]
+    for _, angle in courses[1:]:
+        course.append(angle + tau * round((course[-1] - angle) / tau))  # the turn that is nearest to the last course
+    mean_s, mean = sum(t_s) / len(t_s), sum(course) / len(course)
+    slope = sum((t - mean_s) * (angle - mean) for t, angle in zip(t_s, course, strict=True))
+    return -slope / sum((t - mean_s) ** 2 for t in t_s)

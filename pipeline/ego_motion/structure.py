@@ -14,7 +14,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from pipeline.common.made_sweeps import made_sweeps
 from pipeline.types import F32, F64, Ground, LidarTrack, Sweep
+from pipeline.types.ground_planes import height_above
 
 NEAREST_M, FARTHEST_M = 2.5, 80.0
 """Closer points are the car's own body; farther ones are too sparse to match with a 16-channel LiDAR."""
@@ -32,13 +34,17 @@ _LONGEST_LEVER_M = 30.0
 def standing(sweep: Sweep, ground: Ground, tracks: tuple[LidarTrack, ...], dt_s: float) -> F32:
     """(M, 3) float32 points above the road that are in no vehicle. ground: of the previous sweep; the road changes by
     centimetres in between. tracks: of the previous sweep, ``dt_s`` ago."""
-    points = sweep.points
-    range_m = np.hypot(points[:, 0], points[:, 1])
-    keep = (range_m > NEAREST_M) & (range_m < FARTHEST_M)
-    keep &= ground.above(points) > _ABOVE_ROAD_M  # False without ground, where the height is NaN
-    points = np.ascontiguousarray(points[keep, :3])
-    boxes = _vehicles(tracks, dt_s)
-    return points[~_inside(points, boxes)] if len(boxes) else points
+    return np.asarray(
+        _standing(
+            sweep.points,
+            ground.planes,
+            ground.edges,
+            _vehicles(tracks, dt_s),
+            np.float32(NEAREST_M),
+            np.float32(FARTHEST_M),
+            _ABOVE_ROAD_M,
+        )
+    )
 
 
 def _vehicles(tracks: tuple[LidarTrack, ...], dt_s: float) -> F64:
@@ -58,9 +64,9 @@ def _vehicles(tracks: tuple[LidarTrack, ...], dt_s: float) -> F64:
 
 def warm_up() -> None:
     """Compile every kernel, or load it from numba's cache."""
-    points = np.zeros((2, 3), np.float32)
-    _inside(points, np.zeros((1, 6)))
-    support(points)
+    planes, edges, boxes = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0]), np.zeros((1, 6))
+    for points, _ in made_sweeps():
+        support(_standing(points, planes, edges, boxes, np.float32(0.0), np.float32(9.0), 0.0))
 
 
 class Support(NamedTuple):
@@ -81,18 +87,32 @@ def support(points: F32) -> Support:
 
 
 @numba.njit(cache=True, nogil=True)
-def _inside(points, boxes):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(N,) bool, which points lie in one of the boxes, seen from above."""
-    inside = np.zeros(len(points), np.bool_)
+def _standing(points, planes, edges, boxes, nearest_m, farthest_m, above_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(M, 3) points between two ranges, higher above the ground than ``above_m`` and in none of the boxes. Without
+    ground, where heights are NaN, none."""
+    found = np.empty((len(points), 3), np.float32)
+    count = 0
     for n in range(len(points)):
-        for b in range(len(boxes)):
-            dx, dy = points[n, 0] - boxes[b, 0], points[n, 1] - boxes[b, 1]
-            along = dx * boxes[b, 4] + dy * boxes[b, 5]
-            across = dy * boxes[b, 4] - dx * boxes[b, 5]
-            if abs(along) < boxes[b, 2] and abs(across) < boxes[b, 3]:
-                inside[n] = True
-                break
-    return inside
+        x, y, z = points[n, 0], points[n, 1], points[n, 2]
+        if not height_above(planes, edges, x, y, z) > above_m:
+            continue
+        range_m = np.hypot(x, y)
+        if range_m > nearest_m and range_m < farthest_m and not _is_inside(x, y, boxes):
+            found[count, 0], found[count, 1], found[count, 2] = x, y, z
+            count += 1
+    return found[:count].copy()
+
+
+@numba.njit(cache=True, nogil=True)
+def _is_inside(x, y, boxes):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Whether a point lies in one of the boxes, seen from above."""
+    for b in range(len(boxes)):
+        dx, dy = x - boxes[b, 0], y - boxes[b, 1]
+        along = dx * boxes[b, 4] + dy * boxes[b, 5]
+        across = dy * boxes[b, 4] - dx * boxes[b, 5]
+        if abs(along) < boxes[b, 2] and abs(across) < boxes[b, 3]:
+            return True
+    return False
 
 
 @numba.njit(cache=True, nogil=True)

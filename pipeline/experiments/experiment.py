@@ -21,21 +21,21 @@ class ExperimentDrive:
     """The drive behind an outcome, which can be opened again as a scenario."""
 
     name: str
-    """As a file name."""
+    """Name for use in file names."""
     title: str
-    """For people."""
+    """Title in reports."""
     text: tuple[str, ...]
-    """What happened in it, as paragraphs."""
+    """Description of what happened, as paragraphs."""
     scenario: Scenario
-    """With the ego vehicle as it drove, or with its script."""
+    """The scenario, with the ego vehicle's motion as driven or as scripted."""
     params: Params
-    """That it was driven with."""
+    """Parameters of the drive."""
     sensors: Sensors
-    """That the pipeline was given."""
+    """Sensors that the pipeline got."""
     charts: tuple[Chart, ...]
-    """Of the drive, with time along x."""
+    """Charts of the drive over time."""
     detections: Detections | None = GIVEN
-    """Its detections; None: those of the embedded network."""
+    """Its detections; None for those of the embedded network."""
 
     def as_seen(self) -> Scenario:
         """The scenario with the detections of that drive, so that a run reproduces its results."""
@@ -51,16 +51,16 @@ class Experiment(Generic[Case, Outcome]):
     """Cases to drive, and how their outcomes are reported."""
 
     name: str
-    """For scripts, and in the names of its drives."""
+    """Name on the command line and in the names of its drives."""
     suite: Suite
     """Which set of experiments it belongs to."""
     title: str
-    """For people."""
+    """Title in reports."""
     cases: Callable[[bool], Sequence[Case]]
-    """The cases, or fewer when called with True. They can be pickled."""
+    """Returns the cases; with True, a short selection. Cases can be pickled."""
     run: Callable[[Case], Outcome]
-    """Case to outcome: a pure function at module level."""
+    """Runs one case; a pure function at module level."""
     report: Callable[[Sequence[Case], Sequence[Outcome]], ReportSection]
-    """All cases and outcomes, in order, to a section of the report."""
+    """Turns all cases and outcomes, in order, into a section of the report."""
     as_drive: Callable[[Case, Outcome], ExperimentDrive | None]
-    """The drive behind an outcome; None for one that is not worth keeping."""
+    """Returns the drive behind an outcome; None if it is not worth keeping."""

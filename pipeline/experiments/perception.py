@@ -18,25 +18,25 @@ Boxes = Literal["truth", "network"]
 """Source of the camera's boxes: projected truth with a detector's errors, or the embedded network on rendered
 images."""
 SENSORS: Mapping[Sensors, str] = {"lidar": "LiDAR", "camera": "camera", "both": "fused"}
-"""Their names in reports."""
+"""Names of the sensors in reports."""
 COMPARED: tuple[Sensors, ...] = ("lidar", "both")
-"""The sensors of most experiments: the LiDAR alone, and both sensors."""
+"""The sensors that most experiments compare: the LiDAR alone, and both."""
 GIVEN = Detections(boxes=BoxNoise())
 GIVEN_SAID = (
-    "The camera's boxes are given: projected truth with assumed errors, near those measured of the embedded detector. "
-    "No network was used."
+    "The camera's boxes are given: projected ground truth with assumed errors close to those measured for the embedded "
+    "detector. No network was used."
 )
 
 
 @cache
 def embedded() -> Detector:
-    """The embedded network for rendered images. One per process, since loading takes a while."""
+    """The embedded network for rendered images; one per process, since loading takes a while."""
     return open_detector(EMBEDDED, (WIDTH, HEIGHT))
 
 
 @cache
 def embedded_far_view() -> FarView | None:
-    """Its second look at the same images."""
+    """Its second run on the far part of the same images."""
     return open_far_view(embedded(), (WIDTH, HEIGHT))
 
 
@@ -45,7 +45,7 @@ def eyes_for(boxes: Boxes) -> Eyes:
 
 
 def detections_for(boxes: Boxes) -> Detections | None:
-    """The detections a drive is replayed with; None: those of the embedded network."""
+    """The detections with which a drive is replayed; None for those of the embedded network."""
     return GIVEN if boxes == "truth" else None
 
 

@@ -38,15 +38,15 @@ SUITES = ("paper", "curves", "streets", "euroncap", "iso", "all")
 
 
 class NoSuchSuite(BadInput):
-    """A suite that does not exist."""
+    """Raised for a suite that does not exist."""
 
 
 def of_suite(suite: str) -> tuple[Experiment[Any, Any], ...]:
-    """The experiments of a suite, or the one of that name. NoSuchSuite when there is neither. The suite ``robustness``
-    is made of as many kilometres as are wanted: ``robustness.experiment.suite``."""
+    """The experiments of a suite, or the experiment of that name; NoSuchSuite if there is neither. The suite
+    ``robustness`` depends on the number of kilometres: see ``robustness.experiment.suite``."""
     found = tuple(each for each in EXPERIMENTS if suite in ("all", each.suite, each.name))
     if not found:
-        names = ", ".join(dict.fromkeys((*SUITES, *(each.name for each in EXPERIMENTS))))
+        names = ", ".join(dict.fromkeys((*SUITES, "robustness", *(each.name for each in EXPERIMENTS))))
         raise NoSuchSuite(f"no suite or experiment named {suite!r}; there are {names}")
     return found
 
@@ -62,12 +62,12 @@ def run_all(
     done: Callable[[], None] = lambda: None,
     keep: Keep | None = None,
 ) -> list[ReportSection]:
-    """Each experiment's report. jobs: processes; 0 means one per core, 1 only this one. ``done`` is called after every
-    case, ``keep`` with every drive."""
+    """Run the experiments and return the report of each. jobs: number of processes; 0 for one per core, 1 for only this
+    one. ``done`` is called after every case, ``keep`` with every drive."""
     jobs = jobs or os.cpu_count() or 1
     if jobs == 1:
         return [_reported(each, short, map(each.run, each.cases(short)), done, keep) for each in experiments]
-    # spawn: a forked child would inherit numba's and onnxruntime's threads half alive
+    # spawn, since a forked child would inherit broken threads of numba and onnxruntime
     pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
     try:
         return [_reported(each, short, pool.map(each.run, each.cases(short)), done, keep) for each in experiments]
@@ -82,7 +82,7 @@ def _reported(
     done: Callable[[], None],
     keep: Keep | None,
 ) -> ReportSection:
-    """The report of outcomes that arrive one by one, in the order of the cases."""
+    """The report, made from outcomes that arrive one by one in the order of the cases."""
     cases, got = experiment.cases(short), []
     for case, outcome in zip(cases, outcomes, strict=True):
         got.append(outcome)

@@ -23,7 +23,8 @@ CONTROLLERS: Mapping[str, Mapping[str, Any]] = {
     "ACC + AEB": {},
     "AEB": {"acc.brake_limit_mps2": 0.0},
 }
-"""The controller that brakes. AEB alone: ACC holds the speed, like the driving robot of a test, and never brakes."""
+"""Parameters that select the controllers. AEB alone: ACC holds the speed, like the driving robot of a test, and never
+brakes."""
 _NEAR_ENOUGH = 0.25
 _STANDING_MPS = 0.05
 _BRAKING_MPS2 = 0.5
@@ -46,12 +47,12 @@ def scene(ego_speed: Mapping[float, float], target: Mapping[str, Any], duration_
 
 
 def car(number: int, lane: int, ahead_m: float, speed_mps: Mapping[float, float]) -> dict[str, Any]:
-    """A car as a scenario file has it. speed_mps: seconds → m/s."""
+    """A car as in a scenario file. speed_mps: seconds → m/s."""
     return {"id": number, "kind": "car", "lane": lane, "ahead_m": ahead_m, "speed_mps": dict(speed_mps)}
 
 
 def parameters(controller: str, set_speed_mps: float, changes: Mapping[str, Any] | None = None) -> Params:
-    """The default parameters with one controller and its set speed."""
+    """The default parameters with the chosen controllers and set speed."""
     set_speed = {"acc.set_speed_kmh": set_speed_mps * 3.6}
     return with_changes(Params(), {**set_speed, **CONTROLLERS[controller], **(changes or {})})
 
@@ -61,27 +62,27 @@ class DriveRecord:
     """A drive towards the target, one value per tick."""
 
     t_s: tuple[float, ...]
-    """Since the scenario's start."""
+    """Seconds since the start of the scenario."""
     speed_mps: tuple[float, ...]
-    """Of the ego car."""
+    """Speed of the ego vehicle."""
     accel_mps2: tuple[float, ...]
-    """Of the ego car."""
+    """Acceleration of the ego vehicle."""
     gap_m: tuple[float, ...]
-    """From the bumper to the target's rear."""
+    """Gap from the bumper to the target's rear."""
     target_mps: tuple[float, ...]
     """Speed of the target."""
     measured_m: tuple[float | None, ...]
-    """Distance of the CIPV as the pipeline has it; None without one."""
+    """Distance of the CIPV as measured by the pipeline; None without one."""
     states: tuple[str, ...]
-    """Of the controller."""
+    """States of the controller."""
     acquired_m: float | None
-    """The gap when the target first was the CIPV; None if never."""
+    """Gap when the target first was the CIPV; None if never."""
     brakes_m: float | None
-    """The gap when any braking was first asked for; None if never."""
+    """Gap when braking was first requested; None if never."""
     impact_mps: float | None
     """Relative speed at contact; None without contact."""
     motions: tuple[Motion, ...] = ()
-    """Of the ego vehicle; empty when not kept."""
+    """Motion of the ego vehicle; empty if not kept."""
 
     @property
     def smallest_gap_m(self) -> float:
@@ -103,7 +104,7 @@ class DriveRecord:
         return (self.speed_mps[first] - self.speed_mps[last]) / took_s if took_s > 0.0 else None
 
     def peak_jerk_mps3(self) -> float:
-        """Largest change of the acceleration between two ticks, over their time."""
+        """Largest change of acceleration between two ticks, divided by the time between them."""
         changes = zip(self.accel_mps2, self.accel_mps2[1:], self.t_s, self.t_s[1:], strict=False)
         return max((abs(b - a) / (t1 - t0) for a, b, t0, t1 in changes), default=0.0)
 
@@ -153,7 +154,7 @@ def drive_charts(drive: DriveRecord) -> tuple[Chart, ...]:
 
 
 def _over(tick: LoopStep, target: ActorState) -> bool:
-    """The car stands, or has braked down to the speed of a target that goes on as it does."""
+    """Whether the car stands, or has braked to the speed of a target whose speed is constant."""
     speed, accel = tick.vehicle.speed_mps, tick.vehicle.accel_mps2
     return speed < _STANDING_MPS or (accel < -_BRAKING_MPS2 and speed <= target.speed_mps and not target.braking)
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.common.image_decoding import TooMuch, decode_within_budget
-from pipeline.common.user_file_errors import reason_of
+from pipeline.common.user_file_errors import given_path, reason_of
 from pipeline.common.user_files import check_allowed, read_regular
 from pipeline.formats.extrinsic_mistakes import likely_mistake, looks_ahead
 from pipeline.types import F64, U8, CameraCalibration, CameraImage
@@ -30,7 +30,7 @@ def recording_folder(path: str) -> Path:
     if not path:
         raise SourceError("no folder given after the colon")
     try:
-        folder = Path(path).expanduser()
+        folder = given_path(path, SourceError)
         check_allowed(folder)
         if not folder.exists():
             raise SourceError(f"{path}: no such folder")
@@ -48,7 +48,7 @@ def recording_file(path: str) -> Path:
     if not path:
         raise SourceError("no file given after the colon")
     try:
-        file = Path(path).expanduser()
+        file = given_path(path, SourceError)
         check_allowed(file)
         if not file.exists():
             raise SourceError(f"{path}: no such file")

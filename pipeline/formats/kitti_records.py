@@ -1,4 +1,4 @@
-"""KITTI's small text records: labels, the inertial unit's state, time stamps."""
+"""KITTI's small text records: labels, the inertial unit's state, timestamps."""
 
 from __future__ import annotations
 

@@ -31,5 +31,5 @@ def about_maker(maker: str) -> str:
     """What to do with a recording of its packets."""
     return (
         f"packets of a LiDAR by {maker}, which are not decoded here; convert them with the maker's tools or ROS driver "
-        "to a ROS bag of PointCloud2, or to PCD files, one a sweep"
+        "to a ROS bag of PointCloud2, or to PCD files, one per sweep"
     )

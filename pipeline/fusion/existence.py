@@ -26,34 +26,35 @@ from pipeline.params import ExistenceParams
 from pipeline.types import Frame, FusedObject, Gate, Moment
 
 SURE = 4.0
-"""Limit of the log-odds: 98 %."""
+"""Limit of the log-odds of each sensor and of their sum, 98 %: without it, evidence of long ago would outweigh that of
+the last few sweeps."""
 _EVEN_SCORE, _SCORE_SLOPE = 0.45, 8.5
-"""A box with this score is a vehicle with probability 0.5; the log-odds grow by the slope per 1.0 of score. Logistic
-fit to 1,473 boxes of YOLOX-nano on Astyx and KITTI, compared with labelled vehicles. Leaving out any one of the four
-recordings gives 0.40 to 0.52, and 7.7 to 10.1."""
+"""Score at which a box is a vehicle with probability 0.5, and growth of the log-odds per 1.0 of score. Logistic fit to
+1,473 boxes of YOLOX-nano on Astyx and KITTI, compared with labelled vehicles. Leaving out any one of the four
+recordings gives 0.40 to 0.52 and 7.7 to 10.1."""
 _MEAN_S, _LONGEST_MEAN_S = 0.5, 2.0
-"""Time constant for averaging a box's score, and the maximum time constant for missing boxes, which otherwise is the
-time that the object has been followed. False boxes of YOLOX-nano on Astyx and KITTI come in bursts of one to four
-images; an object seen for two seconds has merely been missed."""
+"""Time constants of the running mean of scores: for boxes, and the longest for missing boxes. For missing boxes it is
+the time since the object was first seen, between these two. False boxes of YOLOX-nano on Astyx and KITTI come in bursts
+of one to four images; an object that was seen for two seconds has merely been missed."""
 _ALONG, _ALONG_AFTER_M, _ALONG_SHARE = 2.0, 25.0, 0.5
-"""False boxes are drawn on static structures, which come nearer by every metre that the car drives. If the distance has
-not shrunk accordingly over 25 m, the object moves along with us, so it is a vehicle. At 50 m the distance from a box
-has a noise of 7 % from image to image, so half of 25 m is more than two standard deviations of a difference."""
+"""Log-odds added for an object that moves along with the car; the distance driven after which that can be judged; and
+the share of it by which the object's distance has then shrunk at most. False boxes lie on static structures, which come
+nearer by every metre that the car drives. At 50 m the distance from a box varies by 7 % from image to image, so half of
+25 m is more than two standard deviations of a difference."""
 _HIDDEN_SHARE = 0.3
-"""Hidden share of a box up to which a network still finds most vehicles."""
+"""If more of a box is hidden by other boxes, a network may miss the vehicle, so a missing box is no evidence."""
 _EMPTY_S = 1.0
-"""Time constant for forgetting that a place was empty: by then the camera has measured the position again."""
+"""Time constant for forgetting that rays passed through the object's position: ten images at 10 Hz, in which the camera
+measures the position again."""
 _CLUSTER, _STOPPED, _PIERCED, _SILENT, _TAKEN = 2.0, 1.0, -3.0, -2.0, -2.0
-"""Log-odds added by one sweep: a cluster on the object; rays that ended at its reported position; rays that passed
-through; rays without a return; close to the car, rays that ended there but in the cluster of another object. Of 394
-labelled vehicles within 30 m in 126 frames of a VLP-16, with the position uncertainty of a box, none was passed through
-and 6 returned no rays; with the smallest position uncertainty, none and 10. The values are lower than these counts
-suggest, because successive sweeps are not independent."""
-
-
+"""Log-odds added by one sweep, in this order: a cluster on the object; rays that ended at its position; rays that
+passed through it; rays without a return; close to the car, rays that ended there but in the cluster of another object.
+Of 394 labelled vehicles within 30 m in 126 frames of a VLP-16, with the position uncertainty of a box, none was passed
+through and 6 returned no rays; with the smallest position uncertainty, none and 10. The values are lower than these
+counts suggest, because successive sweeps are not independent."""
 _FOLLOWED_S = 0.5
-"""A box may be joined with a neighbour's cluster for a moment; an object seen by the LiDAR for longer than this was
-really tracked by it."""
+"""A box may match a neighbour's cluster for a few sweeps; an object that had a cluster for longer than this (five
+sweeps at 10 Hz) was really seen by the LiDAR."""
 
 
 class Existence(NamedTuple):

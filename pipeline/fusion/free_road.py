@@ -21,6 +21,7 @@ import numba
 import numpy as np
 
 from pipeline.common.geometry import F64
+from pipeline.common.made_sweeps import made_sweeps
 from pipeline.fusion.vehicle_sizes import usual_size_m
 from pipeline.types import F32, I32, U8, FusedObject, Ground, Point3
 
@@ -41,6 +42,8 @@ NEAR_M = 20.0
 """Closer than this, every vehicle has a cluster: of 47 labelled ones on Astyx and KITTI, none was seen by the camera
 alone."""
 _SLICE_M, _MOST_SLICES = 2.0, 24
+_BINS = 256
+"""Directions by which points are sorted, so that each is compared only with places in its direction."""
 _AHEAD = 0.5
 """Elevations of the rings are measured within 27° of straight ahead (as a tangent)."""
 _MIN_RING = 5
@@ -161,35 +164,76 @@ def _place(item: FusedObject, origin: Point3) -> tuple[float, float, float, floa
 
 
 def _beams(points: F32, ring: U8, origin: F64) -> _Beams:
-    slope = _slopes(points, ring, origin)
-    fullest = int(np.bincount(ring).argmax())
-    mine = points[ring == fullest]
-    azimuth = np.sort(np.arctan2(mine[:, 1] - origin[1], mine[:, 0] - origin[0]))
-    steps = np.diff(azimuth)
-    return _Beams(slope, float(np.median(steps)) if len(steps) else math.inf)
+    slope, fullest = _slopes(points, ring, origin)
+    steps = np.diff(np.sort(np.arctan2(fullest[:, 1], fullest[:, 0])))
+    half = len(steps) // 2
+    if not len(steps):
+        return _Beams(slope, math.inf)
+    low, high = np.partition(steps, (half - 1, half))[[half - 1, half]].tolist() if half else steps[[0, 0]].tolist()
+    return _Beams(slope, high if len(steps) % 2 else (low + high) / 2)
 
 
 def warm_up() -> None:
     """Compile the kernels."""
-    points, ring = np.ones((1, 4), np.float32), np.zeros(1, np.uint8)
     place = np.array([[1.0, 0.0, 1.0, 2.0, 1.0, 0.0, 0.0]])
-    kind = np.zeros(1, np.int32)
-    _count(points, ring, kind, np.zeros(3), place, _slopes(points, ring, np.zeros(3)), 0.1, _SILENT_M)
+    kind, origin = np.zeros(2, np.int32), np.zeros(3)
+    for points, ring in made_sweeps():
+        slope, _ = _slopes(points, ring, origin)
+        _count(points, ring, kind, origin, place, slope, 0.1, _SILENT_M)
 
 
 @numba.njit(cache=True, nogil=True)
-def _slopes(points: F32, ring: U8, origin: F64) -> F64:
-    """(C,) mean height over distance of each ring ahead."""
+def _slopes(points, ring, origin):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(C,) mean height over distance of each ring ahead, and x y (M, 2) of the points of the fullest ring, relative to
+    ``origin``."""
     rings = int(ring.max()) + 1
-    total, count = np.zeros(rings), np.zeros(rings)
+    total, count, size = np.zeros(rings), np.zeros(rings), np.zeros(rings, np.int64)
     for i in range(len(points)):
         x, y, z = points[i, 0] - origin[0], points[i, 1] - origin[1], points[i, 2] - origin[2]
+        size[ring[i]] += 1
         if x > 0.0 and abs(y) < _AHEAD * x:
             total[ring[i]] += z / np.hypot(x, y)
             count[ring[i]] += 1.0
     for c in range(rings):
         total[c] = total[c] / count[c] if count[c] >= _MIN_RING else np.nan
-    return total
+    fullest, found = size.argmax(), 0
+    xy = np.empty((size[fullest], 2))
+    for i in range(len(points)):
+        if ring[i] == fullest:
+            xy[found, 0], xy[found, 1] = points[i, 0] - origin[0], points[i, 1] - origin[1]
+            found += 1
+    return total, xy
+
+
+@numba.njit(cache=True, nogil=True)
+def _diamond(x, y):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Number of the direction's bin: grows with the angle from behind over the right, ahead and the left to behind,
+    without a trigonometric function."""
+    away = abs(x) + abs(y)
+    part = y / away if away > 0.0 else 0.0
+    if x < 0.0:
+        part = 2.0 - part if y >= 0.0 else -2.0 - part
+    return min(max(int((part + 2.0) * (0.25 * _BINS)), 0), _BINS - 1)
+
+
+@numba.njit(cache=True, nogil=True)
+def _by_direction(places):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """The places (K, 7), as in ``_count``, that may lie in each direction: those of bin b are
+    ``which[first[b] : first[b + 1]]``."""
+    reached = np.zeros((_BINS, len(places)), np.bool_)
+    for k in range(len(places)):
+        ux, uy, half = places[k, 0], places[k, 1], places[k, 4]
+        at, last = _diamond(ux + uy * half, uy - ux * half) - 1, _diamond(ux - uy * half, uy + ux * half) + 1
+        for b in range(at, last + 1 if last >= at else last + 1 + _BINS):
+            reached[b % _BINS, k] = True
+    first, which = np.zeros(_BINS + 1, np.int64), np.empty(reached.sum(), np.int64)
+    for b in range(_BINS):
+        first[b + 1] = first[b]
+        for k in range(len(places)):
+            if reached[b, k]:
+                which[first[b + 1]] = k
+                first[b + 1] += 1
+    return first, which
 
 
 @numba.njit(cache=True, nogil=True)
@@ -200,9 +244,11 @@ def _count(points, ring, kind, origin, places, slope, step_rad, silent_m):  # ty
     through, stopped = np.zeros((len(places), _MOST_SLICES)), np.zeros((len(places), _MOST_SLICES))
     taken = np.zeros((len(places), _MOST_SLICES))
     seen, hidden = np.zeros((len(places), len(slope))), np.zeros(len(places))
+    first, which = _by_direction(places)
     for i in range(len(points)):
         x, y, z = points[i, 0] - origin[0], points[i, 1] - origin[1], points[i, 2] - origin[2]
-        for k in range(len(places)):
+        towards = _diamond(x, y)
+        for k in which[first[towards] : first[towards + 1]]:
             along = x * places[k, 0] + y * places[k, 1]
             if along <= 0.0 or abs(y * places[k, 0] - x * places[k, 1]) > places[k, 4] * along:
                 continue

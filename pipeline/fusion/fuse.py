@@ -19,7 +19,7 @@ from pipeline.common.geometry import F64, corners_of, iou_matrix
 from pipeline.fusion.rows import box_row, hit_row, lidar_sigma_m, quad, range_m
 from pipeline.fusion.vehicle_sizes import LONGEST_M
 from pipeline.params import FusionParams
-from pipeline.types import Box, FusedObject, Gate, LidarTrack, Mask, Point2, VisionTrack
+from pipeline.types import VEHICLES, Box, FusedObject, Gate, LidarTrack, Mask, Point2, VisionTrack
 
 _SURELY_ONE = 0.5
 _KEPT_IOU = 0.2
@@ -177,6 +177,9 @@ def _gates(
     """Which pairs may be one object, and the tests of each overlapping pair. were_one: as returned by ``_were_one``.
     ranges_m, sigmas_m: of the LiDAR tracks."""
     is_held = np.any(were_one & np.array([not each.carried for each in lidar], dtype=np.bool_), axis=1).tolist()
+    # a cluster whose vehicle is still boxed is no suitcase, even if such a box fits it better in this image
+    boxed = np.array([_is_boxed_vehicle(each) for each in vision], dtype=np.bool_)
+    has_vehicle = np.any(were_one & boxed[:, None], axis=0).tolist()
     lengths_m = [max(track.obstacle.cuboid.size[:2]) for track in lidar]
     joinable = np.zeros(overlap.shape, dtype=bool)
     gates: dict[tuple[int, int], tuple[Gate, ...]] = {}
@@ -195,9 +198,16 @@ def _gates(
         if is_held[i] and not were_one[i, j]:
             hits = lidar[j].hits
             tests.append(Gate("cluster_hits", hits, _TAKES_OVER_HITS, hits >= _TAKES_OVER_HITS))
+        if has_vehicle[j] and vision[i].label not in VEHICLES:
+            tests.append(Gate("same_kind", None, 1.0, False))
         joinable[i, j] = all(test.passed for test in tests)
         gates[i, j] = tuple(tests)
     return joinable, gates
+
+
+def _is_boxed_vehicle(track: VisionTrack) -> bool:
+    """Whether the camera sees it now and names it a vehicle."""
+    return track.label in VEHICLES and not track.carried
 
 
 def _most_overlapping(overlap: F64) -> list[int]:

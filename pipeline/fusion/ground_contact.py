@@ -9,16 +9,16 @@ matter, because both sensors pitch with it. The remaining errors are the shape o
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.alignment.projection import Alignment
 from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64, iou_matrix
-from pipeline.lidar.road_profile import ASIDE_M, RoadProfile, fit_road_profile
+from pipeline.lidar.road_profile import ASIDE_M, RoadProfile
 from pipeline.params import FusionParams
-from pipeline.types import F32, VEHICLES, Ground, Mask, VisionMeasurement
+from pipeline.types import VEHICLES, Mask, VisionMeasurement
 
 NEAREST_M = 10.0
 """Minimum distance by the box's height. Nearer, the lower edge is as often a shadow as a tyre
@@ -40,20 +40,6 @@ _WORTHLESS_SHARE = 0.35
 """Above this relative sigma, a contact says less than the vehicle's class does."""
 
 
-class SweptRoad(Protocol):
-    """The parts of a segmented sweep that describe the road."""
-
-    @property
-    def points(self) -> F32:
-        """(N, 4) float32 ``x y z intensity``, ego frame."""
-        ...
-
-    @property
-    def ground(self) -> Ground | None:
-        """The road; None without a sweep."""
-        ...
-
-
 class _Contacts(NamedTuple):
     """Where the lower edges of (M,) boxes meet the road."""
 
@@ -67,21 +53,16 @@ class _Contacts(NamedTuple):
 
 def measure_contacts(
     boxes: tuple[VisionMeasurement, ...] | None,
-    sweep: SweptRoad,
+    road: RoadProfile | None,
     alignment: Alignment | None,
-    speed_mps: float | None,
     params: FusionParams,
 ) -> tuple[VisionMeasurement, ...] | None:
-    """The boxes, with ``contact_m`` and its standard deviations for vehicles whose lower edge is visible.
-
-    speed_mps: own speed; None while unknown."""
+    """The boxes, with ``contact_m`` and its standard deviations for vehicles whose lower edge is visible. road: None
+    while unknown; then there are no contacts."""
     if not params.use_ground_contact or not boxes or alignment is None or not alignment.is_metric:
         return boxes
     asked = [each.detection.label in VEHICLES and (each.distance_m or 0.0) >= NEAREST_M for each in boxes]
-    if not any(asked) or sweep.ground is None:
-        return boxes
-    road = fit_road_profile(sweep.points, sweep.ground.mask, speed_mps)
-    if road is None:
+    if not any(asked) or road is None:
         return boxes
     bbox = np.array([each.detection.bbox for each in boxes])
     found = _contacts(bbox, alignment, road)
@@ -109,8 +90,9 @@ def _hidden_below(bbox: F64) -> Mask:
 def _contacts(bbox: F64, alignment: Alignment, road: RoadProfile) -> _Contacts:
     """Where the lower edges of boxes (M, 4) meet the road."""
     middle, lower = (bbox[:, 0] + bbox[:, 2]) / 2.0, bbox[:, 3]
-    meets = [_meets(np.column_stack([middle, lower + off]), alignment, road) for off in (0.0, -_EDGE_PX, _EDGE_PX)]
-    (x, range_m, closing), (_, far_m, _), (_, near_m, _) = meets
+    edges = np.concatenate([lower, lower - _EDGE_PX, lower + _EDGE_PX])
+    meets = _meets(np.column_stack([np.tile(middle, 3), edges]), alignment, road)
+    (x, _, _), (range_m, far_m, near_m), (closing, _, _) = (each.reshape(3, -1) for each in meets)
     with np.errstate(invalid="ignore", divide="ignore"):
         by_edge = np.log(far_m / near_m) / 2.0
         by_road = road.height_sigma_m(x) / closing / range_m

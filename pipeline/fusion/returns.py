@@ -18,14 +18,17 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, Protocol
 
+import numba
 import numpy as np
 
 from pipeline.alignment.projection import Alignment
 from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64
+from pipeline.common.made_sweeps import made_sweeps
 from pipeline.fusion.free_road import SweepRays
 from pipeline.params import FusionParams
-from pipeline.types import I32, VEHICLES, Ground, VisionMeasurement
+from pipeline.types import GROUND, I32, VEHICLES, Ground, VisionMeasurement
+from pipeline.types.ground_planes import ground_z
 
 NEAREST_M = 30.0
 """Minimum distance, measured by the camera. Closer vehicles have a cluster or are occluded."""
@@ -95,14 +98,30 @@ def range_boxes(
 
 
 def _above_the_road(sweep: SweepReturns, ground: Ground, alignment: Alignment) -> _Points:
-    xyz = sweep.points[:, :3].astype(np.float64)
-    range_m = np.hypot(xyz[:, 0], xyz[:, 1])
-    rows = np.flatnonzero((sweep.kind != -1) & (xyz[:, 0] > 0.0) & (range_m > NEAREST_M / 2))
-    height_m = xyz[rows, 2] - ground.height(xyz[rows, :2])
-    rows = rows[(height_m > _LOW_M) & (height_m < _HIGH_M)]
-    seen = xyz[rows] - np.array(sweep.origin)
+    rows, range_m = _far_and_high(sweep.points, sweep.kind, ground.planes, ground.edges, NEAREST_M / 2, _LOW_M, _HIGH_M)
+    xyz = sweep.points[rows, :3].astype(np.float64)
+    seen = xyz - np.array(sweep.origin)
     elevation_deg = np.degrees(np.arctan2(seen[:, 2], np.hypot(seen[:, 0], seen[:, 1])))
-    return _Points(alignment.project(xyz[rows]), range_m[rows], elevation_deg, sweep.kind[rows] >= 0)
+    return _Points(alignment.project(xyz), range_m, elevation_deg, sweep.kind[rows] >= 0)
+
+
+@numba.njit(cache=True, nogil=True)
+def _far_and_high(points, kind, planes, edges, nearest_m, low_m, high_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(M,) rows of the points ahead that are farther than ``nearest_m``, between two heights over the ground and not
+    ground themselves; (M,) their ranges."""
+    rows, ranges_m = np.empty(len(points), np.int64), np.empty(len(points))
+    count = 0
+    for n in range(len(points)):
+        x, y, z = np.float64(points[n, 0]), np.float64(points[n, 1]), np.float64(points[n, 2])
+        if kind[n] == GROUND or not x > 0.0:
+            continue
+        height_m = z - ground_z(planes, edges, x, y)
+        if height_m > low_m and height_m < high_m:
+            range_m = np.hypot(x, y)
+            if range_m > nearest_m:
+                rows[count], ranges_m[count] = n, range_m
+                count += 1
+    return rows[:count].copy(), ranges_m[:count].copy()
 
 
 def _ranged(seen: VisionMeasurement, points: _Points) -> VisionMeasurement:
@@ -110,16 +129,17 @@ def _ranged(seen: VisionMeasurement, points: _Points) -> VisionMeasurement:
     assert seen.sigma_m is not None
     x1, y1, x2, y2 = seen.detection.bbox
     side, bottom, share = _EDGE_SHARE * (x2 - x1), _BOTTOM_SHARE * (y2 - y1), seen.sigma_m / seen.distance_m
-    u, v = points.uv[:, 0], points.uv[:, 1]
-    off = np.log(points.range_m / seen.distance_m) / share
-    with np.errstate(invalid="ignore"):  # points behind the camera have no pixel
-        inside = (u > x1 + side) & (u < x2 - side) & (v > y1) & (v < y2 - bottom) & (np.abs(off) < _SIGMAS)
-    rows = np.flatnonzero(inside)
+    inner = (x1 + side, y1, x2 - side, y2 - bottom)
+    rows = _inside(points.uv, points.range_m, inner, seen.distance_m, share)
     if not len(rows):
         return seen
-    rows = rows[np.argsort(points.range_m[rows], kind="stable")]
-    parts = np.split(rows, np.flatnonzero(np.diff(points.range_m[rows]) > _GAP_M) + 1)
-    groups = [_Group(part, math.log(len(part)) - 0.5 * float(off[part[0]]) ** 2) for part in parts]
+    off = np.log(points.range_m[rows] / seen.distance_m) / share
+    starts = [0, *(np.flatnonzero(np.diff(points.range_m[rows]) > _GAP_M) + 1).tolist()]
+    ends = [*starts[1:], len(rows)]
+    groups = [
+        _Group(rows[start:end], math.log(end - start) - 0.5 * float(off[start]) ** 2)
+        for start, end in zip(starts, ends, strict=True)
+    ]
     groups.sort(key=lambda group: -group.fit)
     best = groups[0].rows
     if len(groups) > 1 and groups[0].fit - groups[1].fit < _CLEARLY:
@@ -141,3 +161,26 @@ def _goes_on(points: _Points, group: np.ndarray, box: tuple[float, float]) -> bo
         alike &= (points.elevation_deg > low - _SAME_HEIGHT_DEG) & (points.elevation_deg < high + _SAME_HEIGHT_DEG)
         left, right = alike & (u > x1 - reach) & (u < x1), alike & (u > x2) & (u < x2 + reach)
     return bool(left.any() and right.any())
+
+
+@numba.njit(cache=True, nogil=True)
+def _inside(uv, range_m, box, distance_m, share):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(K,) rows of the points inside a box (x1, y1, x2, y2) whose range agrees with the camera's, by range. Points
+    behind the camera have no pixel: NaN."""
+    found, count = np.empty(len(uv), np.int64), 0
+    for n in range(len(uv)):
+        u, v = uv[n, 0], uv[n, 1]
+        is_inside = u > box[0] and u < box[2] and v > box[1] and v < box[3]
+        if is_inside and abs(np.log(range_m[n] / distance_m) / share) < _SIGMAS:
+            found[count] = n
+            count += 1
+    rows = found[:count]
+    return rows[np.argsort(range_m[rows], kind="mergesort")]
+
+
+def warm_up() -> None:
+    """Compile the kernels, or load them from numba's cache."""
+    planes, edges = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0])
+    for points, _ in made_sweeps():
+        _far_and_high(points, np.zeros(2, np.int32), planes, edges, 1.0, 0.0, 2.0)
+    _inside(np.zeros((1, 2)), np.ones(1), (0.0, 0.0, 1.0, 1.0), 1.0, 0.1)

@@ -54,15 +54,15 @@ def agreement(first: LabelSet, second: LabelSet) -> Agreement:
     same_class = reversed_count = alone_first = alone_second = 0
     partners: dict[int, dict[int, int]] = {}
     for frame in sorted(ours.keys() & theirs.keys()):
-        pairs = _pairs([each[1] for each in ours[frame]], [each[1] for each in theirs[frame]])
-        for a, b, iou in pairs:
+        both_have = pairs([each[1] for each in ours[frame]], [each[1] for each in theirs[frame]])
+        for a, b, iou in both_have:
             (one, cuboid), (other, opposite) = ours[frame][a], theirs[frame][b]
             overlaps.append(iou)
             same_class += one.label == other.label
             reversed_count += math.cos(cuboid.yaw_rad - opposite.yaw_rad) < 0
             partners.setdefault(frame, {})[one.id] = other.id
-        alone_first += len(ours[frame]) - len(pairs)
-        alone_second += len(theirs[frame]) - len(pairs)
+        alone_first += len(ours[frame]) - len(both_have)
+        alone_second += len(theirs[frame]) - len(both_have)
     leads, others = _leads(first), _leads(second)
     both = sorted(leads.keys() & others.keys())
     apart = tuple(frame for frame in both if not _is_same(leads[frame], others[frame], partners.get(frame, {})))
@@ -94,7 +94,7 @@ def _is_same(ours: Lead, theirs: Lead, partners: Mapping[int, int]) -> bool:
     return ours == theirs
 
 
-def _pairs(ours: list[Cuboid], theirs: list[Cuboid]) -> list[tuple[int, int, float]]:
+def pairs(ours: list[Cuboid], theirs: list[Cuboid]) -> list[tuple[int, int, float]]:
     """Matching cuboids, one-to-one, with their overlap."""
     overlaps = np.array([[bev_iou(a, b) for b in theirs] for a in ours])
     rows, columns = linear_sum_assignment(-overlaps)

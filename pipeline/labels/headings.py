@@ -168,7 +168,7 @@ def travelled(sightings: Sequence[Sighting], poses: Mapping[int, Pose]) -> Trave
         at, to = poses[a.frame], poses[b.frame]
         if at.stretch != to.stretch or a.cuboid is None or b.cuboid is None:
             continue
-        (ax, ay), (bx, by) = _over_ground(a.cuboid, at), _over_ground(b.cuboid, to)
+        (ax, ay), (bx, by) = over_ground(a.cuboid, at), over_ground(b.cuboid, to)
         yaw_rad = b.cuboid.yaw_rad + to.yaw_rad
         step_m = (bx - ax) * math.cos(yaw_rad) + (by - ay) * math.sin(yaw_rad)
         along_m += step_m
@@ -232,7 +232,15 @@ def _faces_our_way(sighting: Sighting) -> bool:
     return sighting.cuboid is None or math.cos(sighting.cuboid.yaw_rad) >= 0
 
 
-def _over_ground(cuboid: Cuboid, pose: Pose) -> tuple[float, float]:
+def over_ground(cuboid: Cuboid, pose: Pose) -> tuple[float, float]:
+    """Its centre in the frame of the poses."""
     c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     x, y, _ = cuboid.center
     return pose.x + c * x - s * y, pose.y + s * x + c * y
+
+
+def in_ego(x: float, y: float, pose: Pose) -> tuple[float, float]:
+    """A place in the frame of the poses, in the ego frame of one of them."""
+    dx, dy = x - pose.x, y - pose.y
+    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    return c * dx + s * dy, c * dy - s * dx

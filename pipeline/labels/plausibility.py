@@ -1,4 +1,8 @@
-"""Finds implausible labels to check before export. Changes nothing."""
+"""Finds implausible labels to check before export. Changes nothing.
+
+The limits were checked on KITTI drive 0009, whose 411 cuboids were labelled as tracks: none reaches half of a limit. In
+Astyx, labelled frame by frame, 136 steps have 23 jumps in size, 18 in position, and 6 in heading (four half turns).
+"""
 
 from __future__ import annotations
 
@@ -23,12 +27,15 @@ _LEAST_TURN_DEG = 10.0
 """Accuracy of manual labels."""
 _MOST_ACCELERATION_MPS2 = 15.0
 """Maximum relative acceleration, with two vehicles braking or accelerating at their limits."""
-_LEAST_STEP_M = 1.0
-"""Tolerance for a centre's deviation from a smooth path: two cuboids drawn half a metre off in opposite directions."""
+_LEAST_STEP_M = 0.5
+"""Tolerance for a centre's deviation from a smooth path: two cuboids drawn a quarter of a metre off in opposite
+directions. KITTI: at most 0.13 m. Proposals that exceed it are 1.1 m off (median), the others 0.25 m."""
 _MOST_GROWTH_M = 0.3
+"""Bodies are rigid; a person's size differs by this between two frames."""
 _MOST_OVERLAP = 0.1
 """Share of the smaller footprint."""
-_LEAST_BOX_IOU = 0.3
+_LEAST_BOX_IOU = 0.5
+"""KITTI's own boxes have at least 0.79 with the projected cuboids."""
 
 
 @dataclass(frozen=True)

@@ -188,6 +188,7 @@ def _settled(state: LaneState, seen: F64 | None) -> tuple[F64 | None, int]:
 
 def warm_up() -> None:
     """Compile the kernels before the first image."""
+    tracking.warm_up()
     seen = Sightings(np.zeros(20), np.linspace(0.05, 0.2, 20), np.ones(20), 1.0)
     shape, _ = line_fit.shared_shape(seen, RoadCurve())
     line_fit.fit_line(seen, 0.0, shape, 1e-3)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from pipeline.common.fast_replace import evolve
@@ -177,18 +178,29 @@ def _pairs(lines: tuple[LineTrack, ...], measured: tuple[FittedLine, ...], gate_
 
 
 def _joined(line: LineTrack, found: FittedLine) -> LineTrack:
-    gain = np.linalg.solve(line.covariance + found.covariance, line.covariance).T
-    keep = np.eye(4) - gain
-    mean = line.coefficients + gain @ (found.coefficients - line.coefficients)
-    cov = keep @ line.covariance @ keep.T + gain @ found.covariance @ gain.T
+    mean, cov = _update(line.coefficients, line.covariance, found.coefficients, found.covariance)
     return LineTrack(
         mean,
-        (cov + cov.T) / 2.0,
+        cov,
         min(line.x_min_m, found.x_min_m) if line.seen > 1 else found.x_min_m,
         max(line.x_max_m, found.x_max_m),
         line.quality + _SEEN_GAIN * (found.quality - line.quality),
         line.seen + 1,
     )
+
+
+@numba.njit(cache=True, nogil=True)
+def _update(mean, cov, seen, seen_cov):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Mean (4,) and covariance (4, 4), in Joseph's form, after a measurement of all four coefficients."""
+    gain = np.ascontiguousarray(np.linalg.solve(cov + seen_cov, cov).T)
+    keep = np.eye(4) - gain
+    joseph = keep @ cov @ keep.T + gain @ seen_cov @ gain.T
+    return mean + gain @ (seen - mean), (joseph + joseph.T) / 2.0
+
+
+def warm_up() -> None:
+    """Compile the kernel, or load it from numba's cache."""
+    _update(np.zeros(4), np.eye(4), np.zeros(4), np.eye(4))
 
 
 def _faded(line: LineTrack) -> LineTrack:

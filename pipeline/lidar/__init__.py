@@ -5,7 +5,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.lidar import boxes, cluster, deskew, divide_tracked, downsample, ground, road_profile, tracking
+from pipeline.lidar import (
+    boxes,
+    cluster,
+    deskew,
+    divide_tracked,
+    downsample,
+    ground,
+    road_profile,
+    track_history,
+    tracking,
+)
 from pipeline.params import DeskewParams, Params
 from pipeline.types import EgoState, Sweep
 
@@ -23,6 +33,7 @@ def warm_up() -> None:
     keep = np.ones(len(points), dtype=np.bool_)
     time_s = np.zeros(len(points), np.float32)
     sweep = Sweep(0, points, np.zeros(len(points), np.uint8), 16, time_s)
+    track_history.warm_up()
     for writeable in (True, False):
         points.flags.writeable = time_s.flags.writeable = writeable
         plane = ground.fit_ground(points, keep, params.ground)

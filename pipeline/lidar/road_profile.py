@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from pipeline.types import F32, F64, Mask
+from pipeline.types import F32, F64, Ground, Mask
 
 NEAREST_M, FARTHEST_M, ASIDE_M = 3.0, 60.0, 6.0
 """Bounds of the returns that are used: the road ahead, no farther to the side than its own width."""
@@ -46,11 +46,23 @@ class RoadProfile(NamedTuple):
     cov: F64
     """(4, 4) float64."""
 
+    def height(self, xy: F64) -> F64:
+        """(…) height of the road, m. xy: (…, 2) ego x and y, m."""
+        x, y = xy[..., 0], xy[..., 1]
+        height, slope, curvature, cross = self.mean
+        z: F64 = height + slope * x + curvature * x * x / 2.0 + cross * y
+        return z
+
     def height_sigma_m(self, x: F64) -> F64:
         """(M,) standard deviation of the height straight ahead, m. x: (M,) m."""
         rows = np.column_stack([np.ones_like(x), x, x * x / 2.0, np.zeros_like(x)])
         sigma: F64 = np.sqrt(np.einsum("ij,jk,ik->i", rows, self.cov, rows))
         return sigma
+
+
+def road_ahead(points: F32, ground: Ground | None, speed_mps: float | None = None) -> RoadProfile | None:
+    """The road in a segmented sweep; None without a sweep. See ``fit_road_profile``."""
+    return fit_road_profile(points, ground.mask, speed_mps) if ground is not None else None
 
 
 def fit_road_profile(points: F32, mask: Mask, speed_mps: float | None = None) -> RoadProfile | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 
 from pipeline.types import F64, I64
@@ -33,16 +34,7 @@ def first_sightings(place: F64, clock_s: float, frames: int) -> F64:
 def slopes(history: F64) -> F64:
     """(T, C) speed in m/s from a least-squares line through each column of (T, H, 1 + C) ``t_s …``; NaN if all times
     are equal."""
-    known = ~np.isnan(history[:, :, :1])
-    table = np.where(known, history, 0.0)
-    mean = table.sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1)
-    t, xy = (table - mean)[:, :, :1] * known, (table - mean)[:, :, 1:]
-    spread = np.sum(t * t, axis=1)
-    return np.asarray(
-        np.divide(
-            np.sum(t * xy, axis=1), spread, out=np.full((len(history), table.shape[2] - 1), np.nan), where=spread > 0.0
-        )
-    )
+    return np.asarray(_slopes(np.ascontiguousarray(history)))
 
 
 def rigid_sideways(history: F64) -> F64:
@@ -52,20 +44,53 @@ def rigid_sideways(history: F64) -> F64:
     A parked car's footprint grows while we pass, as more of its flank becomes visible: its reference point moves by
     metres, but one of its sides does not. If a car pulls out, both sides move.
     """
-    if not len(history):
-        return np.zeros(0)
-    sides = history[:, :, [0, 3, 4]]
-    speed = slopes(sides)
-    known = ~np.isnan(sides[:, :, :1])
-    count = np.maximum(known.sum(axis=1), 1)
-    t = np.where(known, sides[:, :, :1], 0.0)
-    t = (t - t.sum(axis=1, keepdims=True) / count[:, None]) * known
-    y = np.where(known, sides[:, :, 1:], 0.0)
-    y = (y - y.sum(axis=1, keepdims=True) / count[:, None]) * known
-    residual = np.sum((y - t * np.nan_to_num(speed)[:, None, :]) ** 2, axis=1) / np.maximum(count - 2, 1)
-    noise_m = np.sqrt(np.maximum(residual, _SIDE_NOISE_M**2))
-    span = np.sqrt(np.sum(t * t, axis=1))
-    sure = np.abs(speed) - _SURE_SIGMAS * np.divide(noise_m, span, out=np.full_like(noise_m, np.inf), where=span > 0.0)
-    least = np.clip(np.nan_to_num(sure, nan=0.0, neginf=0.0).min(axis=1), 0.0, None)
-    together = np.sign(speed[:, 0]) == np.sign(speed[:, 1])
-    return np.asarray(np.where(together, np.sign(np.nan_to_num(speed[:, 0])) * least, 0.0))
+    return np.asarray(_rigid_sideways(np.ascontiguousarray(history)))
+
+
+def warm_up() -> None:
+    """Compile the kernels, or load them from numba's cache."""
+    slopes(np.zeros((1, 2, 3)))
+    rigid_sideways(np.zeros((1, 2, 5)))
+
+
+@numba.njit(cache=True, nogil=True)
+def _slopes(history):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Kernel of ``slopes``."""
+    out = np.full((len(history), history.shape[2] - 1), np.nan)
+    for i in range(len(history)):
+        known = np.flatnonzero(~np.isnan(history[i, :, 0]))
+        t, spread = _centred(history[i], known, 0)
+        for c in range(out.shape[1]):
+            xy, _ = _centred(history[i], known, 1 + c)
+            if spread > 0.0:
+                out[i, c] = (t * xy).sum() / spread
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _rigid_sideways(history):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Kernel of ``rigid_sideways``."""
+    out = np.zeros(len(history))
+    for i in range(len(history)):
+        known = np.flatnonzero(~np.isnan(history[i, :, 0]))
+        t, spread = _centred(history[i], known, 0)
+        if not spread > 0.0:
+            continue
+        speed, sure = np.zeros(2), np.zeros(2)
+        for c in range(2):
+            y, _ = _centred(history[i], known, 3 + c)
+            speed[c] = (t * y).sum() / spread
+            residual = ((y - t * speed[c]) ** 2).sum() / max(len(known) - 2, 1)
+            noise_m = np.sqrt(max(residual, _SIDE_NOISE_M**2))
+            sure[c] = abs(speed[c]) - _SURE_SIGMAS * (noise_m / np.sqrt(spread))
+        if np.sign(speed[0]) == np.sign(speed[1]):
+            out[i] = np.sign(speed[0]) * max(sure.min(), 0.0)
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _centred(history, known, column):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """One column of (H, C) at the known rows, minus its mean, and the sum of its squares."""
+    values = history[known, column]
+    values = values - values.sum() / max(len(known), 1)
+    return values, (values * values).sum()

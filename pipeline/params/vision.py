@@ -17,6 +17,9 @@ class DetectionParams(Section):
     nms_iou: float = slider(
         0.55, 0.1, 0.95, 0.01, "", "Of two boxes that overlap more, the one with the lower score is dropped"
     )
+    road_users_only: bool = choice(
+        True, "Drop boxes of classes that no road user belongs to, such as suitcases and traffic lights"
+    )
     car_prior: float = slider(
         1.5, 1.0, 5.0, 0.1, "", "A vehicle is a car unless another class scores this many times higher"
     )

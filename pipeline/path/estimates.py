@@ -130,7 +130,7 @@ def _leaving(x: F64, y: F64, left: F64, right: F64) -> tuple[F64, F64]:
 
 
 def _places(line: LaneLine | None, x: F64) -> tuple[F64, F64] | None:
-    return None if line is None else (line.y_m(x), line.sigma_m(x))
+    return None if line is None else line.along(x)
 
 
 def _along(lane: EgoLane, params: PathParams) -> tuple[F64, float]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -12,12 +13,16 @@ from pipeline.params import PathParams
 from pipeline.path import road_shape, road_structure
 from pipeline.path.estimates import PathEstimate
 from pipeline.path.road_structure import NONE, Cells
-from pipeline.types import F32, I32, U8, EgoState, FusedObject, Ground, LidarTrack, Moment
+from pipeline.types import F32, I32, U8, VEHICLES, EgoState, FusedObject, Ground, LidarTrack, Moment, Point3
 
 _FEWEST_CELLS = 25
 _ANEW_EVERY = 3
 """A tracked shape may be the wrong one, so in every third frame the shape is also searched from scratch, which doubles
 the time."""
+_DROVE_S = 0.5
+"""A vehicle that was seen driving for so long and then stands is traffic, not part of the roadside."""
+_STANDS_MPS = 0.3
+"""A standing car learns nothing more about the road: what changes in front of it is traffic, not the roadside."""
 _LOWEST_M = 0.1
 """Minimum sensor height above the road; a lower value means that there is no road below it."""
 
@@ -39,6 +44,17 @@ class Surroundings(NamedTuple):
     """All objects, including whether they move."""
     sensor_height_m: float
     """Height of the sensor above the road."""
+    origin: Point3 = (0.0, 0.0, 0.0)
+    """Ego x y z of the sensor."""
+
+
+class Edges(NamedTuple):
+    """The course of the road from its edges."""
+
+    path: PathEstimate
+    """The path along the edges, at the car's present distance from them."""
+    cells: F64
+    """(M, 2) ego x, y of the structure that was used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,15 +67,10 @@ class EdgeState:
     """(K, 2) shape of the road in that frame; None if it is not known."""
     turn: int = 0
     """Frame counter, modulo ``_ANEW_EVERY``."""
-
-
-class Edges(NamedTuple):
-    """The course of the road from its edges."""
-
-    path: PathEstimate
-    """The path along the edges, at the car's present distance from them."""
-    cells: F64
-    """(M, 2) ego x, y of the structure that was used."""
+    edges: Edges | None = None
+    """What was found in that frame; None if nothing was."""
+    drove_s: Mapping[int, float] = field(default_factory=dict)
+    """For how long each object has been seen driving, by id."""
 
 
 def follow(
@@ -74,13 +85,18 @@ def follow(
     ego, dt_s = now.ego, now.dt_s
     if ego is None or not params.use_edges:
         return EdgeState(), None
-    # Structure beside the road from earlier sweeps, moved by own motion, and from this sweep, without moving vehicles
+    if abs(ego.speed_mps) < _STANDS_MPS and state.edges is not None:
+        return state, None if is_shown else state.edges
+    # Structure beside the road from earlier sweeps, moved by own motion, and from this sweep; without vehicles that
+    # drive or drove here, and without the trail that they left
     before = road_structure.moved(state.cells, ego, dt_s) if dt_s else NONE
+    if around.ring is not None and around.sensor_height_m > _LOWEST_M:
+        before = road_structure.standing(before, around.points, around.ring, around.origin, around.sensor_height_m)
     cells = road_structure.merged(before, _seen(around))
-    driving = [item for item in around.objects if road_structure.drives(item)]
-    cells = road_structure.without(cells, driving)
+    drove_s = _drove_s(state.drove_s, around.objects, dt_s or 0.0)
+    cells = road_structure.without(cells, [item for item in around.objects if _is_traffic(item, drove_s)])
     if is_shown or len(cells.xy) < _FEWEST_CELLS:
-        return EdgeState(cells), None
+        return EdgeState(cells, drove_s=drove_s), None
     # The shape with the most structure at a constant distance is the road's, and the nearest structure limits the free
     # width
     starts = road_shape.begin(state.shape, ego, dt_s, state.turn == 0, params)
@@ -88,7 +104,22 @@ def follow(
     room_m = road_shape.room(shape, cells.xy[cells.stands], params.half_width_m)
     left_m, right_m = (np.full(len(shape), each) for each in room_m)
     path = PathEstimate("edges", shape, sigma_m, left_m, right_m)
-    return EdgeState(cells, shape, (state.turn + 1) % _ANEW_EVERY), Edges(path, cells.xy)
+    edges = Edges(path, cells.xy)
+    return EdgeState(cells, shape, (state.turn + 1) % _ANEW_EVERY, edges, drove_s), edges
+
+
+def _drove_s(before: Mapping[int, float], objects: tuple[FusedObject, ...], dt_s: float) -> Mapping[int, float]:
+    return {
+        item.id: before.get(item.id, 0.0) + (dt_s if road_structure.drives(item) else 0.0)
+        for item in objects
+        if item.id in before or road_structure.drives(item)
+    }
+
+
+def _is_traffic(item: FusedObject, drove_s: Mapping[int, float]) -> bool:
+    """Whether it drives or, like a lead that has stopped, drove earlier. Without the camera, what seemed to drive may
+    be a hedge that came into view bit by bit."""
+    return road_structure.drives(item) or (item.label in VEHICLES and drove_s.get(item.id, 0.0) >= _DROVE_S)
 
 
 def _seen(around: Surroundings) -> Cells:

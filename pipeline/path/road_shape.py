@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from pipeline.common.geometry import F64
@@ -20,26 +19,35 @@ from pipeline.params import PathParams
 from pipeline.path.corridor import nearest
 from pipeline.path.estimates import arc, samples
 from pipeline.path.ground_points import now_at
+from pipeline.path.shape_kernels import weigh_shapes
 from pipeline.types import EgoState
 
 _NODES_M = (20.0, 40.0)
 """A shape is a cubic, given by its lateral offset at these two distances and its heading at the car."""
 _TEMPER = 0.2
-"""Cells of one car or one hedge are not independent: five count as one."""
+"""Weight of each cell's log-likelihood: cells of one car or one hedge are not independent, so five count as one. In
+simulated traffic, 0.1 gives errors that fit the sigma better, but it doubles the median error at 30 m in the bends of
+the streets suite (0.31 to 0.63 m), because the prior then straightens them."""
 _BAND_M = 12.0
+"""Cells farther from the line than this share one bin on each side: house fronts and side streets no longer follow the
+road."""
 _IMPROBABLE = 12.0
+"""A shape is not evaluated if its log prior is this much below the largest one: the cells rarely make up for a factor
+of 160,000. This only saves time."""
 _CHANCE = 1.0
-"""Number of cells expected by chance, relative to those that line up."""
+"""Number of cells that a lateral bin holds by chance, as a multiple of the mean over all bins."""
 _EDGE_M, _EDGE_CELLS, _EDGE_SHARE = 0.5, 5, 0.3
 """An edge is a strip beside the road of this width with at least this many cells and this share of the fullest strip's
 cells."""
 _CLEAR_M = 0.9
-"""Half a car's width."""
+"""Half a car's width: cells nearer to the line than this block it."""
 _CHANGES_OVER_M, _MOST_CHANGE_PER_M = (3.0, 10.0, 30.0), (0.01, 0.025, 0.1)
-"""Permitted difference of a road's curvature over the next 6 m, the next 20 m and the 20 m beyond from that of the way
-just driven: limited by lateral jerk up to the middle of each section, and by the curvature of a street corner."""
+"""How much the curvature of the road may differ from that of the way just driven, for the next 6 m, the next 20 m and
+the 20 m beyond (1 σ): the change that ``path.lateral_jerk_mps3`` allows up to these distances, the middle of each
+section, but at most these curvatures in 1/m. The last is a street corner with a radius of 10 m."""
 _MODEL_SIGMA_PER_M2 = 0.0004
-"""Model error, since a street is not exactly a cubic."""
+"""Standard deviation of the lateral offset per squared distance, since a street is not exactly a cubic: 0.16 m at 20 m,
+0.64 m at 40 m. In 840 frames of simulated streets, 70 to 88 % of the errors at 30 to 40 m lie within one sigma."""
 
 
 class Grid(NamedTuple):
@@ -55,11 +63,13 @@ class Grid(NamedTuple):
     """Width of the lateral bins for the votes of the points."""
 
 
+# From coarse to fine: a search from scratch, around an earlier shape or the result of that search, and around the best
 _WIDE = Grid((8.0, 1.0), (24.0, 2.0), (0.0, 1.0), 1.5)
 _USUAL = Grid((4.0, 0.5), (15.0, 1.25), (0.02, 0.02), 1.0)
 _FINE = Grid((1.5, 0.25), (4.5, 0.5), (0.02, 0.02), 0.5)
 _MOST_CELLS, _MOST_FINE = 150, 200
-"""Limits the computing time; a sweep of 16 rings has 100 to 300."""
+"""Most cells used by the two coarser grids and by the finest one, to limit the computing time. A sweep of 16 rings
+gives 100 to 300 cells."""
 
 
 class Prior(NamedTuple):
@@ -175,7 +185,7 @@ def _round(line: F64, xy: F64, blocks: F64, grid: Grid, prior: Prior, s: F64) ->
     keep = keep[:: -(-len(keep) // (_MOST_FINE if grid is _FINE else _MOST_CELLS)) or 1]
     heading, bends = _bends(line)
     first, second, turns = (_steps(*each) for each in (grid.first_m, grid.second_m, grid.heading))
-    weights, evidence = _weights(
+    weights, evidence = weigh_shapes(
         along[keep], aside[keep], blocks[keep], first, second, turns, grid.bin_m, _BAND_M, _TEMPER,
         heading, bends, *prior, _CHANCE, _CLEAR_M, _IMPROBABLE,
     )  # fmt: skip
@@ -222,79 +232,3 @@ def _moments(s: F64, first: F64, second: F64, heading: F64, weights: F64) -> tup
     mean = terms @ p
     spread = (terms - mean[:, None]) * p @ (terms - mean[:, None]).T
     return mean @ rows, np.sqrt(np.maximum(np.einsum("ik,ij,jk->k", rows, spread, rows), 0.0))
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz", "contract", "reassoc"})
-def _weights(  # type: ignore[no-untyped-def]
-    s,
-    d,
-    blocks,
-    first,
-    second,
-    heading,
-    bin_m,
-    band_m,
-    temper,
-    heading0,
-    bends,
-    bend_sigma,
-    heading_sigma,
-    own,
-    own_sigma,
-    later_sigma,
-    far_sigma,
-    chance,
-    clear_m,
-    improbable,
-):  # pragma: no cover
-    """(H, U, W) probability of each shape."""
-    bins = int(2.0 * band_m / bin_m) + 3
-    count = np.zeros(bins, np.int32)
-    by_chance = chance * max(len(s) / bins, 1.0)
-    logs = np.log(np.maximum(np.arange(4 * len(s) + 8) / 4.0 - 0.5, 0.0) / by_chance + 1.0)
-    out = np.empty((len(heading), len(first), len(second)))
-    likeliest = np.inf
-    for i in range(len(heading)):
-        for j in range(len(first)):
-            for k in range(len(second)):
-                b = (second[k] - 4.0 * first[j] + 40.0 * heading[i]) / 32000.0
-                a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
-                prior = ((bends[1] + 2.0 * a + 60.0 * b) / bend_sigma) ** 2
-                prior += ((bends[2] + 2.0 * a + 180.0 * b) / bend_sigma) ** 2
-                prior += ((bends[1] + 2.0 * a + 60.0 * b - own) / later_sigma) ** 2
-                prior += ((bends[2] + 2.0 * a + 180.0 * b - own) / far_sigma) ** 2
-                prior += ((heading0 + heading[i]) / heading_sigma) ** 2
-                prior += ((bends[0] + 2.0 * a + 18.0 * b - own) / own_sigma) ** 2
-                out[i, j, k] = 0.5 * prior
-                likeliest = min(likeliest, out[i, j, k])
-    best = -np.inf
-    s2, s3 = s * s, s * s * s
-    per_m, middle, last = 1.0 / bin_m, band_m / bin_m + 1.0, bins - 1.0  # the outer bins collect cells outside the band
-    for i in range(len(heading)):
-        for j in range(len(first)):
-            for k in range(len(second)):
-                prior = out[i, j, k]
-                if prior > likeliest + improbable:
-                    out[i, j, k] = -np.inf
-                    continue
-                b = (second[k] - 4.0 * first[j] + 40.0 * heading[i]) / 32000.0
-                a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
-                count[:] = 0
-                blocked = 0.0
-                for n in range(len(s)):
-                    aside = d[n] - heading[i] * s[n] - a * s2[n] - b * s3[n]
-                    blocked += blocks[n] if abs(aside) < clear_m else 0.0
-                    count[int(min(max(aside * per_m + middle, 0.0), last))] += 1
-                total = -blocked
-                for c in range(1, bins - 1):
-                    if count[c]:
-                        total += count[c] * logs[count[c - 1] + 2 * count[c] + count[c + 1]]
-                out[i, j, k] = temper * total - prior
-                best = max(best, out[i, j, k])
-    whole = 0.0
-    for i in range(len(heading)):
-        for j in range(len(first)):
-            for k in range(len(second)):
-                out[i, j, k] = np.exp(out[i, j, k] - best)
-                whole += out[i, j, k]
-    return out / whole, best + np.log(whole)

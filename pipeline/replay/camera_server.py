@@ -1,4 +1,4 @@
-"""A network camera: MJPEG over HTTP, each image with its time stamp, as mjpg-streamer sends it."""
+"""A network camera: MJPEG over HTTP, each image with its timestamp, as mjpg-streamer sends it."""
 
 from __future__ import annotations
 

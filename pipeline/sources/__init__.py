@@ -78,7 +78,9 @@ def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
         return found
     if kind is None:
         raise SourceError(f"{uri}: unknown kind of source {scheme!r}; use one of {usages(live=live)}")
-    return kind, rest
+    # the folder around a recording stands for it with a scheme, too: kitti:kitti_0009 holds one day with one drive
+    inside = recording_at(rest) if kind.folders or kind.files else None
+    return kind, inside[1] if inside is not None and inside[0] is kind else rest
 
 
 def _exists(uri: str) -> bool:

@@ -5,7 +5,7 @@ file per frame each. The ego frame is the radar's reference frame: every sensor'
 the camera's is the inverse of ``T_camera_ego``.
 
 Times are the LiDAR's: a sweep starts behind the car and looks ahead half a rotation later, and that moment is the
-frame's tick. The camera has no time stamps and is assumed to be at the tick.
+frame's tick. The camera has no timestamps and is assumed to be at the tick.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class AstyxSource:
     def __init__(self, uri: str, path: str) -> None:
         folder = recording_folder(path)
         self.uri, self.title = uri, folder.resolve().name
-        self.notes: tuple[str, ...] = ("camera without time stamps: mid-sweep assumed", "no ego speed recorded")
+        self.notes: tuple[str, ...] = ("camera without timestamps: mid-sweep assumed", "no ego speed recorded")
         self._sweeps = files_by_name(folder / "lidar_vlp16", (".txt",))
         self._images = files_by_name(folder / "camera_front", (".jpg", ".jpeg", ".png"))
         self._labels = files_by_name(folder / "groundtruth_obj3d", (".json",))

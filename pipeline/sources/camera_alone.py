@@ -65,7 +65,7 @@ def open_images(uri: str, rest: str, how: Opening) -> CameraAlone:
     stamped = all(times) and bool(np.all(np.diff(times) > 0))
     step_ns = round(1e9 / _positive(options, "rate_hz", _RATE_HZ))
     ticks = times if stamped else [index * step_ns for index in range(len(names))]
-    notes = [] if stamped else [f"no time stamps in the names: {1e9 / step_ns:g} Hz assumed; ?rate_hz= overrides it"]
+    notes = [] if stamped else [f"no timestamps in the names: {1e9 / step_ns:g} Hz assumed; ?rate_hz= overrides it"]
     return CameraAlone(uri, folder, options, ticks, lambda index: read_image(paths[index]), notes, names)
 
 

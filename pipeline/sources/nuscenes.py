@@ -167,7 +167,7 @@ def parse_sweep(data: bytes, file: str, notes: list[str]) -> tuple[F32, U8]:
     with np.errstate(invalid="ignore"):
         good = (rows[:, 4] >= 0.0) & (rows[:, 4] < _CHANNELS)
     if not np.all(good):
-        notes.append(f"{file}: {len(rows) - np.count_nonzero(good)} points of no ring skipped")
+        notes.append(f"{file}: {len(rows) - np.count_nonzero(good)} points without a valid ring skipped")
     if not np.any(good):
         raise SourceError(f"{file}: no LiDAR points")
     return np.ascontiguousarray(rows[good, :4]), rows[good, 4].astype(np.uint8)

@@ -95,7 +95,7 @@ class PcdSource:
         return cloud.sweep(t_ns, self.T_ego_lidar)
 
     def _about(self) -> tuple[str, ...]:
-        notes = [] if self._has_times else ["no time stamps in the file names: 10 Hz assumed"]
+        notes = [] if self._has_times else ["no timestamps in the file names: 10 Hz assumed"]
         if self._images and self._camera is None:
             notes.append("the camera has no calibration: LiDAR and camera are not fused")
         return (*notes, "no ego speed recorded")

@@ -36,17 +36,23 @@ _FILES: tuple[tuple[tuple[str, ...], str], ...] = (
     ((".csv", ".ply", ".las", ".laz", ".xyz", ".e57"), "a point cloud or table; convert sweeps to PCD, one file each"),
     (
         (".h5", ".hdf5", ".npy", ".npz", ".parquet", ".tfrecord"),
-        "a data format that is not read; convert it to a ROS bag",
+        "an unsupported data format; convert it to a ROS bag",
     ),
     ((".osf",), "an Ouster recording; convert it to a ROS bag of PointCloud2 or to PCD files"),
-    ((".rrd",), "an export for the rerun viewer; open the recording that it was made of"),
+    ((".rrd",), "an export for the rerun viewer; open the recording that it was made from"),
     ((".blf", ".asc", ".mf4", ".dbc"), "a log or definition of a vehicle bus, without LiDAR and images"),
 )
 """Common other files, by suffix: what they are, and what to do."""
 _FOLDERS: tuple[tuple[str, str], ...] = (
     ("samples/LIDAR_TOP", "files of nuScenes without their tables; the folder v1.0-mini or v1.0-trainval is missing"),
-    ("sensors/lidar", "a log of Argoverse 2; it is not read, convert it to a ROS bag or to PCD files, one a sweep"),
-    ("LIDAR_CONCAT", "a data set of TIER IV; it is not read, convert it to a ROS bag or to PCD files, one a sweep"),
+    (
+        "sensors/lidar",
+        "an unsupported Argoverse 2 log; convert it to a ROS bag or to PCD files, one per sweep",
+    ),
+    (
+        "LIDAR_CONCAT",
+        "an unsupported TIER IV data set; convert it to a ROS bag or to PCD files, one per sweep",
+    ),
     ("poses", "poses of KITTI's odometry sequences; the folders with velodyne and calib.txt are missing"),
 )
 """The same for folders, by a folder inside."""
@@ -59,7 +65,7 @@ _BEGINS: tuple[tuple[bytes, str], ...] = (
     (b"#ROSBAG V", "a ROS 1 bag; rename it so that it ends in .bag"),
     (
         b"SQLite format 3",
-        "a database; if it is of a ROS 2 bag, open the bag's folder or rename it so that it ends in .db3",
+        "a database; if it belongs to a ROS 2 bag, open the bag's folder or rename the file so that it ends in .db3",
     ),
 )
 """The same by the first bytes of a file."""

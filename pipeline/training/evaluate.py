@@ -30,9 +30,9 @@ MATCH_IOU = 0.5
 JUDGE_SEEDS = (101, 202, 303, 404, 505, 606, 707)
 """Random traffic not used for training or the distance law."""
 FREE_SHARE = 0.5
-"""Vehicles less visible than this count neither as missed nor as false positives."""
+"""A vehicle with a smaller visible share does not count as missed, nor its box as a false positive."""
 LEAD_M = 60.0
-"""Leads are scored up to here."""
+"""Maximum distance of a scored lead."""
 _HEIGHT_M = 1.6
 
 
@@ -41,19 +41,19 @@ class Bin:
     """Counts of one range of distances."""
 
     vehicles: int = 0
-    """In the images."""
+    """Number of vehicles in the images."""
     found: int = 0
-    """Of these, with a box."""
+    """Of these, how many have a box."""
     named: int = 0
-    """Of the found, with the right class."""
+    """Of those found, how many have the right class."""
     leads: int = 0
-    """Vehicles straight ahead."""
+    """Number of leads, each the nearest vehicle straight ahead in an image."""
     leads_found: int = 0
-    """Of these, with a box."""
+    """Of these, how many have a box."""
     wrong: int = 0
-    """Boxes that are no vehicle's."""
+    """Number of false positives."""
     height_errors: list[float] = field(default_factory=list)
-    """Found height over true height − 1, for whole, unoccluded boxes."""
+    """Detected height / true height − 1 of each uncut, unoccluded vehicle that was found."""
 
     def recall(self) -> float:
         return self.found / max(self.vehicles, 1)
@@ -89,17 +89,17 @@ def evaluate(detector: Detector, images: Iterable[DrawnScene], params: Detection
 
 
 def within(bins: list[Bin], far_m: float) -> Bin:
-    """All nearer bins as one."""
+    """The sum of all bins up to ``far_m``."""
     return _sum(part for part, end_m in zip(bins, EDGES_M[1:], strict=True) if end_m <= far_m)
 
 
 def pooled(runs: Iterable[list[Bin]]) -> list[Bin]:
-    """Several evaluations as one."""
+    """The sum of several evaluations, bin by bin."""
     return [_sum(parts) for parts in zip(*runs, strict=True)]
 
 
 def _sum(bins: Iterable[Bin]) -> Bin:
-    """Every count is the sum of theirs."""
+    """One bin with the sum of every count."""
     return Bin(*(reduce(add, counts) for counts in zip(*(vars(part).values() for part in bins), strict=True)))
 
 

@@ -17,7 +17,7 @@ from pipeline.types import F64, Box, CameraCalibration
 Ints32 = npt.NDArray[np.int32]
 CLASSES = ("car", "truck", "bus", "motorcycle")
 CLASS_OF = {"car": 0, "van": 0, "truck": 1, "bus": 2, "motorcycle": 3}
-"""A van is a car, as in COCO."""
+"""Class index of each kind of simulated vehicle. A van is a car, as in COCO."""
 _FAR_OUTSIDE_PX = 20_000.0
 _WIDEST_TAN = 1.1
 
@@ -27,19 +27,19 @@ class Label:
     """One vehicle in an image."""
 
     actor_id: int
-    """Of the scenario."""
+    """Id of the vehicle in the scenario."""
     label: int
-    """Index of its class."""
+    """Class index, see ``CLASS_OF``."""
     box: Box
-    """Around its whole outline including hidden parts, clipped to the image, since the height gives the distance."""
+    """Box of its whole outline, hidden parts included, because the height gives the distance; clipped to the image."""
     visible: float
     """Share of the outline inside the image that nearer vehicles do not cover."""
     distance_m: float
     """From the ego origin to the nearest corner of its footprint."""
     ahead: bool
-    """Its centre is straight ahead, no more than 1.5 m to either side."""
+    """Whether its centre lies ahead, at most 1.5 m to either side."""
     cut: bool
-    """The outline leaves the image."""
+    """Whether the image's border cuts the outline."""
 
 
 def labels(world: World, camera: CameraCalibration) -> tuple[Label, ...]:
@@ -86,8 +86,8 @@ def _outline(state: ActorState, camera: CameraCalibration) -> F64:
 
 
 def through_lens(flat: F64, camera: CameraCalibration) -> F64:
-    """(K, 2) points of the image plane at distance 1 as the lens bends them (k1, k2). Beyond the image, where the
-    polynomial may turn back, the distortion stays that of the edge."""
+    """Apply the lens distortion (k1, k2) to (K, 2) points of the image plane at distance 1. Beyond the image, where the
+    polynomial may decrease again, the distortion at the image's edge is used."""
     if not camera.distortion.size:
         return flat
     k1, k2 = camera.distortion[:2]
@@ -97,7 +97,7 @@ def through_lens(flat: F64, camera: CameraCalibration) -> F64:
 
 
 def _inside(outline: F64, camera: CameraCalibration) -> F64:
-    """(K, 2): the part of a convex outline inside the image; empty when none is, or less than a pixel across."""
+    """(K, 2): the part of a convex outline inside the image; empty if it is less than a pixel across."""
     if len(outline) < 3:
         return np.empty((0, 2))
     w, h = camera.width, camera.height
@@ -109,7 +109,7 @@ def _inside(outline: F64, camera: CameraCalibration) -> F64:
 
 
 def _fill(owners: Ints32, outline: F64, number: int) -> int:
-    """Assign an outline's pixels to a vehicle, and count them."""
+    """Assign the outline's pixels to a vehicle and return their number."""
     pixels = np.round(outline).astype(np.int32)
     left, top, width, height = cv2.boundingRect(pixels)
     part = owners[top : top + height, left : left + width]

@@ -28,12 +28,13 @@ from pipeline.vision.distance import height_at_reference, is_cut
 from pipeline.vision.nms import select
 
 FIT_SEEDS = (7, 8, 9)
-"""Each has its own roads, traffic and sizes, not used for training or evaluation."""
+"""Seeds not used for training or evaluation; each gives other roads, traffic and vehicle sizes."""
 _JUDGE_COUNT = 100
 MAX_DEPTH_M = 60.0
-"""Beyond this a network mainly finds the taller ones of similar cars, and a law fitted to those overestimates."""
+"""Beyond this, a network mainly finds the taller ones of similar cars, so a law fitted to those would overestimate
+distances."""
 CLEAR_SHARE = 0.9
-"""The box of a vehicle less visible than this has the height of the visible part."""
+"""If less of a vehicle is visible, its box has only the height of the visible part."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class SeenPair(Pair):
 
 
 def pairs(detector: Detector, images: Iterable[DrawnScene]) -> Iterator[SeenPair]:
-    """Every box of a whole, unoccluded vehicle, with the true depth of its nearest point."""
+    """Yield the box of every uncut, unoccluded vehicle with the true depth of its nearest point."""
     camera = calibration()
     for number, moment in enumerate(images):
         detections = select(detector.detect(moment.image), DetectionParams())
@@ -70,14 +71,15 @@ def pairs(detector: Detector, images: Iterable[DrawnScene]) -> Iterator[SeenPair
 
 
 def fit(found: Iterable[SeenPair]) -> DistanceLaw:
-    """The law of a pinhole camera, b = −1. Vans are left out of the car's: they are a third taller, and a law between
-    the two would be wrong for both."""
+    """Fit the law of a pinhole camera, b = −1. Vans are excluded from the law of cars: they are a third taller, so a
+    law in between would be wrong for both."""
     near = [pair for pair in found if pair.depth_m <= MAX_DEPTH_M and (pair.label, pair.kind) != ("car", "van")]
     return as_law(fit_laws(near, -1.0), DistanceParams().reference_focal_px)
 
 
 def errors(found: Iterable[SeenPair], law: DistanceLaw) -> list[tuple[int, float, float]]:
-    """Of cars, for each pair of ``EDGES_M``: how many, mean and mean absolute share of the true depth."""
+    """Errors for cars, for each pair of ``EDGES_M``: number of cars, mean and mean absolute error, relative to the true
+    depth."""
     cars = [pair for pair in found if pair.label == pair.kind == "car"]
     rows = []
     for low, high in itertools.pairwise(EDGES_M):

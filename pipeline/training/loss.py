@@ -18,24 +18,24 @@ _MOST_LOG_SIZE = 6.0
 
 @dataclass(frozen=True)
 class Losses:
-    """Means over the cells assigned to a vehicle."""
+    """The terms of the loss, averaged over the cells assigned to a vehicle."""
 
     total: Tensor
-    """What is minimised; the only one with a gradient."""
+    """The minimised sum; the only one with a gradient."""
     objectness: float
-    """How badly scores tell the boxes' IoU."""
+    """Quality focal loss of the objectness, whose target is the box's IoU."""
     classes: float
     """Cross-entropy of the class scores."""
     iou: float
-    """Of the boxes."""
+    """Generalised IoU loss of the boxes."""
 
 
 def losses(logits: Tensor, labels: Tensor, boxes: Tensor, size: Size) -> Losses:
-    """logits (B, N, 5 + C), labels (B, N), boxes (B, N, 4) of ``targets``.
+    """The losses for logits (B, N, 5 + C), given labels (B, N) and boxes (B, N, 4) from ``targets``.
 
-    Objectness aims at the box's IoU, weighted by its error (quality focal loss, Li 2020), so that the candidate with
-    the best box wins. Boxes: generalised IoU (Rezatofighi 2019) and L1 of the raw numbers, which is more sensitive to
-    the height of far vehicles of ten pixels.
+    The target of objectness is the box's IoU, weighted by its error (quality focal loss, Li 2020), so that the
+    candidate with the best box wins. Boxes: generalised IoU (Rezatofighi 2019) plus L1 of the raw outputs, which is
+    more sensitive to the height of far vehicles of ten pixels.
     """
     cells, strides = (torch.from_numpy(part) for part in grid_centres(size))
     positive = labels >= 0
@@ -65,7 +65,7 @@ def losses(logits: Tensor, labels: Tensor, boxes: Tensor, size: Size) -> Losses:
 
 
 def _overlap(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
-    """(M,) IoU and generalised IoU of (M, 4) boxes, pair by pair."""
+    """(M,) IoU and (M,) generalised IoU of two lists of (M, 4) boxes, element-wise."""
     inner = (torch.minimum(a[:, 2:], b[:, 2:]) - torch.maximum(a[:, :2], b[:, :2])).clamp(min=0).prod(dim=1)
     outer = (torch.maximum(a[:, 2:], b[:, 2:]) - torch.minimum(a[:, :2], b[:, :2])).prod(dim=1)
     union = (a[:, 2:] - a[:, :2]).prod(dim=1) + (b[:, 2:] - b[:, :2]).prod(dim=1) - inner

@@ -22,15 +22,15 @@ from pipeline.vision.heads.decoder import STRIDES
 
 INPUT_SIZE: Size = (384, 640)
 WIDTHS = (16, 24, 48, 80, 128)
-"""Channels at strides 2, 4, 8, 16 and 32."""
+"""Number of channels at strides 2, 4, 8, 16 and 32."""
 NECK = 48
 _CONTRAST = 64.0
 _SURENESS = (1.3, 1.3, 1.3, 0.8)
-"""Of ``CLASSES``: the power of objectness in a score. Objectness is trained to be the box's IoU, and that is 0.4 for
-boxes of nothing, too: 1.3 moves the best threshold, 0.4, to the product's usual 0.3. The boxes of motorcycles are
-narrow, so their IoU, and with it their score, is low where they are right: with 1.3 they were most of the leads that
-were missed. With 0.8 six in ten of their boxes fit, with 1.3 eight; a lead missed costs more."""
-_PRIOR_LOGIT = -4.6  # one cell in a hundred holds an object: keeps the first steps calm (Lin 2017, section 3.3)
+"""Exponent of objectness in the score of each of ``CLASSES``. Objectness is trained to equal the box's IoU, and reaches
+0.4 for false boxes too; the exponent 1.3 moves the best threshold, 0.4, to the product's default of 0.3. Boxes of
+motorcycles are narrow, so even correct ones have a low IoU and score: with 1.3, motorcycles were most of the missed
+leads. With 0.8, six in ten of their boxes are correct instead of eight, but a missed lead costs more."""
+_PRIOR_LOGIT = -4.6  # prior of one cell in a hundred with an object, for stable first steps (Lin 2017, section 3.3)
 
 
 def conv(inputs: int, outputs: int, kernel: int, stride: int = 1, groups: int = 1) -> nn.Sequential:
@@ -43,7 +43,7 @@ def conv(inputs: int, outputs: int, kernel: int, stride: int = 1, groups: int = 
 
 
 class Residual(nn.Module):
-    """x + a 3×3 convolution of half the channels (He 2016)."""
+    """Adds to its input a 3×3 convolution with half the channels (He 2016)."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -95,15 +95,15 @@ class DetectorNetwork(nn.Module):
 
 
 class ExportedNetwork(nn.Module):
-    """The network with probabilities in place of logits: what is written to ONNX."""
+    """The network with probabilities instead of logits, as written to ONNX."""
 
     def __init__(self, network: DetectorNetwork) -> None:
         super().__init__()
         self.network = network
 
     def forward(self, bgr: Tensor) -> Tensor:
-        """A score is objectness times class. What the classes' powers have in common is in the first, the rest in the
-        second, so that neither exceeds 1."""
+        """A score is objectness times class probability. The smallest exponent is applied to objectness and the rest to
+        the classes, so that neither exceeds 1."""
         logits = self.network(bgr)
         objectness = torch.sigmoid(logits[..., 4:5])
         common = min(_SURENESS)
@@ -112,7 +112,7 @@ class ExportedNetwork(nn.Module):
 
 
 def export(network: DetectorNetwork, path: Path, size: tuple[int, int]) -> None:
-    """Write the ONNX file for an input (height, width), class names in its properties."""
+    """Write the ONNX file for an input of (height, width), with the class names in its metadata."""
     import onnx
 
     model = ExportedNetwork(network).eval()

@@ -40,14 +40,14 @@ class DrawnScene:
     image: U8
     """(720, 1280, 3) uint8 blue green red."""
     world: world_state.World
-    """What it shows."""
+    """The world that it shows."""
 
 
 def moments(
     seed: int, count: int, wanted: Callable[[world_state.World], bool] = lambda _: True
 ) -> Iterator[DrawnScene]:
-    """The images out of ``count`` whose world is ``wanted``; the others are not rendered. Equal seeds give equal
-    images; different seeds share no road, traffic or backdrop."""
+    """Yield those of ``count`` images whose world is ``wanted``; the others are not rendered. The same seed gives the
+    same images; different seeds share no road, traffic or backdrop."""
     rng = np.random.default_rng([seed, 11])
     models = size_models(rng)
     for number in range(count):
@@ -106,7 +106,7 @@ def random_road(rng: np.random.Generator) -> Road:
 
 
 def _crossing_places(rng: np.random.Generator) -> list[float]:
-    """None on most roads, else one every 150 m or so."""
+    """Positions of crossings along the road: none on most roads, else about one every 150 m."""
     return [] if rng.random() < 0.6 else (np.arange(100.0, 2000.0, 150.0) + rng.uniform(0.0, 50.0)).tolist()
 
 
@@ -140,7 +140,7 @@ def random_traffic(rng: np.random.Generator, road: Road, models: BodyModels) -> 
 
 
 def size_models(rng: np.random.Generator) -> BodyModels:
-    """A dozen sizes of each kind. More sizes would give more variety, but meshes are cached."""
+    """A dozen sizes of each kind of vehicle: few enough for the cache of meshes to be useful."""
     return {kind: [_grown(rng, SIZES_M[kind]) for _ in range(_MODELS_A_KIND)] for kind in _KINDS}
 
 
@@ -168,7 +168,7 @@ def _vehicle(
 
 
 def _colour(rng: np.random.Generator) -> str:
-    """Half of all cars are grey of some brightness, the rest have any colour."""
+    """A random paint: a shade of grey for half of all vehicles, any colour for the rest."""
     rgb = np.full(3, rng.uniform(15, 245)) + rng.normal(0, 5, 3) if rng.random() < 0.5 else rng.uniform(10, 245, 3)
     return "#" + "".join(f"{int(np.clip(value, 0, 255)):02x}" for value in rgb)
 
@@ -183,7 +183,7 @@ def _lane_change(rng: np.random.Generator, road: Road, lane: int) -> list[dict[s
 
 
 def drive(name: str, step_s: float) -> Iterator[DrawnScene]:
-    """A built-in scenario, or any scenario file, as moments ``step_s`` apart."""
+    """Render a built-in scenario or a scenario file every ``step_s``."""
     scenario = load(name)
     end_m = world_state.at(scenario, scenario.duration_s).s_m + _BEYOND_M
     camera = DrawnCamera(scenario.road, Roadside.build(scenario.road, scenario.seed, 0.0, end_m), scenario.seed)

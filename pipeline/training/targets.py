@@ -12,7 +12,8 @@ from pipeline.types import F32
 from pipeline.vision.heads.decoder import grid_centres
 
 RANGES_PX = {8: (0.0, 56.0), 16: (40.0, 128.0), 32: (96.0, np.inf)}
-"""Range of the geometric mean of a box's sides for each stride; ranges overlap, so that no size is left out."""
+"""Range of box sizes, as the geometric mean of both sides in pixels, for each stride. The ranges overlap, so that every
+size has a stride."""
 RADIUS_CELLS = 1.0
 MIN_VISIBLE, MIN_HEIGHT_PX = 0.25, 5.0
 """A vehicle less visible than this is ignored; less than ``_HIDDEN`` of a vehicle visible is background."""
@@ -23,19 +24,19 @@ BACKGROUND, IGNORED = -1, -2
 
 @dataclass(frozen=True)
 class Targets:
-    """For the N cells of an image."""
+    """Targets of the N cells of an image."""
 
     labels: npt.NDArray[np.int64]
-    """(N,) int64 a class, ``BACKGROUND`` or ``IGNORED``."""
+    """(N,) int64 class index, ``BACKGROUND`` or ``IGNORED``."""
     boxes: F32
-    """(N, 4) float32 x1 y1 x2 y2 in network pixels, zero where there is no class."""
+    """(N, 4) float32 x1 y1 x2 y2 in network pixels; zero for cells without a class."""
 
 
 def assign(boxes: F32, labels: npt.NDArray[np.int64], visible: F32, size: Size) -> Targets:
-    """Cells for (M, 4) boxes with classes (M,) and visible shares (M,) in an input of (height, width).
+    """Assign (M, 4) boxes with (M,) classes and (M,) visible shares to the cells of an input of (height, width).
 
-    A cell whose centre lies within ``RADIUS_CELLS`` of a box's centre answers for it (Tian 2019, centre sampling), at
-    every stride whose range holds the box. Of two boxes the one more visible wins.
+    Each cell whose centre lies within ``RADIUS_CELLS`` of a box's centre is assigned to that box (centre sampling, Tian
+    2019), at every stride whose range contains the box's size. If two boxes compete, the more visible one wins.
     """
     cells, strides = grid_centres(size)
     centres, stride = (cells + 0.5) * strides, strides[:, 0]

@@ -24,8 +24,8 @@ from pipeline.training.targets import assign
 from pipeline.types import F32
 
 _WINDOWS: tuple[tuple[Size, int], ...] = (((192, 320), 20), (INPUT_SIZE, 5))
-"""Sizes of training windows with the batch that costs about the same; the small one is four times as cheap an image,
-and far vehicles are what needs the many examples."""
+"""Sizes of training windows, (height, width), each with a batch size of about the same cost. The small one costs a
+quarter per image and allows more examples of far vehicles, which need them most."""
 _SMALL_SHARE = 0.75
 _DECAY, _WARM_UP_STEPS = 0.02, 60
 _AVERAGE = 0.995
@@ -33,7 +33,7 @@ _CLIP = 10.0
 
 
 class Examples:
-    """The files of ``dataset``, drawn from in shuffled rounds."""
+    """The images written by ``dataset``, drawn in shuffled epochs."""
 
     def __init__(self, folders: list[Path], seed: int) -> None:
         self.examples = [
@@ -45,7 +45,7 @@ class Examples:
         self._order: list[int] = []
 
     def batch(self, size: Size, count: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Images (B, 3, H, W), labels (B, N), boxes (B, N, 4)."""
+        """The next ``count`` examples: images (B, 3, H, W), labels (B, N), boxes (B, N, 4)."""
         windows, labels, boxes = [], [], []
         for _ in range(count):
             window, rows = self._one(size)
@@ -74,9 +74,9 @@ def train(
     rate: float = 3e-3,
     start_from: Path | None = None,
 ) -> None:
-    """At most ``steps`` steps or ``minutes``, whichever is first, on a cosine schedule over that. A checkpoint and an
-    ONNX file are written every tenth of the way. With ``minutes`` the result depends on the
-    machine's speed. start_from: weights of an earlier round (the .pt file beside its ONNX)."""
+    """Train for ``steps`` steps or ``minutes``, whichever ends first, with a cosine schedule over that span. A
+    checkpoint and an ONNX file are written ten times on the way. With ``minutes``, the result depends on the machine's
+    speed. start_from: weights of an earlier training (the .pt file beside its ONNX file)."""
     torch.manual_seed(seed)
     torch.set_num_threads(threads)
     examples = Examples(folders, seed)
@@ -115,7 +115,8 @@ def train(
 
 
 def _blend(average: torch.nn.Module, network: torch.nn.Module, keep: float) -> None:
-    """Exponential moving average of weights and statistics (Polyak averaging): steadier than the last step."""
+    """Update the exponential moving average of weights and statistics (Polyak averaging), which is more stable than the
+    last step."""
     with torch.no_grad():
         for mean, now in zip(average.state_dict().values(), network.state_dict().values(), strict=True):
             if mean.dtype.is_floating_point:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from pipeline.common.geometry import Cuboid
 from pipeline.types.arrays import F64, Box, Mask, Point2, Point3
+from pipeline.types.ground_planes import grounds_z, heights_above
 
 
 @dataclass(frozen=True)
@@ -28,17 +29,13 @@ class Ground:
 
     def height(self, xy: npt.NDArray[np.floating]) -> F64:
         """(M,) ground z in metres at (M, 2) ego places; NaN where no ground was found."""
-        xy = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-        plane = self.planes[self._segment(xy[:, 0])]
-        return np.asarray(-(plane[:, 3] + plane[:, 0] * xy[:, 0] + plane[:, 1] * xy[:, 1]) / plane[:, 2])
+        places = np.ascontiguousarray(xy, dtype=np.float64).reshape(-1, 2)
+        return np.asarray(grounds_z(self.planes, self.edges, places))
 
     def above(self, points: npt.NDArray[np.floating]) -> F64:
         """(M,) height in metres of (M, 3+) ego points over the ground, along its normal; NaN without ground."""
-        plane = self.planes[self._segment(points[:, 0])]
-        return np.asarray(np.sum(plane[:, :3] * points[:, :3], axis=1) + plane[:, 3])
-
-    def _segment(self, x: npt.NDArray[np.floating]) -> npt.NDArray[np.intp]:
-        return np.searchsorted(self.edges[1:-1], x, side="right")
+        dtype = np.float32 if points.dtype == np.float32 else np.float64
+        return np.asarray(heights_above(self.planes, self.edges, np.ascontiguousarray(points, dtype=dtype)))
 
 
 @dataclass(frozen=True)

@@ -9,28 +9,29 @@ same result gives the same bytes.
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import Any, TextIO
 
-from pipeline.common.geometry import F64, Cuboid
+import msgspec
+import numpy as np
+
+from pipeline.common.geometry import F64
 from pipeline.types import (
     AccCommand,
     Cipv,
     EgoState,
     FusedObject,
-    Gate,
     OwnMotion,
     Path,
     Result,
     SensorHealth,
     StreamHealth,
 )
+from pipeline.types.rounding import DECIMALS, rounded, rounded_array
 
 VERSION = 1
-_DECIMALS = 4
 
 
 def to_json(result: Result) -> dict[str, Any]:
@@ -46,7 +47,7 @@ def to_json(result: Result) -> dict[str, Any]:
         "sensors": _sensors(result.sensors, result.streams),
         "ego": _ego(result.ego),
         "own_motion": _own_motion(result.own_motion),
-        "objects": [_object(each) for each in result.objects],
+        "objects": _objects(result.objects),
         "path": _path(result.path),
         "cipv": _cipv(result.cipv),
         "next_cipv": _cipv(result.next_cipv),
@@ -59,7 +60,12 @@ def to_json(result: Result) -> dict[str, Any]:
 
 def to_line(result: Result) -> str:
     """One line of a ``results.jsonl`` file, with its newline."""
-    return json.dumps(to_json(result), ensure_ascii=False, separators=(",", ":"), allow_nan=False) + "\n"
+    return encoded(to_json(result)).decode() + "\n"
+
+
+def encoded(content: dict[str, Any]) -> bytes:
+    """What ``to_json`` returns, as UTF-8 text without spaces."""
+    return msgspec.json.encode(content)
 
 
 def write_line(stream: TextIO, result: Result) -> None:
@@ -124,50 +130,97 @@ def _own_motion(own: OwnMotion | None) -> dict[str, Any] | None:
     }
 
 
-def _object(each: FusedObject) -> dict[str, Any]:
+_NUMBERS = 34
+"""Numbers of an object besides its gates, in the order of ``_numbers_of``."""
+_NAN2, _NAN3, _NAN4 = ((math.nan,) * count for count in (2, 3, 4))
+_NO_CUBOID = (_NAN3, _NAN3, math.nan)
+
+
+def _objects(objects: Sequence[FusedObject]) -> list[dict[str, Any]]:
+    """Every object. Their numbers are rounded all at once."""
+    numbers: list[float | None] = []
+    for each in objects:
+        numbers += _numbers_of(each)
+        for _, value, limit, _ in each.gates:
+            numbers += (value, limit)
+    known = rounded(numbers)
+    rows, first = [], 0
+    for each in objects:
+        end = first + _NUMBERS + 2 * len(each.gates)
+        rows.append(_object(each, known[first : first + _NUMBERS], known[first + _NUMBERS : end]))
+        first = end
+    return rows
+
+
+def _numbers_of(each: FusedObject) -> tuple[float | None, ...]:
+    center, size, yaw_rad = each.cuboid if each.cuboid is not None else _NO_CUBOID
+    a, b, c, d = each.bev if each.bev is not None else (_NAN2, _NAN2, _NAN2, _NAN2)
+    return (
+        each.score,
+        each.distance_m,
+        each.distance_sigma_m,
+        each.speed_over_ground_mps,
+        each.existence,
+        each.in_path_probability,
+        each.path_offset_m,
+        each.lateral_mps,
+        each.crossing_s,
+        each.ttc_s,
+        *(each.velocity_mps if each.velocity_mps is not None else _NAN2),
+        *(each.bbox if each.bbox is not None else _NAN4),
+        *(each.closest_point if each.closest_point is not None else _NAN3),
+        *center,
+        *size,
+        yaw_rad,
+        *a,
+        *b,
+        *c,
+        *d,
+    )
+
+
+def _object(each: FusedObject, numbers: list[float | None], of_gates: list[float | None]) -> dict[str, Any]:
+    """One object. numbers: those of ``_numbers_of``, rounded; of_gates: value and limit of each gate, likewise."""
+    score, distance, sigma, over_ground, existence, probability, offset, lateral, crossing, ttc = numbers[:10]
+    center, size, yaw_rad = numbers[19:22], numbers[22:25], numbers[25]
+    has_cuboid = None not in numbers[19:26]
     return {
         "id": each.id,
         "source": each.source,
         "type": each.label,
-        "type_score": _number(each.score),
-        "bbox": _numbers(each.bbox),
-        "bev": _points(each.bev),
-        "cuboid": _cuboid(each.cuboid),
-        "closest_point": _numbers(each.closest_point),
-        "distance_m": _number(each.distance_m),
-        "distance_sigma_m": _number(each.distance_sigma_m),
+        "type_score": score,
+        "bbox": _whole(numbers[12:16]),
+        "bev": None if None in numbers[26:] else [numbers[26:28], numbers[28:30], numbers[30:32], numbers[32:34]],
+        "cuboid": {"center": center, "size": size, "yaw_rad": yaw_rad} if has_cuboid else None,
+        "closest_point": _whole(numbers[16:19]),
+        "distance_m": distance,
+        "distance_sigma_m": sigma,
         "distance_from": each.distance_from,
         "height_from": each.height_from,
-        "velocity_mps": _numbers(each.velocity_mps),
-        "speed_over_ground_mps": _number(each.speed_over_ground_mps),
+        "velocity_mps": _whole(numbers[10:12]),
+        "speed_over_ground_mps": over_ground,
         "in_path": each.in_path,
-        "existence_probability": _number(each.existence),
-        "in_path_probability": _number(each.in_path_probability),
-        "path_offset_m": _number(each.path_offset_m),
-        "lateral_mps": _number(each.lateral_mps),
-        "crossing_s": _number(each.crossing_s),
+        "existence_probability": existence,
+        "in_path_probability": probability,
+        "path_offset_m": offset,
+        "lateral_mps": lateral,
+        "crossing_s": crossing,
         "moving": each.moving,
-        "ttc_s": _number(each.ttc_s),
+        "ttc_s": ttc,
         "carried": each.carried,
         "seen_by": each.seen_by,
         "hits": each.hits,
         "lidar_points": each.lidar_points,
-        "gates": [_gate(gate) for gate in each.gates],
+        "gates": [
+            {"name": name, "value": value, "limit": limit, "passed": passed}
+            for (name, _, _, passed), value, limit in zip(each.gates, of_gates[::2], of_gates[1::2], strict=True)
+        ],
     }
 
 
-def _gate(gate: Gate) -> dict[str, Any]:
-    return {"name": gate.name, "value": _number(gate.value), "limit": _number(gate.limit), "passed": gate.passed}
-
-
-def _cuboid(cuboid: Cuboid | None) -> dict[str, Any] | None:
-    if cuboid is None or not _finite((*cuboid.center, *cuboid.size, cuboid.yaw_rad)):
-        return None
-    return {
-        "center": _numbers(cuboid.center),
-        "size": _numbers(cuboid.size),
-        "yaw_rad": _number(cuboid.yaw_rad),
-    }
+def _whole(numbers: list[float | None]) -> list[float | None] | None:
+    """A point or box; null as a whole if any of its numbers is unknown."""
+    return None if None in numbers else numbers
 
 
 def _path(path: Path) -> dict[str, Any]:
@@ -202,31 +255,17 @@ def _plain(record: Cipv | AccCommand) -> dict[str, Any]:
     return {name: _number(value) if isinstance(value, float) else value for name, value in values.items()}
 
 
-def _finite(values: Iterable[float]) -> bool:
-    return all(math.isfinite(value) for value in values)
-
-
 def _number(value: float | None) -> float | None:
     """Rounded; null if unknown. Minus zero becomes zero, so that rounding noise does not change a file."""
-    return None if value is None or not math.isfinite(value) else round(float(value), _DECIMALS) + 0.0
+    return None if value is None or not math.isfinite(value) else round(float(value), DECIMALS) + 0.0
 
 
 def _numbers(values: Iterable[float] | None) -> list[float | None] | None:
-    """A point or box; null as a whole if any of its numbers is unknown."""
-    if values is None:
-        return None
-    rounded = [_number(value) for value in values]
-    return None if None in rounded else rounded
-
-
-def _points(points: Iterable[Iterable[float]] | None) -> list[Any] | None:
-    """A polygon; null as a whole if any corner is unknown."""
-    if points is None:
-        return None
-    corners = [_numbers(point) for point in points]
-    return None if None in corners else corners
+    """A few numbers that belong together; null as a whole if any is unknown."""
+    return None if values is None else _whole([_number(value) for value in values])
 
 
 def _line(points: F64) -> list[Any]:
     """A polyline without its unknown points."""
-    return [point for point in map(_numbers, points.tolist()) if point is not None]
+    places = rounded_array(np.asarray(points, dtype=np.float64).reshape(-1, 2))
+    return places[~np.isnan(places).any(axis=1)].tolist()

@@ -17,6 +17,14 @@ COCO_80 = (
 )  # fmt: skip
 """The 80 classes of COCO 2017, in the order used by every COCO-trained YOLO."""
 
+_ON_ROADS = ("person", "bicycle", "car", "motorcycle", "bus", "train", "truck")
+_ANIMALS = ("bird", "cat", "dog", "horse", "sheep", "cow", "elephant", "bear", "zebra", "giraffe")
+NOT_ON_ROADS = frozenset(COCO_80) - {*_ON_ROADS, *_ANIMALS}
+"""COCO's classes that no road user belongs to. A network trained on COCO sees a suitcase in the rear of a car; a LiDAR
+cluster that carried this name would not count as an obstacle."""
+SEEN_AS = {"train": "bus"}
+"""What a class of COCO is on a road: a tram, or a bus or lorry that the network takes for a train."""
+
 SYNONYMS = {
     "motorbike": "motorcycle",
     "van": "car",

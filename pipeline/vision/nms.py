@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.common.geometry import iou_matrix
 from pipeline.params import DetectionParams
 from pipeline.types import VEHICLES, Detection, RawBoxes
+from pipeline.vision.classes import NOT_ON_ROADS, SEEN_AS
 
 
 def select(raw: RawBoxes, params: DetectionParams) -> tuple[Detection, ...]:
@@ -20,9 +21,11 @@ def select(raw: RawBoxes, params: DetectionParams) -> tuple[Detection, ...]:
     """
     raw = raw if params.far_view else raw.without_far()
     candidates = np.flatnonzero(raw.scores >= params.min_score)
+    if params.road_users_only:
+        candidates = np.array([k for k in candidates.tolist() if raw.labels[k] not in NOT_ON_ROADS], dtype=np.intp)
     order = candidates[np.argsort(-raw.scores[candidates], kind="stable")]
     boxes, scores = raw.boxes[order], raw.scores[order].tolist()
-    labels = [raw.labels[index] for index in order.tolist()]
+    labels = [SEEN_AS.get(raw.labels[index], raw.labels[index]) for index in order.tolist()]
     kinds = ["vehicle" if label in VEHICLES else label for label in labels]
     number = {kind: k for k, kind in enumerate(dict.fromkeys(kinds))}
     kind = np.array([number[each] for each in kinds], dtype=np.int64)

@@ -1,4 +1,4 @@
-"""The real drives that accuracy is judged on, and running them once for all tests that look at them."""
+"""The real drives on which accuracy is measured; each is run once for all tests that need it."""
 
 from __future__ import annotations
 
@@ -23,17 +23,18 @@ FOLDERS = {
     "kitti": "kitti_0052",
     "street": "kitti_0009/2011_09_26/2011_09_26_drive_0009_sync",
 }
-"""Where a recording lies in the data folder."""
+"""Folder of each recording inside the data folder."""
 SCHEMES = {"astyx": "astyx", "kitti": "kitti", "street": "kitti"}
-"""As what it is opened."""
+"""Scheme with which each recording is opened."""
 SCORED_CLIPS = {
     "lead near 20 m": range(60, 69),
     "following at 22–24 m": range(183, 193),
     "closing from 32 to 23 m": range(414, 426),
 }
-"""Astyx frames whose lead is judged; 057–059 are a lane change whose lead is half outside the corridor."""
+"""Astyx frames whose lead is scored. 057–059 are left out: during a lane change, the lead is half outside the
+corridor."""
 RECORDED_CLIPS = (range(47, 52), range(57, 69), range(183, 193), range(414, 426))
-"""What Astyx's frames were cut from."""
+"""The continuous clips among the Astyx frames."""
 EMPTY_CLIP = range(47, 52)
 """Astyx frames with nothing in path nearer than 70 m."""
 _FAR_M = 60.0
@@ -42,13 +43,13 @@ RULE = LeadRule()
 
 @dataclass(frozen=True)
 class Drive:
-    """A recording's results, and its verdicts where it is labelled, by frame name."""
+    """The results of a recording and, if it is labelled, its verdicts, both by frame name."""
 
     results: dict[str, Result]
     judged: dict[str, Judged]
 
     def clip(self, numbers: range) -> list[Judged]:
-        """The verdicts of Astyx frames by number."""
+        """The verdicts of Astyx frames, given by number."""
         return [self.judged[f"{number:06d}"] for number in numbers]
 
 
@@ -63,9 +64,9 @@ def drive(
     lanes_every: int | None = None,
     own_motion: bool = True,
 ) -> Drive:
-    """Run a recording of the data folder with YOLOX-nano and, as the command line does where it is, TwinLiteNet.
-    ``changes``: dotted parameters on top of the preset. lanes: another lane detector, as on the command line; it looks
-    at every ``lanes_every``-th image, None: as often as usual. own_motion off: as if the car told nothing of it."""
+    """Run a recording of the data folder with YOLOX-nano and TwinLiteNet. changes: dotted parameters on top of the
+    preset. lanes: another lane detector, as on the command line, run on every ``lanes_every``-th image (None: the
+    default). own_motion: False removes the recorded ego motion."""
     uri = f"{SCHEMES[kind]}:{folder / FOLDERS[kind]}"
     source, frames = open_source(uri), _frames(uri)
     if not own_motion:
@@ -104,13 +105,13 @@ def all_scored(of: Drive) -> Iterator[Judged]:
 
 
 def made_up_leads(of: Drive) -> int:
-    """In how many of the five frames of the empty clip something near leads."""
+    """Number of frames, of the five of the empty clip, with a near lead."""
     leads = [of.results[f"{number:06d}"].cipv for number in EMPTY_CLIP]
     return sum(lead is not None and lead.distance_m <= _FAR_M for lead in leads)
 
 
 def camera_alone_without_own_clip(folder: Path) -> Iterator[Judged]:
-    """The 31 frames by the camera alone, the distance law of each clip fitted on the other clips only."""
+    """The 31 frames with the camera alone. The distance law for each clip is fitted to the other clips only."""
     for numbers in SCORED_CLIPS.values():
         own = next(recorded for recorded in RECORDED_CLIPS if numbers[0] in recorded)
         law = fit_laws([pair for pair in _pairs(folder) if int(pair.frame) not in own], exponent=-1.0)["car"].law

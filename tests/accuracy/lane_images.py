@@ -25,14 +25,14 @@ _FOCAL_SHARE, _HORIZON_SHARE = 0.9, 0.57
 _COLOURS = {"left": (0, 0, 255), "right": (0, 220, 0)}
 _ROWS_BEYOND = 2
 UNSURE = LaneParams(mount_height_m=EYE_HEIGHT_M, pitch_sigma_deg=1.5, min_width_m=2.0, max_width_m=5.5)
-"""The pitch and the scale of a guessed camera may be well off."""
+"""Pitch and scale of a guessed camera may be far off."""
 Marks = Mapping[str, Mapping[int, tuple[float | None, float | None]]]
-"""Image → row v → u of the left and of the right line; null where there is no paint to mark."""
+"""Image → row v → u of the left and the right line; None where there is no paint to mark."""
 
 
 @dataclass(frozen=True)
 class Miss:
-    """One mark against what was found: pixels to the right of the mark, null where no line was believed."""
+    """One mark compared with the detected line: pixels to the right of the mark; None without a line."""
 
     image: str
     row: int
@@ -41,7 +41,8 @@ class Miss:
 
 
 def guessed_camera(width: int, height: int) -> CameraCalibration:
-    """A level dashboard camera of 58° across, its own place the ego origin; its image's horizon a little low."""
+    """A level dashboard camera with a field of view of 58°, located at the ego origin, with the horizon slightly below
+    the middle of the image."""
     focal = _FOCAL_SHARE * width
     K = np.array([[focal, 0.0, width / 2], [0.0, focal, _HORIZON_SHARE * height], [0.0, 0.0, 1.0]])
     T = np.eye(4)
@@ -70,7 +71,7 @@ def misses(name: str, lane: EgoLane | None, aligned: Alignment, marks: Marks) ->
 
 
 def draw(bgr: U8, raw: RawLanes, lane: EgoLane | None, aligned: Alignment, text: str = "") -> U8:
-    """A copy of the image with what the detector saw (dots) and what is believed (left red, right green)."""
+    """A copy of the image with the detected points (dots) and the estimated lines (left red, right green)."""
     drawn = bgr.copy()
     for (u, v), score in zip(raw.points.tolist(), raw.scores.tolist(), strict=True):
         cv2.circle(drawn, (round(u), round(v)), 2, (255, round(255 * score), 0), cv2.FILLED)
@@ -91,7 +92,7 @@ def summary(lane: EgoLane | None) -> str:
 
 
 def tiles(images: Sequence[U8], columns: int = 3, width: int = 640) -> U8:
-    """Many images in one, each ``width`` wide and 16:9."""
+    """A contact sheet of images, each ``width`` wide and 16:9."""
     size = (width, width * 9 // 16)
     small = [cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in images]
     small += [np.zeros_like(small[0])] * (-len(small) % columns)
@@ -99,7 +100,8 @@ def tiles(images: Sequence[U8], columns: int = 3, width: int = 640) -> U8:
 
 
 def _column(uv: F64, row: int) -> float | None:
-    """Where a line crosses a row; it goes on straight below its nearest point, and is not believed above its last."""
+    """Column in which a line crosses a row. Below its nearest point it is extended straight; above its last one it is
+    None."""
     uv = uv[~np.isnan(uv[:, 0])]
     (u0, v0), (u1, v1) = uv[:2]
     if row > v0:

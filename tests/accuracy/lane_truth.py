@@ -32,8 +32,8 @@ _NEAR_M = 0.4
 
 @dataclass(frozen=True)
 class LaneError:
-    """One line at one distance in one frame. error_m: believed minus true, to the left; null where no line was
-    believed. sigma_m: the pipeline's own estimate of that error."""
+    """One line at one distance in one frame. error_m: estimated minus true lateral position, positive to the left; None
+    without a line. sigma_m: the pipeline's own standard deviation of it."""
 
     frame: int
     side: str
@@ -45,7 +45,7 @@ class LaneError:
 def errors(
     name: str, detector: Detects[RawLanes], frames: range, params: Params | None = None, every: int = 1
 ) -> Iterator[LaneError]:
-    """Drive a built-in scenario's ``frames`` (consecutive); the lane detector looks at every ``every``-th one."""
+    """Run consecutive ``frames`` of a built-in scenario, with the lane detector on every ``every``-th one."""
     played = scenario.load(name)
     sensors = SensorRig(played, world_state.at(played, played.duration_s).s_m)
     detectors, state = Detectors(None, detector, every), State()
@@ -67,7 +67,7 @@ def true_lines(played: Scenario, now: World) -> dict[str, F64]:
 
 
 def _painted(road: Road, edge_m: float) -> float:
-    """Where the paint of a lane's edge is: solid lines lie a little inside the carriageway."""
+    """Lateral position of the paint at a lane's edge. Solid lines lie slightly inside the carriageway."""
     return next((d for d in edge_paint_m(road) if abs(d - edge_m) < _NEAR_M), edge_m)
 
 

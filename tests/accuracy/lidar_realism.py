@@ -39,8 +39,8 @@ _FLAT_RINGS, _FIT_M, _FIT_OFF_M = 5, 16.0, (0.6, 0.25, 0.12, 0.12)
 
 @dataclass(frozen=True)
 class CarSeen:
-    """One labelled car: its distance, how far to the left it is, and how many points and rings the real and the
-    simulated sweep have on it."""
+    """One labelled car: its distance, its lateral position, and the number of points and rings on it in the real and in
+    the simulated sweep."""
 
     distance_m: float
     left_m: float
@@ -52,7 +52,7 @@ class CarSeen:
 
 @dataclass(frozen=True)
 class Pair:
-    """A real sweep and the simulated one of the same scene, ego frame."""
+    """A real sweep and the simulated one of the same scene, both in the ego frame."""
 
     name: str
     real: Sweep
@@ -87,8 +87,8 @@ def cars_seen(pair: Pair) -> list[CarSeen]:
 
 
 def ground_plane(sweep: Sweep) -> F64:
-    """(3,) of z = a + b·x + c·y through the ground ahead: least squares on the lowest rings, leaving out ever more of
-    what stands off the plane."""
+    """(3,) coefficients of z = a + b·x + c·y of the ground ahead: least squares on the lowest rings, repeated without
+    points that are off the plane."""
     x, y, z = sweep.points[sweep.ring < _FLAT_RINGS, :3].astype(np.float64).T
     near = (x > 2.0) & (x < _FIT_M) & (np.abs(y) < x)
     A, z = np.column_stack([np.ones(near.sum()), x[near], y[near]]), z[near]
@@ -109,7 +109,7 @@ def _boxes(item: TruthObject, rng: np.random.Generator) -> list[tuple[float, ...
 
 
 def _on(sweep: Sweep, cuboid: Cuboid) -> tuple[int, int]:
-    """Points and rings on an object, the ground below it left out."""
+    """Number of points and rings on an object, without the ground below it."""
     away = sweep.points[:, :3] - np.array(cuboid.center)
     c, s = np.cos(cuboid.yaw_rad), np.sin(cuboid.yaw_rad)
     along, across = away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s

@@ -1,4 +1,4 @@
-"""Waiting for what tells nobody when it comes, and for coroutines."""
+"""Waits for conditions without a notification, and for coroutines."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ T = TypeVar("T")
 
 
 class Runs(Protocol):
-    """Runs a coroutine to its end."""
+    """Runs a coroutine until it is done."""
 
     def __call__(self, what: Coroutine[Any, Any, T], /) -> T: ...
 
 
 @contextmanager
 def loop_apart() -> Iterator[Runs]:
-    """An event loop in a thread of its own: while a browser is open, the main thread is in Playwright's."""
+    """An event loop in its own thread, since the main thread runs Playwright's loop while a browser is open."""
     with ThreadPoolExecutor(1) as apart:
         runner = asyncio.Runner()
 
@@ -35,7 +35,7 @@ def loop_apart() -> Iterator[Runs]:
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float = WAIT_S) -> bool:
-    """Look again and again; false when it never came."""
+    """Poll until the condition holds; False if it did not in time."""
     woken = threading.Event()
     for _ in range(round(timeout_s / 0.01)):
         if condition():

@@ -1,4 +1,4 @@
-"""A real server on the simulator and a real browser that must stay quiet and on this machine."""
+"""A real server on the simulator, and a real browser without console errors or requests to other machines."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ expect.set_options(timeout=WAIT_MS)
 
 
 class CountedDetector:
-    """The installed network, counted; without one, no boxes."""
+    """The installed network with a count of its calls; without a network, it returns no boxes."""
 
     notes: tuple[str, ...] = ()
 
@@ -60,8 +60,8 @@ class CountedDetector:
 
 
 class FilesStay:
-    """Lets a browser keep the page's files, which nobody changes while tests run: asking about each of them again is
-    half of what opening a page costs. (What the server really says of them: tests/app/web/test_api.py.)"""
+    """Lets a browser cache the page's files, which do not change during tests: revalidating them takes half the time of
+    opening a page. (The server's real cache headers are tested in tests/app/web/test_api.py.)"""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -78,7 +78,7 @@ class FilesStay:
 
 @dataclass
 class Site:
-    """A running dashboard. ``stop`` ends its server as a crash would for the pages."""
+    """A running dashboard. ``stop`` ends its server; for the pages, that looks like a crash."""
 
     engine: Engine
     port: int
@@ -146,7 +146,7 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def paused_in_traffic(site: Site) -> None:
-    """The shown frame is ``START``, with default parameters, and nothing plays."""
+    """Pause at frame ``START`` with default parameters."""
     control, before = site.engine.control, site.engine.snapshot.sequence
     control.set_params(Params(), "default")
     control.change(playing=False, speed=1.0, loop=True, target=START, steps=0)
@@ -156,14 +156,14 @@ def paused_in_traffic(site: Site) -> None:
 
 
 class Pages:
-    """Pages that were used, wiped and can be used again: that takes half the time of a new one."""
+    """Pages that are reset and reused, which takes half the time of a new one."""
 
     def __init__(self, browser: Browser) -> None:
         self._browser = browser
         self._spare: list[Page] = []
 
     def take(self, width: int, height: int, color_scheme: ColorScheme, **context: Any) -> Page:
-        """A page that remembers nothing; a new one for a context of its own."""
+        """A page without stored data; a new one if it needs its own context."""
         size = ViewportSize(width=width, height=height)
         if context or not self._spare:
             return self._browser.new_page(viewport=size, color_scheme=color_scheme, **context)
@@ -173,7 +173,8 @@ class Pages:
         return page
 
     def put_back(self, page: Page, origin: str) -> None:
-        """Without anything that it or its test left. origin: whose data it may hold."""
+        """Return a page, after removing everything that it or its test stored. origin: the origin whose data is
+        cleared."""
         if page.is_closed():
             return
         # first: a page may store something as it is left. Of the same server: another's would take a process of its own
@@ -204,9 +205,8 @@ def open_page(pages: Pages, site: Site) -> Iterator[OpenPage]:
 
 @contextmanager
 def opening(pages: Pages, site: Site) -> Iterator[OpenPage]:
-    """Opens the dashboard in a profile without memory; at the end no page may have complained or called elsewhere.
-    ``expects``: words of complaints that the test provokes: a browser says of every refused request that it was
-    refused."""
+    """Opens the dashboard in an empty profile. At the end, no page may have logged an error or sent a request
+    elsewhere. ``expects``: parts of the messages that the test provokes, since browsers log every refused request."""
     complaints: list[str] = []
     opened: list[tuple[Page, dict[str, Callable[[Any], None]], bool]] = []
 

@@ -1,4 +1,4 @@
-"""What a page is judged by, as JavaScript that returns what is wrong."""
+"""Checks of a page, as JavaScript that returns what is wrong."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ LOW_CONTRAST = """() => {
   }
   return found;
 }"""
-"""Words whose contrast is below WCAG 2.2 AA: 4.5, large ones 3."""
+"""Texts whose contrast is below WCAG 2.2 AA: 4.5, or 3 for large text."""
 
 SMALL_TARGETS = """() => [...document.querySelectorAll("button, select, input:not([type=checkbox]), summary")]
   .filter((node) => node.checkVisibility({ visibilityProperty: true }) && !node.disabled)
   .map((node) => [node, node.getBoundingClientRect()])
   .filter(([, box]) => box.width > 0 && box.height < 40)
   .map(([node, { width, height }]) => `${Math.round(width)}×${Math.round(height)} ${node.id || node.outerHTML}`)"""
-"""Controls lower than a finger needs."""
+"""Controls that are too low for a finger."""

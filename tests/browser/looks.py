@@ -1,4 +1,4 @@
-"""Looking at a page, and putting a hand on it."""
+"""Reads a page's state and operates its controls."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from playwright.sync_api import FloatRect, Locator, Page, expect
 from tests.browser.conftest import WAIT_MS, Site
 
 COUNT = 200
-"""Frames of the scenario that the page shows."""
+"""Number of frames of the scenario that the page shows."""
 PLOT_LEFT_PX, PLOT_RIGHT_PX = 132, 8
-"""Where the timeline's plot lies on its canvas."""
+"""Margins of the timeline's plot on its canvas."""
 
 
 def frame_name(page: Page) -> str:
@@ -23,7 +23,7 @@ def wait_for_frame(page: Page, index: int) -> None:
 
 
 def whole_drive(page: Page, site: Site) -> None:
-    """Wait until the whole drive is computed, and is on the page's timeline: from then on no network runs."""
+    """Wait until the whole drive is computed and on the page's timeline. From then on, no network runs."""
     site.engine.wait_for(lambda s: s.drive.done == s.drive.total == COUNT, WAIT_MS / 1e3)
     expect(page.locator(".timeline-pane")).to_have_attribute("aria-busy", "false")
 
@@ -35,29 +35,29 @@ def box_of(locator: Locator) -> FloatRect:
 
 
 def on_timeline(page: Page, index: int) -> float:
-    """The pixel column of a frame's middle, on the timeline that shows everything."""
+    """The pixel column of a frame's middle on the timeline, zoomed out completely."""
     width = box_of(page.locator("#timeline-front"))["width"] - PLOT_LEFT_PX - PLOT_RIGHT_PX
     return PLOT_LEFT_PX + width * (index + 0.5) / COUNT
 
 
 def go_to(page: Page, index: int) -> None:
-    """Press the timeline there, below its ribbon."""
+    """Click the timeline at this frame, below its ribbon."""
     height = box_of(page.locator("#timeline-front"))["height"]
     page.locator("#timeline-front").click(position={"x": on_timeline(page, index), "y": height - 16})
 
 
 _TWO_TURNS = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
-"""Of the screen: what was due has been drawn, and the words that follow it."""
+"""Two screen refreshes: pending drawing is done, and so are the texts that follow it."""
 
 
 def pixels(page: Page, canvas: str) -> str:
-    """What is painted, once nothing more is to be painted."""
+    """The canvas's content, once nothing more is to be painted."""
     page.evaluate(_TWO_TURNS)
     return page.evaluate(f"document.querySelector('{canvas}').toDataURL()")
 
 
 def table(page: Page) -> str:
-    """What the table of objects says, once also the rows out of sight say the shown frame's."""
+    """The text of the objects table, once the rows out of sight show the current frame too."""
     page.evaluate(_TWO_TURNS)
     body = page.locator("#objects tbody")
     expect(body).to_have_attribute("aria-busy", "false")
@@ -67,8 +67,8 @@ def table(page: Page) -> str:
 
 
 def repainted(page: Page, canvas: str, old: str, *, like: bool = False) -> bool:
-    """True as soon as a canvas shows something else than ``old``, or with ``like`` the same. One look a painted frame;
-    the page's policy forbids playwright's own way of waiting, which evaluates text."""
+    """True once the canvas differs from ``old``, or equals it with ``like``. Checked once per painted frame, since the
+    page's policy forbids Playwright's own waiting, which evaluates text."""
     deadline = time.monotonic() + WAIT_MS / 1e3
     while time.monotonic() < deadline:
         if (pixels(page, canvas) == old) == like:
@@ -77,7 +77,7 @@ def repainted(page: Page, canvas: str, old: str, *, like: bool = False) -> bool:
 
 
 def colours(page: Page, canvas: str) -> int:
-    """How many different colours a canvas shows: a blank one has one."""
+    """Number of different colours on a canvas; a blank one has one."""
     return page.evaluate(
         """(selector) => {
           const canvas = document.querySelector(selector);

@@ -1,4 +1,4 @@
-"""The page of a fleet's tables, from their declaration."""
+"""Generates the page on a fleet's tables from their declaration."""
 
 from __future__ import annotations
 

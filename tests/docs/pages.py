@@ -1,4 +1,4 @@
-"""Every Markdown file that people read, and what stands in it."""
+"""Every Markdown file of the documentation, and its content."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Link(NamedTuple):
 
 @cache
 def tokens(file: str) -> tuple[Token, ...]:
-    """The parsed file, by its path from the root."""
+    """The parsed file, given its path from the root."""
     parser = MarkdownIt("commonmark").enable("table")
     return tuple(parser.parse((ROOT / file).read_text(encoding="utf-8")))
 
@@ -44,12 +44,12 @@ def links(file: str) -> Iterator[Link]:
 
 
 def code_spans(file: str) -> Iterator[str]:
-    """What stands in backticks."""
+    """Texts in backticks."""
     return (child.content for child in _inside(file) if child.type == "code_inline")
 
 
 def block_commands(file: str) -> Iterator[list[str]]:
-    """Every `cipv` command of a code block, as its words after the program's name."""
+    """Every `cipv` command of a code block, as the words after the program's name."""
     for token in tokens(file):
         if token.type in ("code_block", "fence"):
             for line in token.content.splitlines():
@@ -57,7 +57,7 @@ def block_commands(file: str) -> Iterator[list[str]]:
 
 
 def span_commands(file: str) -> Iterator[list[str]]:
-    """The same of those in backticks, which may be the beginning of a command only."""
+    """The same for commands in backticks, which may be only the beginning of a command."""
     for span in code_spans(file):
         yield from _commands(span)
 

@@ -1,7 +1,7 @@
 """Writes the parts of the documentation that are generated from the code: parameters, command line, layers.
 ``make docs`` runs it.
 
-It stands here and not in the program: it reads the whole command line, which only the top layer may import.
+It is here instead of in the program because it reads the whole command line, which only the top layer may import.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _MADE = "*This page is generated from the code by `make docs`; change the declar
 
 
 def main() -> None:
-    """Write them all."""
+    """Write all generated pages."""
     for name, text in pages().items():
         (DOCS / name).write_text(text, encoding="utf-8")
 
@@ -103,7 +103,7 @@ def _parameter_lines() -> Iterator[str]:
 
 
 def _range(info: Any) -> str:
-    """What may be given."""
+    """The permitted range of a parameter, as text."""
     if get_origin(info.annotation) is Literal:
         return ", ".join(f"`{choice}`" for choice in get_args(info.annotation))
     if info.annotation is bool:
@@ -176,11 +176,12 @@ _SHARED = (
     ),
     ("Server options", "For the commands that serve the dashboard.", "serve", ("server.",)),
 )
-"""Options that several commands share: title, about, a command that has them, prefixes of their names in the parser."""
+"""Options that several commands share: title, description, a command that has them, prefixes of their names in the
+parser."""
 
 
 def commands() -> list[str]:
-    """Every command with its words, a group's subcommands one by one."""
+    """Every command by its words, including each subcommand of a group."""
     found: list[str] = []
     for name in COMMANDS:
         found += [f"{name} {word}" for word in _subcommands(name)] or [name]
@@ -192,12 +193,12 @@ def parser_of(name: str) -> argparse.ArgumentParser:
     group, _, word = name.partition(" ")
     command = _subcommands(group)[word] if word and name not in COMMANDS else _command(name)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # tyro has no other door to what its help shows
+        warnings.simplefilter("ignore", DeprecationWarning)  # tyro offers no other access to what its help shows
         return tyro.extras.get_parser(command, prog=f"cipv {name}", config=_CONFIG)
 
 
 def _subcommands(name: str) -> dict[str, Any]:
-    """The subcommands of a group: what is typed → its class. Empty for a command that is none."""
+    """The subcommands of a group: name → class. Empty for a command that is not a group."""
     kinds = get_args(get_type_hints(_command(name), include_extras=True).get("action", None))
     found = {}
     for kind in kinds:
@@ -226,12 +227,13 @@ def _command_lines(name: str) -> Iterator[str]:
 
 def _table(rows: list[tuple[str, str, str]]) -> Iterator[str]:
     yield from ("| option | default | meaning |", "|---|---|---|")
-    for row in sorted(rows, key=lambda row: row[0].startswith("`-")):  # what has no name is typed first
+    for row in sorted(rows, key=lambda row: row[0].startswith("`-")):  # positional arguments come first
         yield f"| {' | '.join(_cell(cell) for cell in row)} |"
 
 
 def _option(action: argparse.Action, prefixes: tuple[str, ...] = ()) -> tuple[str, str, str] | None:
-    """A row for an option with one of these prefixes; without them, for the command's own, and for what has no name."""
+    """A row for an option with one of these prefixes; without prefixes, for the command's own options and its
+    positional arguments."""
     shared = any(action.dest.startswith(each) for *_, each in _SHARED)
     if prefixes:
         wanted = action.dest.startswith(prefixes) and bool(action.option_strings)
@@ -263,11 +265,11 @@ def _option(action: argparse.Action, prefixes: tuple[str, ...] = ()) -> tuple[st
 
 
 def _spelled(action: argparse.Action, is_switch: bool, is_on: bool) -> str:
-    """The option as it is typed, with what it takes."""
+    """The option as typed, with its metavar."""
     takes = str(action.metavar or "").replace("{None}|", "").replace("{", "").replace("}", "")
     if not action.option_strings:
         return f"`{takes if takes.isupper() else action.dest.rpartition('.')[2].upper()}`"
-    if is_switch:  # what changes the default
+    if is_switch:  # the form that changes the default
         return f"`{next(each for each in action.option_strings if each.startswith('--no-') == is_on)}`"
     return f"`{action.option_strings[0]} {takes}`"
 

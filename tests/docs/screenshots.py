@@ -35,16 +35,16 @@ SOURCE = "sim:straight"
 MOMENT = 60
 """A frame with traffic around and a lead."""
 QUALITY = 78
-"""Of the JPEGs: a whole page stays below 300 kB, and its text can be read."""
+"""JPEG quality: a whole page stays below 300 kB with legible text."""
 WAIT_MS = 600_000
-"""On a busy machine the whole drive takes minutes: networks look at every image."""
+"""On a busy machine, the whole drive takes minutes, since networks process every image."""
 SESSIONS, SECONDS = 40, 5.0
-"""Of the fleet."""
+"""Number of sessions of the fleet, and their length."""
 DESK, DISPLAY = (1440, 900), (1024, 600)
 
 
 def main() -> None:
-    """All of them."""
+    """Renew all images."""
     expect.set_options(timeout=WAIT_MS)
     with dashboard() as site, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
@@ -145,7 +145,7 @@ def opened(browser: Browser, site: Site) -> Page:
 
 
 def what_if(page: Page) -> None:
-    """More sightings before one sensor is believed: two runs on the timeline, with the frames in which they differ."""
+    """Require more sightings by one sensor: two runs on the timeline, with the frames in which they differ."""
     slider = page.locator("[data-param='cipv.confirm_hits'] input[type=range]")
     slider.evaluate("(range) => { range.closest('details').open = true; range.scrollIntoView() }")
     slider.fill("10")
@@ -186,7 +186,7 @@ def labeled(page: Page) -> None:
 
 
 def painted(page: Page) -> None:
-    """Wait until what was due is drawn."""
+    """Wait until pending drawing is done."""
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 

@@ -1,4 +1,4 @@
-"""Parsers of other people's files, of this program's own, and of what cameras and pages send."""
+"""Parsers of third-party files, of the program's own files, and of data from cameras and pages."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ from tests.pipeline.sources.live.devices.test_mjpeg import MULTIPART, StopAtLook
 from tests.pipeline.vision.networks import yolox
 
 _PART_OF_MANY = 0.25
-"""The weight of one of many files of a format."""
+"""Weight of one of many files of a format."""
 _LOOKS = 30
-"""After which a camera is read no further; each line is one."""
+"""Maximum number of reads from a camera; each line is one."""
 
 
 def by_file(folder: Path, name: str, read: Callable[[str], object]) -> Callable[[bytes], None]:
-    """``read`` of a file that holds any bytes."""
+    """A parser of bytes that writes them to a file and calls ``read`` with its path."""
     path = folder / name
 
     def reading(data: bytes) -> None:
@@ -70,7 +70,7 @@ def by_file(folder: Path, name: str, read: Callable[[str], object]) -> Callable[
 
 
 def file_targets(folder: Path) -> dict[str, Target]:
-    """All of them, below ``folder``, which is made."""
+    """All targets of this module. Their files are written below ``folder``, which is created."""
     folder.mkdir()
     return {
         **_labels(folder / "labels"),
@@ -130,7 +130,7 @@ def _calibrations(folder: Path) -> dict[str, Target]:
 
 
 def _own_files(folder: Path) -> dict[str, Target]:
-    """What the program keeps beside recordings and networks, and what people write for it."""
+    """Files that the program stores beside recordings and networks, and files that users write for it."""
     store = folder / "home" / "models"
     store.mkdir(parents=True)
     network = yolox(folder / "a.onnx")
@@ -184,13 +184,13 @@ def _network(path: Path) -> None:
 
 
 def _results() -> bytes:
-    """Of two frames."""
+    """The results of two frames."""
     found = islice(run(open_source("sim:straight"), Params(), Detectors()), 2)
     return b"".join(to_line(result).encode() + b"\n" for _, result in found)
 
 
 def _recordings(folder: Path) -> dict[str, Target]:
-    """Of those that ``FILES`` of the sources' own test lacks."""
+    """Files of recordings that are missing in ``FILES`` of the sources' own test."""
     folder.mkdir()
     (folder / "a.yaml").write_text(RIG)
     write_video(folder / "b.avi", 6)
@@ -233,7 +233,7 @@ def _mjpeg() -> bytes:
 
 
 class _Wire:
-    """A connected socket that says what it is given, and hears nothing."""
+    """A connected socket that sends the given data and ignores what it receives."""
 
     def __init__(self, data: bytes) -> None:
         self.data = data

@@ -1,14 +1,14 @@
-"""Damaged inputs for every parser, each parser in a process of its own with little memory and time: ``make fuzz``.
+"""Feeds damaged inputs to every parser, each in its own process with limited memory and time: ``make fuzz``.
 
     python -m tests.fuzz.run --seconds 60 [--only session] [--seed 1]
     python -m tests.fuzz.run --inputs 1000000
 
-Time is shared out equally, and a fast parser reads a thousand times as many inputs in it as a slow one; with
-``--inputs``, inputs are shared out, however long that takes. Sessions and ROS bags get a larger share.
+With ``--seconds``, time is divided equally, so a fast parser gets a thousand times as many inputs as a slow one. With
+``--inputs``, inputs are divided, however long that takes. Sessions and ROS bags get a larger share.
 
-What raised something else than a refusal, took more than its time or memory, or ended the process is written to
-``build/fuzz/findings``; copy it to ``tests/fuzz/findings`` and it becomes a test. Inputs that were refused in a way not
-seen before are the corpus, ``build/fuzz/corpus``, from which the next run goes on.
+An input that raises anything but a refusal, exceeds its time or memory, or ends the process is written to
+``build/fuzz/findings``; copied to ``tests/fuzz/findings``, it becomes a test. Inputs that were refused in a new way
+form the corpus, ``build/fuzz/corpus``, with which the next run continues.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ from tests.fuzz.targets import all_targets
 
 BUILD = Path(__file__).resolve().parents[2] / "build" / "fuzz"
 BUDGET_S = 2.0
-"""For one input; the slowest good one takes a tenth."""
+"""Time limit for one input; the slowest valid one takes a tenth of it."""
 BUDGET_BYTES = 1 << 30
-"""Address space beyond what the process has when it begins."""
+"""Limit of address space, in addition to what the process has at its start."""
 _PATIENCE_S = 60.0
-"""Without another input; native code that hangs is not ended by a signal."""
+"""Maximum time without a new input. Native code that hangs is not ended by a signal."""
 _MOST_ENDS = 5
-"""Of a target's process, which is started anew for the rest of its share."""
+"""Number of times that a target's process may end; it is restarted for the rest of its share."""
 _HEAD = struct.Struct("<QI")
-"""Of the memory shared with a target's process: inputs so far, length of the one under way."""
+"""Header of the memory shared with a target's process: number of inputs so far, length of the current one."""
 _LARGEST_INPUT = 1 << 20
 _MOST_KEPT = 200
 _TOKENS = (
@@ -56,11 +56,11 @@ _TOKENS = (
 
 
 class OverTime(BaseException):
-    """One input took longer than it may."""
+    """Raised if one input took too long."""
 
 
 def mutated(data: bytes, other: bytes, chance: random.Random) -> bytes:
-    """A damaged copy; ``other``: what pieces are taken from."""
+    """A damaged copy of ``data``. other: another input, from which pieces are inserted."""
     changed = bytearray(data)
     for _ in range(chance.choice((1, 1, 2, 4, 8))):
         at, length = chance.randrange(len(changed) + 1), chance.choice((1, 2, 4, 8, 64))
@@ -90,8 +90,8 @@ def mutated(data: bytes, other: bytes, chance: random.Random) -> bytes:
 
 @contextmanager
 def within_budget() -> Any:
-    """OverTime after ``BUDGET_S`` of computing, or ten times that of waiting for anything but a processor: a busy
-    machine is no finding. An address space that is full raises MemoryError by itself."""
+    """Raises OverTime after ``BUDGET_S`` of processor time, or after ten times that of waiting for anything but a
+    processor, since a busy machine is not a finding. Exhausted address space raises MemoryError by itself."""
     thread, began_s = threading.get_native_id(), time.monotonic()
     starved_s = waited_s(thread) or 0.0
 
@@ -118,7 +118,7 @@ def within_budget() -> Any:
 
 
 def outcome(target: Target, data: bytes) -> tuple[str, bool]:
-    """How it ended, in a word or a place of the code, and whether that is a finding."""
+    """How it ended, as a word or a position in the code, and whether that is a finding."""
     try:
         with within_budget():
             target.read(data)
@@ -134,7 +134,7 @@ def outcome(target: Target, data: bytes) -> tuple[str, bool]:
 
 @dataclass(frozen=True)
 class Share:
-    """How much a target gets: so many inputs, or so many seconds."""
+    """The share of a target: a number of inputs, or of seconds."""
 
     inputs: float = math.inf
     seconds: float = math.inf
@@ -150,8 +150,8 @@ class Share:
 
 
 def fuzz(name: str, target: Target, share: Share, seed: str, build: Path, shared: Any) -> None:
-    """One target, in a process of its own, whose libraries need not tell what they think of the inputs. shared: memory
-    in which the input under way is, behind ``_HEAD``."""
+    """Fuzz one target in its own process, with the log messages of libraries suppressed. shared: memory that holds the
+    current input after ``_HEAD``."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
     chance = random.Random(seed)
     corpus = build / "corpus" / file_name(name)
@@ -177,12 +177,12 @@ def fuzz(name: str, target: Target, share: Share, seed: str, build: Path, shared
 
 
 def file_name(target: str) -> str:
-    """Of a target's folder and report."""
+    """Name of a target's folder and report."""
     return target.replace(" ", "_").replace(",", "")
 
 
 def report(build: Path, name: str, count: int, findings: dict[str, bytes]) -> None:
-    """Keep what was found, beside what was found before."""
+    """Write new findings beside those of earlier runs."""
     folder = build / "findings" / file_name(name)
     for data in findings.values():
         folder.mkdir(parents=True, exist_ok=True)
@@ -194,7 +194,7 @@ def report(build: Path, name: str, count: int, findings: dict[str, bytes]) -> No
 
 
 def run_one(name: str, target: Target, share: Share, seed: int, build: Path) -> dict[str, Any]:
-    """Fuzz a target until its share is used up, in a new process whenever one ended or hung. What it did."""
+    """Fuzz a target until its share is used up, in a new process whenever one ended or hung. Returns its figures."""
     context = multiprocessing.get_context("fork")
     done: dict[str, Any] = {"target": name, "inputs": 0, "findings": []}
     file = build / "reports" / f"{file_name(name)}.json"
@@ -207,7 +207,7 @@ def run_one(name: str, target: Target, share: Share, seed: int, build: Path) -> 
         before = -1
         while process.is_alive() and before != (before := _HEAD.unpack(shared[: _HEAD.size])[0]):
             process.join(_PATIENCE_S)
-        if process.is_alive() or not file.is_file():  # native code that hangs or crashes tells nobody
+        if process.is_alive() or not file.is_file():  # native code that hangs or crashes reports nothing
             process.kill()
             process.join()
             count, length = _HEAD.unpack(shared[: _HEAD.size])
@@ -224,7 +224,7 @@ def run_one(name: str, target: Target, share: Share, seed: int, build: Path) -> 
 
 
 def run(share: Share, seed: int = 0, only: str = "", build: Path = BUILD) -> list[dict[str, Any]]:
-    """Fuzz every target for its part of all. What each did."""
+    """Fuzz every target with its part of the share. Returns the figures of each."""
     found: list[dict[str, Any]] = []
     with contextmanager(all_targets)() as known:
         chosen = {name: target for name, target in known.items() if only in name}

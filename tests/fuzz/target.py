@@ -1,4 +1,4 @@
-"""What the fuzzer tries: one parser, with inputs that it reads well."""
+"""A target of the fuzzer: one parser, with valid inputs."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from pipeline.sources.live.devices.device_reader import DeviceLost
 from pipeline.sources.live.devices.mjpeg import NotMjpeg
 
 Refused = (BadInput, Damaged, TooMuch, ValueError, DeviceLost, NotMjpeg)
-"""ValueError: of the parsers inside, whose callers turn it into a sentence."""
+"""Permitted exceptions. ValueError comes from inner parsers, whose callers turn it into a sentence."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """One parser. It takes any bytes, and returns or raises ``Refused``; everything else is a finding."""
+    """One parser. For any bytes, it must return or raise ``Refused``; everything else is a finding."""
 
     seeds: tuple[bytes, ...]
-    """Inputs that it reads well."""
+    """Valid inputs."""
     read: Callable[[bytes], object]
-    """What it does with any."""
+    """Parses an input."""
     weight: float = 1.0
-    """Its share of a run, beside the others'."""
+    """Its share of a run, relative to the other targets."""

@@ -1,5 +1,5 @@
-"""Every parser of what comes from outside, each with inputs that it reads well. Those of other people's files and of
-this program's own are in ``file_targets.py``."""
+"""Every parser of external data, each with valid inputs. Those of third-party files and of the program's own files are
+in ``file_targets.py``."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ from tests.pipeline.sources.test_route_files import GGA, GPX, POINTS, RMC
 
 _MOST_FRAMES = 3
 _ABOVE_ALL = 2.0
-"""The weight of sessions and bags, which have most ways to be wrong."""
+"""Weight of sessions and bags, which can be damaged in most ways."""
 
 
 def _sentences(data: bytes) -> None:
@@ -75,7 +75,7 @@ def _frames_of_bag(path: str) -> None:
 
 
 def _whole_recording(uri: str, _: str) -> None:
-    """A recording one of whose files was written anew."""
+    """Read a whole recording, one of whose files was replaced."""
     _frames_of(uri)
 
 
@@ -92,7 +92,7 @@ def _bag(folder: Path, kind: Kind) -> bytes:
 
 
 def _many_chunks(folder: Path) -> bytes:
-    """A session whose frames lie in chunks of their own, chained by hash, with labels."""
+    """A session with one chunk per frame, a hash chain and labels."""
     path = folder / f"chunks{len(list(folder.iterdir()))}.mcap"
     writer = SessionWriter(path, ABOUT, compression="lz4")
     for index in range(4):
@@ -124,7 +124,7 @@ def _recovered(path: str) -> None:
 
 
 def targets(folder: Path) -> dict[str, Target]:
-    """All of them; those that read files write them below ``folder``."""
+    """All targets. Those that read files write them below ``folder``."""
     grey = np.full((24, 40, 3), 90, np.uint8)
     images = tuple(cv2.imencode(suffix, grey)[1].tobytes() for suffix in (".png", ".jpg"))
     built_in = tuple(path.read_bytes() for path in sorted(scenario.FOLDER.glob("*.yaml"))[:3])
@@ -172,7 +172,7 @@ def targets(folder: Path) -> dict[str, Target]:
 
 @contextmanager
 def _undamaged_files_read_once() -> Iterator[None]:
-    """Most of the time of a recording with one damaged file would else go to its other images and sweeps."""
+    """Cache undamaged files, since reading a recording's other images and sweeps would take most of the time."""
     decode, elevations = cv2.imdecode, hdl64_rings.ring_elevations_deg
 
     @lru_cache(maxsize=64)
@@ -193,7 +193,7 @@ def _undamaged_files_read_once() -> Iterator[None]:
 
 
 def all_targets() -> Iterator[dict[str, Target]]:
-    """For a ``with`` of contextlib: the folder goes at the end. It is in memory where that is possible."""
+    """All targets; their folder, in memory if possible, is removed at the end."""
     memory = Path("/dev/shm")
     with (
         tempfile.TemporaryDirectory(prefix="cipv-fuzz-", dir=memory if memory.is_dir() else None) as folder,
@@ -202,5 +202,5 @@ def all_targets() -> Iterator[dict[str, Target]]:
     ):
         known = targets(Path(folder))
         for target in known.values():
-            target.read(target.seeds[0])  # what is compiled the first time is not the parser's time
+            target.read(target.seeds[0])  # compilation does not count as the parser's time
         yield known

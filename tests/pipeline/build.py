@@ -9,7 +9,7 @@ from pipeline.types import Box, EgoState, FusedObject, LidarTrack, Moment, Objec
 
 
 def moment(ego: EgoState | None = None, dt_s: float | None = None) -> Moment:
-    """A frame's time and own motion; without arguments a first frame of a car that knows nothing of its own motion."""
+    """A frame's time and ego motion; by default a first frame without known ego motion."""
     return Moment(0, dt_s, ego, ego)
 
 
@@ -48,7 +48,7 @@ def fused(
     hits: int = 5,
     **size: float,
 ) -> FusedObject:
-    """A fused object with its nearest face's middle at (x, y); x null: place not known."""
+    """A fused object with the middle of its nearest face at (x, y); x None: position unknown."""
     box = cuboid(x, y, **size) if x is not None else None
     corners = box.footprint() if box is not None else None
     return FusedObject(

@@ -1,4 +1,4 @@
-"""What runs in a chaos soak, and what befalls it: a server that is labelled on, a recorder, and who is around them."""
+"""The participants and the faults of a chaos soak: a server used for labeling, a recorder, and misbehaving clients."""
 
 from __future__ import annotations
 
@@ -48,36 +48,36 @@ _FRAMES = 30
 
 @dataclass
 class Figures:
-    """What happened in all, and what must be empty: ``wrong``."""
+    """Counts of everything that happened. ``wrong`` must stay empty."""
 
     befell: Counter[str] = field(default_factory=Counter)
-    """By kind."""
+    """Number of faults by kind."""
     acts: int = 0
-    """Labels that were answered as done."""
+    """Number of label changes that the server confirmed."""
     refused: int = 0
-    """Answered as not done, or not at all."""
+    """Number of changes that were rejected or not answered."""
     sessions: int = 0
-    """That a recorder began, until it was killed or the disk was full."""
+    """Number of sessions that a recorder began, until it was killed or the disk was full."""
     frames: int = 0
     """Of these, read back."""
     drives: int = 0
-    """Whole drives whose every final frame was compared."""
+    """Number of drives of which every final frame was compared."""
     clients: int = 0
-    """That misbehaved."""
+    """Number of misbehaving clients."""
     live_ticks: int = 0
-    """Of live sensors, that were shown."""
+    """Number of ticks of live sensors that were shown."""
     live_frames: int = 0
-    """Of these, read back from the recording."""
+    """Of these, how many were read back from the recording."""
     slowest_return_s: float = 0.0
-    """Of driving, from a check to the moment when every live sensor had been seen again."""
+    """Longest driving time from a check until every live sensor had delivered data again."""
     checks: int = 0
     wrong: list[str] = field(default_factory=list)
     resident_mb: list[float] = field(default_factory=list)
-    """Of the server, at each check."""
+    """Memory of the server at each check."""
 
 
 class LabelledServer:
-    """A server on one database, started anew whenever it was killed, and somebody who labels on it without a pause."""
+    """A server on one database, restarted whenever it is killed, and a person who labels without a pause."""
 
     def __init__(self, context: ForkServerContext, url: str, figures: Figures) -> None:
         self._context, self.url, self.figures = context, url, figures
@@ -93,7 +93,7 @@ class LabelledServer:
         self.process, self.address = started(self._context, self.url, self._ahead_s)
 
     def label(self, stop: threading.Event) -> None:
-        """One track after the other, until ``stop``; after each kill on the next server."""
+        """Create one track after another until ``stop``; after each kill, on the next server."""
         while not stop.is_set():
             with httpx.Client(base_url=self.address, timeout=_ANSWER_S) as client:
                 try:
@@ -115,7 +115,7 @@ class LabelledServer:
             self.figures.refused += 1
             time.sleep(0.05)
 
-    # ------------------------------------------------------------ what befalls it
+    # ------------------------------------------------------------ faults
 
     def kill(self) -> None:
         self.process.kill()
@@ -123,7 +123,7 @@ class LabelledServer:
         self.start()
 
     def freeze(self) -> None:
-        """As a machine that sleeps."""
+        """Suspend the server, as if the machine slept."""
         os.kill(self.process.pid or 0, signal.SIGSTOP)
         time.sleep(1.5)
         os.kill(self.process.pid or 0, signal.SIGCONT)
@@ -132,7 +132,7 @@ class LabelledServer:
         self._ahead_s.value = random.choice(_JUMPS_S)
 
     def use_up_descriptors(self) -> None:
-        """It can open none for two seconds."""
+        """Let the server open no file descriptors for two seconds."""
         pid = self.process.pid or 0
         soft, hard = resource.prlimit(pid, resource.RLIMIT_NOFILE)
         resource.prlimit(pid, resource.RLIMIT_NOFILE, (len(os.listdir(f"/proc/{pid}/fd")), hard))
@@ -140,7 +140,7 @@ class LabelledServer:
         resource.prlimit(pid, resource.RLIMIT_NOFILE, (soft, hard))
 
     def kill_database(self) -> None:
-        """One of PostgreSQL's processes dies, and all start anew. A file has none."""
+        """Kill one of PostgreSQL's processes, after which all restart. Does nothing for SQLite."""
         folder = re.search(r"host=(\S+)", self.url)
         if folder is None:
             return
@@ -150,10 +150,10 @@ class LabelledServer:
                 os.kill(int(child), signal.SIGKILL)
                 return
 
-    # ------------------------------------------------------------ what must hold
+    # ------------------------------------------------------------ checks
 
     def check(self) -> None:
-        """Every act that was answered is there, and every final frame is what it was the first time."""
+        """Check that every confirmed change is stored, and that every final frame equals the first computation."""
         figures, said = self.figures, dict(self._said)
         database = Database(self.url)
         try:
@@ -206,7 +206,7 @@ for index in range(10**9):
 
 
 def record(folder: Path, chance: random.Random, figures: Figures) -> None:
-    """Record faster than the disk takes it, until the recorder is killed or its disk is full; then read it back."""
+    """Record faster than the disk can write, until the recorder is killed or its disk is full; then read it back."""
     path, is_full = folder / "a.mcap", chance.random() < 0.5
     path.unlink(missing_ok=True)
     limit = chance.randint(2_000_000, 20_000_000) if is_full else 0
@@ -227,7 +227,7 @@ def record(folder: Path, chance: random.Random, figures: Figures) -> None:
 
 
 def _read_back(path: Path, figures: Figures) -> int:
-    """How many frames; each is whole, and frames that are missing between them are said."""
+    """Number of frames; checks that each is complete and that missing frames are reported."""
     out = path.with_name("b.mcap")
     out.unlink(missing_ok=True)
     if verify(path).state != "cut off":
@@ -244,11 +244,11 @@ def _read_back(path: Path, figures: Figures) -> int:
     return len(times)
 
 
-# ------------------------------------------------------------ around them
+# ------------------------------------------------------------ misbehaving clients
 
 
 def half_open(server: LabelledServer, stop: threading.Event) -> None:
-    """A client that begins requests and ends none, and one that says what is no request."""
+    """A client that never completes its requests, and one that sends garbage."""
     held: list[socket.socket] = []
     while not stop.wait(0.05):
         parts = urlsplit(server.address)
@@ -263,7 +263,7 @@ def half_open(server: LabelledServer, stop: threading.Event) -> None:
 
 
 def deaf(server: LabelledServer, stop: threading.Event) -> None:
-    """Clients of the stream that never read, and say what nobody understands."""
+    """Clients of the stream that never read, and send garbage."""
     while not stop.is_set():
         with (
             contextlib.suppress(Exception),
@@ -279,7 +279,7 @@ def deaf(server: LabelledServer, stop: threading.Event) -> None:
 
 @contextmanager
 def pressure() -> Iterator[None]:
-    """Somebody else's programs: one that computes, and one that takes memory."""
+    """Run other programs: one that uses a processor, and one that uses memory."""
     hungry = "import time; held = bytearray(300 << 20); held[::4096] = b'x' * len(held[::4096]); time.sleep(600)"
     commands = [[sys.executable, "-c", text] for text in ("while True: pass", hungry)]
     processes = [subprocess.Popen(command) for command in commands]

@@ -1,4 +1,4 @@
-"""Live sensors in a chaos soak: a car that is replayed with random faults, and what listens to it and records."""
+"""Live sensors in a chaos soak: a replayed car with random faults, and a server that listens and records."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ from tests.soak.live_run import KINDS, config_file
 
 _SENSORS = ("lidar", "camera", "gnss")
 _DRIVE_S = 40.0
-"""How long the car drives before it starts anew, as after a flat battery."""
+"""How long the car drives before it is restarted, as after a flat battery."""
 _FAULTS = 8
 _BACK_WITHIN_S = 40.0
-"""Of driving. How long a car that was killed takes to draw its images again is not counted: it depends on what else the
-machine does, and no sensor sends meanwhile."""
+"""Maximum driving time until all sensors are back. The time that a killed car takes to render its images again does not
+count: it depends on the machine's load, and no sensor sends meanwhile."""
 _DRIVES_AGAIN_WITHIN_S = 600.0
 _FLOOD = 3000
 _SEVERAL_S = 3.0
 
 
 class LiveCar:
-    """Sensors that fail one after the other, a car that is switched off, and a recorder that goes on all the time."""
+    """A car whose sensors fail one after another and which is switched off, and a recorder that runs all the time."""
 
     def __init__(self, folder: Path, chance: random.Random, figures: Figures) -> None:
         folder.mkdir()
@@ -59,7 +59,7 @@ class LiveCar:
         self._engine.listen(self._shown)
 
     def drive(self, stop: threading.Event) -> None:
-        """Until ``stop``: one car after the other, each with faults of its own."""
+        """Run one car after another until ``stop``, each with its own faults."""
         faults = self._folder / "faults.yaml"
         while not stop.is_set():
             faults.write_text(yaml.safe_dump([each.model_dump() for each in self._random_faults()]))
@@ -79,25 +79,25 @@ class LiveCar:
             self._drives_since_s = time.monotonic()
 
     def _driven(self) -> float:
-        """For how long any car has sent, s."""
+        """Total time in seconds in which a car was sending."""
         since_s = self._drives_since_s
         return self._driven_s + (time.monotonic() - since_s if since_s is not None else 0.0)
 
     def begin(self) -> None:
-        """Record from the first tick on."""
+        """Start recording, from the first tick on."""
         self._engine.start()
         self._engine.wait_for(lambda shown: shown.processed is not None, _DRIVES_AGAIN_WITHIN_S)
         self._desk.start(self._engine.source)
 
-    # ------------------------------------------------------------ what befalls it
+    # ------------------------------------------------------------ faults
 
     def switch_off(self) -> None:
-        """All sensors at once, in the middle of a packet; they come back half a minute later."""
+        """Switch off all sensors at once, in the middle of a packet; they return half a minute later."""
         if self._car is not None:
             self._car.kill()
 
     def flood(self) -> None:
-        """Somebody else sends to the ports of the LiDAR and the receiver, as fast as it goes."""
+        """Let another sender flood the ports of the LiDAR and the GNSS receiver."""
         config = load(str(self._config))
         assert config.lidar is not None
         assert config.gnss is not None
@@ -109,10 +109,10 @@ class LiveCar:
                     data = self._chance.choice((b"\xff\xee" * 603, b"$GPRMC,", self._chance.randbytes(512)))
                     stranger.sendto(data, ("127.0.0.1", self._chance.choice(ports) or 9))
 
-    # ------------------------------------------------------------ what must hold
+    # ------------------------------------------------------------ checks
 
     def check(self) -> None:
-        """Every sensor is there again within the time, whatever was done to it, and the recording goes on."""
+        """Check that every sensor is back in time after its faults, and that the recording continues."""
         asked_s, driven_s = time.monotonic(), self._driven()
         while missing := [name for name, at_s in self._seen_s.items() if at_s < asked_s]:
             is_late = self._driven() - driven_s > _BACK_WITHIN_S
@@ -130,7 +130,7 @@ class LiveCar:
         return str([each for each in source.health() if each.sensor == name] if is_live_source(source) else source)
 
     def end(self) -> None:
-        """Close the recording and read it back: what is missing is said, and nothing was changed."""
+        """Close the recording and read it back: missing data must be reported, and nothing may be changed."""
         state = self._desk.stop()
         self._engine.stop()
         if state is None:

@@ -69,7 +69,7 @@ def _real(folder: Path) -> Iterator[Path]:
 
 
 class Cluster:
-    """A scheduler, and workers that are started again when they die, in processes that can be killed."""
+    """A scheduler and workers, which are restarted when they die, in processes that can be killed."""
 
     def __init__(self, workers: int) -> None:
         with listen_socket("127.0.0.1", 0, strict=True) as free:
@@ -124,12 +124,12 @@ def plain(inside: str, workers: int) -> tuple[dict[str, str], dict[str, Any]]:
 
 
 def resident_bytes() -> int:
-    """Of this process."""
+    """Memory of this process."""
     return int(psutil.Process().memory_info().rss)
 
 
 def faulty(endpoint: str) -> tuple[dict[str, str], dict[str, Any]]:
-    """A batch to which everything happens."""
+    """Run a batch with all faults. Returns the digests of its files, and its figures."""
     out = f"s3://{BUCKET}/out-faulty"
     every(endpoint, FAILING)
     killed, schedulers, start = set[int](), 0, time.monotonic()
@@ -166,8 +166,9 @@ def faulty(endpoint: str) -> tuple[dict[str, str], dict[str, Any]]:
 
 
 def every(endpoint: str, number: int) -> tuple[int, int]:
-    """Let every n-th request fail from now on, 0 for none. Returns how many there were, and how many failed."""
-    for _ in range(3):  # this request may be one that fails
+    """Let every n-th request fail from now on; 0 for none. Returns the number of requests so far, and of failed
+    ones."""
+    for _ in range(3):  # this request may itself fail
         try:
             with urllib.request.urlopen(f"{endpoint}/every/{number}") as answer:
                 requests, failed = answer.read().split()
@@ -178,7 +179,7 @@ def every(endpoint: str, number: int) -> tuple[int, int]:
 
 
 def main() -> int:
-    """0 if all batches gave the same bytes."""
+    """Exit status: 0 if all batches gave the same bytes."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--sessions", type=int, default=200)
     parser.add_argument("--seconds", type=float, default=5.0, help="length of a simulated session")

@@ -1,4 +1,4 @@
-"""What a batch costs: fits processor time to measured drives, and tells what 10,000 hours would take.
+"""Measures the cost of a batch: fits processor time to measured drives, and predicts that of 10,000 hours.
 
     python -m tests.soak.fleet_cost FOLDER
 
@@ -25,7 +25,7 @@ from tests.app.fleet.fleets import job_of
 
 LENGTHS, EACH, REAL = (10, 25, 50), 6, 8
 HOURS, RATE_HZ, DRIVE_MIN = 10_000, 10, 10
-"""Of the fleet that is foretold: drives of so many minutes."""
+"""Hours, frame rate and minutes per drive of the predicted fleet."""
 
 
 def measure(folder: Path) -> list[tuple[int, int, float]]:
@@ -48,7 +48,7 @@ def measure(folder: Path) -> list[tuple[int, int, float]]:
             assert isinstance(outcome, Outcome)
             assert outcome.frames, outcome.reason
             rows.append((outcome.frames, outcome.looked_at, seconds))
-    return rows[1:]  # the first one compiles and opens the networks
+    return rows[1:]  # the first drive compiles and opens the networks
 
 
 def main(folder: str) -> None:

@@ -1,4 +1,5 @@
-"""Whether the seconds that `cipv mine` chooses are those in which the pipeline errs, by labels of a simulated fleet.
+"""Checks with the labels of a simulated fleet whether the pipeline is wrong more often in the seconds that `cipv mine`
+chooses.
 
     cipv batch FOLDER --out DIR --results --lanes off --far-view-px 0
     python -m tests.soak.fleet_mining DIR
@@ -33,7 +34,7 @@ RESAMPLED, SEED = 2000, 1
 
 
 def wrong_frames(store: Store, run: str, drive: str, source: Source) -> set[int]:
-    """Frames whose lead is not that of the labels."""
+    """Frames whose lead differs from the labels."""
     packed = store.read(f"results/run={run}/{drive}.jsonl.zst")
     assert packed is not None
     lines = zstandard.ZstdDecompressor().decompressobj().decompress(packed)

@@ -1,4 +1,4 @@
-"""An S3 in a process of its own, which keeps objects on the disk and fails every n-th request.
+"""An S3 server in its own process, which stores objects on disk and fails every n-th request.
 
 python -m tests.soak.fleet_store EVERY
 """
@@ -21,13 +21,13 @@ ENVIRONMENT = {
     "AWS_DEFAULT_REGION": "us-east-1",
     "MOTO_S3_DEFAULT_KEY_BUFFER_SIZE": "65536",
 }
-"""The last: objects above it go to temporary files."""
+"""The last variable: larger objects go to temporary files."""
 
 
 @contextmanager
 def s3_process(every: int) -> Iterator[str]:
-    """The address of a server with one empty bucket. Set it as ``AWS_ENDPOINT_URL``. every: which requests fail; 0 for
-    none, until POST /every/N."""
+    """The address of a server with one empty bucket, to be set as ``AWS_ENDPOINT_URL``. every: every n-th request
+    fails, 0 for none; POST /every/N changes it."""
     typed = [sys.executable, "-m", "tests.soak.fleet_store", str(every)]
     environment = os.environ | ENVIRONMENT | {"PYTHONPATH": str(ROOT)}
     with subprocess.Popen(typed, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True) as server:

@@ -1,7 +1,8 @@
 """A car for the soak: `python -m tests.soak.live_car CONFIG SECONDS FAULTS`.
 
-In a process of its own, as sensors are: LiDAR 10 Hz, camera 1280×720 at 30 Hz, GNSS 10 Hz, of two seconds of a
-simulated drive played to and fro. Says when it begins (unix ns) on a line, and in the end what it sent, as JSON.
+In its own process, like real sensors: LiDAR at 10 Hz, camera 1280×720 at 30 Hz, GNSS at 10 Hz, from two seconds of a
+simulated drive that is played back and forth. Prints its start time (unix ns) on a line and, at the end, what it sent,
+as JSON.
 """
 
 from __future__ import annotations
@@ -28,11 +29,11 @@ from pipeline.types import CameraCalibration, Frame
 SCENARIO, FROM_S, SPAN = "straight", 8.6, 20
 MS = 1_000_000
 LEAD_M = (22.0, 25.5)
-"""Where the car ahead is in these two seconds, the nearest and the farthest."""
+"""Minimum and maximum distance of the car ahead in these two seconds."""
 
 
 def clip() -> tuple[list[Frame], list[bytes]]:
-    """``SPAN`` frames of the LiDAR, and three images to each."""
+    """``SPAN`` frames of the LiDAR, with three images each."""
     drive = scenario.load(SCENARIO)
     sensors = SensorRig(drive, world_state.at(drive, drive.duration_s).s_m)
     frames, jpegs = [], []

@@ -1,4 +1,4 @@
-"""The figures of a soak of live sensors, from what was watched and what was recorded."""
+"""Computes the figures of a soak of live sensors, from what was shown and what was recorded."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.soak import live_car
 from tests.soak.live_watch import Memory, Shown, Watcher
 
 QUIET_S = 4.0
-"""The end of a soak, without faults."""
+"""Length of the end of a soak, which has no faults."""
 
 
 def report(
@@ -77,22 +77,22 @@ def report(
 
 
 def _sweeps_taken(session: SessionSource) -> int:
-    """How many sweeps came, at least: a frame's number counts the ticks before it that nobody took, too."""
+    """Minimum number of received sweeps: a frame's number also counts skipped ticks before it."""
     ticks = [frame_record_from(stored.data) for stored in session.file.messages((FRAMES,))][
         1:
-    ]  # the first was under way
+    ]  # the first sweep was incomplete
     first = int(ticks[0].sweep is not None)
     return first + sum(int(b.name) - int(a.name) for a, b in pairwise(ticks) if b.sweep is not None)
 
 
 def _right_leads(leads_m: list[float | None]) -> float:
-    """Share of the quiet end's frames whose lead is where the car ahead is, within a metre."""
+    """Share of the frames at the end without faults whose lead is within a metre of the car ahead."""
     low, high = live_car.LEAD_M
     right = [lead is not None and low - 1.0 < lead < high + 1.0 for lead in leads_m]
     return round(sum(right) / max(1, len(right)), 3)
 
 
 def _recovery_s(fault: Fault, shown: list[Shown]) -> float | None:
-    """From the fault's end to the first result that holds its sensor again; null when none did."""
+    """Time from the fault's end to the first result with data of its sensor; None if there was none."""
     back = (each.at_s - fault.to_s for each in shown if each.at_s > fault.to_s and each.has[fault.sensor])
     return next((round(seconds, 3) for seconds in back), None)

@@ -14,8 +14,8 @@ _FIRST_VIEWS = 5
 _SEEKS = 24
 _SLIDES = 24
 _FAR = 37
-"""Frames between one seek and the next, modulo the recording: coprime with most lengths, so that nearly all frames are
-visited."""
+"""Number of frames between one seek and the next, modulo the length of the recording. A prime, so that nearly all
+frames are visited."""
 _PARAMETER = "cluster.tolerance_m"
 _ACT_PAUSE_MS, _PATIENCE_MS = 120, 30_000
 
@@ -83,9 +83,9 @@ class Waits(NamedTuple):
     cursor show the outcome; and until the table, the reasons and the parameters do, one screen refresh later."""
 
     painted_ms: float
-    """Until image, bird's-eye view, figures and cursor."""
+    """Until image, bird's-eye view, figures and cursor show the outcome."""
     whole_ms: float
-    """Until table, reasons and parameters too."""
+    """Until table, reasons and parameters show it too."""
 
 
 def first_views_ms(running: Browser, address: str) -> list[float]:
@@ -106,8 +106,8 @@ def opened(running: Browser, address: str) -> BrowserPage:
 
 
 def playing(running: Browser, address: str, for_s: float) -> tuple[list[float], float, dict[str, float]]:
-    """During playback: milliseconds from the creation of the result to each painted frame, frames per second, and the
-    browser's CPU time in ms per frame by kind of process."""
+    """Figures during playback: milliseconds from the creation of each result to its painted frame, frames per second,
+    and the browser's CPU time in ms per frame by kind of process."""
     page = opened(running, address)
     time.sleep(_SETTLE_S)
     page.call("() => { window.painted = []; }")

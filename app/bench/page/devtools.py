@@ -30,8 +30,8 @@ FLAGS = (
     "--disable-component-update",
     "--disable-sync",
 )
-"""The browser's own defaults on a machine without a GPU: the CPU composes the page, and WebGL is available for the 3D
-views."""
+"""These are the browser's own defaults on a machine without a GPU: the CPU composites the page, and WebGL is available
+for the 3D views."""
 SIZE_PX = (1440, 900)
 _STARTS_WITHIN_S, _LOOK_EVERY_S, _ANSWERS_WITHIN_S = 30.0, 0.05, 120.0
 
@@ -53,7 +53,7 @@ def browser() -> Iterator[Browser]:
 
 
 def _address(profile: Path, running: subprocess.Popen[bytes]) -> str:
-    """The address it listens on, which it writes to its profile."""
+    """The address that the browser listens on, which it writes to its profile."""
     said, deadline = profile / "DevToolsActivePort", time.monotonic() + _STARTS_WITHIN_S
     while time.monotonic() < deadline and running.poll() is None:
         port, _, path = said.read_text().partition("\n") if said.exists() else ("", "", "")
@@ -72,7 +72,7 @@ class Browser:
         self._told: set[tuple[str, str]] = set()
 
     def ask(self, method: str, session: str | None = None, **params: Any) -> dict[str, Any]:
-        """The answer to a command. BadInput when the browser refuses it or does not answer."""
+        """Send a command and return its result. BadInput if the browser refuses it or does not answer."""
         self._asked += 1
         command = {"id": self._asked, "method": method, "params": params} | ({"sessionId": session} if session else {})
         self._socket.send(json.dumps(command))
@@ -83,7 +83,7 @@ class Browser:
         return dict(answer["result"])
 
     def wait_for(self, event: str, session: str) -> None:
-        """Wait until the browser has reported an event, now or earlier."""
+        """Wait until the browser reports an event; return at once if it already has."""
         while (event, session) not in self._told:
             self._heard(event)
 
@@ -97,7 +97,7 @@ class Browser:
         return said
 
     def open(self, address: str, first: str = "") -> BrowserPage:
-        """A loaded page with an empty cache. first: a script that runs before the page's own."""
+        """Load a page with an empty cache. first: a script that runs before the page's own scripts."""
         context = self.ask("Target.createBrowserContext")["browserContextId"]
         width, height = SIZE_PX
         target = self.ask("Target.createTarget", url="about:blank", browserContextId=context)["targetId"]
@@ -125,7 +125,7 @@ class BrowserPage:
         self._browser, self._context, self._session = browser, context, session
 
     def call(self, function: str, *given: Any) -> Any:
-        """The value that a JavaScript function returns; a promise is awaited. BadInput with its message when it
+        """Call a JavaScript function and return its value, or that of its promise. BadInput with its message if it
         throws."""
         script = f"({function})({', '.join(map(json.dumps, given))})"
         wanted = {"expression": script, "awaitPromise": True, "returnByValue": True}
@@ -135,5 +135,5 @@ class BrowserPage:
         return answer["result"].get("value")
 
     def close(self) -> None:
-        """Close it and discard its storage."""
+        """Close the page and discard its storage."""
         self._browser.ask("Target.disposeBrowserContext", browserContextId=self._context)

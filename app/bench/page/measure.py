@@ -30,11 +30,13 @@ _REVISION = re.compile(rb'"params_revision":([0-9]+)')
 
 
 def figures(source: str, for_s: float) -> dict[str, Any]:
-    """All in milliseconds. ``page``: latency from result to paint, and CPU time per frame by kind of process; when
-    paused, latency from a seek and from a slider move to the paint, and from a seek with 100,000 labels in labeling
-    mode; from opening the address to the first painted frame. ``while_computed``: the same while the whole drive is
-    computed for the first time, with networks. ``parameter``: during playback, from the request to the first message
-    with its result. BadInput without a browser."""
+    """All figures, in milliseconds. BadInput without a browser.
+
+    ``page``: latency from result to paint and CPU time per frame by kind of process; while paused, latency from a seek
+    and from a slider move to the paint, and from a seek with 100,000 labels in labeling mode; time from opening the
+    address to the first painted frame. ``while_computed``: the same while the whole drive is computed for the first
+    time, with networks. ``parameter``: during playback, time from the request to the first message with its result.
+    """
     with browser() as running:
         with _dashboard(source) as address:
             live = _playing(running, address, for_s)
@@ -50,7 +52,7 @@ def _dashboard(source: str) -> Iterator[str]:
     """The address of a dashboard that plays a recording, in its own process."""
     code = "import sys; from app.cli import main; sys.exit(main())"
     folder = tempfile.TemporaryDirectory(prefix="cipv-bench-")
-    labels = f"sqlite:///{folder.name}/labels.db"  # nobody's own are touched
+    labels = f"sqlite:///{folder.name}/labels.db"  # leaves the user's own labels and settings alone
     command = [sys.executable, "-c", code, "serve", source, "--port", "0", "--labels", labels]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -102,8 +104,8 @@ def _still(running: Browser, address: str) -> dict[str, Any]:
 
 
 def _while_computed(running: Browser, address: str) -> dict[str, Any]:
-    """Measured from the start. frames_hz: frames computed per second meanwhile. to_the_end: the computation lasted for
-    the whole measurement; a short drive is finished earlier."""
+    """Figures while the whole drive is being computed. frames_hz: frames computed per second. to_the_end: whether the
+    computation lasted for the whole measurement; a short drive finishes earlier."""
     _post(address, "POST", "/api/playback", {"playing": False})
     before, start = _state(address), time.monotonic()
     seeks, slides = paused(running, address, int(before["count"]), _SETTLE_BRIEFLY_S)
@@ -119,13 +121,14 @@ def _while_computed(running: Browser, address: str) -> dict[str, Any]:
 
 
 def _waits(waits: list[Waits]) -> dict[str, Any]:
-    """Until the frame is painted, and until the whole page is: table, reasons and parameters follow the frame."""
+    """Figures of the delays until the frame is painted, and until the whole page is: table, reasons and parameters
+    follow the frame."""
     whole = _spread([each.whole_ms for each in waits])
     return {**_spread([each.painted_ms for each in waits]), "whole": whole}
 
 
 def _paused_with_all_seen(address: str) -> int:
-    """Pause after the networks have seen every frame, as when a user has waited for the timeline. Returns the number of
+    """Pause once the networks have processed every frame, as when a user waits for the timeline. Returns the number of
     frames."""
     deadline = time.monotonic() + _ALL_SEEN_WITHIN_S
     while time.monotonic() < deadline:
@@ -142,7 +145,7 @@ def _state(address: str) -> Any:
 
 
 def _parameter(address: str, for_s: float) -> dict[str, Any]:
-    """Change one parameter back and forth during playback."""
+    """Figures for changing one parameter back and forth during playback."""
     waits_ms: list[float] = []
     with connect(_stream(address), max_size=None, compression=None) as socket:
         end = time.monotonic() + for_s

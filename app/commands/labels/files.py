@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from app.labels.store.drive_labels import DriveLabels
 
 _NOBODY_KNOWS_WHEN = 0
-"""The truth of a recording was made before it was opened; the same recording gives the same file."""
+"""Time of change of labels that come with a recording: a constant, so that the same recording gives the same file."""
 
 Database = Annotated[str | None, option("URL")]
 Person = Annotated[str, tyro.conf.arg(metavar="NAME")]
@@ -71,7 +71,7 @@ class ExportLabels:
         return 0
 
     def _labels(self, source: Source, drive: LabeledDrive) -> tuple[LabelSet, tuple[str, ...]]:
-        """The labels that are meant, with what there is to say of them."""
+        """The labels to export, and notes about them."""
         if self.labels is not None:
             with gc_paused():
                 found = from_json(read_bytes(given_path(self.labels)), str(self.labels))
@@ -114,7 +114,7 @@ class ImportLabels:
             say(*found.notes, f"{self.out}: {_amount(found.labels)}")
             return 0
         with _kept(source, drive, self.database) as kept:
-            from app.labels.acts.bulk import importing  # the database and the run: who writes a file needs neither
+            from app.labels.acts.bulk import importing  # imported only if needed
 
             say(importing(kept, found.labels, self.person, found.notes))
         return 0
@@ -123,7 +123,7 @@ class ImportLabels:
 @contextmanager
 def _kept(source: Source, drive: LabeledDrive, url: str | None) -> Iterator[DriveLabels]:
     """The database's labels of a recording."""
-    from app.labels.store.database import open_database  # as above
+    from app.labels.store.database import open_database  # imported only if needed, as above
     from app.labels.store.drive_labels import DriveLabels, info_of
 
     database = open_database(url)
@@ -144,6 +144,6 @@ def _amount(labels: LabelSet) -> str:
 
 
 def say(*sentences: str) -> None:
-    """To the person, beside what goes to standard output."""
+    """Print notes to standard error, since results go to standard output."""
     for sentence in sentences:
         print(f"cipv: {sentence}", file=sys.stderr)

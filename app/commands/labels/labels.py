@@ -119,8 +119,8 @@ class ListLabels:
             return 0
         for drive in drives:
             print(
-                f"{drive['title']}: frames {drive['count']:,}, tracks {drive['tracks']:,}, acts {drive['revision']:,}, "
-                f"first opened as {drive['uri']}"
+                f"{drive['title']}: frames {drive['count']:,}, tracks {drive['tracks']:,}, "
+                f"changes {drive['revision']:,}, first opened as {drive['uri']}"
             )
         if not drives:
             say(f"{database.name}: no labels yet")

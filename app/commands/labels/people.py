@@ -20,7 +20,7 @@ from pipeline.labels.formats.reading import read_bytes
 
 _MOST_NAMED = 20
 State = Literal["open", "labeling", "review", "done"]
-"""As of ``app.labels.store.work``, which takes two seconds to import."""
+"""The states of ``app.labels.store.work``, repeated here because its import takes two seconds."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class LabelAgreement:
     """Print the figures as JSON"""
 
     def __call__(self) -> int:
-        from pipeline.labels.agreement import agreement  # SciPy: only who compares pays
+        from pipeline.labels.agreement import agreement  # imports SciPy, which no other command here needs
 
         first, second = (from_json(read_bytes(given_path(file)), str(file)) for file in (self.first, self.second))
         found = agreement(first, second)
@@ -59,8 +59,8 @@ class LabelAgreement:
 
 @dataclass(frozen=True)
 class LabelEffort:
-    """List acts and active time of each person on each recording, also per frame. Pauses of more than two minutes do
-    not count.
+    """List the number of changes and the active time of each person on each recording, in total and per frame. Pauses
+    of more than two minutes do not count.
 
     Example: cipv labels effort --json
     """
@@ -85,8 +85,8 @@ class LabelEffort:
             return 0
         for each in found:
             print(
-                f"{each.title}: {each.person}: acts {each.acts:,} ({each.acts_per_frame:.2f} a frame), "
-                f"{each.active_s / 60:.0f} min ({each.s_per_frame:.1f} s a frame)"
+                f"{each.title}: {each.person}: changes {each.acts:,} ({each.acts_per_frame:.2f} per frame), "
+                f"{each.active_s / 60:.0f} min ({each.s_per_frame:.1f} s per frame)"
             )
         if not found:
             say("no labels yet")
@@ -134,8 +134,8 @@ class LabelQueue:
         for each in found:
             print(
                 f"{each.title}: {each.state}, {each.person or 'unassigned'}; labelled {_percent(each.labelled)}, "
-                f"reviewed {_percent(each.reviewed)}, proposals {each.proposals:,}, frames asked for {each.asked:,}, "
-                f"worth {each.worth:.2f}"
+                f"reviewed {_percent(each.reviewed)}, proposals {each.proposals:,}, frames to label next {each.asked:,}"
+                f", worth {each.worth:.2f}"
             )
         if not found:
             say("no recordings yet: open one and label it, or run `cipv labels propose`")

@@ -8,5 +8,5 @@ import tyro
 
 
 def option(metavar: str, **more: Any) -> Any:
-    """An option that may be left out: its help shows what it takes, and no ``None``."""
+    """An optional argument, whose help shows its metavar instead of ``None``."""
     return tyro.conf.arg(metavar=metavar, help_behavior_hint="", **more)

@@ -34,13 +34,14 @@ class ClusterOptions:
     """A running Dask scheduler, e.g. tcp://10.0.0.5:8786, whose workers have the same version installed"""
 
     def check(self) -> None:
-        """BadInput for what cannot be."""
+        """BadInput if an option has an impossible value."""
         if self.workers is not None and self.workers < 1:
             raise BadInput(f"--workers {self.workers}: expected at least 1")
 
     @contextmanager
     def client(self, drives: int) -> Iterator[Client]:
-        """Dask, for so many drives. Its page's address is printed. BadInput where the scheduler does not answer."""
+        """A Dask client with workers for ``drives`` drives. Prints the address of Dask's dashboard. BadInput if the
+        scheduler does not answer."""
         from app.fleet.batch.schedule import client_of, usual_workers
 
         count = max(1, min(self.workers or usual_workers(), drives)) if self.scheduler is None else 0
@@ -50,7 +51,7 @@ class ClusterOptions:
 
 
 def run_with_bar(client: Client, work: PlannedWork, tally: Tally, title: str = "drives") -> None:
-    """Run what is left of a batch, with a progress bar. Raises what ``run_batch`` raises."""
+    """Run the remaining drives of a batch with a progress bar. Raises what ``run_batch`` raises."""
     from app.fleet.batch.schedule import run_batch
 
     with drives_progress() as bar:
@@ -65,7 +66,7 @@ def run_with_bar(client: Client, work: PlannedWork, tally: Tally, title: str = "
 
 
 def tally_of(work: PlannedWork) -> Tally:
-    """What an earlier batch has done of it."""
+    """The tally of drives that an earlier batch has already done."""
     from app.fleet.batch.schedule import Tally
     from app.fleet.runs import set_aside
 

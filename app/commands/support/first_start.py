@@ -10,11 +10,11 @@ from pipeline.run import run
 from pipeline.sources import open_source
 
 STARTED = ("app.cli", "app.commands.serve", "app.web.server", "app.views.scene_feed", "app.labels.store.drive_labels")
-"""Of the dashboard; what they import comes with them."""
+"""Modules of the dashboard, which import all others."""
 
 
 def main() -> None:
-    """Import the dashboard's modules, and run the pipeline on one frame of its demo."""
+    """Import the dashboard's modules and run the pipeline on one frame of the demo."""
     for name in STARTED:
         import_module(name)
     source = open_source("sim:straight")

@@ -18,7 +18,7 @@ _LONGEST_NAME = 40
 
 
 def opened(uri: str, rings: int = 16) -> AnySource:
-    """Open a recording or live sensors; a bar shows progress while a whole file has to be read. Raises what
+    """Open a recording or live sensors, with a progress bar if a whole file has to be read first. Raises what
     ``open_any`` raises."""
     with _reading(uri) as told:
         return open_any(uri, rings=rings, progress=told)
@@ -40,7 +40,7 @@ def _reading(uri: str) -> Iterator[progress.Progress]:
         def told(done: int, total: int) -> None:
             if not bars:
                 from app.commands.support.progress_bars import (
-                    share_progress,  # rich takes 0.1 s to import: most recordings need no bar
+                    share_progress,  # rich takes 0.1 s to import, and most recordings need no bar
                 )
 
                 bars.append(stack.enter_context(share_progress()))

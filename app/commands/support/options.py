@@ -34,7 +34,7 @@ def planned(file: Path | None) -> Route | None:
     """The route in a file; None without a file."""
     if file is None:
         return None
-    from pipeline.sources.route_files import load_route  # NMEA and map projections, imported for routes only
+    from pipeline.sources.route_files import load_route  # NMEA and map projections, imported only for routes
 
     return load_route(str(file))
 
@@ -47,11 +47,11 @@ class SourceOptions:
     rings: int = 16
     """KITTI: LiDAR channels to keep: 16, like a VLP-16, or 64 for all"""
     route: Annotated[Path | None, option("FILE")] = None
-    """Planned route, on which GNSS places the car: CSV (degrees, or metres of a UTM zone: r.csv?epsg=32632),
+    """Planned route, on which GNSS locates the car: CSV (degrees, or metres of a UTM zone: r.csv?epsg=32632),
     GPX, an NMEA log or an earlier session"""
 
     def open(self) -> Source:
-        """Open a recording. SourceError or RouteError, in one sentence, when the source or route cannot be used."""
+        """Open a recording. SourceError or RouteError, in one sentence, if the source or route cannot be used."""
         from app.commands.support.open_with_progress import opened_recording
         from pipeline.sources.along_route import along_route
 
@@ -116,7 +116,7 @@ class PipelineOptions:
         return with_changes(params, changes)
 
     def changes_parameters(self) -> bool:
-        """Whether the options ask for other parameters than the defaults."""
+        """Whether the options select other parameters than the defaults."""
         return self.preset != "default" or self.params is not None or bool(self.set) or self.own_motion is not None
 
     def every(self) -> int | None:
@@ -126,27 +126,27 @@ class PipelineOptions:
         return self.lanes_every
 
     def far_px(self) -> int | None:
-        """``far_view_px``, validated; None where it is off."""
+        """``far_view_px``, validated; None if it is off."""
         if self.far_view_px and not 64 <= self.far_view_px <= 2048:
             raise BadInput(f"--far-view-px {self.far_view_px}: expected 0, or 64 to 2048")
         return self.far_view_px or None
 
     def choice(self) -> DetectorChoice:
-        """The networks that are asked for."""
+        """The selected networks."""
         from pipeline.detection import DetectorChoice
 
         return DetectorChoice(self.detector, self.lanes, self.every(), self.far_px())
 
     def open_detectors(self, source: AnySource, sensors: Sensors = "both") -> Detectors:
-        """All detectors for the source's images; their notes are printed. None of them for LiDAR alone, and for
-        recordings that contain detections."""
+        """All detectors for the source's images; their notes are printed. Empty for LiDAR alone, and for recordings
+        that contain detections."""
         from pipeline.detection import open_detectors
 
         return open_detectors(source, self.choice(), sensors, _say)
 
     def open_detector(self, source: AnySource, sensors: Sensors = "both") -> Detector | None:
-        """The detector for the source's images; its notes are printed. DetectorMissing when a named one is missing, or
-        any with ``sensors="camera"``; otherwise a message says so and LiDAR runs alone."""
+        """The detector for the source's images; its notes are printed. DetectorMissing if the named one is missing or,
+        with ``sensors="camera"``, if there is none; otherwise a message says so and LiDAR runs alone."""
         from pipeline.detection import open_boxes
 
         return open_boxes(source, self.detector, sensors, _say)

@@ -38,13 +38,13 @@ def drives_progress() -> Progress:
 
 
 def task_progress(bar: Progress, name: str, total: int | None = None) -> Told:
-    """Add a task to the bar, and return the callback that reports its progress."""
+    """Add a task to the bar and return the callback that reports its progress."""
     task = bar.add_task(name, total=total)
     return lambda done, of: bar.update(task, completed=done, total=of)
 
 
 def _bar(*counts: ProgressColumn) -> Progress:
-    """Disappears when done, and is not shown when standard error is not a terminal."""
+    """A bar that disappears when done and is not shown if standard error is not a terminal."""
     columns = (TextColumn("{task.description}"), BarColumn(), *counts, TimeRemainingColumn())
     console = Console(stderr=True)
     return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)

@@ -9,7 +9,7 @@ from pipeline.types.source import LiveSource
 
 
 class Waiting:
-    """Prints the sensors that are waited for whenever they change. Called while there is no tick."""
+    """Prints which sensors have not delivered data yet, whenever that changes. Called while there is no tick."""
 
     def __init__(self, live: LiveSource) -> None:
         self._live = live

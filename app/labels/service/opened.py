@@ -42,14 +42,15 @@ class KeptLabels:
         opened."""
         from app.labels.store.drive_labels import DriveLabels
 
-        return DriveLabels(self._opened(), _info(uri, recording), self.station)
+        return DriveLabels(self.opened(), _info(uri, recording), self.station)
 
     def close(self) -> None:
         with self._opening:
             if self._database is not None:
                 self._database.close()
 
-    def _opened(self) -> Database:
+    def opened(self) -> Database:
+        """The database, opened on first use."""
         with self._opening:
             if self._database is None:
                 self._database = (self._open_later or _temporary)()

@@ -31,6 +31,8 @@ class Effort:
     """Changes of labels, including undo and redo."""
     active_s: float
     """Total time between acts, without pauses of more than two minutes."""
+    key: str
+    """The recording's key, derived from its content."""
 
     @property
     def acts_per_frame(self) -> float:
@@ -45,16 +47,17 @@ def efforts(database: Database) -> list[Effort]:
     """Sorted by recording and person."""
     with database.reading() as connection:
         rows = connection.execute(
-            select(DriveRow.id, DriveRow.title, DriveRow.count, ActRow.person, ActRow.t_unix_ms)
+            select(DriveRow.key, DriveRow.title, DriveRow.count, ActRow.person, ActRow.t_unix_ms)
             .join(DriveRow, DriveRow.id == ActRow.drive_id)
             .where(DriveRow.count > 0, ActRow.kind.not_in(_NO_ACTS))
             .order_by(DriveRow.title, DriveRow.id, ActRow.person, ActRow.number)
         ).all()
     found: dict[tuple[Any, ...], list[int]] = {}
-    for drive, title, count, person, t_unix_ms in rows:
-        found.setdefault((drive, title, count, person), []).append(t_unix_ms)
+    for key, title, count, person, t_unix_ms in rows:
+        found.setdefault((key, title, count, person), []).append(t_unix_ms)
     return [
-        Effort(title, count, person, len(times), _active_s(times)) for (_, title, count, person), times in found.items()
+        Effort(title, count, person, len(times), _active_s(times), key)
+        for (key, title, count, person), times in found.items()
     ]
 
 

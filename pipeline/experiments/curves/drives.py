@@ -30,25 +30,29 @@ from pipeline.types import Frame, Path, Result
 from pipeline.warm_up import warm_up
 
 LIDAR_ALONE = "LiDAR alone"
+_ALL = ("lanes", "gnss", "yaw_rate", "edges", "traffic")
+
+
+def _only(*used: str) -> Mapping[str, bool]:
+    """The parameters that leave the path these sources."""
+    return {f"path.use_{each}": False for each in _ALL if each not in used}
+
+
 SOURCES: Mapping[str, Mapping[str, bool]] = {
-    "lane lines": {"path.use_gnss": False, "path.use_yaw_rate": False, "path.use_edges": False},
-    "GNSS route": {"path.use_lanes": False, "path.use_yaw_rate": False, "path.use_edges": False},
-    "yaw rate": {"path.use_lanes": False, "path.use_gnss": False, "path.use_edges": False},
-    "road edges": {"path.use_lanes": False, "path.use_gnss": False, "path.use_yaw_rate": False},
-    "lane lines and yaw rate": {"path.use_gnss": False, "path.use_edges": False},
-    "straight guess": {
-        "path.use_lanes": False,
-        "path.use_gnss": False,
-        "path.use_yaw_rate": False,
-        "path.use_edges": False,
-    },
+    "lane lines": _only("lanes"),
+    "GNSS route": _only("gnss"),
+    "yaw rate": _only("yaw_rate"),
+    "road edges": _only("edges"),
+    "other vehicles": _only("traffic"),
+    "lane lines and yaw rate": _only("lanes", "yaw_rate"),
+    "straight guess": _only(),
     "fused": {},
     LIDAR_ALONE: {},
 }
-"""The parameters that select each path source; the last one has all of them but no camera, so neither boxes nor
+"""The parameters that select each path source. The last entry has all sources but no camera, so neither boxes nor lane
 lines."""
 BOXES = BoxNoise(reach_m=105.0)
-"""As measured for the embedded detector (``truth_boxes``), its reach included."""
+"""Errors and range as measured for the embedded detector (``truth_boxes``)."""
 LINES = LineNoise()
 LOOK_AHEAD_M = (10, 30, 60, 100)
 _TRUE_WAY_M = 130.0
@@ -59,26 +63,26 @@ CurveVerdict = Literal["right", "missed", "decoy", "none", "false", "undecided"]
 
 @dataclass(frozen=True)
 class SourceFrames:
-    """One drive with one set of sources, one entry per frame. (N, 4): the path's errors at 10, 30, 60, 100 m."""
+    """One drive with one set of path sources, with an entry per frame. (N, 4): values at 10, 30, 60 and 100 m."""
 
     t_s: tuple[float, ...]
-    """Since the scenario's start."""
+    """Seconds since the start of the scenario."""
     verdicts: tuple[CurveVerdict, ...]
-    """On the CIPV."""
+    """Whether the CIPV was correct."""
     lead_m: tuple[float | None, ...]
-    """Range of the true lead; None without one."""
+    """Distance of the true lead; None without one."""
     told: tuple[bool, ...]
-    """Whether the car that cuts in is recognised."""
+    """Whether the car that cuts in was recognised."""
     errors_m: tuple[tuple[float, ...], ...]
-    """(N, 4) lateral; NaN where the true path ends."""
+    """(N, 4) lateral errors of the path; NaN beyond the end of the true path."""
     sigmas_m: tuple[tuple[float, ...], ...]
-    """(N, 4) the path's own at the same places."""
+    """(N, 4) the path's own standard deviations at the same distances."""
     over_line_s: float | None = None
-    """When the car that cuts in crosses the line; None where none does."""
+    """When the car that cuts in crosses the lane line; None if no car cuts in."""
 
 
 def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[World, Frame]]:
-    """Each tick of a scripted drive, with given detections. lines None: the road has no lane lines."""
+    """Yield each tick of a scripted drive, with given detections. lines: None if the road has no lane lines."""
     sensors = SensorRig(scene, scene.ego.start_m + scene.ego.travelled_m(scene.duration_s))
     for index in range(scene.frame_count()):
         now = world_state.at(scene, index / scene.rate_hz)
@@ -91,33 +95,33 @@ def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[Wor
 
 @dataclass(frozen=True)
 class CurveFrame:
-    """A frame and its truth."""
+    """A frame with its ground truth."""
 
     now: World
     """The world that the frame shows."""
     frame: Frame
-    """As the pipeline is given it."""
+    """The frame as passed to the pipeline."""
     true_path: Path | None
-    """None where the road ends."""
+    """The path really driven; None at the end of the road."""
     lead: ActorState | None
-    """The first vehicle in the lane within reach; None without one."""
+    """The first vehicle in the lane within the scored range; None without one."""
     is_doubtful: bool
-    """Whether it cannot be decided who leads."""
+    """Whether it cannot be decided which vehicle leads."""
     is_confirmable: bool
     """Whether the lead has been visible for long enough to be confirmed."""
     beyond: ActorState | None
-    """The first vehicle within a third more than the reach."""
+    """The first vehicle in the lane within 4/3 of the scored range."""
 
     @property
     def lead_m(self) -> float | None:
-        """The range of the lead's rear, None without a decidable lead."""
+        """Distance of the lead's rear; None without a decidable lead."""
         if self.lead is None or self.is_doubtful:
             return None
         return float(np.hypot(*self.lead.cuboid.center[:2]) - self.lead.cuboid.size[0] / 2)
 
 
 def moments(scene: Scenario, frames: Iterable[tuple[World, Frame]], reach_m: float) -> Iterator[CurveFrame]:
-    """The truth of each frame of a drive. reach_m: leads beyond this do not count."""
+    """Add the ground truth to each frame of a drive. reach_m: leads beyond this do not count."""
     way, in_sight = ScriptedWay.of(scene), InSight()
     for now, frame in frames:
         assert frame.camera is not None
@@ -138,8 +142,8 @@ def driven(
     settings: Mapping[str, Mapping[str, bool]] = SOURCES,
     lines: LineNoise | None = LINES,
 ) -> dict[str, SourceFrames]:
-    """Every frame once through the sensors, and once through the pipeline for each named one of the settings.
-    over_line_s: when a wheel of vehicle 2 crosses the lane line, if it cuts in. lines None: the road has no paint."""
+    """Simulate the sensors once per frame, and run the pipeline once for each of the named sources. over_line_s: when a
+    wheel of vehicle 2 crosses the lane line, if it cuts in. lines: None if the road has no lane lines."""
     warm_up()
     chosen = {name: with_changes(Params(), settings[name]) for name in names}
     states = dict.fromkeys(names, State())
@@ -165,7 +169,7 @@ def _frames(rows: Sequence[tuple[CurveFrame, Result]], over_line_s: float | None
 
 
 def judge(moment: CurveFrame, result: Result) -> CurveVerdict:
-    """The frame's CIPV against the vehicle that really is the first in the lane."""
+    """Compare the frame's CIPV with the true first vehicle in the lane."""
     chosen = result.chosen()
     place = near_face_middle(chosen.bev) if chosen is not None and chosen.bev is not None else None
     if moment.is_doubtful:
@@ -179,7 +183,7 @@ def judge(moment: CurveFrame, result: Result) -> CurveVerdict:
 
 
 def _is_told(now: World, result: Result, actor: int) -> bool:
-    """Whether the car that cuts in is the CIPV or announced as the next one."""
+    """Whether the car that cuts in is the CIPV or announced as a cut-in."""
     state = next(each for each in now.actors if each.actor.id == actor)
     known = {lead.id for lead in (result.cipv, result.next_cipv) if lead is not None}
     places = [near_face_middle(item.bev) for item in result.objects if item.id in known and item.bev is not None]
@@ -187,7 +191,7 @@ def _is_told(now: World, result: Result, actor: int) -> bool:
 
 
 def _errors_m(path: Path, true_path: Path | None) -> tuple[float, ...]:
-    """Sideways distance of the path's points at 10, 30, 60, 100 m from the path really driven."""
+    """Lateral distance of the path's points at 10, 30, 60 and 100 m from the path really driven."""
     if true_path is None:
         return (np.nan,) * len(LOOK_AHEAD_M)
     points = path.center[[min(s, len(path.center) - 1) for s in LOOK_AHEAD_M]]

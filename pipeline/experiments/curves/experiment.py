@@ -32,11 +32,11 @@ class CurveCase:
     """One drive through a layout."""
 
     kind: Literal["follow", "cut_in"]
-    """Behind a lead, or with a car that cuts in."""
+    """Whether the car follows a lead, or another car cuts in."""
     layout: str
     """Name of the road."""
     seed: int
-    """Of noise and traffic."""
+    """Seed of noise and traffic."""
 
 
 CurveOutcome = dict[str, SourceFrames]
@@ -82,7 +82,7 @@ def as_drive(case: CurveCase, outcome: CurveOutcome) -> ExperimentDrive:
 
 
 def _lead_chart(drive: SourceFrames) -> Chart:
-    """The true lead's range, by whether it was chosen."""
+    """Chart of the true lead's distance, with different lines for correct and wrong choices."""
     shown = {"right": ("right",), "not": ("missed", "decoy"), "not decidable": ("undecided",)}
     series = (
         Series.of_points(
@@ -99,8 +99,8 @@ def _lead_chart(drive: SourceFrames) -> Chart:
 
 
 def share_right(drives: Sequence[SourceFrames], reach_m: float = np.inf) -> tuple[float, int]:
-    """Share of the decidable frames whose lead is nearer than ``reach_m`` that are right, and how many there are. A
-    frame without a lead is right when none is chosen."""
+    """Share of correct frames among the decidable ones whose lead is nearer than ``reach_m``, and the number of those
+    frames. A frame without a lead is correct if no lead is chosen."""
     judged = [
         verdict
         for drive in drives
@@ -124,8 +124,8 @@ def longest_wrong_s(drive: SourceFrames) -> float:
 
 
 def told_before_line_s(drive: SourceFrames) -> float | None:
-    """How many seconds before its wheel crossed the lane line the car that cuts in was recognised for good; negative:
-    after it. None: never."""
+    """How many seconds before its wheel crossed the lane line the car that cuts in was recognised for good. Negative:
+    afterwards. None: never."""
     assert drive.over_line_s is not None
     if not drive.told[-1]:
         return None
@@ -140,8 +140,8 @@ def report(cases: Sequence[CurveCase], outcomes: Sequence[CurveOutcome]) -> Repo
         "curves",
         "Curves: the CIPV at up to 3 m/s² lateral, by path source",
         (
-            "Given detections: ground-truth boxes with the errors measured for the embedded detector (3 % of the "
-            "height that stays with a vehicle, 3 % and 0.7 px new in each frame, half missed at 105 m), a simulated "
+            "The detections are given: ground-truth boxes with the errors measured for the embedded detector (3 % of "
+            "the height, constant for a vehicle; 3 % and 0.7 px, new in each frame; half missed at 105 m), a simulated "
             "VLP-16, lane lines with 1.5 px of noise to 55 m, RTK GNSS on a surveyed route with 0.3° of course noise, "
             "yaw rate with 0.0024 rad/s of noise and 0.0005 rad/s of bias. Frames in which the lead has been "
             f"visible for fewer frames than confirmation needs ({CipvParams().confirm_hits}) and is not chosen yet do "
@@ -235,7 +235,8 @@ def _told_too_late(cut_ins: dict[str, dict[str, list[SourceFrames]]]) -> Iterato
 
 
 def _held(layout: str, fused: list[SourceFrames]) -> bool:
-    """Right in 99 % of the frames up to 60 m, in the required share up to the reach, and no decoy for long."""
+    """Whether 99 % of the frames up to 60 m and the required share up to the full range are correct, and no decoy leads
+    for long."""
     near, far = share_right(fused, 60.0)[0], share_right(fused)[0]
     wrong_s = max(longest_wrong_s(drive) for drive in fused)
     return near >= 0.99 and far >= scenarios.LAYOUTS[layout].wanted and wrong_s <= LONGEST_WRONG_S + 1e-9
@@ -250,7 +251,7 @@ def _verdict(layout: str, by_source: dict[str, list[SourceFrames]]) -> str:
     better = "better than" if far > alone + 0.005 else "no better than"
     return (
         f"{kind.title}: right in {100 * near:.1f} % to 60 m and {100 * far:.1f} % to {kind.reach_m:.0f} m, "
-        f"{wrong_s:.1f} s on a decoy at most: {held}; {better} the LiDAR alone ({100 * alone:.1f} %)."
+        f"at most {wrong_s:.1f} s on a decoy: {held}; {better} the LiDAR alone ({100 * alone:.1f} %)."
     )
 
 

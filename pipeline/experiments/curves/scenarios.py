@@ -22,20 +22,20 @@ Shape = Literal["straight", "bend", "s_curve"]
 
 @dataclass(frozen=True)
 class CurveLayout:
-    """A road and a speed on it."""
+    """A road, and the speed on it."""
 
     name: str
-    """For cases and files."""
+    """Name in cases and file names."""
     title: str
-    """For people."""
+    """Title in reports."""
     shape: Shape
     """Straight, bend or S-curve."""
     radius_m: float | None
-    """Of its bends; None when straight."""
+    """Radius of its bends; None if straight."""
     speed_kmh: float
-    """Of the ego car."""
+    """Speed of the ego vehicle."""
     reach_m: float
-    """How far ahead the choice is scored."""
+    """Maximum distance of a scored lead."""
     wanted: float
     """Required share of correct frames."""
 
@@ -58,8 +58,9 @@ LAYOUTS = {
 
 
 def scenario(layout: CurveLayout, seed: int) -> Scenario:
-    """Even seeds bend to the left first, odd ones to the right. The lead drives away from 20 m to the scored reach; two
-    cars drive in either lane beside, at 20–100 m, a little faster or slower than the ego car."""
+    """A drive behind a lead. With even seeds the road bends to the left first, with odd ones to the right. The lead
+    draws away from 20 m to the scored range. In each adjacent lane, two cars drive at 20–100 m, a little faster or
+    slower than the ego vehicle."""
     rng = np.random.default_rng([seed, list(LAYOUTS).index(layout.name)])
     speed = layout.speed_mps
     gain = (layout.reach_m - 22.0) / DURATION_S
@@ -72,7 +73,7 @@ def scenario(layout: CurveLayout, seed: int) -> Scenario:
 
 
 def cut_in(layout: CurveLayout, seed: int) -> tuple[Scenario, float]:
-    """The same road with a lead at 60 m and a car that cuts in before it from the next lane within 3 s; and the time at
+    """The same road with a lead at 60 m, before which a car cuts in from the next lane within 3 s; and the time at
     which its nearer wheel crosses the lane line."""
     side = 1 if seed % 2 else -1
     start_s, takes_s = 5.0, 3.0
@@ -106,7 +107,7 @@ def _scene(layout: CurveLayout, seed: int, actors: list[dict[str, Any]]) -> Scen
 
 
 def _segments(layout: CurveLayout, side: float) -> list[dict[str, float]]:
-    """The length of a transition follows from the usual lateral jerk, v³/(R·j)."""
+    """Segments of the road. The length of a transition curve follows from the usual lateral jerk, v³/(R·j)."""
     if layout.radius_m is None:
         return [{"length_m": 5000.0}]
     bend = side / layout.radius_m

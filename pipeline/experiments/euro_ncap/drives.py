@@ -16,7 +16,7 @@ from pipeline.simulation.scenario import Scenario
 
 NcapTest = Literal["CCRs", "CCRm", "CCRb"]
 OVERLAPS = (-50, -75, 100, 75, 50)
-"""Share of the ego car's width that meets the target, %. Negative: the target stands to the ego car's left."""
+"""Overlap: share of the ego vehicle's width that would hit the target, %. Negative: the target is to the left."""
 EGO_WIDTH_M = 1.82
 MOVING_KMH = 20.0
 BRAKED_KMH = 50.0
@@ -37,7 +37,7 @@ NETWORK_SAMPLE: tuple[tuple[NcapTest, float, int], ...] = (
     *(("CCRs", 40.0, overlap) for overlap in (-50, 50)),
     *(("CCRm", speed, 100) for speed in (40.0, 60.0, 80.0)),
 )
-"""Cells that are also driven with the embedded network on rendered images, besides the lead that brakes at 6 m/s² 40
+"""Cells that are also driven with the embedded network on rendered images. So is the lead that brakes at 6 m/s² from 40
 m ahead."""
 
 
@@ -53,19 +53,19 @@ class EuroNcapCase:
     test: NcapTest
     """Standing, moving or braking target."""
     speed_kmh: float
-    """Of the ego car."""
+    """Speed of the ego vehicle."""
     overlap: int
-    """Share of the ego car's width that meets the target, %; negative: the target stands to the ego car's left."""
+    """Share of the ego vehicle's width that would hit the target, %. Negative: the target is to the left."""
     sensors: Sensors
-    """Those that the pipeline is given."""
+    """Sensors that the pipeline gets."""
     controller: str
     """``ACC`` or ``ACC + AEB``."""
     gap_m: float = 0.0
-    """CCRb only: at the start of braking."""
+    """CCRb only: gap when the target begins to brake."""
     decel_mps2: float = 0.0
-    """CCRb only: of the target."""
+    """CCRb only: deceleration of the target."""
     boxes: Boxes = "truth"
-    """Where the camera's boxes come from."""
+    """Source of the camera's boxes."""
 
     @property
     def kind(self) -> SensorSetup:
@@ -73,14 +73,14 @@ class EuroNcapCase:
 
     @property
     def name(self) -> str:
-        """As part of a file name."""
+        """Name for use in file names."""
         what = f"gap{self.gap_m:.0f}_brake{self.decel_mps2:.0f}" if self.test == "CCRb" else f"overlap{self.overlap}"
         kind = "_".join((SENSORS[self.sensors], self.controller.replace(" + ", "+"), self.boxes))
         return f"{self.test}_{self.speed_kmh:.0f}kmh_{what}_{kind}".lower()
 
     @property
     def at(self) -> str:
-        """Where in its test's grid, for people."""
+        """Position in the grid of its test, as text."""
         at = f"{self.gap_m:.0f} m, −{self.decel_mps2:.0f} m/s²" if self.test == "CCRb" else f"overlap {self.overlap} %"
         return f"{self.speed_kmh:.0f} km/h, {at}"
 
@@ -90,14 +90,14 @@ class EuroNcapCase:
 
 @dataclass(frozen=True)
 class CellResult:
-    """What a cell came to."""
+    """Outcome of a cell."""
 
     impact_kmh: float
-    """Relative; 0 when avoided."""
+    """Relative impact speed; 0 if the collision was avoided."""
     void: str
-    """Why the run is not valid; empty when it is."""
+    """Reason why the run is not valid; empty if it is."""
     drive: DriveRecord | None = field(default=None, compare=False)
-    """The run itself; None when only its figures were kept."""
+    """The run itself; None if only its figures were kept."""
 
 
 def cases(short: bool) -> list[EuroNcapCase]:
@@ -123,7 +123,7 @@ def cases(short: bool) -> list[EuroNcapCase]:
 
 
 def run(case: EuroNcapCase) -> CellResult:
-    """One approach, driven."""
+    """Drive one approach."""
     drive = approach(scenario(case), Setup(_params(case), case.sensors, eyes_for(case.boxes)))
     return CellResult((drive.impact_mps or 0.0) / KMH, _void(case, drive), drive)
 
@@ -168,8 +168,8 @@ def as_drive(case: EuroNcapCase, result: CellResult) -> ExperimentDrive:
 
 
 def _void(case: EuroNcapCase, drive: DriveRecord) -> str:
-    """Why the approach did not meet the protocol: the speed must stay within 0 to +1 km/h from the start of the test
-    until the car brakes by itself, and it must not brake before the start."""
+    """Why the approach violated the protocol; empty if it did not. From the start of the test until the car brakes by
+    itself, the speed must stay within 0 to +1 km/h, and the car must not brake before the start."""
     wanted = case.speed_kmh * KMH
     for t_s, speed, state, accel in zip(drive.t_s, drive.speed_mps, drive.states, drive.accel_mps2, strict=True):
         acts = accel < -0.5 or state in ("partial_brake", "full_brake")

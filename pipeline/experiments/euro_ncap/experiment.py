@@ -43,9 +43,9 @@ def report(cases: Sequence[EuroNcapCase], results: Sequence[CellResult]) -> Repo
         "ncap",
         "Euro NCAP car-to-car rear grid",
         (
-            f"Every run starts {RUN_UP_S:g} s before TTC {START_TTC_S:g} s with the speed held; the camera's boxes "
-            "are projected truth with a detector's errors, and in a sample of the cells (network) the embedded "
-            "network's on rendered images. AEB: a robot holds the speed and only AEB brakes. ACC: the "
+            f"Every run starts {RUN_UP_S:g} s before TTC {START_TTC_S:g} s with the speed held. The camera's boxes "
+            "are projected ground truth with a detector's errors; in a sample of the cells (network), those of the "
+            "embedded network on rendered images. AEB: a robot holds the speed and only AEB brakes. ACC: the "
             "paper's speed law alone, set to the test speed. Cells are relative impact speeds in km/h; 0 is avoided. "
             "Colours are those of Euro NCAP's protocol of 2026, whose bands depend on the test speed: green avoided, "
             "then yellow, orange, brown, red. Grey: the approach did not meet the protocol.",
@@ -103,7 +103,7 @@ def _cell(found: tuple[EuroNcapCase, CellResult] | None) -> Cell | Coloured:
 
 
 def _r152(done: dict[EuroNcapCase, CellResult]) -> Table:
-    """Standing and moving targets, full overlap, AEB alone, against the Regulation's limits."""
+    """Standing and moving targets at full overlap with AEB alone, compared with the Regulation's limits."""
     rows: list[tuple[Cell | Coloured, ...]] = []
     for test in ("CCRs", "CCRm"):
         for closing in sorted({round(case.closing_mps() / KMH) for case in done if case.test == test}):
@@ -128,8 +128,8 @@ def _passes(case: EuroNcapCase, result: CellResult, limit_kmh: float) -> Coloure
 
 
 def _verdict(done: dict[EuroNcapCase, CellResult]) -> str:
-    """AEB alone: in how many cells the impact is slower with both sensors than with the LiDAR alone, and in how many
-    faster."""
+    """A sentence for AEB alone: in how many cells the impact is slower with both sensors than with the LiDAR alone, and
+    in how many it is faster."""
     pairs = [
         (result, done[other])
         for case, result in done.items()

@@ -14,15 +14,16 @@ BANDS: tuple[tuple[float, tuple[tuple[float, Tone], ...]], ...] = (
     (30.0, ((10.0, "brown"),)),
     (0.0, ()),
 )
-"""From each ego speed on, km/h: the relative impact speeds, km/h, below which each colour applies. Green is an avoided
-impact, red is everything else. The protocol tests every 10 km/h; in between, the bands of the lower speed apply."""
+"""For each ego speed and above, in km/h: the relative impact speeds, in km/h, below which each colour applies. Green is
+an avoided collision, red is everything else. The protocol tests every 10 km/h; in between, the bands of the lower speed
+apply."""
 R152_LIMITS: tuple[tuple[float, float], ...] = ((42.0, 0.0), (45.0, 15.0), (50.0, 25.0), (55.0, 30.0), (60.0, 35.0))
-"""UN R152, 5.2.1.4, category M1 unladen: for relative speeds up to the first number, km/h, the impact may be no faster
-than the second."""
+"""UN R152, 5.2.1.4, category M1 unladen: for relative speeds up to the first number, the impact speed may not exceed
+the second; both in km/h."""
 
 
 def impact_tone(speed_kmh: float, impact_kmh: float) -> Tone:
-    """Euro NCAP's colour of a relative impact speed at this ego speed; 0 is an avoided impact."""
+    """Euro NCAP's colour for a relative impact speed at this ego speed; 0 is an avoided collision."""
     if impact_kmh <= 0.0:
         return "green"
     bands = next(bands for from_kmh, bands in BANDS if speed_kmh >= from_kmh)

@@ -34,13 +34,13 @@ class FollowingCase:
     """One drive of one test."""
 
     test: IsoTest
-    """Which of the standard's situations."""
+    """Test of the standard."""
     value: float
     """Radius in metres (curve), or speed in km/h (all others)."""
     sensors: Sensors
-    """That the pipeline is given."""
+    """Sensors that the pipeline gets."""
     seed: int
-    """Of noise and scenery."""
+    """Seed of noise and scenery."""
 
     @property
     def at(self) -> str:
@@ -48,30 +48,30 @@ class FollowingCase:
 
     @property
     def name(self) -> str:
-        """As part of a file name."""
+        """Name for use in file names."""
         return f"iso_{self.test}_{self.value:g}_{SENSORS[self.sensors]}_{self.seed}".lower()
 
 
 @dataclass(frozen=True)
 class FollowingOutcome:
-    """What one drive came to. Tuples have a value for each tick."""
+    """Outcome of one drive. Tuples have a value for each tick."""
 
     acquired_m: float | None
-    """Range when the lead first was the CIPV; None if never."""
+    """Distance at which the lead first was the CIPV; None if never."""
     kept: float
-    """Share of the frames from then on in which it still was."""
+    """Share of the frames from then on in which it was the CIPV."""
     smallest_gap_m: float
-    """Range to the lead."""
+    """Smallest distance to the lead."""
     smallest_time_gap_s: float | None
-    """Gap over ego speed while driving; None when it never drove."""
+    """Smallest ratio of gap to ego speed while driving; None if the car never drove."""
     touched: bool
     """Whether there was contact."""
     t_s: tuple[float, ...]
-    """Since the scenario's start."""
+    """Seconds since the start of the scenario."""
     range_m: tuple[float, ...]
-    """To the lead."""
+    """Distance to the lead."""
     speed_mps: tuple[float, ...]
-    """Of the ego vehicle."""
+    """Speed of the ego vehicle."""
     motions: tuple[Motion, ...] = ()
     """Of the ego vehicle."""
 
@@ -184,9 +184,9 @@ def report(cases: Sequence[FollowingCase], outcomes: Sequence[FollowingOutcome])
         "iso",
         "ACC, modelled on ISO 15622",
         (
-            f"ACC alone, braking at {ACC_BRAKE_MPS2:g} m/s² at most. Acquisition: the mean range at which the lead "
-            "first becomes the CIPV. Kept: share of the later frames in which it still is. Passed: no contact, kept in "
-            f"{100 * _KEPT:.0f} % of the frames, time gap never under {SMALLEST_TIME_GAP_S} s. Curves are driven at "
+            f"ACC alone, braking at {ACC_BRAKE_MPS2:g} m/s² at most. Acquired: the mean distance at which the lead "
+            "first becomes the CIPV. Kept: share of the later frames in which it is the CIPV. Passed: no contact, kept "
+            f"in {100 * _KEPT:.0f} % of the frames, time gap never under {SMALLEST_TIME_GAP_S} s. Curves are driven at "
             f"{CURVE_LATERAL_MPS2:g} m/s² of lateral acceleration, and kept counts from where the radius is constant, "
             "as in the standard: in the transition before it, the current yaw rate bends the path too little.",
             GIVEN_SAID,

@@ -13,13 +13,14 @@ LEAD_BRAKE_MPS2 = 2.5
 RADII_M = (500.0, 250.0, 125.0)
 CURVE_LATERAL_MPS2 = 2.0
 BEND_FROM_M = 210.0
-"""From here on a curve's radius is constant."""
+"""Beyond this, the radius of a curve is constant."""
 _TRANSITION_M = 30.0
 _LANE_WIDTH_M = 3.5
 
 
 def scenario(test: IsoTest, value: float, seed: int) -> Scenario:
-    """value: radius, m (curve), or speed, km/h (all others). The lead is ``TARGET``."""
+    """The scenario of one test. value: radius in metres (curve), or speed in km/h (all others). The lead is
+    ``TARGET``."""
     speed = sqrt(CURVE_LATERAL_MPS2 * value) if test == "curve" else value / 3.6
     leads, duration_s = _traffic(test, speed)
     bend = [
@@ -44,8 +45,8 @@ def scenario(test: IsoTest, value: float, seed: int) -> Scenario:
 
 
 def _traffic(test: IsoTest, speed_mps: float) -> tuple[list[dict[str, Any]], float]:
-    """The vehicles, the lead first, and how long the drive lasts, s. A lead at the ego car's speed starts at the
-    distance ACC would keep: 5 m and 1.8 s ahead (``acc.min_gap_m``, ``acc.time_gap_s``)."""
+    """The vehicles, the lead first, and the length of the drive in seconds. A lead at the ego vehicle's speed starts at
+    the distance that ACC keeps: 5 m and 1.8 s ahead (``acc.min_gap_m``, ``acc.time_gap_s``)."""
     steady, gap_m = {0.0: speed_mps}, 5.0 + 1.8 * speed_mps
     match test:
         case "acquisition":

@@ -49,11 +49,11 @@ class BevCase:
     layout: str
     """a, b or c."""
     seed: int
-    """Of noise and scenery."""
+    """Seed of noise and scenery."""
     sensors: Sensors = "both"
-    """That the pipeline is given."""
+    """Sensors that the pipeline gets."""
     boxes: Boxes = "truth"
-    """Where the camera's boxes come from."""
+    """Source of the camera's boxes."""
 
     @property
     def kind(self) -> BevVariant:
@@ -69,27 +69,28 @@ class PositionSample:
     """The target in one frame."""
 
     range_m: float
-    """True."""
+    """True distance."""
     error: PositionError | None
-    """Of its estimated place; None when no object matches it."""
+    """Error of its estimated position; None if no object matches it."""
 
 
 @dataclass(frozen=True)
 class PositionError:
-    """Estimated minus true, of the nearest face's middle."""
+    """Estimated minus true position of the middle of the nearest face."""
 
     source: str
     """The object's sensors."""
     distance_m: float
-    """Of the range."""
+    """Error of the distance."""
     lateral_m: float
-    """Across the ego axis."""
+    """Error across the ego axis."""
     longitudinal_m: float
-    """Along the ego axis."""
+    """Error along the ego axis."""
 
 
 def cases(short: bool) -> list[BevCase]:
-    """The network runs in one layout only: rendering an image takes ten times as long as everything else."""
+    """All cases. The network runs in one layout only, since rendering an image takes ten times as long as everything
+    else."""
     given = [BevCase(each.layout, each.seed, sensors) for sensors in COMPARED for each in layouts.cases(short)]
     return given if short else given + [BevCase("a", seed, boxes="network") for seed in range(_BY_NETWORK)]
 
@@ -107,7 +108,7 @@ def as_drive(case: BevCase, seen: list[PositionSample]) -> ExperimentDrive:
     return ExperimentDrive(
         f"bev_error_{case.layout}_{case.sensors}_{case.boxes}_{case.seed}",
         f"Position of fused objects: {LAYOUTS[case.layout]}, {who}, run {case.seed}",
-        (f"Placed in {len(errors)} of {len(seen)} frames, {far_m:.1f} m off in range at most.",),
+        (f"Located in {len(errors)} of {len(seen)} frames; largest distance error {far_m:.1f} m.",),
         _scenario(case),
         _PARAMS,
         case.sensors,
@@ -121,8 +122,8 @@ def _scenario(case: BevCase) -> Scenario:
 
 
 def sighting(tick: LoopStep) -> PositionSample | None:
-    """The errors of the object that matches the target: the one whose image box overlaps the target's most, whatever
-    its distance. Carried objects do not count. None beyond 60 m and beside the car."""
+    """The errors of the object whose image box overlaps the target's most, whatever its distance. Carried objects do
+    not count. None beyond 60 m and beside the car."""
     target, camera = target_of(tick), tick.frame.camera
     assert camera is not None
     truth_m = true_range_m(target)
@@ -163,15 +164,15 @@ def report(cases: Sequence[BevCase], runs: Sequence[list[PositionSample]]) -> Re
         "bev_error",
         "Position of fused objects (Table 4)",
         (
-            "Measured over all ranges up to 60 m. VL is the position by the LiDAR, so it exists within the LiDAR's "
-            "range. V is the position by the camera, mostly beyond that; its error is what a few pixels of box height "
-            "amount to at that range. The published vision rows equal the error of rounding to whole metres and are "
-            "not measurements of a camera.",
-            "The camera's boxes are given: projected truth with assumed errors, near those measured of the embedded "
-            'detector. Rows with "network": the embedded network looked at drawn images of the first '
-            f"{_BY_NETWORK} runs. The object that overlaps the car most in the image is compared with it (IoU over "
-            f'{_SAME_IOU:g}), however wrong its position. "Without" counts the frames without such an object; they '
-            "have no error.",
+            "Measured at all distances up to 60 m. VL is the position measured by the LiDAR, so it exists only in "
+            "the LiDAR's range. V is the position measured by the camera, mostly beyond that; its error corresponds to "
+            "a few pixels of box height at that distance. The published vision rows equal the error of rounding to "
+            "whole metres and are not measurements of a camera.",
+            "The camera's boxes are given: projected ground truth with assumed errors close to those measured for the "
+            'embedded detector. Rows with "network": the embedded network processed rendered images of the first '
+            f"{_BY_NETWORK} runs. The car is compared with the object that overlaps it most in the image (IoU over "
+            f'{_SAME_IOU:g}), however wrong its position. "Without" counts frames without such an object, which have '
+            "no error.",
             "Lateral and longitudinal errors are of the middle of the nearest face. The LiDAR sees a car in another "
             "lane from its corner, so a box fitted to few points may be skewed.",
             *(_verdict(layout, by_kind) for layout in LAYOUTS),
@@ -183,12 +184,12 @@ def report(cases: Sequence[BevCase], runs: Sequence[list[PositionSample]]) -> Re
 
 
 def _verdict(layout: str, by_kind: dict[BevVariant, list[PositionSample]]) -> str:
-    """Both sensors compared with the LiDAR alone in the same runs: how often each places the car, and the range error
-    where both do."""
+    """A sentence that compares both sensors with the LiDAR alone in the same runs: how often each locates the car, and
+    the distance error if both do."""
     title = LAYOUTS[layout].capitalize()
     fused, lidar = (by_kind.get((layout, sensors, "truth"), []) for sensors in ("both", "lidar"))
     if not fused or not lidar:
-        return f"{title}: not driven with both sensor sets."
+        return f"{title}: not driven with both sets of sensors."
     both = [
         (abs(ours.error.distance_m), abs(theirs.error.distance_m))
         for ours, theirs in zip(fused, lidar, strict=True)
@@ -196,14 +197,14 @@ def _verdict(layout: str, by_kind: dict[BevVariant, list[PositionSample]]) -> st
     ]
     placed, alone = (sum(each.error is not None for each in seen) for seen in (fused, lidar))
     verdict = (
-        f"{title}: fused places the car in {placed} of {len(fused)} frames, {_better(placed, alone)} the LiDAR alone, "
-        f"which does in {alone}."
+        f"{title}: fused locates the car in {placed} of {len(fused)} frames, {_better(placed, alone)} the LiDAR alone "
+        f"with {alone} frames."
     )
     if not both:
         return verdict
     ours_m, theirs_m = (mean(pair[n] for pair in both) for n in (0, 1))
     return (
-        f"{verdict} In the {len(both)} frames in which both do, fused is {ours_m:.3f} m off in range on average, "
+        f"{verdict} In the {len(both)} frames in which both do, the mean distance error of fused is {ours_m:.3f} m, "
         f"{_better(theirs_m, ours_m)} the LiDAR alone with {theirs_m:.3f} m."
     )
 

@@ -35,15 +35,15 @@ class BrakingCase:
     """One manoeuvre, driven once."""
 
     manoeuvre: Manoeuvre
-    """Which of the paper's three."""
+    """One of the paper's three manoeuvres."""
     sensors: Sensors
-    """That the pipeline is given."""
+    """Sensors that the pipeline gets."""
     controller: str
     """``ACC`` or ``ACC + AEB``."""
     seed: int
-    """Of noise and scenery."""
+    """Seed of noise and scenery."""
     boxes: Boxes = "truth"
-    """Where the camera's boxes come from."""
+    """Source of the camera's boxes."""
 
     @property
     def key(self) -> BrakingKey:
@@ -52,7 +52,7 @@ class BrakingCase:
 
     @property
     def name(self) -> str:
-        """As part of a file name."""
+        """Name for use in file names."""
         controller = self.controller.replace(" + ", "+")
         return f"{self.manoeuvre}_{SENSORS[self.sensors]}_{controller}_{self.boxes}_{self.seed}".lower()
 
@@ -72,7 +72,7 @@ def cases(short: bool) -> list[BrakingCase]:
 
 
 def run(case: BrakingCase) -> DriveRecord:
-    """One manoeuvre, driven."""
+    """Drive one manoeuvre."""
     setup = Setup(_params(case), case.sensors, eyes_for(case.boxes))
     return approach(_scenario(case), setup, stop_when_over=case.manoeuvre != "CCRm")
 
@@ -108,7 +108,7 @@ def _label(case: BrakingCase) -> str:
 
 
 def _target(manoeuvre: Manoeuvre, speed_mps: float) -> tuple[dict[str, object], float]:
-    """The target and how long the drive lasts."""
+    """The target, and the length of the drive in seconds."""
     if manoeuvre == "CCRs":
         return {"ahead_m": 120.0, "speed_mps": {0.0: 0.0}, "colour": "#a3202a"}, 15.0
     if manoeuvre == "CCRm":

@@ -36,8 +36,8 @@ _MARGIN_M = 12.0
 ChoiceKey = tuple[str, Sensors]
 ChoiceVerdict = Literal["correct", "none", "missed", "false", "wrong", "edge", "hidden", "new"]
 UNDECIDABLE = ("edge", "hidden", "new")
-"""edge: either answer is right · hidden: a nearer vehicle covers the lead · new: the lead came into sight, or the drive
-began, too recently for confirmation."""
+"""edge: either answer is correct · hidden: a nearer vehicle hides the lead · new: the lead came into sight, or the
+drive began, too recently for confirmation."""
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,15 @@ class ChoiceCase:
     """One scene, driven once."""
 
     scene: str
-    """Which of the paper's four."""
+    """One of the paper's four scenes."""
     sensors: Sensors
-    """That the pipeline is given."""
+    """Sensors that the pipeline gets."""
     seed: int
-    """Of noise and scenery."""
+    """Seed of noise and scenery."""
 
     @property
     def name(self) -> str:
-        """As part of a file name."""
+        """Name for use in file names."""
         return f"choosing_{self.scene}_{SENSORS[self.sensors]}_{self.seed}".lower()
 
 
@@ -62,17 +62,17 @@ class ChoiceFrame:
     """One frame's verdict."""
 
     t_s: float
-    """Since the scenario's start."""
+    """Seconds since the start of the scenario."""
     verdict: ChoiceVerdict
-    """On the CIPV."""
+    """Whether the CIPV was correct."""
     lead: int | None
-    """The true lead's id; None where there is none."""
+    """Id of the true lead; None without one."""
     lead_m: float | None
-    """Its true range."""
+    """Its true distance."""
     chosen: int | None
-    """The CIPV's id; None where there is none."""
+    """Id of the CIPV; None without one."""
     chosen_m: float | None
-    """Its estimated range."""
+    """Its estimated distance."""
 
 
 def cases(short: bool) -> list[ChoiceCase]:
@@ -115,7 +115,7 @@ def as_drive(case: ChoiceCase, frames: list[ChoiceFrame]) -> ExperimentDrive:
 
 
 def judge(way: ScriptedWay, tick: LoopStep, in_sight: InSight) -> ChoiceFrame:
-    """The frame's CIPV compared with the vehicle that the car will really meet first."""
+    """Compare the frame's CIPV with the vehicle that the car will really meet first."""
     lead, doubtful = true_lead(tick.world, way.ahead(tick.world))
     chosen = tick.result.chosen()
     if chosen is not None and (chosen.distance_m or 0.0) > MAX_M:
@@ -145,7 +145,7 @@ def judge(way: ScriptedWay, tick: LoopStep, in_sight: InSight) -> ChoiceFrame:
 
 
 def acquired_m(frames: Sequence[ChoiceFrame]) -> list[float]:
-    """For each true lead, its range in the first frame in which it was correctly chosen."""
+    """For each true lead, its distance in the first frame in which it was correctly chosen."""
     first: dict[int, float] = {}
     for frame in frames:
         if frame.verdict == "correct" and frame.lead is not None and frame.lead_m is not None:
@@ -247,7 +247,7 @@ def _verdict(scene: str, groups: dict[ChoiceKey, list[list[ChoiceFrame]]]) -> st
 
 
 def _chart(scene: str, groups: dict[ChoiceKey, list[list[ChoiceFrame]]]) -> Chart:
-    """The first run: the true lead's range and what each set of sensors chose."""
+    """Chart of the first run: the true lead's distance, and what each set of sensors chose."""
     first = {sensors: runs[0] for (name, sensors), runs in groups.items() if name == scene and runs}
     truth = [(frame.t_s, frame.lead_m) for frame in next(iter(first.values()), []) if frame.lead_m is not None]
     seen = (

@@ -15,12 +15,12 @@ LEAD_DECEL_MPS2 = 6.0
 
 @dataclass(frozen=True)
 class Printed:
-    """A manoeuvre as the paper computes it."""
+    """A manoeuvre as computed in the paper."""
 
     speed_kmh: float
-    """Before."""
+    """Speed before braking."""
     end_kmh: float
-    """After."""
+    """Speed after braking."""
     keep_m: float
     """The gap that remains."""
     lidar_m: float

@@ -32,14 +32,14 @@ _BINS_M = (5.0, 15.0, 25.0, 35.0, 45.0, 55.0, 65.0, 75.0)
 
 @dataclass(frozen=True)
 class Sample:
-    """One box with its truth."""
+    """One box with its ground truth."""
 
     height_px: float
-    """As the reference camera would see it."""
+    """Box height as seen by the reference camera."""
     depth_m: float
-    """True, along the optical axis."""
+    """True distance along the optical axis."""
     range_m: float
-    """True."""
+    """True distance."""
 
 
 def run(case: LayoutCase) -> list[Sample]:

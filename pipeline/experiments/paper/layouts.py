@@ -29,7 +29,7 @@ class LayoutCase:
     layout: str
     """a, b or c."""
     seed: int
-    """Of noise and scenery."""
+    """Seed of noise and scenery."""
 
 
 def cases(short: bool) -> list[LayoutCase]:
@@ -43,7 +43,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def scenario(case: LayoutCase) -> Scenario:
-    """Cars are 1.48 m tall give or take 4 cm, as one class of cars is."""
+    """The scenario of one drive. Cars are 1.48 ± 0.04 m tall, as within one class of cars."""
     rng = np.random.default_rng([case.seed, list(LAYOUTS).index(case.layout)])
     size = (float(rng.normal(4.5, 0.15)), float(rng.normal(1.82, 0.03)), float(rng.normal(1.48, 0.04)))
     target = {

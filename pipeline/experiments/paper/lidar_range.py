@@ -16,7 +16,7 @@ from pipeline.simulation.closed_loop import LoopStep, Setup, drive
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.world.actors import VehicleKind
 
-PRINTED = {"mean error %": 2.14, "largest error m": 0.47, "recognised to m": 35.0}
+PRINTED = {"mean error %": 2.14, "largest error m": 0.47, "recognised up to m": 35.0}
 _SPEED_MPS = 10.0
 _FROM_M, _TO_M = 100.0, 4.0
 _PARAMS = parameters("ACC", _SPEED_MPS)
@@ -32,9 +32,9 @@ class RangeCase:
     """One approach to a standing vehicle."""
 
     kind: VehicleKind
-    """What stands there: larger vehicles are detected farther away."""
+    """Kind of the standing vehicle; larger ones are detected farther away."""
     seed: int
-    """Of noise and scenery."""
+    """Seed of noise and scenery."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class RangeSample:
     """One tick."""
 
     true_m: float
-    """Range of the car."""
+    """True distance of the car."""
     measured_m: float | None
-    """None when the car was not detected in this sweep."""
+    """Measured distance; None if the car was not detected in this sweep."""
 
 
 def cases(short: bool) -> list[RangeCase]:
@@ -75,17 +75,17 @@ def as_drive(case: RangeCase, seen: list[RangeSample]) -> ExperimentDrive:
     return ExperimentDrive(
         f"ranging_{case.kind}_{case.seed}",
         f"LiDAR range check: {case.kind}, run {case.seed}",
-        (f"{len(errors)} of {len(seen)} sweeps contain it{largest}.",),
+        (f"Detected in {len(errors)} of {len(seen)} sweeps{largest}.",),
         _scenario(case),
         _PARAMS,
         "lidar",
-        (Chart("Error of the range", "true range m", "error m", (_errors(case.kind, seen),)),),
+        (Chart("Distance error", "true range m", "error m", (_errors(case.kind, seen),)),),
     )
 
 
 def _measured_m(tick: LoopStep) -> float | None:
-    """The range of the nearest object in the car's lane, where nothing else stands, whatever its error; carried objects
-    do not count."""
+    """Distance of the nearest object in the car's lane, whatever its error, since nothing else stands there. Carried
+    objects do not count."""
     ahead = [
         item.distance_m
         for item in tick.result.objects
@@ -98,7 +98,8 @@ def _measured_m(tick: LoopStep) -> float | None:
 
 
 def recognised_to_m(sightings: Sequence[RangeSample]) -> float | None:
-    """The far edge of the last 5 m bin, coming from near, in which at least half of the sweeps hold the car."""
+    """The far edge of the last 5 m bin, from near to far, in which the car is detected in at least half of the
+    sweeps."""
     reached = None
     edge = _BIN_M
     while edge < _FROM_M:
@@ -120,22 +121,22 @@ def report(cases: Sequence[RangeCase], runs: Sequence[list[RangeSample]]) -> Rep
         "ranging",
         "LiDAR range check",
         (
-            "A standing vehicle from 100 m to 4 m, one LiDAR, no camera. Recognised: at least half of the sweeps in a "
-            "5 m bin hold it, and so do all nearer bins. Errors are over all sweeps that hold it, of the nearest "
-            "object in its lane, however far off.",
-            "No comparison with both sensors: there is no camera here. Within this reach a fused distance is "
-            "the LiDAR's; what the camera adds beyond it is in the experiments that follow.",
+            "A standing vehicle from 100 m to 4 m, one LiDAR, no camera. Recognised up to: in this 5 m bin and in all "
+            "nearer ones, the vehicle is detected in at least half of the sweeps. Errors are those of the nearest "
+            "object in its lane, however large, in all sweeps with a detection.",
+            "No comparison with both sensors, since there is no camera here. Within this range, a fused distance is "
+            "that of the LiDAR; the following experiments show what the camera adds beyond it.",
         ),
         (Table("Range and error", _COLUMNS, (_PRINTED_ROW, *(_row(kind, seen) for kind, seen in by_kind.items()))),),
         (
             Chart(
-                "Share of sweeps with the vehicle",
+                "Share of sweeps in which the vehicle is detected",
                 "true range m",
                 "share",
                 tuple(_rate(kind, seen) for kind, seen in by_kind.items()),
             ),
             Chart(
-                "Error of the range",
+                "Distance error",
                 "true range m",
                 "error m",
                 tuple(_errors(kind, seen) for kind, seen in by_kind.items()),
@@ -145,13 +146,13 @@ def report(cases: Sequence[RangeCase], runs: Sequence[list[RangeSample]]) -> Rep
     )
 
 
-_COLUMNS = ("target", "mean error %", "mean error m", "largest error m", "recognised to m", "first seen at m")
+_COLUMNS = ("target", "mean error %", "mean error m", "largest error m", "recognised up to m", "first seen at m")
 _PRINTED_ROW = (
     "car (paper)",
     PRINTED["mean error %"],
     None,
     PRINTED["largest error m"],
-    PRINTED["recognised to m"],
+    PRINTED["recognised up to m"],
     None,
 )
 

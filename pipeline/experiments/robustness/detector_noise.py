@@ -15,12 +15,12 @@ from pipeline.simulation.sensors.measured_noise import SHARES, FalseBoxes, Measu
 from pipeline.types import F64, Box, Detection
 
 DOUBLE = 0.25
-"""Overlap from which a second box is of the same vehicle."""
+"""Overlap above which a second box belongs to the same vehicle."""
 RANGES_M = (0.0, 15.0, 25.0, 35.0, 45.0, 60.0, 80.0)
 VISIBLE = (1.0, 0.8, 0.4, 0.1)
 _LARGE = ("truck", "bus")
 _STEP_S = 0.15
-"""Frames that follow each other faster than this show what lasts from frame to frame."""
+"""Only frames at most this far apart show which errors persist from frame to frame."""
 
 
 @dataclass
@@ -32,40 +32,40 @@ class JudgedVehicle:
     frame: int
     """Index in the recording."""
     t_s: float
-    """Of the frame."""
+    """Time of the frame."""
     track: int | None
-    """Identity over frames; None where labels have none."""
+    """Id of the track; None if the labels have no ids."""
     label: str
-    """Of the truth."""
+    """True class."""
     range_m: float
-    """To its nearest face."""
+    """Distance of its nearest face."""
     visible: float
-    """Share of it that nothing hides, 0–1."""
+    """Visible share, 0–1."""
     found: Detection | None
-    """The box that was found for it; None when it was missed."""
+    """The box that was found for it; None if it was missed."""
     offs: F64 | None
-    """(4,) error of each edge as a share of the height; None when it was missed."""
+    """(4,) error of each edge as a share of the height; None if it was missed."""
     height_px: float
-    """Of its true box."""
+    """Height of its true box."""
     doubled: bool
     """Whether a second box was found for it."""
 
 
 @dataclass
 class Counted:
-    """All that was seen, and each frame's false boxes: (recording, t_s, box at 907 px, bearing, score)."""
+    """All labelled vehicles and false boxes: (recording, t_s, box at 907 px, bearing, score)."""
 
     seen: list[JudgedVehicle] = field(default_factory=list)
     """Every labelled vehicle in every frame."""
     false: list[tuple[int, float, Box, float, float]] = field(default_factory=list)
     """(recording, t_s, box at 907 px, bearing, score) of each false box."""
     frames: int = 0
-    """Number of labelled ones."""
+    """Number of labelled frames."""
 
 
 def summed_up(counted: Counted, measured_on: Sequence[str]) -> MeasuredNoise:
-    """The model's numbers. Of edges, what is the same in all boxes (a cuboid's projection is larger than its image)
-    is taken off first."""
+    """The numbers of the noise model. The mean error of each edge is subtracted first: it only says that a cuboid's
+    projection is larger than the vehicle's image."""
     bins = [_between(counted.seen, low, high) for low, high in pairwise(RANGES_M)]
     found = tuple(
         tuple(_share_found([s for s in each if low < s.visible <= high]) for each in bins)
@@ -99,19 +99,21 @@ def _between(seen: Sequence[JudgedVehicle], low: float, high: float) -> list[Jud
 
 
 def _share_found(seen: Sequence[JudgedVehicle]) -> float:
-    """With half a vehicle found and half a vehicle missed added, so that no share is 0 or 1 by chance (Jeffreys)."""
+    """Share of vehicles found, with half a vehicle added to those found and to those missed, so that it is not 0 or 1
+    by chance (Jeffreys)."""
     return round((sum(each.found is not None for each in seen) + 0.5) / (len(seen) + 1.0), 3)
 
 
 def _spread(values: F64) -> F64:
-    """Standard deviation of each column, by the quartiles: a few boxes that took in two vehicles do not count."""
+    """Standard deviation of each column, estimated from the quartiles, so that a few boxes around two vehicles have no
+    effect."""
     low, high = np.percentile(values, [25, 75], axis=0)
     spread: F64 = (high - low) / 1.349
     return spread
 
 
 def _followed(seen: Sequence[JudgedVehicle]) -> Iterator[tuple[JudgedVehicle, JudgedVehicle]]:
-    """The same vehicle in two frames that follow each other."""
+    """Yield the same vehicle in two consecutive frames."""
     by_key = {(each.recording, each.track, each.frame): each for each in seen if each.track is not None}
     for (recording, track, frame), now in by_key.items():
         after = by_key.get((recording, track, frame + 1))
@@ -125,7 +127,7 @@ def _white(seen: Sequence[JudgedVehicle]) -> F64:
 
 
 def _white_px(seen: Sequence[JudgedVehicle]) -> float:
-    """Of the vehicles that are lowest in the image, where pixels count and not shares."""
+    """White noise in pixels, of the vehicles with the smallest boxes, for which pixels matter instead of shares."""
     low = sorted(_followed(seen), key=lambda pair: pair[0].height_px)
     low = low[: max(len(low) // 3, 1)]
     steps = [(b.offs - a.offs) * a.height_px for a, b in low if a.offs is not None and b.offs is not None]
@@ -133,7 +135,7 @@ def _white_px(seen: Sequence[JudgedVehicle]) -> float:
 
 
 def _missed_again(seen: Sequence[JudgedVehicle]) -> float:
-    """Correlation of being missed in two frames that follow each other, of all vehicles that are partly in sight."""
+    """Correlation of being missed in two consecutive frames, over all vehicles that are partly visible."""
     pairs = [(a.found is None, b.found is None) for a, b in _followed(seen) if a.visible > VISIBLE[2]]
     return round(float(np.clip(np.corrcoef(np.array(pairs, dtype=float).T)[0, 1], 0.0, 0.98)), 3)
 

@@ -37,6 +37,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     },
     "standing like driving vehicles": {"cipv.become_standing": 0.0},
     "oncoming like other vehicles": {"cipv.become_oncoming": 0.0},
+    "crossing like other vehicles": {"cipv.use_crossing": False},
     "wide clusters not split": {"cluster.divide_m": 3.0},
     "clusters of two tracks not split": {"cluster.divide_tracked": False},
     "ACC acts on one frame": {"acc.confirm_frames": 1},
@@ -53,14 +54,15 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "boxes change clusters freely": {"fusion.keep_partners": False},
     "AEB acts on one frame": {"aeb.confirm_frames": 1},
 }
-"""Each rule against false leads, switched off by its parameter."""
+"""The parameter that switches off each rule against false leads."""
 ALLOWED: Mapping[Kind, float] = {
     "phantom full braking": 0.0,
     "phantom partial braking": 1.0,
     "lead missed": 2.0,
     "lead late": 2.0,
 }
-"""Per 1,000 km. A demand fails when the lower bound is above it: a short run cannot tell a few from none."""
+"""Permitted failures per 1,000 km. A requirement fails if the lower bound exceeds this, since a short run cannot
+distinguish a few failures from none."""
 _SHORT_KM = 2
 _CONFIDENCE = 0.95
 _WORST = 40
@@ -68,30 +70,30 @@ _WORST = 40
 
 @dataclass(frozen=True)
 class Kilometre:
-    """One case."""
+    """One case: a kilometre of random traffic."""
 
     seed: int
-    """Of the suite."""
+    """Seed of the suite."""
     number: int
-    """Of the kilometre; with the seed it decides road and traffic."""
+    """Number of the kilometre; together with the seed, it determines road and traffic."""
     variants: tuple[str, ...] = (AS_IS,)
-    """Names of what is driven on the same frames."""
+    """Names of the variants that run on the same frames."""
 
 
 @dataclass(frozen=True)
 class DriveOutcome:
-    """What one drive came to."""
+    """Outcome of one drive."""
 
     km: float
-    """Driven by the ego vehicle."""
+    """Distance driven by the ego vehicle."""
     seconds: float
-    """Of driving."""
+    """Duration of the drive."""
     failures: Mapping[str, tuple[Failure, ...]]
-    """By variant."""
+    """Failures by variant."""
 
 
 def run(case: Kilometre) -> DriveOutcome:
-    """One drive with each variant, on the same frames."""
+    """Run each variant on the same frames of one drive."""
     warm_up()
     scene = traffic.scenario(case.seed, case.number)
     params = [with_changes(Params(), VARIANTS[name]) for name in case.variants]
@@ -108,7 +110,7 @@ def run(case: Kilometre) -> DriveOutcome:
 
 
 def suite(km: int, seed: int = 0, ablation: bool = False) -> Experiment[Kilometre, DriveOutcome]:
-    """So many kilometres; with ``ablation`` each rule is switched off in turn as well."""
+    """The suite with ``km`` kilometres; with ``ablation``, each rule is also switched off in turn."""
     return Experiment(
         "robustness", "robustness", "Robustness", partial(_cases, km, seed, ablation), run, report, as_drive
     )
@@ -120,7 +122,7 @@ def _cases(km: int, seed: int, ablation: bool, short: bool) -> list[Kilometre]:
 
 
 def as_drive(case: Kilometre, outcome: DriveOutcome) -> ExperimentDrive | None:
-    """A drive in which something failed."""
+    """The drive, if something failed in it; otherwise None."""
     failures = outcome.failures[AS_IS]
     if not failures:
         return None
@@ -195,14 +197,15 @@ def _counts(outcomes: Sequence[DriveOutcome], variant: str) -> Counter[str]:
 
 
 def _rate(count: int, km: float) -> tuple[float, float, float]:
-    """Per 1,000 km, with its bounds."""
+    """The rate per 1,000 km, with its lower and upper bound."""
     low, high = poisson_bounds(count)
     return tuple(1000.0 * each / max(km, 1e-9) for each in (count, low, high))  # type: ignore[return-value]
 
 
 def poisson_bounds(count: int, confidence: float = _CONFIDENCE) -> tuple[float, float]:
-    """Within which the mean of a Poisson variable lies that was ``count`` once (Garwood 1936, exact)."""
-    from scipy.stats import chi2  # half a second to import: only reports need it
+    """Exact confidence interval of the mean of a Poisson variable that was observed once as ``count`` (Garwood
+    1936)."""
+    from scipy.stats import chi2  # takes half a second to import; only reports need it
 
     tail = (1.0 - confidence) / 2.0
     low = float(chi2.ppf(tail, 2 * count)) / 2.0 if count else 0.0
@@ -235,7 +238,7 @@ def _by_layout(cases: Sequence[Kilometre], outcomes: Sequence[DriveOutcome]) -> 
 
 
 def _where(cases: Sequence[Kilometre], outcomes: Sequence[DriveOutcome]) -> Iterator[tuple[AnyCell, ...]]:
-    """The worst failures first; switches are not listed."""
+    """Rows of failures, the worst first. Switches of the lead are not listed."""
     found = [
         (KINDS.index(each.kind), -each.lasts_s, case.number, case, each)
         for case, outcome in zip(cases, outcomes, strict=True)

@@ -16,20 +16,21 @@ _HARDEST_MPS2 = 6.0
 
 @dataclass(frozen=True)
 class Drive:
-    """How one car drives, every ``STEP_S``. Between two steps the speed is linear, as a script's is."""
+    """The motion of one car in steps of ``STEP_S``. Speed is linear between two steps, as in a script."""
 
     speeds_mps: F64
-    """(N,) at each step."""
+    """(N,) speed at each step."""
     rear_m: F64
-    """(N,) of its rear, from where the ego vehicle's bumper starts."""
+    """(N,) position of its rear, relative to the initial position of the ego vehicle's bumper."""
 
     def script(self) -> dict[float, float]:
-        """``speed_mps`` of a scenario file."""
+        """The speed as ``speed_mps`` of a scenario file: seconds → m/s."""
         return {round(n * STEP_S, 3): round(float(v), 3) for n, v in enumerate(self.speeds_mps)}
 
 
 def wandering(rng: np.random.Generator, steps: int, usual_mps: float, rear_m: float, stops: bool) -> Drive:
-    """A car that nobody holds up: its wish changes every few seconds, now and then it stops for a while."""
+    """A car with a free road ahead: its desired speed changes every few seconds, and occasionally it stops for a
+    while."""
     wishes, wish, left = [], usual_mps, 0
     for _ in range(steps):
         if left <= 0:
@@ -53,7 +54,8 @@ def steady(steps: int, speed_mps: float, rear_m: float) -> Drive:
 def following(
     ahead: list[tuple[int, int, Drive]], steps: int, usual_mps: float, start_mps: float, front_m: float
 ) -> F64:
-    """Speeds of a car whose bumper starts at ``front_m``. ahead: those in its lane, each from one step to another."""
+    """Speeds of a car whose bumper starts at ``front_m``. ahead: the cars in its lane, each with its first and last
+    step there."""
     speeds = np.empty(steps)
     speed, place = start_mps, front_m
     for n in range(steps):
@@ -74,7 +76,7 @@ def following(
 
 
 def places_m(speeds_mps: F64, start_m: float) -> F64:
-    """Where something is at each step."""
+    """Position at each step."""
     moved = (speeds_mps[1:] + speeds_mps[:-1]) / 2.0 * STEP_S
     return start_m + np.concatenate([[0.0], np.cumsum(moved)])
 

@@ -52,30 +52,31 @@ Kind = Literal[
 ]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 MISSED_S = 0.5
-"""A lead may be missed for so long, and may take so long to be found beyond its confirmation."""
+"""Time for which a lead may be missed, and by which it may be found later than its confirmation takes."""
 _SOON_S = (0.75, 1.5, 2.25, 3.0)
 _BRAKES_MPS2, _PARTIAL_MPS2, _FULL_MPS2 = 0.5, 3.6, 5.5
 _NO_NEED_MPS2, _NO_NEED_TTC_S = 2.0, 4.0
-"""A true vehicle that needs less braking, and is farther in time, is no reason for an emergency stage."""
+"""A true vehicle does not justify an emergency stage if it requires less deceleration than this and has a longer
+TTC."""
 _JOINS_S = 0.5
-"""Two moments of one failure lie this near to each other."""
+"""Two moments of the same failure are at most this far apart."""
 _SEVERITY: tuple[Kind, ...] = ("phantom comfort braking", "phantom partial braking", "phantom full braking")
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Something that went wrong, from when to when."""
+    """A failure and its time span."""
 
     kind: Kind
-    """What went wrong."""
+    """Kind of failure."""
     cause: str
-    """In words that count alike."""
+    """Cause, as text by which failures are grouped."""
     from_s: float
-    """Since the drive's start."""
+    """Start, in seconds since the start of the drive."""
     to_s: float
-    """When it was over; the same as ``from_s`` for a moment."""
+    """End; the same as ``from_s`` for a single moment."""
     text: str
-    """What was believed, for a person."""
+    """Description of what the pipeline believed."""
 
     @property
     def lasts_s(self) -> float:
@@ -84,7 +85,7 @@ class Failure:
 
 @dataclass
 class _Reign:
-    """A true lead from when it leads."""
+    """A true lead, and since when it leads."""
 
     lead: int | None = None
     could_s: float = 0.0
@@ -96,16 +97,16 @@ class _Reign:
 
 @dataclass
 class Judge:
-    """Takes a drive's results one by one."""
+    """Judges the results of a drive one by one."""
 
     scenario: Scenario
-    """Its traffic is the truth."""
+    """The scenario, whose traffic is the ground truth."""
     step_s: float
-    """Between two results."""
+    """Time between two results."""
     failures: list[Failure] = field(default_factory=list)
-    """So far, those that are over."""
+    """Failures that have ended so far."""
     reign: _Reign = field(default_factory=_Reign)
-    """The present CIPV and since when."""
+    """The current true lead, and since when it leads."""
 
     def __post_init__(self) -> None:
         self._way = ScriptedWay.of(self.scenario)
@@ -151,7 +152,7 @@ class Judge:
         met = vehicles_at(now, where) if where is not None else []
         due = [state for state in met if _in_path(state, path)] or self._comes_in(now, met)
         if due:
-            # ACC's gap law brakes hard for a true lead that the script follows closer than the law would: no phantom
+            # not a phantom: the gap law brakes hard for a true lead if the script follows it closer than ACC would
             is_emergency = acc.state in ("partial_brake", "full_brake")
             if not is_emergency or any(self._needs_braking(now, state) for state in due):
                 return
@@ -194,14 +195,14 @@ class Judge:
             self._fail(kind, why_missed(lead, chosen), now.t_s, f"true lead {lead.actor.kind} {number}")
 
     def _is_it(self, now: World, camera: CameraCalibration | None, chosen: FusedObject, lead: ActorState) -> bool:
-        """Whether the chosen object is this vehicle, if perhaps misplaced."""
+        """Whether the chosen object is this vehicle, even if misplaced."""
         where = place(chosen)
         if where is None or same_place(where, lead):
             return where is not None
         return not vehicles_at(now, where) and vehicle_in_box(now, camera, chosen) is lead
 
     def _comes_in(self, now: World, met: Sequence[ActorState]) -> list[ActorState]:
-        """Those of these vehicles that will be in the path, or have just been."""
+        """The vehicles among ``met`` that will soon be in the path, or have just been."""
         if not met:
             return []
         wanted = {state.actor.id for state in met}
@@ -216,7 +217,7 @@ class Judge:
         return []
 
     def _needs_braking(self, now: World, state: ActorState) -> bool:
-        """Whether a true vehicle could call for an emergency stage, give or take."""
+        """Whether a true vehicle could justify an emergency stage, with a margin."""
         x, y = closest_on_polygon(state.cuboid.footprint())
         gap_m = max((x * x + y * y) ** 0.5, 0.1)
         later = world_state.at(self.scenario, now.t_s + 0.1)
@@ -231,7 +232,7 @@ class Judge:
         return needed > _NO_NEED_MPS2 or gap_m / closing < _NO_NEED_TTC_S
 
     def _fail(self, kind: Kind, cause: str, t_s: float, text: str) -> None:
-        """Add a failure, or make the one that goes on longer. A harder braking takes over a softer one's place."""
+        """Add a failure, or extend the ongoing one. Harder braking replaces softer braking."""
         for n in range(len(self.failures) - 1, -1, -1):
             last = self.failures[n]
             if t_s - last.to_s > _JOINS_S or kind == "switch":
@@ -248,7 +249,7 @@ class Judge:
 
 
 def _in_path(state: ActorState, path: Path, behind_m: float = 0.0) -> bool:
-    """Whether a vehicle is in the path, or so near to its edge that either answer is right."""
+    """Whether a vehicle is in the path, or so close to its edge that either answer is correct."""
     too_little, nearest = overlap(state, path)
     return too_little > -EDGE_M and nearest > -behind_m
 

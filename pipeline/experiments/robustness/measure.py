@@ -33,9 +33,9 @@ from pipeline.vision.nms import select
 
 _FOCAL_PX = 907.0
 _SAME, _FALSE = 0.4, 0.15
-"""Overlap from which a box is of a vehicle, and below which it is of none."""
+"""Overlap above which a box belongs to a vehicle, and below which it is false."""
 _FEWEST_PX = 10.0
-"""Lower vehicles are not asked for: labels hold cars of 5 px that no network finds."""
+"""Vehicles of smaller height are ignored: some labelled cars are 5 px high, which no network finds."""
 
 
 def truths(source: Source, labels: str) -> Iterator[tuple[TruthObject, ...] | None]:
@@ -54,7 +54,7 @@ def truths(source: Source, labels: str) -> Iterator[tuple[TruthObject, ...] | No
 
 
 def left_out(labels: str) -> dict[int, list[Box]]:
-    """By frame, the parts of the image that KITTI's labellers left out: what is there is neither true nor false."""
+    """By frame, the image regions that KITTI's labelers left out; boxes there are neither true nor false."""
     found: dict[int, list[Box]] = {}
     for line in Path(labels).read_text(encoding="utf-8").splitlines() if labels else ():
         frame, _, kind, _, _, _, x1, y1, x2, y2, *_ = line.split()
@@ -64,7 +64,7 @@ def left_out(labels: str) -> dict[int, list[Box]]:
 
 
 def _is_left_out(box: Box, parts: Sequence[Box]) -> bool:
-    """Whether half of a box lies in such a part."""
+    """Whether at least half of a box lies in such a region."""
     area = (box[2] - box[0]) * (box[3] - box[1])
     return any(
         max(min(box[2], x2) - max(box[0], x1), 0.0) * max(min(box[3], y2) - max(box[1], y1), 0.0) > area / 2
@@ -73,7 +73,7 @@ def _is_left_out(box: Box, parts: Sequence[Box]) -> bool:
 
 
 def count(recording: int, source: Source, labels: str, detector: str | None, into: Counted) -> None:
-    """Look at every labelled frame of a recording."""
+    """Process every labelled frame of a recording."""
     look, parts = detector_for(source, detector), left_out(labels)
     for index, truth in enumerate(truths(source, labels)):
         frame = source.frame(index)

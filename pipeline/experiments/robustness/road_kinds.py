@@ -9,20 +9,20 @@ import numpy as np
 
 @dataclass(frozen=True)
 class RoadKind:
-    """A kind of road. Pairs are from and to, drawn evenly."""
+    """A kind of road. Pairs are minimum and maximum of a uniform distribution."""
 
     name: str
-    """As failures are told apart by it."""
+    """Name, by which failures are grouped."""
     speed_kmh: tuple[float, float]
-    """Of the traffic."""
+    """Speed of the traffic."""
     lanes: tuple[int, int]
-    """In the ego vehicle's direction."""
+    """Number of lanes in the ego vehicle's direction."""
     lane_m: tuple[float, float]
     """Width of a lane."""
     median_m: float
-    """Between the directions."""
+    """Width of the median between the directions."""
     shoulder_m: float
-    """Beside the outermost lanes."""
+    """Width of the shoulder beside the outermost lanes."""
     sideways_mps2: tuple[float, float]
     """Lateral acceleration in its bends."""
     kinds: tuple[float, float, float, float, float]
@@ -44,30 +44,30 @@ ROAD_KINDS = (
 
 @dataclass(frozen=True)
 class DriveLayout:
-    """What a drive has, by which its failures are told apart."""
+    """Properties of a drive, by which its failures are grouped."""
 
     place: str
     """Name of the kind of road."""
     lead: bool
-    """Somebody drives ahead."""
+    """Whether there is a lead."""
     cut_in: bool
-    """Somebody cuts in."""
+    """Whether a car cuts in."""
     crossing: bool
-    """Another road crosses, with traffic."""
+    """Whether another road with traffic crosses."""
     bends: bool
-    """The road is not straight."""
+    """Whether the road has bends."""
     crests: bool
-    """The road is not level."""
+    """Whether the road has crests and dips."""
     roadworks: bool
-    """Beacons stand on the road."""
+    """Whether beacons stand on the road."""
     lanes_seen: bool
-    """Lane lines are found in the image."""
+    """Whether lane lines are detected in the image."""
     routed: bool
-    """A route is known."""
+    """Whether a route is known."""
 
 
 def layout_of(seed: int, number: int) -> tuple[RoadKind, DriveLayout, np.random.Generator]:
-    """The kind of drive that a number stands for, and the dice that are to be rolled on."""
+    """The kind of road and the properties of the drive with this number, and the random generator to continue with."""
     rng = np.random.default_rng([seed, number])
     place = ROAD_KINDS[int(rng.choice(3, p=(0.45, 0.3, 0.25)))]
     chance = rng.random(8)

@@ -17,7 +17,7 @@ from pipeline.experiments.robustness.road_kinds import DriveLayout, RoadKind, la
 from pipeline.simulation.scenario import Scenario
 
 DRIVE_M = 1000.0
-"""Of each drive."""
+"""Length of each drive."""
 _BEYOND_M, _START_M = 900.0, 100.0
 _LONGEST_S = 160.0
 _JERK_MPS3 = 0.8
@@ -27,7 +27,7 @@ _COLOURS = ("#e8e8e6", "#20252c", "#a3202a", "#2f5f8f", "#8090a0", "#5b6f86", "#
 
 
 def scenario(seed: int, number: int) -> Scenario:
-    """The drive of a number. The same seed and number give the same drive, whatever was driven before."""
+    """The drive with this number. The same seed and number always give the same drive."""
     place, layout, rng = layout_of(seed, number)
     usual = float(rng.uniform(*place.speed_kmh)) / 3.6
     lanes = int(rng.integers(place.lanes[0], place.lanes[1] + 1))
@@ -80,7 +80,8 @@ def scenario(seed: int, number: int) -> Scenario:
 
 
 def _faults(rng: np.random.Generator) -> dict[str, Any]:
-    """Of one drive: calibration within half a degree, images within 50 ms, a dead ring in a tenth of the drives."""
+    """Sensor faults of one drive: calibration wrong by up to half a degree, images late by up to 50 ms, and a dead ring
+    in one of ten drives."""
 
     def angle() -> float:
         return round(float(np.clip(rng.normal(0.0, 0.2), -0.5, 0.5)), 3)
@@ -155,8 +156,8 @@ def _cut_in(
     lead: Drive | None,
     steps: int,
 ) -> tuple[int, Drive, dict[str, Any]] | None:
-    """A car from beside that changes into the ego lane: from which step it is there, how it drives, and its script.
-    None where the gap to the lead is too small for it."""
+    """A car from an adjacent lane that changes into the ego lane: the step from which it is there, its motion, and its
+    script. None if the gap to the lead is too small."""
     sides = [lane for lane in (own_lane - 1, own_lane + 1) if -lanes <= lane <= -1]
     at = int(rng.integers(16, 60))
     way = places_m(own, 0.0)
@@ -187,7 +188,8 @@ def _roadworks(
     place: RoadKind,
     way: np.ndarray,
 ) -> None:
-    """Beacons close the outermost lane: a taper, then a row along the line. Whoever drives there changes first."""
+    """Beacons close the outermost lane: a taper, then a row along the lane line. A car in that lane leaves it
+    before."""
     begins_m = float(rng.uniform(350.0, 600.0))
     lanes = road["lanes_forward"]
     line_m = -(place.median_m / 2 + (lanes - 1) * lane_m)
@@ -200,7 +202,7 @@ def _roadworks(
 
 
 def _parked_rows(rng: np.random.Generator, road: dict[str, Any], lanes: int, lane_m: float) -> Iterator[dict[str, Any]]:
-    """Along both kerbs, a stretch here and there, never on a crossing."""
+    """Parked cars in stretches along both kerbs, never on a crossing."""
     number = _PARKED
     free = [each["s_m"] - _START_M for each in road.get("crossings", ())]
     aside = lane_m / 2 + 0.25 + 0.9
@@ -241,7 +243,8 @@ def _oncoming(rng: np.random.Generator, place: RoadKind, lanes: int, usual: floa
 def _beside(
     rng: np.random.Generator, place: RoadKind, own_lane: int, lanes: int, usual: float, taken: set[int]
 ) -> Iterator[dict[str, Any]]:
-    """Traffic in the lanes beside, all of a lane at one speed. Lanes from which a car cuts in stay empty."""
+    """Traffic in the adjacent lanes, with the same speed for all cars of a lane. Lanes from which a car cuts in stay
+    empty."""
     number = _BESIDE
     for lane in range(-lanes, 0):
         if lane == own_lane or lane in taken:
@@ -257,7 +260,7 @@ def _beside(
 
 
 def _crossing(rng: np.random.Generator, road: dict[str, Any], way: np.ndarray) -> list[dict[str, Any]]:
-    """Cars from the sides that pass a few seconds before the ego vehicle or after it."""
+    """Crossing cars that pass a few seconds before or after the ego vehicle."""
     at_m = road["crossings"][0]["s_m"] - _START_M
     there_s = float(np.interp(at_m, way, np.arange(len(way)) * STEP_S))
     made = []

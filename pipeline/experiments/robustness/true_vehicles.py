@@ -17,11 +17,11 @@ from pipeline.types import CameraCalibration, FusedObject, Point2
 from pipeline.types.sensors import SENSOR_NAMES, are_several
 
 _PARKED, _ONCOMING, _BESIDE, _CROSSING = 100, 1000, 2000, 3000
-"""Where the numbers of each part of the random traffic begin (``traffic``)."""
+"""First number of each part of the random traffic (``traffic``)."""
 
 
 def place(item: FusedObject | None) -> Point2 | None:
-    """Ego x, y of an object's nearest face; None where it has no place."""
+    """Ego x, y of an object's nearest face; None if its position is unknown."""
     if item is None:
         return None
     if item.bev is not None:
@@ -30,14 +30,14 @@ def place(item: FusedObject | None) -> Point2 | None:
 
 
 def vehicles_at(now: World, where: Point2) -> list[ActorState]:
-    """The true vehicles that may be what is believed at a place."""
+    """The true vehicles that an object believed to be at a position may be."""
     reach_m = 20.0 + 0.25 * hypot(*where)
     near = [state for state in now.actors if dist(where, state.cuboid.center[:2]) < reach_m]
     return [state for state in near if same_place(where, state) or _inside(where, state)]
 
 
 def vehicle_in_box(now: World, camera: CameraCalibration | None, item: FusedObject | None) -> ActorState | None:
-    """The true vehicle whose box in the image is that of an object."""
+    """The true vehicle whose box in the image matches that of an object; None without one."""
     seen = in_image(now, camera) if camera is not None and item is not None and item.bbox is not None else ()
     if not seen or item is None:
         return None
@@ -47,17 +47,18 @@ def vehicle_in_box(now: World, camera: CameraCalibration | None, item: FusedObje
 
 
 def how_misplaced(state: ActorState, where: Point2) -> str:
-    """How a true vehicle is misplaced, in words that count alike."""
+    """How a true vehicle is misplaced, as text by which failures are grouped."""
     return f"true vehicle placed too {'near' if hypot(*where) < range_m(state) else 'far'}"
 
 
 def named(state: ActorState) -> str:
-    """A true vehicle in a sentence, for example "car 1 at 52.3 m"."""
+    """A true vehicle as text, for example "car 1 at 52.3 m"."""
     return f"{state.actor.kind} {state.actor.id} at {range_m(state):.1f} m"
 
 
 def _inside(where: Point2, state: ActorState) -> bool:
-    """Whether a place is on a vehicle, or within a metre of it: of a long one the nearest face is far from its side."""
+    """Whether a position is on a vehicle or within a metre of it. The nearest face alone would not do, since it is far
+    from the side of a long vehicle."""
     x, y = where[0] - state.cuboid.center[0], where[1] - state.cuboid.center[1]
     c, s = cos(state.cuboid.yaw_rad), sin(state.cuboid.yaw_rad)
     length, width, _ = state.cuboid.size
@@ -65,7 +66,7 @@ def _inside(where: Point2, state: ActorState) -> bool:
 
 
 def what(met: Sequence[ActorState]) -> str:
-    """What part of the traffic these vehicles are."""
+    """The part of the traffic to which these vehicles belong."""
     if not met:
         return "nothing there"
     number = min(state.actor.id for state in met)
@@ -79,14 +80,14 @@ def what(met: Sequence[ActorState]) -> str:
 
 
 def seen_by(item: FusedObject | None) -> str:
-    """The sensors that an object rests on."""
+    """The sensors that an object is based on."""
     if item is None:
         return "nobody"
     return "both" if are_several(item.source) else SENSOR_NAMES[item.source]
 
 
 def why_missed(lead: ActorState, chosen: FusedObject | None) -> str:
-    """What was chosen instead of a true lead, and how far that is, by 20 m."""
+    """What was chosen instead of a true lead, and its distance in steps of 20 m."""
     away_m = hypot(*lead.cuboid.center[:2]) - lead.cuboid.size[0] / 2
     choice = "no lead" if chosen is None else "another object leads"
     return f"{choice}, true lead within {20 * ceil(away_m / 20)} m"

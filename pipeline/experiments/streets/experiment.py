@@ -35,16 +35,16 @@ class StreetCase:
     """One drive through a street."""
 
     street: Street
-    """Bends, borders and traffic."""
+    """The street: bends, borders and traffic."""
     seed: int
-    """Of noise and scenery."""
+    """Seed of noise and scenery."""
 
 
 StreetOutcome = dict[str, SourceFrames]
 
 
 def cases(short: bool) -> list[StreetCase]:
-    """Every street, every other one bending to the left first."""
+    """Every street; every second one bends to the left first."""
     if short:
         return [StreetCase(Street(50.0, "hedges", "lead"), 0)]
     streets = [Street(r, beside, ahead) for r in SPEEDS_KMH for beside in BESIDE for ahead in ("lead", "nothing")]
@@ -73,13 +73,13 @@ def as_drive(case: StreetCase, outcome: StreetOutcome) -> ExperimentDrive:
 
 
 def report(cases: Sequence[StreetCase], outcomes: Sequence[StreetOutcome]) -> ReportSection:
-    """By what is beside the road, and all together."""
+    """The report, by kind of border and in total."""
     return ReportSection(
         "streets",
         "Streets without lane markings and without a route",
         (
-            "Given detections and a simulated VLP-16 as in the curves, speed and yaw rate from the car's bus, leads to "
-            f"{REACH_M:.0f} m. With nothing ahead, a frame is right when no lead is chosen.",
+            "Detections are given and the VLP-16 is simulated as in the curves. Speed and yaw rate come from the car's "
+            f"bus; leads count up to {REACH_M:.0f} m. With nothing ahead, a frame is right if no lead is chosen.",
         ),
         (
             Table(

@@ -24,18 +24,18 @@ _COLOURS = ("#e8e8e6", "#20252c", "#a3202a", "#2f5f8f", "#8090a0", "#5b6f86", "#
 StreetBorder = Literal["parked", "hedges", "kerbs", "mixed"]
 Ahead = Literal["lead", "nothing"]
 SPEEDS_KMH = {30.0: 24.0, 50.0: 31.0, 80.0: 39.0, 150.0: 48.0}
-"""By radius: 1.5 m/s² sideways, as people drive in streets, and no faster than 50 km/h."""
+"""Speed by radius: a lateral acceleration of 1.5 m/s², as usual in streets, and at most 50 km/h."""
 BESIDE: tuple[StreetBorder, ...] = ("parked", "hedges", "kerbs", "mixed")
 
 
 @dataclass(frozen=True)
 class Street:
-    """A street without paint."""
+    """A street without lane markings."""
 
     radius_m: float
-    """Of its bends."""
+    """Radius of its bends."""
     beside: StreetBorder
-    """What shows where it goes."""
+    """Kind of border, which shows the course of the road."""
     ahead: Ahead
     """Whether a car drives ahead."""
 
@@ -49,7 +49,8 @@ class Street:
 
 
 def scenario(street: Street, seed: int) -> Scenario:
-    """Even seeds bend to the left first, odd ones to the right; then the other way. The same seed, the same street."""
+    """With even seeds, the street bends to the left first, with odd ones to the right; then the other way. The same
+    seed gives the same street."""
     rng = np.random.default_rng([seed, int(street.radius_m), BESIDE.index(street.beside), street.ahead == "lead"])
     actors: list[dict[str, Any]] = []
     if street.ahead == "lead":
@@ -80,13 +81,15 @@ def scenario(street: Street, seed: int) -> Scenario:
 
 
 def _of_the_lead(street: Street, rng: np.random.Generator) -> dict[float, float]:
-    """A little faster at first, then for a while slower: it draws away to some 40 m and comes back."""
+    """Speed of the lead: first a little faster than the ego vehicle, then slower for a while, so that it draws away to
+    about 40 m and comes back."""
     speed = street.speed_mps
     return {0.0: speed, 2.0: speed * float(rng.uniform(1.2, 1.5)), 7.0: speed * 1.2, 9.0: speed * 0.7}
 
 
 def _segments(street: Street, side: float) -> list[dict[str, float]]:
-    """A bend, and one the other way, each through a right angle at most. Transitions as lateral jerk asks for."""
+    """Segments of the road: a bend and then one the other way, each through at most a right angle. The length of a
+    transition curve follows from the lateral jerk."""
     bend = side / street.radius_m
     transition = max(street.speed_mps**3 / street.radius_m / _JERK_MPS3, 5.0)
     arc = min(3.0 * street.speed_mps, 1.2 * street.radius_m)
@@ -104,8 +107,8 @@ def _segments(street: Street, side: float) -> list[dict[str, float]]:
 
 
 def _strips(street: Street, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Kerbs everywhere, at the back of the parking strip or, where nobody parks, at the lane; hedges and walls behind
-    the pavement in stretches, with gaps as for drives and gardens."""
+    """Borders: kerbs everywhere, behind the parking strip or, without parked cars, at the lane; hedges and walls behind
+    the pavement in stretches, with gaps like those for driveways and gardens."""
     strips: list[dict[str, Any]] = []
     for side in (-1.0, 1.0):
         kerb_m = LANE_WIDTH_M + (PARKING_M if _parks(street) else 0.3)
@@ -129,7 +132,7 @@ def _parks(street: Street) -> bool:
 
 
 def _parked(street: Street, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Rows along both kerbs, with gaps."""
+    """Rows of parked cars along both kerbs, with gaps."""
     actors: list[dict[str, Any]] = []
     if not _parks(street):
         return actors

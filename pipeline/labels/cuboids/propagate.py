@@ -19,7 +19,7 @@ from pipeline.common.geometry import Cuboid
 from pipeline.labels.cuboids.aggregate import Sweeps
 from pipeline.labels.cuboids.outline import misfit_m, outline, placed
 from pipeline.labels.cuboids.points_of import Clustered, points_of
-from pipeline.labels.headings import Pose
+from pipeline.labels.headings import Pose, in_ego, over_ground
 from pipeline.labels.link_identities import MAX_GAP_S
 from pipeline.labels.model import Sighting
 from pipeline.types import F32, F64
@@ -197,16 +197,13 @@ def _pose(poses: Mapping[int, Pose], frame: int) -> Pose:
 
 
 def _over_ground(cuboid: Cuboid, pose: Pose, t_ns: int) -> _At:
-    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-    x, y, _ = cuboid.center
-    return _At(t_ns / 1e9, np.array([pose.x + c * x - s * y, pose.y + s * x + c * y]), cuboid.yaw_rad + pose.yaw_rad)
+    return _At(t_ns / 1e9, np.array(over_ground(cuboid, pose)), cuboid.yaw_rad + pose.yaw_rad)
 
 
 def _in_ego(place: _At, pose: Pose, cuboid: Cuboid) -> Cuboid:
-    dx, dy = place.xy[0] - pose.x, place.xy[1] - pose.y
-    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    x, y = in_ego(float(place.xy[0]), float(place.xy[1]), pose)
     yaw_rad = math.remainder(place.yaw_rad - pose.yaw_rad, math.tau)
-    return Cuboid((float(c * dx + s * dy), float(c * dy - s * dx), cuboid.center[2]), cuboid.size, yaw_rad)
+    return Cuboid((x, y, cuboid.center[2]), cuboid.size, yaw_rad)
 
 
 def _mixed(a: Cuboid, b: Cuboid, share: float) -> Cuboid:

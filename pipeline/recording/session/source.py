@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from itertools import chain, repeat
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from pipeline.common.progress import Progress, silent
 from pipeline.common.remote_files import is_remote
+from pipeline.common.user_file_errors import given_path
 from pipeline.params import Params, ParamsError, with_changes
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
@@ -40,7 +40,7 @@ class SessionSource:
 
     def __init__(self, uri: str, path: str, progress: Progress = silent) -> None:
         try:
-            self.file = McapFile(path if is_remote(path) else Path(path).expanduser())
+            self.file = McapFile(path if is_remote(path) else given_path(path, SourceError))
         except (NotMcap, OSError, RuntimeError, ValueError) as error:
             raise SourceError(str(error)) from None
         try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -39,7 +38,7 @@ from pipeline.recording.session.scene_update import objects_message
 from pipeline.recording.session.velodyne_scan import RawLidar, scan_message
 from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, GnssFix, Result, Route, Sweep
 from pipeline.types.camera_shot import Shot
-from pipeline.types.result_json import to_json
+from pipeline.types.result_json import encoded, to_json
 from pipeline.types.source import TruthObject
 
 _KEPT, _SWEEPS_KEPT = 256, 16
@@ -286,6 +285,5 @@ class SessionWriter:
 
     def _put_result(self, result: Result | dict[str, Any], at_ns: int) -> None:
         content = to_json(result) if isinstance(result, Result) else result
-        text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-        self._add(topics.RESULTS, at_ns, text.encode())
+        self._add(topics.RESULTS, at_ns, encoded(content))
         self._add(topics.OBJECTS, at_ns, objects_message(content, self._header_ns))

@@ -19,6 +19,19 @@ _BLOBS_TO_M, _BLOBS_ASIDE_M = 30.0, 6.0
 _NODS_FOR_S = 0.4
 
 
+class Knock(ScenarioPart):
+    """A camera that is turned during the drive, beyond its error from the start."""
+
+    at_s: float = Field(ge=0.0)
+    """When, seconds from the start."""
+    yaw_deg: float = Field(default=0.0, ge=-5.0, le=5.0)
+    """To the left."""
+    pitch_deg: float = Field(default=0.0, ge=-5.0, le=5.0)
+    """Downwards."""
+    roll_deg: float = Field(default=0.0, ge=-5.0, le=5.0)
+    """Clockwise."""
+
+
 class Faults(ScenarioPart):
     """Faults of the camera, the LiDAR and their synchronisation; the LiDAR's own ``dropout`` is in its model."""
 
@@ -28,6 +41,8 @@ class Faults(ScenarioPart):
     """The same downwards."""
     camera_roll_deg: float = Field(default=0.0, ge=-5.0, le=5.0)
     """The same clockwise."""
+    knock: Knock | None = None
+    """Rotation of the camera in the middle of the drive."""
     nods_deg: float = Field(default=0.0, ge=0.0, le=5.0)
     """Standard deviation by which the car, and both sensors with it, nods on bumps and when it brakes."""
     camera_skew_ms: float = Field(default=0.0, ge=-200.0, le=200.0)
@@ -51,9 +66,13 @@ def nods_rad(faults: Faults, seed: int, frames: int, rate_hz: float) -> F32:
     return np.radians(faults.nods_deg * lasting([seed, 20], frames, kept)[:, 0]).astype(np.float32)
 
 
-def true_camera(camera: CameraCalibration, faults: Faults, nod_rad: float = 0.0) -> CameraCalibration:
-    """The camera with its actual orientation, where ``camera`` is its calibration."""
-    turned = (faults.camera_roll_deg, faults.camera_pitch_deg, faults.camera_yaw_deg)
+def true_camera(camera: CameraCalibration, faults: Faults, nod_rad: float = 0.0, t_s: float = 0.0) -> CameraCalibration:
+    """The camera with its actual orientation at ``t_s``, where ``camera`` is its calibration."""
+    turned: tuple[float, ...] = (faults.camera_roll_deg, faults.camera_pitch_deg, faults.camera_yaw_deg)
+    knock = faults.knock
+    if knock is not None and t_s >= knock.at_s:
+        by = (knock.roll_deg, knock.pitch_deg, knock.yaw_deg)
+        turned = tuple(from_start + more for from_start, more in zip(turned, by, strict=True))
     if not any(turned) and not nod_rad:
         return camera
     angles = [float(np.radians(each)) for each in turned]

@@ -53,7 +53,7 @@ class Senses:
         assert frame.camera is not None
         if np.random.default_rng([seed, 22, index]).random() < faults.pictures_lost:
             return frame
-        camera = true_camera(frame.camera, faults, self._nod_rad(index))
+        camera = true_camera(frame.camera, faults, self._nod_rad(index), now.t_s)
         if faults.camera_skew_ms:
             now = world_state.at(scene, max(now.t_s + faults.camera_skew_ms / 1e3, 0.0))
         boxes = None

@@ -218,7 +218,7 @@ class KittiSource:
         elif self._channels:
             notes.append(f"{len(self._channels)} of a VLP-16's 16 rings remain: the HDL-64 reaches only about +3°")
         if not self._files.lidar_stamps and not self._files.camera_stamps:
-            notes.append("no time stamps: 10 Hz assumed")
+            notes.append("no timestamps: 10 Hz assumed")
         if not self._files.oxts and not self._moved:
             notes.append("no ego speed recorded")
         return tuple(notes)

@@ -236,7 +236,7 @@ class LiveConfig(ConfigPart):
 def load(path: str) -> LiveConfig:
     """The file's content; paths in it are relative to it. SourceError in one sentence when it cannot be used."""
     try:
-        file = Path(path).expanduser()
+        file = given_path(path, SourceError)
         if file.suffix.lower() not in _SUFFIXES:
             raise ValueError
         text = read_regular(file, LARGEST_TEXT_BYTES).decode("utf-8")

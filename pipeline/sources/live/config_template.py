@@ -14,7 +14,7 @@ lidar:                      # Velodyne on the network
   interface: 0.0.0.0        # address of the network interface; 0.0.0.0 listens on all
   sender: null              # the sensor's address, e.g. 192.168.1.201; null accepts the first VLP-16 that sends
   multicast_group: null     # for example 239.0.0.1 when the sensor sends to a group
-  time_offset_ms: 0         # added to its time stamps
+  time_offset_ms: 0         # added to its timestamps
   mount:                    # pose of the sensor; points are levelled with it
     x_m: 0.0
     y_m: 0.0
@@ -27,7 +27,7 @@ camera:                     # exactly one of device, url, file
   url: http://192.168.1.20:8080/video   # MJPEG or RTSP (rtsp://…); JPEGs are stored unchanged
   # device: 0               # a local camera; its path below /dev/v4l/by-id/ is more stable than a number
   # file: drive.mp4         # a video played in a loop, for testing
-  time_offset_ms: 0         # added to its time stamps; for a camera without stamps, minus its latency
+  time_offset_ms: 0         # added to its timestamps; for a camera without stamps, minus its latency
   calibration:              # without it, LiDAR and camera are not fused
     fx_px: 907.0
     fy_px: 907.0

@@ -79,7 +79,7 @@ class StreamStats:
 
     def _said(self, impossible: int) -> str:
         refused = say_refused(self.refused.copy())  # copied, because a reader thread may add a reason meanwhile
-        times = f"{impossible} refused: impossible time stamp" if impossible else ""
+        times = f"{impossible} refused: impossible timestamp" if impossible else ""
         again = f"hung {self.hung} {'time' if self.hung == 1 else 'times'} and was restarted" if self.hung else ""
         return "; ".join(text for text in (self.note, again, *(ask() for ask in self.remarks), times, refused) if text)
 

@@ -10,6 +10,7 @@ from weakref import finalize
 
 from rosbags.highlevel import AnyReader
 
+from pipeline.common.user_file_errors import given_path
 from pipeline.common.user_files import check_regular
 from pipeline.formats.velodyne.ros import typestore
 from pipeline.sources.rosbag import unpack_budget
@@ -75,7 +76,7 @@ def bag_path(path: str) -> Path:
     if not path:
         raise SourceError("no bag given after the colon")
     try:
-        bag = Path(path).expanduser()
+        bag = given_path(path, SourceError)
         if not bag.exists():
             raise SourceError(f"{path}: no such file or folder")
         if bag.is_dir() and not (bag / "metadata.yaml").is_file():

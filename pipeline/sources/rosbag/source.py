@@ -140,7 +140,7 @@ class RosbagSource:
         for role, stream in (("LiDAR", self._index.lidar), ("camera", self._index.camera)):
             if stream is not None and stream.without_header:
                 notes.append(
-                    f"{role}: {stream.without_header} messages without a time stamp: their recording time is used"
+                    f"{role}: {stream.without_header} messages without a timestamp: their recording time is used"
                 )
         counts = self._index.counts
         if counts is not None:

@@ -42,3 +42,16 @@ def test_a_recordings_calibration_goes_through_every_format_with_its_correction(
 def test_a_format_that_lacks_something_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(str(tmp_path / "none.txt"), "--format", "kitti", "--out", str(tmp_path / "out.yaml")) == 2
     assert "image size" in capsys.readouterr().err
+
+
+def test_one_model_becomes_the_best_fit_of_the_other(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    angular, rig = tmp_path / "angular.yaml", tmp_path / "rig.yaml"
+    assert run("sim:straight", "--to", "angular", "--out", str(angular)) == 0
+    assert "0–5°" in capsys.readouterr().out, "the cost is said"
+    assert run("sim:straight", "--params", str(angular), "--to", "rig", "--out", str(rig)) == 0
+    ahead = np.array([[20.0, 1.0, 0.0], [40.0, -3.0, 0.5]])
+    right = resolve(Params().alignment, open_source("sim:straight").frame(0).camera)
+    found = resolve(Params().alignment, load_rig(rig).camera_calibration())
+    assert right is not None
+    assert found is not None
+    assert np.abs(found.project(ahead) - right.project(ahead)).max() < 25.0

@@ -46,6 +46,8 @@ def test_the_report_leads_to_every_drive_wherever_both_are_moved(
             ["scenarios", "run", *arguments, "--report", str(made / "ncap.html"), "--drives", str(made / "all drives")]
         )
     assert ended.value.code == 0
+    count = len(NCAP.cases(True))
+    assert f"{count} drives saved: {made / 'all drives' / 'index.html'}" in capsys.readouterr().err
     made.rename(moved)
     report = (moved / "ncap.html").read_text(encoding="utf-8")
     cells = set(re.findall(r'href="all%20drives/([^"#]+)\.html"', report))

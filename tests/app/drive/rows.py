@@ -1,4 +1,4 @@
-"""Rows and objects of made-up drives, as few words as a case needs."""
+"""Builds rows and objects of synthetic drives for tests of events."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PERIOD_NS = 100_000_000
 
 
 def row(index: int, cipv_id: int | None = None, **values: Any) -> Row:
-    """Frame ``index`` at 10 Hz with every sensor there; a CIPV is seen by both at 30 m."""
+    """Frame ``index`` at 10 Hz with data of every sensor. The CIPV, if any, is seen by both sensors at 30 m."""
     lead: dict[str, Any] = {} if cipv_id is None else {"source": "VL", "carried": False, "distance_m": 30.0}
     plain = dict.fromkeys(Row._fields) | {"gaps": "", "extra": ()}
     return Row(**(plain | {"t_ns": index * PERIOD_NS, "cipv_id": cipv_id} | lead | values))
@@ -25,7 +25,7 @@ def drive(*cipv_ids: int | None) -> list[Row]:
 
 
 def objects(*records: dict[str, Any]) -> Objects:
-    """Records of one frame; an object is an L one in the path at 30 m unless told otherwise."""
+    """The objects of one frame. By default, an object is an L object in the path at 30 m."""
     made = np.zeros(len(records), OBJECT)
     for place, given in enumerate(records):
         plain = {"source": SOURCES.index("L"), "in_path": True, "vehicle": True, "distance_m": 30.0}

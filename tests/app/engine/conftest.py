@@ -1,4 +1,4 @@
-"""An engine on a recording that counts what is asked of it."""
+"""An engine with a recording that counts requests."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.app.engine.running import WAIT_S, Start
 
 @pytest.fixture
 def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
-    """An engine on a recording, showing its first frame, paused. Hands rest at once."""
+    """Starts an engine on a recording, paused on its first frame. Input counts as stopped immediately."""
     monkeypatch.setattr(compute_scheduler, "HAND_RESTS_S", 0.0)
     with ExitStack() as stack:
 

@@ -1,4 +1,4 @@
-"""A recording in memory, of real types: a car 30 m ahead comes 0.4 m nearer with each frame, on a flat road."""
+"""A recording in memory: a car 30 m ahead on a flat road, which comes 0.4 m nearer with each frame."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ FOCAL_PX = 250.0
 GROUND_M = -0.6
 PERIOD_NS = 100_000_000
 HANGS_S = 600.0
-"""A disk that hangs does so for longer than any test waits, on a busy machine too."""
+"""A hanging disk hangs for longer than any test waits, even on a busy machine."""
 
 
 @dataclass
 class CountingDetector:
-    """Finds the drawn car, and counts how often it was asked: where no network runs, a call is what matters."""
+    """Detects the drawn car and counts its calls."""
 
     name: str = "counting"
     notes: tuple[str, ...] = ()
@@ -37,7 +37,7 @@ class CountingDetector:
 
 
 class CountingLanes:
-    """Sees no lane line, and counts how often it was asked."""
+    """Detects no lane lines and counts its calls."""
 
     name, notes = "counting lanes", ()
 
@@ -50,15 +50,15 @@ class CountingLanes:
 
 
 class Options:
-    """Of a network's run."""
+    """Options of a network's run."""
 
     terminate = False
 
 
 @dataclass
 class SlowDetector(CountingDetector):
-    """A network that takes for ever in its ``slow_at``-th call, until it is told to end: then it is quick again.
-    ``slow``: set when it does. ``stopped``: how often it was."""
+    """A network whose ``slow_at``-th call does not return until it is stopped; later calls are fast. ``slow``: set
+    during that call. ``stopped``: how often it was stopped."""
 
     slow_at: int = 0
     slow: threading.Event = field(default_factory=threading.Event)
@@ -76,8 +76,8 @@ class SlowDetector(CountingDetector):
 
 
 class Recording:
-    """``gate``: cleared, reading a frame waits; ``reading``: set when one begins;
-    ``broken``: frames that cannot be read."""
+    """``gate``: while it is cleared, reading a frame waits. ``reading``: set when reading begins. ``broken``: frames
+    that cannot be read."""
 
     rate_hz = 10.0
 
@@ -120,7 +120,7 @@ class Recording:
 
 
 def opener(*recordings: Recording):
-    """``open_source`` over these."""
+    """An ``open_source`` that opens these recordings."""
     known = {recording.uri: recording for recording in recordings}
 
     def open_source(uri: str, *, progress: Progress = silent) -> Recording:
@@ -138,7 +138,7 @@ def _camera() -> CameraCalibration:
 
 
 def _points(distance_m: float) -> tuple[F32, U8]:
-    """A grid of ground, and the car's rear: 1.6 m wide, 1.2 m high."""
+    """A grid of ground points, and points on the car's rear, 1.6 m wide and 1.2 m high."""
     x, y = np.meshgrid(np.arange(2.0, 40.0, 0.5), np.arange(-6.0, 6.01, 0.5))
     ground = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, GROUND_M)])
     across, up = np.meshgrid(np.linspace(-0.8, 0.8, 9), np.linspace(GROUND_M + 0.4, GROUND_M + 1.3, 6))

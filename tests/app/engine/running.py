@@ -1,4 +1,4 @@
-"""What tests ask of a running engine."""
+"""Helpers for tests with a running engine."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ Start = Callable[..., tuple[Engine, Recording, CountingDetector]]
 
 
 def body(result: Result) -> str:
-    """A result's bytes, times of this machine apart."""
+    """A result as JSON, without timings."""
     plain = to_json(result)
     del plain["timing_ms"]
     return json.dumps(plain)
 
 
 def at(index: int) -> Callable[[Snapshot], bool]:
-    """The frame is shown, after a whole warm-up."""
+    """A condition: the frame is shown, with the state after a complete warm-up."""
     return lambda s: s.processed is not None and s.index == index and s.processed.whole
 
 
 def played(recording: Recording, first: int, last: int, params: Params, looked_from: int = 0) -> Result:
-    """What the plain line says at ``last``, run from a fresh state at ``first``; nobody looked at the images before
-    ``looked_from``."""
+    """The pipeline's result at ``last``, run from a fresh state at ``first``. Images before ``looked_from`` have no
+    detections."""
     detector, state = CountingDetector(), State()
     for index in range(first, last + 1):
         frame = recording.frame(index)

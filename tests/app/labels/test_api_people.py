@@ -184,3 +184,22 @@ def test_what_others_stand_behind_is_reviewed_one_by_one(client: httpx.Client) -
     assert following("Cy") == (None, None, 0), "what was reviewed once is reviewed"
     act(client, kind="relabel", track=track["id"], revision=labels(client)["tracks"][0]["revision"], label="truck")
     assert following("Cy") == (4, key(car), 1), "and when it is changed, to be reviewed again"
+
+
+def test_recordings_are_assigned_and_whoever_labels_one_does_not_say_that_it_is_done(client: httpx.Client) -> None:
+    act(client, kind="set_lead", first=0, last=4, lead="none")
+    key = client.get("/api/labels").json()["drive"]["id"]
+
+    def change(**body: object) -> httpx.Response:
+        return client.post("/api/labels/queue", json={"person": "Ada", "drive": key, **body})
+
+    assert change(assign="Ada").status_code == 200
+    work = next(each for each in client.get("/api/labels/queue").json() if each["key"] == key)
+    assert (work["person"], work["state"]) == ("Ada", "labeling")
+    assert work["labelled"] > 0
+    assert "Ada" in {each["person"] for each in work["efforts"]}
+    refused = change(state="done")
+    assert (refused.status_code, "a second person" in refused.json()["detail"]) == (409, True)
+    assert change(state="done", person="Bob").status_code == 200
+    assert change(assign="", state="open").status_code == 200
+    assert client.post("/api/labels/queue", json={"person": "Ada", "drive": "none"}).status_code == 404

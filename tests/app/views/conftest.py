@@ -52,7 +52,7 @@ def _filled(cuboid: Cuboid, count: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def _cloud() -> tuple[np.ndarray, np.ndarray]:
-    """60 ground points, 40 of the lead (cluster 0), 12 of the pole (cluster 1), 5 loose ones."""
+    """60 ground points, 40 on the lead (cluster 0), 12 on the pole (cluster 1), 5 without a cluster."""
     rng = np.random.default_rng(7)
     ground = np.column_stack(
         [rng.uniform(3, 40, 60), rng.uniform(-8, 8, 60), np.full(60, GROUND_M), np.full(60, 10.0)]
@@ -154,7 +154,7 @@ def frames() -> list[tuple[Frame, Result]]:
 
 
 class SceneClient:
-    """A browser's end of viser's protocol: collects what the server sends, and can move a slider.
+    """The browser's side of viser's protocol: collects the server's messages, and can move a slider.
 
     Messages come as ``[8 bytes inner size][8 bytes packed size][zstd of msgpack][arrays]``.
     """
@@ -165,7 +165,7 @@ class SceneClient:
         self.largest = 0
 
     def read_until(self, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        """The first message that is wanted; TimeoutError when none comes."""
+        """The first message that fulfils ``wanted``; TimeoutError without one."""
         while True:
             data = self.connection.recv(timeout=180)
             assert isinstance(data, bytes)
@@ -182,7 +182,7 @@ class SceneClient:
         self.read_until(lambda each: each["type"] == "ReplayDoneMessage")
 
     def nodes(self) -> dict[str, bool]:
-        """Name and visibility of every scene node, after all messages so far."""
+        """Name → visibility of every scene node, after all messages so far."""
         seen: dict[str, bool] = {}
         for each in self.messages:
             if each["type"] == "SetSceneNodeVisibilityMessage":
@@ -192,12 +192,12 @@ class SceneClient:
         return seen
 
     def owned(self, name: str) -> bool:
-        """Whether this browser has a node of its own of that name, which it shows rather than everybody's."""
+        """Whether this browser has its own node of that name, which overrides the shared one."""
         of_name = [each for each in self.messages if each.get("name") == name and each.get("owner")]
         return bool(of_name) and of_name[-1]["type"] != "RemoveSceneNodeMessage"
 
     def texts(self) -> list[str]:
-        """The labels that are shown."""
+        """The texts of the visible labels."""
         words: dict[str, str] = {}
         for each in self.messages:
             written = each.get("props", each.get("updates", {}))
@@ -206,21 +206,21 @@ class SceneClient:
         return [words[name] for name, shown in self.nodes().items() if shown and name in words]
 
     def inputs(self, label: str) -> list[dict[str, Any]]:
-        """Every input of the panel with this label, in the panel's order."""
+        """Every input of the panel with this label, in order."""
         return [each for each in self.messages if each.get("props", {}).get("label") == label]
 
     def look(self) -> None:
-        """The browser's first word, its camera: only then does viser count it as somebody."""
+        """Send the camera, which a browser does first; only then does viser count it as a client."""
         pose = {"wxyz": (1.0, 0.0, 0.0, 0.0), "position": (-9.0, 0.0, 5.0), "look_at": (9.0, 0.0, 0.0)}
         lens = {"fov": 1.2, "near": 0.01, "far": 1000.0, "image_height": 600, "image_width": 800}
         self._send("ViewerCameraMessage", **pose, **lens, up_direction=(0.0, 0.0, 1.0))
 
     def move(self, uuid: str, value: object) -> None:
-        """What the browser sends when a person moves a slider."""
+        """Send what a browser sends when the user moves a slider."""
         self._send("GuiUpdateMessage", uuid=uuid, updates={"value": value})
 
     def click(self, origin: Point3, direction: Point3) -> None:
-        """What the browser sends when a person clicks into the scene: the ray through that pixel."""
+        """Send what a browser sends when the user clicks into the scene: the ray through that pixel."""
         place = {"screen_pos": ((0.5, 0.5),), "modifier": None}
         self._send("ScenePointerMessage", event_type="click", ray_origin=origin, ray_direction=direction, **place)
 
@@ -239,7 +239,7 @@ def open_scene() -> Iterator[OpenScene]:
         def opening(
             port: int, path: str = "", version: str = viser.__version__, page: str = "", **options: Any
         ) -> SceneClient:
-            if not path:  # viser's own port, as the proxy reaches it
+            if not path:  # viser's own port, which the proxy uses
                 options["additional_headers"] = HEADERS | {PAGE_HEADER: page}
             connection = connect(
                 f"ws://127.0.0.1:{port}{path}",

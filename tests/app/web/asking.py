@@ -1,4 +1,4 @@
-"""What tests ask of a server and its stream."""
+"""Requests that tests send to a server and its stream."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def looks() -> SharedViewState:
 
 @pytest.fixture(scope="module")
 def address(engine: Engine, looks: SharedViewState) -> Iterator[str]:
-    """Where a real server answers."""
+    """The address of a real server."""
     bound = listen_socket("127.0.0.1", 0)
     address = f"http://127.0.0.1:{bound.getsockname()[1]}"
     is_ready = threading.Event()
@@ -58,7 +58,7 @@ def client(address: str) -> Iterator[httpx.Client]:
 
 @pytest.fixture
 def stream(address: str) -> Callable[..., ClientConnection]:
-    """Opens a stream, as a page of the server's own origin unless told otherwise."""
+    """Opens a stream, by default with the server's own origin."""
 
     def begin(query: str = "", **headers: str) -> ClientConnection:
         own = {"origin": address} | headers
@@ -70,7 +70,7 @@ def stream(address: str) -> Callable[..., ClientConnection]:
 
 @pytest.fixture(autouse=True)
 def _at_the_start(engine: Engine) -> None:
-    """Each test begins at the first frame of the first recording with default parameters."""
+    """Each test starts at the first frame of the first recording, with default parameters."""
     held = engine.snapshot.processed
     old = held.frame if held is not None else None
     engine.control.change(uri="test:car", playing=False, target=None, steps=0)

@@ -1,4 +1,4 @@
-"""A running engine and a real server, for a while."""
+"""A running engine and a real server, as context managers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ WAIT_S = 180.0
 def running(
     desk: SessionRecorder | None = None, *, whole_drives: bool = False, source: Source | None = None
 ) -> Iterator[Engine]:
-    """An engine on a made-up recording, or another, which shows its first frame."""
+    """An engine that shows the first frame of a synthetic recording, or of ``source``."""
     recording = source if source is not None else Recording()
     engine = Engine(
         opener(recording),
@@ -43,7 +43,7 @@ def running(
 
 @contextmanager
 def serving(app: FastAPI) -> Iterator[str]:
-    """Its address, as soon as it answers there."""
+    """The address of the app, once it responds there."""
     bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
     address = f"http://127.0.0.1:{bound.getsockname()[1]}"
     server = Server(app, address, lambda _: is_ready.set())

@@ -37,7 +37,7 @@ GET /api/drive/events · POST /api/marks · GET /api/runs · GET /api/runs/{numb
 GET /api/runs/{number}/params.yaml · GET /api/compare · GET /api/labels · GET /api/labels/frames ·
 GET /api/labels/tracks/{number} · GET /api/labels/tracks/{number}/filmstrip ·
 GET /api/labels/tracks/{number}/close_up · GET /api/labels/checks · GET /api/labels/classes ·
-GET /api/labels/next · GET /api/labels/score · GET /api/labels/history ·
+GET /api/labels/next · GET /api/labels/queue · GET /api/labels/score · GET /api/labels/history ·
 GET /api/labels/formats · GET /api/labels/export · GET /api/labels/export/notes · GET /api/labels/versions ·
 GET /api/labels/versions/{name} · GET /api/jobs · GET /api/jobs/{number} · GET /api/jobs/{number}/file ·
 GET /api/alignment/score · GET /api/alignment/fit · GET /api/alignment/fit.yaml · GET /api/alignment/versions ·
@@ -49,12 +49,12 @@ PEOPLE = """
 POST /api/playback · POST /api/source · PATCH /api/params · POST /api/params · POST /api/params/undo ·
 POST /api/params/redo · POST /api/params/preset · DELETE /api/marks/{number} · POST /api/runs/{number}/keep ·
 POST /api/runs/{number}/base · POST /api/runs/{number}/use · DELETE /api/runs/{number} · POST /api/labels/act ·
-POST /api/labels/undo · POST /api/labels/redo · POST /api/labels/import · POST /api/labels/versions · POST /api/clip ·
-DELETE /api/jobs/{number} · POST /api/alignment/fit · DELETE /api/alignment/fit ·
-POST /api/alignment/versions · DELETE /api/alignment/versions/{number} ·
-POST /api/project · POST /api/project/ray · WEBSOCKET /viser · WEBSOCKET /viser/ ·
-GET /api/fleet · GET /api/fleet/rows · GET /api/fleet/histogram · GET /api/fleet/counts ·
-WEBSOCKET /viser/of/{name} · GET /viser/of/{name}/{path:path} · GET /viser · GET /viser/{path:path}
+POST /api/labels/queue · POST /api/labels/undo · POST /api/labels/redo · POST /api/labels/import ·
+POST /api/labels/versions · POST /api/clip · DELETE /api/jobs/{number} · POST /api/alignment/fit ·
+DELETE /api/alignment/fit · POST /api/alignment/versions · DELETE /api/alignment/versions/{number} ·
+POST /api/project · POST /api/project/ray · WEBSOCKET /viser · WEBSOCKET /viser/ · GET /api/fleet ·
+GET /api/fleet/rows · GET /api/fleet/histogram · GET /api/fleet/counts · WEBSOCKET /viser/of/{name} ·
+GET /viser/of/{name}/{path:path} · GET /viser · GET /viser/{path:path}
 """
 RULES: dict[str, Rule] = {
     door.strip(): rule

@@ -1,4 +1,4 @@
-"""The in-vehicle display, opened by touch, and a dashboard that a test has for itself."""
+"""The in-vehicle display on a touch screen, and a dashboard for one test alone."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ OpenDisplay = Callable[..., Page]
 
 @pytest.fixture
 def open_display(browser: Browser, request: pytest.FixtureRequest) -> Iterator[OpenDisplay]:
-    """Opens the display in a fresh profile, by touch; at the end no page may have complained or called elsewhere."""
+    """Opens the display in an empty profile with touch. At the end, no page may have logged an error or sent a request
+    elsewhere."""
     if "own" in request.fixturenames:
-        request.getfixturevalue("own")  # what comes first goes last: a page must not see its server go
+        request.getfixturevalue("own")  # requested first, so that the server outlives its pages
     complaints: list[str] = []
     pages: list[Page] = []
 
@@ -49,7 +50,7 @@ def open_display(browser: Browser, request: pytest.FixtureRequest) -> Iterator[O
 
 @pytest.fixture
 def own(tmp_path: Path) -> Iterator[tuple[Site, Recording]]:
-    """A dashboard of this test alone, which plays."""
+    """A playing dashboard for this test alone."""
     recording = Recording()
     engine = Engine(
         opener(recording),

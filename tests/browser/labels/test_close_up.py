@@ -136,3 +136,22 @@ def test_the_selected_row_is_in_view_and_the_mode_survives_a_reload(hand: Hand, 
     expect(page.locator("#label-pane")).to_be_visible()
     is_at(page, START)
     expect(page.locator("#label-bar")).to_contain_text("Ada")
+
+
+def test_what_is_implausible_is_listed_as_one_labels_and_a_press_goes_there(hand: Hand, labels: Labels):
+    page = hand.page
+    page.get_by_role("tab", name="Checks").click()
+    listed = page.locator("#label-checks")
+    expect(listed).to_contain_text("No problems found")
+    made = []
+    for aside_m in (0.0, 0.5):
+        cuboid = CAR | {"center": [LEAD_X, aside_m, 0.1]}
+        new = {"kind": "add_track", "label": "car", "frame": START + 5, "cuboid": cuboid, "bbox": None}
+        made.append(labels.act("Bob", new)["changed"]["tracks"][0])
+    row = listed.get_by_role("button", name="overlap")
+    expect(row).to_contain_text(f"#{made[0]['id']} car and #{made[1]['id']} car overlap")
+    row.click()
+    is_at(page, START + 5)
+    hand.keys("Shift+Delete")
+    labels.wait_for(lambda now: set(now.tracks) == {made[1]["id"]})
+    expect(row).to_have_count(0)

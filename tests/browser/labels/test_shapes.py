@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.conftest import START, Site
+from tests.browser.labels.conftest import Line
 from tests.browser.labels.hands import LEAD_X, LEAD_Y, Hand, Labels, draw, is_at, is_saved
 from tests.browser.looks import pixels, repainted
 
@@ -233,19 +234,27 @@ def test_everything_is_drawn_and_merged_by_keys_alone(hand: Hand, labels: Labels
     hand.keys(".", "Enter")
     labels.wait_for(lambda now: set(now.tracks) == {second})
 
+
+def test_a_path_is_drawn_on_by_keys_before_it_is_saved_and_after(hand: Hand, labels: Labels, line: Line):
+    page = hand.page
+    line.full = True
     hand.keys("Shift+P", "Enter")
+    expect(page.locator(".saved")).to_have_text("not saved: the disk is full")
+    hand.keys("Shift+P", "ArrowLeft", "ArrowLeft")
+    line.full = False
+    page.get_by_role("button", name="Retry").click()
     labels.wait_for(lambda now: len(now.everything["paths"]) == 1)
-    ours = labels.everything["paths"][0]
-    page.wait_for_function(  # until the page knows it too, there is no path that it could go on with
-        "async () => (await import('/js/core/store.js')).get('labels')?.paths.length === 1"
-    )
     is_saved(page)
-    hand.keys("Shift+P", "ArrowLeft", "ArrowLeft", "ArrowUp", "Enter")
+    ours = labels.everything["paths"][0]
+    hand.keys("ArrowUp", "Enter")
     labels.wait_for(lambda now: now.everything["paths"][0]["left"] != ours["left"])
     bent = labels.everything["paths"][0]
     assert bent["left"][0] == pytest.approx(ours["left"][0], abs=0.05), "it begins where it began"
     assert bent["left"][len(ours["left"]) - 1][1] - ours["left"][-1][1] == pytest.approx(0.5, abs=0.05)
     assert len(bent["left"]) == len(ours["left"]) + 1
+    is_saved(page)
+    hand.keys("Shift+P", "ArrowUp", "Enter")
+    labels.wait_for(lambda now: len(now.everything["paths"][0]["left"]) == len(ours["left"]) + 2)
 
 
 def test_a_label_without_a_cuboid_says_why_and_how_to_give_it_one(hand: Hand, labels: Labels):

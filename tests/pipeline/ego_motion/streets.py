@@ -1,4 +1,4 @@
-"""Made-up sweeps of standing things, for odometry: a street of poles and house fronts, a tunnel, an open road."""
+"""Synthetic sweeps of static structures for odometry: a street of poles and house fronts, a tunnel, an open road."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _HEIGHTS = np.array([-1.2, -0.6, 0.0, 0.6, 1.2])
 
 
 def street(seed: int = 1) -> F64:
-    """(N, 2) places of poles, and of house fronts with gaps and steps between them, along 200 m."""
+    """(N, 2) positions of poles and of house fronts with gaps and steps between them, along 200 m."""
     random = np.random.default_rng(seed)
     places = [np.column_stack([random.uniform(-60.0, 140.0, 60), random.choice([-1.0, 1.0], 60) * 6.0])]
     for side in (-1.0, 1.0):
@@ -28,13 +28,13 @@ def street(seed: int = 1) -> F64:
 
 
 def tunnel() -> F64:
-    """(N, 2) places of two smooth walls."""
+    """(N, 2) positions of two smooth walls."""
     x = np.arange(-60.0, 140.0, 0.2)
     return np.concatenate([np.column_stack([x, np.full(len(x), side * 5.0)]) for side in (-1.0, 1.0)])
 
 
 def seen(world: F64, x_m: float, y_m: float, heading_rad: float, t_ns: int) -> Sweep:
-    """What a LiDAR at that pose sees of the world, with 2 cm of noise that each moment has anew."""
+    """The sweep of a LiDAR at this pose, with 2 cm of noise that is new in each sweep."""
     c, s = np.cos(heading_rad), np.sin(heading_rad)
     local = (world - [x_m, y_m]) @ np.array([[c, -s], [s, c]])
     local = local[np.hypot(local[:, 0], local[:, 1]) < 45.0]

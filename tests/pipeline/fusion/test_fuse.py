@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -142,6 +144,22 @@ def test_a_box_stays_with_the_cluster_that_it_was_joined_with(
     assert pair.distance_m == pytest.approx(ranged_m)
     gates = [gate.passed for item in result.objects for gate in item.gates if gate.name == "cluster_hits"]
     assert all(gates) == (hits > 1 or carried or not params.keep_partners)
+
+
+@pytest.mark.parametrize(
+    ("label", "carried", "who"), [("suitcase", False, 1), ("suitcase", True, 2), ("car", False, 2)]
+)
+def test_the_cluster_of_a_vehicle_that_is_still_boxed_becomes_nothing_else(label: str, carried: bool, who: int) -> None:
+    """A network saw a suitcase in the rear of the lead, in a box that fitted its cluster better than the lead's own."""
+    lead = lidar_track(1, 7.0)
+    x1, y1, x2, y2 = box_of(lead)
+    car = vision_track(1, (x1, y1, x2, y2), 7.0)
+    state, _ = joined([lead], [car])
+    loose = replace(car, bbox=(x1 - 60, y1 - 60, x2 + 60, y2), carried=carried)
+    better = replace(vision_track(2, (x1, y1, x2, y2), 7.0), label=label)
+    _, result = joined([lead], [loose, better], OPTIMAL, state)
+    (pair,) = [item for item in result.objects if item.source == "VL"]
+    assert pair.vision_track == who
 
 
 def test_a_slightly_better_overlap_is_no_reason_to_change() -> None:

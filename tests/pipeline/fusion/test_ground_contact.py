@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
 from pipeline.alignment.projection import Alignment, Angular, resolve
 from pipeline.common.geometry import F64
 from pipeline.fusion.ground_contact import measure_contacts
+from pipeline.lidar.road_profile import RoadProfile, road_ahead
 from pipeline.params import AlignmentParams, FusionParams
 from pipeline.types import F32, Box, CameraCalibration, Detection, Ground, VisionMeasurement
 from tests.pipeline.lidar.test_road_profile import road
@@ -26,17 +25,12 @@ def aligned() -> Alignment:
     return found
 
 
-@dataclass
-class Sweep:
-    points: F32
-    ground: Ground | None
-
-
-def swept(points: F32 | None = None) -> Sweep:
+def swept(points: F32 | None = None) -> RoadProfile | None:
     points = road() if points is None else points
     planes: F64 = np.array([[0.0, 0.0, 1.0, 0.8]])
-    ground = Ground(np.ones(len(points), dtype=np.bool_), planes, np.array([0.0, 60.0]), np.array([True]))
-    return Sweep(points, ground)
+    return road_ahead(
+        points, Ground(np.ones(len(points), dtype=np.bool_), planes, np.array([0.0, 60.0]), np.array([True]))
+    )
 
 
 def box_of(range_m: float, height_m: float = 1.5, y_m: float = 0.0, width_m: float = 1.8) -> Box:
@@ -54,7 +48,7 @@ def seen(bbox: Box, distance_m: float | None, label: str = "car") -> VisionMeasu
 
 def contact(*boxes: VisionMeasurement, points: F32 | None = None) -> VisionMeasurement:
     """The first box, measured among the others."""
-    found = measure_contacts(boxes, swept(points), aligned(), None, FusionParams())
+    found = measure_contacts(boxes, swept(points), aligned(), FusionParams())
     assert found is not None
     return found[0]
 
@@ -119,9 +113,9 @@ def test_a_camera_that_is_turned_a_little_stays_within_its_sigma(range_m: float,
 def test_without_what_it_rests_on_boxes_stay_as_they_are() -> None:
     boxes = (seen(box_of(40.0), 40.0),)
     params, angular = FusionParams(), Angular(0.001, 0.001, MIDDLE_PX, HORIZON_PX)
-    assert measure_contacts(None, swept(), aligned(), None, params) is None
-    assert measure_contacts(boxes, swept(road()[:10]), aligned(), None, params) == boxes
-    assert measure_contacts(boxes, Sweep(road(), None), aligned(), None, params) == boxes
-    assert measure_contacts(boxes, swept(), None, None, params) == boxes
-    assert measure_contacts(boxes, swept(), angular, None, params) == boxes, "its rays do not start at the camera"
-    assert measure_contacts(boxes, swept(), aligned(), None, FusionParams(use_ground_contact=False)) == boxes
+    assert measure_contacts(None, swept(), aligned(), params) is None
+    assert measure_contacts(boxes, swept(road()[:10]), aligned(), params) == boxes
+    assert measure_contacts(boxes, road_ahead(road(), None), aligned(), params) == boxes
+    assert measure_contacts(boxes, swept(), None, params) == boxes
+    assert measure_contacts(boxes, swept(), angular, params) == boxes, "its rays do not start at the camera"
+    assert measure_contacts(boxes, swept(), aligned(), FusionParams(use_ground_contact=False)) == boxes

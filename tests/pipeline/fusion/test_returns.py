@@ -25,18 +25,15 @@ def aligned() -> Alignment:
     return found
 
 
-class FlatRoad:
-    """0.8 m under the sensor."""
-
-    def height(self, xy: np.ndarray) -> np.ndarray:
-        return np.full(len(xy), -0.8)
+ROAD = Ground(np.zeros(0, bool), np.array([[0.0, 0.0, 1.0, 0.8]]), np.array([0.0, 100.0]), np.ones(1, bool))
+"""Flat, 0.8 m under the sensor."""
 
 
 @dataclass
 class Sweep:
     points: F32
     kind: I32
-    ground: Ground | None = FlatRoad()  # type: ignore[assignment]
+    ground: Ground | None = field(default_factory=lambda: ROAD)
     origin: Point3 = (0.0, 0.0, 0.0)
 
 

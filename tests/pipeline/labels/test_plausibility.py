@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from pipeline.common.geometry import Cuboid
+from pipeline.labels.formats.base import drive_of
+from pipeline.labels.formats.registry import import_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
 from pipeline.labels.plausibility import problems
+from pipeline.sources import open_source
 from tests.pipeline.labels.formats.sets import COUNT, drive
 
 BY = Origin("person", "Ada", 1)
@@ -67,3 +71,26 @@ def test_a_box_that_somebody_set_elsewhere_is_found() -> None:
     track = LabelTrack(1, "car", (Sighting(0, CAR, (5.0, 5.0, 60.0, 50.0), box_set=True),), "accepted", BY)
     assert found(track) == [(0, "#1 car: its box is not where its cuboid is")]
     assert found(replace(track, sightings=(replace(track.sightings[0], box_set=False),))) == [], "one that follows is"
+
+
+def test_a_labelled_street_is_plausible_and_what_is_put_wrong_in_it_is_found(data_dir: Path) -> None:
+    """KITTI 0009: in each track, one cuboid is moved, turned or made longer."""
+    folder = data_dir / "kitti_0009"
+    if not folder.is_dir():
+        pytest.skip(f"no KITTI drive at {folder}")
+    street = drive_of(open_source(f"kitti:{folder / '2011_09_26' / '2011_09_26_drive_0009_sync'}"))
+    labels = import_labels(folder / "label_02.txt", street, "kitti-tracking", BY).labels
+    assert problems(labels, street) == []
+    wrong = {
+        "it jumps": lambda car: car._replace(center=(car.center[0] + 0.6, *car.center[1:])),
+        "it turns": lambda car: car._replace(yaw_rad=car.yaw_rad + 0.2),
+        "its size": lambda car: car._replace(size=(car.size[0] + 0.4, *car.size[1:])),
+    }
+    for said, change in wrong.items():
+        for track in (each for each in labels.tracks if len(each.sightings) > 4):
+            middle = track.sightings[2]
+            assert middle.cuboid is not None
+            odd = replace(middle, cuboid=change(middle.cuboid))
+            changed = replace(track, sightings=(*track.sightings[:2], odd, *track.sightings[3:]))
+            words = [each.words for each in problems(replace(labels, tracks=(changed,)), street)]
+            assert any(said in each for each in words), (said, track.id, words)

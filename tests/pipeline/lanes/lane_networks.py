@@ -36,14 +36,14 @@ _NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
 def twin(path: Path, size: Size = (72, 128)) -> Path:
-    """Two masks: nothing drivable, and a line where 0–1 red is above a half."""
+    """Two masks: nothing drivable, and a line where red (0–1) is above one half."""
     road, first = _linear("da", [_NOTHING, (0.0, 0.0, 0.0, -9.0)])
     line, second = _linear("ll", [_NOTHING, (40.0, 0.0, 0.0, -20.0)])
     return _saved(path, [road, line], {**first, **second}, ["da", "ll"], size)
 
 
 def yolop(path: Path, size: Size = (128, 128)) -> Path:
-    """Boxes and two masks; full red is above 1.5 only after ImageNet's mean and spread."""
+    """Boxes and two masks; full red exceeds 1.5 only after normalisation with ImageNet's mean and deviation."""
     road, first = _linear("drive_area_seg", [_NOTHING, (0.0, 0.0, 0.0, -9.0)])
     line, second = _linear("lane_line_seg", [_NOTHING, (40.0, -20.0, -20.0, -60.0)])
     none = helper.make_node("Identity", ["boxes"], ["det_out"])
@@ -52,8 +52,9 @@ def yolop(path: Path, size: Size = (128, 128)) -> Path:
 
 
 def lstr(path: Path, size: Size = (72, 128)) -> Path:
-    """Two curves and a mask that must be empty: the first is the upright line at x = 0.5 from the middle of the input
-    to its lower edge, the second is said not to be there. Training leaves outputs of the same shapes behind."""
+    """Two curves and a mask that must be empty. The first curve is the upright line at x = 0.5 from the middle of the
+    input to its lower edge; the second has a low score. Real exports have further outputs of the same shapes, left from
+    training."""
     upright, elsewhere = (0.5, 1.0, 0.0, 0.4, 0.0, 0.5, 0.0, 0.0), (0.5, 1.0, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0)
     weights = {
         "scores": np.array([[(-4.0, 4.0), (4.0, -4.0)]]),
@@ -77,7 +78,7 @@ def lstr(path: Path, size: Size = (72, 128)) -> Path:
 
 
 def classes(path: Path, size: Size = (72, 128), there: tuple[float, ...] = (0.0, 1.0, 1.0, 0.0)) -> Path:
-    """Five classes: red is the second line, green the third; and which lines are there."""
+    """Five classes: red is the second line, green the third. there: probability of each line."""
     rows = [(0.0, 0.0, 0.0, 20.0), _NOTHING, (40.0, -20.0, -20.0, 0.0), (-20.0, 40.0, -20.0, 0.0), _NOTHING]
     node, weights = _linear("seg", rows)
     exist = helper.make_node("Identity", ["there"], ["exist"])
@@ -85,7 +86,7 @@ def classes(path: Path, size: Size = (72, 128), there: tuple[float, ...] = (0.0,
 
 
 def rows(path: Path, anchors: int = 56, cells: int = 100, cell: int = 25) -> Path:
-    """A row grid whose second line is in ``cell`` in every row, and whose other lines are nowhere."""
+    """A row grid whose second line is in ``cell`` in every row, without other lines."""
     values = np.zeros((1, cells + 1, anchors, 4))
     values[0, cells] = 10.0
     values[0, cells, :, 1] = 0.0

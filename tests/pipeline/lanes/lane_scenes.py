@@ -1,4 +1,4 @@
-"""Painted lines on a flat road as a camera sees them."""
+"""Painted lines on a flat road, as seen by a camera."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def paint(
     seed: int = 0,
     x_m: tuple[float, float] = (4.0, 45.0),
 ) -> RawLanes:
-    """Points of y(x) = Σ c_k·x^k, about one a row, as a detector gives them. clutter: points anywhere below the
-    horizon. numbered: with the line that each belongs to."""
+    """Points of y(x) = Σ c_k·x^k, about one per row, as from a detector. clutter: number of random points below the
+    horizon. numbered: whether each point has the number of its line."""
     random = np.random.default_rng(seed)
     seen, of = [np.zeros((0, 2))], [np.zeros(0, np.int64)]
     for number, coefficients in enumerate(lines):

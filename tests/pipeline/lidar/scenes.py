@@ -1,4 +1,4 @@
-"""Sweeps made by hand: a VLP-16 over a plane road with boxes on it, by intersecting rays; and real ones."""
+"""Synthetic sweeps of a VLP-16 over a plane road with boxes on it, by intersecting rays; and real sweeps."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from pipeline.types import F32, F64, Frame
 from pipeline.types.source import TruthObject
 
 Block = tuple[float, float, float, float, float, float]
-"""x, y, z from; x, y, z to."""
+"""Minimum x, y, z and maximum x, y, z."""
 
 
 def scan(blocks: Sequence[Block] = (), height_m: float = 1.5, tilt_deg: tuple[float, float] = (0.0, 0.0)) -> F32:
-    """(N, 4) the returns of 16 rings of 600 columns within 60 m. The road is ``height_m`` below the sensor; blocks
-    stand in its frame; then all is turned by (roll, pitch)."""
+    """(N, 4) returns of 16 rings with 600 columns within 60 m. The road is ``height_m`` below the sensor, blocks are
+    given in the sensor's frame, and the result is then rotated by (roll, pitch)."""
     elevation = np.radians(np.arange(-15.0, 16.0, 2.0))
     azimuth = np.radians(np.arange(0.0, 360.0, 0.6))
     e, a = (g.ravel() for g in np.meshgrid(elevation, azimuth))
@@ -39,15 +39,15 @@ def scan(blocks: Sequence[Block] = (), height_m: float = 1.5, tilt_deg: tuple[fl
 
 
 def road_height(xy: F64, height_m: float, tilt_deg: tuple[float, float]) -> F64:
-    """The road's z at places of the turned frame."""
+    """The road's z at positions in the rotated frame."""
     normal = rotation(np.radians(tilt_deg[0]), np.radians(tilt_deg[1]), 0.0)[:, 2]
     return np.asarray((-height_m - xy @ normal[:2]) / normal[2])
 
 
 @cache
 def real_frames(data_dir: Path) -> tuple[tuple[Frame, tuple[TruthObject, ...]], ...]:
-    """Every real frame: Astyx (16 rings) and KITTI cut to what a VLP-16 would see of it (about 10 rings). Read once for
-    all tests of a process, and kept without the images, which no test of the LiDAR looks at."""
+    """Every real frame: Astyx (16 rings), and KITTI reduced to a VLP-16 (about 10 rings). Read once per process and
+    kept without images, which LiDAR tests do not need."""
     sources = [open_source(f"astyx:{data_dir / 'astyx'}"), open_source(f"kitti:{data_dir / 'kitti_0052'}")]
     return tuple(
         (evolve(source.frame(index), image=None), source.truth(index) or ())

@@ -8,7 +8,7 @@ from pipeline.types.lane import EgoLane, LaneLine, Side
 
 
 def straight_lane(sigma_m: float = 0.05) -> EgoLane:
-    """A straight lane, 3.5 m wide, whose lines are as sure everywhere."""
+    """A straight lane, 3.5 m wide, with the same sigma everywhere."""
 
     def line(side: Side, y_m: float) -> LaneLine:
         covariance = np.diag([sigma_m**2, 1e-8, 1e-12, 1e-16])

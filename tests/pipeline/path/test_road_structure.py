@@ -51,14 +51,16 @@ def test_what_stands_counts_and_walls_block_more_than_cars() -> None:
 
 
 def test_cells_move_with_the_car_and_are_forgotten() -> None:
-    cells = Cells(np.array([[10.0, 2.0], [-7.5, 0.0]]), np.ones(2), np.zeros(2), np.ones(2, np.bool_))
+    cells = Cells(np.array([[10.0, 2.0], [-7.5, 0.0]]), np.ones(2), np.zeros(2), np.ones(2, np.bool_), np.zeros(2))
     moved = road_structure.moved(cells, EgoState(0, 10.0, 0.0), 0.1)
     assert moved.xy == pytest.approx(np.array([[9.0, 2.0]])), "the other is too far behind"
     assert len(road_structure.moved(cells, EgoState(0, 0.0, 0.0), 3.0).xy) == 0
 
 
 def test_one_cell_of_the_grid_is_one_vote() -> None:
-    before = Cells(np.array([[10.1, 2.1], [20.0, 2.0]]), np.ones(2), np.array([0.5, 0.5]), np.ones(2, np.bool_))
-    fresh = Cells(np.array([[10.2, 2.2], [10.3, 2.3]]), np.ones(2), np.zeros(2), np.ones(2, np.bool_))
+    before = Cells(
+        np.array([[10.1, 2.1], [20.0, 2.0]]), np.ones(2), np.array([0.5, 0.5]), np.ones(2, np.bool_), np.zeros(2)
+    )
+    fresh = Cells(np.array([[10.2, 2.2], [10.3, 2.3]]), np.ones(2), np.zeros(2), np.ones(2, np.bool_), np.zeros(2))
     merged = road_structure.merged(before, fresh)
     assert sorted(merged.age_s.tolist()) == [0.0, 0.5]

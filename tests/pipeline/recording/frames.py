@@ -1,4 +1,4 @@
-"""Small frames that hold everything a frame can hold, and what makes two of them the same."""
+"""Small frames with everything that a frame can contain, and their comparison."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TRUTH = (TruthObject("car", Cuboid((20.0, 0.1, 0.3), (4.0, 1.8, 1.5), 0.01), 7),
 
 
 def sweep(index: int = 0, points: int = 40, t_ns: int | None = None) -> Sweep:
-    """Random points of a random 16-channel sweep, the same for the same index."""
+    """A random 16-channel sweep, the same for the same index."""
     random = np.random.default_rng(index)
     xyzi = random.normal(0.0, 20.0, (points, 4)).astype(np.float32)
     ring = random.integers(0, 16, points).astype(np.uint8)
@@ -39,7 +39,7 @@ def sweep(index: int = 0, points: int = 40, t_ns: int | None = None) -> Sweep:
 
 
 def image(index: int = 0, kind: str = ".jpg", t_ns: int | None = None) -> CameraImage:
-    """Noise, the same for the same index; only a JPEG has its encoded form."""
+    """An image of noise, the same for the same index. Only a JPEG has its encoded form."""
     bgr = np.random.default_rng(index).integers(0, 255, (24, 32, 3)).astype(np.uint8)
     if kind != ".jpg":
         return CameraImage(t_ns, bgr)
@@ -67,7 +67,7 @@ def full(index: int) -> Frame:
 
 
 def write(path: Path, frames: list[Frame], params: Params | None = None, result: dict[str, Any] | None = None) -> Path:
-    """A session of these frames, closed."""
+    """Write a finished session of these frames."""
     writer = SessionWriter(path, ABOUT)
     for frame in frames:
         writer.write(frame, result, params, truth=TRUTH)
@@ -76,7 +76,7 @@ def write(path: Path, frames: list[Frame], params: Params | None = None, result:
 
 
 def same(a: object, b: object) -> bool:
-    """Equal in every bit, arrays and all that is inside."""
+    """Whether both are equal in every bit, including nested values and arrays."""
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         equal = isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and a.dtype == b.dtype and a.shape == b.shape
         return equal and a.tobytes() == b.tobytes()

@@ -37,7 +37,7 @@ POINT = np.dtype(
         "itemsize": 32,
     }
 )
-"""As velodyne_pointcloud packs them."""
+"""The layout of points in velodyne_pointcloud."""
 
 
 @cache
@@ -49,7 +49,7 @@ def _store(ros1: bool) -> Any:
 
 
 class BagWriter:
-    """One bag of either generation, written by the same messages."""
+    """Writes one bag of ROS 1 or ROS 2 from the same messages."""
 
     def __init__(self, path: Path, kind: Kind) -> None:
         self.kind = kind
@@ -73,7 +73,7 @@ class BagWriter:
         self._writer.write(self._connections[topic], recorded_ns, to_bytes(message, kind))
 
     def make(self, kind: str, **values: Any) -> Any:
-        """A message of a ROS 2 type's name; ``seq`` and the names of CameraInfo's fields differ in ROS 1."""
+        """A message, by its ROS 2 type name. In ROS 1, it has ``seq``, and CameraInfo's fields have other names."""
         return self.store.types[kind](**values)
 
     def time(self, t_ns: int) -> Any:
@@ -154,7 +154,7 @@ class BagWriter:
         )
 
     def transforms(self, *edges: tuple[str, str, tuple[float, float, float], tuple[float, float, float, float]]) -> Any:
-        """Parent, child, translation, quaternion x y z w."""
+        """A message of transforms. Each edge: parent, child, translation, quaternion x y z w."""
         made = []
         for parent, child, (x, y, z), (qx, qy, qz, qw) in edges:
             moved = self.make("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
@@ -198,12 +198,12 @@ class BagWriter:
 
 
 OPTICAL = (-0.5, 0.5, -0.5, 0.5)
-"""Quaternion of an optical frame in its body's: z forward, x right, y down."""
+"""Quaternion of an optical frame (z forward, x right, y down) in its body frame."""
 
 
 def write_bag(path: Path, kind: Kind = "db3", sweeps: int = 3, every: int = 1) -> Path:
-    """A car at 12 m/s: clouds, images 20 ms after them, fixes, odometry, a camera 0.3 m above the LiDAR, which is
-    turned 90° to the left on the car. every: of the clouds' points only each n-th."""
+    """A bag of a car at 12 m/s: clouds, images 20 ms later, fixes, odometry. The LiDAR is turned 90° to the left on the
+    car, with the camera 0.3 m above it. every: keep only every n-th point of the clouds."""
     with BagWriter(path, kind) as bag:
         half = float(np.sqrt(0.5))
         tree = bag.transforms(
@@ -226,7 +226,7 @@ def write_bag(path: Path, kind: Kind = "db3", sweeps: int = 3, every: int = 1) -
 
 
 def write_packet_bag(path: Path, kind: Kind = "db3", sweeps: int = 4) -> Path:
-    """VelodyneScan messages that begin and end ahead of the car, as some drivers cut them."""
+    """VelodyneScan messages that begin and end ahead of the car, like those of some drivers."""
     stream = drive(sweeps)
     with BagWriter(path, kind) as bag:
         for begin in range(0, len(stream), 75):
@@ -237,7 +237,7 @@ def write_packet_bag(path: Path, kind: Kind = "db3", sweeps: int = 4) -> Path:
 
 
 def write_long_bag(path: Path, sweeps: int) -> Path:
-    """Clouds and raw 720p images, 3 MB of both ten times a second."""
+    """Clouds and raw 720p images at 10 Hz, 3 MB each time."""
     pixels = np.random.default_rng(0).integers(0, 255, (720, 1280, 3), dtype=np.uint8)
     with BagWriter(path, "mcap") as bag:
         for index in range(sweeps):

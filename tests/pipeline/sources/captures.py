@@ -1,4 +1,4 @@
-"""Captures written by hand: classic pcap and pcapng, of Ethernet frames with UDP datagrams in them."""
+"""Synthetic captures: classic pcap and pcapng, with Ethernet frames that contain UDP datagrams."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from tests.pipeline.formats.velodyne.streams import START_NS, drive
 
 Datagrams = Iterable[tuple[int, int, bytes]]
-"""When captured (ns), port, payload."""
+"""Capture time (ns), port, payload."""
 
 
 def ethernet(port: int, payload: bytes, vlan: bool = False, version: int = 4, kind: int = 17) -> bytes:
@@ -36,7 +36,8 @@ def pcap(datagrams: Datagrams, order: str = "<", nano: bool = False, link: int =
 
 
 def pcapng(datagrams: Datagrams, order: str = "<", nano: bool = True, interface: int = 0) -> bytes:
-    """interface: the number of the one that the datagrams come through; those before it are silent, and of raw IP."""
+    """A pcapng file. interface: number of the interface with the datagrams; those before it are raw IP and without
+    packets."""
 
     def block(kind: int, body: bytes) -> bytes:
         body += bytes(-len(body) % 4)
@@ -61,7 +62,7 @@ def lidar(sweeps: int, port: int = 2368) -> list[tuple[int, int, bytes]]:
 
 
 def write_capture(folder: Path) -> Path:
-    """A folder with one capture of three sweeps, a video, sentences and a rig beside it."""
+    """Write a folder with a capture of three sweeps and its sidecar files: a video, NMEA sentences and a rig file."""
     folder.mkdir(parents=True)
     (folder / "drive.pcap").write_bytes(pcap(lidar(3), nano=True))
     write_video(folder / "drive.avi", 8)
@@ -78,7 +79,7 @@ camera:
 
 
 def write_video(path: Path, images: int, rate: int = 25, codec: str = "mjpeg", step: int = 20) -> None:
-    """Images whose grey is ``step`` times their number, 80×48."""
+    """A video of 80×48 px; the grey level of each image is ``step`` times its number."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream(codec, rate=rate)
         stream.width, stream.height, stream.pix_fmt = 80, 48, "yuvj420p" if codec == "mjpeg" else "yuv420p"
@@ -89,7 +90,7 @@ def write_video(path: Path, images: int, rate: int = 25, codec: str = "mjpeg", s
 
 
 def sentences(seconds: Iterable[int]) -> list[str]:
-    """GGA and RMC, once a second from the beginning of the capture on, going north at 10 m/s."""
+    """GGA and RMC once per second from the start of the capture, moving north at 10 m/s."""
     lines = []
     for second in seconds:
         at = START_NS // 10**9 - 1 + second

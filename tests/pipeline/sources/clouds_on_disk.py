@@ -51,7 +51,7 @@ def pcd(rows: np.ndarray[Any, np.dtype[np.void]], encoding: str = "binary") -> b
 
 
 def lzf(data: bytes) -> bytes:
-    """Literals, and runs of one byte as the copies of one byte back that LZF makes of them."""
+    """LZF compression: literals, and runs of one byte as back-references by one byte."""
     out, literals, at = bytearray(), bytearray(), 0
 
     def flush() -> None:
@@ -71,14 +71,14 @@ def lzf(data: bytes) -> bytes:
             flush()
             length = run - 1
             out += bytes([(length - 2) << 5]) if length < 9 else bytes([7 << 5, length - 9])
-            out.append(0)  # one back
+            out.append(0)  # distance: one byte back
             at += length
     flush()
     return bytes(out)
 
 
 def write_clouds(folder: Path, encoding: str = "binary") -> Path:
-    """Two sweeps named by their times, and their images."""
+    """Write two sweeps named by their times, and their images."""
     (folder / "images").mkdir(parents=True)
     for index, stamp in enumerate(STAMPS_NS):
         rows = rows_of(ring_wall(0, 10.0 - index))[:: 1 if encoding != "ascii" else 20]

@@ -19,7 +19,7 @@ LIDAR_ROWS = [
     "20.00 0.50 0.20 33 15 1000014",
 ]
 CAMERA_AXES = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""Columns: the camera's x, y and z in ego axes, for a camera that looks along ego +x."""
+"""Columns: the camera's x, y and z axes in the ego frame, for a camera that looks along ego +x."""
 
 
 def astyx_calibration() -> dict[str, object]:
@@ -57,7 +57,7 @@ def write_astyx(folder: Path, names: tuple[str, ...] = ("000001", "000002")) -> 
 
 
 def rings_file(count: int = 64, columns: int = 40) -> bytes:
-    """A Velodyne file of rings from +2° down to −23.5°, highest first, each counter-clockwise from straight ahead."""
+    """A Velodyne file with rings from +2° down to −23.5°, highest first, each counter-clockwise from straight ahead."""
     elevation = np.radians(np.linspace(2.0, -23.5, count))[:, None]
     azimuth = np.radians(np.linspace(0.5, 359.5, columns))[None, :]
     x, y = np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth)
@@ -106,14 +106,14 @@ def write_kitti_raw(date: Path) -> Path:
     stamps = "".join(f"2011-09-26 13:04:32.{100 + 103 * i:03d}000512\n" for i in range(4))
     (drive / "velodyne_points" / "timestamps.txt").write_text(stamps)
     (drive / "image_02" / "timestamps.txt").write_text(stamps.replace("000512", "004000"))
-    for i in (0, 1, 3):  # the recording lacks the sweep of frame 2
+    for i in (0, 1, 3):  # frame 2 has no sweep
         (drive / "velodyne_points" / "data" / f"{i:010d}.bin").write_bytes(rings_file())
     for i in range(4):
         cv2.imwrite(str(drive / "image_02" / "data" / f"{i:010d}.png"), np.zeros((40, 120, 3), dtype=np.uint8))
         record = [0.0] * 30
         record[8], record[22] = 13.5 + i, 0.02
         record[0], record[1], record[2] = 49.0, 8.4, 112.0
-        record[5], record[6], record[7] = math.pi / 2, 13.5 + i, 0.0  # it drives north
+        record[5], record[6], record[7] = math.pi / 2, 13.5 + i, 0.0  # the car drives north
         record[23], record[27] = 0.04, 5.0 if i else 2.0
         (drive / "oxts" / "data" / f"{i:010d}.txt").write_text(" ".join(map(str, record)))
     head = "calib_time: 09-Jan-2012 13:57:47\n"

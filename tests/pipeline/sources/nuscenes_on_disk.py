@@ -1,5 +1,5 @@
-"""A small data set in nuScenes' layout, written by its published schema: one or two scenes of a round wall, a car on an
-arc, boxes in the key frames."""
+"""A small data set in nuScenes' layout, written according to its published schema: one or two scenes with a round wall,
+a car on an arc, and boxes in the key frames."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ START_US, STEP_US = 1_532_402_927_647_951, 50_000
 SPEED_MPS, YAW_RATE_RADPS = 10.0, 0.2
 LIDAR_AT, CAMERA_AT = (0.94, 0.0, 1.84), (1.7, 0.0, 1.5)
 BOX_AT, BOX_SIZE = (20.0, 3.0, 0.9), (1.9, 4.6, 1.7)
-"""In the car's frame of the first sweep; width, length, height."""
+"""Position in the car's frame at the first sweep; width, length, height."""
 _LIDAR_YAW = -np.pi / 2
-"""The sensor's y looks ahead."""
+"""The sensor's y axis points ahead."""
 _CAMERA_AXES = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
 def write_nuscenes(folder: Path, frames: int = 12, scenes: int = 1, cloud: Callable[[int], F32] | None = None) -> Path:
-    """frames: sweeps a scene; every tenth is a key frame. cloud: (N, 5) ``x y z intensity ring`` in the sensor's axes
-    of a sweep."""
+    """Write the data set. frames: number of sweeps per scene; every tenth is a key frame. cloud: returns (N, 5) ``x y z
+    intensity ring`` of a sweep in the sensor's frame."""
     for name in ("samples/LIDAR_TOP", "sweeps/LIDAR_TOP", "samples/CAM_FRONT", "sweeps/CAM_FRONT", "v1.0-mini", "maps"):
         (folder / name).mkdir(parents=True)
     tables: dict[str, list[dict[str, Any]]] = {
@@ -85,7 +85,7 @@ def _write_scene(
 
 
 def wall(ahead_m: float = 12.0) -> F32:
-    """(N, 5): a wall straight ahead, left half of it bright, as 32 rings see it."""
+    """(N, 5): a wall straight ahead as seen by 32 rings; its left half is bright."""
     left, up = np.meshgrid(np.linspace(-4.0, 4.0, 41), np.linspace(-1.5, 1.5, 32))
     ring = np.repeat(np.arange(32), 41)
     intensity = np.where(left.ravel() > 0, 200.0, 20.0)
@@ -93,7 +93,7 @@ def wall(ahead_m: float = 12.0) -> F32:
 
 
 def car_at(t_s: float) -> F64:
-    """(4, 4) of the car's frame on the map: on an arc, far from the map's origin."""
+    """(4, 4) pose of the car on the map: on an arc, far from the map's origin."""
     heading = 0.7 + YAW_RATE_RADPS * t_s
     radius = SPEED_MPS / YAW_RATE_RADPS
     T = np.eye(4)
@@ -109,7 +109,7 @@ def _at(place: Sequence[float]) -> F64:
 
 
 def quaternion(R: F64) -> list[float]:
-    """w x y z."""
+    """The quaternion w x y z of a rotation matrix."""
     vector, _ = cv2.Rodrigues(R)
     angle = float(np.linalg.norm(vector))
     axis = vector.ravel() / angle if angle > 1e-12 else np.zeros(3)

@@ -21,7 +21,7 @@ from pipeline.sources import SourceError, open_any, open_source
         ("astyx:missing/folder", "missing/folder: no such folder"),
         ("kitti:missing/folder", "missing/folder: no such folder"),
         ("astyx:bad\0name", "no such folder"),
-        ("astyx:~no_such_user_here/x", "cannot be opened"),
+        ("astyx:~no_such_user_here/x", "~no_such_user_here/x: unknown home directory"),
         ("sim:", "no scenario named ''; there are"),
         ("sim:drive.xosc", "drive.xosc: not a scenario file: its name must end in .yaml"),
         ("sim:folder/nosuch", "folder/nosuch: not a scenario file"),

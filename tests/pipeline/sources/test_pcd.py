@@ -106,7 +106,7 @@ def test_names_that_are_no_times_are_ten_a_second(tmp_path: Path) -> None:
         (tmp_path / f"{name}.pcd").write_bytes(pcd(ROWS))
     source = open_source(f"pcd:{tmp_path}")
     assert [source.t_ns(index) for index in range(2)] == [0, 100_000_000]
-    assert source.notes[0] == "no time stamps in the file names: 10 Hz assumed"
+    assert source.notes[0] == "no timestamps in the file names: 10 Hz assumed"
     assert [source.frame(index).name for index in range(2)] == ["000001", "000002"]
 
 

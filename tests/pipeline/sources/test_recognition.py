@@ -230,6 +230,13 @@ def test_anything_else_is_answered_in_one_line(what: str, tmp_path: Path) -> Non
     assert "\n" not in str(error.value)
 
 
+def test_a_scheme_may_name_the_folder_around_the_recording(tmp_path: Path) -> None:
+    day = write_kitti_raw(tmp_path / "kitti").parent
+    assert len(open_source(f"kitti:{day.parent}")) == len(open_source(str(day)))
+    with pytest.raises(SourceError, match="not an Astyx recording"):
+        open_source(f"astyx:{day}")
+
+
 def test_options_follow_the_path_of_a_folder_that_stands_for_its_one_recording(tmp_path: Path) -> None:
     folder = video(tmp_path / "drive").parent
     assert len(open_source(f"{folder}?rate_hz=5")) < len(open_source(str(folder)))

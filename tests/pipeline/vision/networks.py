@@ -1,4 +1,4 @@
-"""Tiny ONNX networks for tests: real graphs that onnxruntime runs, whose answers follow from the image itself."""
+"""Tiny ONNX networks for tests: real graphs for onnxruntime, whose outputs are simple functions of the image."""
 
 from __future__ import annotations
 
@@ -131,5 +131,5 @@ def detr(path: Path) -> Path:
 
 
 def classifier(path: Path) -> Path:
-    """A network that is no detector."""
+    """A network that is not a detector."""
     return _save(path, [helper.make_node("GlobalAveragePool", ["images"], ["output"])], [], ["output"], (64, 64))

@@ -47,6 +47,17 @@ def test_a_rider_stays_beside_the_motorcycle() -> None:
     assert _kept(raw) == [("motorcycle", 0.9), ("person", 0.8)]
 
 
+def test_what_is_never_on_a_road_is_dropped() -> None:
+    raw = _raw((A, "suitcase", 0.9), (B, "person", 0.5), (A, "traffic light", 0.8), (A, "reindeer", 0.4))
+    assert _kept(raw) == [("person", 0.5), ("reindeer", 0.4)], "an unknown class may be a road user"
+    assert len(_kept(raw, road_users_only=False)) == 4
+
+
+def test_a_train_on_a_road_is_a_bus() -> None:
+    assert _kept(_raw((A, "train", 0.9), (B, "train", 0.5), (B, "truck", 0.4))) == [("bus", 0.9), ("bus", 0.5)]
+    assert _kept(_raw((A, "train", 0.5), (A_SHIFTED, "car", 0.4))) == [("car", 0.5)]
+
+
 def test_ties_keep_the_detectors_order() -> None:
     assert [d.bbox[0] for d in select(_raw((B, "car", 0.5), (A, "car", 0.5)), DetectionParams())] == [300, 0]
 

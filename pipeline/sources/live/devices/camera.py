@@ -10,7 +10,7 @@ from pipeline.sources.live.devices.sensor_input import Deliver
 from pipeline.sources.live.health import StreamStats
 from pipeline.types.camera_shot import Shot, is_whole_jpeg
 
-_ARRIVAL = "sends no time stamps: images are stamped on arrival"
+_ARRIVAL = "sends no timestamps: images are stamped on arrival"
 
 
 class CameraInput:

@@ -1,5 +1,5 @@
 """MJPEG over HTTP (multipart/x-mixed-replace), read with the standard library. Every JPEG is kept unchanged, and so is
-the time stamp that many cameras send with it, which video libraries drop."""
+the timestamp that many cameras send with it, which video libraries drop."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import * as draft from "../state/draft.js";
 import { chosen, shown } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
 import { newLabel } from "../state/new_class.js";
-import { sides } from "../views/path.js";
+import { keep, labelled, sides } from "../views/path.js";
 import { boxOf } from "../views/image_drawing.js";
 
 /** @typedef {import("../../core/types.js").Point2} Point2 */
@@ -114,10 +114,11 @@ export function changeBox(du, dv, isSize) {
   draft.release();
 }
 
-/** @returns {Point2[]} one point per metre, of the drawn path or else the pipeline's */
+/** @returns {Point2[]} one point per metre, of the drawn path, else the labelled one, else the pipeline's */
 function drawnMiddle() {
-  const lines = get("drawnPath");
-  if (lines) return lines.left.map(([x, y], i) => [(x + lines.right[i][0]) / 2, (y + lines.right[i][1]) / 2]);
+  const { left, right } = get("drawnPath") ?? labelled() ?? { left: null, right: null };
+  if (left && right && left.length === right.length)
+    return left.map(([x, y], i) => [(x + right[i][0]) / 2, (y + right[i][1]) / 2]);
   const line = middleOfPath(),
     last = Math.max(STEP_M, line[line.length - 1][0]);
   return Array.from({ length: Math.floor(last / STEP_M) + 1 }, (_, i) => [i * STEP_M, lateral(line, i * STEP_M)]);
@@ -147,11 +148,5 @@ export function lengthenPath(direction) {
   );
 }
 
-/** Save the drawn path, or else the pipeline's. */
-export async function keepPath() {
-  const lines = get("drawnPath") ?? sides(drawnMiddle());
-  setTool(null);
-  set("drawnPath", lines);
-  await act({ kind: "set_path", frame: shown(), ...lines });
-  set("drawnPath", null);
-}
+/** Save the drawn path, else the labelled or the pipeline's. */
+export const keepPath = () => keep(get("drawnPath") ?? sides(drawnMiddle()));

@@ -108,7 +108,7 @@ export async function send() {
         return tell("failed", answer instanceof Refused ? answer.message : "cannot reach the server");
       queue.shift();
       if (refusal) await refused(next, refusal);
-      else settle(next, /** @type {ActAnswer} */ (answer));
+      else await settle(next, /** @type {ActAnswer} */ (answer));
     }
   } finally {
     busy = false;
@@ -144,18 +144,19 @@ async function refused(waiting, refusal) {
 const tell = (state, problem = "") => set("saving", { state, at_ms: savedAt_ms, problem });
 
 /**
- * Handle an answer. Background tasks (proposals, imports) and acts without effect do not count as saved.
+ * Handle an answer. Background tasks (proposals, imports) and acts without effect do not count as saved. Whoever waits
+ * for the act goes on when the page knows what it changed.
  * @param {Waiting} waiting
  * @param {ActAnswer} answer
  */
-function settle({ act, done }, answer) {
+async function settle({ act, done }, answer) {
   if (answer.act != null) savedAt_ms = Date.now();
   tell("saved");
   const how = { undo: "undone: ", redo: "redone: " }[act.kind] ?? "";
   set("said", how + [answer.what, answer.note].filter(Boolean).join(": "));
   if (answer.changed) {
     for (const later of queue) later.act = rebased(later.act, act, answer);
-    data.accept(answer.changed);
+    await data.accept(answer.changed);
   }
   done(answer);
 }

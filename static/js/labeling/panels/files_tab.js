@@ -8,6 +8,7 @@ import { attachMenu, refill } from "../../workspace/menu.js";
 import { act } from "../acts/queue.js";
 import { propose, say } from "../acts/commands.js";
 import { personName } from "../state/person.js";
+import * as queue from "./queue_list.js";
 
 /** @typedef {import("../state/types.js").Version} Version */
 
@@ -130,10 +131,12 @@ export function setUp(parent) {
     versions,
     el("form", { class: "menu-row", onsubmit: freeze }, freezeName, el("button", { textContent: "Freeze" })),
   );
+  queue.setUp(parent);
 }
 
-/** Reload the versions. */
+/** Reload the versions and the queue. */
 export async function look() {
+  queue.look();
   if (!formats.length) listFormats();
   /** @type {Version[]} */
   const found = await request("api/labels/versions").catch(() => []);

@@ -43,12 +43,15 @@ function follow() {
   if (!get("labels") || state.labels.revision > (get("labels")?.revision ?? 0)) refresh(false);
 }
 
-/** Apply what an act changed, and fetch changes by others. @param {LabelsAnswer} changed */
-export function accept(changed) {
+/**
+ * Apply what an act changed, and fetch changes by others; resolves once the page has both.
+ * @param {LabelsAnswer} changed
+ */
+export async function accept(changed) {
   const labels = get("labels");
   if (labels && labels.drive === changed.drive.id && changed.revision === labels.revision + 1)
     set("labels", merged(labels, changed));
-  else if (labels && changed.revision > labels.revision) refresh(false);
+  else if (labels && changed.revision > labels.revision) await refresh(false);
 }
 
 /** Force a refresh. */

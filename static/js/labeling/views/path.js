@@ -11,6 +11,7 @@ import { setTool } from "../state/mode.js";
 /** @typedef {import("../../core/types.js").Point2} Point2 */
 /** @typedef {import("../../views/drawing/viewport.js").Place} Place */
 /** @typedef {import("../../views/drawing/viewport.js").Viewport} Viewport */
+/** @typedef {{left: Point2[], right: Point2[]}} Lines */
 
 /** Spacing of the points of a drawn path. */
 const STEP_M = 1;
@@ -30,19 +31,32 @@ export function drawing(from) {
     },
     ended: async () => {
       const lines = get("drawnPath");
-      setTool(null);
-      set("drawnPath", lines);
-      if (lines && middle.length > 1) await act({ kind: "set_path", frame: shown(), ...lines });
-      set("drawnPath", null);
+      if (lines && middle.length > 1) await keep(lines);
+      else setTool(null);
     },
     cancelled: () => set("drawnPath", null),
   };
 }
 
 /**
+ * Save a drawn path for this frame. It is shown as drawn until the labels have it; one drawn meanwhile stays.
+ * @param {Lines} lines
+ */
+export async function keep(lines) {
+  setTool(null);
+  set("drawnPath", lines);
+  await act({ kind: "set_path", frame: shown(), ...lines });
+  if (get("drawnPath") === lines) set("drawnPath", null);
+}
+
+/** The labelled path of the current frame. */
+export const labelled = () =>
+  get("labels")?.paths.find(({ frame, state }) => frame === shown() && state !== "rejected") ?? null;
+
+/**
  * Left and right boundaries, half a corridor width from a centre line.
  * @param {Point2[]} middle
- * @returns {{left: Point2[], right: Point2[]}}
+ * @returns {Lines}
  */
 export function sides(middle) {
   const half = Number(get("params")?.values["path.half_width_m"] ?? 1.5);
@@ -62,8 +76,7 @@ export function sides(middle) {
  * @param {Viewport} view
  */
 export function drawPathLabel(ctx, view) {
-  const held = get("labels")?.paths.find(({ frame, state }) => frame === shown() && state !== "rejected"),
-    drawn = get("drawnPath") ?? held;
+  const drawn = get("drawnPath") ?? labelled();
   if (!drawn) return;
   ctx.strokeStyle = color("path");
   ctx.lineWidth = 2.5;

@@ -1,4 +1,4 @@
-"""Drives in numbers, as scores without labels see them."""
+"""Synthetic drives for scores without labels."""
 
 from __future__ import annotations
 

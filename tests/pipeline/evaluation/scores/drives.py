@@ -1,4 +1,4 @@
-"""Drives made by hand: who is where in each frame, what is labelled and what is believed."""
+"""Synthetic drives: the position of each vehicle in each frame, as labelled and as estimated."""
 
 from __future__ import annotations
 
@@ -19,12 +19,13 @@ Place = tuple[float, float]
 
 
 def labelled(key: int, x: float, y: float = 0.0, label: str = "car") -> TruthObject:
-    """A car whose rear face's middle is at (x, y)."""
+    """A car with the middle of its rear face at (x, y)."""
     return TruthObject(label, cuboid(x, y), key)
 
 
 def truth(*frames: Mapping[int, Place] | None, uri: str = "made:1") -> DriveTruth:
-    """One frame every 0.1 s, by id where each vehicle is; null: not labelled. The lead is the nearest in the lane."""
+    """One frame every 0.1 s, each with the position of every vehicle by id; None: not labelled. The lead is the nearest
+    vehicle in the lane."""
     made = {}
     for n, places in enumerate(frames):
         if places is not None:
@@ -34,7 +35,7 @@ def truth(*frames: Mapping[int, Place] | None, uri: str = "made:1") -> DriveTrut
 
 
 def believed(n: int, objects: Sequence[FusedObject], lead: int | None, acc: str | None = None) -> Result:
-    """The pipeline's result of frame ``n``. acc: the state of the controller, None where ego speed is not known."""
+    """The pipeline's result of frame ``n``. acc: state of the controller; None if ego speed is unknown."""
     distance = next((item.distance_m for item in objects if item.id == lead), None)
     return dataclasses.replace(
         EMPTY,

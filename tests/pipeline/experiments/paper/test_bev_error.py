@@ -33,7 +33,9 @@ def test_errors_are_small_near_honest_far_and_stand_beside_the_print(see_again: 
     assert len(section.scenes) == 3
     left = rows["one lane left", "VL", "measured"]
     assert left[7] < 1.0, "lateral mean: the car is in its own lane"  # type: ignore[operator]
-    assert any("better than the LiDAR alone, which does in" in text for text in section.text)
+    assert any(
+        "fused locates the car in" in text and "better than the LiDAR alone with" in text for text in section.text
+    )
     again = see_again(as_drive(cases[1], runs[1]), 50)
     seen = {each.range_m + each.error.distance_m for each in runs[1] if each.error is not None}
     believed = [item.distance_m for result in again for item in result.objects if item.source == "VL"]

@@ -1,4 +1,4 @@
-"""A stream in which a share of the packets is spoiled, against the same stream whole."""
+"""Compares the decoding of a stream with a share of damaged packets with that of the undamaged stream."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ class Report(NamedTuple):
 
 
 def survives(packets: int, share: float, seed: int) -> Report:
-    """AssertionError unless every sweep comes, at its time, with the points of every good packet that was sent.
+    """AssertionError unless every sweep is decoded, with its time and the points of every undamaged packet.
 
-    The same 40 sweeps are sent again and again, spoiled anew, to a fresh decoder.
+    The same 40 sweeps are sent repeatedly, with new damage, each time to a fresh decoder.
+
     """
     whole = [packet for packet, _ in drive(_SWEEPS)]
     clean = _decoded([(packet, True) for packet in whole])[0]
@@ -49,7 +50,7 @@ def _decoded(stream: list[tuple[bytes, bool]]) -> tuple[list[Sweep], VelodyneDec
 
 
 def _good_a_sweep(stream: list[tuple[bytes, bool]], clean: list[Sweep]) -> list[int]:
-    """How many good packets were sent of each sweep."""
+    """Number of undamaged packets of each sweep."""
     cuts_us = [sweep.t_ns // 1000 + 49_766 for sweep in clean]
     counts = [0] * len(clean)
     for packet, good in stream:
@@ -62,12 +63,12 @@ def _compare(clean: list[Sweep], got: list[Sweep], good: list[int], share: float
     by_time = {round(sweep.t_ns / 1e6 / 50): sweep for sweep in got}
     for index, (sweep, packets) in enumerate(zip(clean, good, strict=True)):
         found = by_time.get(round(sweep.t_ns / 1e6 / 50))
-        is_at_an_end = index in (0, len(clean) - 1)  # whose first packets may be the spoiled ones: seen in part only
+        is_at_an_end = index in (0, len(clean) - 1)  # its first packets may be damaged, so it may be incomplete
         if found is None and is_at_an_end:
             continue
         assert found is not None, f"sweep {index} is lost: {packets} of its 75 packets were good"
         assert abs(found.t_ns - sweep.t_ns) < 1_000_000
         a_packet = len(sweep.points) / 75
-        refused_too = max(2.0, share * packets * 0.1)  # good ones taken for the copy of a spoiled one
+        refused_too = max(2.0, share * packets * 0.1)  # undamaged packets mistaken for copies of a damaged one
         assert len(found.points) >= (packets - refused_too) * a_packet
         assert np.isfinite(found.points).all()

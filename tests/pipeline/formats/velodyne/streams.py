@@ -1,4 +1,4 @@
-"""Streams of VLP-16 packets to test with, and ways to spoil them."""
+"""Streams of VLP-16 packets for tests, and ways to damage them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MODE, PRODUCT, STAMP = 1204, 1205, 1200
 
 
 def ring_wall(t_ns: int, range_m: float = 10.0) -> Sweep:
-    """A round wall seen by all 16 rings over the whole rotation, every point on a firing's azimuth."""
+    """A round wall, seen by all 16 rings over the whole rotation, with every point on a firing's azimuth."""
     azimuth = np.radians(np.arange(-179.9, 180.0, 0.4))
     elevation = np.radians(np.arange(-15.0, 16.0, 2.0))
     a, e = (grid.ravel() for grid in np.meshgrid(azimuth, elevation))
@@ -30,8 +30,8 @@ def ring_wall(t_ns: int, range_m: float = 10.0) -> Sweep:
 
 
 def drive(sweeps: int) -> list[tuple[bytes, int]]:
-    """Packets and when the host received them, which is when their last laser fired, of a wall that comes 10 cm nearer
-    with every sweep."""
+    """Packets of a wall that comes 10 cm nearer with every sweep, each with its time of arrival, which is when its last
+    laser fired."""
     stream = []
     for index in range(sweeps):
         packets = packets_of(ring_wall(START_NS + index * STEP_NS, 10.0 - 0.1 * index))
@@ -41,13 +41,13 @@ def drive(sweeps: int) -> list[tuple[bytes, int]]:
 
 
 def decoded(decoder: VelodyneDecoder, stream: list[tuple[bytes, int | None]] | list[tuple[bytes, int]]) -> list[Sweep]:
-    """Every sweep of a stream, with the one under way at its end."""
+    """Every sweep of a stream, including the incomplete one at its end."""
     sweeps = [decoder.push(packet, t_host_ns) for packet, t_host_ns in stream]
     return [sweep for sweep in (*sweeps, decoder.flush()) if sweep is not None]
 
 
 def stamped(packet: bytes, time_us: int) -> bytes:
-    """The packet with another time."""
+    """The packet with another timestamp."""
     return packet[:STAMP] + struct.pack("<I", time_us % 2**32) + packet[MODE:]
 
 
@@ -65,13 +65,13 @@ def with_azimuth(packet: bytes, block: int, cdeg: int) -> bytes:
 
 
 def mutated(packet: bytes, rng: np.random.Generator) -> bytes:
-    """The packet spoiled in one of the ways that a network, a disk or another device spoils one."""
+    """The packet, damaged in one of the ways in which a network, a disk or another device may damage it."""
     data = bytearray(packet)
     match rng.integers(8):
         case 0:  # some bytes
             for at in rng.integers(len(data), size=rng.integers(1, 20)):
                 data[at] = rng.integers(256)
-        case 1:  # one bit of what the packet says about itself
+        case 1:  # one bit of the packet's own metadata
             at = int(rng.choice([*(100 * block + k for block in range(12) for k in range(4)), *range(STAMP, 1206)]))
             data[at] ^= 1 << int(rng.integers(8))
         case 2:
@@ -91,8 +91,8 @@ def mutated(packet: bytes, rng: np.random.Generator) -> bytes:
 
 
 def spoil(stream: list[bytes], share: float, seed: int) -> Iterator[tuple[bytes, bool]]:
-    """The stream with that share of packets spoiled, half of them in place of the good one, half before it: each packet
-    and whether it is good."""
+    """The stream with this share of damaged packets, half of them replacing the original, half preceding it. Yields
+    each packet and whether it is undamaged."""
     rng = np.random.default_rng(seed)
     for packet in stream:
         fate = rng.random()

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.simulation.scenario import load
 from pipeline.simulation.sensors.camera import calibration
-from pipeline.simulation.sensors.faults import Faults, disturb_sweep, nods_rad, true_camera
+from pipeline.simulation.sensors.faults import Faults, Knock, disturb_sweep, nods_rad, true_camera
 from pipeline.simulation.sensors.rig import SensorRig
 from pipeline.simulation.world import world_state
 from pipeline.types import Sweep
@@ -54,6 +54,15 @@ def test_a_camera_that_looks_left_sees_things_farther_to_the_right() -> None:
     turned = true_camera(calibration(), Faults(camera_yaw_deg=0.5))
     before, after = (each.T_camera_ego @ np.array([40.0, 0.0, 0.0, 1.0]) for each in (calibration(), turned))
     assert np.degrees(np.arctan2(after[0], after[2]) - np.arctan2(before[0], before[2])) == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_knock_turns_the_camera_from_then_on() -> None:
+    faults = Faults(camera_yaw_deg=0.5, knock=Knock(at_s=2.0, yaw_deg=1.0))
+    for t_s, yaw_deg in ((1.9, 0.5), (2.0, 1.5)):
+        seen, wanted = (
+            true_camera(calibration(), each, 0.0, t_s).T_camera_ego for each in (faults, Faults(camera_yaw_deg=yaw_deg))
+        )
+        assert seen == pytest.approx(wanted)
 
 
 def test_nods_have_the_size_that_is_asked_for() -> None:

@@ -1,6 +1,6 @@
-"""A car on a bench: what its sensors send, with faults, given to the live source at times of a clock that tests move.
+"""Simulates the sensors of a car, with faults, on a clock that tests control.
 
-No thread, no socket and no waiting: an hour of sensors would take as long as it takes to decode them."""
+It needs no threads, sockets or waiting, so an hour of sensor data takes only the time to decode it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ CONFIG = {
 
 
 class MovedClock(HostClock):
-    """Stands where it is put."""
+    """A clock that shows the time to which it is set."""
 
     def __init__(self) -> None:
         self.at_ns = START
@@ -57,7 +57,7 @@ class MovedClock(HostClock):
 
 @dataclass(frozen=True)
 class Taken:
-    """A frame and when it was taken, seconds after the start."""
+    """A frame, and when it was taken, in seconds after the start."""
 
     frame: Frame
     at_s: float
@@ -68,7 +68,7 @@ class Taken:
 
 
 def small_sweep(t_ns: int) -> Sweep:
-    """One point on each degree and ring, 20 m away."""
+    """One point per degree and ring, 20 m away."""
     azimuth = np.radians(np.arange(-179.0, 180.0))
     elevation = np.radians(np.arange(-15.0, 16.0, 2.0))
     a, e = (each.ravel() for each in np.meshgrid(azimuth, elevation))
@@ -86,7 +86,7 @@ def fix_at(t_ns: int) -> GnssFix:
 
 
 def messages(seconds: float, camera_hz: float = 30.0, gnss_hz: float = 10.0) -> list[Message]:
-    """LiDAR at 10 Hz, camera and receiver, each with a phase of its own."""
+    """Messages of a LiDAR at 10 Hz, a camera and a GNSS receiver, each with its own phase."""
     jpeg, sweep = small_jpeg(), small_sweep(0)
     found = [Message(k * 100 * MS, "lidar", sweep) for k in range(round(seconds * 10))]
     found += [
@@ -106,14 +106,14 @@ def sent(faults: Sequence[Fault], seconds: float = 4.0, camera_hz: float = 30.0)
 
 
 class Bench:
-    """The live source, and what goes into it. ``source``: after ``drive`` it tells how its sensors do."""
+    """The live source and its inputs. ``source``: reports the health of the sensors after ``drive``."""
 
     def __init__(self, config: dict[str, Any] | None = None) -> None:
         self.clock = MovedClock()
         self.source = LiveSensors("live:bench", LiveConfig.model_validate(config or CONFIG), self.clock)
 
     def drive(self, events: Iterator[WireEvent], params: SyncParams | None = None, until_s: float = 0.0) -> list[Taken]:
-        """Every frame, taken as soon as it is there."""
+        """Every frame, taken as soon as it is available."""
         taken: list[Taken] = []
 
         def look_until(at_ns: int) -> None:
@@ -132,7 +132,7 @@ class Bench:
         return taken
 
     def give(self, event: WireEvent) -> None:
-        """What the event's reader would have read."""
+        """Pass on what the event's device reader would have read."""
         each, now_ns = self.source.inputs[event.sensor], self.clock.at_ns
         if event.sensor == "lidar":
             cast("LidarInput", each).receive(stamped(event), now_ns)
@@ -150,7 +150,7 @@ def stamped(event: WireEvent) -> bytes:
 
 
 def endless() -> Iterator[Message]:
-    """As ``messages``, without end."""
+    """Like ``messages``, but endless."""
     for second in count():
         for message in messages(1.0):
             yield message._replace(t_ns=message.t_ns + second * 1000 * MS)

@@ -1,4 +1,4 @@
-"""Live sources that are closed in the end."""
+"""Closes live sources at the end of a test."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pipeline.sources.live.source import LiveSensors
 
 @pytest.fixture
 def sensors() -> Iterator[list[LiveSensors]]:
-    """What is put in here is closed."""
+    """A list of live sources, which are closed at the end of the test."""
     opened: list[LiveSensors] = []
     yield opened
     for each in opened:

@@ -1,5 +1,5 @@
-"""The live path for real on loopback: a replayer in a thread sends, a live source receives, on ports of the system's
-choice."""
+"""The real live path on loopback: a replayer in a thread sends and a live source receives, on ports chosen by the
+system."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pipeline.sources.live.source import LiveSensors
 from pipeline.types import Frame
 
 PATIENCE_S = 30.0
-"""Tests wait for conditions; this long only when they fail, on a machine however busy."""
+"""Timeout of waits for a condition; reached only if a test fails, even on a busy machine."""
 
 
 def free_port(kind: socket.SocketKind) -> int:
@@ -30,7 +30,7 @@ def free_port(kind: socket.SocketKind) -> int:
 
 
 def loopback_config(**more: Any) -> LiveConfig:
-    """LiDAR, MJPEG camera, receiver and own motion from it, all on 127.0.0.1; ``more`` replaces sections."""
+    """LiDAR, MJPEG camera, GNSS receiver and ego motion from it, all on 127.0.0.1. more: replaces sections."""
     sections: dict[str, Any] = {
         "lidar": {
             "data_port": free_port(socket.SOCK_DGRAM),
@@ -45,7 +45,7 @@ def loopback_config(**more: Any) -> LiveConfig:
 
 
 class Replaying(AbstractContextManager["Replaying"]):
-    """Plays the messages from entering on, until they end or the block does."""
+    """A context in which the messages are replayed, until they end or the block does."""
 
     def __init__(self, config: LiveConfig, messages: Iterable[Message], faults: Sequence[Fault] = ()) -> None:
         self._senders = open_senders(config)
@@ -62,11 +62,11 @@ class Replaying(AbstractContextManager["Replaying"]):
     def _play(self) -> None:
         try:
             self.sent = replay(self._messages, self._senders, faults=self._faults, stopped=self._stop.is_set)
-        except Exception as error:  # shown by the test that waited in vain
+        except Exception as error:  # reported by the test that times out
             self.error = error
 
     def stop(self) -> None:
-        """Send nothing more."""
+        """Stop sending."""
         self._stop.set()
 
     def __enter__(self) -> Replaying:
@@ -84,7 +84,7 @@ class Replaying(AbstractContextManager["Replaying"]):
 
 
 def frames_until(source: LiveSensors, done: Callable[[Frame], bool], seen: list[Frame] | None = None) -> Frame:
-    """The first frame for which ``done``; all are added to ``seen``."""
+    """The first frame that fulfils ``done``. All frames are added to ``seen``."""
     end_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < end_s:
         frame = source.next(1.0)
@@ -98,7 +98,7 @@ def frames_until(source: LiveSensors, done: Callable[[Frame], bool], seen: list[
 
 
 def opened(config: LiveConfig, sensors: list[LiveSensors]) -> LiveSensors:
-    """Started, and put where it is closed in the end (the fixture ``sensors``)."""
+    """A started live source, added to the fixture ``sensors``, which closes it."""
     source = LiveSensors("live:loopback", config)
     sensors.append(source)
     source.start()

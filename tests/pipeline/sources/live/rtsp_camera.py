@@ -1,5 +1,5 @@
 """An RTSP camera made by GStreamer: `python3 rtsp_camera.py CODEC PORT`, with the system's Python and its bindings.
-Says ``ready`` when it listens; 640×360 at 30 Hz, grey with a white bar at the left that is 100 pixels wide."""
+Prints ``ready`` once it listens. 640×360 at 30 Hz, grey with a white bar at the left, 100 pixels wide."""
 
 from __future__ import annotations
 

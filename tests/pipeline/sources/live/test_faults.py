@@ -284,4 +284,4 @@ def test_messages_measured_at_an_impossible_time_are_refused_and_said() -> None:
     bench = Bench({**CONFIG, **late})
     assert all(each.frame.image is None for each in bench.drive(sent([], seconds=1.0)))
     camera = next(each for each in bench.source.health() if each.sensor == "camera")
-    assert re.fullmatch(r"\d+ refused: impossible time stamp", camera.note)
+    assert re.fullmatch(r"\d+ refused: impossible timestamp", camera.note)

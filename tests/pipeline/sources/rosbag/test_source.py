@@ -133,7 +133,7 @@ def test_a_message_without_a_time_is_taken_when_it_was_recorded(tmp_path: Path) 
             bag.write("/points", cloud, HEADER_NS + index * STEP_NS + RECORDED_LATER_NS)
     source = open_source(f"rosbag:{tmp_path / 'drive'}")
     assert source.t_ns(1) == HEADER_NS + STEP_NS + RECORDED_LATER_NS
-    assert "LiDAR: 2 messages without a time stamp: their recording time is used" in source.notes
+    assert "LiDAR: 2 messages without a timestamp: their recording time is used" in source.notes
     assert source.frame(1).sweep is not None
 
 

@@ -1,0 +1,243 @@
+"""Detects whether camera or LiDAR has been turned, since when, and by which angle, from vehicles that both sensors see.
+
+A vehicle's cluster should coincide with its box. If all vehicles are off by the same angle, the mounts are turned
+relative to the calibration. ``compare`` finds the pairs of a frame, ``estimate`` and ``judge`` decide about the last
+``fusion.drift_s`` seconds. Nothing is corrected; the angles are reported until the alignment is changed or vehicles
+show that they no longer hold.
+
+A wrong distance law moves no box, and a bend in the road moves cluster and box alike, so neither looks like a turn. A
+time offset between the sensors moves each vehicle by the rate of its bearing; it is estimated together with the angle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.alignment.projection import Alignment
+from pipeline.fusion.drift.compare import Offset, offsets
+from pipeline.fusion.drift.estimate import Sightings
+from pipeline.fusion.drift.judge import FEWEST_FRAMES, PIECE_S, SMALLEST_DEG, Turn, Verdict, judge
+from pipeline.lidar.road_profile import RoadProfile
+from pipeline.params import AlignmentParams, FusionParams
+from pipeline.types import F64, LidarTrack, VisionMeasurement
+
+SAME_SIZE = 0.25
+"""Difference of ln(size) from which a track shows another vehicle or has another box: detectors vary by less, and a
+turned camera changes no size."""
+SIZES_OVER = 10
+"""Number of frames over which the size of a vehicle is averaged."""
+FORGOTTEN_S = 3.0
+"""A vehicle unseen for so long counts as another one: it may have turned."""
+HELD = 2
+"""Judgements in a row, one second apart, that must find the same turn."""
+CONTRADICTED_SIGMAS = 3.0
+"""A reported turn is dropped once vehicles show less than half of it, this clearly."""
+_PIECE_NS = round(PIECE_S * 1e9)
+_PIECE, _VEHICLE, _FRAMES, _YAW, _PITCH, _RATE, _HEIGHT = range(7)
+_AXES = (_YAW, _PITCH)
+
+
+class Drift(NamedTuple):
+    """Rotation of the camera relative to its calibration."""
+
+    yaw_deg: float
+    """To the left."""
+    pitch_deg: float
+    """Downwards."""
+    yaw_sigma_deg: float
+    """Standard deviation of ``yaw_deg``."""
+    pitch_sigma_deg: float
+    """Standard deviation of ``pitch_deg``."""
+    vehicles: int
+    """Number of vehicles that it was estimated from."""
+    since: str | None
+    """Name of the frame since which it holds; None if it held from the beginning."""
+
+    @property
+    def note(self) -> str:
+        """What has happened, what follows, and the remedy."""
+        since = f" since about frame {self.since}" if self.since is not None else ""
+        yaw = f"yaw {self.yaw_deg:+.1f}° ± {self.yaw_sigma_deg:.1f}°"
+        pitch = f"pitch {self.pitch_deg:+.1f}° ± {self.pitch_sigma_deg:.1f}°"
+        return (
+            f"Camera or LiDAR has turned{since}: {yaw}, {pitch}. Nothing is corrected; objects may appear twice, and "
+            "ACC does not accelerate while they do. Check with Align, then Fit."
+        )
+
+
+class _Vehicle(NamedTuple):
+    """A LiDAR track while it shows the same vehicle with the same box."""
+
+    number: int
+    """Never given twice."""
+    t_ns: int
+    """When it was last compared."""
+    frames: int
+    """Number of frames, at most ``SIZES_OVER``."""
+    sizes: tuple[float, ...]
+    """Mean ln of the sizes."""
+
+
+class _Found(NamedTuple):
+    """A turn about each axis, as judged last; None for an axis that has not been judged."""
+
+    turns: tuple[Turn | None, Turn | None] = (None, None)
+    """The clear turn about yaw and pitch; None without one."""
+    held: tuple[int, int] = (0, 0)
+    """Judgements in a row with a turn to the same side."""
+    estimates: tuple[Turn | None, Turn | None] = (None, None)
+    """The angle about each axis, clear or not."""
+
+
+class DriftState(NamedTuple):
+    """What the vehicles of the last seconds have shown."""
+
+    alignment: AlignmentParams | None = None
+    """With which they were compared."""
+    vehicles: tuple[tuple[int, _Vehicle], ...] = ()
+    """By id of the LiDAR track."""
+    next_number: int = 0
+    """Number of the next vehicle."""
+    piece: int = 0
+    """The piece of time under way."""
+    fresh: tuple[tuple[float, ...], ...] = ()
+    """Rows of the piece under way, one for each vehicle and frame."""
+    rows: F64 = np.zeros((0, 7))
+    """(M, 7) means over earlier pieces: piece, vehicle, frames, yaw, pitch, rate, height."""
+    names: tuple[tuple[int, str], ...] = ()
+    """Name of the first frame of each piece."""
+    found: _Found = _Found()
+    """What was judged last."""
+    told: Drift | None = None
+    """What is reported."""
+
+
+class Seen(NamedTuple):
+    """What the sensors show in one frame."""
+
+    t_ns: int
+    """The tick."""
+    name: str
+    """Of the frame."""
+    tracks: Sequence[LidarTrack]
+    """Of the LiDAR."""
+    boxes: Sequence[VisionMeasurement] | None
+    """Of the detector; None without an image."""
+    road: RoadProfile | None
+    """The road ahead; None while unknown."""
+    image_size: tuple[int, int] | None
+    """Width and height."""
+
+
+def follow(
+    state: DriftState, seen: Seen, aligned: Alignment | None, alignment: AlignmentParams, params: FusionParams
+) -> tuple[DriftState, Drift | None]:
+    """The state after this frame, and the turn that is reported; None without one."""
+    if aligned is None or seen.image_size is None:
+        return DriftState(), None
+    if state.alignment is not alignment and state.alignment != alignment:
+        state = DriftState(alignment)  # the user has changed it: what was seen before says nothing about it
+    piece = seen.t_ns // _PIECE_NS
+    if piece != state.piece:
+        state = _judged(_closed(state, piece, params), params)._replace(piece=piece)
+        state = state._replace(names=(*state.names, (piece, seen.name)))
+    if seen.boxes:
+        held = (state.told.yaw_deg, state.told.pitch_deg) if state.told is not None else (0.0, 0.0)
+        pairs = offsets(seen.tracks, seen.boxes, aligned, seen.image_size, held, seen.road)
+        state = _noted(state, pairs, seen.t_ns)
+    return state, state.told
+
+
+def _noted(state: DriftState, pairs: Sequence[Offset], t_ns: int) -> DriftState:
+    """With the offsets of one frame."""
+    known, number = dict(state.vehicles), state.next_number
+    rows = []
+    for pair in pairs:
+        sizes = np.log(np.maximum(pair.sizes_m, 0.1)).tolist()
+        before = known.get(pair.track)
+        if before is None or t_ns - before.t_ns > FORGOTTEN_S * 1e9 or _differ(before.sizes, sizes):
+            now = _Vehicle(number, t_ns, 1, tuple(sizes))
+            number += 1
+        else:
+            frames = min(before.frames + 1, SIZES_OVER)
+            means = tuple(old + (new - old) / frames for old, new in zip(before.sizes, sizes, strict=True))
+            now = _Vehicle(before.number, t_ns, frames, means)
+        known[pair.track] = now
+        rows.append((now.number, pair.yaw_deg, pair.pitch_deg, pair.rate_degps, pair.height_deg))
+    kept = tuple((track, each) for track, each in known.items() if t_ns - each.t_ns <= FORGOTTEN_S * 1e9)
+    return state._replace(vehicles=kept, next_number=number, fresh=(*state.fresh, *rows))
+
+
+def _differ(a: Sequence[float], b: Sequence[float]) -> bool:
+    return max(abs(x - y) for x, y in zip(a, b, strict=True)) > SAME_SIZE
+
+
+def _closed(state: DriftState, piece: int, params: FusionParams) -> DriftState:
+    """With the means over the piece that has ended, and without what is too old."""
+    rows = state.rows
+    if state.fresh:
+        fresh = np.array(state.fresh)
+        numbers, at = np.unique(fresh[:, 0], return_inverse=True)
+        frames = np.bincount(at)
+        means = [np.bincount(at, fresh[:, k]) / frames for k in range(1, 5)]
+        rows = np.vstack([rows, np.column_stack([np.full(len(numbers), state.piece), numbers, frames, *means])])
+    oldest = piece - params.drift_s / PIECE_S
+    names = tuple(each for each in state.names if each[0] > oldest)
+    return state._replace(rows=rows[rows[:, _PIECE] > oldest], fresh=(), names=names)
+
+
+def _judged(state: DriftState, params: FusionParams) -> DriftState:
+    """With the verdict about one axis, in turn."""
+    numbers, at = np.unique(state.rows[:, _VEHICLE], return_inverse=True)
+    often = np.bincount(at, state.rows[:, _FRAMES], len(numbers)) >= FEWEST_FRAMES
+    rows = state.rows[often[at]]
+    if not len(rows):
+        return state
+    axis = state.piece % 2
+    rate = rows[:, _RATE] if axis == 0 else np.zeros(len(rows))
+    vehicle = np.unique(rows[:, _VEHICLE], return_inverse=True)[1]
+    seen = Sightings(rows[:, _PIECE].astype(np.int64), vehicle, rows[:, _FRAMES], rows[:, _HEIGHT], rate)
+    verdict = judge(seen, rows[:, _AXES[axis]])
+    found = _updated(state.found, axis, verdict, params)
+    return state._replace(found=found, told=_told(state, found, axis, verdict))
+
+
+def _updated(found: _Found, axis: int, verdict: Verdict, params: FusionParams) -> _Found:
+    turn, before = verdict.turn(params.drift_sigmas), found.turns[axis]
+    goes_on = turn is not None and before is not None and turn.angle_deg * before.angle_deg > 0.0
+    held = found.held[axis] + 1 if goes_on else int(turn is not None)
+    other = found.turns[1 - axis]
+    estimate = turn or verdict.since(other.since if other is not None else None)
+    return _Found(_with(found.turns, axis, turn), _with(found.held, axis, held), _with(found.estimates, axis, estimate))
+
+
+def _told(state: DriftState, found: _Found, axis: int, verdict: Verdict) -> Drift | None:
+    """What is reported after a verdict."""
+    before = state.told
+    clear = [turn for turn, held in zip(found.turns, found.held, strict=True) if turn is not None and held >= HELD]
+    if clear:
+        sinces = [each.since for each in clear if each.since is not None]
+        since = _name(state, min(sinces)) if sinces else None
+        yaw, pitch = (each or Turn(0.0, 0.0, 0, None) for each in found.estimates)
+        since = since or (before.since if before is not None else None)
+        count = max(each.vehicles for each in clear)
+        return Drift(yaw.angle_deg, pitch.angle_deg, yaw.sigma_deg, pitch.sigma_deg, count, since)
+    if before is None:
+        return None
+    told_deg = (before.yaw_deg, before.pitch_deg)[axis]
+    shown = verdict.at(len(verdict.moments) - 1)
+    away_deg = abs(shown.angle_deg - told_deg)
+    is_gone = away_deg > max(abs(told_deg) / 2, CONTRADICTED_SIGMAS * shown.sigma_deg)
+    return None if is_gone and abs(told_deg) > SMALLEST_DEG else before
+
+
+def _name(state: DriftState, piece: int) -> str | None:
+    """Of the first frame from a piece of time on."""
+    return next((name for number, name in state.names if number >= piece), None)
+
+
+def _with(pair, axis: int, value):  # type: ignore[no-untyped-def]
+    return (value, pair[1]) if axis == 0 else (pair[0], value)

@@ -1,0 +1,68 @@
+"""Which box belongs to which cluster while nobody knows how the camera is turned, and by which angle they differ."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from pipeline.alignment.projection import resolve
+from pipeline.fusion.drift.compare import Offset, offsets
+from pipeline.params import AlignmentParams
+from pipeline.types import LidarTrack, VisionMeasurement
+from tests.pipeline.calibration.alignment.made_drive import CAMERA, SIZE
+from tests.pipeline.fusion.drift.traffic import PLACES, box, track
+
+
+def told(
+    tracks: list[LidarTrack], boxes: list[VisionMeasurement], held: tuple[float, float] = (0.0, 0.0)
+) -> list[Offset]:
+    aligned = resolve(AlignmentParams(), CAMERA)
+    assert aligned is not None
+    return offsets(tracks, boxes, aligned, SIZE, held)
+
+
+def test_every_vehicle_shows_the_angle_of_a_turned_camera():
+    turned = AlignmentParams(yaw_deg=-2.0, pitch_deg=1.0)
+    found = told([track(k, *place) for k, place in enumerate(PLACES)], [box(*place, turned) for place in PLACES])
+    assert {each.track for each in found} == set(range(len(PLACES)))
+    for each in found:
+        assert each.yaw_deg == pytest.approx(-2.0, abs=0.15)
+        assert each.pitch_deg == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_box_of_a_neighbour_is_not_taken_when_the_others_disagree():
+    """Two cars 3° apart, the camera turned by 3°: the box of one lies on the other."""
+    places = ((32.0, 0.0), (32.0, 1.7), (20.0, -5.0), (15.0, 5.0))
+    boxes = [box(*place, AlignmentParams(yaw_deg=3.0)) for place in places]
+    found = told([track(k, *place) for k, place in enumerate(places)], boxes)
+    assert [each.yaw_deg for each in found] == pytest.approx([3.0] * 4, abs=0.25)
+
+
+def test_the_side_of_a_vehicle_that_the_lidar_does_not_hit_is_no_angle():
+    places = ((14.0, -3.5), (20.0, -3.6), (27.0, 3.4))
+    found = told(
+        [track(k, *place) for k, place in enumerate(places)],
+        [box(*place, AlignmentParams(), length_m=4.5) for place in places],
+    )
+    assert len(found) == 3
+    assert [each.yaw_deg for each in found] == pytest.approx([0.0] * 3, abs=0.15)
+
+
+@pytest.mark.parametrize("what", ["carried", "new", "narrow", "passed", "cut", "not sure", "no vehicle", "too high"])
+def test_what_tells_nothing(what: str):
+    hit, seen = track(1, 18.0, 0.5), box(18.0, 0.5, AlignmentParams())
+    cuboid, detection = hit.obstacle.cuboid, seen.detection
+    x1, y1, x2, y2 = detection.bbox
+    hit, seen = {
+        "carried": (hit._replace(carried=True), seen),
+        "new": (hit._replace(hits=1), seen),
+        "narrow": (hit._replace(obstacle=hit.obstacle._replace(cuboid=cuboid._replace(size=(0.2, 0.9, 1.5)))), seen),
+        "passed": (hit._replace(velocity_mps=(0.0, 12.0)), seen),
+        "cut": (hit, replace(seen, detection=replace(detection, bbox=(x1, y1, x2, float(SIZE[1]))))),
+        "not sure": (hit, replace(seen, detection=replace(detection, score=0.2))),
+        "no vehicle": (hit, replace(seen, detection=replace(detection, label="person"))),
+        "too high": (hit, replace(seen, detection=replace(detection, bbox=(x1, y1 - 4 * (y2 - y1), x2, y2)))),
+    }[what]
+    assert told([hit], [seen]) == []
+    assert len(told([track(1, 18.0, 0.5)], [box(18.0, 0.5, AlignmentParams())])) == 1

@@ -1,0 +1,51 @@
+"""When vehicles make a turn certain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.fusion.drift.estimate import Sightings
+from pipeline.fusion.drift.judge import Turn, judge
+
+SIGMAS = 4.0
+
+
+def turn(angles_deg: list[list[float]], frames: int = 5) -> Turn | None:
+    """angles_deg: of each vehicle in each piece of time."""
+    values = np.array(angles_deg).T
+    pieces, vehicles = values.shape
+    piece, vehicle = (each.ravel() for each in np.meshgrid(np.arange(pieces), np.arange(vehicles), indexing="ij"))
+    count = len(piece)
+    seen = Sightings(piece, vehicle, np.full(count, float(frames)), np.full(count, 3.0), np.zeros(count))
+    return judge(seen, values.ravel()).turn(SIGMAS)
+
+
+@pytest.mark.parametrize(
+    ("each_deg", "is_told"),
+    [
+        ((1.5, 1.4, 1.6), True),
+        ((1.5, 1.4), True),
+        ((1.5,), False),
+        ((0.1, -0.1, 3.0, 0.0), False),
+        ((3.0, -3.0, 2.5, -2.0, 2.8), False),
+        ((0.2,) * 12, False),
+    ],
+    ids=["three", "two", "one, from the beginning", "one wrong pair", "crossing both ways", "too small to matter"],
+)
+def test_vehicles_must_agree(each_deg: tuple[float, ...], is_told: bool):
+    assert (turn([[angle] * 20 for angle in each_deg]) is not None) is is_told
+
+
+def test_the_moment_is_found():
+    found = turn([[0.1] * 20 + [1.1] * 12, [-0.1] * 20 + [0.9] * 12])
+    assert found is not None
+    assert found.since == 20
+    assert found.angle_deg == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_single_vehicle_is_believed_when_it_was_followed_before():
+    found = turn([[0.2] * 16 + [1.7] * 16])
+    assert found is not None
+    assert found.vehicles == 1
+    assert turn([[0.2] * 2 + [1.7] * 16]) is None
