@@ -122,6 +122,7 @@ function changed(change) {
 const load = newestOnly(async (/** @type {void} */ _) => {
   const { of, run } = filters;
   dialog.ariaBusy = "true";
+  $("#fleet-facts").textContent = "Searching…";
   for (const tab of dialog.querySelectorAll("[role=tab]"))
     tab.setAttribute("aria-selected", String(/** @type {HTMLElement} */ (tab).dataset.of === of));
   try {
@@ -132,6 +133,7 @@ const load = newestOnly(async (/** @type {void} */ _) => {
     await loadCharts();
     problem("");
   } catch (error) {
+    $("#fleet-facts").textContent = "";
     problem(/** @type {Error} */ (error).message);
   }
   dialog.ariaBusy = "false";
