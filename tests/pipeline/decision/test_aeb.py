@@ -71,7 +71,7 @@ def test_an_oncoming_lead_is_braked_for_only_if_it_is_surely_in_the_path(path_si
     ego = EgoState(0, 15.0)
     (oncoming,) = describe([fused(1, 30.0, 0.3, velocity=(-28.0, 0.0))], ego, MotionParams())
     path = replace(PATH, profile_m=np.full(len(PATH.center), path_sigma_m))
-    lead = Cipv(1, 30.0, 28.0, 1.1, "")
+    lead = Cipv(1, oncoming.distance_m or 0.0, 28.0, 1.1, "")
     aeb = AebState()
     for _ in range(2):
         judged = replace(choose(CipvState(), (oncoming,), PATH, moment(ego), CipvParams())[1].objects[0], in_path=True)
