@@ -15,6 +15,7 @@ import tyro
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
 from app.core.stop_signals import as_interrupts
+from app.core.terminal import make_safe, one_line
 from pipeline.common.errors import BadInput
 
 COMMANDS = {
@@ -60,25 +61,27 @@ _PATHS = ConstructorRegistry()
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of the console script."""
     typed = sys.argv[1:] if arguments is None else arguments
+    make_safe()
     try:
         with as_interrupts():
             raise SystemExit(_parse(typed)())
     except BadInput as error:
-        print(f"cipv: {error}", file=sys.stderr)
+        print(f"cipv: {one_line(error)}", file=sys.stderr)
         raise SystemExit(2) from None
     except BrokenPipeError:
         # the reader of our output has exited (`cipv run … | head`): not an error, but nothing more can be written
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(0) from None
     except OSError as error:
-        print(f"cipv: {error.strerror or error}: {error.filename or ''}".rstrip(": "), file=sys.stderr)
+        said = f"{error.strerror or error}: {error.filename or ''}"
+        print(f"cipv: {one_line(said)}".rstrip(": "), file=sys.stderr)
         raise SystemExit(2 if isinstance(error, _NAMED_WRONG) else 1) from None
     except KeyboardInterrupt:
         raise SystemExit(130) from None
     except Exception as error:
         if os.environ.get("CIPV_DEBUG"):
             raise
-        print(f"cipv: {type(error).__name__}: {error} (CIPV_DEBUG=1 shows where)", file=sys.stderr)
+        print(f"cipv: {type(error).__name__}: {one_line(error)} (CIPV_DEBUG=1 shows where)", file=sys.stderr)
         raise SystemExit(1) from None
 
 

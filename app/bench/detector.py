@@ -52,8 +52,8 @@ def _in_turn(work: Callable[[U8], object], images: Sequence[U8]) -> Callable[[],
     return lambda: work(next(turn))
 
 
-def _opencv(detector: Detector, images: Sequence[U8]) -> Callable[[], object] | None:
-    """``cv2.dnn`` on the same graph with our pre-processing and decoding; None if OpenCV cannot read the graph."""
+def _opencv(detector: Detector, images: Sequence[U8]) -> tuple[Callable[[], object] | None, str]:
+    """``cv2.dnn`` on the same graph with our pre-processing and decoding; None and why if OpenCV cannot run it."""
     try:
         network = cv2.dnn.readNetFromONNX(np.frombuffer(detector.graph, np.uint8))
 

@@ -13,6 +13,7 @@ import tyro
 from app.commands.support.cluster import ClusterOptions, run_with_bar, tally_of
 from app.commands.support.options import PipelineOptions
 from app.commands.support.progress_bars import share_progress, task_progress
+from app.core.terminal import one_line
 from app.fleet.extra import need_extra
 from pipeline.common.errors import BadInput
 
@@ -111,7 +112,7 @@ class Batch:
             print(json.dumps(said, indent=1, ensure_ascii=False))
         for word, found in (("set aside", tally.aside), ("failed, will be retried", tally.failed)):
             for address, reason in list(found.items())[:_MOST_REASONS]:
-                print(f"cipv: {word}: {address}: {reason}", file=sys.stderr)
+                print(f"cipv: {word}: {one_line(f'{address}: {reason}')}", file=sys.stderr)
             if len(found) > _MOST_REASONS:
                 print(f"cipv: {word}: {len(found) - _MOST_REASONS} more, see aside/run={run}", file=sys.stderr)
         print(

@@ -14,6 +14,7 @@ import tyro
 from app.commands.support.arguments import option
 from app.commands.support.cluster import ClusterOptions, run_with_bar, tally_of
 from app.commands.support.options import PipelineOptions
+from app.core.terminal import one_line
 from app.fleet.extra import need_extra
 from pipeline.common.errors import BadInput
 from pipeline.evaluation.report_sections import Chart, ReportSection, Series, Table
@@ -128,7 +129,7 @@ class ParameterSweep:
                 if work.jobs:
                     run_with_bar(client, work, tally, f"set {len(runs) + 1} of {count}")
                 for address, reason in (tally.failed if runs else tally.aside | tally.failed).items():
-                    print(f"cipv: skipped: {address}: {reason}", file=sys.stderr)
+                    print(f"cipv: skipped: {one_line(f'{address}: {reason}')}", file=sys.stderr)
                 pack(store, work.key.name)
                 runs.append((work.key.name, changes))
                 values[work.key.name] = values_of(FleetTables(store, work.key.name).scores())

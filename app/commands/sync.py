@@ -15,6 +15,7 @@ from app.commands.info import size_text
 from app.commands.support.arguments import option
 from app.commands.support.progress_bars import bytes_progress, task_progress
 from app.core.session_folder import SESSIONS
+from app.core.terminal import one_line
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress
 from pipeline.common.user_files import Overloaded
@@ -88,9 +89,12 @@ class SyncSessions:
             }
             print(json.dumps(said, indent=1, ensure_ascii=False))
         for name in tally.unfinished:
-            print(f"cipv: {name}: still being recorded, or cut off (`cipv recover`); not copied", file=sys.stderr)
+            print(
+                f"cipv: {one_line(name)}: still being recorded, or cut off (`cipv recover`); not copied",
+                file=sys.stderr,
+            )
         for name, reason in (*tally.notes.items(), *tally.failed.items()):
-            print(f"cipv: {name}: {reason}", file=sys.stderr)
+            print(f"cipv: {one_line(f'{name}: {reason}')}", file=sys.stderr)
         if stopped:
             print(f"cipv: {stopped}; the next `cipv sync` continues", file=sys.stderr)
         print(

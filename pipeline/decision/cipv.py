@@ -15,9 +15,10 @@ from math import exp, hypot
 from typing import NamedTuple
 
 from pipeline.common.fast_replace import evolve
+from pipeline.decision.crossing import clears_path_s
 from pipeline.decision.gates import Candidate, judge, may_cut_in
 from pipeline.decision.object_motion import closing_speed_mps
-from pipeline.decision.path_position import Place, believed_mps, place
+from pipeline.decision.path_position import SURE, Place, believed_mps, place
 from pipeline.params import CipvParams
 from pipeline.types import Cipv, FusedObject, Moment, Path, Rejection, sensors_in_words
 
@@ -74,7 +75,7 @@ def choose(
     """The CIPV of this frame, the next one, and a reason for each other object."""
     # Position of each object relative to the path, and which conditions of a lead it meets
     places = place(objects, path, now.ego, params)
-    judged = [_judge(state, item, placed, path, now.dt_s, params) for item, placed in zip(objects, places, strict=True)]
+    judged = [_judge(state, item, placed, path, now, params) for item, placed in zip(objects, places, strict=True)]
     # The nearest object that meets all conditions is the lead
     able = [each.item for each in judged if each.why_not is None]
     nearest = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
@@ -94,24 +95,25 @@ def _judge(
     item: FusedObject,
     placed: tuple[Place, float | None] | None,
     path: Path,
-    dt_s: float | None,
+    moment: Moment,
     params: CipvParams,
 ) -> _Judged:
     """Judge one object. placed: its position relative to the path, and when it will cross the edge."""
     where, crossing_s = placed if placed is not None else (None, None)
     leads, widening_m, odds = item.id == state.lead_id, 0.0, None
+    clears_s = clears_path_s(where, item, moment.speed_mps, params)
     if where is not None:
         moving_mps = believed_mps(where.sideways_mps, item)
         decide_s = min(params.decide_s, _BLUR_M / max(abs(moving_mps), 1e-3))
         widening_m = _widening_m(leads, moving_mps, params)
-        now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY)
+        now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY) if clears_s is None else -SURE
         before = state.odds.get(item.id, now)
-        odds = before + _fresh(dt_s, decide_s) * (now - before)
+        odds = before + _fresh(moment.dt_s, decide_s) * (now - before)
     is_ahead = where is not None and where.ahead_m > 0.0
     probability = 1.0 / (1.0 + exp(-odds)) if is_ahead and odds is not None else 0.0
     is_in = probability > 0.5
-    verdict = judge(Candidate(item, where, odds or 0.0, leads, widening_m, path, params))
-    if where is not None and where.margin_m() >= 0.0 and is_ahead:
+    verdict = judge(Candidate(item, where, odds or 0.0, leads, widening_m, path, params, clears_s))
+    if clears_s is None and where is not None and where.margin_m() >= 0.0 and is_ahead:
         comes_in = where.middle_m * believed_mps(where.sideways_mps, item) < 0.0
         if not is_in or (comes_in and not verdict.eligibility.probable):
             crossing_s = 0.0  # it is over the edge, but not yet for long enough to count as in the path
@@ -124,6 +126,7 @@ def _judge(
         in_path_probability=probability if where is not None else None,
         lateral_mps=where.sideways_mps if where is not None else None,
         crossing_s=crossing_s,
+        clears_path_s=clears_s,
     )
     return _Judged(item, odds, verdict.why_not)
 
@@ -192,6 +195,7 @@ def _next_lead(
         item
         for item in judged
         if _is_outside(item)
+        and item.clears_path_s is None
         and item.crossing_s is not None
         and item.crossing_s <= params.cut_in_s
         and (item.distance_m or 0.0) < lead_m

@@ -48,6 +48,8 @@ class Candidate(NamedTuple):
     """The path ahead."""
     params: CipvParams
     """Limits of the conditions."""
+    clears_path_s: float | None = None
+    """How long before the car arrives it will have left the path that it crosses; None if it does not."""
 
     @property
     def aside_m(self) -> float:
@@ -187,6 +189,11 @@ def _ahead(who: Candidate) -> Answer:
     return who.place.ahead_m > limit_m, who.place.ahead_m, limit_m
 
 
+def _stays(who: Candidate) -> Answer:
+    """What crosses is in the path only if it is still there when the car arrives."""
+    return who.clears_path_s is None, who.clears_path_s, who.params.crossing_margin_s
+
+
 def _in_path(who: Candidate) -> Answer:
     """The running mean of the log-odds, expressed in metres: see ``aside_m``."""
     if who.place is None:
@@ -276,6 +283,7 @@ CONDITIONS = Conditions(
     ahead=Condition(
         "ahead", _ahead, lambda who: "position unknown" if who.place is None else "beside or behind the bumper"
     ),
+    stays=Condition("clears_path_s", _stays, lambda who: f"crosses: gone {who.clears_path_s:.1f} s before we arrive"),
     in_path=Condition("path_offset", _in_path, _out_of_path),
     confirmed=Condition(
         "hits", _confirmed, lambda who: f"seen {_sightings(who.item)} of {who.params.confirm_hits} times"

@@ -67,6 +67,8 @@ class Place(NamedTuple):
     """Standard deviation of its lateral position relative to the path, including the path's error."""
     sideways_mps: float | None
     """Speed to the left of the path, over ground; None if its velocity is not known."""
+    forward_mps: float = 0.0
+    """Speed along the path, over ground; relative to the car while ego speed is unknown."""
 
     @property
     def limit_m(self) -> float:
@@ -151,8 +153,9 @@ def place(
         usable_rate(ego) or 0.0,
     ).tolist()
     placed = []
-    for item, (half_left, half_right, sideways, *numbers) in zip(known, rows, strict=True):
-        there = Place._make((*numbers, sideways if item.velocity_mps is not None else None))
+    for item, (half_left, half_right, sideways, forward, *numbers) in zip(known, rows, strict=True):
+        has_velocity = item.velocity_mps is not None
+        there = Place._make((*numbers, sideways if has_velocity else None, forward if has_velocity else 0.0))
         placed.append((there, there.crossing_s(believed_mps(there.sideways_mps, item), half_left, half_right)))
     following = iter(placed)
     return [next(following) if item.bev is not None else None for item in objects]
@@ -190,9 +193,9 @@ def _numbers(item: FusedObject) -> tuple[float, ...]:
 
 @numba.njit(cache=True, nogil=True)
 def _against(rows, center, left, right, half_width, profile, step, overlap, use_flank, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]
-    """(N, 11) from (N, 19) rows of ``_numbers``: distances from the centre to the left and to the right edge at the
-    object, lateral speed, then the fields of ``Place`` up to ``sigma_m``. half_width: for a path without edges, else
-    0."""
+    """(N, 12) from (N, 19) rows of ``_numbers``: distances from the centre to the left and to the right edge at the
+    object, speed to the left of the path and along it, then the fields of ``Place`` up to ``sigma_m``. half_width: for
+    a path without edges, else 0."""
     middles = np.empty((len(rows), 2))
     for n in range(len(rows)):
         for k in range(2):
@@ -211,7 +214,7 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, use_
             edge = rows[n // 2, 14 + 2 * (n % 2) + k]
             edges[n, k] = edge if np.isfinite(edge) else 0.0  # the kernel below assumes no NaN
     beside, _ = nearest(center, edges)
-    out = np.empty((len(rows), 11))
+    out = np.empty((len(rows), 12))
     for n in range(len(rows)):
         offsets, ahead = aside[5 * n : 5 * n + 5], reached[5 * n]
         near_x, near_y = corners[5 * n, 0], corners[5 * n, 1]
@@ -234,12 +237,12 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, use_
         half_left = half_width + np.hypot(left[k, 0] - center[k, 0], left[k, 1] - center[k, 1])
         half_right = half_width + np.hypot(right[k, 0] - center[k, 0], right[k, 1] - center[k, 1])
         spare = 0.5 * (high - low) - min(overlap, 0.5 * (high - low))
-        out[n, 0], out[n, 1], out[n, 2] = half_left, half_right, sideways
-        out[n, 3], out[n, 4], out[n, 5], out[n, 6] = offsets[0], ahead, low, high
-        out[n, 7] = 0.5 * (low + high)
-        out[n, 8], out[n, 9] = half_left + spare, half_right + spare
+        out[n, 0], out[n, 1], out[n, 2], out[n, 3] = half_left, half_right, sideways, forward
+        out[n, 4], out[n, 5], out[n, 6], out[n, 7] = offsets[0], ahead, low, high
+        out[n, 8] = 0.5 * (low + high)
+        out[n, 9], out[n, 10] = half_left + spare, half_right + spare
         own = _sigma_m(near_x, near_y, cos, sin, rows[n, 11], rows[n, 12], rows[n, 13])
-        out[n, 10] = np.sqrt(profile[k] ** 2 + own**2 + flanks[n] ** 2)
+        out[n, 11] = np.sqrt(profile[k] ** 2 + own**2 + flanks[n] ** 2)
     return out
 
 

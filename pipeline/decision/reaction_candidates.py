@@ -31,9 +31,9 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None) -> bool:
 
     If the path's uncertainty exceeds its width, no course counts as leading into it: in a bend, other traffic follows
     the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty. Oncoming
-    or crossing objects behind the lead cannot be reached.
+    or crossing objects behind the lead cannot be reached. What crosses and is gone before the car arrives is not met.
     """
-    if item.path_offset_m is None or item.velocity_mps is None or item.ttc_s is None:
+    if item.path_offset_m is None or item.velocity_mps is None or item.ttc_s is None or item.clears_path_s is not None:
         return False
     distance_m, oncoming = item.distance_m or 0.0, bool(item.oncoming)
     sigma_m = _sigma_m(path, distance_m)

@@ -25,6 +25,7 @@ VISIBLE_SHARE = 0.35
 EDGE_M = 0.3
 """If the overlap differs by less than this from the limit, either answer is correct."""
 _AHEAD_M, _STEP_S, _LONGEST_S, _SMALLEST_MOVE_M = 90.0, 0.25, 15.0, 0.2
+_CROSSES_MPS = 2.0
 _SAME_PLACE_M, _SAME_SHARE = 2.5, 0.2
 
 
@@ -56,7 +57,8 @@ class ScriptedWay:
 
 
 def true_lead(now: World, path: Path | None, max_m: float = MAX_M) -> tuple[ActorState | None, bool]:
-    """The first vehicle on the driven path within ``max_m``, and whether one at the path's edge makes that doubtful."""
+    """The first vehicle on the driven path within ``max_m``, and whether that is doubtful because of one at the path's
+    edge, or one that crosses and will be gone when the car arrives."""
     found: list[tuple[float, ActorState]] = []
     doubtful_m = np.inf
     for state in now.actors:
@@ -65,12 +67,29 @@ def true_lead(now: World, path: Path | None, max_m: float = MAX_M) -> tuple[Acto
         too_little, nearest = overlap(state, path)
         if nearest <= 0.0:
             continue
-        if abs(too_little) < EDGE_M:
+        if abs(too_little) < EDGE_M or (too_little > 0.0 and _clears(state, path, now.speed_mps, nearest)):
             doubtful_m = min(doubtful_m, nearest)
         elif too_little > 0.0:
             found.append((nearest, state))
     nearest_m, lead = min(found, key=lambda pair: pair[0], default=(np.inf, None))
     return lead, bool(doubtful_m < nearest_m)
+
+
+def _clears(state: ActorState, path: Path, ego_mps: float, nearest_m: float) -> bool:
+    """Whether a vehicle in the path crosses it and will have left before the car is there, or just about."""
+    _, along = nearest_on_path(path, np.array([state.cuboid.center[:2]]))
+    reached = np.cumsum(np.hypot(*np.diff(path.center, axis=0).T))
+    k = int(np.clip(np.searchsorted(reached, along[0]), 0, len(reached) - 1))
+    way = path.center[k + 1] - path.center[k]
+    turned = state.cuboid.yaw_rad - float(np.arctan2(way[1], way[0]))
+    sideways_mps, forward_mps = abs(state.speed_mps * np.sin(turned)), state.speed_mps * np.cos(turned)
+    if sideways_mps < _CROSSES_MPS or sideways_mps < abs(forward_mps):
+        return False
+    offsets, _ = nearest_on_path(path, state.cuboid.footprint())
+    moves_left = state.speed_mps * np.sin(turned) > 0.0
+    way_m = path.half_width_m - float(offsets.min()) if moves_left else path.half_width_m + float(offsets.max())
+    closing_mps = ego_mps - forward_mps
+    return bool(closing_mps <= 0.0 or way_m / sideways_mps < nearest_m / closing_mps)
 
 
 def overlap(state: ActorState, path: Path) -> tuple[float, float]:

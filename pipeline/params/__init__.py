@@ -155,6 +155,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "existence": {"enabled": False},
         "path": {"use_edges": False},
         "cipv": {
+            "use_crossing": False,
             "confirm_hits": 1,
             "carried_may_become_lead": True,
             "hysteresis_m": 0.0,

@@ -21,6 +21,8 @@ _ANEW_EVERY = 3
 the time."""
 _DROVE_S = 0.5
 """A vehicle that was seen driving for so long and then stands is traffic, not part of the roadside."""
+_STANDS_MPS = 0.3
+"""A standing car learns nothing more about the road: what changes in front of it is traffic, not the roadside."""
 _LOWEST_M = 0.1
 """Minimum sensor height above the road; a lower value means that there is no road below it."""
 
@@ -46,6 +48,15 @@ class Surroundings(NamedTuple):
     """Ego x y z of the sensor."""
 
 
+class Edges(NamedTuple):
+    """The course of the road from its edges."""
+
+    path: PathEstimate
+    """The path along the edges, at the car's present distance from them."""
+    cells: F64
+    """(M, 2) ego x, y of the structure that was used."""
+
+
 @dataclass(frozen=True, eq=False)
 class EdgeState:
     """State from one frame to the next."""
@@ -56,17 +67,10 @@ class EdgeState:
     """(K, 2) shape of the road in that frame; None if it is not known."""
     turn: int = 0
     """Frame counter, modulo ``_ANEW_EVERY``."""
+    edges: Edges | None = None
+    """What was found in that frame; None if nothing was."""
     drove_s: Mapping[int, float] = field(default_factory=dict)
     """For how long each object has been seen driving, by id."""
-
-
-class Edges(NamedTuple):
-    """The course of the road from its edges."""
-
-    path: PathEstimate
-    """The path along the edges, at the car's present distance from them."""
-    cells: F64
-    """(M, 2) ego x, y of the structure that was used."""
 
 
 def follow(
@@ -81,6 +85,8 @@ def follow(
     ego, dt_s = now.ego, now.dt_s
     if ego is None or not params.use_edges:
         return EdgeState(), None
+    if abs(ego.speed_mps) < _STANDS_MPS and state.edges is not None:
+        return state, None if is_shown else state.edges
     # Structure beside the road from earlier sweeps, moved by own motion, and from this sweep; without vehicles that
     # drive or drove here, and without the trail that they left
     before = road_structure.moved(state.cells, ego, dt_s) if dt_s else NONE
@@ -98,7 +104,8 @@ def follow(
     room_m = road_shape.room(shape, cells.xy[cells.stands], params.half_width_m)
     left_m, right_m = (np.full(len(shape), each) for each in room_m)
     path = PathEstimate("edges", shape, sigma_m, left_m, right_m)
-    return EdgeState(cells, shape, (state.turn + 1) % _ANEW_EVERY, drove_s), Edges(path, cells.xy)
+    edges = Edges(path, cells.xy)
+    return EdgeState(cells, shape, (state.turn + 1) % _ANEW_EVERY, edges, drove_s), edges
 
 
 def _drove_s(before: Mapping[int, float], objects: tuple[FusedObject, ...], dt_s: float) -> Mapping[int, float]:

@@ -36,6 +36,8 @@ class Conditions(NamedTuple, Generic[Each]):
     """It is as large as a vehicle. Tested only if no class is known."""
     ahead: Each
     """It is ahead of the bumper."""
+    stays: Each
+    """It does not cross the path, or will still be in it when the car arrives."""
     in_path: Each
     """According to all sightings so far, it is in the path."""
     confirmed: Each

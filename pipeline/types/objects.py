@@ -151,6 +151,9 @@ class FusedObject:
     crossing_s: float | None = None
     """Until it is over the edge of the path, or out of the path if it is in it; None when its sideways speed leads to
     neither."""
+    clears_path_s: float | None = None
+    """How long before the car arrives it will have left the path that it crosses; None for one that does not cross, or
+    that the car might meet."""
     lidar_hits: int = 0
     """Sightings of its LiDAR track."""
     lidar_steady: int = 0

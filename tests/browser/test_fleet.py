@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from app.fleet.batch.work import run_drive
 from app.fleet.desk import FleetDesk
@@ -148,12 +148,23 @@ def test_a_press_opens_the_moment(open_fleet: OpenPage, fleet_site: Site, tables
     expect(page.locator("#transport .where .dim")).to_have_text("6/8")
 
 
+def test_the_page_says_that_it_is_searching(open_fleet: OpenPage):
+    page, asked = open_fleet(), list[Route]()
+    page.route("**/api/fleet/rows*", lambda route: asked.append(route))  # playwright wants no bound method
+    page.get_by_role("tab", name="drives").click()
+    expect(page.locator("#fleet-facts")).to_have_text("Searching…")
+    asked.pop().continue_()
+    expect(page.locator("#fleet-facts")).to_contain_text("3 drives")
+    settled(page)
+
+
 def test_a_wrong_condition_is_said_in_words(open_fleet: OpenPage):
     page = open_fleet(expects=("409",))
     page.get_by_label("Condition").fill("no_such_column > 1")
     page.keyboard.press("Enter")
     expect(page.get_by_role("alert").filter(has_text="no_such_column")).to_be_visible()
     settled(page)
+    expect(page.locator("#fleet-facts")).to_have_text("")
 
 
 def test_without_a_fleet_the_page_says_how_to_open_one(open_page: OpenPage):

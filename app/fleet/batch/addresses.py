@@ -37,7 +37,7 @@ class Recording:
         _, _, rest = self.address.rpartition(":")
         stem = PurePosixPath(rest.partition("?")[0].rstrip("/")).name.removesuffix(_SESSION)
         slug = re.sub(r"[^A-Za-z0-9]+", "-", stem).strip("-")[-_LONGEST_SLUG:]
-        return f"{slug or 'drive'}-{hashlib.sha256(self.address.encode()).hexdigest()[:8]}"
+        return f"{slug or 'drive'}-{hashlib.sha256(os.fsencode(self.address)).hexdigest()[:8]}"
 
 
 def recordings(addresses: Iterable[str]) -> list[Recording]:

@@ -48,7 +48,7 @@ class Plan:
             "rings": self.rings,
             "results": self.keeps_results,
         }
-        store.write(_PLAN, json.dumps(said, ensure_ascii=False, indent=1).encode())
+        store.write(_PLAN, json.dumps(said, indent=1).encode())
 
     @staticmethod
     def load(store: Store) -> Plan:

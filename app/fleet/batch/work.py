@@ -56,6 +56,8 @@ def run_drive(job: Job, may_split: bool = False) -> Outcome | TooLong:
     before = _before(job)
     if before is not None:
         return before
+    if not _is_text(job.recording.address):
+        return set_aside(job, "its name is not valid UTF-8, which tables cannot hold; rename it")
     try:
         source = open_source(job.recording.address, rings=job.key.rings)
         if not len(source):
@@ -94,9 +96,18 @@ def set_aside(job: Job, reason: str, seconds: float = 0.0) -> Outcome:
     return Outcome(job.recording.drive, 0, 0, seconds, reason)
 
 
+def _is_text(address: str) -> bool:
+    """False for a file name with bytes that are no UTF-8, which Python holds as lone surrogates."""
+    try:
+        address.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def _write(job: Job, name: str, what: dict[str, object]) -> None:
     said = {"drive": job.recording.drive, "address": job.recording.address, "mark": job.recording.mark} | what
-    job.store.write(name, json.dumps(said, ensure_ascii=False, indent=1).encode())
+    job.store.write(name, json.dumps(said, indent=1).encode())
 
 
 def _before(job: Job) -> Outcome | None:

@@ -30,18 +30,22 @@ from pipeline.types import Frame, Path, Result
 from pipeline.warm_up import warm_up
 
 LIDAR_ALONE = "LiDAR alone"
+_ALL = ("lanes", "gnss", "yaw_rate", "edges", "traffic")
+
+
+def _only(*used: str) -> Mapping[str, bool]:
+    """The parameters that leave the path these sources."""
+    return {f"path.use_{each}": False for each in _ALL if each not in used}
+
+
 SOURCES: Mapping[str, Mapping[str, bool]] = {
-    "lane lines": {"path.use_gnss": False, "path.use_yaw_rate": False, "path.use_edges": False},
-    "GNSS route": {"path.use_lanes": False, "path.use_yaw_rate": False, "path.use_edges": False},
-    "yaw rate": {"path.use_lanes": False, "path.use_gnss": False, "path.use_edges": False},
-    "road edges": {"path.use_lanes": False, "path.use_gnss": False, "path.use_yaw_rate": False},
-    "lane lines and yaw rate": {"path.use_gnss": False, "path.use_edges": False},
-    "straight guess": {
-        "path.use_lanes": False,
-        "path.use_gnss": False,
-        "path.use_yaw_rate": False,
-        "path.use_edges": False,
-    },
+    "lane lines": _only("lanes"),
+    "GNSS route": _only("gnss"),
+    "yaw rate": _only("yaw_rate"),
+    "road edges": _only("edges"),
+    "other vehicles": _only("traffic"),
+    "lane lines and yaw rate": _only("lanes", "yaw_rate"),
+    "straight guess": _only(),
     "fused": {},
     LIDAR_ALONE: {},
 }

@@ -37,6 +37,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     },
     "standing like driving vehicles": {"cipv.become_standing": 0.0},
     "oncoming like other vehicles": {"cipv.become_oncoming": 0.0},
+    "crossing like other vehicles": {"cipv.use_crossing": False},
     "wide clusters not split": {"cluster.divide_m": 3.0},
     "clusters of two tracks not split": {"cluster.divide_tracked": False},
     "ACC acts on one frame": {"acc.confirm_frames": 1},

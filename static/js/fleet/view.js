@@ -1,5 +1,5 @@
 /**
- * The Fleet view: events, frames, objects or drives of a whole fleet, filtered and counted. A press on a row opens that
+ * The Fleet view: events, frames, objects or drives of a whole fleet, filtered and counted. Clicking a row opens that
  * moment in the dashboard. Filters stay while the page is open.
  */
 import { newestOnly, request } from "../core/api.js";
@@ -112,7 +112,7 @@ function clear() {
   });
 }
 
-/** Change the filters, and ask again. @param {() => unknown} change */
+/** Change the filters and query again. @param {() => unknown} change */
 function changed(change) {
   change();
   memory.write("fleet.of", filters.of);
@@ -122,6 +122,7 @@ function changed(change) {
 const load = newestOnly(async (/** @type {void} */ _) => {
   const { of, run } = filters;
   dialog.ariaBusy = "true";
+  $("#fleet-facts").textContent = "Searching…";
   for (const tab of dialog.querySelectorAll("[role=tab]"))
     tab.setAttribute("aria-selected", String(/** @type {HTMLElement} */ (tab).dataset.of === of));
   try {
@@ -132,6 +133,7 @@ const load = newestOnly(async (/** @type {void} */ _) => {
     await loadCharts();
     problem("");
   } catch (error) {
+    $("#fleet-facts").textContent = "";
     problem(/** @type {Error} */ (error).message);
   }
   dialog.ariaBusy = "false";

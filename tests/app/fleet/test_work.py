@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,11 +14,13 @@ import zstandard
 from app.cli import main
 from app.drive.events import event_kinds
 from app.fleet.batch.job import Outcome, TooLong
+from app.fleet.batch.plan import Plan, work_of
 from app.fleet.batch.tables import EVENTS, FRAMES, OBJECTS, SCORES, TABLES, file_of
 from app.fleet.batch.work import WrongWorker, look_at_piece, run_drive
+from app.fleet.runs import set_aside
 from app.fleet.store import Store
 from pipeline.params import Params, with_changes
-from tests.app.fleet.fleets import BAD, contents, job_of
+from tests.app.fleet.fleets import BAD, begun, contents, job_of, plan_of
 
 
 @pytest.fixture(scope="module")
@@ -130,6 +133,17 @@ def test_a_bad_recording_is_set_aside_with_the_reason(fleet: Path, tmp_path: Pat
     assert isinstance(again, Outcome)
     assert again.reason == outcome.reason
     assert not (tmp_path / "tables").exists()
+
+
+def test_a_name_that_is_no_text_is_set_aside(fleet: Path, tmp_path: Path):
+    name = Path(os.fsdecode(b"bad\xff.mcap"))
+    (tmp_path / name).write_bytes((fleet / "near-0.mcap").read_bytes())
+    work = begun(plan_of(tmp_path), tmp_path / "out")
+    outcome = run_drive(work.jobs[0])
+    assert isinstance(outcome, Outcome)
+    assert "UTF-8" in outcome.reason
+    assert set_aside(work.store, work.key.name) == {str(tmp_path / name): outcome.reason}
+    assert work_of(Plan.load(work.store), work.store).jobs == ()
 
 
 def test_a_worker_with_other_code_or_networks_is_told(fleet: Path, tmp_path: Path):

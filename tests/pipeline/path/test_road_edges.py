@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipeline.common.fast_replace import evolve
 from pipeline.params import PathParams
 from pipeline.path import road_edges
 from pipeline.path.corridor import Evidence, PathState, predict
@@ -12,6 +13,7 @@ from pipeline.path.estimates import PathEstimate, arc, samples
 from pipeline.path.road_edges import EdgeState, Surroundings
 from pipeline.types import EgoState, Ground, Moment
 from pipeline.types.lane import EgoLane
+from tests.pipeline.build import fused
 from tests.pipeline.path.lines import straight_lane
 
 PARAMS = PathParams(use_edges=True)
@@ -81,3 +83,42 @@ def test_edges_have_a_say_where_paint_ends_early() -> None:
     vague = straight_lane(sigma_m=3.0)
     _, path = predict(PathState(), Evidence(lane=vague, edges=edges), NOW, PARAMS)
     assert path.carried_by["30"]["edges"] > 0.5
+
+
+def test_a_standing_car_keeps_the_road_that_it_saw() -> None:
+    """Cross traffic stops on both sides of its lane; the hedges are hidden."""
+    state, edges = EdgeState(), None
+    for _ in range(3):
+        state, edges = road_edges.follow(state, between_hedges(), NOW, PARAMS)
+    stands = EgoState(0, 0.0, 0.0)
+    row = np.column_stack([np.full(60, 12.0), np.linspace(-15, 15, 60), np.full(60, 0.5), np.zeros(60)])
+    crossing = between_hedges()._replace(
+        points=row.astype(np.float32), kind=np.zeros(60, np.int32), ring=np.zeros(60, np.uint8)
+    )
+    for _ in range(30):
+        state, now = road_edges.follow(state, crossing, Moment(0, 0.1, stands, stands), PARAMS)
+    assert edges is not None
+    assert now is not None
+    np.testing.assert_array_equal(now.path.center, edges.path.center)
+
+
+@pytest.mark.parametrize(("label", "is_left"), [("car", 0), (None, 8)])
+def test_a_lead_that_has_stopped_is_no_roadside(label: str | None, is_left: int) -> None:
+    """Once seen driving by the camera too; a hedge only seems to drive while more of it comes into view."""
+    stopped = fused(3, 20.0, 0.0, source="VL" if label else "L", label=label)
+    drove = evolve(stopped, surely_moving=True, speed_over_ground_mps=8.0)
+    rear = np.column_stack([np.full(8, 20.1), np.linspace(-0.8, 0.8, 8), np.full(8, 0.5), np.zeros(8)]).astype(
+        np.float32
+    )
+    hedges = between_hedges()
+    seen = hedges._replace(
+        points=np.vstack([hedges.points, rear]).astype(np.float32),
+        kind=np.zeros(len(hedges.points) + 8, np.int32),
+        ring=np.zeros(len(hedges.points) + 8, np.uint8),
+    )
+    state = EdgeState()
+    for item in (drove,) * 6 + (stopped,) * 3:
+        state, _ = road_edges.follow(state, seen._replace(objects=(item,)), NOW, PARAMS)
+    in_lane = np.abs(state.cells.xy - (20.1, 0.0)).max(axis=1) < 1.2
+    assert in_lane.sum() <= is_left
+    assert bool(in_lane.any()) is bool(is_left)

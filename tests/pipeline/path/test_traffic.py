@@ -121,6 +121,50 @@ def test_what_is_not_known_to_drive(change: Callable[[FusedObject], FusedObject]
     assert drive(Driver(25.0, 0.0), change=lambda item, _: change(item), frames=16)[1] is None
 
 
+def by_camera(item: FusedObject, n: int = 0, **changed: object) -> FusedObject:
+    """As the camera alone sees it, with a distance that wavers by 2 m."""
+    assert item.bev is not None
+    nearer = 1.0 + 2.0 * (-1) ** n / 45.0
+    seen = replace(item, source="V", seen_by="V", cuboid=None, lidar_track=None, vision_track=7, distance_sigma_m=3.0)
+    bev = tuple((x * nearer, y * nearer) for x, y in item.bev)
+    return replace(seen, bev=bev, surely_moving=True, existence=0.95, **changed)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("heading", [0.2, -0.3])
+def test_a_far_car_that_only_the_camera_follows_bends_the_path_too(heading: float) -> None:
+    on_arc = 45.0 * cos(heading / 2), 45.0 * sin(heading / 2)
+    path = centre(drive(Driver(*on_arc, heading), frames=25, change=by_camera)[1])
+    assert path[45, 1] / heading > 8.0
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        pytest.param({"existence": 0.7}, id="may not exist"),
+        pytest.param({"surely_moving": False}, id="may stand"),
+        pytest.param({"measured": False}, id="its distance did not fit"),
+        pytest.param({"seen_by": ""}, id="not seen now"),
+    ],
+)
+def test_a_car_of_which_the_camera_is_not_sure_shows_no_road(changed: dict[str, object]) -> None:
+    def seen(item: FusedObject, n: int) -> FusedObject:
+        return replace(by_camera(item, n), **changed)  # type: ignore[arg-type]
+
+    assert drive(Driver(45.0, 0.0), frames=25, change=seen)[1] is None
+
+
+def test_a_camera_track_that_jumps_aside_shows_no_road() -> None:
+    """From one parked car to another, 3 m beside it."""
+
+    def jumps(item: FusedObject, n: int) -> FusedObject:
+        aside = 3.0 if n % 2 else 0.0
+        seen = by_camera(item, n)
+        assert seen.bev is not None
+        return replace(seen, bev=tuple((x, y + aside) for x, y in seen.bev))  # type: ignore[arg-type]
+
+    assert drive(Driver(45.0, 0.0), frames=25, change=jumps)[1] is None
+
+
 def test_a_track_that_jumps_from_one_parked_car_to_the_next_does_not_drive() -> None:
     """Each car is 6 m farther than the last: on average the track goes along at ego's speed."""
 
