@@ -124,11 +124,11 @@ def searching(axes: Sequence[Axis], count: int, seed: int = 0) -> Proposer:
 
     def propose(tried: Sequence[Tried]) -> Mapping[str, Any] | None:
         if asked:
-            scores = tried[-1].missed, tried[-1].phantoms
-            if None in scores:
+            missed, phantoms = tried[-1].missed, tried[-1].phantoms
+            if missed is None or phantoms is None:
                 study.tell(asked[-1], state=optuna.trial.TrialState.FAIL)
             else:
-                study.tell(asked[-1], scores)
+                study.tell(asked[-1], (missed, phantoms))
         if len(tried) == count:
             return None
         asked.append(study.ask())

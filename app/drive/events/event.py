@@ -20,7 +20,7 @@ of a drive of many hours."""
 
 def event_fields(records: Objects) -> Objects:
     """A copy of a frame's objects, with ``OBJECT_FIELDS`` only."""
-    return repack_fields(records[OBJECT_FIELDS])  # type: ignore[no-any-return]
+    return repack_fields(records[OBJECT_FIELDS])
 
 
 @dataclass(frozen=True)
