@@ -44,20 +44,30 @@ class _Law(msgspec.Struct, array_like=True):
 
 
 class DetectionRow(msgspec.Struct, array_like=True):
-    """One detector's output for one image. boxes and the following fields: of ``RawBoxes``; points and line: of
-    ``RawLanes``. Arrays are bytes, little-endian."""
+    """One detector's output for one image. Arrays are bytes, little-endian."""
 
     index: int
+    """Of the frame in the recording."""
     detector: str
+    """Name under which the detector was asked."""
     model: str
+    """Name of its network."""
     scores: bytes
+    """float32, of each box or lane point."""
     boxes: bytes | None = None
+    """float32, four pixels each; None for lanes."""
     labels: list[str] = []
+    """Class name of each box."""
     law: _Law | None = None
+    """The detector's distance law."""
     far: tuple[int, int, int, int] | None = None
+    """Window of the second look, pixels; None without one."""
     far_count: int = 0
+    """How many of the last boxes come from it."""
     points: bytes = b""
+    """float32, two pixels each: points of lane lines."""
     line: bytes = b""
+    """int32: the number of the line of each point."""
 
 
 def row_of(index: int, name: str, answer: RawBoxes | RawLanes) -> DetectionRow:
