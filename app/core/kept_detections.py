@@ -44,20 +44,30 @@ class _Law(msgspec.Struct, array_like=True):
 
 
 class DetectionRow(msgspec.Struct, array_like=True):
-    """One detector's output for one image. boxes and the following fields: of ``RawBoxes``; points and line: of
-    ``RawLanes``. Arrays are bytes, little-endian."""
+    """One detector's output for one image. Arrays are bytes, little-endian."""
 
     index: int
+    """Of the frame; 0 where the image identifies it."""
     detector: str
+    """The detector's name."""
     model: str
+    """As ``RawBoxes.model`` and ``RawLanes.model``."""
     scores: bytes
+    """float32, 0–1, one for each box or point."""
     boxes: bytes | None = None
+    """float32 ``x1 y1 x2 y2`` of each box, pixels; None for lanes."""
     labels: list[str] = []
+    """Class name of each box."""
     law: _Law | None = None
+    """As ``RawBoxes.law``; None for lanes."""
     far: tuple[int, int, int, int] | None = None
+    """As ``RawBoxes.far``: the region seen a second time, pixels; None without one."""
     far_count: int = 0
+    """How many of the boxes come from there."""
     points: bytes = b""
+    """float32 ``u v`` of each point on a line, pixels."""
     line: bytes = b""
+    """int32, which line each point belongs to."""
 
 
 def row_of(index: int, name: str, answer: RawBoxes | RawLanes) -> DetectionRow:
