@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -110,26 +111,30 @@ class FleetTables:
 
     def scores(self) -> list[tuple[str, str, float, float]]:
         """(drive, score, over, under) of every drive."""
-        rows = self._duckdb.execute('SELECT drive, score, "over", under FROM scores ORDER BY ALL').fetchall()
+        with _interruptible():
+            rows = self._duckdb.execute('SELECT drive, score, "over", under FROM scores ORDER BY ALL').fetchall()
         return [(str(drive), str(score), float(over), float(under)) for drive, score, over, under in rows]
 
     def drives(self) -> list[str]:
         """Names of all drives."""
-        return [str(row[0]) for row in self._duckdb.execute("SELECT drive FROM drives ORDER BY drive").fetchall()]
+        with _interruptible():
+            return [str(row[0]) for row in self._duckdb.execute("SELECT drive FROM drives ORDER BY drive").fetchall()]
 
     def rows(self, table: QueryTable) -> list[dict[str, Any]]:
         """Every row of a table, by column."""
-        found = self._duckdb.execute(f"SELECT * FROM {table} ORDER BY ALL")
-        names = [column[0] for column in found.description or ()]
-        return [dict(zip(names, row, strict=True)) for row in found.fetchall()]
+        with _interruptible():
+            found = self._duckdb.execute(f"SELECT * FROM {table} ORDER BY ALL")
+            names = [column[0] for column in found.description or ()]
+            return [dict(zip(names, row, strict=True)) for row in found.fetchall()]
 
     def ask(self, sql: str) -> Any:
         """The result of a complete query, which must not come from outside, as a pyarrow table."""
-        return self._duckdb.sql(sql).to_arrow_table()
+        with _interruptible():
+            return self._duckdb.sql(sql).to_arrow_table()
 
     def arrow(self, table: QueryTable, columns: str) -> Any:
         """Columns of a table, named in SQL, as a pyarrow table."""
-        return self._duckdb.sql(f"SELECT {columns} FROM {table}").to_arrow_table()
+        return self.ask(f"SELECT {columns} FROM {table}")
 
     def histogram(self, where: str, of: QueryTable, column: str, bins: int = 24) -> tuple[list[float], list[int]]:
         """(bins + 1) edges, and between them the counts of a column's values in rows that meet a condition. Raises what
@@ -159,7 +164,8 @@ class FleetTables:
             statements = self._duckdb.extract_statements(sql)
             if len(statements) != 1 or statements[0].type != duckdb.StatementType.SELECT:
                 raise BadInput(f"{where!r}: expected one condition")
-            return self._duckdb.execute(statements[0]).fetchall()
+            with _interruptible():
+                return self._duckdb.execute(statements[0]).fetchall()
         except duckdb.InterruptException:
             raise BadInput(f"{where!r}: stopped after {self._most_s:g} s") from None
         except duckdb.Error as error:
@@ -204,6 +210,17 @@ class FleetTables:
         if self.store.folder is not None:
             return str(self.store.folder / name)
         return str(self.store.system.unstrip_protocol(self.store.path(name)))
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Ctrl-C during a query is Ctrl-C: DuckDB turns what a signal's handler raises into an error of its own."""
+    try:
+        yield
+    except RuntimeError as error:
+        if str(error) == "Query interrupted":
+            raise KeyboardInterrupt from None
+        raise
 
 
 def _quoted(name: str) -> str:

@@ -84,7 +84,7 @@ class Cluster:
         at = ["--host", "127.0.0.1", "--port", port, "--no-dashboard"]
         self.scheduler = subprocess.Popen([*dask, "scheduler", *at], **how)
         options = ["--nworkers", str(workers), "--nthreads", "1", "--no-dashboard", "--memory-limit", MEMORY]
-        self._workers = subprocess.Popen([*dask, "worker", self.address, *options, "--death-timeout", "60"], **how)
+        self._workers = subprocess.Popen([*dask, "worker", self.address, *options, "--death-timeout", "600"], **how)
 
     def stop(self) -> None:
         for process in (self._workers, self.scheduler):

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import signal
+import threading
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -115,6 +118,19 @@ def test_a_question_without_end_is_stopped(batch: Path):
     endless = "(SELECT sum(a.range * b.range) FROM range(10000000) a, range(10000000) b) > 0"
     with pytest.raises(BadInput, match=r"stopped after 0\.2 s"):
         FleetTables(Store(str(batch)), most_s=0.2).find(endless)
+
+
+def test_ctrl_c_ends_a_question(batch: Path):
+    endless = "(SELECT sum(a.range * b.range) FROM range(10000000) a, range(10000000) b) > 0"
+    stop = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        stop.start()
+        with pytest.raises(KeyboardInterrupt):
+            FleetTables(Store(str(batch))).find(endless)
+    finally:
+        stop.join()
+        signal.signal(signal.SIGINT, before)
 
 
 def test_a_question_fills_neither_the_memory_nor_the_disk(batch: Path, monkeypatch: pytest.MonkeyPatch):
