@@ -13,6 +13,8 @@ from app.bench.timing import figures, interleaved
 from pipeline.types import U8
 from pipeline.vision.detector import Detector
 
+_PEER = "cv2.dnn"
+
 
 def stages(images: Sequence[U8], detector: Detector, budget_s: float) -> dict[str, dict[str, Any]]:
     """``{"detector": …}`` as ``cipv bench --json`` prints it; empty without an image. images: (H, W, 3) uint8, used in
@@ -21,9 +23,9 @@ def stages(images: Sequence[U8], detector: Detector, budget_s: float) -> dict[st
         return {}
     ours = _in_turn(detector.detect, images)
     contestants = {"ours": ours}
-    peer = _opencv(detector, images)
+    peer, absent = _opencv(detector, images)
     if peer is not None:
-        contestants["cv2.dnn"] = peer
+        contestants[_PEER] = peer
     threads = cv2.getNumThreads()
     cv2.setNumThreads(detector.threads)
     try:
@@ -31,11 +33,14 @@ def stages(images: Sequence[U8], detector: Detector, budget_s: float) -> dict[st
     finally:
         cv2.setNumThreads(threads)
     median = float(np.median(times["ours"]) * 1e3)
-    peers = {name: float(np.median(spent) * 1e3) for name, spent in times.items() if name != "ours"}
+    peers: dict[str, dict[str, Any]] = {_PEER: {"median_ms": None, "ratio": None, "absent": absent}}
+    if peer is not None:
+        peer_ms = float(np.median(times[_PEER]) * 1e3)
+        peers = {_PEER: {"median_ms": round(peer_ms, 4), "ratio": round(peer_ms / median, 2)}}
     return {
         "detector": {
             **figures(times["ours"]),
-            "peers": {name: {"median_ms": round(ms, 4), "ratio": round(ms / median, 2)} for name, ms in peers.items()},
+            "peers": peers,
             "model": detector.name,
             "providers": list(detector.providers),
         }
@@ -47,8 +52,8 @@ def _in_turn(work: Callable[[U8], object], images: Sequence[U8]) -> Callable[[],
     return lambda: work(next(turn))
 
 
-def _opencv(detector: Detector, images: Sequence[U8]) -> Callable[[], object] | None:
-    """``cv2.dnn`` on the same graph with our pre-processing and decoding; None if OpenCV cannot read the graph."""
+def _opencv(detector: Detector, images: Sequence[U8]) -> tuple[Callable[[], object] | None, str]:
+    """``cv2.dnn`` on the same graph with our pre-processing and decoding; None and why if OpenCV cannot run it."""
     try:
         network = cv2.dnn.readNetFromONNX(np.frombuffer(detector.graph, np.uint8))
 
@@ -58,6 +63,6 @@ def _opencv(detector: Detector, images: Sequence[U8]) -> Callable[[], object] | 
             return detector.decode([np.asarray(output, np.float32) for output in outputs], bgr.shape[:2])
 
         detect(images[0])
-    except cv2.error:
-        return None
-    return _in_turn(detect, images)
+    except (cv2.error, ValueError, IndexError) as error:  # the last two: its outputs have other shapes
+        return None, f"OpenCV cannot run this graph: {' '.join(str(getattr(error, 'err', '') or error).split())}"
+    return _in_turn(detect, images), ""

@@ -15,7 +15,10 @@ import tyro
 from app.commands.support.arguments import option
 from app.commands.support.open_with_progress import opened
 from app.commands.support.options import PipelineOptions, SourceName, planned
+from app.core.detection_cache import DetectionCache
+from app.core.kept_detections import KeptDetections
 from app.core.server_address import DEFAULT_PORT
+from app.core.session_folder import SESSIONS
 from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
 from app.labels import URL_VARIABLE
@@ -165,6 +168,7 @@ class Serve:
             lanes_every=self.pipeline.every(),
             far_view_px=self.pipeline.far_px(),
             labels=self.server.label_desk(),
+            detections=DetectionCache(kept=KeptDetections(SESSIONS / "detections.db")),
         )
 
 

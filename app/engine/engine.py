@@ -50,8 +50,8 @@ class Engine:
     the lane detector, which runs on every ``lanes_every``-th frame. ``far_view_px``: side of the window of the second
     pass, None for none. ``whole_drives``: a recording's whole drive is computed in the background (``drives``), so that
     any frame is shown as in a complete run. ``desk``: where what is shown can be recorded; by default the folder of
-    this machine's sessions. ``labels``: the labels, and the steps that can be undone; by default discarded at the
-    end."""
+    this machine's sessions. ``labels``: the labels, and the steps that can be undone; by default discarded at the end.
+    ``detections``: those of earlier frames; by default none are kept."""
 
     def __init__(
         self,
@@ -70,13 +70,14 @@ class Engine:
         desk: SessionRecorder | None = None,
         labels: LabelDesk | None = None,
         watchdog: Watchdog | None = None,
+        detections: DetectionCache | None = None,
     ) -> None:
         self.control = Control(Wish(params, preset, uri=uri, playing=playing))
         self._publisher = SnapshotPublisher(Snapshot(params, preset))
         self.listen, self.wait_for = self._publisher.listen, self._publisher.wait_for
         self._open_source = open_source
         self._sensors: Sensors = sensors
-        self._detections = DetectionCache()
+        self._detections = detections or DetectionCache()
         self.drives = BackgroundRuns(self._detections)
         self.control.on_ask = self.drives.turn.asked
         self.page_frames = PageFrames(self.drives.turn.foreground)

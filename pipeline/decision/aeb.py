@@ -74,14 +74,16 @@ def guard(
 
 
 def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
-    """The CIPV, and any other reliable object that heads into the corridor, while the gap to them shrinks."""
+    """The CIPV, and any other reliable object that heads into the corridor, while the gap to them shrinks. An oncoming
+    CIPV counts only if it would do so as another object: in a bend that was not foreseen, it is in the path for a
+    moment before it passes."""
     found = []
     for item in situation.objects:
         closing = closing_speed_mps(item)
         if closing is None or closing <= STANDSTILL_MPS or not item.distance_m or item.ttc_s is None:
             continue
         is_lead = situation.lead is not None and item.id == situation.lead.id
-        if (is_lead and not item.carried) or (
+        if (is_lead and not item.carried and not item.oncoming) or (
             is_dependable(item) and enters_corridor(item, situation.path, situation.lead)
         ):
             required = required_decel_mps2(item.distance_m, closing, params)

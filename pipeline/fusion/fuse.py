@@ -14,7 +14,6 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from pipeline.alignment.projection import Alignment, project_cuboids
-from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64, corners_of, iou_matrix
 from pipeline.fusion.rows import box_row, hit_row, lidar_sigma_m, quad, range_m
 from pipeline.fusion.vehicle_sizes import LONGEST_M
@@ -112,12 +111,14 @@ def fuse(
         compared = (i if i is not None else nearest_of_lidar[j or 0], j if j is not None else nearest_of_vision[i or 0])
         tested = gates.get(compared, ())
         seen = vision[i] if i is not None else None
+        side = sides.get(i) if i is not None else None
         if j is not None:
             footprint = quad(footprints[j])
-            row = hit_row(object_id, seen, lidar[j], projected[j], footprint, ranges_m[j], sigmas_m[j], tested)
+            objects.append(
+                hit_row(object_id, seen, lidar[j], projected[j], footprint, ranges_m[j], sigmas_m[j], tested, side)
+            )
         elif seen is not None:
-            row = box_row(object_id, seen, tested)
-        objects.append(evolve(row, box_sides=sides[i]) if i is not None and i in sides else row)
+            objects.append(box_row(object_id, seen, tested, side))
     objects.sort(key=lambda o: (o.distance_m is None, o.distance_m or 0.0, o.id))
     numbered = list(zip(ids, pairs, strict=True))
     lidar_boxes = {number: box for number, (_, j) in numbered if j is not None and (box := projected[j]) is not None}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 from pipeline.common.fast_replace import evolve
 from pipeline.fusion.vehicle_sizes import usual_size_m
@@ -16,6 +17,7 @@ plus where its beams hit the bumper and grille. Compared with the nearest corner
 CARRIED_SPEED_SIGMA_MPS, CARRIED_ACCEL_SIGMA_MPS2 = 0.5, 3.0
 
 Quad = tuple[Point2, Point2, Point2, Point2]
+Sides = tuple[Point2, Point2]
 
 _UNKNOWN = FusedObject(
     id=0,
@@ -48,50 +50,50 @@ def hit_row(
     range_m: float,
     sigma_m: float,
     gates: tuple[Gate, ...],
+    sides: Sides | None = None,
 ) -> FusedObject:
     """Table 3 for an object seen by the LiDAR: position, distance and velocity are from the LiDAR, the class is from
-    the camera."""
-    row = evolve(
+    the camera. sides: as ``FusedObject.box_sides``."""
+    seen_by_lidar: Literal["L", ""] = "" if hit.carried else "L"
+    by_camera = (
+        {"source": "L", "bbox": box, "velocity_mps": hit.velocity_mps, "seen_by": seen_by_lidar, "hits": hit.hits}
+        if seen is None
+        else {
+            "source": "VL",
+            "label": seen.label,
+            "score": seen.score,
+            "bbox": box if box is not None else seen.bbox,
+            # in the one frame in which the LiDAR finds an object that the camera already follows, the velocity is the
+            # camera's, so that braking for it does not lose its speed
+            "velocity_mps": hit.velocity_mps if hit.velocity_mps is not None else seen.velocity_mps,
+            "seen_by": seen_by_lidar if seen.carried else "V" if hit.carried else "VL",
+            "hits": max(hit.hits, seen.hits),
+            "vision_track": seen.id,
+            "camera_ranges": seen.ranges,
+            "box_sides": sides,
+        }
+    )
+    return evolve(
         _UNKNOWN,
         id=object_id,
-        source="L",
-        bbox=box,
         bev=footprint,
         cuboid=hit.obstacle.cuboid,
         closest_point=hit.obstacle.closest_point,
         distance_m=range_m,
         distance_sigma_m=sigma_m,
-        velocity_mps=hit.velocity_mps,
-        seen_by="" if hit.carried else "L",
         measured=not hit.carried,
-        hits=hit.hits,
         lidar_points=hit.obstacle.points,
         lidar_track=hit.id,
         lidar_hits=hit.hits,
         lidar_steady=hit.steady,
         rigid_mps=hit.rigid_mps,
         gates=gates,
-    )
-    if seen is None:
-        return row
-    return evolve(
-        row,
-        source="VL",
-        label=seen.label,
-        score=seen.score,
-        bbox=box if box is not None else seen.bbox,
-        # in the one frame in which the LiDAR finds an object that the camera already follows, the velocity is the
-        # camera's, so that braking for it does not lose its speed
-        velocity_mps=hit.velocity_mps if hit.velocity_mps is not None else seen.velocity_mps,
-        seen_by=row.seen_by if seen.carried else "V" if hit.carried else "VL",
-        hits=max(hit.hits, seen.hits),
-        vision_track=seen.id,
-        camera_ranges=seen.ranges,
+        **by_camera,
     )
 
 
-def box_row(object_id: int, seen: VisionTrack, gates: tuple[Gate, ...]) -> FusedObject:
-    """Table 3 for an object seen only by the camera."""
+def box_row(object_id: int, seen: VisionTrack, gates: tuple[Gate, ...], sides: Sides | None = None) -> FusedObject:
+    """Table 3 for an object seen only by the camera. sides: as ``FusedObject.box_sides``."""
     place = seen.position
     return evolve(
         _UNKNOWN,
@@ -113,6 +115,7 @@ def box_row(object_id: int, seen: VisionTrack, gates: tuple[Gate, ...]) -> Fused
         returns=seen.returns,
         height_from=seen.height_from,
         gates=gates,
+        box_sides=sides,
     )
 
 

@@ -19,7 +19,7 @@ from pipeline.params import PathParams
 from pipeline.path.corridor import nearest
 from pipeline.path.estimates import arc, samples
 from pipeline.path.ground_points import now_at
-from pipeline.path.shape_kernels import weigh_shapes
+from pipeline.path.shape_kernels import moments, weigh_shapes
 from pipeline.types import EgoState
 
 _NODES_M = (20.0, 40.0)
@@ -189,7 +189,7 @@ def _round(line: F64, xy: F64, blocks: F64, grid: Grid, prior: Prior, s: F64) ->
         along[keep], aside[keep], blocks[keep], first, second, turns, grid.bin_m, _BAND_M, _TEMPER,
         heading, bends, *prior, _CHANCE, _CLEAR_M, _IMPROBABLE,
     )  # fmt: skip
-    mean, sigma = _moments(s, first, second, turns, weights)
+    mean, sigma = moments(s, first, second, turns, weights, _NODES_M[1])
     return _shifted(line, mean, s), sigma, evidence
 
 
@@ -211,24 +211,3 @@ def _shifted(line: F64, aside: F64, s: F64) -> F64:
     way = np.gradient(line, axis=0)
     normal = np.column_stack([-way[:, 1], way[:, 0]]) / np.maximum(np.hypot(*way.T), 1e-9)[:, None]
     return _resampled(line + aside[:, None] * normal, s)
-
-
-def _cubic(first: F64, second: F64, heading: F64) -> tuple[F64, F64]:
-    """a, b of heading·s + a·s² + b·s³ through the nodes."""
-    b = (second - 4.0 * first + 40.0 * heading) / 32000.0
-    return (first - 20.0 * heading - 8000.0 * b) / 400.0, b
-
-
-def _moments(s: F64, first: F64, second: F64, heading: F64, weights: F64) -> tuple[F64, F64]:
-    """Mean and standard deviation of the shape's lateral offset at ``s``, straight beyond the last node."""
-    h, u, w = np.meshgrid(heading, first, second, indexing="ij")
-    a, b = _cubic(u, w, h)
-    near = np.minimum(s, _NODES_M[1])
-    over = s - near
-    rows = np.stack([near, near**2 + 2.0 * near * over, near**3 + 3.0 * near**2 * over])
-    rows[0] += over
-    p = weights.ravel()
-    terms = np.stack([h.ravel(), a.ravel(), b.ravel()])
-    mean = terms @ p
-    spread = (terms - mean[:, None]) * p @ (terms - mean[:, None]).T
-    return mean @ rows, np.sqrt(np.maximum(np.einsum("ik,ij,jk->k", rows, spread, rows), 0.0))

@@ -94,3 +94,40 @@ def weigh_shapes(  # type: ignore[no-untyped-def]
                 out[i, j, k] = np.exp(out[i, j, k] - best)
                 whole += out[i, j, k]
     return out / whole, best + np.log(whole)
+
+
+@numba.njit(cache=True, nogil=True)
+def moments(s, first, second, heading, weights, last_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(K,) mean and standard deviation of the shape's lateral offset at ``s``, straight beyond the last node. weights:
+    (H, U, W) probability of each shape."""
+    mean, square = np.zeros(3), np.zeros((3, 3))
+    term = np.empty(3)
+    for only_mean in (True, False):
+        for i in range(len(heading)):
+            for j in range(len(first)):
+                for k in range(len(second)):
+                    p = weights[i, j, k]
+                    if p == 0.0:
+                        continue
+                    term[2] = (second[k] - 4.0 * first[j] + 40.0 * heading[i]) / 32000.0
+                    term[1] = (first[j] - 20.0 * heading[i] - 8000.0 * term[2]) / 400.0
+                    term[0] = heading[i]
+                    for a in range(3):
+                        if only_mean:
+                            mean[a] += p * term[a]
+                        else:
+                            for b in range(3):
+                                square[a, b] += p * (term[a] - mean[a]) * (term[b] - mean[b])
+    out, sigma, row = np.zeros(len(s)), np.empty(len(s)), np.empty(3)
+    for n in range(len(s)):
+        near = min(s[n], last_m)
+        over = s[n] - near
+        row[0], row[1] = near + over, near * near + 2.0 * near * over
+        row[2] = near * near * near + 3.0 * near * near * over
+        variance = 0.0
+        for a in range(3):
+            out[n] += mean[a] * row[a]
+            for b in range(3):
+                variance += row[a] * square[a, b] * row[b]
+        sigma[n] = np.sqrt(max(variance, 0.0))
+    return out, sigma

@@ -17,8 +17,9 @@ from pipeline.common.made_sweeps import made_sweeps
 from pipeline.types import F32, U8
 from pipeline.types.arrays import Mask
 
-_BIN_RAD = np.radians(0.5)
-"""Width of the sectors in which a ring's nearest return is sought: two or three rays of a VLP-16."""
+_SECTORS = 360
+"""Number of sectors of the half plane ahead in which a ring's nearest return is sought: 0.3° wide straight ahead, 0.6°
+to the side, one to three rays of a VLP-16."""
 _BELOW_M, _ABOVE_M = 0.5, 0.1
 """A ray meets a cell if it passes at most this much below or above the return that made it. What stands beside a road
 stands on the ground, but a higher ray may pass over it; the car's pitch moves rays by 0.1 m at 30 m."""
@@ -53,7 +54,7 @@ def is_gone(
         return np.zeros(len(xy), np.bool_)
     gone: Mask = _gone(
         xy, z_m, points, ring, np.array(origin), origin[2] - height_m + _LOWEST_M, 0.5 * cell_m,
-        _BIN_RAD, _BELOW_M, _ABOVE_M, _BEFORE_M, _BEYOND_M, _FEWEST_RAYS, _LIVE,
+        _SECTORS, _BELOW_M, _ABOVE_M, _BEFORE_M, _BEYOND_M, _FEWEST_RAYS, _LIVE,
     )  # fmt: skip
     return gone
 
@@ -66,30 +67,30 @@ def warm_up() -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _gone(  # type: ignore[no-untyped-def]
-    xy, z, points, ring, origin, lowest_z, half_m, bin_rad, below_m, above_m, before_m, beyond_m, fewest, live
+    xy, z, points, ring, origin, lowest_z, half_m, sectors, below_m, above_m, before_m, beyond_m, fewest, live
 ):  # pragma: no cover
     """Nearest return of each ring in each sector of the half plane ahead, then every cell against the sectors and rings
     that meet it."""
-    sectors, rings = int(np.pi / bin_rad) + 1, int(ring.max()) + 1
+    rings = int(ring.max()) + 1
     nearest = np.full((sectors, rings), np.inf)
     total, count = np.zeros(rings), np.zeros(rings)
     for i in range(len(points)):
         x, y = points[i, 0] - origin[0], points[i, 1] - origin[1]
         if x <= 0.0:
             continue
-        r = np.hypot(x, y)
-        k = int((np.arctan2(y, x) + 0.5 * np.pi) / bin_rad)
+        r = np.sqrt(x * x + y * y)
+        k = _sector(x, y, sectors)
         nearest[k, ring[i]] = min(nearest[k, ring[i]], r)
         total[ring[i]] += (points[i, 2] - origin[2]) / r
         count[ring[i]] += 1.0
     out = np.zeros(len(xy), np.bool_)
     for n in range(len(xy)):
         x, y = xy[n, 0] - origin[0], xy[n, 1] - origin[1]
-        r = np.hypot(x, y)
-        if x <= 0.0 or r <= half_m:
+        r = np.sqrt(x * x + y * y)
+        aside_x, aside_y = -half_m * y / max(r, 1e-6), half_m * x / max(r, 1e-6)
+        if r <= half_m or min(x + aside_x, x - aside_x) <= 0.0:
             continue
-        at, half = np.arctan2(y, x) + 0.5 * np.pi, np.arctan(half_m / r)
-        first, last = max(int((at - half) / bin_rad), 0), min(int((at + half) / bin_rad), sectors - 1)
+        first, last = _sector(x - aside_x, y - aside_y, sectors), _sector(x + aside_x, y + aside_y, sectors)
         passed, ended = 0, 0
         for c in range(rings):
             if count[c] < live:
@@ -104,3 +105,9 @@ def _gone(  # type: ignore[no-untyped-def]
                     ended += 1
         out[n] = passed >= fewest and ended == 0
     return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _sector(x, y, sectors):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Number of the sector of a direction ahead. y over |x| + |y| grows with the angle too, without an arctangent."""
+    return min(int((y / (x + abs(y)) + 1.0) * 0.5 * sectors), sectors - 1)

@@ -1,5 +1,5 @@
 // @ts-check
-/** The help in the theme that was chosen in the dashboard; without a choice, as the system says. */
+/** Shows the help in the theme chosen in the dashboard; by default, in that of the system. */
 try {
   const chosen = JSON.parse(localStorage.getItem("cipv.theme") ?? "null");
   if (chosen === "dark" || chosen === "light") document.documentElement.dataset.theme = chosen;

@@ -27,7 +27,7 @@ function update() {
   if (!frame) return;
   const { sensors, ego } = frame.result;
   /**
-   * What the frame contains. Ages alone are not enough: a recording may have no timestamps.
+   * The sensors that the frame has data of. Ages alone are not enough, since a recording may have no timestamps.
    * @type {Record<string, boolean>}
    */
   const held = { lidar: Boolean(sensors.lidar?.points), camera: frame.image !== null, ego: ego !== null };

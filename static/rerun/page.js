@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The page around rerun's web viewer: it starts the viewer on this drive, at this moment, and says what goes wrong.
- * The viewer's script, loaded before this one, leaves `wasm_bindgen` behind.
+ * The page around rerun's web viewer: it starts the viewer on this drive at this moment, and reports errors. The
+ * viewer's script, loaded before this one, defines `wasm_bindgen`.
  */
 
 /**

@@ -46,7 +46,7 @@ class ClusterOptions:
 
         count = max(1, min(self.workers or usual_workers(), drives)) if self.scheduler is None else 0
         with client_of(self.scheduler, count, self.memory) as client:
-            print(f"cipv: Dask's own page: {client.dashboard_link}", file=sys.stderr)
+            print(f"cipv: Dask dashboard: {client.dashboard_link}", file=sys.stderr)
             yield client
 
 

@@ -7,44 +7,18 @@ import hashlib
 from typing import cast
 
 import msgspec
-import numpy as np
 import zstandard
 
+from app.core.kept_detections import DetectionRow, answer_of, row_of
 from app.fleet.store import Store
 from pipeline.detection import Detectors, Detects, Seen, look
-from pipeline.types import U8, DistanceLaw, Frame, RawBoxes, RawLanes
+from pipeline.types import U8, Frame, RawBoxes, RawLanes
 
 PIECE_FRAMES = 600
 """Number of frames whose detections are stored in one file: a minute at 10 Hz."""
 _LEVEL = 3
 Answers = dict[tuple[int, str], RawBoxes | RawLanes]
 """By frame and detector."""
-
-
-class _Law(msgspec.Struct, array_like=True):
-    coefficient: float
-    exponent: float
-    focal_px: float
-    truck_ratio: float
-    bus_ratio: float
-    motorcycle_ratio: float
-
-
-class _Answer(msgspec.Struct, array_like=True):
-    """One detector's output for one image. boxes and the following fields: of ``RawBoxes``; points and line: of
-    ``RawLanes``. Arrays are bytes, little-endian."""
-
-    index: int
-    detector: str
-    model: str
-    scores: bytes
-    boxes: bytes | None = None
-    labels: list[str] = []
-    law: _Law | None = None
-    far: tuple[int, int, int, int] | None = None
-    far_count: int = 0
-    points: bytes = b""
-    line: bytes = b""
 
 
 def answers_file(mark: str, detectors: Detectors, first: int, piece_frames: int = PIECE_FRAMES) -> str:
@@ -93,44 +67,14 @@ class KeptLook:
 
 def packed(answers: Answers) -> bytes:
     """As one file; equal detections give equal bytes."""
-    rows = [_row(index, name, answer) for (index, name), answer in sorted(answers.items(), key=lambda each: each[0])]
+    rows = [row_of(index, name, answer) for (index, name), answer in sorted(answers.items(), key=lambda each: each[0])]
     return zstandard.ZstdCompressor(level=_LEVEL).compress(msgspec.msgpack.encode(rows))
 
 
 def unpacked(data: bytes) -> Answers:
     """What ``packed`` wrote; empty if it cannot be read, so that networks run again."""
     try:
-        rows = msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(data), type=list[_Answer])
-        return {(row.index, row.detector): _answer(row) for row in rows}
+        rows = msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(data), type=list[DetectionRow])
+        return {(row.index, row.detector): answer_of(row) for row in rows}
     except (msgspec.DecodeError, zstandard.ZstdError, ValueError):
         return {}
-
-
-def _row(index: int, name: str, answer: RawBoxes | RawLanes) -> _Answer:
-    if isinstance(answer, RawLanes):
-        points, line = answer.points.astype("<f4").tobytes(), answer.line.astype("<i4").tobytes()
-        return _Answer(index, name, answer.model, answer.scores.astype("<f4").tobytes(), points=points, line=line)
-    law = answer.law
-    numbers = (law.coefficient, law.exponent, law.focal_px, law.truck_ratio, law.bus_ratio, law.motorcycle_ratio)
-    return _Answer(
-        index,
-        name,
-        answer.model,
-        answer.scores.astype("<f4").tobytes(),
-        answer.boxes.astype("<f4").tobytes(),
-        list(answer.labels),
-        _Law(*numbers),
-        answer.far,
-        answer.far_count,
-    )
-
-
-def _answer(row: _Answer) -> RawBoxes | RawLanes:
-    scores = np.frombuffer(row.scores, "<f4").astype(np.float32)
-    if row.boxes is None:
-        points = np.frombuffer(row.points, "<f4").astype(np.float32).reshape(-1, 2)
-        return RawLanes(row.model, points, scores, np.frombuffer(row.line, "<i4").astype(np.int32))
-    boxes = np.frombuffer(row.boxes, "<f4").astype(np.float32).reshape(-1, 4)
-    assert row.law is not None
-    law = DistanceLaw(*msgspec.structs.astuple(row.law))
-    return RawBoxes(row.model, boxes, scores, tuple(row.labels), law, row.far, row.far_count)

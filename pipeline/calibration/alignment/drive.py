@@ -1,4 +1,4 @@
-"""Fits the alignment to a drive: selects frames and collects boxes and clusters."""
+"""Fits the alignment to a drive: selects frames and collects boxes, clusters and edges."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.calibration.alignment.edges import FRAMES as EDGE_FRAMES
+from pipeline.calibration.alignment.edges import EdgeView
 from pipeline.calibration.alignment.fit import STEPS, AlignmentFit, fit_alignment
 from pipeline.calibration.alignment.models import ModelName
 from pipeline.calibration.alignment.scenes import FitScene, fit_scene
+from pipeline.calibration.depth_edges import edge_scene
 from pipeline.common.progress import Progress, silent
 from pipeline.params import Params
 from pipeline.types import Frame
@@ -33,12 +36,22 @@ def fit_drive(
     indices = np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int)).tolist()
     total = len(indices) + STEPS
     scenes: list[FitScene] = []
+    edges: list[EdgeView] = []
+    every = -(-len(indices) // EDGE_FRAMES)
     for number, index in enumerate(indices):
         progress(number, total)
-        scene = fit_scene(frame_of(index), params)
-        if scene is not None:
-            scenes.append(scene)
+        frame = frame_of(index)
+        scene = fit_scene(frame, params)
+        if scene is None:
+            continue
+        scenes.append(scene)
+        if name == "pinhole" and number % every == 0 and frame.sweep is not None and frame.image is not None:
+            edges.append(EdgeView(edge_scene(frame.sweep, frame.image.bgr), frame.t_ns))
     looked = len(indices)
-    found = fit_alignment(scenes, name, params.alignment, offset, lambda done, _: progress(looked + done, total))
+
+    def told(done: int, _: int) -> None:
+        progress(looked + done, total)
+
+    found = fit_alignment(scenes, name, params.alignment, offset, told, edges)
     progress(total, total)
     return found

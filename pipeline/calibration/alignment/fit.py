@@ -4,7 +4,8 @@
    a cluster where that mount predicts one. The correct one stands out over many frames.
 2. **Fine.** From the best few mounts: pair each box with its cluster, move the projected edges onto the box's edges
    with a robust loss, and pair again more strictly, until both converge.
-3. **Uncertainty.** The fit is repeated on frames resampled from blocks of the drive (bootstrap); the spread is the
+3. **Roll.** Boxes ahead hardly determine it; edges of the images do (``edges``).
+4. **Uncertainty.** The fit is repeated on frames resampled from blocks of the drive (bootstrap); the spread is the
    uncertainty. Held-out frames show how good the result is, and the drive itself whether it could determine it.
 """
 
@@ -14,32 +15,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from pipeline.calibration.alignment.doubts import Found, warnings_of
-from pipeline.calibration.alignment.models import STEP_DEG, FitModel, ModelName
-from pipeline.calibration.alignment.pairs import PairTable, coarse_scores
+from pipeline.calibration.alignment.doubts import warnings_of
+from pipeline.calibration.alignment.edges import EdgeView, RollScores, roll_scores
+from pipeline.calibration.alignment.models import FitModel, ModelName
+from pipeline.calibration.alignment.pairs import PairTable
 from pipeline.calibration.alignment.scenes import FitScene
+from pipeline.calibration.alignment.search import GATES, SEARCH_STEPS, explained, refine, search
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
 from pipeline.params import AlignmentParams
 from pipeline.types import F64, I64
 
-COARSE_FRAMES, FIRST_FRAMES, FIRST_SHARE = 30, 8, 0.1
-"""The coarse search uses the frames with the most boxes: a few for the whole grid, then more for its best tenth."""
-_COARSE_STEPS = 8
-STARTS = 6
-"""Number of best grid points that are refined."""
-GATES = ((4.0, 3.0), (2.5, 2.5), (1.5, 2.5), (1.0, 2.5), (1.0, 2.5), (1.0, 2.5))
-"""Rounds of the refinement: factor on the edge uncertainty, and the pairs' gate in standard deviations."""
-LOSS_SCALE = 1.0
-"""Standard deviations from which the loss grows only linearly (soft L1)."""
-ROLL_SIGMA_DEG, OFFSET_SIGMA_M = 5.0, 0.3
-"""Prior for roll and the camera's position, if the pairs do not determine them."""
-SQUARE_SIGMA = 0.02
-"""Permitted relative difference of the two resolutions of a camera with square pixels."""
+_EXACT_DEG = 0.01
+"""Standard deviation that holds a roll in place."""
 BOOTSTRAPS = 24
-STEPS = _COARSE_STEPS + STARTS + BOOTSTRAPS
+STEPS = SEARCH_STEPS + BOOTSTRAPS
 """Number of progress steps of a fit."""
 CLEAR_SIGMAS = 3.0
 """Random differences between blocks of the drive stay below this many standard deviations in sum."""
@@ -111,11 +102,12 @@ def fit_alignment(
     present: AlignmentParams,
     offset: bool = False,
     progress: Progress = silent,
+    edges: Sequence[EdgeView] = (),
 ) -> AlignmentFit:
     """The model's parameters from frames of one camera.
 
-    present: scored for comparison; the fit does not start from it. offset: of a pinhole model, also fit the camera's
-    position. NothingToFit if too little is visible.
+    edges: of frames of the same camera; they determine the roll of a pinhole model. present: scored for comparison, not
+    a start. offset: of a pinhole model, also fit the camera's position. NothingToFit if too little is visible.
     """
     scenes = _of_one_camera(scenes)
     if name == "pinhole" and scenes[0].camera is None:
@@ -123,12 +115,17 @@ def fit_alignment(
     model = FitModel(name, scenes[0].camera, scenes[0].size, offset)
     train, held = _split(scenes)
     table = PairTable.of([scenes[k] for k in train])
-    found = _search(table, model, progress)
+    found = search(table, model, progress, STEPS)
+    if len(found[0].rows) < FEWEST_PAIRS:
+        raise NothingToFit(_too_few(len(found[0].rows), len(table.boxes)))
+    numbers = {scenes[k].t_ns // BLOCK_NS for k in train}
+    rolls = _rolls(table, model, found[0].vector, [each for each in edges if each.t_ns // BLOCK_NS in numbers])
+    if rolls is not None:
+        model = replace(model, roll_deg=(rolls.best_deg(), rolls.sigma_deg()))
+        found = [refine(table, model, found[0].vector, GATES[-3:]), *found[1:]]
     vector, rows = found[0].vector, found[0].rows
-    if len(rows) < FEWEST_PAIRS:
-        raise NothingToFit(_too_few(len(rows), len(table.boxes)))
     blocks = _blocks([scenes[k] for k in train])
-    spread = _bootstrap(table, model, vector, blocks, progress)
+    spread = _bootstrap(table, model, vector, blocks, rolls, progress)
     warnings = warnings_of(table, model, found, model.spread(spread))
     if looks_undistorted(table, model, vector, blocks):
         warnings += ("the boxes fit better without the lens distortion: are the images undistorted already?",)
@@ -148,87 +145,6 @@ def fit_alignment(
     )
 
 
-# ---------------------------------------------------------------- coarse and fine search
-
-
-def _search(table: PairTable, model: FitModel, progress: Progress) -> list[Found]:
-    """Refined optima, best first."""
-    grid = model.grid()
-    slack_px = 0.6 * STEP_DEG * _pixels_per_degree(model)
-    scores = np.zeros(len(grid))
-    few = _richest(table, FIRST_FRAMES)
-    for part, at in enumerate(np.array_split(np.arange(len(grid)), _COARSE_STEPS)):
-        progress(part, STEPS)
-        scores[at] = coarse_scores(few, model, grid[at], 2.0, slack_px)
-    best = np.argsort(-scores, kind="stable")[: max(STARTS, round(FIRST_SHARE * len(grid)))]
-    grid, scores = grid[best], coarse_scores(_richest(table, COARSE_FRAMES), model, grid[best], 2.0, slack_px)
-    found = []
-    for number, start in enumerate(_peaks(model, grid, scores)):
-        progress(_COARSE_STEPS + number, STEPS)
-        found.append(refine(table, model, start))
-    return sorted(found, key=lambda each: -each.explained)
-
-
-def _pixels_per_degree(model: FitModel) -> float:
-    if model.camera is not None:
-        return float(model.camera.K[0, 0] * np.radians(1.0))
-    return model.size[0] / 60.0
-
-
-def _richest(table: PairTable, frames: int) -> PairTable:
-    """Only the frames with the most boxes."""
-    count = np.bincount(table.frame)
-    return table.taken(np.sort(np.argsort(-count, kind="stable")[:frames]))
-
-
-def _peaks(model: FitModel, grid: F64, scores: F64) -> list[F64]:
-    """The best grid points that are not neighbours of each other."""
-    scale = np.array([0.2, 0.2, 4.0, 4.0]) if model.name == "angular" else np.full(grid.shape[1], 2.5)
-    chosen: list[F64] = []
-    for vector in grid[np.argsort(-scores, kind="stable")]:
-        if all(np.abs((vector - other) / scale).max() > 1.0 for other in chosen):
-            chosen.append(vector)
-            if len(chosen) == STARTS:
-                break
-    return chosen
-
-
-def refine(table: PairTable, model: FitModel, start: F64, gates: Sequence[tuple[float, float]] = GATES) -> Found:
-    """Repeatedly match pairs and optimise, from a start within some degrees."""
-    vector, rows = start, np.zeros(0, np.int64)
-    low, high = model.bounds()
-    for widen, gate in gates:
-        rows = table.matched(table.residuals(model.aligned(vector), widen), gate)
-        if len(rows) < 3:
-            break
-        some = table.only(rows)
-
-        def off(at: F64, some: PairTable = some, widen: float = widen) -> F64:
-            return np.concatenate([some.residuals(model.aligned(at), widen).ravel(), _prior(model, at)])
-
-        solved = least_squares(
-            off, np.clip(vector, low + 1e-9, high - 1e-9), bounds=(low, high), loss="soft_l1", f_scale=LOSS_SCALE
-        )
-        vector = solved.x
-    return Found(vector, rows, _explained(table, model, vector))
-
-
-def _explained(table: PairTable, model: FitModel, vector: F64) -> float:
-    """Number of boxes with a cluster of their own, weighted by the quality of the match."""
-    off = table.residuals(model.aligned(vector), 1.5)
-    return float(np.exp(-0.5 * np.mean(off[table.matched(off, np.inf)] ** 2, axis=1)).sum())
-
-
-def _prior(model: FitModel, vector: F64) -> F64:
-    """Residuals of the prior, in standard deviations."""
-    if model.name == "pinhole":
-        return vector[2:] / [ROLL_SIGMA_DEG, OFFSET_SIGMA_M, OFFSET_SIGMA_M][: len(vector) - 2]
-    return np.array([(vector[1] - vector[0]) / SQUARE_SIGMA])
-
-
-# ---------------------------------------------------------------- uncertainty
-
-
 def looks_undistorted(table: PairTable, model: FitModel, vector: F64, blocks: list[I64]) -> bool:
     """Whether the boxes fit clearly better without the calibration's distortion, as with images that are already
     undistorted: by the sum over the blocks of the drive, relative to their scatter."""
@@ -237,18 +153,35 @@ def looks_undistorted(table: PairTable, model: FitModel, vector: F64, blocks: li
     flat = replace(model, camera=replace(model.camera, distortion=np.zeros(0)))
     without = refine(table, flat, vector, GATES[-3:]).vector
     parts = [table.taken(block) for block in blocks]
-    gained = np.array([_explained(part, flat, without) - _explained(part, model, vector) for part in parts])
+    gained = np.array([explained(part, flat, without) - explained(part, model, vector) for part in parts])
     return bool(gained.sum() > CLEAR_SIGMAS * np.sqrt(np.sum(gained**2)))
 
 
-def _bootstrap(table: PairTable, model: FitModel, vector: F64, blocks: list[I64], progress: Progress) -> F64:
-    """(K, P) vectors fitted to resampled blocks of frames."""
+def _bootstrap(
+    table: PairTable, model: FitModel, vector: F64, blocks: list[I64], rolls: RollScores | None, progress: Progress
+) -> F64:
+    """(K, P) vectors fitted to resampled blocks of frames, with the roll of resampled edges."""
     rng, found = np.random.default_rng(0), []
     for number in range(BOOTSTRAPS):
-        progress(_COARSE_STEPS + STARTS + number, STEPS)
+        progress(SEARCH_STEPS + number, STEPS)
         drawn = np.concatenate([blocks[k] for k in rng.integers(0, len(blocks), len(blocks))])
+        if rolls is not None:
+            roll_deg = rolls.best_deg(rng.integers(0, len(rolls.blocks), len(rolls.blocks)))
+            model = replace(model, roll_deg=(roll_deg, model.roll_deg[1]))
         found.append(refine(table.taken(drawn), model, vector, GATES[-2:]).vector)
     return np.array(found)
+
+
+def _rolls(table: PairTable, model: FitModel, vector: F64, edges: Sequence[EdgeView]) -> RollScores | None:
+    """How well edges match by roll; None for an angular model, and if no roll stands out."""
+    if model.name != "pinhole":
+        return None
+
+    def with_roll(roll_deg: float) -> F64:
+        start = np.array([*vector[:2], roll_deg, *vector[3:]])
+        return refine(table, replace(model, roll_deg=(roll_deg, _EXACT_DEG)), start, GATES[-2:]).vector
+
+    return roll_scores(edges, model, with_roll)
 
 
 def _blocks(scenes: Sequence[FitScene]) -> list[I64]:

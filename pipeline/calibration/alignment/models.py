@@ -22,6 +22,8 @@ REACH_DEG = 10.0
 """Search range of the mount around the recording's calibration, in all directions."""
 FARTHEST_OFF_M = 1.0
 """Maximum distance of the camera's position from that in the calibration."""
+ROLL_SIGMA_DEG = 5.0
+"""Prior standard deviation of the roll, if neither boxes nor edges determine it."""
 STEP_DEG = 1.0
 """Step of the coarse search over mounts; the coarse score varies slowly enough for it."""
 VIEWS_DEG = (20.0, 130.0)
@@ -46,6 +48,8 @@ class FitModel:
     offset: bool = False
     """Pinhole: whether the camera's position is also fitted, laterally and in height. Boxes do not determine it along
     the optical axis."""
+    roll_deg: tuple[float, float] = (0.0, ROLL_SIGMA_DEG)
+    """Pinhole: what is known of the roll besides the boxes, and its standard deviation."""
 
     @property
     def unknowns(self) -> tuple[str, ...]:

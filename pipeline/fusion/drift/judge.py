@@ -22,9 +22,9 @@ FEW, FEW_SIGMAS = 3, 0.5
 clearer: the errors of a few vehicles may agree by chance."""
 AGREE_DEG, AGREE_SHARE, AGREEING_SHARE = 0.35, 0.5, 0.7
 """A vehicle agrees with an angle within this angle, or within this share of it; share of the vehicles that must."""
-BEFORE, AFTER = 6, 8
-"""A single vehicle is believed if it was seen in so many pieces before and after the turn: its own error cannot look
-like a turn then."""
+BEFORE, AFTER, LONG = 6, 8, 20
+"""A single vehicle is believed if it was seen in so many pieces before and after the turn, because its own error cannot
+look like a turn then; or if it was seen in so many pieces, since a wrong pair does not last."""
 
 
 class Turn(NamedTuple):
@@ -85,7 +85,8 @@ def judge(seen: Sightings, values: F64) -> Verdict:
     near = np.maximum(AGREE_DEG, AGREE_SHARE * np.abs(found.after))
     agreeing = np.sum(counts & (np.abs(shown - found.after[:, None]) < near[:, None]), axis=1)
     vehicles = np.sum(counts, axis=1)
-    followed = ((is_after @ of_vehicle >= AFTER) & ((1.0 - is_after) @ of_vehicle >= BEFORE)).any(axis=1)
+    pieces, earlier = is_after @ of_vehicle, (1.0 - is_after) @ of_vehicle
+    followed = ((pieces >= LONG) | ((pieces >= AFTER) & (earlier >= BEFORE))).any(axis=1)
     is_sound = (agreeing >= AGREEING_SHARE * vehicles) & (agreeing >= np.where(followed, 1, 2))
     sigmas = np.abs(found.after) / found.after_sigma - FEW_SIGMAS * np.maximum(FEW - vehicles, 0)
     sigmas = np.where(is_sound & (np.abs(found.after) > SMALLEST_DEG), sigmas, 0.0)

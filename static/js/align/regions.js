@@ -1,6 +1,6 @@
 /**
- * How well points and image lie on each other, by region of the image (heat map and arrows) and by distance (words).
- * An arrow shows where the points should move; a region without colour cannot tell.
+ * How well points and image match, by image region (heat map and arrows) and by distance (text). An arrow shows where
+ * the points should move; a region without colour has no score.
  */
 import { el, press } from "../core/dom.js";
 import { get, on, set } from "../core/store.js";
@@ -8,7 +8,7 @@ import { get, on, set } from "../core/store.js";
 /** @typedef {import("../core/types.js").AlignmentScore} AlignmentScore */
 /** @typedef {import("../core/types.js").MatchRange} MatchRange */
 
-/** Arrows are drawn longer than the shift, so that a few pixels are seen. */
+/** Factor by which arrows are longer than the shift, so that a few pixels are visible. */
 const LENGTHEN = 3;
 const HEAD_PX = 7;
 const GOOD_HUE = 130;
@@ -92,9 +92,13 @@ export function drawRegions(ctx, frame, place) {
 }
 
 /**
- * A dot where nothing has to move.
- * @param {CanvasRenderingContext2D} ctx @param {number} x @param {number} y @param {[number, number]} shift
- * @param {number} scale @param {string} tint
+ * A dot instead of an arrow if nothing has to move.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {number} x
+ * @param {number} y
+ * @param {[number, number]} shift
+ * @param {number} scale
+ * @param {string} tint
  */
 function drawArrow(ctx, x, y, [across, down], scale, tint) {
   const toX = x + across * scale,

@@ -58,7 +58,7 @@ export function tell(name, value) {
 /** @type {(state: import("./types.js").State) => import("./types.js").State} */
 let patch = (state) => state;
 
-/** What this page knows better than the server. @param {typeof patch} how */
+/** Values that this page has set and the server may not know yet. @param {typeof patch} how */
 export function patchState(how) {
   patch = how;
 }

@@ -104,7 +104,7 @@ export function context(canvas, settings) {
   return ctx;
 }
 
-/** Values kept in a storage. Without it, they are lost. @param {() => Storage} storage */
+/** Values kept in a browser storage; without one, they are lost on reload. @param {() => Storage} storage */
 const keptIn = (storage) => ({
   /** @template T @param {string} key @param {T} fallback @returns {T} */
   read(key, fallback) {
@@ -126,7 +126,7 @@ const keptIn = (storage) => ({
 
 /** Settings of this browser. */
 export const memory = keptIn(() => localStorage);
-/** What this tab was doing, for when it is reloaded. */
+/** State of this tab, restored after a reload. */
 export const tabMemory = keptIn(() => sessionStorage);
 /** Whether the page was reloaded, not opened. */
 export const isReloaded = () =>

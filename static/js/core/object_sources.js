@@ -1,7 +1,7 @@
-/** What the letters in an object's `source` say: which sensors track it. */
+/** The meaning of an object's `source`: the sensors that track it. */
 
-/** The camera tracks it. @param {{source: string}} item */
+/** Whether the camera tracks it. @param {{source: string}} item */
 export const isImaged = (item) => item.source.includes("V");
 
-/** More than one sensor tracks it. @param {{source: string|null}} item */
+/** Whether more than one sensor tracks it. @param {{source: string|null}} item */
 export const isTrackedByTwo = (item) => (item.source ?? "").length > 1;

@@ -1,5 +1,5 @@
 /**
- * The page's tooltip: help on hover, and what lies under the pointer in a view.
+ * The page's tooltip: help on hover, and the object under the pointer in a view.
  */
 import { $ } from "./dom.js";
 

@@ -1,7 +1,7 @@
 /**
- * A playhead of this page alone: others do not move it, and it moves nobody. The server makes its frames; playing is
- * done here, since the server plays for all. The 3D and rerun views are one for all pages, so a page that shows them
- * follows the shared playhead, and brings it along to its own frame.
+ * This page's own playhead: other pages do not move it, and it does not move theirs. The server computes its frames,
+ * but playback runs here, since the server plays for all pages. The 3D and rerun views are shared by all pages, so a
+ * page that shows them follows the shared playhead and moves it to its own frame.
  */
 import { handlePlayback, request } from "../core/api.js";
 import { patchState, tell } from "../core/connection.js";
@@ -23,7 +23,7 @@ const SHARED_VIEWS = ["3d", "rerun"];
 
 export const isOwn = () => own !== null;
 
-/** Whether the tab in front is drawn for all pages at once. */
+/** Whether the active tab is shared by all pages. */
 export const isShared = () => SHARED_VIEWS.includes(get("layout")?.tab ?? "");
 
 export function setUp() {
@@ -70,7 +70,10 @@ export function go(index) {
 
 let resumes = isReloaded();
 
-/** Where this tab was before a reload; null otherwise, and in another recording. @param {string|null} uri */
+/**
+ * The frame of this tab before a reload; null without a reload, or if another recording is open.
+ * @param {string|null} uri
+ */
 function keptIndex(uri) {
   const held = tabMemory.read("own", /** @type {{uri: string|null, index: number}|null} */ (null)),
     isKept = resumes && held?.uri === uri;
@@ -92,7 +95,7 @@ function changed({ playing, seek, step, speed, loop }) {
   return true;
 }
 
-/** Play on: the next frame that is due; late ones are skipped. */
+/** Continue playback with the next frame that is due; late ones are skipped. */
 function schedule() {
   const state = get("state");
   clearTimeout(timer);
@@ -110,7 +113,7 @@ function schedule() {
   }, due_ms);
 }
 
-/** Show what is this page's own of the state. */
+/** Put this page's own playhead into the state. */
 function show() {
   const state = get("state");
   if (state && own) set("state", { ...state, playing: own.playing, speed: own.speed, loop: own.loop });

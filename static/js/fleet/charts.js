@@ -1,4 +1,4 @@
-/** Histograms and counts of the Fleet view, which filter when pressed or dragged. */
+/** Histograms and counts of the Fleet view; clicking or dragging them sets a filter. */
 import { el, press } from "../core/dom.js";
 
 /** @typedef {import("./filters.js").Range} Range */
@@ -32,7 +32,7 @@ function chip(words, isOn, title, act) {
 }
 
 /**
- * A histogram of a column. A drag over bars chooses a range, and so do the fields below.
+ * A histogram of a column. Dragging over bars, or filling in the fields below, sets a range.
  * @param {import("./filters.js").Chart} chart
  * @param {{edges: number[], counts: number[]}} found
  * @param {Range} chosen

@@ -1,13 +1,17 @@
-/** What the Fleet view asks for, as an SQL condition. */
+/** The filters of the Fleet view as an SQL condition. */
 import { memory } from "../core/dom.js";
 
 /** @typedef {"events"|"frames"|"objects"|"drives"} Table */
-/** most: larger values are not drawn. @typedef {{column: string, title: string, unit: string, most?: number}} Chart */
+/** most: upper end of the histogram. @typedef {{column: string, title: string, unit: string, most?: number}} Chart */
 /** Lower and upper end; null: open. @typedef {[number|null, number|null]} Range */
 
 /** @param {string} column @param {string} title @param {string} unit @returns {Chart} */
 const chart = (column, title, unit) => ({ column, title, unit });
-/** A vehicle that hardly comes nearer has a TTC of minutes. @param {string} column @param {string} title */
+/**
+ * Longer TTCs are not shown: a vehicle that hardly approaches has one of minutes.
+ * @param {string} column
+ * @param {string} title
+ */
 const ttc = (column, title) => ({ ...chart(column, `${title}, up to 20`, "s"), most: 20 });
 const SPEED = chart("speed_mps", "Ego speed", "m/s");
 const DISTANCE = chart("distance_m", "Distance of the CIPV", "m");
@@ -45,7 +49,7 @@ export const filters = {
   descending: false,
 };
 
-/** Columns differ from table to table: what is filtered by them ends with it. @param {Table} of */
+/** Columns differ between tables, so filters on them end when the table changes. @param {Table} of */
 export function toggleTable(of) {
   if (of === filters.of) return;
   filters.of = of;

@@ -1,16 +1,16 @@
 /** The table of the Fleet view. */
 import { $, el } from "../core/dom.js";
 
-/** Columns whose names say too little. @type {Record<string, string>} */
+/** Titles of columns whose names are not clear. @type {Record<string, string>} */
 const TITLES = { t_s: "time (s)", index: "frame" };
-/** How names of columns end, and the units that they name. @type {[string, string][]} */
+/** Suffixes of column names, and their units. @type {[string, string][]} */
 const UNITS = [
   ["_mps", "m/s"],
   ["_sigmas", "σ"],
   ["_s", "s"],
   ["_m", "m"],
 ];
-/** Not shown: the drive's name says it. */
+/** Not shown, since the drive's name contains it. */
 const HIDDEN = new Set(["address"]);
 const LEFT = new Set(["drive", "kind", "text", "title", "source", "type"]);
 

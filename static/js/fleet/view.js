@@ -1,5 +1,5 @@
 /**
- * The Fleet view: events, frames, objects or drives of a whole fleet, filtered and counted. A press on a row opens that
+ * The Fleet view: events, frames, objects or drives of a whole fleet, filtered and counted. Clicking a row opens that
  * moment in the dashboard. Filters stay while the page is open.
  */
 import { newestOnly, request } from "../core/api.js";
@@ -112,7 +112,7 @@ function clear() {
   });
 }
 
-/** Change the filters, and ask again. @param {() => unknown} change */
+/** Change the filters and query again. @param {() => unknown} change */
 function changed(change) {
   change();
   memory.write("fleet.of", filters.of);

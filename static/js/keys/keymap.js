@@ -23,7 +23,7 @@ import { toggleTheme } from "../workspace/theme.js";
 /**
  * keys: as `nameOf` in keyboard.js returns them; isOn: whether the binding is active, the first active one wins.
  * Bindings without words are not listed in the help.
- * id: its default keys, as `own_keys.js` names it; isOwn: somebody changed its key.
+ * id: its default keys, as `own_keys.js` names it; isOwn: whether the user changed its key.
  * @typedef {{keys: string[], shown: string, words: string, act: () => unknown, isOn?: () => boolean, id?: string,
  *   isOwn?: boolean}} Binding
  */
@@ -42,7 +42,7 @@ import { toggleTheme } from "../workspace/theme.js";
 const key = (keys, shown, words, act) => ({ keys: keys.split(" "), shown, words, act });
 const last = () => Math.max(0, (get("state")?.count ?? 1) - 1);
 
-/** With the keys that the person here has changed. @returns {Group[]} */
+/** The keymap with this person's changed keys. @returns {Group[]} */
 export const keymap = () => withOwn(defaults());
 
 /** @returns {Group[]} */

@@ -5,17 +5,17 @@ import { get, set } from "../core/store.js";
 /** @typedef {import("./keymap.js").Binding} Binding */
 /** @typedef {import("./keymap.js").Group} Group */
 
-/** Who changed them; "" without a name. */
+/** The person whose keys these are; "" without a name. */
 const owner = () => get("person") || memory.read("person", "");
 const place = () => `keys ${owner()}`;
 
-/** New keys by what they are in the keymap. @returns {Record<string, string>} */
+/** Changed keys, by their id in the keymap. @returns {Record<string, string>} */
 const changed = () => memory.read(place(), /** @type {Record<string, string>} */ ({}));
 
 /** Keys of a mode and of the page are kept separate. @param {Group} group @param {Binding} binding */
 const idOf = ({ mode }, { keys }) => `${mode ?? "page"} ${keys[0]}`;
 
-/** As people read it. @param {string} name */
+/** A key as shown to the user. @param {string} name */
 export const shownAs = (name) =>
   name
     .split("+")

@@ -92,7 +92,7 @@ function whyNone(result) {
     : "No objects in this frame.";
 }
 
-/** What measures own speed. */
+/** The source of ego speed, as text. */
 const MOTION_WORDS = { can: "CAN", ins: "IMU", gnss: "GNSS", lidar: "LiDAR" };
 
 /** @param {Result} result */

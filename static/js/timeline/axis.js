@@ -1,4 +1,4 @@
-/** The timeline's frame: seconds along the top, rules between lanes, and the scroll bar. */
+/** Draws the timeline's seconds along the top, lines between lanes, and the scroll bar. */
 import { color, ui } from "../core/colors.js";
 import { clock } from "../core/format.js";
 import { get } from "../core/store.js";
@@ -38,7 +38,7 @@ export function drawAxis(ctx, size, span, rows) {
 }
 
 /**
- * Which part of the recording is shown, unless it is all of it.
+ * The scroll bar: the part of the recording that is shown; hidden if that is all of it.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Span} span
  * @param {Rows} rows

@@ -1,4 +1,4 @@
-/** Draws the two sheets of the timeline: the recording itself, and on top what the pointer is changing. */
+/** Draws the two layers of the timeline: the recording, and on top of it pointer edits. */
 import { color, ui } from "../core/colors.js";
 import { get } from "../core/store.js";
 import { here } from "../drive/seek.js";
@@ -16,7 +16,7 @@ const placer = (span, rows, isLight) => {
 };
 
 /**
- * What stays while the cursor moves: axis and lanes. Drawn when data change.
+ * The part that does not change with the cursor: axis and lanes. Drawn when data change.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Size} size
  * @param {Span} span
@@ -40,9 +40,13 @@ export function drawBack(ctx, size, span, rows, isLight) {
 }
 
 /**
- * The marked clip, what lanes have under the pointer, and the frame that it points at.
- * @param {CanvasRenderingContext2D} ctx @param {Size} size @param {Span} span @param {Rows} rows
- * @param {number|null} hover the frame under the pointer @param {boolean} isLight
+ * The marked clip, the lanes' pointer edits, and the frame under the pointer.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Size} size
+ * @param {Span} span
+ * @param {Rows} rows
+ * @param {number|null} hover the frame under the pointer
+ * @param {boolean} isLight
  */
 export function drawFront(ctx, size, span, rows, hover, isLight) {
   const place = placer(span, rows, isLight);
@@ -66,7 +70,7 @@ function drawLine(ctx, span, index, top, bottom) {
 }
 
 /**
- * Where a clip of the recording ends and the next begins: nothing is carried across, and the time between is left out.
+ * Borders between clips of the recording: nothing is carried across them, and the time between is left out.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Span} span
  * @param {Rows} rows
@@ -83,7 +87,7 @@ function drawSeams(ctx, span, rows, clips) {
 }
 
 /**
- * What is outside the marked clip is dimmed.
+ * Dim everything outside the marked clip.
  * @param {CanvasRenderingContext2D} ctx
  * @param {{height: number}} size
  * @param {Span} span

@@ -65,7 +65,7 @@ function watchLanes() {
   redraw();
 }
 
-/** How many frames there are to show. */
+/** Number of frames to show. */
 const frames = () => Math.max(1, (get("state")?.live ? get("drive")?.count : get("state")?.count) ?? 1);
 
 /** Show the whole drive. */
@@ -125,7 +125,7 @@ function drawHand() {
   if (!hand.isHidden) drawFront(hand.begin(), hand, span, shared, hover, isLight);
 }
 
-/** The frame has moved. */
+/** The shown frame has changed. */
 function follow() {
   const state = get("state");
   if (!state?.frame || values.isHidden) return;

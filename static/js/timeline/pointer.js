@@ -67,7 +67,7 @@ export function followPointer(canvas, hand) {
   canvas.addEventListener("wheel", (event) => onWheel(hand, event), { passive: false });
 }
 
-/** What a drag that begins here does. @param {Hand} hand @param {PointerEvent} event @returns {Act} */
+/** The action of a drag that begins here. @param {Hand} hand @param {PointerEvent} event @returns {Act} */
 function actionAt({ span, rows, zoomed }, event) {
   const { axis, bar } = rows(),
     clip = get("clip");
@@ -93,7 +93,7 @@ function actionAt({ span, rows, zoomed }, event) {
   return act ?? ((x) => seekTo(span.index(x)));
 }
 
-/** What the lane under a click does with it. @param {Hand} hand @param {number} x @param {number} y */
+/** Pass a click to the lane under it. @param {Hand} hand @param {number} x @param {number} y */
 function click({ span, rows }, x, y) {
   laneAt(rows(), y)?.lane.click?.(span, x);
 }

@@ -1,4 +1,4 @@
-/** Shares out the timeline's height from the top: time axis, lanes of a fixed height, growing lanes, scroll bar. */
+/** Divides the timeline's height, from the top: time axis, lanes of fixed height, growing lanes, scroll bar. */
 
 /** @typedef {import("./lanes/registry.js").Lane} Lane */
 /** @typedef {{top: number, height: number}} Row  CSS pixels */
@@ -9,8 +9,8 @@ const AXIS_PX = 15,
   GAP_PX = 4;
 
 /**
- * Lanes of height 0 are left out. Growing lanes share the height that is left; the last ones are left out when each
- * would get less than its least height.
+ * Lanes of height 0 are left out. Growing lanes share the remaining height; the last ones are left out if each would
+ * get less than its minimum height.
  * @param {number} height
  * @param {Lane[]} lanes
  * @returns {Rows}
@@ -36,11 +36,11 @@ export function shareOut(height, lanes) {
   };
 }
 
-/** As many of the first lanes as fit side by side. @param {Lane[]} lanes @param {number} room @returns {Lane[]} */
+/** As many of the first lanes as fit below each other. @param {Lane[]} lanes @param {number} room @returns {Lane[]} */
 function fitting(lanes, room) {
   const least = Math.max(1, ...lanes.map((lane) => lane.height()));
   return lanes.slice(0, Math.max(0, Math.floor(room / least)));
 }
 
-/** The lane at a pixel row, with the row it has. @param {Rows} rows @param {number} y */
+/** The lane at a pixel row, and its position. @param {Rows} rows @param {number} y */
 export const laneAt = (rows, y) => rows.lanes.find(({ row }) => y >= row.top && y < row.top + row.height) ?? null;

@@ -7,7 +7,7 @@ export class Span {
   first = 0;
   /** One past the last shown frame. */
   end = 1;
-  /** Where the plot lies, CSS pixels. */
+  /** Position of the plot in CSS pixels. */
   left = 0;
   width = 1;
 
@@ -57,7 +57,7 @@ export class Span {
   }
 
   /**
-   * Zoom so that what lies under a pixel column stays there.
+   * Zoom, keeping the frame under a pixel column in place.
    * @param {number} factor above 1 shows more
    * @param {number} x
    */

@@ -1,6 +1,6 @@
 /**
- * What moves with the frame: lane names with current values, and the cursor. Kept on a small canvas of their own, since
- * they are redrawn ten times a second.
+ * The parts that change with the frame: lane names with current values, and the cursor. They have their own small
+ * canvas, since they are redrawn ten times a second.
  */
 import { ui } from "../core/colors.js";
 

@@ -20,7 +20,7 @@ import { drawTape, measure } from "./measuring_tape.js";
 /** @typedef {(ctx: CanvasRenderingContext2D, frame: Frame, place: Place) => void} Layer */
 
 const UNSEEN = -32768;
-/** From here on single pixels are shown. */
+/** From this zoom on, single pixels are shown. */
 const SINGLE_PX = 3;
 const PICK_PX = 8,
   HOLD_PX = 16;

@@ -3,13 +3,13 @@ import { get } from "../core/store.js";
 
 /** @typedef {{x: number, y: number, scale: number}} Place */
 
-/** At most so many canvas pixels for a pixel of the camera. */
+/** Maximum number of canvas pixels per camera pixel. */
 const LARGEST = 40;
 const WHEEL = 0.0016,
   PINCH = 0.012;
 const WHOLE = { factor: 1, u: 0.5, v: 0.5 };
 
-/** factor: 1 shows the whole image; u, v: what is in the middle of the pane, as a share of the image. */
+/** factor: 1 shows the whole image; u, v: the point at the pane's centre, as a share of the image. */
 let view = { ...WHOLE };
 /** @type {() => void} */
 let changed = () => {};
@@ -17,7 +17,7 @@ let changed = () => {};
 export const isZoomed = () => view.factor > 1;
 
 /**
- * Where an image lies in a pane.
+ * Position of an image in a pane.
  * @param {{width: number, height: number}} pane
  * @param {{width: number, height: number}} image
  * @returns {Place}
@@ -30,7 +30,12 @@ export function placed(pane, image) {
   return { x, y, scale };
 }
 
-/** An image that is larger than its pane covers it. @param {number} pane @param {number} image @param {number} share */
+/**
+ * An image larger than its pane covers it completely.
+ * @param {number} pane
+ * @param {number} image
+ * @param {number} share
+ */
 const start = (pane, image, share) =>
   image <= pane ? (pane - image) / 2 : Math.min(0, Math.max(pane - image, pane / 2 - share * image));
 
@@ -64,7 +69,11 @@ export function setUp(canvas, place, redraw) {
   pinch(canvas, place);
 }
 
-/** Two fingers zoom where they are, and move the image. @param {HTMLCanvasElement} canvas @param {() => Place} place */
+/**
+ * Two fingers zoom at their position and move the image.
+ * @param {HTMLCanvasElement} canvas
+ * @param {() => Place} place
+ */
 function pinch(canvas, place) {
   /** @type {Map<number, {x: number, y: number}>} */
   const fingers = new Map();
@@ -89,7 +98,7 @@ function pinch(canvas, place) {
 }
 
 /**
- * Zoom and keep what is under a pixel of the canvas there.
+ * Zoom, keeping the point under a canvas pixel in place.
  * @param {HTMLCanvasElement} canvas
  * @param {Place} at
  * @param {number} x
@@ -113,7 +122,7 @@ export function pan(at, dx, dy) {
 }
 
 /**
- * Zoom by keys, at a place of the image.
+ * Zoom by keys at a point of the image.
  * @param {number} by
  * @param {{u: number, v: number}|null} to pixels of the full camera image; null keeps the middle
  * @param {Place} at

@@ -187,7 +187,7 @@ function drawLanes(ctx, lanes) {
 }
 
 /**
- * What runs beside the road, where the path is taken from it.
+ * The road edges, if the path is based on them.
  * @param {CanvasRenderingContext2D} ctx
  * @param {import("../core/types.js").Point2[]} cells
  */

@@ -1,11 +1,13 @@
-/** The 3D view, which the server draws for this page: what is selected here, and whether it is visible. */
+/**
+ * The 3D view, which the server draws for this page. Tells the server the selection and whether the view is visible.
+ */
 import { tell } from "../core/connection.js";
 import { $, el } from "../core/dom.js";
 import { get, on } from "../core/store.js";
 
-/** By which the server knows whose 3D view it draws. */
+/** Identifies this page's 3D view at the server. */
 const NAME = [...crypto.getRandomValues(new Uint8Array(16))].map((each) => each.toString(16).padStart(2, "0")).join("");
-/** In a narrower frame the 3D view's own panel opens over the scene, so a narrower one is scaled down. */
+/** Narrower frames are scaled down, since there the 3D view's own panel would cover the scene. */
 const LEAST_PX = 600;
 
 export function setUp() {
@@ -21,7 +23,7 @@ export function setUp() {
   on(["selection"], () => tell("selected", get("selection")));
 }
 
-/** Load the 3D view, with a note until its page is there. */
+/** Load the 3D view, with a note until it is loaded. */
 export function open() {
   const body = $("#three-body");
   if (body.firstChild) return;

@@ -21,6 +21,14 @@ def test_the_figures_have_the_contracts_form(tmp_path: Path) -> None:
     assert figures["peers"]["cv2.dnn"].keys() == {"median_ms", "ratio"}
 
 
+def test_a_peer_that_cannot_run_the_graph_is_named_with_its_reason(tmp_path: Path) -> None:
+    detector = open_detector(str(networks.yolov8(tmp_path / "tiny.onnx")), (128, 128))
+    peer = stages([np.zeros((128, 128, 3), np.uint8)], detector, 0.0)["detector"]["peers"]["cv2.dnn"]
+    assert (peer["median_ms"], peer["ratio"]) == (None, None)
+    assert peer["absent"].startswith("OpenCV cannot run this graph: ")
+    assert "\n" not in peer["absent"]
+
+
 def test_without_images_there_is_nothing_to_measure(tmp_path: Path) -> None:
     assert stages([], open_detector(str(networks.yolox(tmp_path / "tiny.onnx")), None), 0.0) == {}
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +15,7 @@ from pipeline.decision.cipv import CipvState, choose
 from pipeline.decision.object_motion import describe, required_decel_mps2
 from pipeline.params import AccParams, AebParams, CipvParams, MotionParams, PathParams, preset
 from pipeline.path.corridor import corridor
-from pipeline.types import AccCommand, EgoState, FusedObject, Situation
+from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Situation
 from tests.pipeline.build import fused, moment
 
 PARAMS = AebParams(margin_m=1.0, build_up_s=0.3, confirm_frames=2)
@@ -55,6 +57,26 @@ def decide(
 )
 def test_stages(distance_m: float, closing_mps: float, speed_mps: float, state: str) -> None:
     _, command = decide(fused(1, distance_m, velocity=(-closing_mps, 0.0)), speed_mps=speed_mps)
+    assert command.state == state
+
+
+@pytest.mark.parametrize(
+    ("path_sigma_m", "state"),
+    [
+        pytest.param(0.2, "full_brake", id="surely in our lane"),
+        pytest.param(1.0, "cruise", id="before an unknown bend"),
+    ],
+)
+def test_an_oncoming_lead_is_braked_for_only_if_it_is_surely_in_the_path(path_sigma_m: float, state: str) -> None:
+    ego = EgoState(0, 15.0)
+    (oncoming,) = describe([fused(1, 30.0, 0.3, velocity=(-28.0, 0.0))], ego, MotionParams())
+    path = replace(PATH, profile_m=np.full(len(PATH.center), path_sigma_m))
+    lead = Cipv(1, oncoming.distance_m or 0.0, 28.0, 1.1, "")
+    aeb = AebState()
+    for _ in range(2):
+        judged = replace(choose(CipvState(), (oncoming,), PATH, moment(ego), CipvParams())[1].objects[0], in_path=True)
+        aeb, command = guard(aeb, CRUISE, Situation(moment(ego, 0.1), path, (judged,), lead), PARAMS, AccParams())
+    assert command is not None
     assert command.state == state
 
 

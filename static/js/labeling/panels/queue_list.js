@@ -29,14 +29,15 @@ const show = (queue) => list.replaceChildren(...queue.map(row));
 /** @param {Work} work */
 function row(work) {
   const isOpen = get("labels")?.drive === work.key;
-  const open = el("button", {
-    type: "button",
-    class: "quiet",
-    textContent: work.title,
-    title: work.uri,
-    disabled: isOpen,
-    onclick: () => attempt(() => request("api/source", "POST", { uri: work.uri })),
-  });
+  const name = isOpen
+    ? el("b", { textContent: work.title, title: "Open now" })
+    : el("button", {
+        type: "button",
+        class: "quiet",
+        textContent: work.title,
+        title: `Open ${work.uri}`,
+        onclick: () => attempt(() => request("api/source", "POST", { uri: work.uri })),
+      });
   const state = el(
     "select",
     { aria: { label: `State of ${work.title}` }, onchange: () => change(work, { state: state.value }) },
@@ -52,7 +53,8 @@ function row(work) {
   return el(
     "div",
     { class: "queue-row", data: { key: work.key } },
-    el("div", { class: "menu-row" }, open, state, take),
+    name,
+    el("div", { class: "menu-row" }, state, take),
     el("p", { class: "facts", textContent: facts(work) }),
   );
 }

@@ -1,5 +1,5 @@
 /**
- * A curve of the CIPV, ACC or our own speed over the drive: the current run, the compared one and the selected object.
+ * A curve of the CIPV, ACC or ego speed over the drive: the current run, the compared run and the selected object.
  */
 import { color, ui } from "../../core/colors.js";
 import { DASH } from "../../core/format.js";
@@ -69,7 +69,7 @@ function drawCurve(ctx, span, row, curve, now, base) {
  */
 
 /**
- * A column as samples, not joined across clips of the recording; CIPV values nor across object changes.
+ * A column as samples, not joined across clips of the recording, and CIPV values not across changes of the object.
  * @param {Series} series
  * @param {keyof Columns} key
  * @param {number} factor

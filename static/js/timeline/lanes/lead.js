@@ -24,7 +24,7 @@ export const lead = {
 };
 
 /**
- * A line through the frames that are not computed yet.
+ * A line over the frames that are not computed yet.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Place} place
  * @param {number} done

@@ -49,7 +49,11 @@ export class DotRaster {
   }
 }
 
-/** A colour as `DotRaster` takes it (little-endian RGBA). @param {string} css `#rrggbb` @param {number} alpha 0–1 */
+/**
+ * A colour in the format of `DotRaster` (little-endian RGBA).
+ * @param {string} css `#rrggbb`
+ * @param {number} alpha 0–1
+ */
 export function rgba(css, alpha = 1) {
   const n = parseInt(css.slice(1), 16);
   return pack(n >> 16, (n >> 8) & 255, n & 255, alpha);

@@ -115,8 +115,11 @@ export function drawBox(ctx, [x1, y1, x2, y2], tint, width, X, Y) {
 }
 
 /**
- * The window of the far view, faint, because it is no object.
- * @param {CanvasRenderingContext2D} ctx @param {number[]} window @param {Axis} X @param {Axis} Y
+ * The window of the far view, drawn faintly because it is not an object.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {number[]} window
+ * @param {Axis} X
+ * @param {Axis} Y
  */
 export function drawWindow(ctx, window, X, Y) {
   ctx.globalAlpha = 0.45;

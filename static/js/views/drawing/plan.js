@@ -177,7 +177,7 @@ export function drawRing(ctx, view, { bev }, tint, dash = []) {
 }
 
 /**
- * The headings of other vehicles that the path follows: a dash of two metres each.
+ * The headings of other vehicles that the path follows, as a dash of two metres each.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Viewport} view
  * @param {[number, number, number][]} headings

@@ -29,7 +29,7 @@ const DRAG_FROM_PX = 4;
  */
 
 export class Viewport {
-  /** Pixels per metre, and the place at the pane's middle. */
+  /** Pixels per metre, and the position at the pane's centre. */
   scale = 1;
   x = 0;
   y = 0;
@@ -78,12 +78,12 @@ export class Viewport {
     return this.height / 2 - (x - this.x) * this.scale;
   }
 
-  /** The place under a pixel. @param {number} u @param {number} v @returns {Place} */
+  /** The position under a pixel. @param {number} u @param {number} v @returns {Place} */
   place(u, v) {
     return { x: this.x - (v - this.height / 2) / this.scale, y: this.y - (u - this.width / 2) / this.scale };
   }
 
-  /** Zoom so that the place under (u, v) stays there. @param {number} factor */
+  /** Zoom, keeping the position under (u, v) in place. @param {number} factor */
   zoom(factor, u = this.width / 2, v = this.height / 2) {
     this.view = null;
     const before = this.place(u, v);

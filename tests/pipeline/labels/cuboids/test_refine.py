@@ -183,5 +183,5 @@ def test_a_snap_seldom_makes_a_real_box_worse(data_dir: Path) -> None:
     gains = np.array(change)
     assert len(gains) >= 50
     assert float((gains > 0.02).mean()) > 0.2
-    assert float((gains < -0.02).mean()) < 0.15
-    assert float((gains < -0.1).mean()) < 0.03
+    assert float((gains < -0.02).mean()) < 0.13
+    assert float((gains < -0.1).mean()) < 0.02

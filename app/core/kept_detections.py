@@ -1,0 +1,196 @@
+"""Keeps detections on disk by the content of the image, so that no network processes the same image twice, even after a
+restart: opening a drive a second time takes as long as reading it."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import sqlite3
+import threading
+from collections.abc import Iterable
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import zstandard
+
+import pipeline
+from pipeline.types import DistanceLaw, Frame, RawBoxes, RawLanes
+
+logger = logging.getLogger("cipv.detections")
+
+_MOST_BYTES = 500_000_000
+"""Of all detections together: some 40,000 images with two networks. The oldest are dropped beyond that."""
+_DROPPED_SHARE = 0.2
+_LOOK_EVERY = 500
+"""The size is checked after this many new detections."""
+_BUSY_S = 0.2
+"""Another server may be writing; a network is not much slower than a longer wait."""
+_LEVEL = 1
+_CODE = ("vision", "lanes", "inference")
+"""Packages whose code decides what a network's detections are."""
+
+
+class _Law(msgspec.Struct, array_like=True):
+    coefficient: float
+    exponent: float
+    focal_px: float
+    truck_ratio: float
+    bus_ratio: float
+    motorcycle_ratio: float
+
+
+class DetectionRow(msgspec.Struct, array_like=True):
+    """One detector's output for one image. boxes and the following fields: of ``RawBoxes``; points and line: of
+    ``RawLanes``. Arrays are bytes, little-endian."""
+
+    index: int
+    detector: str
+    model: str
+    scores: bytes
+    boxes: bytes | None = None
+    labels: list[str] = []
+    law: _Law | None = None
+    far: tuple[int, int, int, int] | None = None
+    far_count: int = 0
+    points: bytes = b""
+    line: bytes = b""
+
+
+def row_of(index: int, name: str, answer: RawBoxes | RawLanes) -> DetectionRow:
+    """The row of a frame's detections by the detector with this name."""
+    if isinstance(answer, RawLanes):
+        points, line = answer.points.astype("<f4").tobytes(), answer.line.astype("<i4").tobytes()
+        return DetectionRow(index, name, answer.model, answer.scores.astype("<f4").tobytes(), points=points, line=line)
+    law = answer.law
+    numbers = (law.coefficient, law.exponent, law.focal_px, law.truck_ratio, law.bus_ratio, law.motorcycle_ratio)
+    return DetectionRow(
+        index,
+        name,
+        answer.model,
+        answer.scores.astype("<f4").tobytes(),
+        answer.boxes.astype("<f4").tobytes(),
+        list(answer.labels),
+        _Law(*numbers),
+        answer.far,
+        answer.far_count,
+    )
+
+
+def answer_of(row: DetectionRow) -> RawBoxes | RawLanes:
+    """The detections of a row. ValueError for a damaged one."""
+    scores = np.frombuffer(row.scores, "<f4").astype(np.float32)
+    if row.boxes is None:
+        points = np.frombuffer(row.points, "<f4").astype(np.float32).reshape(-1, 2)
+        return RawLanes(row.model, points, scores, np.frombuffer(row.line, "<i4").astype(np.int32))
+    boxes = np.frombuffer(row.boxes, "<f4").astype(np.float32).reshape(-1, 4)
+    if row.law is None or not len(boxes) == len(scores) == len(row.labels):
+        raise ValueError("boxes without their law, scores or classes")
+    law = DistanceLaw(*msgspec.structs.astuple(row.law))
+    return RawBoxes(row.model, boxes, scores, tuple(row.labels), law, row.far, row.far_count)
+
+
+def seen_mark(frame: Frame) -> bytes | None:
+    """Sixteen bytes that identify what detectors are given of a frame: the image (its file as the camera sent it, else
+    its pixels), and the calibration and own motion from which the far view follows. None without an image."""
+    if frame.image is None:
+        return None
+    image, camera, ego = frame.image, frame.camera, frame.ego
+    digest = hashlib.blake2b(repr(image.bgr.shape).encode(), digest_size=16)
+    digest.update(image.encoded if image.encoded is not None else np.ascontiguousarray(image.bgr).data)
+    if camera is not None:
+        for numbers in (camera.K, camera.distortion, camera.T_camera_ego):
+            digest.update(np.ascontiguousarray(numbers, np.float64).data)
+    if ego is not None:
+        digest.update(repr((ego.speed_mps, ego.yaw_rate_radps)).encode())
+    return digest.digest()
+
+
+class KeptDetections:
+    """Detections in a file, by image and detector. Any thread; several processes may use the same file. A disk that
+    cannot be read or written only costs time: networks run again."""
+
+    def __init__(self, file: Path, most_bytes: int = _MOST_BYTES) -> None:
+        self._file, self._most_bytes = file, most_bytes
+        self._lock = threading.Lock()
+        self._database: sqlite3.Connection | None = None
+        self._is_off = False
+        self._added = 0
+
+    def get(self, mark: bytes, detector: str) -> RawBoxes | RawLanes | None:
+        """The detections in the image with this ``seen_mark``; None if they are not kept."""
+        held = self._execute("SELECT answer FROM detections WHERE mark = ?", (_key(mark, detector),))
+        if not held:
+            return None
+        try:
+            packed = zstandard.ZstdDecompressor().decompress(held[0][0])
+            return answer_of(msgspec.msgpack.decode(packed, type=DetectionRow))
+        except (msgspec.DecodeError, zstandard.ZstdError, ValueError):
+            return None
+
+    def put(self, mark: bytes, detector: str, answer: RawBoxes | RawLanes) -> None:
+        """Keep the detections in an image."""
+        packed = zstandard.ZstdCompressor(level=_LEVEL).compress(msgspec.msgpack.encode(row_of(0, detector, answer)))
+        self._execute("INSERT OR REPLACE INTO detections (mark, answer) VALUES (?, ?)", (_key(mark, detector), packed))
+        self._added += 1
+        if self._added % _LOOK_EVERY == 0:
+            self.drop_oldest()
+
+    def drop_oldest(self) -> None:
+        """Drop the oldest detections if all of them take more space than permitted."""
+        taken = self._execute("SELECT coalesce(sum(length(answer)), 0), count(*) FROM detections")
+        if taken and taken[0][0] > self._most_bytes:
+            over = 1.0 - (1.0 - _DROPPED_SHARE) * self._most_bytes / taken[0][0]
+            self._execute(
+                "DELETE FROM detections WHERE rowid IN (SELECT rowid FROM detections ORDER BY rowid LIMIT ?)",
+                (max(1, int(over * taken[0][1])),),
+            )
+
+    def close(self) -> None:
+        """Close the file; later calls find nothing."""
+        with self._lock:
+            self._is_off = True
+            if self._database is not None:
+                self._database.close()
+                self._database = None
+
+    def _execute(self, sql: str, values: Iterable[object] = ()) -> list[tuple[Any, ...]]:
+        with self._lock:
+            if self._is_off:
+                return []
+            try:
+                if self._database is None:
+                    self._database = self._open()
+                with self._database:
+                    return self._database.execute(sql, tuple(values)).fetchall()
+            except sqlite3.OperationalError as error:  # busy, full or read-only: may pass
+                logger.debug("%s: %s", self._file, error)
+            except (sqlite3.Error, OSError) as error:
+                logger.warning("%s: detections are not kept: %s", self._file, error)
+                self._is_off = True
+            return []
+
+    def _open(self) -> sqlite3.Connection:
+        self._file.parent.mkdir(parents=True, exist_ok=True)
+        database = sqlite3.connect(self._file, timeout=_BUSY_S, check_same_thread=False)
+        database.execute("PRAGMA journal_mode = WAL")
+        database.execute("PRAGMA synchronous = OFF")  # after a crash of the system, networks run again
+        database.execute("CREATE TABLE IF NOT EXISTS detections (mark BLOB UNIQUE NOT NULL, answer BLOB NOT NULL)")
+        return database
+
+
+def _key(mark: bytes, detector: str) -> bytes:
+    return hashlib.blake2b(b"\0".join([mark, detector.encode(), _code_mark()]), digest_size=16).digest()
+
+
+@cache
+def _code_mark() -> bytes:
+    """Changes with the code that prepares images and decodes outputs, and with the libraries that run networks."""
+    digest = hashlib.blake2b(f"{version('onnxruntime')} {version('opencv-python-headless')}".encode(), digest_size=16)
+    for package in _CODE:
+        for file in sorted((Path(pipeline.__file__).parent / package).rglob("*.py")):
+            digest.update(file.read_bytes())
+    return digest.digest()

@@ -1,0 +1,117 @@
+"""Roll from depth edges: where the LiDAR sees an object end, the image has an edge.
+
+Boxes hardly determine the roll of a camera when all vehicles are ahead, and a wrong roll also makes the pitch wrong.
+Depth edges are everywhere in the image, beside the road as well. For each roll, yaw and pitch follow from the boxes;
+the roll whose projected depth edges lie on the strongest edges of the images is the right one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.calibration.alignment.models import REACH_DEG, FitModel
+from pipeline.calibration.depth_edges import EdgeScene
+from pipeline.types import F64, I64
+
+FRAMES = 40
+"""Number of frames whose edges are used; their edge images take 20 to 50 MB."""
+MOST = 15_000
+"""Maximum number of evaluated depth edges: if there are more, every second, third …"""
+COARSE_DEG, FINE_DEG = 1.0, 0.25
+"""Steps of the search over rolls."""
+YAWS_DEG = tuple(np.arange(-0.6, 0.61, 0.2).round(2).tolist())
+"""Yaws relative to that of the boxes: a box and the edge of a vehicle may differ by a few pixels everywhere."""
+BLOCK_NS = 500_000_000
+"""Frames within half a second show the same edges and are resampled together."""
+FEWEST, FEWEST_BLOCKS = 500, 4
+"""Depth edges and pieces of the drive below which nothing is said."""
+DRAWS = 60
+"""Resampled drives, for the standard deviation."""
+WIDEST_DEG = 0.7
+"""Above this standard deviation, no roll stands out."""
+_NEAREST_SIGMA_DEG = 0.1
+
+
+class EdgeView(NamedTuple):
+    """Depth edges and edge image of a frame."""
+
+    scene: EdgeScene
+    """What does not depend on the alignment."""
+    t_ns: int
+    """The tick."""
+
+
+class RollScores(NamedTuple):
+    """How well edges match, by roll, for each piece of the drive."""
+
+    rolls_deg: F64
+    """(R,) ascending, evenly spaced."""
+    blocks: I64
+    """(B,) numbers of the pieces."""
+    strengths: F64
+    """(B, R) sums of edge strength at depth edges."""
+
+    def best_deg(self, drawn: I64 | None = None) -> float:
+        """The roll with the strongest edges, to a fraction of a step. drawn: rows of the pieces; without it all."""
+        total = self.strengths.sum(axis=0) if drawn is None else self.strengths[drawn].sum(axis=0)
+        k = int(np.argmax(total))
+        if not 0 < k < len(total) - 1:
+            return float(self.rolls_deg[k])
+        left, middle, right = total[k - 1 : k + 2].tolist()
+        off = 0.5 * (left - right) / min(left - 2.0 * middle + right, -1e-9)
+        return float(self.rolls_deg[k] + off * (self.rolls_deg[1] - self.rolls_deg[0]))
+
+    def sigma_deg(self) -> float:
+        """Standard deviation of the best roll, over resampled drives."""
+        rng, count = np.random.default_rng(0), len(self.blocks)
+        found = [self.best_deg(rng.integers(0, count, count)) for _ in range(DRAWS)]
+        return max(float(np.std(found)), _NEAREST_SIGMA_DEG)
+
+
+def roll_scores(views: Sequence[EdgeView], model: FitModel, with_roll: Callable[[float], F64]) -> RollScores | None:
+    """Scores around the best roll; None if no roll stands out. with_roll: gives the vector that the boxes ask for at a
+    roll in degrees."""
+    blocks = np.unique([each.t_ns // BLOCK_NS for each in views])
+    if len(blocks) < FEWEST_BLOCKS or sum(len(each.scene.points) for each in views) < FEWEST:
+        return None
+    coarse = _scores(views, blocks, model, with_roll, np.arange(-REACH_DEG + 1.0, REACH_DEG, COARSE_DEG))
+    around = coarse.best_deg() + np.arange(-1.5, 1.51, FINE_DEG)
+    found = _scores(views, blocks, model, with_roll, around)
+    is_inside = around[0] < found.best_deg() < around[-1]
+    return found if is_inside and found.sigma_deg() < WIDEST_DEG else None
+
+
+def _scores(
+    views: Sequence[EdgeView], blocks: I64, model: FitModel, with_roll: Callable[[float], F64], rolls_deg: F64
+) -> RollScores:
+    """With the best of the yaws for each roll, over all pieces."""
+    strengths = np.zeros((len(blocks), len(rolls_deg)))
+    every = -(-sum(len(each.scene.points) for each in views) // MOST)
+    for k, roll in enumerate(rolls_deg.tolist()):
+        vector = with_roll(roll)
+        by_yaw = [_strengths(views, blocks, model, vector + _turned(yaw, len(vector)), every) for yaw in YAWS_DEG]
+        strengths[:, k] = max(by_yaw, key=lambda each: float(each.sum()))
+    return RollScores(rolls_deg, blocks, strengths)
+
+
+def _strengths(views: Sequence[EdgeView], blocks: I64, model: FitModel, vector: F64, every: int) -> F64:
+    """(B,) for one alignment."""
+    aligned, found = model.aligned(vector), np.zeros(len(blocks))
+    for view in views:
+        scene = view.scene
+        height, width = scene.strength.shape
+        uv = aligned.project(scene.points[::every])
+        inside = ((uv >= 0.0) & (uv < [width, height])).all(axis=1)  # false for NaN, behind the camera
+        column, row = uv[inside].astype(np.int64).T
+        met = scene.strength[row, column] - scene.usual[row]
+        found[np.searchsorted(blocks, view.t_ns // BLOCK_NS)] += float(met.sum())
+    return found
+
+
+def _turned(yaw_deg: float, unknowns: int) -> F64:
+    turned = np.zeros(unknowns)
+    turned[0] = yaw_deg
+    return turned
