@@ -20,7 +20,8 @@ _ANEW_EVERY = 3
 """A tracked shape may be the wrong one, so in every third frame the shape is also searched from scratch, which doubles
 the time."""
 _DROVE_S = 0.5
-"""A vehicle that was seen driving for so long and then stands is traffic, not part of the roadside."""
+"""A vehicle that the LiDAR has seen driving for so long and that then stands is traffic, not part of the roadside. To the
+camera alone, a parked car may seem to drive for as long."""
 _STANDS_MPS = 0.3
 """A standing car learns nothing more about the road: what changes in front of it is traffic, not the roadside."""
 _LOWEST_M = 0.1
@@ -70,7 +71,7 @@ class EdgeState:
     edges: Edges | None = None
     """What was found in that frame; None if nothing was."""
     drove_s: Mapping[int, float] = field(default_factory=dict)
-    """For how long each object has been seen driving, by id."""
+    """For how long the LiDAR has seen each object driving, by id."""
 
 
 def follow(
@@ -110,9 +111,9 @@ def follow(
 
 def _drove_s(before: Mapping[int, float], objects: tuple[FusedObject, ...], dt_s: float) -> Mapping[int, float]:
     return {
-        item.id: before.get(item.id, 0.0) + (dt_s if road_structure.drives(item) else 0.0)
+        item.id: before.get(item.id, 0.0) + (dt_s if item.ranged and road_structure.drives(item) else 0.0)
         for item in objects
-        if item.id in before or road_structure.drives(item)
+        if item.id in before or (item.ranged and road_structure.drives(item))
     }
 
 
