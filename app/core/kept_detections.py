@@ -47,27 +47,27 @@ class DetectionRow(msgspec.Struct, array_like=True):
     """One detector's output for one image. Arrays are bytes, little-endian."""
 
     index: int
-    """Of the frame; 0 where the image identifies it."""
+    """Of the frame in the recording."""
     detector: str
-    """The detector's name."""
+    """Name under which the detector was asked."""
     model: str
-    """As ``RawBoxes.model`` and ``RawLanes.model``."""
+    """Name of its network."""
     scores: bytes
-    """float32, 0–1, one for each box or point."""
+    """float32, of each box or lane point."""
     boxes: bytes | None = None
-    """float32 ``x1 y1 x2 y2`` of each box, pixels; None for lanes."""
+    """float32, four pixels each; None for lanes."""
     labels: list[str] = []
     """Class name of each box."""
     law: _Law | None = None
-    """As ``RawBoxes.law``; None for lanes."""
+    """The detector's distance law."""
     far: tuple[int, int, int, int] | None = None
-    """As ``RawBoxes.far``: the region seen a second time, pixels; None without one."""
+    """Window of the second look, pixels; None without one."""
     far_count: int = 0
-    """How many of the boxes come from there."""
+    """How many of the last boxes come from it."""
     points: bytes = b""
-    """float32 ``u v`` of each point on a line, pixels."""
+    """float32, two pixels each: points of lane lines."""
     line: bytes = b""
-    """int32, which line each point belongs to."""
+    """int32: the number of the line of each point."""
 
 
 def row_of(index: int, name: str, answer: RawBoxes | RawLanes) -> DetectionRow:

@@ -36,7 +36,7 @@ DOUBTED, ROUNDS = 2.0, 5
 rounds of re-weighting."""
 
 
-class Sightings(NamedTuple):
+class PairedBoxes(NamedTuple):
     """Vehicles in pieces of time, M rows."""
 
     piece: I64
@@ -51,7 +51,7 @@ class Sightings(NamedTuple):
     """(M,) rate of its bearing, mean."""
 
 
-class Change(NamedTuple):
+class AngleChange(NamedTuple):
     """The angle before and after each of T moments, degrees; standard deviations."""
 
     before: F64
@@ -70,7 +70,7 @@ class Change(NamedTuple):
     """(T, V) error of each vehicle."""
 
 
-def changes(seen: Sightings, values: F64, moments: I64) -> Change:
+def changes(seen: PairedBoxes, values: F64, moments: I64) -> AngleChange:
     """For each moment, the angle before it and from then on. values: (M,) degrees. moments: (T,) pieces of time."""
     count = int(seen.vehicle.max()) + 1
     of_vehicle = np.equal.outer(seen.vehicle, np.arange(count)).astype(np.float64)
@@ -102,7 +102,7 @@ def changes(seen: Sightings, values: F64, moments: I64) -> Change:
         weight = sigma**-2 / (1.0 + (off / DOUBTED) ** 2)
         hold = own_sigma**-2 / (1.0 + (own / own_sigma / DOUBTED) ** 2)
     variance = covariance[:, 0, 0] + covariance[:, 1, 1] - 2.0 * covariance[:, 0, 1]
-    return Change(
+    return AngleChange(
         found[:, 0],
         found[:, 1],
         np.sqrt(covariance[:, 1, 1]),

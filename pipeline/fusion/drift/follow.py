@@ -18,8 +18,8 @@ import numpy as np
 
 from pipeline.alignment.projection import Alignment
 from pipeline.fusion.drift.compare import Offset, offsets
-from pipeline.fusion.drift.estimate import Sightings
-from pipeline.fusion.drift.judge import FEWEST_FRAMES, PIECE_S, SMALLEST_DEG, Turn, Verdict, judge
+from pipeline.fusion.drift.estimate import PairedBoxes
+from pipeline.fusion.drift.judge import FEWEST_FRAMES, PIECE_S, SMALLEST_DEG, MountTurn, TurnEstimates, judge
 from pipeline.lidar.road_profile import RoadProfile
 from pipeline.params import AlignmentParams, FusionParams
 from pipeline.types import F64, LidarTrack, VisionMeasurement
@@ -84,11 +84,11 @@ class _Vehicle(NamedTuple):
 class _Found(NamedTuple):
     """A turn about each axis, as judged last; None for an axis that has not been judged."""
 
-    turns: tuple[Turn | None, Turn | None] = (None, None)
+    turns: tuple[MountTurn | None, MountTurn | None] = (None, None)
     """The clear turn about yaw and pitch; None without one."""
     held: tuple[int, int] = (0, 0)
     """Judgements in a row with a turn to the same side."""
-    estimates: tuple[Turn | None, Turn | None] = (None, None)
+    estimates: tuple[MountTurn | None, MountTurn | None] = (None, None)
     """The angle about each axis, clear or not."""
 
 
@@ -199,13 +199,13 @@ def _judged(state: DriftState, params: FusionParams) -> DriftState:
     axis = state.piece % 2
     rate = rows[:, _RATE] if axis == 0 else np.zeros(len(rows))
     vehicle = np.unique(rows[:, _VEHICLE], return_inverse=True)[1]
-    seen = Sightings(rows[:, _PIECE].astype(np.int64), vehicle, rows[:, _FRAMES], rows[:, _HEIGHT], rate)
+    seen = PairedBoxes(rows[:, _PIECE].astype(np.int64), vehicle, rows[:, _FRAMES], rows[:, _HEIGHT], rate)
     verdict = judge(seen, rows[:, _AXES[axis]])
     found = _updated(state.found, axis, verdict, params)
     return state._replace(found=found, told=_told(state, found, axis, verdict))
 
 
-def _updated(found: _Found, axis: int, verdict: Verdict, params: FusionParams) -> _Found:
+def _updated(found: _Found, axis: int, verdict: TurnEstimates, params: FusionParams) -> _Found:
     turn, before = verdict.turn(params.drift_sigmas), found.turns[axis]
     goes_on = turn is not None and before is not None and turn.angle_deg * before.angle_deg > 0.0
     held = found.held[axis] + 1 if goes_on else int(turn is not None)
@@ -214,14 +214,14 @@ def _updated(found: _Found, axis: int, verdict: Verdict, params: FusionParams) -
     return _Found(_with(found.turns, axis, turn), _with(found.held, axis, held), _with(found.estimates, axis, estimate))
 
 
-def _told(state: DriftState, found: _Found, axis: int, verdict: Verdict) -> Drift | None:
+def _told(state: DriftState, found: _Found, axis: int, verdict: TurnEstimates) -> Drift | None:
     """What is reported after a verdict."""
     before = state.told
     clear = [turn for turn, held in zip(found.turns, found.held, strict=True) if turn is not None and held >= HELD]
     if clear:
         sinces = [each.since for each in clear if each.since is not None]
         since = _name(state, min(sinces)) if sinces else None
-        yaw, pitch = (each or Turn(0.0, 0.0, 0, None) for each in found.estimates)
+        yaw, pitch = (each or MountTurn(0.0, 0.0, 0, None) for each in found.estimates)
         since = since or (before.since if before is not None else None)
         count = max(each.vehicles for each in clear)
         return Drift(yaw.angle_deg, pitch.angle_deg, yaw.sigma_deg, pitch.sigma_deg, count, since)

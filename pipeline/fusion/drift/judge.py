@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.fusion.drift.estimate import Sightings, changes
+from pipeline.fusion.drift.estimate import PairedBoxes, changes
 from pipeline.types import F64, Mask
 
 PIECE_S = 0.5
@@ -27,7 +27,7 @@ BEFORE, AFTER, LONG = 6, 8, 20
 look like a turn then; or if it was seen in so many pieces, since a wrong pair does not last."""
 
 
-class Turn(NamedTuple):
+class MountTurn(NamedTuple):
     """A turn about one axis."""
 
     angle_deg: float
@@ -40,7 +40,7 @@ class Turn(NamedTuple):
     """Piece of time at which it happened; None if it was so from the beginning of what is remembered."""
 
 
-class Verdict(NamedTuple):
+class TurnEstimates(NamedTuple):
     """The estimates about one axis, one for each moment from which the camera may have been turned."""
 
     moments: np.ndarray
@@ -56,22 +56,22 @@ class Verdict(NamedTuple):
     sigmas: F64
     """(T,) the angle in standard deviations; 0 where it is not sound or too small."""
 
-    def turn(self, sigmas: float) -> Turn | None:
+    def turn(self, sigmas: float) -> MountTurn | None:
         """The clearest turn of at least so many standard deviations."""
         k = int(np.argmax(self.sigmas))
         return self.at(k) if self.sigmas[k] > sigmas else None
 
-    def at(self, k: int) -> Turn:
+    def at(self, k: int) -> MountTurn:
         """The turn at the k-th moment."""
         since = int(self.moments[k]) if k else None
-        return Turn(float(self.angle_deg[k]), float(self.sigma_deg[k]), int(self.vehicles[k]), since)
+        return MountTurn(float(self.angle_deg[k]), float(self.sigma_deg[k]), int(self.vehicles[k]), since)
 
-    def since(self, piece: int | None) -> Turn:
+    def since(self, piece: int | None) -> MountTurn:
         """The estimate from a piece of time on."""
         return self.at(0 if piece is None else max(int(np.searchsorted(self.moments, piece, "right")) - 1, 0))
 
 
-def judge(seen: Sightings, values: F64) -> Verdict:
+def judge(seen: PairedBoxes, values: F64) -> TurnEstimates:
     """values: (M,) angles of the sightings about one axis, degrees."""
     first, last = int(seen.piece[0]), int(seen.piece[-1])
     moments = np.concatenate([[first], np.arange(first + FIRST, last - 1, EVERY)])
@@ -90,4 +90,4 @@ def judge(seen: Sightings, values: F64) -> Verdict:
     is_sound = (agreeing >= AGREEING_SHARE * vehicles) & (agreeing >= np.where(followed, 1, 2))
     sigmas = np.abs(found.after) / found.after_sigma - FEW_SIGMAS * np.maximum(FEW - vehicles, 0)
     sigmas = np.where(is_sound & (np.abs(found.after) > SMALLEST_DEG), sigmas, 0.0)
-    return Verdict(moments, found.after, found.after_sigma, vehicles, is_sound, sigmas)
+    return TurnEstimates(moments, found.after, found.after_sigma, vehicles, is_sound, sigmas)

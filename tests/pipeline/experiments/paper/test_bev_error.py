@@ -67,9 +67,9 @@ def test_the_verdict_is_what_was_measured(fused_m: float | None, lidar_m: float,
         PositionSample(20.0, PositionError("L", lidar_m, 0.0, 0.0)),
     ]
     text = report([BevCase("a", 0), BevCase("a", 0, "lidar")], [fused, [*lidar, PositionSample(50.0, None)]]).text
-    (verdict,) = (each for each in text if each.startswith("Straight ahead: fused places"))
-    assert f"frames, {says[0]} than the LiDAR alone, which does" in verdict
-    assert says[1] is None or f"on average, {says[1]} than the LiDAR alone" in verdict
+    (verdict,) = (each for each in text if each.startswith("Straight ahead: fused locates"))
+    assert f"frames, {says[0]} than the LiDAR alone with" in verdict
+    assert says[1] is None or f" m, {says[1]} than the LiDAR alone with" in verdict
     assert f"{'1' if fused_m is None else '3'} of 3 frames" in verdict
 
 

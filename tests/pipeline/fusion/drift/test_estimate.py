@@ -5,25 +5,25 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.fusion.drift.estimate import Change, Sightings, changes
+from pipeline.fusion.drift.estimate import AngleChange, PairedBoxes, changes
 from pipeline.types import F64
 
 
-def sightings(vehicles: int, pieces: int, rates: F64 | None = None) -> Sightings:
+def sightings(vehicles: int, pieces: int, rates: F64 | None = None) -> PairedBoxes:
     """Every vehicle in every piece of time."""
     piece, vehicle = (each.ravel() for each in np.meshgrid(np.arange(pieces), np.arange(vehicles), indexing="ij"))
     rate = np.zeros(len(piece)) if rates is None else rates[vehicle]
-    return Sightings(piece, vehicle, np.full(len(piece), 5.0), np.full(len(piece), 3.0), rate)
+    return PairedBoxes(piece, vehicle, np.full(len(piece), 5.0), np.full(len(piece), 3.0), rate)
 
 
-def shown(seen: Sightings, before: float, after: float, at: int, time_s: float = 0.0, seed: int = 0) -> F64:
+def shown(seen: PairedBoxes, before: float, after: float, at: int, time_s: float = 0.0, seed: int = 0) -> F64:
     rng = np.random.default_rng(seed)
     own = rng.normal(0.0, 0.2, seen.vehicle.max() + 1)
     angle = np.where(seen.piece >= at, after, before)
     return angle + own[seen.vehicle] + time_s * seen.rate_degps + rng.normal(0.0, 0.2, len(seen.piece))
 
 
-def one(seen: Sightings, values: F64, moment: int) -> Change:
+def one(seen: PairedBoxes, values: F64, moment: int) -> AngleChange:
     return changes(seen, values, np.array([moment]))
 
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.fusion.drift.estimate import Sightings
-from pipeline.fusion.drift.judge import Turn, judge
+from pipeline.fusion.drift.estimate import PairedBoxes
+from pipeline.fusion.drift.judge import MountTurn, judge
 
 SIGMAS = 4.0
 
 
-def turn(angles_deg: list[list[float]], frames: int = 5) -> Turn | None:
+def turn(angles_deg: list[list[float]], frames: int = 5) -> MountTurn | None:
     """angles_deg: of each vehicle in each piece of time."""
     values = np.array(angles_deg).T
     pieces, vehicles = values.shape
     piece, vehicle = (each.ravel() for each in np.meshgrid(np.arange(pieces), np.arange(vehicles), indexing="ij"))
     count = len(piece)
-    seen = Sightings(piece, vehicle, np.full(count, float(frames)), np.full(count, 3.0), np.zeros(count))
+    seen = PairedBoxes(piece, vehicle, np.full(count, float(frames)), np.full(count, 3.0), np.zeros(count))
     return judge(seen, values.ravel()).turn(SIGMAS)
 
 
