@@ -99,7 +99,9 @@ def _remark(row: dict[str, Any]) -> tuple[str, str, str]:
     """The cells of a stage without peers."""
     if "p99_to_idle_median" in row:
         return f"p99 is {row['p99_to_idle_median']:.1f} × the idle step's median", "", ""
-    return (f"{row['rate_hz']:.0f} Hz", "", "") if "rate_hz" in row else ("", "", "")
+    if "rate_hz" in row:
+        return f"{row['rate_hz']:.0f} Hz", "", ""
+    return (f"{row['cpu_ms']:.2f} ms of processor time", "", "") if "cpu_ms" in row else ("", "", "")
 
 
 def _peer_cells(name: str, peer: dict[str, Any]) -> tuple[str, str, str]:

@@ -53,6 +53,7 @@ def test_the_step_is_measured_alone_and_beside_the_network(tmp_path: Path, monke
     for row in figures.values():
         assert 0.0 < row["median_ms"] <= row["p99_ms"]
         assert row["samples"] >= 1
+    assert figures["step"]["cpu_ms"] > 0.0
     beside = figures["step_beside_network"]
     ratio = beside["p99_ms"] / figures["step"]["median_ms"]
     assert beside["p99_to_idle_median"] == pytest.approx(ratio, abs=0.01)
