@@ -13,7 +13,7 @@ from pipeline.simulation import scenario
 from pipeline.simulation.drawing.lens import CameraModel
 from pipeline.simulation.scenario import Ego, Scenario
 from pipeline.simulation.sensors.detection_model import BoxNoise, Detections, LineNoise
-from pipeline.simulation.sensors.faults import Faults
+from pipeline.simulation.sensors.faults import Faults, Knock
 from pipeline.simulation.sensors.gnss_model import GnssModel, OdometryModel
 from pipeline.simulation.sensors.lidar_model import LidarModel
 from pipeline.simulation.world.actors import Actor, Brake
@@ -40,6 +40,7 @@ PARTS: dict[str, type[BaseModel]] = {
     "boxes": BoxNoise,
     "lines": LineNoise,
     "faults": Faults,
+    "knock": Knock,
 }
 
 
