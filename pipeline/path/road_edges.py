@@ -20,8 +20,8 @@ _ANEW_EVERY = 3
 """A tracked shape may be the wrong one, so in every third frame the shape is also searched from scratch, which doubles
 the time."""
 _DROVE_S = 0.5
-"""A vehicle that the LiDAR has seen driving for so long and that then stands is traffic, not part of the roadside. To the
-camera alone, a parked car may seem to drive for as long."""
+"""A vehicle that the LiDAR has seen driving for so long and that then stands is traffic, not part of the roadside. To
+the camera alone, a parked car may seem to drive for as long."""
 _STANDS_MPS = 0.3
 """A standing car learns nothing more about the road: what changes in front of it is traffic, not the roadside."""
 _LOWEST_M = 0.1
