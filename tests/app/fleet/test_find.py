@@ -121,15 +121,24 @@ def test_a_question_without_end_is_stopped(batch: Path):
 
 
 def test_ctrl_c_ends_a_question(batch: Path):
+    """The key is pressed again and again, because an interrupt that comes while a library is being imported is lost."""
     endless = "(SELECT sum(a.range * b.range) FROM range(10000000) a, range(10000000) b) > 0"
-    stop = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    tables, is_over = FleetTables(Store(str(batch)), most_s=60.0), threading.Event()
+
+    def press() -> None:
+        while not is_over.wait(0.3):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    presses = threading.Thread(target=press)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    presses.start()
     try:
-        stop.start()
         with pytest.raises(KeyboardInterrupt):
-            FleetTables(Store(str(batch))).find(endless)
+            tables.find(endless)
     finally:
-        stop.join()
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        is_over.set()
+        presses.join()
         signal.signal(signal.SIGINT, before)
 
 
