@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import duckdb
 
@@ -20,6 +20,7 @@ from app.fleet.store import Store
 from pipeline.common.errors import BadInput
 
 QueryTable = Literal["events", "frames", "objects", "drives"]
+Answer = TypeVar("Answer")
 _ALWAYS = ("drive", "address", "index", "t_s")
 _SHOWN: dict[QueryTable, tuple[str, ...]] = {
     "events": ("kind", "text", "distance_m", "ttc_s", "min_ttc_s", "max_gap_sigmas", "speed_mps"),
@@ -111,26 +112,26 @@ class FleetTables:
 
     def scores(self) -> list[tuple[str, str, float, float]]:
         """(drive, score, over, under) of every drive."""
-        with _interruptible():
-            rows = self._duckdb.execute('SELECT drive, score, "over", under FROM scores ORDER BY ALL').fetchall()
+        rows = self._rows('SELECT drive, score, "over", under FROM scores ORDER BY ALL')
         return [(str(drive), str(score), float(over), float(under)) for drive, score, over, under in rows]
 
     def drives(self) -> list[str]:
         """Names of all drives."""
-        with _interruptible():
-            return [str(row[0]) for row in self._duckdb.execute("SELECT drive FROM drives ORDER BY drive").fetchall()]
+        return [str(row[0]) for row in self._rows("SELECT drive FROM drives ORDER BY drive")]
 
     def rows(self, table: QueryTable) -> list[dict[str, Any]]:
         """Every row of a table, by column."""
-        with _interruptible():
+
+        def asked() -> list[dict[str, Any]]:
             found = self._duckdb.execute(f"SELECT * FROM {table} ORDER BY ALL")
             names = [column[0] for column in found.description or ()]
             return [dict(zip(names, row, strict=True)) for row in found.fetchall()]
 
+        return self._interruptibly(asked)
+
     def ask(self, sql: str) -> Any:
         """The result of a complete query, which must not come from outside, as a pyarrow table."""
-        with _interruptible():
-            return self._duckdb.sql(sql).to_arrow_table()
+        return self._interruptibly(lambda: self._duckdb.sql(sql).to_arrow_table())
 
     def arrow(self, table: QueryTable, columns: str) -> Any:
         """Columns of a table, named in SQL, as a pyarrow table."""
@@ -164,8 +165,7 @@ class FleetTables:
             statements = self._duckdb.extract_statements(sql)
             if len(statements) != 1 or statements[0].type != duckdb.StatementType.SELECT:
                 raise BadInput(f"{where!r}: expected one condition")
-            with _interruptible():
-                return self._duckdb.execute(statements[0]).fetchall()
+            return self._rows(statements[0])
         except duckdb.InterruptException:
             raise BadInput(f"{where!r}: stopped after {self._most_s:g} s") from None
         except duckdb.Error as error:
@@ -173,6 +173,22 @@ class FleetTables:
         finally:
             if stop is not None:
                 stop.cancel()
+
+    def _rows(self, query: str | duckdb.Statement) -> list[tuple[Any, ...]]:
+        return self._interruptibly(lambda: self._duckdb.execute(query).fetchall())
+
+    def _interruptibly(self, asked: Callable[[], Answer]) -> Answer:
+        """The answer of a query. Ctrl-C ends it: the main thread waits where it can be interrupted, since DuckDB does
+        not look for signals while its own threads work."""
+        if threading.current_thread() is not threading.main_thread():
+            return asked()
+        with ThreadPoolExecutor(1, "duckdb") as beside:
+            answer = beside.submit(asked)
+            try:
+                return answer.result()
+            except KeyboardInterrupt:
+                self._duckdb.interrupt()
+                raise
 
     def _shut_in(self) -> None:
         """Queries may come from a page, so they can read only the batch's folder, and can fill neither the memory nor
@@ -210,17 +226,6 @@ class FleetTables:
         if self.store.folder is not None:
             return str(self.store.folder / name)
         return str(self.store.system.unstrip_protocol(self.store.path(name)))
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Ctrl-C during a query is Ctrl-C: DuckDB turns what a signal's handler raises into an error of its own."""
-    try:
-        yield
-    except RuntimeError as error:
-        if str(error) == "Query interrupted":
-            raise KeyboardInterrupt from None
-        raise
 
 
 def _quoted(name: str) -> str:
