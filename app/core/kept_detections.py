@@ -7,6 +7,7 @@ import hashlib
 import logging
 import sqlite3
 import threading
+import zlib
 from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import version
@@ -15,7 +16,6 @@ from typing import Any
 
 import msgspec
 import numpy as np
-import zstandard
 
 import pipeline
 from pipeline.types import DistanceLaw, Frame, RawBoxes, RawLanes
@@ -136,14 +136,14 @@ class KeptDetections:
         if not held:
             return None
         try:
-            packed = zstandard.ZstdDecompressor().decompress(held[0][0])
+            packed = zlib.decompress(held[0][0])
             return answer_of(msgspec.msgpack.decode(packed, type=DetectionRow))
-        except (msgspec.DecodeError, zstandard.ZstdError, ValueError):
+        except (msgspec.DecodeError, zlib.error, ValueError):
             return None
 
     def put(self, mark: bytes, detector: str, answer: RawBoxes | RawLanes) -> None:
         """Keep the detections in an image."""
-        packed = zstandard.ZstdCompressor(level=_LEVEL).compress(msgspec.msgpack.encode(row_of(0, detector, answer)))
+        packed = zlib.compress(msgspec.msgpack.encode(row_of(0, detector, answer)), _LEVEL)
         self._execute("INSERT OR REPLACE INTO detections (mark, answer) VALUES (?, ?)", (_key(mark, detector), packed))
         self._added += 1
         if self._added % _LOOK_EVERY == 0:

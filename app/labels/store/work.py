@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast, get_args
+from typing import Any, cast
 
 from sqlalchemy import Connection, func, or_, select
 
@@ -12,11 +12,8 @@ from app.labels.errors import ActRefused, NoSuchLabel
 from app.labels.store.database import Database
 from app.labels.store.items import read_items
 from app.labels.store.tables import DriveRow, SightingRow, WorkRow
+from app.labels.work_states import State
 from pipeline.labels.model import NEXT_TAG, FrameTag, LabelTrack, LeadRange
-
-State = Literal["open", "labeling", "review", "done"]
-"""open: not started. review: labelled, waiting for a second person's review."""
-STATES: tuple[State, ...] = get_args(State)
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ def test_a_scheduler_that_is_killed_and_the_batch_resumed(fleet: Path, tmp_path:
         typed = [*CIPV, "batch", str(fleet), "--out", str(out), "--scheduler", address, *LIDAR]
         with subprocess.Popen(typed, cwd=ROOT, stderr=subprocess.PIPE, text=True) as batch:
             assert batch.stderr is not None
-            assert "page" in batch.stderr.readline()
+            assert "Dask dashboard" in batch.stderr.readline()
             assert wait_until(lambda: any(out.glob("done/*/*.json")) or batch.poll() is not None)
             scheduler.send_signal(signal.SIGKILL)
             said = batch.stderr.read()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -75,6 +76,9 @@ def test_relative_paths_and_home_work(astyx: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_a_date_folder_points_to_its_drives(kitti_raw: Path) -> None:
+    """A folder with a single drive stands for it."""
+    assert len(open_source(f"kitti:{kitti_raw.parent}")) == len(open_source(f"kitti:{kitti_raw}"))
+    shutil.copytree(kitti_raw, kitti_raw.parent / kitti_raw.name.replace("0009", "0010"))
     with pytest.raises(SourceError, match=r"it holds drives; open one of them, for example kitti:.*drive_0009_sync"):
         open_source(f"kitti:{kitti_raw.parent}")
 

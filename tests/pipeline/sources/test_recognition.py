@@ -205,7 +205,7 @@ OTHERS: dict[str, tuple[Write, str]] = {
         holding("samples/LIDAR_TOP"),
         "nuScenes without their tables; .* v1.0-mini or .* missing",
     ),
-    "Argoverse 2": (holding("sensors/lidar"), "a log of Argoverse 2; it is not read, convert it"),
+    "Argoverse 2": (holding("sensors/lidar"), "an unsupported Argoverse 2 log; convert it"),
     "poses alone": (holding("poses"), "poses of KITTI's odometry sequences; the folders with .* are missing"),
     "unrelated files": (unrelated, r"it holds 1 \.csv files and folders radar; use one of"),
     "thousands of files": (thousands, r"it holds at least 1000 \.doc files; use one of"),

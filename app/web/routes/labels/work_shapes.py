@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from app.labels.acts.request_fields import Person, PersonOrNobody, Strict
-from app.labels.store.work import State
+from app.labels.work_states import State
 from app.web.routes.shapes.common import ApiModel
 
 
