@@ -44,7 +44,8 @@ def test_a_frame_wanted_at_once_is_shown_after_two_reads_and_again_after_a_whole
     engine.control.seek(20)
     engine.wait_for(at(20), WAIT_S)
     assert recording.reads == [19, 20, *range(10, 19)]
-    assert wait_until(lambda: any(whole and looked for whole, looked, _ in shown)), "listeners hear of a state after those who wait"
+    # listeners hear of a state after those who wait for it
+    assert wait_until(lambda: any(whole and looked for whole, looked, _ in shown))
     at_once, warmed = [one for one in dict.fromkeys(shown) if one[1]]
     assert at_once == (False, 1, body(played(recording, 19, 20, Params(), looked_from=20)))
     assert warmed == (True, 11, body(played(recording, 10, 20, Params())))
