@@ -10,7 +10,8 @@ from app.commands.labels.people import State as Offered
 from app.labels.errors import ActRefused, NoSuchLabel
 from app.labels.store.database import Database
 from app.labels.store.drive_labels import DriveLabels
-from app.labels.store.work import STATES, put, queue
+from app.labels.store.work import put, queue
+from app.labels.work_states import STATES
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.model import LabelTrack, LeadRange, Origin, Sighting
 from tests.app.labels.acts.doing import act
