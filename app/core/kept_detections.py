@@ -34,15 +34,6 @@ _CODE = ("vision", "lanes", "inference")
 """Packages whose code decides what a network's detections are."""
 
 
-class _Law(msgspec.Struct, array_like=True):
-    coefficient: float
-    exponent: float
-    focal_px: float
-    truck_ratio: float
-    bus_ratio: float
-    motorcycle_ratio: float
-
-
 class DetectionRow(msgspec.Struct, array_like=True):
     """One detector's output for one image. Arrays are bytes, little-endian."""
 
@@ -58,7 +49,7 @@ class DetectionRow(msgspec.Struct, array_like=True):
     """float32, four pixels each; None for lanes."""
     labels: list[str] = []
     """Class name of each box."""
-    law: _Law | None = None
+    law: DistanceLaw | None = None
     """The detector's distance law."""
     far: tuple[int, int, int, int] | None = None
     """Window of the second look, pixels; None without one."""
@@ -75,8 +66,6 @@ def row_of(index: int, name: str, answer: RawBoxes | RawLanes) -> DetectionRow:
     if isinstance(answer, RawLanes):
         points, line = answer.points.astype("<f4").tobytes(), answer.line.astype("<i4").tobytes()
         return DetectionRow(index, name, answer.model, answer.scores.astype("<f4").tobytes(), points=points, line=line)
-    law = answer.law
-    numbers = (law.coefficient, law.exponent, law.focal_px, law.truck_ratio, law.bus_ratio, law.motorcycle_ratio)
     return DetectionRow(
         index,
         name,
@@ -84,7 +73,7 @@ def row_of(index: int, name: str, answer: RawBoxes | RawLanes) -> DetectionRow:
         answer.scores.astype("<f4").tobytes(),
         answer.boxes.astype("<f4").tobytes(),
         list(answer.labels),
-        _Law(*numbers),
+        answer.law,
         answer.far,
         answer.far_count,
     )
@@ -99,8 +88,7 @@ def answer_of(row: DetectionRow) -> RawBoxes | RawLanes:
     boxes = np.frombuffer(row.boxes, "<f4").astype(np.float32).reshape(-1, 4)
     if row.law is None or not len(boxes) == len(scores) == len(row.labels):
         raise ValueError("boxes without their law, scores or classes")
-    law = DistanceLaw(*msgspec.structs.astuple(row.law))
-    return RawBoxes(row.model, boxes, scores, tuple(row.labels), law, row.far, row.far_count)
+    return RawBoxes(row.model, boxes, scores, tuple(row.labels), row.law, row.far, row.far_count)
 
 
 def seen_mark(frame: Frame) -> bytes | None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -39,6 +39,7 @@ from pipeline.sources import open_source
 from pipeline.types import VEHICLES, Frame, Result
 from pipeline.types.source import Source
 from tests import looking
+from tests.pipeline.labels.cuboids.test_refine import hand_drawn
 
 DRIVES = {
     "astyx": "astyx:astyx",
@@ -179,20 +180,6 @@ def report_clutter(name: str, drive: Drive, tracks: Sequence[LabelTrack]) -> Non
             f"{name}: at {threshold:.0%} {sum(votes)} tracks on vehicles, {len(votes) - sum(votes)} others with "
             f"cuboids, {boxes} with image boxes only"
         )
-
-
-def hand_drawn(sightings: Sequence[Sighting], rng: np.random.Generator) -> list[Sighting]:
-    """As a person draws: about 20 cm and 3° off, one error along the whole track, a smaller one in each frame."""
-    common, long, wide = rng.normal(0, 1, 3), *rng.normal(0, [0.2, 0.1])
-    out = []
-    for each in sightings:
-        assert each.cuboid is not None
-        (x, y, z), (length, width, height), yaw_rad = each.cuboid
-        off = 0.5 * common + 0.6 * rng.normal(0, 1, 3)
-        size = (length + long, width + wide, height)
-        moved = Cuboid((x + 0.25 * off[0], y + 0.2 * off[1], z), size, yaw_rad + math.radians(3) * off[2])
-        out.append(replace(each, cuboid=moved))
-    return out
 
 
 def report_snap(name: str, drive: Drive) -> None:

@@ -41,7 +41,7 @@ NEAREST_M, FARTHEST_M = 7.0, 45.0
 BESIDE_M = 2.0
 """The profile of the road is used for vehicles this far beside the strip that it was fitted to."""
 FEWEST_HITS = 3
-"""PairedBoxes of a LiDAR track before it counts."""
+"""Sightings of a LiDAR track before it counts."""
 FASTEST_DEGPS = 6.0
 """Faster bearings belong to vehicles that we pass, which are seen from a different side in every frame."""
 AGREE_DEG, KEPT = 0.6, 0.5
