@@ -283,7 +283,9 @@ CONDITIONS = Conditions(
     ahead=Condition(
         "ahead", _ahead, lambda who: "position unknown" if who.place is None else "beside or behind the bumper"
     ),
-    stays=Condition("clears_path_s", _stays, lambda who: f"crosses: gone {who.clears_path_s:.1f} s before we arrive"),
+    stays=Condition(
+        "clears_path_s", _stays, lambda who: f"crossing: clears the path {who.clears_path_s:.1f} s before we arrive"
+    ),
     in_path=Condition("path_offset", _in_path, _out_of_path),
     confirmed=Condition(
         "hits", _confirmed, lambda who: f"seen {_sightings(who.item)} of {who.params.confirm_hits} times"

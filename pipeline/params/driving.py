@@ -121,14 +121,14 @@ class CipvParams(Section):
     )
     max_sigma_m: float = slider(4.0, 0.5, 20.0, 0.1, "m", "Largest standard deviation of a lead's lateral position")
     cut_in_s: float = slider(3.0, 0.5, 6.0, 0.1, "s", "Cut-ins and cut-outs are predicted this far ahead")
-    use_crossing: bool = choice(True, "What crosses the path is in it only if it is still there when the car arrives")
+    use_crossing: bool = choice(True, "A crossing object is in the path only if it is still there when the car arrives")
     crossing_margin_s: float = slider(
         1.0,
         0.0,
         5.0,
         0.1,
         "s",
-        "A crossing vehicle counts as gone if it leaves the path this long before we arrive",
+        "A crossing object counts as gone if it clears the path this long before the car arrives",
     )
     min_width_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "LiDAR-only objects: smallest width")
     min_height_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "LiDAR-only objects: smallest height")

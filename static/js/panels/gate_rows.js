@@ -27,7 +27,7 @@ const KINDS = {
   seen: { label: "Detected in this frame", test: "flag", param: "cipv.carried_may_become_lead" },
   size: { label: "Vehicle size", test: "flag", unit: "m", param: "cipv.max_size_m" },
   ahead: { label: "Ahead of bumper", test: "least", unit: "m" },
-  clears_path_s: { label: "Crosses before we arrive", test: "most", unit: "s", param: "cipv.crossing_margin_s" },
+  clears_path_s: { label: "Clears path before us", test: "most", unit: "s", param: "cipv.crossing_margin_s" },
   path_offset: { label: "Path offset", test: "most", unit: "m", param: "path.half_width_m" },
   path_sigma: { label: "Position uncertainty", test: "most", unit: "m", param: "cipv.max_sigma_m" },
   lead_probability: { label: "Lead probability", test: "least", param: "cipv.become_probability" },

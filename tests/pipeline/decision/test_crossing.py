@@ -58,7 +58,7 @@ def test_who_crosses_leads_only_if_it_is_met(item: FusedObject, ego_mps: float, 
     assert judged.in_path is leads
     assert (judged.clears_path_s is None) is leads
     if not leads:
-        assert found.rejected[0].reason.startswith("crosses: gone ")
+        assert found.rejected[0].reason.startswith("crossing: clears the path ")
         assert found.next_lead is None
         assert not reaction_candidates.enters_corridor(judged, PATH, None)
 
