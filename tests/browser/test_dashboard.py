@@ -152,9 +152,10 @@ def test_a_click_in_the_image_or_the_plan_selects(open_page: OpenPage, site: Sit
     expect(page.locator("tr.is-selected td").first).to_have_text(f"#{lead.id}")
 
 
-def test_the_plan_zooms_and_fits(open_page: OpenPage):
+def test_the_plan_zooms_and_fits(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
+    whole_drive(page, site)  # until then, the frame may come anew
     fitted = pixels(page, "#bev")
     page.locator("#bev").hover()
     page.mouse.wheel(0, -400)

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.streaming.sent_image import WIDTH_STEP_PX
 from tests.browser.conftest import START, OpenPage, Site
-from tests.browser.looks import box_of, pixels, repainted, wait_for_frame
+from tests.browser.looks import box_of, pixels, repainted, wait_for_frame, whole_drive
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
@@ -51,16 +51,18 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
     page.mouse.up()
 
 
-def opened(open_page: OpenPage) -> Page:
+def opened(open_page: OpenPage, site: Site) -> Page:
+    """The page once it shows the frame as the whole drive has it: until then, views change by themselves."""
     page = open_page()
     wait_for_frame(page, START)
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    whole_drive(page, site)
+    pixels(page, "#bev")
     return page
 
 
 @pytest.mark.parametrize(("view", "canvas"), [("camera", "#camera"), ("plan", "#bev")])
-def test_points_take_every_colour_that_is_offered(open_page: OpenPage, view: str, canvas: str):
-    page = opened(open_page)
+def test_points_take_every_colour_that_is_offered(open_page: OpenPage, site: Site, view: str, canvas: str):
+    page = opened(open_page, site)
     choice = page.get_by_label(f"Colour {view} points by")
     choice.select_option("age")
     looks = [pixels(page, canvas)]
@@ -74,8 +76,8 @@ def test_points_take_every_colour_that_is_offered(open_page: OpenPage, view: str
     expect(choice).to_have_value(COLOURS[-1])
 
 
-def test_the_tape_measures_metres_in_the_plan(open_page: OpenPage):
-    page = opened(open_page)
+def test_the_tape_measures_metres_in_the_plan(open_page: OpenPage, site: Site):
+    page = opened(open_page, site)
     before = pixels(page, "#bev")
     page.get_by_role("group", name="plan tools").get_by_role("button", name="Tape").click()
     drag(page, on_plan(page, 10.0, 3.0), on_plan(page, 40.0, -5.0))
@@ -90,8 +92,8 @@ def test_the_tape_measures_metres_in_the_plan(open_page: OpenPage):
     assert repainted(page, "#bev", before, like=True), "the plan has not moved"
 
 
-def test_the_tape_holds_on_to_lidar_points_in_the_image(open_page: OpenPage):
-    page = opened(open_page)
+def test_the_tape_holds_on_to_lidar_points_in_the_image(open_page: OpenPage, site: Site):
+    page = opened(open_page, site)
     points = of_store(
         page,
         """(() => {
@@ -119,8 +121,8 @@ def test_the_tape_holds_on_to_lidar_points_in_the_image(open_page: OpenPage):
         assert of_store(page, f"Array.from(get('frame').xyz).some((_, i, all) => {is_there})"), "it is a point's place"
 
 
-def test_a_click_on_a_point_selects_its_object(open_page: OpenPage):
-    page = opened(open_page)
+def test_a_click_on_a_point_selects_its_object(open_page: OpenPage, site: Site):
+    page = opened(open_page, site)
     point = of_store(
         page,
         """(() => {
@@ -138,7 +140,7 @@ def test_a_click_on_a_point_selects_its_object(open_page: OpenPage):
 
 
 def test_what_lies_under_the_pointer_is_named(open_page: OpenPage, site: Site):
-    page = opened(open_page)
+    page = opened(open_page, site)
     tick = site.engine.snapshot.processed
     assert tick is not None
     lead = tick.result.cipv
@@ -155,7 +157,7 @@ def test_what_lies_under_the_pointer_is_named(open_page: OpenPage, site: Site):
 
 def test_a_failed_test_of_the_selected_object_is_drawn_with_its_number(open_page: OpenPage, site: Site):
     """In the image at its box, in the plan as a dimension from the path's middle."""
-    page = opened(open_page)
+    page = opened(open_page, site)
     tick = site.engine.snapshot.processed
     assert tick is not None
     aside = next(
@@ -185,8 +187,8 @@ def test_a_failed_test_of_the_selected_object_is_drawn_with_its_number(open_page
         assert f"camera: {words}" in written
 
 
-def test_trails_follow_what_is_played(open_page: OpenPage):
-    page = opened(open_page)
+def test_trails_follow_what_is_played(open_page: OpenPage, site: Site):
+    page = opened(open_page, site)
     for step in range(1, 4):
         page.keyboard.press("ArrowRight")
         wait_for_frame(page, START + step)
@@ -207,8 +209,8 @@ def test_trails_follow_what_is_played(open_page: OpenPage):
     )
 
 
-def test_the_plan_shows_all_around_and_ahead_again(open_page: OpenPage):
-    page = opened(open_page)
+def test_the_plan_shows_all_around_and_ahead_again(open_page: OpenPage, site: Site):
+    page = opened(open_page, site)
     ahead = pixels(page, "#bev")
     tools = page.get_by_role("group", name="plan tools")
     tools.get_by_role("button", name="Around").click()
@@ -220,7 +222,7 @@ def test_the_plan_shows_all_around_and_ahead_again(open_page: OpenPage):
 
 def test_no_wider_image_is_sent_than_is_shown(open_page: OpenPage, site: Site):
     """And a wider one as soon as the pane grows, though nothing plays."""
-    page = opened(open_page)
+    page = opened(open_page, site)
     shown = box_of(page.locator("#camera"))["width"]
     sent = of_store(page, "get('frame').image.width")
     assert sent < shown + WIDTH_STEP_PX, "from the first one on"
