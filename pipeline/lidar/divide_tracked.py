@@ -112,7 +112,8 @@ def _homed(pieces: I32, parts: list[list[int]], owner: I32, tracks: int, min_poi
     for numbers in parts:
         largest = max(numbers, key=lambda number: int(sizes[number]))
         for number in numbers:
-            home = int(seeds[int(seeds[:, number].argmax())].argmax())
+            track = int(seeds[:, number].argmax())
+            home = int(seeds[track].argmax()) if seeds[track, number] > 0 else number
             if home != number and goes_to[home] == home and home not in numbers:
                 goes_to[number] = home
             elif sizes[number] < min_points:

@@ -117,6 +117,15 @@ def test_what_a_known_vehicle_cannot_have_grown_by_is_something_else(tracks: lis
     assert set(after[len(LEAD) :]) == {1}
 
 
+def test_what_no_track_follows_yet_stays_where_it_is():
+    """It belongs to no other cluster, wherever that is."""
+    elsewhere = wall((8.0, 6.0), (8.0, 7.5))
+    tracks = [track(1, (8.0, 6.75), (0.1, 1.5), STANDS), track(2, *LEAD_TRACK, DRIVES)]
+    _, after = divided(np.vstack([elsewhere, BESIDE]), tracks)
+    assert set(after[: len(elsewhere)]) == {0}
+    assert set(after[-len(PARKED) - len(FLANK) :]) == {2}
+
+
 def test_a_moment_in_which_they_were_one_is_forgotten():
     """In the last two sweeps the lead's cluster had taken the parked car's flank."""
     tracks = [track(1, (12.0, -0.3), (1.5, 2.6), DRIVES), track(2, *PARKED_TRACK, STANDS)]
