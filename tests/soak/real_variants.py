@@ -34,6 +34,8 @@ from tests.soak.real_changes import HARSH, IMMATERIAL, Change, as_it_is
 
 FAR_M, SAME_SHARE = 60.0, 0.98
 _LEAST_SCORE, _OVERLAP = 0.2, 0.45
+_UNDECIDED = 0.1
+"""A vehicle whose probability of being in the path is this near to a half, as in the middle of a lane change."""
 _SAME_M, _SAME_PART = 1.0, 0.1
 """Two distances of one vehicle differ by less than this, and this part of it."""
 
@@ -116,9 +118,15 @@ def _judged(kind: str, name: str, source: object, done: list[tuple[Frame, Result
 
 
 def same_share(one: Row, other: Row) -> float:
-    """Share of the frames in which both have the same lead nearer than 60 m, or both have none."""
-    same = [_is_same(a, b) for (_, a), (_, b) in zip(one.frames, other.frames, strict=True)]
-    return sum(same) / len(same)
+    """Share of the frames in which both have the same lead nearer than 60 m, or both have none. Frames in which the
+    lead of ``one`` is as likely beside the path as in it are left out, as in the simulator's suites."""
+    pairs = [(a, b) for (_, a), (_, b) in zip(one.frames, other.frames, strict=True) if _is_decided(a)]
+    return sum(_is_same(a, b) for a, b in pairs) / len(pairs)
+
+
+def _is_decided(result: Result) -> bool:
+    lead = next((item for item in result.objects if result.cipv is not None and item.id == result.cipv.id), None)
+    return lead is None or abs((lead.in_path_probability or 0.0) - 0.5) > _UNDECIDED
 
 
 def _is_same(one: Result, other: Result) -> bool:
