@@ -120,7 +120,9 @@ def test_the_covariance_stays_positive() -> None:
     state = place_filter.start(sighting(50.0), -5.0, 8.0)
     rng = np.random.default_rng(1)
     for _ in range(50):
-        state, _ = place_filter.update(kalman.predict(state, 0.1, 3.0), sighting(40.0 + rng.normal(), rng.normal() * 0.01))
+        state, _ = place_filter.update(
+            kalman.predict(state, 0.1, 3.0), sighting(40.0 + rng.normal(), rng.normal() * 0.01)
+        )
         assert np.linalg.eigvalsh(state.cov).min() > 0.0
 
 
