@@ -152,7 +152,7 @@ def _predict(followed: Sequence[Followed], dt_s: float, params: VisionTrackingPa
 
 def _predicted(followed: Followed, moved: CvState, predicted: PredictedPlace, dt_s: float) -> Followed:
     place, growth = predicted
-    unseen = {
+    unseen: dict[str, Any] = {
         "carried": True,
         "measured": False,
         "returns": 0,
