@@ -166,6 +166,8 @@ def _display_may(scope: Scope) -> bool:
         return False  # its controls change what all clients see
     if path == "/api/fleet" or path.startswith("/api/fleet/"):
         return False  # contains drives of other cars
+    if (scope["method"], path) in _LABEL_ROLES:
+        return False
     return scope["method"] in _READING or (scope["method"], path) in _DISPLAY_MAY
 
 

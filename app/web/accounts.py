@@ -1,7 +1,7 @@
 """The accounts of people who label: a name, a role, and the digest of a personal token.
 
-They are kept in a file that only its owner can read. The tokens themselves are not stored: a token is printed once, when
-its account is made. A running server notices changes of the file.
+They are kept in a file that only its owner can read. The tokens themselves are not stored: a token is printed once,
+when its account is made. A running server notices changes of the file.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Nobody acts under the name of somebody else: checked for every route at once, so that a new one is covered as well."""
+"""Nobody acts under the name of somebody else: checked for all routes at once, so that a new one is covered too."""
 
 from __future__ import annotations
 

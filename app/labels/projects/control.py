@@ -1,6 +1,7 @@
 """Control frames: frames whose truth is known, in which each person's labels are compared with it.
 
-Nothing in the labels or the queue distinguishes them from other frames; only reviewers see the results.
+Nothing in the labels or the queue distinguishes them from other frames, and they do not change which frames are sampled:
+a dense run of requested frames would give them away. Only reviewers see the results.
 """
 
 from __future__ import annotations
@@ -130,4 +131,4 @@ def within(labels: LabelSet, first: int, last: int) -> LabelSet:
 
 def has_labels(labels: LabelSet) -> bool:
     """Whether anything in the set counts as truth."""
-    return any(each.state in _COUNTED for each in (*labels.tracks, *labels.leads))
+    return any(each.state in _COUNTED for each in labels.tracks) or any(each.state in _COUNTED for each in labels.leads)

@@ -46,7 +46,7 @@ class ProjectEntries(Strict):
     """A class list, relative to this file; None for the server's list."""
     sampling: Sampling | None = None
     """Which frames enter the queue; None for those that people and `cipv mine` ask for."""
-    control: list[ControlEntry] = []
+    control: list[ControlEntry] = Field(default_factory=list)
     """Frames with known truth."""
 
 

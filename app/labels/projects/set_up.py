@@ -41,8 +41,6 @@ def set_up(database: Database, file: ProjectFile, person: str) -> Iterator[str]:
     if entries.sampling is None:
         return
     chosen = sample(entries.sampling, [_sampled(labels) for labels in by_key.values()])
-    for span in control:  # control frames are asked for like all others
-        chosen[span.key] = sorted({*chosen[span.key], *range(span.first, span.last + 1)})
     origin = Origin("pipeline", f"{entries.name}: {entries.sampling.text}", int(time.time() * 1000))
     for key, labels in by_key.items():
         labels.log.act("tag", person, _tagging(entries.name, chosen[key], origin))

@@ -43,7 +43,8 @@ def put_project(
     with database.writing() as connection:
         if not database.insert_new(connection, ProjectRow, values):
             connection.execute(update(ProjectRow).where(ProjectRow.name == entries.name).values(values))
-        connection.execute(delete(ControlRow).where(ControlRow.drive_id.in_(_in_project(entries.name))))
+        members = select(ProjectDriveRow.drive_id).where(ProjectDriveRow.project == entries.name)
+        connection.execute(delete(ControlRow).where(ControlRow.drive_id.in_(members)))
         connection.execute(delete(ProjectDriveRow).where(ProjectDriveRow.project == entries.name))
         numbers = _numbers(connection, keys)
         for number in numbers.values():
@@ -60,10 +61,6 @@ def projects(database: Database) -> dict[str, str]:
     with database.reading() as connection:
         rows = connection.execute(select(ProjectRow.name, ProjectRow.sampling).order_by(ProjectRow.name)).all()
     return {row.name: row.sampling for row in rows}
-
-
-def _in_project(name: str) -> object:
-    return select(ProjectDriveRow.drive_id).where(ProjectDriveRow.project == name)
 
 
 def _numbers(connection: Connection, keys: Sequence[str]) -> Mapping[str, int]:

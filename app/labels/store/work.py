@@ -82,8 +82,8 @@ def put(
     allowed: Callable[[str], None] = lambda assigned: None,
 ) -> Work:
     """Assign a recording, or set its state. drive: its title, address or key. NoSuchLabel if there is none or several;
-    ActRefused if its labeler would mark it as reviewed, or nothing was labelled. allowed: raises an error if the present
-    assignee forbids the change."""
+    ActRefused if its labeler would mark it as reviewed, or nothing was labelled. allowed: raises an error if the
+    change is not allowed for a recording with this assignee."""
     with database.reading() as connection:
         matches = or_(DriveRow.key == drive, DriveRow.title == drive, DriveRow.uri == drive)
         rows = connection.execute(select(DriveRow.id, DriveRow.key).where(matches, DriveRow.count > 0)).all()

@@ -10,8 +10,8 @@ from fastapi.responses import JSONResponse
 from app.core.client_role import account_of
 from app.labels.acts.requests import Import, Propose
 from app.labels.errors import Stale
-from app.labels.service.answers import changes_json
 from app.labels.permissions import check_act
+from app.labels.service.answers import changes_json
 from app.labels.service.desk import ActDone, LabelDesk
 from app.web.routes.labels.act_shapes import ActBody, ActedJson, StaleJson, TaskBegun, Who
 from app.web.routes.refusals import refusing
