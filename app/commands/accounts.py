@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from app.commands.support.arguments import option
-from app.core.client_role import LabelRole
+from app.core.client_role import AccountRole
 from pipeline.common.errors import BadInput
 
 
@@ -21,7 +21,7 @@ class ListAccounts:
 
     add: Annotated[str | None, option("NAME")] = None
     """Make an account, or give an existing one a new token and role"""
-    role: LabelRole | None = None
+    role: AccountRole | None = None
     """labeler: labels. reviewer: also approves labels and imports. admin: also assigns recordings to others"""
     remove: Annotated[str | None, option("NAME")] = None
     """Remove an account; its labels stay"""

@@ -9,9 +9,9 @@ from starlette.requests import HTTPConnection
 
 Role = Literal["person", "display"]
 """A display may view, mark and record; it cannot change parameters, seek or open sources."""
-LabelRole = Literal["labeler", "reviewer", "admin"]
+AccountRole = Literal["labeler", "reviewer", "admin"]
 """What a person with an account may do with labels; each role includes the ones before it."""
-LABEL_ROLES: tuple[LabelRole, ...] = get_args(LabelRole)
+ACCOUNT_ROLES: tuple[AccountRole, ...] = get_args(AccountRole)
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Account:
 
     name: str
     """The person's name, as in their labels."""
-    role: LabelRole
+    role: AccountRole
     """What they may do with labels."""
 
 
@@ -40,6 +40,6 @@ def account_of(connection: HTTPConnection) -> Account | None:
     return account
 
 
-def includes(account: Account | None, role: LabelRole) -> bool:
+def includes(account: Account | None, role: AccountRole) -> bool:
     """Whether a client may do what a role may do."""
-    return account is None or LABEL_ROLES.index(account.role) >= LABEL_ROLES.index(role)
+    return account is None or ACCOUNT_ROLES.index(account.role) >= ACCOUNT_ROLES.index(role)

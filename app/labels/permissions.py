@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from app.core.client_role import Account, LabelRole, includes
+from app.core.client_role import Account, AccountRole, includes
 from app.labels.errors import NotAllowed
 from app.labels.work_states import State
 
-ACT_ROLES: Mapping[str, LabelRole] = {"review_ok": "reviewer", "send_back": "reviewer", "import": "reviewer"}
+ACT_ROLES: Mapping[str, AccountRole] = {"review_ok": "reviewer", "send_back": "reviewer", "import": "reviewer"}
 """The role that an act needs; without an entry, every account may do it. Import: a labeler would import the truth of
 control frames."""
 

@@ -22,7 +22,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from app.core.client_role import LabelRole, includes, set_client
+from app.core.client_role import AccountRole, includes, set_client
 from app.core.server_address import LOOPBACK_HOSTS, WILDCARDS, is_address
 from app.web.tokens import Guesses, Tokens
 
@@ -36,7 +36,7 @@ _OPEN_TO_ALL = "/healthz"
 _DISPLAY_MAY = frozenset({("POST", "/api/marks"), ("POST", "/api/recording")})
 """Requests by which a display may change something."""
 _DISPLAY_STREAM = "/api/stream"
-_LABEL_ROLES: dict[tuple[str, str], LabelRole] = {
+_LABEL_ROLES: dict[tuple[str, str], AccountRole] = {
     ("POST", "/api/labels/import"): "reviewer",
     ("POST", "/api/labels/versions"): "reviewer",
     ("GET", "/api/labels/control"): "reviewer",

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from app.core.client_role import Account, LabelRole
+from app.core.client_role import Account, AccountRole
 from app.core.session_folder import SESSIONS
 from app.labels.acts.request_fields import Person
 from pipeline.common.errors import BadInput
@@ -35,7 +35,7 @@ class StoredAccount(BaseModel):
 
     name: Person
     """Unique among the accounts."""
-    role: LabelRole
+    role: AccountRole
     """What the person may do with labels."""
     sha256: str = Field(pattern="^[0-9a-f]{64}$")
     """Digest of the token."""
@@ -87,7 +87,7 @@ def read_accounts(file: Path = FILE) -> list[StoredAccount]:
     return sorted(found, key=lambda each: each.name)
 
 
-def add_account(name: str, role: LabelRole, file: Path = FILE) -> str:
+def add_account(name: str, role: AccountRole, file: Path = FILE) -> str:
     """Make an account, or give an existing one another role and token; returns the token, which is not stored."""
     token = secrets.token_urlsafe(_BYTES)
     try:

@@ -1,7 +1,7 @@
 """Control frames: frames whose truth is known, in which each person's labels are compared with it.
 
-Nothing in the labels or the queue distinguishes them from other frames, and they do not change which frames are sampled:
-a dense run of requested frames would give them away. Only reviewers see the results.
+Nothing in the labels or the queue distinguishes them from other frames, and they do not change which frames are
+sampled: a dense run of requested frames would give them away. Only reviewers see the results.
 """
 
 from __future__ import annotations

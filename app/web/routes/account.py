@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request
 
-from app.core.client_role import LabelRole, account_of
+from app.core.client_role import AccountRole, account_of
 from app.web.routes.shapes.common import ApiModel
 
 
@@ -13,7 +13,7 @@ class AccountJson(ApiModel):
 
     name: str | None
     """Under which its labels are stored; null without an account: then each request names a person."""
-    role: LabelRole | None
+    role: AccountRole | None
     """labeler, reviewer or admin; null without an account: then everything is allowed."""
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import httpx
 import pytest
 
-from app.core.client_role import LABEL_ROLES, Account
+from app.core.client_role import ACCOUNT_ROLES, Account
 from app.web.accounts import Accounts, add_account, read_accounts, remove_account
 from app.web.server import create_app
 from app.web.tokens import Tokens
@@ -61,8 +61,8 @@ def people(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, httpx
     """A client of each role; ``person`` has the token with full access."""
     file = tmp_path_factory.mktemp("accounts") / "accounts.json"
     tokens = Tokens("person-0123456789abcdef", "display-0123456789abcde", accounts=Accounts(file))
-    known = {role: add_account(role.title(), role, file) for role in LABEL_ROLES} | {"person": tokens.person}
-    with running() as engine, serving(create_app(engine, tokens=tokens)) as address:
+    known = {role: add_account(role.title(), role, file) for role in ACCOUNT_ROLES} | {"person": tokens.person}
+    with running(whole_drives=True) as engine, serving(create_app(engine, tokens=tokens)) as address:
         engine.wait_for(lambda shown: shown.labels.labelled, WAIT_S)
         clients = {
             role: httpx.Client(base_url=address, timeout=WAIT_S, headers={"authorization": f"Bearer {token}"})
@@ -84,7 +84,7 @@ def act(client: httpx.Client, person: str, act: dict[str, Any]) -> httpx.Respons
 
 def test_everybody_is_told_who_they_are(people: dict[str, httpx.Client]) -> None:
     told = {role: client.get("/api/account").json() for role, client in people.items()}
-    assert told == {role: {"name": role.title(), "role": role} for role in LABEL_ROLES} | {
+    assert told == {role: {"name": role.title(), "role": role} for role in ACCOUNT_ROLES} | {
         "person": {"name": None, "role": None}
     }
 
@@ -111,7 +111,7 @@ def test_nobody_acts_under_the_name_of_somebody_else(people: dict[str, httpx.Cli
 
 
 def test_a_labeler_does_not_review_and_a_reviewer_does_not_assign(people: dict[str, httpx.Client]) -> None:
-    labeler, reviewer, admin = (people[role] for role in LABEL_ROLES)
+    labeler, reviewer, admin = (people[role] for role in ACCOUNT_ROLES)
     added = act(labeler, "Labeler", {"kind": "set_lead", "first": 0, "last": 3, "lead": "none"}).json()
     (lead,) = added["changed"]["leads"]
     approve = {"kind": "review_ok", "items": [{"kind": "lead", "id": lead["id"], "revision": lead["revision"]}]}

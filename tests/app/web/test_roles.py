@@ -17,7 +17,7 @@ from starlette.routing import Mount
 from starlette.types import Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from app.core.client_role import LABEL_ROLES, Account, LabelRole, Role
+from app.core.client_role import ACCOUNT_ROLES, Account, AccountRole, Role
 from app.engine.engine import Engine
 from app.labels.acts.requests import Act
 from app.labels.errors import NotAllowed
@@ -75,9 +75,9 @@ RULES: dict[str, Rule] = {
     for door in doors.split("·")
 }  # type: ignore[assignment]
 WELCOME: dict[Rule, set[str]] = {
-    "everybody": {"nobody", "display", "person", *LABEL_ROLES},
-    "whoever looks": {"display", "person", *LABEL_ROLES},
-    "people": {"person", *LABEL_ROLES},
+    "everybody": {"nobody", "display", "person", *ACCOUNT_ROLES},
+    "whoever looks": {"display", "person", *ACCOUNT_ROLES},
+    "people": {"person", *ACCOUNT_ROLES},
     "reviewers": {"person", "reviewer", "admin"},
 }
 
@@ -86,7 +86,7 @@ WELCOME: dict[Rule, set[str]] = {
 def tokens(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The token of each role; for accounts from a file."""
     file = tmp_path_factory.mktemp("accounts") / "accounts.json"
-    made = {role: add_account(f"a {role}", role, file) for role in LABEL_ROLES}
+    made = {role: add_account(f"a {role}", role, file) for role in ACCOUNT_ROLES}
     return made | {"person": TOKENS.person, "display": TOKENS.display, "file": str(file)}
 
 
@@ -136,7 +136,7 @@ def lets_in(door: str, token: str | None, guarded: Tokens) -> bool:
     return sent[0].get("status") == 200
 
 
-@pytest.mark.parametrize("role", ["nobody", "display", "person", *LABEL_ROLES])
+@pytest.mark.parametrize("role", ["nobody", "display", "person", *ACCOUNT_ROLES])
 def test_the_guard_lets_in_whom_the_rules_do_and_nobody_else(role: str, tokens: dict[str, str]):
     guarded = replace(TOKENS, accounts=Accounts(Path(tokens["file"])))
     wrong = [
@@ -145,12 +145,12 @@ def test_the_guard_lets_in_whom_the_rules_do_and_nobody_else(role: str, tokens: 
     assert wrong == []
 
 
-ACTS: dict[str, LabelRole] = {"review_ok": "reviewer", "send_back": "reviewer", "import": "reviewer"}
+ACTS: dict[str, AccountRole] = {"review_ok": "reviewer", "send_back": "reviewer", "import": "reviewer"}
 """All other acts are for every account."""
 
 
-@pytest.mark.parametrize("role", LABEL_ROLES)
-def test_every_act_on_labels_has_a_rule(role: LabelRole):
+@pytest.mark.parametrize("role", ACCOUNT_ROLES)
+def test_every_act_on_labels_has_a_rule(role: AccountRole):
     kinds = {get_args(each.model_fields["kind"].annotation)[0] for each in get_args(get_args(Act)[0])}
     assert set(ACTS) < kinds
 
