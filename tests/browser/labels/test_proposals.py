@@ -6,12 +6,23 @@ import json
 from typing import Any
 
 import pytest
-from playwright.sync_api import WebSocket, expect
+from playwright.sync_api import expect
 
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.labels.hands import Hand, Labels, begin, draw, is_at
 from tests.browser.looks import COUNT
 
+NO_VISER = ("status of 502",)
+"""The server of these tests has no 3D view of its own."""
+HEAR = """() => {
+  window.said = [];
+  const { send } = WebSocket.prototype;
+  WebSocket.prototype.send = function (message) {
+    window.said.push(message);
+    return send.call(this, message);
+  };
+}"""
+"""Keeps what the page tells the server from now on."""
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
 
@@ -20,7 +31,7 @@ def test_the_next_unlabelled_frame_is_one_whose_lead_is_only_proposed(hand: Hand
     page = hand.page
     labels.act("Bob", {"kind": "set_lead", "first": 0, "last": COUNT - 1, "lead": "none"})
     hand.keys("n")
-    expect(page.locator(".said")).to_have_text("the lead is labelled in every frame there")
+    expect(page.locator(".said")).to_have_text("No unlabelled after this frame")
     (lead,) = labels.everything["leads"]
     ref = {"kind": "lead", "id": lead["id"], "revision": lead["revision"]}
     labels.act("Bob", {"kind": "send_back", "items": [ref], "comment": "look again"})
@@ -32,14 +43,8 @@ def test_the_next_unlabelled_frame_is_one_whose_lead_is_only_proposed(hand: Hand
 def test_the_3d_view_is_told_of_labels_with_class_number_and_state_and_of_the_selected_one(
     open_page: OpenPage, site: Site
 ):
-    page = open_page()
-    said: list[dict[str, Any]] = []
-
-    def hear(socket: WebSocket) -> None:
-        socket.on("framesent", lambda message: said.append(json.loads(message)))
-
-    page.on("websocket", hear)
-    page.reload()
+    page = open_page(expects=NO_VISER)
+    page.evaluate(HEAR)
     labels, hand = Labels(page, site.address), begin(page)
     labels.clear(COUNT)
     page.get_by_role("button", name="Here", exact=True).click()
@@ -50,7 +55,7 @@ def test_the_3d_view_is_told_of_labels_with_class_number_and_state_and_of_the_se
 
     def told() -> dict[str, Any]:
         """The newest of each word."""
-        return {word: value for each in said for word, value in each.items()}
+        return {word: value for each in page.evaluate("window.said") for word, value in json.loads(each).items()}
 
     def drawn(_: Labels) -> bool:
         shown = (told().get("labels_3d") or {}).get("labels", [])
