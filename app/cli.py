@@ -28,6 +28,7 @@ COMMANDS = {
     "info": "app.commands.info:ShowInfo",
     "recover": "app.commands.sessions:Recover",
     "keys": "app.commands.keys:Keys",
+    "accounts": "app.commands.accounts:ListAccounts",
     "live": "app.commands.live:Live",
     "replay": "app.commands.replay:Replay",
     "labels": "app.commands.labels.labels:Labels",

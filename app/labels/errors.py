@@ -15,6 +15,10 @@ class ActRefused(BadInput):
     """The act is not possible with the current labels; nothing was written."""
 
 
+class NotAllowed(BadInput):
+    """The account's role does not include it."""
+
+
 class BadAct(BadInput):
     """The act is invalid, whatever the labels are."""
 

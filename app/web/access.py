@@ -22,7 +22,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from app.core.client_role import set_role
+from app.core.client_role import AccountRole, includes, set_client
 from app.core.server_address import LOOPBACK_HOSTS, WILDCARDS, is_address
 from app.web.tokens import Guesses, Tokens
 
@@ -36,6 +36,12 @@ _OPEN_TO_ALL = "/healthz"
 _DISPLAY_MAY = frozenset({("POST", "/api/marks"), ("POST", "/api/recording")})
 """Requests by which a display may change something."""
 _DISPLAY_STREAM = "/api/stream"
+_LABEL_ROLES: dict[tuple[str, str], AccountRole] = {
+    ("POST", "/api/labels/import"): "reviewer",
+    ("POST", "/api/labels/versions"): "reviewer",
+    ("GET", "/api/labels/control"): "reviewer",
+}
+"""Requests that need a role; what depends on the body is in ``app.labels.permissions``."""
 _COOKIE_DAYS = 400
 """The longest lifetime that browsers permit: a display in a car has no keyboard to type a link again."""
 
@@ -124,17 +130,21 @@ class Guard:
         if self._tokens is None or (connection.scope["path"] == _OPEN_TO_ALL and not changes):
             return None
         by_link = connection.query_params.get("token") if not changes else None
-        if by_link is not None and self._tokens.role_of(by_link) is not None:
+        if by_link is not None and self._tokens.client_of(by_link) is not None:
             return _signed_in(connection, by_link)
         given = _bearer(connection.headers) or connection.cookies.get(cookie_name(connection))
-        role = self._tokens.role_of(given)
-        if role is None:
+        client = self._tokens.client_of(given)
+        if client is None:
             wrong, address = by_link or given, connection.client.host if connection.client else ""
             is_guessing = wrong is not None and self._guesses.wrong(address, wrong)
             return _who_are_you(connection) if not is_guessing else _TOO_MANY_GUESSES
+        role, account = client
         if role == "display" and not _display_may(connection.scope):
             return JSONResponse({"detail": "not allowed for the in-vehicle display"}, 403)
-        set_role(connection, role)
+        needed = _LABEL_ROLES.get((connection.scope.get("method", "WEBSOCKET"), connection.scope["path"]))
+        if needed is not None and not includes(account, needed):
+            return JSONResponse({"detail": f"only for accounts with the role {needed}"}, 403)
+        set_client(connection, role, account)
         return None
 
 
@@ -156,6 +166,8 @@ def _display_may(scope: Scope) -> bool:
         return False  # its controls change what all clients see
     if path == "/api/fleet" or path.startswith("/api/fleet/"):
         return False  # contains drives of other cars
+    if (scope["method"], path) in _LABEL_ROLES:
+        return False
     return scope["method"] in _READING or (scope["method"], path) in _DISPLAY_MAY
 
 

@@ -20,7 +20,7 @@ from starlette.datastructures import Headers
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.core.client_role import is_display
+from app.core.client_role import account_of, is_display
 
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _WITH_CONTROLS = "/viser"
@@ -100,6 +100,7 @@ class Audit:
         entry = {
             "time": datetime.now(UTC).isoformat(timespec="milliseconds"),
             "role": "display" if is_display(connection) else "person",
+            "account": account.name if (account := account_of(connection)) is not None else None,
             "client": connection.client.host if connection.client else None,
             "method": method,
             "path": scope["path"] + (f"?{urlencode(query)}" if query else ""),

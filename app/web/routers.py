@@ -20,6 +20,7 @@ from app.fleet.desk import FleetDesk
 from app.streaming.stream import Stream
 from app.views.rerun.web import ViewerFiles
 from app.web.metrics import Metrics
+from app.web.routes.account import account_router
 from app.web.routes.alignment import alignment_router
 from app.web.routes.alignment_fit import alignment_fit_router
 from app.web.routes.alignment_versions import alignment_versions_router
@@ -69,6 +70,7 @@ class Services:
 
 ROUTERS: list[Callable[[Services], APIRouter]] = [
     lambda on: health_router(on.engine, on.metrics),
+    lambda on: account_router(),
     lambda on: playback_router(on.engine, on.stream),
     lambda on: params_router(on.engine),
     lambda on: recording_router(on.engine),

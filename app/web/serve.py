@@ -20,6 +20,7 @@ from app.drive.alignment_versions import AlignmentVersions
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.fleet.desk import FleetDesk
+from app.web.accounts import Accounts
 from app.web.tokens import Tokens
 from pipeline.common.garbage_collection import freeze_loaded_objects
 
@@ -46,10 +47,10 @@ def serve(
     otherwise. tls: files of a certificate and its key. fleet: the tables that the Fleet view searches. ends_process:
     the process does nothing else, and ends even if some of its work hangs.
 
-    PortTaken and BadInput (a weak token, no certificate) are raised before anything is started.
+    PortTaken and BadInput (a weak token, unreadable accounts, no certificate) are raised before anything is started.
     """
     is_private = is_loopback(host) and not tuple(hosts) and not always_token
-    tokens = None if is_private else Tokens.from_environment()
+    tokens = None if is_private else Tokens.from_environment(accounts=Accounts())
     bound = listen_socket(host, port, strict=strict_port)
     number = bound.getsockname()[1]
     if port not in (0, number):

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import uvicorn
-from fastapi import FastAPI, Request
+from fastapi import Depends, FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
@@ -39,6 +39,7 @@ from app.web.connections import LimitedProtocol
 from app.web.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
 from app.web.log_limit import limit_logs
 from app.web.metrics import Metrics
+from app.web.own_name import own_name
 from app.web.quotas import RoleQuota
 from app.web.routers import ROUTERS, Services
 from app.web.routes.labels.files import IMPORT
@@ -95,7 +96,13 @@ def create_app(
         viewer.close()
 
     app = FastAPI(
-        title="CIPV Studio", version="1", docs_url=None, redoc_url=None, lifespan=listening, responses=REFUSALS
+        title="CIPV Studio",
+        version="1",
+        docs_url=None,
+        redoc_url=None,
+        lifespan=listening,
+        responses=REFUSALS,
+        dependencies=[Depends(own_name)],
     )
     app.openapi = titled(app)  # type: ignore[method-assign]
     app.add_middleware(BodyLimit, files={IMPORT: LARGEST_FILE})

@@ -14,7 +14,8 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from app.core.client_role import Role
+from app.core.client_role import Account, Role
+from app.web.accounts import Accounts
 from pipeline.common.errors import BadInput
 
 _BYTES = 24
@@ -37,9 +38,11 @@ class Tokens:
     chosen: frozenset[Role] = frozenset()
     """Roles whose tokens come from the environment, where other programs' logs do not show them: these are never
     printed."""
+    accounts: Accounts | None = None
+    """People with a token of their own; None for none."""
 
     @classmethod
-    def from_environment(cls, environment: Mapping[str, str] = os.environ) -> Tokens:
+    def from_environment(cls, environment: Mapping[str, str] = os.environ, accounts: Accounts | None = None) -> Tokens:
         """``CIPV_TOKEN`` and ``CIPV_DISPLAY_TOKEN``; a token that is not set is generated. BadInput for a weak one."""
         chosen: dict[Role, str] = {}
         for role, variable in _VARIABLES.items():
@@ -51,7 +54,8 @@ class Tokens:
             chosen[role] = token
         if chosen["person"] == chosen["display"]:
             raise BadInput("CIPV_TOKEN and CIPV_DISPLAY_TOKEN must differ")
-        return cls(**chosen, chosen=frozenset(role for role, name in _VARIABLES.items() if environment.get(name)))
+        named = frozenset(role for role, name in _VARIABLES.items() if environment.get(name))
+        return cls(**chosen, chosen=named, accounts=accounts)
 
     def shown(self, role: Role) -> str:
         """The token as printed: by the variable's name if it comes from one."""
@@ -63,6 +67,14 @@ class Tokens:
         is_person = hmac.compare_digest(digest, _digest(self.person))
         is_display = hmac.compare_digest(digest, _digest(self.display))
         return "person" if is_person else "display" if is_display else None
+
+    def client_of(self, given: str | None) -> tuple[Role, Account | None] | None:
+        """The role of a token, and the account if it is personal; None if it is invalid."""
+        role = self.role_of(given)
+        if role is not None or self.accounts is None:
+            return (role, None) if role is not None else None
+        account = self.accounts.of_token(given)
+        return ("person", account) if account is not None else None
 
 
 def _repeats(token: str) -> bool:

@@ -6,12 +6,12 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import read_yaml
+from pipeline.common.user_file_errors import parse_yaml, read_yaml
 from pipeline.labels.model import LabelSet
 from pipeline.vision.classes import canonical
 
@@ -75,6 +75,15 @@ def read_classes(path: Path) -> ClassList:
         return _parsed(read_yaml(path, str(path)))
     except ValueError as error:
         raise BadInput(f"{path}: {error}") from None
+
+
+@lru_cache(64)
+def parse_classes(text: str, what: str) -> ClassList:
+    """A class list from YAML text. Raises BadInput, beginning with ``what``, if it is invalid."""
+    try:
+        return _parsed(parse_yaml(text, what))
+    except ValueError as error:
+        raise BadInput(f"{what}: {error}") from None
 
 
 def as_bases(labels: LabelSet, classes: ClassList) -> LabelSet:

@@ -20,6 +20,7 @@ from app.labels.project_classes import project_classes
 from app.labels.wording import WORKING
 from pipeline.common.garbage_collection import gc_paused
 from pipeline.common.user_file_errors import given_path
+from pipeline.labels.classes import ClassList
 from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.native import from_json, onto
 from pipeline.labels.formats.reading import read_bytes
@@ -64,23 +65,24 @@ class ExportLabels:
     def __call__(self) -> int:
         source = opened_recording(self.source)
         drive = _drive(source)
-        labels, notes = self._labels(source, drive)
+        labels, notes, classes = self._labels(source, drive)
         labels = selected(labels, self.only)
-        lost = export_labels(labels, drive, self.format, self.out, project_classes())
+        lost = export_labels(labels, drive, self.format, self.out, classes or project_classes())
         say(*notes, *lost, f"{self.out}: {_amount(labels)}")
         return 0
 
-    def _labels(self, source: Source, drive: LabeledDrive) -> tuple[LabelSet, tuple[str, ...]]:
-        """The labels to export, and notes about them."""
+    def _labels(self, source: Source, drive: LabeledDrive) -> tuple[LabelSet, tuple[str, ...], ClassList | None]:
+        """The labels to export, notes about them, and the class list of the recording's project, if it has one."""
         if self.labels is not None:
             with gc_paused():
                 found = from_json(read_bytes(given_path(self.labels)), str(self.labels))
                 placed = onto(found, drive, str(self.labels))
-            return placed.labels, placed.notes
+            return placed.labels, placed.notes, None
         with _kept(source, drive, self.database) as kept:
             if self.version != WORKING or kept.has_labels():
-                return kept.label_set(self.version), ()
-        return truth_labels(source, drive.frames, Origin("import", source.title, _NOBODY_KNOWS_WHEN))
+                return kept.label_set(self.version), (), kept.classes()
+        truth, notes = truth_labels(source, drive.frames, Origin("import", source.title, _NOBODY_KNOWS_WHEN))
+        return truth, notes, None
 
 
 @dataclass(frozen=True)

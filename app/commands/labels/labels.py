@@ -15,6 +15,7 @@ import tyro
 
 from app.commands.labels.files import Database, ExportLabels, ImportLabels, Person, say
 from app.commands.labels.people import LabelAgreement, LabelEffort, LabelQueue
+from app.commands.labels.projects import LabelProjects
 from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress, task_progress
@@ -167,6 +168,7 @@ class Labels:
         | Annotated[ListLabels, tyro.conf.subcommand("list")]
         | Annotated[ListClasses, tyro.conf.subcommand("classes")]
         | Annotated[LabelQueue, tyro.conf.subcommand("queue")]
+        | Annotated[LabelProjects, tyro.conf.subcommand("projects")]
         | Annotated[LabelAgreement, tyro.conf.subcommand("agreement")]
         | Annotated[LabelEffort, tyro.conf.subcommand("effort")]
         | Annotated[ExportLabels, tyro.conf.subcommand("export")]

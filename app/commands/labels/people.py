@@ -46,14 +46,14 @@ class LabelAgreement:
         if self.json:
             print(json.dumps(asdict(found), indent=2))
             return 0
-        print(f"lead: {_percent(found.lead_share)} of {found.frames:,} frames agree")
+        print(f"lead: {percent(found.lead_share)} of {found.frames:,} frames agree")
         if found.lead_disagreements:
             named = ", ".join(str(frame + 1) for frame in found.lead_disagreements[:_MOST_NAMED])
             print(f"  not in frames {named}{' …' if len(found.lead_disagreements) > _MOST_NAMED else ''}")
         overlap = "-" if found.iou is None else f"{found.iou:.2f}"
         print(f"cuboids: {found.vehicles:,} in both, median IoU {overlap}")
         print(f"  only in the first {found.only_first:,}, only in the second {found.only_second:,}")
-        print(f"class: {_percent(found.class_share)} agree; reversed: {_percent(found.reversed_share)}")
+        print(f"class: {percent(found.class_share)} agree; reversed: {percent(found.reversed_share)}")
         return 0
 
 
@@ -133,8 +133,8 @@ class LabelQueue:
             return 0
         for each in found:
             print(
-                f"{each.title}: {each.state}, {each.person or 'unassigned'}; labelled {_percent(each.labelled)}, "
-                f"reviewed {_percent(each.reviewed)}, proposals {each.proposals:,}, frames to label next {each.asked:,}"
+                f"{each.title}: {each.state}, {each.person or 'unassigned'}; labelled {percent(each.labelled)}, "
+                f"reviewed {percent(each.reviewed)}, proposals {each.proposals:,}, frames to label next {each.asked:,}"
                 f", worth {each.worth:.2f}"
             )
         if not found:
@@ -142,5 +142,6 @@ class LabelQueue:
         return 0
 
 
-def _percent(share: float | None) -> str:
+def percent(share: float | None) -> str:
+    """A share in words; a dash where there is none."""
     return "-" if share is None else f"{100 * share:.0f} %"

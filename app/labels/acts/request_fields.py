@@ -20,20 +20,20 @@ _MOST_POINTS = 1000
 _MOST_ITEMS = 10_000
 
 
-def _clean(text: str) -> str:
+def clean(text: str) -> str:
     """The text on one line, without characters that a terminal or page would interpret."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def _named(text: str) -> str:
-    cleaned = _clean(text)
+    cleaned = clean(text)
     if not cleaned:
         raise ValueError("a name is needed")
     return cleaned
 
 
 def _commented(text: str) -> str:
-    cleaned = _clean(text)
+    cleaned = clean(text)
     if not cleaned:
         raise ValueError("a comment is needed: say what to check")
     return cleaned
@@ -42,7 +42,7 @@ def _commented(text: str) -> str:
 Id = Annotated[int, Field(ge=0, le=_LARGEST_ID)]
 Index = Annotated[int, Field(ge=0, le=MOST_FRAMES)]
 Person = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_named)]
-PersonOrNobody = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_clean)]
+PersonOrNobody = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(clean)]
 """Cleaned in the same way as ``Person``, so that both give the same name; empty if anonymous."""
 Word = Annotated[str, Field(max_length=40), AfterValidator(_named)]
 Comment = Annotated[str, Field(max_length=1000), AfterValidator(_commented)]

@@ -64,8 +64,8 @@ class LabelDesk:
         open_later: Callable[[], Database] | None = None,
         classes: ClassList | None = None,
     ) -> None:
-        """classes: classes of the project; None for the defaults."""
-        self.classes = classes or default_classes()
+        """classes: for recordings whose project has none; None for the defaults."""
+        self.default_classes = classes or default_classes()
         self.kept = KeptLabels(database, open_later)
         self._control = Control(Wish(Params()))
         self._is_shown = False
@@ -144,12 +144,18 @@ class LabelDesk:
         """The key of the open recording; None if the source has no frames to label."""
         return self._open.key
 
+    @property
+    def classes(self) -> ClassList:
+        """Of the open recording's project, else the default."""
+        opened = self._open
+        return (opened.labels.classes() if opened.recording is not None else None) or self.default_classes
+
     @cached_property
     def scores(self) -> LabelScores:
         """Scores of runs against labels."""
         from app.labels.service.scoring import LabelScores
 
-        return LabelScores(self.classes)
+        return LabelScores(self.default_classes)
 
     # ------------------------------------------------------------ acts
 
@@ -167,7 +173,7 @@ class LabelDesk:
                 from app.labels.acts.measured import measured
 
                 doing, note = measured(labels, recording, self._control.peek().params, act)
-            scope = Scope(labels.info.t_ns, self.classes)
+            scope = Scope(labels.info.t_ns, labels.classes() or self.default_classes)
             self._settling.finish()
             done = labels.log.act(doing.kind, person, lambda draft: do(draft, scope, doing), act_id=act_id, note=note)
             self.refresh()

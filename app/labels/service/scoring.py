@@ -49,23 +49,23 @@ class LabelScores:
     """Any thread. Scores are cached until labels or runs change."""
 
     def __init__(self, classes: ClassList | None = None) -> None:
-        """classes: sub-classes are scored as their parent class."""
+        """classes: for recordings whose project has none. Sub-classes are scored as their parent class."""
         self._classes = classes or default_classes()
         self._lock = threading.Lock()
-        self._of: tuple[DriveLabels, int] | None = None
+        self._of: tuple[DriveLabels, int, ClassList] | None = None
         self._truth: DriveTruth | None = None
         self._scores: dict[tuple[int, int], DriveScore | None] = {}
 
     def truth(self, labels: DriveLabels) -> tuple[int, DriveTruth | None]:
         """(revision, labels accepted by people; None without any)."""
         with self._lock:
-            revision = labels.revision
-            if self._of is None or self._of[0] is not labels or self._of[1] != revision:
+            revision, classes = labels.revision, labels.classes() or self._classes
+            if self._of is None or self._of[0] is not labels or self._of[1:] != (revision, classes):
                 try:
-                    self._truth = of_labels(as_bases(labels.unnamed_set(), self._classes), RULE)
+                    self._truth = of_labels(as_bases(labels.unnamed_set(), classes), RULE)
                 except NoTruth:
                     self._truth = None
-                self._of, self._scores = (labels, revision), {}
+                self._of, self._scores = (labels, revision, classes), {}
             return revision, self._truth
 
     def score(self, labels: DriveLabels, run: DriveRun) -> DriveScore | None:
@@ -73,7 +73,7 @@ class LabelScores:
         revision, truth = self.truth(labels)
         key = (run.number, run.done)
         with self._lock:
-            if truth is None or self._of != (labels, revision):
+            if truth is None or self._of is None or self._of[:2] != (labels, revision):
                 return None
             if key not in self._scores:
                 if len(self._scores) >= _MOST_HELD:

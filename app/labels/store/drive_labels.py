@@ -24,14 +24,18 @@ from app.labels.store.items import (
     read_track,
     read_window,
 )
-from app.labels.store.tables import DriveRow, ItemRow, SightingRow, VersionRow
+from app.labels.store.tables import DriveRow, ItemRow, ProjectDriveRow, ProjectRow, SightingRow, VersionRow
 from app.labels.store.values import KINDS, LONGEST_ITEM, Item, ItemKind, sighting_of
 from app.labels.store.version_chain import chained, check
 from app.labels.wording import WORKING
+from pipeline.labels.classes import ClassList, parse_classes
 from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, PathLabel, Sighting
 from pipeline.sources.fingerprint import content_key
 from pipeline.types.source import Source
+
+_REVIEWS = ("review_ok", "send_back")
+"""Acts that judge a label without changing it."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +140,21 @@ class DriveLabels:
         """The last person who changed each item, by kind and id."""
         with self._database.reading() as connection:
             return read_changers(connection, self._id)
+
+    def made_by(self) -> dict[tuple[ItemKind, int], str]:
+        """Like ``changed_by``, but reviews do not count."""
+        with self._database.reading() as connection:
+            return read_changers(connection, self._id, _REVIEWS)
+
+    def classes(self) -> ClassList | None:
+        """The class list of the recording's project; None if it has none."""
+        with self._database.reading() as connection:
+            text = connection.scalars(
+                select(ProjectRow.classes)
+                .join(ProjectDriveRow, ProjectDriveRow.project == ProjectRow.name)
+                .where(ProjectDriveRow.drive_id == self._id)
+            ).first()
+        return parse_classes(text, "the project's classes") if text else None
 
     def track(self, number: int) -> Item:
         """With its sightings. NoSuchLabel if it does not exist."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, cast
@@ -98,13 +98,16 @@ def read_extents(
     return found
 
 
-def read_changers(connection: Connection, drive_id: int) -> dict[tuple[ItemKind, int], str]:
-    """Person of the last effective act on each item, by kind and id; undone acts and undos do not count."""
+def read_changers(
+    connection: Connection, drive_id: int, without: Sequence[str] = ()
+) -> dict[tuple[ItemKind, int], str]:
+    """Person of the last effective act on each item, by kind and id; undone acts and undos do not count. without: kinds
+    of acts that do not count either."""
     of_act = and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act)
     last = (
         select(ChangeRow.kind, ChangeRow.item, func.max(ChangeRow.act).label("act"))
         .join(ActRow, of_act)
-        .where(ChangeRow.drive_id == drive_id, ActRow.status == "done", ActRow.kind.not_in(WAYS))
+        .where(ChangeRow.drive_id == drive_id, ActRow.status == "done", ActRow.kind.not_in((*WAYS, *without)))
         .where(ChangeRow.kind.in_(KINDS))
         .group_by(ChangeRow.kind, ChangeRow.item)
         .subquery()

@@ -136,3 +136,33 @@ class WorkRow(Base):
     person: Mapped[str] = mapped_column(String(LONGEST_NAME))
     state: Mapped[str] = mapped_column(String(16))
     t_unix_ms: Mapped[int] = mapped_column(BigInteger)
+
+
+class ProjectRow(Base):
+    """A project. classes: its class list as YAML, empty for the server's. sampling: its rule in words, empty for none.
+    person, t_unix_ms: who changed it last, and when."""
+
+    __tablename__ = "project"
+    name: Mapped[str] = mapped_column(String(LONGEST_NAME), primary_key=True)
+    classes: Mapped[str] = mapped_column(Text)
+    sampling: Mapped[str] = mapped_column(Text)
+    person: Mapped[str] = mapped_column(String(LONGEST_NAME))
+    t_unix_ms: Mapped[int] = mapped_column(BigInteger)
+
+
+class ProjectDriveRow(Base):
+    """A recording of a project; it is in one at most, because it has one class list."""
+
+    __tablename__ = "project_drive"
+    drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
+    project: Mapped[str] = mapped_column(ForeignKey("project.name"))
+
+
+class ControlRow(Base):
+    """Frames whose truth is known, first … last. truth: a native file with the labels of these frames, compressed."""
+
+    __tablename__ = "control"
+    drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
+    first: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
+    last: Mapped[int] = mapped_column(Integer)
+    truth: Mapped[bytes] = mapped_column(LargeBinary)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -11,7 +12,7 @@ from sqlalchemy import Connection, func, or_, select
 from app.labels.errors import ActRefused, NoSuchLabel
 from app.labels.store.database import Database
 from app.labels.store.items import read_items
-from app.labels.store.tables import DriveRow, SightingRow, WorkRow
+from app.labels.store.tables import DriveRow, ProjectDriveRow, SightingRow, WorkRow
 from app.labels.work_states import State
 from pipeline.labels.model import NEXT_TAG, FrameTag, LabelTrack, LeadRange
 
@@ -39,10 +40,14 @@ class Work:
     proposals: int
     """Number of untouched proposals."""
     asked: int
-    """Frames requested for labeling by `cipv mine` or a person whose lead is not labelled."""
+    """Frames requested for labeling by `cipv mine`, a project's sampling or a person whose lead is not labelled."""
     worth: float
     """Expected value of a label per frame: uncertain proposals, weighted by their uncertainty (1 at a confidence of
     0.5, 0 at 0 and 1), frames with an unclear lead, and ``asked``."""
+    sampled: int
+    """Frames requested for labeling, whether labelled since or not."""
+    project: str
+    """The project that it is in; empty if none."""
 
 
 def queue(database: Database) -> list[Work]:
@@ -50,18 +55,35 @@ def queue(database: Database) -> list[Work]:
     with database.reading() as connection:
         rows = connection.execute(
             select(
-                DriveRow.id, DriveRow.key, DriveRow.title, DriveRow.uri, DriveRow.count, WorkRow.person, WorkRow.state
+                DriveRow.id,
+                DriveRow.key,
+                DriveRow.title,
+                DriveRow.uri,
+                DriveRow.count,
+                WorkRow.person,
+                WorkRow.state,
+                ProjectDriveRow.project,
             )
             .outerjoin(WorkRow, WorkRow.drive_id == DriveRow.id)
+            .outerjoin(ProjectDriveRow, ProjectDriveRow.drive_id == DriveRow.id)
             .where(DriveRow.count > 0)
         ).all()
         found = [_work(connection, row, row.person or "", cast("State", row.state or "open")) for row in rows]
     return sorted(found, key=lambda each: (each.state == "done", -each.worth, each.title, each.key))
 
 
-def put(database: Database, drive: str, by: str, *, person: str | None = None, state: State | None = None) -> Work:
+def put(
+    database: Database,
+    drive: str,
+    by: str,
+    *,
+    person: str | None = None,
+    state: State | None = None,
+    allowed: Callable[[str], None] = lambda assigned: None,
+) -> Work:
     """Assign a recording, or set its state. drive: its title, address or key. NoSuchLabel if there is none or several;
-    ActRefused if its labeler would mark it as reviewed, or nothing was labelled."""
+    ActRefused if its labeler would mark it as reviewed, or nothing was labelled. allowed: raises an error if the
+    change is not allowed for a recording with this assignee."""
     with database.reading() as connection:
         matches = or_(DriveRow.key == drive, DriveRow.title == drive, DriveRow.uri == drive)
         rows = connection.execute(select(DriveRow.id, DriveRow.key).where(matches, DriveRow.count > 0)).all()
@@ -69,6 +91,7 @@ def put(database: Database, drive: str, by: str, *, person: str | None = None, s
         raise NoSuchLabel(f"{drive}: {len(rows) or 'no'} such recordings; `cipv labels queue` lists them")
     number, key = rows[0]
     now = next(each for each in queue(database) if each.key == key)
+    allowed(now.person)
     new = replace(now, person=now.person if person is None else person, state=now.state if state is None else state)
     if state == "done" and by == new.person:
         raise ActRefused(f"{by} labels {now.title}: a second person must mark it as done")
@@ -94,17 +117,13 @@ def _work(connection: Connection, drive: Any, person: str, state: State) -> Work
     lengths = {track: count for track, count in counted}
     proposed = [each for each in tracks if each.state == "proposed"]
     accepted = [each for each in tracks if each.state in ("accepted", "corrected")]
-    unsure = sum(
-        (1.0 - abs(2.0 * each.confidence - 1.0)) * lengths.get(each.id, 0)
-        for each in proposed
-        if each.confidence is not None
-    )
-    unclear = sum(each.last + 1 - each.first for each in leads if each.state == "proposed" and each.lead == "unknown")
+    unsure = sum(doubt(each) * lengths.get(each.id, 0) for each in proposed)
+    unclear = sum(each.last + 1 - each.first for each in leads if is_unclear(each))
     spans = [range(each.first, each.last + 1) for each in leads if each.state in ("accepted", "corrected")]
     said = sum(map(len, spans))
     tags = [cast("FrameTag", item.value) for item in read_items(connection, drive.id, "tag").values()]
-    asked = {frame for tag in tags if tag.tag == NEXT_TAG for frame in range(tag.first, tag.last + 1)}
-    asked -= {frame for span in spans for frame in span}
+    sampled = {frame for tag in tags if tag.tag == NEXT_TAG for frame in range(tag.first, tag.last + 1)}
+    asked = sampled - {frame for span in spans for frame in span}
     return Work(
         drive.key,
         drive.title,
@@ -117,4 +136,17 @@ def _work(connection: Connection, drive: Any, person: str, state: State) -> Work
         len(proposed),
         len(asked),
         round((unsure + unclear + len(asked)) / drive.count, 3),
+        len(sampled),
+        drive.project or "",
     )
+
+
+def doubt(track: LabelTrack) -> float:
+    """How uncertain a proposal is: 1 at a confidence of 0.5, 0 at 0 and 1; 0 for other tracks."""
+    is_proposed = track.state == "proposed" and track.confidence is not None
+    return 1.0 - abs(2.0 * cast("float", track.confidence) - 1.0) if is_proposed else 0.0
+
+
+def is_unclear(lead: LeadRange) -> bool:
+    """Whether the lead is proposed as unclear."""
+    return lead.state == "proposed" and lead.lead == "unknown"

@@ -10,20 +10,22 @@ from fastapi import HTTPException
 from app.drive.background_runs import BackgroundRuns
 from app.drive.open_recording import OpenRecording
 from app.drive.run_registry import NoSuchRun
-from app.labels.errors import BadAct, DatabaseError, NoSuchLabel, Stale
+from app.labels.errors import BadAct, DatabaseError, NoSuchLabel, NotAllowed, Stale
 from pipeline.common.errors import BadInput
 
 
 @contextmanager
 def refusing() -> Iterator[None]:
-    """404 for missing items, 409 for refused changes, 422 for invalid input, 503 for a failing database. Stale passes
-    through: the client must receive both versions."""
+    """403 for what a role does not include, 404 for missing items, 409 for refused changes, 422 for invalid input, 503
+    for a failing database. Stale passes through: the client must receive both versions."""
     try:
         yield
     except Stale:
         raise
     except (NoSuchRun, NoSuchLabel) as error:
         raise HTTPException(404, str(error)) from None
+    except NotAllowed as error:
+        raise HTTPException(403, str(error)) from None
     except BadAct as error:
         raise HTTPException(422, str(error)) from None
     except DatabaseError as error:

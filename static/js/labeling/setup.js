@@ -12,6 +12,7 @@ import { leads } from "./lanes/leads.js";
 import { tags } from "./lanes/tags.js";
 import { track } from "./lanes/track.js";
 import * as mode from "./state/mode.js";
+import * as person from "./state/person.js";
 import * as panel from "./panels/panel.js";
 import { drawInImage } from "./views/image_drawing.js";
 import * as imageHand from "./views/image_pointer.js";
@@ -22,7 +23,7 @@ import * as steps from "./state/undo_state.js";
 import * as three from "./views/three.js";
 
 export function setUp() {
-  const parts = [mode, acts, data, steps, frames, draft, projection, three, bar, panel, imageHand, classes];
+  const parts = [person, mode, acts, data, steps, frames, draft, projection, three, bar, panel, imageHand, classes];
   for (const part of parts) part.setUp();
   addMode({ isOn: mode.isOn, draw: drawInPlan, ...planHand });
   addLayer(drawInImage, "over");

@@ -8,25 +8,31 @@ import inspect
 import json
 import re
 from collections.abc import Iterator
-from typing import Any, Literal, cast
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal, cast, get_args
 
 import pytest
 from starlette.routing import Mount
 from starlette.types import Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from app.core.client_role import Role
+from app.core.client_role import ACCOUNT_ROLES, Account, AccountRole, Role
 from app.engine.engine import Engine
+from app.labels.acts.requests import Act
+from app.labels.errors import NotAllowed
+from app.labels.permissions import check_act
 from app.streaming.scene_requests import hear
 from app.streaming.slot import FrameCounts, Slot
 from app.streaming.stream import MAY_SAY, Stream
 from app.web.access import Access, Guard
+from app.web.accounts import Accounts, add_account
 from app.web.server import create_app
 from app.web.tokens import Tokens
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import Recording, opener
 
-Rule = Literal["everybody", "whoever looks", "people"]
+Rule = Literal["everybody", "whoever looks", "people", "reviewers"]
 TOKENS = Tokens("person-0123456789abcdef", "display-0123456789abcde")
 
 EVERYBODY = "GET /healthz · HEAD /healthz"
@@ -37,7 +43,8 @@ GET /api/drive/events · POST /api/marks · GET /api/runs · GET /api/runs/{numb
 GET /api/runs/{number}/params.yaml · GET /api/compare · GET /api/labels · GET /api/labels/frames ·
 GET /api/labels/tracks/{number} · GET /api/labels/tracks/{number}/filmstrip ·
 GET /api/labels/tracks/{number}/close_up · GET /api/labels/checks · GET /api/labels/classes ·
-GET /api/labels/next · GET /api/labels/queue · GET /api/labels/score · GET /api/labels/history ·
+GET /api/labels/next · GET /api/labels/queue · GET /api/labels/projects · GET /api/account ·
+GET /api/labels/score · GET /api/labels/history ·
 GET /api/labels/formats · GET /api/labels/export · GET /api/labels/export/notes · GET /api/labels/versions ·
 GET /api/labels/versions/{name} · GET /api/jobs · GET /api/jobs/{number} · GET /api/jobs/{number}/file ·
 GET /api/alignment/score · GET /api/alignment/fit · GET /api/alignment/fit.yaml · GET /api/alignment/versions ·
@@ -49,23 +56,38 @@ PEOPLE = """
 POST /api/playback · POST /api/source · PATCH /api/params · POST /api/params · POST /api/params/undo ·
 POST /api/params/redo · POST /api/params/preset · DELETE /api/marks/{number} · POST /api/runs/{number}/keep ·
 POST /api/runs/{number}/base · POST /api/runs/{number}/use · DELETE /api/runs/{number} · POST /api/labels/act ·
-POST /api/labels/queue · POST /api/labels/undo · POST /api/labels/redo · POST /api/labels/import ·
-POST /api/labels/versions · POST /api/clip · DELETE /api/jobs/{number} · POST /api/alignment/fit ·
+POST /api/labels/queue · POST /api/labels/undo · POST /api/labels/redo · POST /api/clip ·
+DELETE /api/jobs/{number} · POST /api/alignment/fit ·
 DELETE /api/alignment/fit · POST /api/alignment/versions · DELETE /api/alignment/versions/{number} ·
 POST /api/project · POST /api/project/ray · WEBSOCKET /viser · WEBSOCKET /viser/ · GET /api/fleet ·
 GET /api/fleet/rows · GET /api/fleet/histogram · GET /api/fleet/counts · WEBSOCKET /viser/of/{name} ·
 GET /viser/of/{name}/{path:path} · GET /viser · GET /viser/{path:path}
 """
+REVIEWERS = "GET /api/labels/control · POST /api/labels/import · POST /api/labels/versions"
 RULES: dict[str, Rule] = {
     door.strip(): rule
-    for rule, doors in (("everybody", EVERYBODY), ("whoever looks", WHOEVER_LOOKS), ("people", PEOPLE))
+    for rule, doors in (
+        ("everybody", EVERYBODY),
+        ("whoever looks", WHOEVER_LOOKS),
+        ("people", PEOPLE),
+        ("reviewers", REVIEWERS),
+    )
     for door in doors.split("·")
 }  # type: ignore[assignment]
 WELCOME: dict[Rule, set[str]] = {
-    "everybody": {"nobody", "display", "person"},
-    "whoever looks": {"display", "person"},
-    "people": {"person"},
+    "everybody": {"nobody", "display", "person", *ACCOUNT_ROLES},
+    "whoever looks": {"display", "person", *ACCOUNT_ROLES},
+    "people": {"person", *ACCOUNT_ROLES},
+    "reviewers": {"person", "reviewer", "admin"},
 }
+
+
+@pytest.fixture(scope="module")
+def tokens(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The token of each role; for accounts from a file."""
+    file = tmp_path_factory.mktemp("accounts") / "accounts.json"
+    made = {role: add_account(f"a {role}", role, file) for role in ACCOUNT_ROLES}
+    return made | {"person": TOKENS.person, "display": TOKENS.display, "file": str(file)}
 
 
 def doors_of(routes: Any) -> Iterator[str]:
@@ -89,11 +111,10 @@ async def _inside(_: Scope, receive: Receive, send: Send) -> None:
     await send({"type": "http.response.start", "status": 200, "headers": []})
 
 
-def lets_in(door: str, role: str) -> bool:
+def lets_in(door: str, token: str | None, guarded: Tokens) -> bool:
     """Whether the request comes through to what is behind the guard."""
     method, _, path = door.partition(" ")
     path = re.sub(r"\{[^}]*\}", "1", path)
-    token = getattr(TOKENS, role, None)
     headers = [(b"host", b"127.0.0.1:8420")] + ([(b"authorization", f"Bearer {token}".encode())] if token else [])
     kind = "websocket" if method == "WEBSOCKET" else "http"
     scope = {
@@ -109,16 +130,38 @@ def lets_in(door: str, role: str) -> bool:
         async def receive() -> Message:
             return {"type": "websocket.connect"}
 
-        await Guard(_inside, Access(["0.0.0.0"]), TOKENS)(scope, receive, send)
+        await Guard(_inside, Access(["0.0.0.0"]), guarded)(scope, receive, send)
 
     asyncio.run(ask())
     return sent[0].get("status") == 200
 
 
-@pytest.mark.parametrize("role", ["nobody", "display", "person"])
-def test_the_guard_lets_in_whom_the_rules_do_and_nobody_else(role: str):
-    wrong = [door for door, rule in RULES.items() if lets_in(door, role) != (role in WELCOME[rule])]
+@pytest.mark.parametrize("role", ["nobody", "display", "person", *ACCOUNT_ROLES])
+def test_the_guard_lets_in_whom_the_rules_do_and_nobody_else(role: str, tokens: dict[str, str]):
+    guarded = replace(TOKENS, accounts=Accounts(Path(tokens["file"])))
+    wrong = [
+        door for door, rule in RULES.items() if lets_in(door, tokens.get(role), guarded) != (role in WELCOME[rule])
+    ]
     assert wrong == []
+
+
+ACTS: dict[str, AccountRole] = {"review_ok": "reviewer", "send_back": "reviewer", "import": "reviewer"}
+"""All other acts are for every account."""
+
+
+@pytest.mark.parametrize("role", ACCOUNT_ROLES)
+def test_every_act_on_labels_has_a_rule(role: AccountRole):
+    kinds = {get_args(each.model_fields["kind"].annotation)[0] for each in get_args(get_args(Act)[0])}
+    assert set(ACTS) < kinds
+
+    def may(kind: str) -> bool:
+        try:
+            check_act(Account("Ada", role), kind)
+        except NotAllowed:
+            return False
+        return True
+
+    assert {kind for kind in kinds if not may(kind)} == (set(ACTS) if role == "labeler" else set())
 
 
 WORDS: dict[str, Rule] = {

@@ -1,4 +1,4 @@
 """The history of the database schema."""
 
-HEAD = "0007"
+HEAD = "0008"
 """The schema revision of this program."""

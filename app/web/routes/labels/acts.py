@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse
 
+from app.core.client_role import account_of
 from app.labels.acts.requests import Import, Propose
 from app.labels.errors import Stale
+from app.labels.permissions import check_act
 from app.labels.service.answers import changes_json
 from app.labels.service.desk import ActDone, LabelDesk
 from app.web.routes.labels.act_shapes import ActBody, ActedJson, StaleJson, TaskBegun, Who
@@ -29,10 +31,11 @@ def label_acts_router(desk: LabelDesk) -> APIRouter:
     router = APIRouter(prefix="/api/labels", tags=["labels"])
 
     @router.post("/act", responses=_ANSWERS)
-    def act(body: ActBody) -> Response:
+    def act(body: ActBody, request: Request) -> Response:
         """Change labels. One act is one transaction and one undo step; the answer comes once it is on disk."""
         try:
             with refusing():
+                check_act(account_of(request), body.act.kind)
                 if isinstance(body.act, Propose | Import):
                     number = desk.begin(body.person, body.act, body.drive, body.sent_as)
                     return JSONResponse({"status": "begun", "what": body.act.kind, "task": number}, 202)

@@ -30,7 +30,8 @@ def labels_router(desk: LabelDesk) -> APIRouter:
     @router.get("/classes")
     def classes() -> ClassListJson:
         """List the classes and attributes of the project."""
-        known = desk.classes
+        with refusing():
+            known = desk.classes
         return ClassListJson(
             classes=[
                 ClassJson(name=each.name, of=each.of, size=each.size, exports=dict(each.exports))

@@ -1,13 +1,22 @@
-"""/api/labels/queue: the recordings to label, by whom, and how far each is."""
+"""/api/labels/queue, projects and control: the recordings to label, by whom, how far each is, and how well."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 
+from app.core.client_role import account_of
+from app.labels.permissions import check_work
 from app.labels.service.desk import LabelDesk
-from app.web.routes.labels.work_shapes import EffortJson, WorkChange, WorkJson
+from app.web.routes.labels.work_shapes import (
+    ControlResultJson,
+    EffortJson,
+    PersonEffortJson,
+    ProjectProgressJson,
+    WorkChange,
+    WorkJson,
+)
 from app.web.routes.refusals import refusing
 
 if TYPE_CHECKING:
@@ -25,14 +34,42 @@ def label_work_router(desk: LabelDesk) -> APIRouter:
             return _queue(desk.kept.opened())
 
     @router.post("/queue", responses={404: {"description": "No such recording"}})
-    def change(body: WorkChange) -> list[WorkJson]:
-        """Assign a recording, or set its state; answers with the queue. 409 where its labeler would mark it as done."""
+    def change(body: WorkChange, request: Request) -> list[WorkJson]:
+        """Assign a recording, or set its state; answers with the queue. 403 where the account's role does not include
+        it; 409 where its labeler would mark it as done."""
         from app.labels.store.work import put  # with the database's library
 
         with refusing():
             database = desk.kept.opened()
-            put(database, body.drive, body.person, person=body.assign, state=body.state)
+
+            def allowed(assigned: str) -> None:
+                check_work(account_of(request), assigned, body.assign, body.state)
+
+            put(database, body.drive, body.person, person=body.assign, state=body.state, allowed=allowed)
             return _queue(database)
+
+    @router.get("/projects")
+    def projects() -> list[ProjectProgressJson]:
+        """List the projects with their progress, and each person's changes and active time."""
+        from app.labels.projects.progress import progress
+
+        with refusing():
+            found = progress(desk.kept.opened())
+        return [
+            ProjectProgressJson(
+                **(vars(each) | {"people": [PersonEffortJson(**vars(person)) for person in each.people]})
+            )
+            for each in found
+        ]
+
+    @router.get("/control")
+    def control() -> list[ControlResultJson]:
+        """Compare each person's labels in the control frames with their truth. Accounts need the role reviewer."""
+        from app.labels.projects.control import control_results
+
+        with refusing():
+            found = control_results(desk.kept.opened(), desk.default_classes)
+        return [ControlResultJson(**vars(each)) for each in found]
 
     return router
 

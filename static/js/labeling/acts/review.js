@@ -10,7 +10,7 @@ import { ahead, refOf, say } from "./commands.js";
 import { ask } from "../panels/dialogs.js";
 import { chosen, leadAt, leadName, nameOf, shown } from "../state/labels.js";
 import { setItem, setReview } from "../state/mode.js";
-import { knownName } from "../state/person.js";
+import { knownName, mayReview } from "../state/person.js";
 
 /**
  * The label under review, its display name, and the comment if it was sent back before.
@@ -20,6 +20,7 @@ import { knownName } from "../state/person.js";
 export const isReviewing = () => get("labeling")?.on === true && get("labeling")?.review === true;
 
 export function toggleReview() {
+  if (!mayReview()) return say("Only for accounts with the role reviewer");
   setReview(!isReviewing());
   if (isReviewing()) begin();
 }

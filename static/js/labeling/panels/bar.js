@@ -12,7 +12,7 @@ import { labelKeys } from "../keys.js";
 import { withOwn } from "../../keys/own_keys.js";
 import { setTool, toggleFollows } from "../state/mode.js";
 import { newLabel, setNewLabel } from "../state/new_class.js";
-import { askName, knownName } from "../state/person.js";
+import { askName, hasAccount, shownName } from "../state/person.js";
 import * as offer from "./offer.js";
 import * as review from "../acts/review.js";
 import * as span from "../state/marked_frames.js";
@@ -126,7 +126,7 @@ export function setUp() {
     kind.blur();
   });
   name.addEventListener("click", async () => {
-    await askName();
+    if (!hasAccount()) await askName();
     reflect();
   });
   const next = (/** @type {string} */ words, /** @type {string} */ title, /** @type {commands.Wanted} */ what) =>
@@ -233,7 +233,7 @@ function reflect() {
   reviewed.hidden = !review.isReviewing();
   text(under, review.target()?.name ?? "nothing");
   press(fresh, get("labeling")?.tool === "new");
-  text(name, knownName() || "your name");
+  text(name, shownName() || "your name");
 }
 
 /** @param {import("../state/types.js").LeadRange} range */

@@ -17,17 +17,19 @@ export const firstClass = () => classNames()[0] ?? FIRST;
 /** Length, width, height; null where there is none. @param {string} label @returns {[number, number, number]|null} */
 export const usualSize = (label) => get("classes")?.classes.find(({ name }) => name === label)?.size ?? null;
 
-/** Asked for once, when somebody first labels. */
+/** Asked for when somebody first labels a recording, because its project may have classes of its own. */
 export function setUp() {
-  let isAsked = false;
+  /** @type {string|null} */
+  let askedFor = null;
   const ask = async () => {
-    if (isAsked || !get("labeling")?.on) return;
-    isAsked = true;
+    const drive = get("labels")?.drive ?? "";
+    if (askedFor === drive || !get("labeling")?.on) return;
+    askedFor = drive;
     const found = await request("api/labels/classes").catch(() => null);
-    isAsked = found !== null;
     if (found) set("classes", found);
+    else if (askedFor === drive) askedFor = null;
   };
-  on(["labeling"], ask);
+  on(["labeling", "labels"], ask);
   ask();
 }
 

@@ -2,12 +2,13 @@
 import { request } from "../../core/api.js";
 import { el } from "../../core/dom.js";
 import { get } from "../../core/store.js";
-import { personName } from "../state/person.js";
+import { knownName, mayAssign, mayReview, personName } from "../state/person.js";
+import * as projects from "./project_list.js";
 
 /**
  * An entry of `/api/labels/queue`.
  * @typedef {{key: string, title: string, uri: string, frames: number, person: string, state: string, labelled: number,
- *   reviewed: number, proposals: number, asked: number, worth: number,
+ *   reviewed: number, proposals: number, asked: number, worth: number, project: string,
  *   efforts: {person: string, acts: number, active_s: number}[]}} Work
  */
 
@@ -18,13 +19,25 @@ const problem = el("p", { class: "params-error", aria: { role: "alert" } });
 
 /** @param {HTMLElement} parent */
 export function setUp(parent) {
-  parent.append(el("h3", { textContent: "Recordings to label" }), problem, list);
+  parent.append(el("h3", { textContent: "Recordings to label" }), problem);
+  projects.setUp(parent, () => show(queue));
+  parent.append(list);
 }
 
-export const look = () => attempt(async () => show(await request("api/labels/queue")));
+/** As the server sent it last. @type {Work[]} */
+let queue = [];
 
-/** @param {Work[]} queue */
-const show = (queue) => list.replaceChildren(...queue.map(row));
+export const look = () =>
+  attempt(async () => {
+    await projects.look();
+    show(await request("api/labels/queue"));
+  });
+
+/** @param {Work[]} found */
+function show(found) {
+  queue = found;
+  list.replaceChildren(...queue.filter(({ project }) => projects.isShown(project)).map(row));
+}
 
 /** @param {Work} work */
 function row(work) {
@@ -41,13 +54,16 @@ function row(work) {
   const state = el(
     "select",
     { aria: { label: `State of ${work.title}` }, onchange: () => change(work, { state: state.value }) },
-    ...STATES.map((each) => el("option", { value: each, textContent: each })),
+    ...STATES.map((each) =>
+      el("option", { value: each, textContent: each, disabled: each === "done" && !mayReview() }),
+    ),
   );
   state.value = work.state;
   const take = el("button", {
     type: "button",
     textContent: work.person || "assign to me",
     title: work.person ? "Unassign" : "Label this recording",
+    disabled: work.person !== "" && work.person !== knownName() && !mayAssign(),
     onclick: async () => change(work, { assign: work.person ? "" : await personName() }),
   });
   return el(

@@ -1,0 +1,43 @@
+"""What accounts may do with labels, where it depends on the request's content. ``app.web.access`` has the rules by
+address.
+
+A labeler labels, and takes recordings from the queue. A reviewer also approves labels and sends them back, marks
+recordings as done, imports labels, freezes versions, and sees the results of control frames. An admin also assigns
+recordings to others. A client without an account may do everything, under any name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from app.core.client_role import Account, AccountRole, includes
+from app.labels.errors import NotAllowed
+from app.labels.work_states import State
+
+ACT_ROLES: Mapping[str, AccountRole] = {"review_ok": "reviewer", "send_back": "reviewer", "import": "reviewer"}
+"""The role that an act needs; without an entry, every account may do it. Import: a labeler would import the truth of
+control frames."""
+
+
+def check_name(account: Account | None, person: str) -> None:
+    """Nobody acts under the name of somebody else. NotAllowed if an account does."""
+    if account is not None and person not in ("", account.name):
+        raise NotAllowed(f"you are signed in as {account.name}, not as {person}")
+
+
+def check_act(account: Account | None, kind: str) -> None:
+    """NotAllowed if the account's role does not include the act."""
+    needed = ACT_ROLES.get(kind)
+    if needed is not None and not includes(account, needed):
+        raise NotAllowed(f"only for accounts with the role {needed}")
+
+
+def check_work(account: Account | None, assigned: str, person: str | None, state: State | None) -> None:
+    """NotAllowed if the account may not change a recording of the queue so. assigned: its present assignee; person: the
+    new one, empty for nobody; None to leave it."""
+    if state == "done" and not includes(account, "reviewer"):
+        raise NotAllowed("only for accounts with the role reviewer")
+    if person is None or account is None or includes(account, "admin"):
+        return
+    if person not in ("", account.name) or assigned not in ("", account.name):
+        raise NotAllowed("only for accounts with the role admin")

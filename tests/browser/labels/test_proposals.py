@@ -1,0 +1,71 @@
+"""What is only proposed is not labelled yet, and the 3D view is told of every label, drawn by hand or not."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.conftest import START, OpenPage, Site
+from tests.browser.labels.hands import Hand, Labels, begin, draw, is_at
+from tests.browser.looks import COUNT
+
+NO_VISER = ("status of 502",)
+"""The server of these tests has no 3D view of its own."""
+HEAR = """() => {
+  window.said = [];
+  const { send } = WebSocket.prototype;
+  WebSocket.prototype.send = function (message) {
+    window.said.push(message);
+    return send.call(this, message);
+  };
+}"""
+"""Keeps what the page tells the server from now on."""
+pytestmark = pytest.mark.usefixtures("paused_in_traffic")
+
+
+def test_the_next_unlabelled_frame_is_one_whose_lead_is_only_proposed(hand: Hand, labels: Labels):
+    """Sent back, a label is a proposal again."""
+    page = hand.page
+    labels.act("Bob", {"kind": "set_lead", "first": 0, "last": COUNT - 1, "lead": "none"})
+    hand.keys("n")
+    expect(page.locator(".said")).to_have_text("No unlabelled after this frame")
+    (lead,) = labels.everything["leads"]
+    ref = {"kind": "lead", "id": lead["id"], "revision": lead["revision"]}
+    labels.act("Bob", {"kind": "send_back", "items": [ref], "comment": "look again"})
+    hand.keys("n")
+    is_at(page, START + 1)
+    expect(page.locator(".said")).to_contain_text("lead only proposed")
+
+
+def test_the_3d_view_is_told_of_labels_with_class_number_and_state_and_of_the_selected_one(
+    open_page: OpenPage, site: Site
+):
+    page = open_page(expects=NO_VISER)
+    page.evaluate(HEAR)
+    labels, hand = Labels(page, site.address), begin(page)
+    labels.clear(COUNT)
+    page.get_by_role("button", name="Here", exact=True).click()
+    page.evaluate("async (index) => (await import('/js/drive/seek.js')).seekTo(index)", START)
+    is_at(page, START)
+    made = draw(hand, labels)
+    page.get_by_role("tab", name="3D").click()
+
+    def told() -> dict[str, Any]:
+        """The newest of each word."""
+        return {word: value for each in page.evaluate("window.said") for word, value in json.loads(each).items()}
+
+    def drawn(_: Labels) -> bool:
+        shown = (told().get("labels_3d") or {}).get("labels", [])
+        return [each["text"] for each in shown] == [f"#{made} car, corrected"]
+
+    labels.wait_for(drawn)
+    assert told()["labels_3d"]["alone"], "the pipeline's objects are hidden"
+    assert told()["held"]["track"] == made, "the camera goes to it"
+    assert told()["held"]["frame"] == START
+    hand.keys("Escape")
+    labels.wait_for(lambda _: told()["held"] is None)
+    page.get_by_role("tab", name="Plan").click()
+    labels.wait_for(lambda _: told()["labels_3d"] is None)
