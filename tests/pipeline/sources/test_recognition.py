@@ -214,7 +214,7 @@ OTHERS: dict[str, tuple[Write, str]] = {
         lambda folder: copies(write_astyx)(folder / "a" / "b").parent,
         r"it holds recordings; open one of them, for example .*/a/b/one$",
     ),
-    "a link to itself": (link_to_itself, "a link that leads nowhere|cannot be read"),
+    "a link to itself": (link_to_itself, "a broken link|cannot be read"),
     "a folder in itself": (folder_in_itself, "it holds folders again"),
     "a pipe": (pipe, "not a file or folder"),
     "a video's first bytes": (some_file("a", b"\0\0\0\x20ftypisom"), "a: not a readable video: cut off, or something"),
