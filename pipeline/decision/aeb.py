@@ -8,6 +8,7 @@ lasts until the danger is over. Terms as in UN Regulation 152 and Euro NCAP's AE
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Literal, NamedTuple
@@ -23,6 +24,9 @@ from pipeline.types import AccCommand, Braking, EgoState, FusedObject, Situation
 Stage = Literal["warn", "partial_brake", "full_brake"]
 STAGES: tuple[Stage, ...] = ("warn", "partial_brake", "full_brake")
 _NONE, _WARN, _PARTIAL, _FULL = range(4)
+_SAME_PLACE_M = 2.0
+"""Another object up to this much farther than the one braked for may be the same vehicle under a new id: half a car's
+length, as when the nearest return is that of its mirror and then that of its rear."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,10 @@ class AebState:
     """Why the stage is active, in words."""
     object_id: int | None = None
     """The object that activated it."""
+    distance_m: float = 0.0
+    """How far ahead that object is, or would be if it had gone on as when it was last a threat."""
+    closing_mps: float = 0.0
+    """Its closing speed then."""
 
 
 class Threat(NamedTuple):
@@ -46,6 +54,10 @@ class Threat(NamedTuple):
 
     id: int
     """Of the object."""
+    distance_m: float
+    sigma_m: float
+    """Standard deviation of the distance."""
+    closing_mps: float
     ttc_s: float
     """Time to collision."""
     required_mps2: float
@@ -69,7 +81,9 @@ def guard(
     # The threat that requires the hardest braking determines the stage, which is held until the danger has passed
     threats = find_threats(situation, params)
     worst = max(threats, key=lambda threat: (_level(threat, params), threat.required_mps2), default=None)
-    state = _next(state, worst, ego, situation.now.dt_s or 0.0, params)
+    state = _next(
+        _tracked(state, threats, situation.now.dt_s or 0.0), threats, worst, ego, situation.now.dt_s or 0.0, params
+    )
     return state, _stronger(command, state, params, pedals)
 
 
@@ -87,7 +101,10 @@ def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
             is_dependable(item) and enters_corridor(item, situation.path, situation.lead)
         ):
             required = required_decel_mps2(item.distance_m, closing, params)
-            found.append(Threat(item.id, item.ttc_s, required, _justified(item, required)))
+            sigma_m = item.distance_sigma_m or 0.0
+            found.append(
+                Threat(item.id, item.distance_m, sigma_m, closing, item.ttc_s, required, _justified(item, required))
+            )
     return tuple(found)
 
 
@@ -108,7 +125,29 @@ def _level(threat: Threat, params: AebParams) -> int:
     return _WARN if threat.ttc_s < params.warn_ttc_s else _NONE
 
 
-def _next(state: AebState, worst: Threat | None, ego: EgoState, dt_s: float, params: AebParams) -> AebState:
+def _tracked(state: AebState, threats: Sequence[Threat], dt_s: float) -> AebState:
+    """The state with the object braked for where it is now."""
+    cause = next((threat for threat in threats if threat.id == state.object_id), None)
+    if cause is not None:
+        return evolve(state, distance_m=cause.distance_m, closing_mps=cause.closing_mps)
+    return evolve(state, distance_m=max(state.distance_m - state.closing_mps * dt_s, 0.0))
+
+
+def _is_pressing(threat: Threat, state: AebState, params: AebParams) -> bool:
+    """Whether this is still the danger that is braked for: its object, or one at its place or nearer. A vehicle clearly
+    beyond must ask for a stage itself: if what was braked for turns out to be no danger, the brakes are released."""
+    same = threat.id == state.object_id or threat.distance_m - threat.sigma_m <= state.distance_m + _SAME_PLACE_M
+    return same and threat.ttc_s < params.release_ttc_s
+
+
+def _next(
+    state: AebState,
+    threats: Sequence[Threat],
+    worst: Threat | None,
+    ego: EgoState,
+    dt_s: float,
+    params: AebParams,
+) -> AebState:
     """The stage that is active now: one requested in enough consecutive frames, or a braking stage that has not
     ended."""
     fast = ego.speed_mps * 3.6 >= params.min_speed_kmh
@@ -116,7 +155,7 @@ def _next(state: AebState, worst: Threat | None, ego: EgoState, dt_s: float, par
     streak = tuple(count + 1 if asked > level else 0 for level, count in enumerate(state.streak))
     confirmed = sum(count >= params.confirm_frames for count in streak)
     moving = ego.speed_mps > STANDSTILL_MPS
-    pressing = moving and worst is not None and worst.ttc_s < params.release_ttc_s
+    pressing = moving and (confirmed >= _PARTIAL or any(_is_pressing(threat, state, params) for threat in threats))
     calm_s = 0.0 if pressing else state.calm_s + dt_s
     over = calm_s >= (params.release_s if moving else params.standstill_s)
     held = state.level if state.level >= _PARTIAL and not over else _NONE
@@ -124,8 +163,8 @@ def _next(state: AebState, worst: Threat | None, ego: EgoState, dt_s: float, par
     if not level:
         return AebState(level, streak, calm_s)
     if worst is not None and confirmed >= held:
-        return AebState(level, streak, calm_s, _cause(worst), worst.id)
-    return AebState(level, streak, calm_s, state.cause, state.object_id)
+        return AebState(level, streak, calm_s, _cause(worst), worst.id, worst.distance_m, worst.closing_mps)
+    return evolve(state, level=level, streak=streak, calm_s=calm_s)
 
 
 def _cause(threat: Threat) -> str:

@@ -5,6 +5,10 @@ of a single car can be as far apart. The tracks, which were followed while the v
 are two vehicles if they move apart, because the parts of a rigid body share its velocity, or if together they are wider
 than any vehicle and leave a gap that no surface has.
 
+One track is enough if its vehicle is narrower than the cluster: a rigid body does not widen, so returns beside the
+lateral extent that it had over the last second belong to something that no track follows yet, as when the next parked
+car comes into view beside a bus. Here too, the two must leave a gap, or else a side of the vehicle came into view.
+
 Returns within an expected footprint are its seeds. Every other return of the cluster joins the seeds that it is linked
 with by the shortest steps (a minimum spanning forest, like a watershed): a side that comes into view joins its rear,
 which it is connected to by returns centimetres apart, whatever is beside it.
@@ -20,6 +24,7 @@ import numpy as np
 from pipeline.common import kalman
 from pipeline.lidar import divide_kernels as kernels
 from pipeline.lidar.cluster import WIDEST_M
+from pipeline.lidar.track_history import steady_sides
 from pipeline.params import ClusterParams
 from pipeline.types import F32, F64, I32, I64, LidarTrack, Mask
 
@@ -57,33 +62,38 @@ def divide(
     labels: I32,
     tracks: Sequence[LidarTrack],
     filters: kalman.CvState,
+    history: F64,
     dt_s: float | None,
     params: ClusterParams,
 ) -> I32:
     """(N,) int32 labels as returned by ``cluster``, with a separate label for each vehicle that shared a cluster.
 
-    points: (N, 4) float32 ``x y z intensity``, ego frame. labels: (N,) int32. tracks, filters: tracks of the previous
-    sweep and their constant-velocity filters, in the same order. dt_s: time since then; None at a start. A part of a
-    divided cluster is merged into the cluster that contains most of its track, so that a flank is not cut off from its
-    rear.
+    points: (N, 4) float32 ``x y z intensity``, ego frame. labels: (N,) int32. tracks, filters, history: tracks of the
+    previous sweep, their constant-velocity filters and their sightings (T, H, 5), in the same order. dt_s: time since
+    then; None at a start. A part of a divided cluster is merged into the cluster that contains most of its track, so
+    that a flank is not cut off from its rear.
     """
     count = int(labels.max(initial=-1)) + 1
     known = [n for n, each in enumerate(tracks) if each.hits >= MIN_HITS and each.velocity_mps is not None]
-    if not params.divide_tracked or dt_s is None or len(known) < 2 or count == 0:
+    if not params.divide_tracked or dt_s is None or not known or count == 0:
         return labels
     expected = _expect([tracks[n] for n in known], filters.cov[known], dt_s)
-    # only clusters near two or more tracks, and the other clusters near these tracks
-    reached = kernels.reach_clusters(points, labels, expected.footprints, count)
-    involved = np.any(reached[:, reached.sum(axis=0) >= 2], axis=1, keepdims=True)
+    sides = steady_sides(history[known], np.nanmax(history[:, :, 0]) + dt_s)
+    # only clusters near two or more tracks, or wider than the one they are near, and what else is near these tracks
+    reached, width_m = kernels.reach_clusters(points, labels, expected.footprints, count)
+    widened = (width_m > WIDEST_M) & np.any(reached & (np.diff(sides) < WIDEST_M), axis=0)
+    involved = np.any(reached[:, (reached.sum(axis=0) >= 2) | widened], axis=1, keepdims=True)
     if not np.any(involved):
         return labels
-    owner = kernels.find_owners(points, labels, expected.footprints, reached & involved)
+    owner = kernels.find_owners(points, labels, expected.footprints, sides, reached & involved)
     seeds = kernels.count_seeds(labels, owner, len(known), count)
+    outside = np.bincount(labels[(labels >= 0) & (owner == kernels.OUTSIDE)], minlength=count) >= _LEAST_SEEDS
+    sharing = (seeds >= _LEAST_SEEDS).sum(axis=0)
     pieces, parts = labels.copy(), []
-    for which in np.flatnonzero((seeds >= _LEAST_SEEDS).sum(axis=0) >= 2).tolist():
+    for which in np.flatnonzero((sharing >= 2) | ((sharing == 1) & widened & outside)).tolist():
         present = np.flatnonzero(seeds[:, which] >= _LEAST_SEEDS)
         members = np.flatnonzero(labels == which)
-        part = _parts(points[members], owner[members], present, expected, params)
+        part = _parts(points[members], owner[members], present, bool(widened[which]), expected, params)
         if part is not None:
             numbers = np.concatenate([[which], pieces.max() + np.arange(1, part.max() + 1)]).astype(np.int32)
             pieces[members] = numbers[part]
@@ -102,7 +112,8 @@ def _homed(pieces: I32, parts: list[list[int]], owner: I32, tracks: int, min_poi
     for numbers in parts:
         largest = max(numbers, key=lambda number: int(sizes[number]))
         for number in numbers:
-            home = int(seeds[int(seeds[:, number].argmax())].argmax())
+            track = int(seeds[:, number].argmax())
+            home = int(seeds[track].argmax()) if seeds[track, number] > 0 else number
             if home != number and goes_to[home] == home and home not in numbers:
                 goes_to[number] = home
             elif sizes[number] < min_points:
@@ -117,7 +128,11 @@ def warm_up(points: F32, labels: I32, tracks: Sequence[LidarTrack]) -> None:
     """Compile the kernels before the first frame."""
     expected = _expect(tracks, np.zeros((len(tracks), 4, 4)), 0.0)
     owner = kernels.find_owners(
-        points, labels, expected.footprints, kernels.reach_clusters(points, labels, expected.footprints, 1)
+        points,
+        labels,
+        expected.footprints,
+        np.zeros((len(tracks), 2)),
+        kernels.reach_clusters(points, labels, expected.footprints, 1)[0],
     )
     kernels.count_seeds(labels, owner, len(tracks), 1)
     joined = kernels.join(points[:2], np.arange(2, dtype=np.int32), 1.0)
@@ -134,27 +149,34 @@ def _expect(tracks: Sequence[LidarTrack], cov: F64, dt_s: float) -> _Expected:
     return _Expected(np.column_stack([footprints, np.cos(yaw), np.sin(yaw)]), velocity, cov[:, 2, 2] + cov[:, 3, 3])
 
 
-def _parts(points: F32, owner: I32, present: I64, expected: _Expected, params: ClusterParams) -> I32 | None:
+def _parts(
+    points: F32, owner: I32, present: I64, widened: bool, expected: _Expected, params: ClusterParams
+) -> I32 | None:
     """(M,) int32 the part of each point of a cluster, 0 first; None if it stays whole.
 
-    owner: (M,) the track of each point that is a seed, else −1. present: tracks with enough seeds.
+    owner: (M,) the track of each point that is a seed, else negative. present: tracks with enough seeds. widened: the
+    cluster is wider than any vehicle, so what is beside its tracks may be something else that no track follows yet.
     """
-    apart = _move_apart(expected.velocity[present], expected.variance[present])
-    wide = _are_wide(expected.footprints[present])
+    groups = len(present) + 1  # the last for what is beside the tracks
+    apart, wide = np.zeros((groups, groups), dtype=np.bool_), np.full((groups, groups), widened)
+    apart[:-1, :-1] = _move_apart(expected.velocity[present], expected.variance[present])
+    wide[:-1, :-1] = _are_wide(expected.footprints[present])
     if not np.any(apart | wide):
         return None
     first, cell = _thinned(points, params.z_weight)
     if len(first) > _MOST_CELLS:
         return None
-    number = np.full(len(expected.velocity) + 1, -1, dtype=np.int32)  # the last entry is for points that are no seeds
+    number = np.full(len(expected.velocity) + 2, -1, dtype=np.int32)  # the last two are for points that are no seeds
     number[present] = np.arange(len(present), dtype=np.int32)
+    number[kernels.OUTSIDE] = len(present) if widened else -1
     seeds = np.full(len(first), -1, dtype=np.int32)
     np.maximum.at(seeds, cell, number[owner])
     part = kernels.join(points[first], seeds, params.z_weight)
-    gaps = kernels.measure_gaps(points[first], part, len(present), params.z_weight)
+    gaps = kernels.measure_gaps(points[first], part, groups, params.z_weight)
     # pairs that neither condition separates are treated as without tracks
     together = np.where(wide, _GAP_M, params.tolerance_m)
-    part = _grouped(((gaps <= together) & ~apart) | np.eye(len(present), dtype=np.bool_))[part][cell]
+    part = _grouped(((gaps <= together) & ~apart) | np.eye(groups, dtype=np.bool_))[part][cell]
+    part = np.unique(part, return_inverse=True)[1].astype(np.int32)
     return part if part.max() > 0 else None
 
 

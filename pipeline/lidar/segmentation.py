@@ -68,7 +68,9 @@ def segment(
     candidates = cluster.candidates(sweep.points, plane, keep, params.cluster)
     labels = cluster.cluster(sweep.points, candidates, params.cluster)
     if before is not None:  # split clusters of tracks that move apart
-        labels = divide_tracked.divide(sweep.points, labels, before.tracks, before.filters, dt_s, params.cluster)
+        labels = divide_tracked.divide(
+            sweep.points, labels, before.tracks, before.filters, before.history, dt_s, params.cluster
+        )
     clock.lap("cluster")
 
     # An upright box around each cluster

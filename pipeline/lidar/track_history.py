@@ -47,10 +47,20 @@ def rigid_sideways(history: F64) -> F64:
     return np.asarray(_rigid_sideways(np.ascontiguousarray(history)))
 
 
+def steady_sides(history: F64, now_s: float) -> F64:
+    """(T, 2) the lateral extent of each track now, right and left, ego y in metres: the median of the sightings in its
+    (T, H, 5) history, each moved by the speed common to both sides.
+
+    A rigid body does not widen from one sweep to the next; a cluster does, by returns from what stands beside it.
+    """
+    return np.asarray(_steady_sides(np.ascontiguousarray(history), now_s))
+
+
 def warm_up() -> None:
     """Compile the kernels, or load them from numba's cache."""
     slopes(np.zeros((1, 2, 3)))
     rigid_sideways(np.zeros((1, 2, 5)))
+    steady_sides(np.zeros((1, 2, 5)), 0.0)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -85,6 +95,16 @@ def _rigid_sideways(history):  # type: ignore[no-untyped-def]  # pragma: no cove
             sure[c] = abs(speed[c]) - _SURE_SIGMAS * (noise_m / np.sqrt(spread))
         if np.sign(speed[0]) == np.sign(speed[1]):
             out[i] = np.sign(speed[0]) * max(sure.min(), 0.0)
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _steady_sides(history, now_s):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Kernel of ``steady_sides``."""
+    out, speed = np.empty((len(history), 2)), _rigid_sideways(history)
+    for i in range(len(history)):
+        for side in range(2):
+            out[i, side] = np.nanmedian(history[i, :, 3 + side] + speed[i] * (now_s - history[i, :, 0]))
     return out
 
 

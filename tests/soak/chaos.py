@@ -27,6 +27,7 @@ import httpx
 from sqlalchemy import select
 from websockets.sync.client import connect
 
+from app.labels.errors import DatabaseError
 from app.labels.store.database import Database
 from app.labels.store.drive_labels import DriveLabels
 from app.labels.store.tables import DriveRow
@@ -42,8 +43,24 @@ from tests.conftest import ROOT
 from tests.pipeline.recording.frames import PERIOD_NS
 
 _ANSWER_S = 20.0
+_FULL_S = 600.0
+"""A disk is full after a second. A machine whose processors are taken needs minutes to start Python."""
 _JUMPS_S = (-86_400.0, -30.0, 30.0, 86_400.0)
 _FRAMES = 30
+_RECOVERY_S = 60.0
+"""PostgreSQL's own recovery after a process was killed, on a machine whose processors and memory are taken."""
+
+
+def _reached(url: str) -> Database:
+    """The database, once it has recovered."""
+    deadline = time.monotonic() + _RECOVERY_S
+    while True:
+        try:
+            return Database(url)
+        except DatabaseError:
+            if time.monotonic() > deadline:
+                raise
+            threading.Event().wait(0.2)
 
 
 @dataclass
@@ -155,7 +172,7 @@ class LabelledServer:
     def check(self) -> None:
         """Check that every confirmed change is stored, and that every final frame equals the first computation."""
         figures, said = self.figures, dict(self._said)
-        database = Database(self.url)
+        database = _reached(self.url)
         try:
             with database.reading() as connection:
                 key = connection.scalars(select(DriveRow.key)).one()
@@ -213,7 +230,7 @@ def record(folder: Path, chance: random.Random, figures: Figures) -> None:
     command = [sys.executable, "-c", _RECORD, str(path), str(limit)]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         if is_full:
-            told, _ = process.communicate(timeout=120)
+            told, _ = process.communicate(timeout=_FULL_S)
             if "recording stopped" not in told:
                 figures.wrong.append("a full disk is not said")
         else:

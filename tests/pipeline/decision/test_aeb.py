@@ -140,6 +140,22 @@ def test_a_threat_that_vanishes_is_braked_for_a_little_longer() -> None:
     assert decide(state=state, frames=3)[1] == CRUISE
 
 
+@pytest.mark.parametrize(
+    ("farther_m", "state"),
+    [
+        pytest.param(1.5, "full_brake", id="the same vehicle under a new id"),
+        pytest.param(-3.0, "full_brake", id="something nearer"),
+        pytest.param(4.0, "cruise", id="the vehicle beyond, which needs 0.5 m/s²"),
+    ],
+)
+def test_what_holds_the_brakes_once_their_cause_is_gone(farther_m: float, state: str) -> None:
+    aeb, _ = decide(fused(1, 4.0, velocity=(-5.0, 0.0)), speed_mps=5.0)
+    for tick in range(1, 5):
+        other = fused(2, 4.0 + farther_m - 0.2 * tick, velocity=(-2.0, 0.0))
+        aeb, command = decide(other, speed_mps=5.0, frames=1, state=replace(aeb, closing_mps=2.0))
+    assert command.state == state
+
+
 def test_at_standstill_the_brakes_hold() -> None:
     state, _ = decide(fused(1, 10.0, velocity=(-20.0, 0.0)))
     standing = fused(1, 1.5, velocity=(0.0, 0.0))

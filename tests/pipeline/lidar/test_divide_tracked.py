@@ -12,7 +12,7 @@ from pipeline.common.geometry import Cuboid
 from pipeline.lidar.cluster import cluster
 from pipeline.lidar.divide_tracked import MIN_HITS, divide
 from pipeline.params import ClusterParams
-from pipeline.types import F32, I32, LidarTrack, Obstacle
+from pipeline.types import F32, F64, I32, LidarTrack, Obstacle
 
 DT_S = 0.1
 PARAMS = ClusterParams()
@@ -43,10 +43,31 @@ def filters(count: int, speed_sigma: float = 0.2) -> kalman.CvState:
     )
 
 
-def divided(points: F32, tracks: list[LidarTrack], params: ClusterParams = PARAMS) -> tuple[I32, I32]:
+def sightings(tracks: list[LidarTrack]) -> F64:
+    """(T, 10, 5) a second of them: each as it is, moved at its velocity."""
+    history = np.empty((len(tracks), 10, 5))
+    for each, rows in zip(tracks, history, strict=True):
+        ago_s = np.arange(9, -1, -1) * DT_S
+        x, y = each.obstacle.cuboid.center[:2]
+        half = each.obstacle.cuboid.size[1] / 2
+        assert each.velocity_mps is not None
+        vx, vy = each.velocity_mps
+        rows[:] = np.column_stack([-ago_s, x - vx * ago_s, *(y + dy - vy * ago_s for dy in (0.0, -half, half))])
+    return history
+
+
+def divided(
+    points: F32,
+    tracks: list[LidarTrack],
+    params: ClusterParams = PARAMS,
+    dt_s: float | None = DT_S,
+    speed_sigma: float = 0.2,
+    history: F64 | None = None,
+) -> tuple[I32, I32]:
     """Labels before and after."""
     before = cluster(points, np.ones(len(points), dtype=np.bool_), params)
-    return before, divide(points, before, tracks, filters(len(tracks)), DT_S, params)
+    seen = sightings(tracks) if history is None else history
+    return before, divide(points, before, tracks, filters(len(tracks), speed_sigma), seen, dt_s, params)
 
 
 LEAD, PARKED = wall((12.0, -1.0), (12.0, 1.0)), wall((10.0, -3.5), (10.0, -1.6))
@@ -79,6 +100,42 @@ def test_a_flank_that_was_joined_with_the_lead_comes_home():
     assert set(after[: len(LEAD)]) == {after[0]} != {after[-1]}
 
 
+@pytest.mark.parametrize(
+    "tracks",
+    [
+        [track(1, *LEAD_TRACK, DRIVES)],
+        [track(2, *PARKED_TRACK, STANDS)],
+        [track(1, *LEAD_TRACK, DRIVES, hits=MIN_HITS - 1), track(2, *PARKED_TRACK, STANDS)],
+        [track(1, *LEAD_TRACK, DRIVES), track(2, (20.0, -2.55), (1.0, 1.9), STANDS)],
+    ],
+    ids=["the lead alone is known", "the parked car alone is known", "the lead is new", "the other one is elsewhere"],
+)
+def test_what_a_known_vehicle_cannot_have_grown_by_is_something_else(tracks: list[LidarTrack]):
+    before, after = divided(BESIDE, tracks)
+    assert set(before) == {0}, "the clusters touch"
+    assert set(after[: len(LEAD)]) == {0}
+    assert set(after[len(LEAD) :]) == {1}
+
+
+def test_what_no_track_follows_yet_stays_where_it_is():
+    """It belongs to no other cluster, wherever that is."""
+    elsewhere = wall((8.0, 6.0), (8.0, 7.5))
+    tracks = [track(1, (8.0, 6.75), (0.1, 1.5), STANDS), track(2, *LEAD_TRACK, DRIVES)]
+    _, after = divided(np.vstack([elsewhere, BESIDE]), tracks)
+    assert set(after[: len(elsewhere)]) == {0}
+    assert set(after[-len(PARKED) - len(FLANK) :]) == {2}
+
+
+def test_a_moment_in_which_they_were_one_is_forgotten():
+    """In the last two sweeps the lead's cluster had taken the parked car's flank."""
+    tracks = [track(1, (12.0, -0.3), (1.5, 2.6), DRIVES), track(2, *PARKED_TRACK, STANDS)]
+    history = sightings([track(1, *LEAD_TRACK, DRIVES), tracks[1]])
+    history[0, -2:, 3] -= 0.7
+    _, after = divided(BESIDE, tracks, history=history)
+    assert set(after[: len(LEAD)]) == {0}
+    assert set(after[len(LEAD) :]) == {1}
+
+
 SIDE = wall((15.0, -4.0), (15.0, 4.0))
 UNDIVIDED = {
     "one long surface that was followed as two": (
@@ -89,12 +146,13 @@ UNDIVIDED = {
         np.vstack([wall((10.0, -0.9), (10.0, 0.9)), wall((10.6, -0.9), (10.6, 0.9))]),
         [track(1, (10.0, 0.0), (0.1, 1.8), STANDS), track(2, (10.6, 0.0), (0.1, 1.8), STANDS)],
     ),
-    "the lead has just been found": (
-        BESIDE,
-        [track(1, *LEAD_TRACK, DRIVES, hits=MIN_HITS - 1), track(2, *PARKED_TRACK, STANDS)],
+    "none is known for long": (BESIDE, [track(1, *LEAD_TRACK, DRIVES, hits=MIN_HITS - 1)]),
+    "the only one was always as wide": (BESIDE, [track(1, (10.0, -1.25), (3.5, 4.5), STANDS)]),
+    "the side of the only one comes into view": (
+        np.vstack([LEAD, wall((12.0, 1.0), (14.0, 3.0))]),
+        [track(1, *LEAD_TRACK, DRIVES)],
     ),
-    "only one is known": (BESIDE, [track(1, *LEAD_TRACK, DRIVES)]),
-    "one of them is elsewhere": (BESIDE, [track(1, *LEAD_TRACK, DRIVES), track(2, (20.0, -2.55), (1.0, 1.9), STANDS)]),
+    "the only one and its mirror": (np.vstack([LEAD, wall((12.2, 1.5), (12.2, 1.5))]), [track(1, *LEAD_TRACK, DRIVES)]),
 }
 
 
@@ -109,9 +167,7 @@ def test_speeds_known_too_poorly_set_nothing_apart():
     """Two halves of one car, one of which seems to move at 3 m/s, give or take 2."""
     points = np.vstack([wall((10.0, -0.9), (10.0, 0.9)), wall((10.6, -0.9), (10.6, 0.9))])
     tracks = [track(1, (10.0, 0.0), (0.1, 1.8), STANDS), track(2, (10.6, 0.0), (0.1, 1.8), (-4.0, 0.0))]
-    labels = cluster(points, np.ones(len(points), dtype=np.bool_), PARAMS)
-    unsure = divide(points, labels, tracks, filters(2, 2.0), DT_S, PARAMS)
-    sure = divide(points, labels, tracks, filters(2, 0.2), DT_S, PARAMS)
+    unsure, sure = (divided(points, tracks, speed_sigma=sigma)[1] for sigma in (2.0, 0.2))
     assert (set(unsure), set(sure)) == ({0}, {0, 1})
 
 
@@ -121,8 +177,8 @@ def test_speeds_known_too_poorly_set_nothing_apart():
 def test_without_it_or_without_a_sweep_before_nothing_is_divided(changes: dict[str, bool], dt_s: float | None):
     params = PARAMS.model_copy(update=changes)
     tracks = [track(1, *LEAD_TRACK, DRIVES), track(2, *PARKED_TRACK, STANDS)]
-    labels = cluster(BESIDE, np.ones(len(BESIDE), dtype=np.bool_), params)
-    assert divide(BESIDE, labels, tracks, filters(2), dt_s, params) is labels
+    before, after = divided(BESIDE, tracks, params, dt_s)
+    assert after is before
 
 
 @given(
