@@ -1,4 +1,4 @@
-"""What is made from the code is up to date, and what is written by hand says the same as the code."""
+"""Generated pages are up to date, and handwritten ones agree with the code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What in labels can hardly be so."""
+"""Implausible labels."""
 
 from __future__ import annotations
 

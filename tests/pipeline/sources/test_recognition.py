@@ -1,4 +1,4 @@
-"""A path without a scheme: opened by what is in it, or answered with what it looks like and what to do."""
+"""A path without a scheme is opened by its content, or answered with what it seems to be and what to do."""
 
 from __future__ import annotations
 
