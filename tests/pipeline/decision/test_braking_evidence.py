@@ -13,6 +13,8 @@ from tests.pipeline.build import fused
 
 PARAMS = ExistenceParams()
 CAMERA = replace(fused(1, 30.0, source="V"), existence=0.95, in_path_probability=0.95)
+RANGED = replace(CAMERA, camera_ranges=8, height_from="range", velocity_mps=(-24.0, 0.0), camera_speed_sigma_mps=2.5)
+"""The camera has followed it for long, and single LiDAR returns have ranged it."""
 BOTH = replace(fused(1, 30.0), existence=0.95, ranged_hits=5)
 
 
@@ -27,6 +29,12 @@ BOTH = replace(fused(1, 30.0), existence=0.95, ranged_hits=5)
             Braking.COMFORT,
             id="for long, but hardly in the path: an oncoming car before a bend",
         ),
+        pytest.param(RANGED, Braking.FULL, id="the camera for long, and LiDAR ranges"),
+        pytest.param(replace(RANGED, camera_ranges=7), Braking.COMFORT, id="LiDAR ranges, the camera not for long"),
+        pytest.param(replace(RANGED, height_from="road"), Braking.PARTIAL, id="for long, its height never measured"),
+        pytest.param(replace(RANGED, camera_speed_sigma_mps=4.0), Braking.PARTIAL, id="ranged, its speed uncertain"),
+        pytest.param(replace(RANGED, velocity_mps=(-6.0, 0.0)), Braking.PARTIAL, id="ranged, slowly approached"),
+        pytest.param(replace(RANGED, in_path_probability=0.6), Braking.COMFORT, id="ranged, perhaps beside the path"),
         pytest.param(replace(BOTH, ranged_hits=1), Braking.PARTIAL, id="the LiDAR, once"),
         pytest.param(replace(BOTH, ranged_hits=3), Braking.FULL, id="the LiDAR, three times"),
         pytest.param(replace(BOTH, ranged_hits=1, camera_ranges=8), Braking.PARTIAL, id="for long, now measured"),
