@@ -55,9 +55,11 @@ class Threat(NamedTuple):
     id: int
     """Of the object."""
     distance_m: float
+    """How far ahead it is."""
     sigma_m: float
     """Standard deviation of the distance."""
     closing_mps: float
+    """How fast the gap to it shrinks."""
     ttc_s: float
     """Time to collision."""
     required_mps2: float

@@ -44,7 +44,7 @@ def _justified(item: FusedObject, params: ExistenceParams) -> Braking:
     is_steady = item.camera_ranges >= params.camera_ranges
     if item.ranged:
         # a camera track, however long, does not turn one LiDAR sighting into a measured speed
-        return Braking.FULL if item.lidar_hits >= RANGED_SIGHTINGS else Braking.PARTIAL
+        return Braking.FULL if item.ranged_hits >= RANGED_SIGHTINGS else Braking.PARTIAL
     is_in_path = (item.in_path_probability or 0.0) >= params.min_braking
     if not (is_steady and is_in_path):
         return Braking.COMFORT

@@ -141,7 +141,7 @@ def _seen(who: Candidate) -> Answer:
     not become the lead, because its current position is only predicted. An object that the camera sees and the LiDAR
     has just lost still counts as known."""
     item = who.item
-    just_lost = item.ranged and item.seen_by_camera and not item.seen_by_lidar
+    just_lost = item.ranged and item.seen_by_camera and not item.ranged_now
     followed = just_lost and (item.distance_sigma_m or 0.0) < _KNOWN_M
     known = not item.carried and (item.measured or followed)
     return known or who.leads or who.params.carried_may_become_lead, float(known), 0.0 if who.leads else 1.0
