@@ -22,7 +22,7 @@ from pipeline.inference.tuning import USUAL_THREADS, Trial, is_tuned, keep_faste
 from pipeline.lanes.network import LaneNetwork
 from pipeline.vision.detector import Detector
 
-_FIRST_PICTURE_S = 60.0
+_FIRST_IMAGES_S = 60.0
 """Time after the opening in which the user looks at the first images and the drive begins to be computed."""
 _IDLE_S = 5.0
 """For so long the machine must have been idle."""
@@ -34,7 +34,7 @@ class FirstUseTuning:
     delay_s: how long after the opening tuning may begin.
     """
 
-    def __init__(self, delay_s: float = _FIRST_PICTURE_S) -> None:
+    def __init__(self, delay_s: float = _FIRST_IMAGES_S) -> None:
         self._delay_s = delay_s
         self._paths: queue.SimpleQueue[Path] = queue.SimpleQueue()
         self._known: set[Path] = set()

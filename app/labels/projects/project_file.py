@@ -19,15 +19,15 @@ from pipeline.labels.formats.reading import read_bytes
 from pipeline.labels.model import LabelSet
 
 _MOST_DRIVES = 10_000
-Address = Annotated[str, Field(min_length=1, max_length=4096)]
+AddressText = Annotated[str, Field(min_length=1, max_length=4096)]
 
 
 class ControlEntry(Strict):
     """Frames of a recording whose truth is known."""
 
-    drive: Address
+    drive: AddressText
     """One of the project's recordings."""
-    truth: Address
+    truth: AddressText
     """A file of labels in the native format, relative to the project's file."""
     first: int | None = Field(None, ge=1)
     """First frame, counted from 1 as in the page; None for the recording's first."""
@@ -40,9 +40,9 @@ class ProjectEntries(Strict):
 
     name: Annotated[Person, Field(pattern="^[^:]*$")]
     """The project; without a colon, which ends it where the queue shows who asked for a frame."""
-    drives: Annotated[list[Address], Field(min_length=1, max_length=_MOST_DRIVES)]
+    drives: Annotated[list[AddressText], Field(min_length=1, max_length=_MOST_DRIVES)]
     """Its recordings, as they are opened: paths relative to where the command runs, or addresses."""
-    classes: Address | None = None
+    classes: AddressText | None = None
     """A class list, relative to this file; None for the server's list."""
     sampling: Sampling | None = None
     """Which frames enter the queue; None for those that people and `cipv mine` ask for."""
