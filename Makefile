@@ -9,20 +9,27 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: install demo test check check-types check-layers check-style fix bench docs screenshots suite soak fuzz sbom lock clean
 
+# On a terminal, uv shows its own progress bar; in CI and into a file, it only reports errors.
+QUIET := $(shell test -t 2 && test -z "$$CI" || echo --quiet)
+
 install: .venv/.compiled
 
 # The lock pins every version; --no-deps-like strictness comes from installing it first and the project without deps.
 .venv/.installed: pyproject.toml requirements.lock
+	@echo "1/4 environment in .venv, and uv, which installs the rest"
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "uv>=0.5"
-	@$(BIN)/uv pip install --quiet --python $(BIN)/python -r requirements.lock
+	@echo "2/4 $$(grep -c == requirements.lock) libraries at the versions of requirements.lock"
+	@$(BIN)/uv pip install $(QUIET) --python $(BIN)/python -r requirements.lock
+	@echo "3/4 CIPV Studio itself, from this folder"
 	@$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps -e .
 	@touch $@
 
 .venv/.compiled: .venv/.installed
-	@echo "compiling what a first start would wait for, once"
+	@echo "4/4 compiling what a first start would wait for, once"
 	@$(BIN)/python -m app.commands.support.first_start
 	@touch $@
+	@echo "installed: make demo shows it"
 
 demo: install
 	@$(BIN)/cipv demo

@@ -22,7 +22,7 @@ from pipeline.fusion import agreement, existence, ground_contact, returns
 from pipeline.fusion import fuse as fusion
 from pipeline.fusion.drift import follow as drift
 from pipeline.lanes import road_lines as lanes
-from pipeline.lidar import road_profile, segmentation
+from pipeline.lidar import segmentation
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.params import Params
 from pipeline.path import corridor, road_edges, traffic, yaw_rate
@@ -104,7 +104,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     # Camera: the detector's boxes, each with a distance from its height, tracked from image to image
     boxes = _measure_boxes(frame, aligned, params)
     boxes = returns.range_boxes(boxes, sweep, aligned, params.fusion)
-    road = road_profile.road_ahead(sweep.points, sweep.ground, now.speed_mps) if boxes else None
+    road = ground_contact.road_ahead(sweep.points, sweep.ground, boxes, aligned, now.speed_mps)
     boxes = ground_contact.measure_contacts(boxes, road, aligned, params.fusion)
     clock.lap("distance")
     vision_state, vision_tracks = vision_tracking.track(

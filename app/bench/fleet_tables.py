@@ -15,7 +15,7 @@ ROUNDS = 5
 QUESTIONS = {
     "cut-ins under 1.5 s, sensors disagreeing": ("events", "cut_in AND min_ttc_s < 1.5 AND disagreement"),
     "events at night in a bend": ("events", "night AND bend AND severity = 'warning'"),
-    "frames with hard braking close behind": ("frames", "accel_mps2 < -5 AND distance_m < 10"),
+    "frames with hard braking close behind a lead": ("frames", "accel_mps2 < -5 AND distance_m < 10"),
     "objects in the path, sensors disagreeing": ("objects", "in_path AND vl_gap_sigmas > 3.5 AND distance_m < 20"),
     "drives with a lead in most frames": ("drives", "frames_with_lead > 0.9 * frames"),
 }

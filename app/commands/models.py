@@ -15,7 +15,7 @@ from pipeline.common.errors import BadInput
 from pipeline.inference.model_registry import ModelEntry, known_model, list_models, own_file, pull, register, store
 from pipeline.inference.model_registry import find as find_model
 from pipeline.inference.runtime import ways_of
-from pipeline.inference.tuning import fastest, keep, tune
+from pipeline.inference.tuning import USUAL_THREADS, keep_fastest, tune
 from pipeline.lanes.network import open_lane_network
 from pipeline.types import REAL_VEHICLES
 from pipeline.vision.detector import open_detector
@@ -91,28 +91,30 @@ class RegisterModel:
 class TuneModel:
     """Find the fastest way to run a network on this machine, and use it from then on.
 
-    Tries the installed providers, numbers of threads, graph optimisation levels and the memory arena. A setting whose
-    outputs differ is not used. Run it on an idle machine.
+    Tries numbers of threads and the memory arena. A setting whose outputs differ in any bit is not used. Run it on an
+    idle machine. The dashboard does the same by itself for a network that it uses for the first time.
 
     Example: cipv models tune twinlitenet
     """
 
     spec: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
     """Name or ONNX file"""
-    threads: int = 2
+    threads: int = USUAL_THREADS
     """Threads of the untuned network that others are compared with"""
+    rounding: bool = False
+    """Also try other providers and graph optimisation levels, whose outputs differ by rounding: results then differ
+    from those of an untuned network in their last digits"""
 
     def __call__(self) -> int:
         path = find_model(self.spec)
         if path is None:
             raise BadInput(f"no network {self.spec!r} is installed; see `cipv models list`")
         trials = []
-        for trial in tune(ways_of(path), self.threads):
+        for trial in tune(ways_of(path), self.threads, self.rounding):
             trials.append(trial)
             took = f"{trial.best_ms:8.1f} ms" if trial.best_ms is not None else f"not used: {trial.refused}"
             print(f"{took}  {trial.way}")
-        usual, best = trials[0], fastest(trials)
-        keep(path, best.way)
+        usual, best = trials[0], keep_fastest(path, trials)
         if best is usual or usual.best_ms is None or best.best_ms is None:
             print(f"{path.stem}: nothing is faster than the default")
         else:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from app.commands.support.arguments import option
+from app.commands.support.first_use_tuning import FirstUseTuning
 from app.commands.support.open_with_progress import opened
 from app.commands.support.options import PipelineOptions, SourceName, planned
 from app.core.detection_cache import DetectionCache
@@ -29,9 +30,11 @@ from app.web.serve import serve
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress
 from pipeline.detection import detector_for, lanes_for
+from pipeline.lanes.open_detector import LaneDetector
 from pipeline.sources import open_any
 from pipeline.sources.along_route import along_route
 from pipeline.types.source import AnySource
+from pipeline.vision.detector import Detector
 
 if TYPE_CHECKING:
     from app.fleet.desk import FleetDesk
@@ -140,10 +143,12 @@ class Serve:
     """Planned route, on which GNSS locates the car: CSV, GPX, an NMEA log or an earlier session"""
 
     def __call__(self) -> int:
-        return self.server.serve(self.engine())
+        with FirstUseTuning() as tuning:
+            return self.server.serve(self.engine(tuning.used))
 
-    def engine(self) -> Engine:
-        """The engine for the source, not started yet. BadInput if the source cannot be opened."""
+    def engine(self, on_network: Callable[[object], object] = lambda _: None) -> Engine:
+        """The engine for the source, not started yet. BadInput if the source cannot be opened. on_network: called with
+        every detector that it opens."""
         params = self.pipeline.parameters()
         route = planned(self.route)
         # opened here, so that a typo is reported in the terminal; a large recording is not opened twice
@@ -155,16 +160,26 @@ class Serve:
                 source = open_any(uri, rings=self.rings, progress=progress)
             return along_route(source, route)
 
+        def open_boxes(source: AnySource) -> Detector:
+            detector = detector_for(source, self.pipeline.detector)
+            on_network(detector)
+            return detector
+
+        def open_lanes(source: AnySource) -> LaneDetector | None:
+            detector = lanes_for(source, self.pipeline.lanes)
+            on_network(detector)
+            return detector
+
         return Engine(
             open_source,
-            lambda source: detector_for(source, self.pipeline.detector),
+            open_boxes,
             params,
             preset=self.pipeline.preset,
             uri=self.source,
             sensors=self.sensors,
             playing=True,
             whole_drives=True,
-            open_lanes=lambda source: lanes_for(source, self.pipeline.lanes),
+            open_lanes=open_lanes,
             lanes_every=self.pipeline.every(),
             far_view_px=self.pipeline.far_px(),
             labels=self.server.label_desk(),

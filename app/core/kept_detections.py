@@ -167,7 +167,7 @@ class KeptDetections:
             except sqlite3.OperationalError as error:  # busy, full or read-only: may pass
                 logger.debug("%s: %s", self._file, error)
             except (sqlite3.Error, OSError) as error:
-                logger.warning("%s: detections are not kept: %s", self._file, error)
+                logger.warning("%s: detections are not cached: %s", self._file, error)
                 self._is_off = True
             return []
 

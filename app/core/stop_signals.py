@@ -47,7 +47,7 @@ def end_process_once(asked: Event, save: Callable[[], object]) -> None:
         asked.wait()
         save()
         time.sleep(REST_S)
-        print("cipv: ended without waiting for work that hangs; the recording is closed", file=sys.stderr, flush=True)
+        print("cipv: exited without waiting for hung work; the recording is closed", file=sys.stderr, flush=True)
         os._exit(0)
 
     threading.Thread(target=end, name="cipv-shutdown", daemon=True).start()

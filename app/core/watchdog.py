@@ -181,7 +181,7 @@ class Watchdog:
                 heart.retired = True
                 found.append((heart, Stuck(heart.name, heart.doing, now_s - heart.since_s, heart.thread_id)))
         for heart, stuck in found:
-            logger.error("%s hangs: %s, for %.1f s\n%s", *_told(stuck), _stack(heart.thread_id))
+            logger.error("%s hangs (%s), for %.1f s so far\n%s", *_told(stuck), _stack(heart.thread_id))
             try:
                 heart.on_stuck(stuck)
             except Exception:  # the watchdog continues if one callback fails

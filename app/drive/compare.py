@@ -104,7 +104,7 @@ def _against_truth(base: Sequence[Row], run: Sequence[Row]) -> tuple[Metric, ...
         Metric("CIPV correct", "frames", a.correct, b.correct, "higher"),
         Metric("lead missed", "frames", a.missed, b.missed, "lower"),
         Metric("CIPV without a lead", "frames", a.false, b.false, "lower"),
-        Metric("CIPV not where the lead is", "frames", a.wrong, b.wrong, "lower"),
+        Metric("CIPV not at the lead's position", "frames", a.wrong, b.wrong, "lower"),
         Metric("mean distance error", "m", a.mean_error_m, b.mean_error_m, "lower"),
         Metric("largest distance error", "m", a.max_error_m, b.max_error_m, "lower"),
     )

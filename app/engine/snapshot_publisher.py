@@ -31,7 +31,7 @@ class SnapshotPublisher:
         """The first snapshot that satisfies ``condition``; TimeoutError if there is none in time."""
         with self._changed:
             if not self._changed.wait_for(lambda: condition(self.snapshot), timeout_s):
-                raise TimeoutError(f"nothing of the kind within {timeout_s:g} s; last: {self.snapshot.state_json()}")
+                raise TimeoutError(f"no such snapshot within {timeout_s:g} s; last: {self.snapshot.state_json()}")
             return self.snapshot
 
     def publish(self, snapshot: Snapshot) -> None:

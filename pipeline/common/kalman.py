@@ -11,6 +11,7 @@ piecewise constant white acceleration: an acceleration of standard deviation ``a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numba
@@ -41,18 +42,34 @@ def start(position: npt.ArrayLike, R: F64, speed_sigma: float) -> CvState:
     return CvState(np.concatenate([z, np.zeros_like(z)], axis=-1), cov)
 
 
-def predict(state: CvState, dt_s: float, accel_sigma: float) -> CvState:
-    """The state ``dt_s`` ≥ 0 seconds later. ``accel_sigma``: m/s², along each axis. ValueError for a negative dt."""
+def stacked(states: Sequence[CvState]) -> CvState:
+    """Single filters as one state of many: mean (T, 4), cov (T, 4, 4)."""
+    mean, cov = [each.mean for each in states], [each.cov for each in states]
+    return CvState(np.array(mean).reshape(-1, 4), np.array(cov).reshape(-1, 4, 4))
+
+
+def unstacked(state: CvState) -> list[CvState]:
+    """The single filters of a state of many, as views."""
+    return list(map(CvState, state.mean, state.cov))
+
+
+def predict(state: CvState, dt_s: float, accel_sigma: npt.ArrayLike) -> CvState:
+    """The state ``dt_s`` ≥ 0 seconds later. ``accel_sigma``: m/s², along each axis; for all filters, or (…) for
+    each. ValueError for a negative dt."""
     if dt_s < 0.0:
         raise ValueError(f"a filter cannot run back in time: dt = {dt_s} s")
-    mean, cov = _predict(state.mean.reshape(-1, 4), state.cov.reshape(-1, 4, 4), dt_s, accel_sigma**2)
+    mean, cov = state.mean.reshape(-1, 4), state.cov.reshape(-1, 4, 4)
+    accel_var = np.zeros(len(mean)) + np.square(accel_sigma)
+    mean, cov = _predict(mean, cov, dt_s, accel_var)
     return CvState(mean.reshape(state.mean.shape), cov.reshape(state.cov.shape))
 
 
 def update(state: CvState, z: npt.ArrayLike, R: F64) -> CvState:
-    """The state updated by a measured position ``z`` (…, 2) m with covariance ``R`` (2, 2) m² (Joseph form)."""
+    """The state updated by a measured position ``z`` (…, 2) m with covariance ``R`` m² (Joseph form): (2, 2) for all
+    filters, or (…, 2, 2) for each."""
     z = np.asarray(z, dtype=np.float64).reshape(-1, 2)
-    mean, cov = _update(state.mean.reshape(-1, 4), state.cov.reshape(-1, 4, 4), z, R)
+    noise = np.zeros((len(z), 2, 2)) + R
+    mean, cov = _update(state.mean.reshape(-1, 4), state.cov.reshape(-1, 4, 4), z, noise)
     return CvState(mean.reshape(state.mean.shape), cov.reshape(state.cov.shape))
 
 
@@ -69,10 +86,10 @@ def _predict(mean, cov, dt, accel_var):  # type: ignore[no-untyped-def]  # pragm
                 new_cov[t, i, j] += dt * (vp + pv) + dt * dt * vv
                 new_cov[t, i, j + 2] += dt * vv
                 new_cov[t, i + 2, j] += dt * vv
-            new_cov[t, i, i] += accel_var * dt**4 / 4
-            new_cov[t, i, i + 2] += accel_var * dt**3 / 2
-            new_cov[t, i + 2, i] += accel_var * dt**3 / 2
-            new_cov[t, i + 2, i + 2] += accel_var * dt**2
+            new_cov[t, i, i] += accel_var[t] * dt**4 / 4
+            new_cov[t, i, i + 2] += accel_var[t] * dt**3 / 2
+            new_cov[t, i + 2, i] += accel_var[t] * dt**3 / 2
+            new_cov[t, i + 2, i + 2] += accel_var[t] * dt**2
     return new_mean, new_cov
 
 
@@ -82,8 +99,8 @@ def _update(mean, cov, z, R):  # type: ignore[no-untyped-def]  # pragma: no cove
     new_mean, new_cov = np.empty_like(mean), np.empty_like(cov)
     keep = np.empty((4, 4))
     for t in range(len(mean)):
-        a, b = cov[t, 0, 0] + R[0, 0], cov[t, 0, 1] + R[0, 1]
-        c, d = cov[t, 1, 0] + R[1, 0], cov[t, 1, 1] + R[1, 1]
+        a, b = cov[t, 0, 0] + R[t, 0, 0], cov[t, 0, 1] + R[t, 0, 1]
+        c, d = cov[t, 1, 0] + R[t, 1, 0], cov[t, 1, 1] + R[t, 1, 1]
         det = a * d - b * c
         gain = np.empty((4, 2))
         for i in range(4):
@@ -93,7 +110,7 @@ def _update(mean, cov, z, R):  # type: ignore[no-untyped-def]  # pragma: no cove
             new_mean[t, i] = mean[t, i] + gain[i, 0] * (z[t, 0] - mean[t, 0]) + gain[i, 1] * (z[t, 1] - mean[t, 1])
             for j in range(4):
                 keep[i, j] = (1.0 if i == j else 0.0) - (gain[i, j] if j < 2 else 0.0)
-        joseph = keep @ cov[t] @ keep.T + gain @ R @ gain.T
+        joseph = keep @ cov[t] @ keep.T + gain @ R[t] @ gain.T
         for i in range(4):
             for j in range(4):
                 new_cov[t, i, j] = (joseph[i, j] + joseph[j, i]) / 2

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 
 from pipeline.common.fast_replace import evolve
 from pipeline.decision.acc import STANDSTILL_MPS
-from pipeline.decision.braking_evidence import FRICTION_MPS2
+from pipeline.decision.braking_evidence import FRICTION_MPS2, has_known_height
 from pipeline.decision.object_motion import closing_speed_mps, required_decel_mps2
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
 from pipeline.params import AccParams, AebParams
@@ -55,9 +55,11 @@ class Threat(NamedTuple):
     id: int
     """Of the object."""
     distance_m: float
+    """How far ahead it is."""
     sigma_m: float
     """Standard deviation of the distance."""
     closing_mps: float
+    """How fast the gap to it shrinks."""
     ttc_s: float
     """Time to collision."""
     required_mps2: float
@@ -109,9 +111,9 @@ def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
 
 
 def _justified(item: FusedObject, required_mps2: float) -> Braking:
-    """According to its evidence. But an object that the LiDAR has not measured and that no braking could avoid is not
+    """According to its evidence. But an object that the LiDAR has never measured and that no braking could avoid is not
     trusted."""
-    if item.ranged:
+    if item.ranged or has_known_height(item):
         return item.justifies
     return min(item.justifies, Braking.PARTIAL) if required_mps2 <= FRICTION_MPS2 else Braking.COMFORT
 

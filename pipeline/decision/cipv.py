@@ -18,7 +18,7 @@ from pipeline.common.fast_replace import evolve
 from pipeline.decision.crossing import clears_path_s
 from pipeline.decision.gates import Candidate, judge, may_cut_in
 from pipeline.decision.object_motion import closing_speed_mps
-from pipeline.decision.path_position import SURE, Place, believed_mps, place
+from pipeline.decision.path_position import SURE, Place, place
 from pipeline.params import CipvParams
 from pipeline.types import Cipv, FusedObject, Moment, Path, Rejection, sensors_in_words
 
@@ -103,7 +103,7 @@ def _judge(
     leads, widening_m, odds = item.id == state.lead_id, 0.0, None
     clears_s = clears_path_s(where, item, moment.speed_mps, params)
     if where is not None:
-        moving_mps = believed_mps(where.sideways_mps, item)
+        moving_mps = where.believed_mps
         decide_s = min(params.decide_s, _BLUR_M / max(abs(moving_mps), 1e-3))
         widening_m = _widening_m(leads, moving_mps, params)
         now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY) if clears_s is None else -SURE
@@ -114,7 +114,7 @@ def _judge(
     is_in = probability > 0.5
     verdict = judge(Candidate(item, where, odds or 0.0, leads, widening_m, path, params, clears_s))
     if clears_s is None and where is not None and where.margin_m() >= 0.0 and is_ahead:
-        comes_in = where.middle_m * believed_mps(where.sideways_mps, item) < 0.0
+        comes_in = where.middle_m * where.believed_mps < 0.0
         if not is_in or (comes_in and not verdict.eligibility.probable):
             crossing_s = 0.0  # it is over the edge, but not yet for long enough to count as in the path
     item = evolve(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import inf
 
-from pipeline.decision.path_position import Place, believed_mps
+from pipeline.decision.path_position import Place
 from pipeline.params import CipvParams
 from pipeline.types import FusedObject
 
@@ -39,7 +39,7 @@ def clears_path_s(
     """
     if where is None or not params.use_crossing or not (item.ranged or item.camera_ranges >= _FEWEST_RANGES):
         return None
-    sideways_mps = believed_mps(where.sideways_mps, item)
+    sideways_mps = where.believed_mps
     if abs(sideways_mps) < _SLOWEST_MPS or not _crosses(where, ego_speed_mps is not None):
         return None
     outwards_m = where.left_m - where.middle_m if sideways_mps > 0.0 else where.right_m + where.middle_m

@@ -91,14 +91,10 @@ class GateVerdict(NamedTuple):
 
 def judge(who: Candidate) -> GateVerdict:
     """Check one object against every condition of a lead."""
-    answers = [check(who) for _, check, _ in CONDITIONS]
-    eligibility = Conditions(*[met for met, _, _ in answers])
-    gates = tuple(
-        [
-            _gate((shown_as, value, limit, met))
-            for (shown_as, _, _), (met, value, limit) in zip(CONDITIONS, answers, strict=True)
-        ]
-    )
+    names, checks, _ = zip(*CONDITIONS, strict=True)
+    met, values, limits = zip(*[check(who) for check in checks], strict=True)
+    eligibility = _conditions(met)
+    gates = tuple(map(_gate, zip(names, values, limits, met, strict=True)))
     why_not = None if all(eligibility) else CONDITIONS[eligibility.index(False)].why_not(who)
     return GateVerdict(eligibility, gates, why_not)
 
@@ -145,7 +141,7 @@ def _seen(who: Candidate) -> Answer:
     not become the lead, because its current position is only predicted. An object that the camera sees and the LiDAR
     has just lost still counts as known."""
     item = who.item
-    just_lost = item.ranged and item.seen_by_camera and not item.seen_by_lidar
+    just_lost = item.ranged and item.seen_by_camera and not item.ranged_now
     followed = just_lost and (item.distance_sigma_m or 0.0) < _KNOWN_M
     known = not item.carried and (item.measured or followed)
     return known or who.leads or who.params.carried_may_become_lead, float(known), 0.0 if who.leads else 1.0
@@ -236,11 +232,12 @@ def _probable(who: Candidate) -> Answer:
     """
     there, in_path = _existence(who), _in_path_probability(who) if who.odds > 0.0 else 1.0
     # objects out of the path already fail another gate
-    asked = ((there, _needed_existence(who)), (in_path, who.params.stay_probability))
-    if not who.leads:
-        asked = (asked[0], (there * in_path, _needed_probability(who)))
-    probability, limit = min(asked, key=lambda pair: pair[0] - pair[1])
-    return probability >= limit, probability, limit
+    to_exist, to_be_in_path = _needed_existence(who), _needed_probability(who)
+    probability = in_path if who.leads else there * in_path
+    # the one that is missed by more is shown
+    if there - to_exist <= probability - to_be_in_path:
+        return there >= to_exist, there, to_exist
+    return probability >= to_be_in_path, probability, to_be_in_path
 
 
 def _existence(who: Candidate) -> float:
@@ -252,7 +249,9 @@ def _needed_existence(who: Candidate) -> float:
 
 
 def _needed_probability(who: Candidate) -> float:
-    """The probability required of a new lead."""
+    """The probability that is required of being in the path."""
+    if who.leads:
+        return who.params.stay_probability
     usual, params = who.params.become_probability, who.params
     if who.item.oncoming:
         return max(usual, params.become_oncoming)
@@ -270,7 +269,7 @@ def _improbable(who: Candidate) -> str:
     if there < _needed_existence(who):
         return f"only {100 * there:.0f} % likely to exist"
     in_path = _in_path_probability(who)
-    needed = who.params.stay_probability if who.leads else _needed_probability(who)
+    needed = _needed_probability(who)
     if in_path < needed:
         return f"only {100 * in_path:.0f} % likely to be in path"
     return f"only {100 * there * in_path:.0f} % likely to exist and be in path"
@@ -296,4 +295,6 @@ CONDITIONS = Conditions(
 )
 
 _gate: Callable[[tuple[str, float | None, float, bool]], Gate] = partial(tuple.__new__, Gate)
-"""``Gate`` without its Python constructor, which takes three times as long: a frame may have a thousand gates."""
+_conditions: Callable[[tuple[bool, ...]], Eligibility] = partial(tuple.__new__, Conditions)
+"""``Gate`` and ``Conditions`` without their Python constructors, which take three times as long: a frame may have a
+thousand gates."""

@@ -69,6 +69,8 @@ class Place(NamedTuple):
     """Speed to the left of the path, over ground; None if its velocity is not known."""
     forward_mps: float = 0.0
     """Speed along the path, over ground; relative to the car while ego speed is unknown."""
+    believed_mps: float = 0.0
+    """The part of ``sideways_mps`` that is surely motion: see ``believed_mps`` below."""
 
     @property
     def limit_m(self) -> float:
@@ -98,19 +100,19 @@ class Place(NamedTuple):
         surety = min(0.5 * (margin / self.sigma_m) ** 2, SURE)
         return surety if margin >= 0.0 else -surety
 
-    def crossing_s(self, believed_mps: float, half_left_m: float, half_right_m: float) -> float | None:
+    def crossing_s(self, half_left_m: float, half_right_m: float) -> float | None:
         """Seconds until the nearer side of an object outside the path crosses the edge, or until an object inside has
         left; None if its estimated lateral speed (positive to the left) leads to neither. 0: on the edge."""
-        if believed_mps == 0.0 or self.ahead_m <= 0.0:
+        if self.believed_mps == 0.0 or self.ahead_m <= 0.0:
             return None
-        outwards = (self.middle_m > 0.0) == (believed_mps > 0.0)
+        outwards = (self.middle_m > 0.0) == (self.believed_mps > 0.0)
         if outwards != (self.margin_m() >= 0.0):  # it moves towards the middle inside the path, or away outside it
             return None
         if outwards:
             way = self.margin_m()
         else:
             way = self.low_m - half_left_m if self.middle_m > 0.0 else -half_right_m - self.high_m
-        return max(way, 0.0) / abs(believed_mps)
+        return max(way, 0.0) / abs(self.believed_mps)
 
 
 def believed_mps(sideways_mps: float | None, item: FusedObject) -> float:
@@ -154,9 +156,11 @@ def place(
     ).tolist()
     placed = []
     for item, (half_left, half_right, sideways, forward, *numbers) in zip(known, rows, strict=True):
-        has_velocity = item.velocity_mps is not None
-        there = Place._make((*numbers, sideways if has_velocity else None, forward if has_velocity else 0.0))
-        placed.append((there, there.crossing_s(believed_mps(there.sideways_mps, item), half_left, half_right)))
+        motion = (
+            (sideways, forward, believed_mps(sideways, item)) if item.velocity_mps is not None else (None, 0.0, 0.0)
+        )
+        there = Place._make((*numbers, *motion))
+        placed.append((there, there.crossing_s(half_left, half_right)))
     following = iter(placed)
     return [next(following) if item.bev is not None else None for item in objects]
 

@@ -21,7 +21,7 @@ _SURE_SIGMAS = 2.0
 def is_dependable(item: FusedObject) -> bool:
     """Seen now, with a measured range, and all conditions of a lead met except class and position. A distance from box
     height alone gives too uncertain a speed to brake for an object that is not the lead."""
-    has_velocity = item.ranged and (not item.imaged or item.lidar_steady >= _VELOCITY_HITS)
+    has_velocity = item.ranged and (not item.imaged or item.ranged_steady >= _VELOCITY_HITS)
     return has_velocity and not item.carried and is_solid(item)
 
 

@@ -183,7 +183,7 @@ def _nothing_of(wanted: str, sources: list[MotionEstimate]) -> tuple[str, ...]:
     others = [_NAMES[each.source] for each in sources]
     if wanted not in ("can", "gnss") or not others:
         return ()
-    return (f"ego motion: nothing from {_NAMES[wanted]}; there is {' and '.join(others)}, not used",)
+    return (f"ego motion: no data from {_NAMES[wanted]}; {' and '.join(others)} available but not used",)
 
 
 def _contradictions(own: OwnMotion) -> tuple[str, ...]:

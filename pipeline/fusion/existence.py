@@ -171,7 +171,7 @@ def _weight(dt_s: float, mean_s: float) -> float:
 def _said_by_lidar(item: FusedObject, rays: Rays | None, was_followed: bool) -> float:
     """Log-odds added by this sweep. If the LiDAR has tracked the object and its returns now belong to another cluster,
     the two clusters have merged; if the LiDAR never tracked it, it is a second box on the neighbour."""
-    if item.seen_by_lidar:
+    if item.ranged_now:
         return _CLUSTER
     if rays is not None and rays.is_free:
         return _PIERCED

@@ -16,9 +16,9 @@ import numpy as np
 from pipeline.alignment.projection import Alignment
 from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64, iou_matrix
-from pipeline.lidar.road_profile import ASIDE_M, RoadProfile
+from pipeline.lidar.road_profile import ASIDE_M, RoadProfile, fit_road_profile
 from pipeline.params import FusionParams
-from pipeline.types import VEHICLES, Mask, VisionMeasurement
+from pipeline.types import F32, VEHICLES, Ground, Mask, VisionMeasurement
 
 NEAREST_M = 10.0
 """Minimum distance by the box's height. Nearer, the lower edge is as often a shadow as a tyre
@@ -49,6 +49,33 @@ class _Contacts(NamedTuple):
     """Standard deviation of ln(range) due to errors that persist from image to image."""
     noise_share: F64
     """Standard deviation of ln(range) due to the noise of the edge."""
+
+
+def road_ahead(
+    points: F32,
+    ground: Ground | None,
+    boxes: tuple[VisionMeasurement, ...] | None,
+    alignment: Alignment | None,
+    speed_mps: float | None = None,
+) -> RoadProfile | None:
+    """The road in a sweep, as far as no vehicle in the image covers it; None without a sweep or boxes.
+
+    Over a crest, the road falls away, and a ring on the rear of a far car lies where the flat road would be: to the
+    LiDAR alone it is road. points: (N, 4) float32 ``x y z intensity``, ego frame.
+    """
+    if ground is None or not boxes:
+        return None
+    mask = ground.mask
+    bbox = np.array([each.detection.bbox for each in boxes if each.detection.label in VEHICLES])
+    rows = np.flatnonzero(mask & (points[:, 0] > NEAREST_M) & (np.abs(points[:, 1]) < ASIDE_M))
+    if alignment is not None and len(bbox) and len(rows):
+        u, v = alignment.project(points[rows, :3].astype(np.float64)).T[:, :, None]
+        x1, y1, x2, y2 = bbox.T
+        with np.errstate(invalid="ignore"):
+            covered = ((u > x1) & (u < x2) & (v > y1) & (v < y2 - _EDGE_PX)).any(axis=1)
+        mask = mask.copy()
+        mask[rows[covered]] = False
+    return fit_road_profile(points, mask, speed_mps)
 
 
 def measure_contacts(

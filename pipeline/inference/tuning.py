@@ -1,7 +1,11 @@
 """Finds the fastest way to run a network on this machine, and stores it next to the networks.
 
 A stored setting belongs to a file, a processor and a version of onnxruntime; with any other, the network runs untuned.
-A setting that changes the network's outputs is never stored.
+
+The results of a recording must not depend on whether a network was tuned, so a setting is only stored if the outputs
+are equal bit by bit. This holds for the number of threads, which share the rows of a layer's output, and for the memory
+arena. It does not hold for levels of graph optimisation and for other providers, which sum in another order; those are
+tried only where that is asked for (``rounding``).
 """
 
 from __future__ import annotations
@@ -28,9 +32,11 @@ from pipeline.types import F32
 PROVIDERS = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "OpenVINOExecutionProvider", "CPUExecutionProvider")
 """Possible providers, in the order of preference without tuning (which excludes OpenVINO)."""
 _UNTUNED = tuple(name for name in PROVIDERS if name != "OpenVINOExecutionProvider")
+USUAL_THREADS = 2
+"""Threads of an untuned network."""
 _AGREE = 1e-3
-"""Largest permitted difference of an output, relative to its largest value: allows another order of summation, but no
-lower precision."""
+"""With ``rounding``: largest permitted difference of an output, relative to its largest value. It allows another order
+of summation, but no lower precision."""
 _WORTH = 0.97
 """To be preferred, settings must take less than this share of the best time so far: smaller differences are noise."""
 _ROUNDS = 7
@@ -86,22 +92,32 @@ def kept_way(path: Path, threads: int) -> RunSettings:
     return way if known and set(way.providers) <= set(ort.get_available_providers()) else usual
 
 
+def is_tuned(path: Path) -> bool:
+    """Whether settings are stored for a network's file on this machine."""
+    return _key(path) in _read(_file())
+
+
 def keep(path: Path, way: RunSettings) -> None:
     """Use these settings for this file's network from now on. OSError if the store cannot be written."""
     file = _file()
     replace_text(file, json.dumps(_read(file) | {_key(path): asdict(way)}, indent=1, sort_keys=True) + "\n")
 
 
-def tune(run: Callable[[RunSettings], Callable[[], Sequence[F32]]], threads: int) -> Iterator[Trial]:
+def tune(
+    run: Callable[[RunSettings], Callable[[], Sequence[F32]]], threads: int, rounding: bool = False
+) -> Iterator[Trial]:
     """Try all settings, the default first; then the best so far is varied in one setting at a time.
 
-    run: returns for given settings a function that runs the network once on a fixed input; either may raise.
+    run: returns for given settings a function that runs the network once on a fixed input; either may raise. rounding:
+    also try settings that round differently, and accept outputs that differ by that.
     """
-    best, expected = _timed(run, untuned(threads), None)
+    agree = _agree if rounding else _are_equal
+    best, expected = _timed(run, untuned(threads), None, agree)
     yield best
-    for vary in (_other_providers, _other_threads, _other_levels, _no_arena):
+    exact, others = (_other_threads, _no_arena), (_other_providers, _other_levels)
+    for vary in (*others, *exact) if rounding else exact:
         for way in vary(best.way):
-            trial, _ = _timed(run, way, expected)
+            trial, _ = _timed(run, way, expected, agree)
             yield trial
             if trial.best_ms is not None and best.best_ms is not None and trial.best_ms < _WORTH * best.best_ms:
                 best = trial
@@ -116,13 +132,24 @@ def fastest(trials: Sequence[Trial]) -> Trial:
     return best
 
 
+def keep_fastest(path: Path, trials: Sequence[Trial]) -> Trial:
+    """Use the fastest trial's settings for this file's network from now on; returns it. OSError if the store cannot be
+    written."""
+    best = fastest(trials)
+    keep(path, best.way)
+    return best
+
+
 def _timed(
-    run: Callable[[RunSettings], Callable[[], Sequence[F32]]], way: RunSettings, expected: Sequence[F32] | None
+    run: Callable[[RunSettings], Callable[[], Sequence[F32]]],
+    way: RunSettings,
+    expected: Sequence[F32] | None,
+    agree: Callable[[Sequence[F32], Sequence[F32]], bool],
 ) -> tuple[Trial, Sequence[F32]]:
     try:
         once = run(way)
         outputs = once()
-        if expected is not None and not _agree(outputs, expected):
+        if expected is not None and not agree(outputs, expected):
             return Trial(way, None, "its outputs differ"), outputs
         taken = []
         for _ in range(_ROUNDS):
@@ -134,6 +161,12 @@ def _timed(
             raise
         return Trial(way, None, (str(error).splitlines() or ["no reason given"])[0]), ()
     return Trial(way, min(taken) * 1e3), outputs
+
+
+def _are_equal(ours: Sequence[F32], theirs: Sequence[F32]) -> bool:
+    """Whether outputs are equal bit by bit. One input decides: another order of summation shows in some of the many
+    thousand numbers."""
+    return [a.tobytes() for a in ours] == [b.tobytes() for b in theirs]
 
 
 def _agree(ours: Sequence[F32], theirs: Sequence[F32]) -> bool:

@@ -71,7 +71,7 @@ def lift(
         raise NothingThere("no points and no detection there: draw a box around it")
     law = _by_height(frame, params, alignment, label, bbox)
     if law.distance_m is None or law.sigma_m is None:
-        raise NothingThere(f"no points there, and such a box of a {label} gives no distance")
+        raise NothingThere(f"no points there, and such a box gives no distance for a {label}")
     how = f"no points there: about {law.distance_m:.0f} ± {law.sigma_m:.0f} m judging by its height in the image"
     return Lifted(_at_height(alignment, label, bbox, law, ground), bbox, 0, how)
 

@@ -118,7 +118,7 @@ def _boxes_apart(tracks: Sequence[LabelTrack], drive: LabeledDrive) -> Iterator[
     for track in tracks:
         for each in track.sightings:
             if each.box_set and each.cuboid is not None and each.bbox is not None and _is_apart(each, drive):
-                yield Problem(each.frame, track.id, f"#{track.id} {track.label}: its box is not where its cuboid is")
+                yield Problem(each.frame, track.id, f"#{track.id} {track.label}: its box does not match its cuboid")
 
 
 def _is_apart(sighting: Sighting, drive: LabeledDrive) -> bool:

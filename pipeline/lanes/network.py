@@ -23,6 +23,7 @@ from pipeline.inference.runtime import (
     read_graph,
     run_session,
 )
+from pipeline.inference.tuning import USUAL_THREADS
 from pipeline.lanes.heads import LaneHead, UnknownLaneHead, pick_head
 from pipeline.lanes.horizon import horizon_share
 from pipeline.types import F32, U8, CameraCalibration, RawLanes
@@ -39,6 +40,8 @@ _MOST_SKY = 0.6
 class LaneNetwork:
     """A loaded lane network."""
 
+    path: Path
+    """The ONNX file."""
     name: str
     """File and digest; equal names give equal points, so this is used as cache key."""
     providers: tuple[str, ...]
@@ -96,7 +99,9 @@ class _Placed:
     shift: tuple[float, float]
 
 
-def open_lane_network(spec: str | None, threads: int = 2, camera: CameraCalibration | None = None) -> LaneNetwork:
+def open_lane_network(
+    spec: str | None, threads: int = USUAL_THREADS, camera: CameraCalibration | None = None
+) -> LaneNetwork:
     """Load a lane network by name or path; None: the default one (``pipeline.inference.model_registry``). camera:
     camera of the images; None if it is not known.
 
@@ -136,7 +141,7 @@ def _loaded(path: Path, threads: int, horizon: float) -> LaneNetwork:
         name += f"-{horizon:.3f}"
     notes = (f"Lane lines by the network {path.stem}",)
     count = session.get_session_options().intra_op_num_threads
-    return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, count, horizon, sha256, session)
+    return LaneNetwork(path, name, tuple(session.get_providers()), size, head, notes, count, horizon, sha256, session)
 
 
 def _placed(image: Size, size: Size, head: LaneHead, horizon: float) -> _Placed:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from pipeline.types import F32, F64, Ground, Mask
+from pipeline.types import F32, F64, Mask
 
 NEAREST_M, FARTHEST_M, ASIDE_M = 3.0, 60.0, 6.0
 """Bounds of the returns that are used: the road ahead, no farther to the side than its own width."""
@@ -58,11 +58,6 @@ class RoadProfile(NamedTuple):
         rows = np.column_stack([np.ones_like(x), x, x * x / 2.0, np.zeros_like(x)])
         sigma: F64 = np.sqrt(np.einsum("ij,jk,ik->i", rows, self.cov, rows))
         return sigma
-
-
-def road_ahead(points: F32, ground: Ground | None, speed_mps: float | None = None) -> RoadProfile | None:
-    """The road in a segmented sweep; None without a sweep. See ``fit_road_profile``."""
-    return fit_road_profile(points, ground.mask, speed_mps) if ground is not None else None
 
 
 def fit_road_profile(points: F32, mask: Mask, speed_mps: float | None = None) -> RoadProfile | None:

@@ -136,7 +136,7 @@ def _with(state: TrafficState, item: FusedObject, number: int, ego: EgoState) ->
             return state
         off_x, off_y = moved_x - along_mps * waited_s, moved_y - across_mps * waited_s
         off_m = hypot(off_x, off_y)
-        if not item.seen_by_lidar:  # the distance of a box wavers by far more than its direction
+        if not item.ranged_now:  # the distance of a box wavers by far more than its direction
             off_m = max(abs(off_y * x - off_x * y) / max(hypot(x, y), 1.0), off_m - (item.distance_sigma_m or 0.0))
         if off_m > _STRAYS_M + _STRAYS * moved_m:
             others = ~mine  # it is now a different vehicle, or never drove

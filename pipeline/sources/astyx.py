@@ -185,7 +185,7 @@ def _label(entry: dict[str, Any]) -> TruthObject:
     qw, qx, qy, qz = (float(value) for value in entry["orientation_quat"])
     yaw = float(np.arctan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz)))
     if not np.all(np.isfinite([x, y, z, length, width, height, yaw])) or min(length, width, height) <= 0.0:
-        raise ValueError("a box without place or size")
+        raise ValueError("a box without a position or size")
     name = str(entry["classname"]).lower()
     return TruthObject(_LABELS.get(name, name), Cuboid((x, y, z), (length, width, height), yaw))
 

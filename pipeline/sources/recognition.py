@@ -104,7 +104,7 @@ def about_path(uri: str, live: bool) -> str:
         if place.is_dir() or place.is_file():
             found = _about_folder(place) if place.is_dir() else _about_file(place)
             return f": {found}" if ";" in found else f": {found}{otherwise}"
-        return f": {'a link that leads nowhere' if place.is_symlink() else 'not a file or folder'}{otherwise}"
+        return f": {'a broken link' if place.is_symlink() else 'not a file or folder'}{otherwise}"
     except _PROBLEMS as error:
         return f": cannot be read: {reason_of(error)}"
 

@@ -154,10 +154,10 @@ class FusedObject:
     clears_path_s: float | None = None
     """How long before the car arrives it will have left the path that it crosses; None for one that does not cross, or
     that the car might meet."""
-    lidar_hits: int = 0
-    """Sightings of its LiDAR track."""
-    lidar_steady: int = 0
-    """Of these, the last ones in a row that lay where the track was expected."""
+    ranged_hits: int = 0
+    """Sightings of its track by the sensor that measures range, today the LiDAR; 0 without one."""
+    ranged_steady: int = 0
+    """The most recent of these in a row that were where the track was expected."""
     justifies: Braking = Braking.FULL
     """The hardest braking that what is known of it can justify."""
     camera_ranges: int = 0
@@ -197,6 +197,11 @@ class FusedObject:
         """A sensor that measures range follows it, today the LiDAR. Otherwise its distance and speed come from the
         height of its image box, and are much less sure."""
         return is_ranging_in(self.source)
+
+    @property
+    def ranged_now(self) -> bool:
+        """A sensor that measures range saw it in this frame."""
+        return is_ranging_in(self.seen_by)
 
     @property
     def imaged(self) -> bool:

@@ -28,6 +28,7 @@ from pipeline.inference.runtime import (
     read_graph,
     run_session,
 )
+from pipeline.inference.tuning import USUAL_THREADS
 from pipeline.types import F32, REAL_VEHICLES, U8, DistanceLaw, RawBoxes
 from pipeline.vision.classes import class_names
 from pipeline.vision.heads import Decoder, UnknownHead, pick_decoder
@@ -106,7 +107,7 @@ class Detector:
 def open_detector(
     spec: str | None,
     image_size: tuple[int, int] | None,
-    threads: int = 2,
+    threads: int = USUAL_THREADS,
     input_size: Size | None = None,
 ) -> Detector:
     """Load a network by name or path. Without one, load the default (``pipeline.inference.model_registry``), with a

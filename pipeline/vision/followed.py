@@ -4,8 +4,9 @@ Estimation with Regression; the paper has neither)."""
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from pipeline.common import kalman
 from pipeline.common.fast_replace import evolve
@@ -63,17 +64,36 @@ class SpeedGuess(NamedTuple):
     """The same along x and y."""
 
 
-def predict_place(followed: Followed, dt_s: float, params: VisionTrackingParams) -> tuple[CvState | None, float]:
-    """The place a moment later, and how much the box has grown as the range changed. A place not measured for
-    ``max_missed_s`` is forgotten, though its box be seen (it may be too near to be measured)."""
-    if followed.place_filter is None:
-        return None, 1.0
-    moved = kalman.predict(followed.place_filter, dt_s, params.accel_sigma_mps2)
-    (before_x, before_y), (x, y) = followed.place_filter.mean[:2].tolist(), moved.mean[:2].tolist()
+class PredictedPlace(NamedTuple):
+    """The place of an object a moment later."""
+
+    place: CvState | None
+    """None where it is not known, or no longer."""
+    growth: float
+    """How much its box has grown as the range changed."""
+
+
+def predict_places(followed: Sequence[Followed], dt_s: float, params: VisionTrackingParams) -> list[PredictedPlace]:
+    """The place of each object ``dt_s`` later. A place not measured for ``max_missed_s`` is forgotten, though its box
+    be seen (it may be too near to be measured)."""
+    known = [each.place_filter for each in followed if each.place_filter is not None]
+    moved = iter(kalman.unstacked(kalman.predict(kalman.stacked(known), dt_s, params.accel_sigma_mps2)))
+    return [
+        _predicted(each, each.place_filter, next(moved), dt_s, params)
+        if each.place_filter is not None
+        else PredictedPlace(None, 1.0)
+        for each in followed
+    ]
+
+
+def _predicted(
+    followed: Followed, before: CvState, now: CvState, dt_s: float, params: VisionTrackingParams
+) -> PredictedPlace:
+    (before_x, before_y), (x, y) = before.mean[:2].tolist(), now.mean[:2].tolist()
     before_m, now_m = math.hypot(before_x, before_y), math.hypot(x, y)
-    if followed.unplaced_s > params.max_missed_s or now_m <= 0.0 or x <= 0.0:
-        return None, 1.0
-    return moved, before_m / now_m
+    if followed.unplaced_s + dt_s > params.max_missed_s or now_m <= 0.0 or x <= 0.0:
+        return PredictedPlace(None, 1.0)
+    return PredictedPlace(now, before_m / now_m)
 
 
 def take_place(
@@ -99,7 +119,6 @@ def take_place(
     if seen.size_share is not None:
         pixel_share = math.sqrt(max(share**2 - seen.size_share**2, 0.0))
         share = math.hypot(pixel_share, followed.height.share(seen.size_share))
-    followed = evolve(followed, seen=seen)
     noise_share = seen.noise_share if seen.noise_share is not None else share
     if seen.ranged_m is not None:
         # what the height is learned to be moves the place there first, so that it is no motion
@@ -112,21 +131,21 @@ def take_place(
         noise_share,
         math.hypot(math.radians(params.bearing_sigma_deg), slip_m / own_m),
     )
-    filtered, placed = followed.place_filter, followed.placed + 1
-    if filtered is not None and place_filter.surprise(filtered, sighting) > params.max_nis:
-        # one or two sightings have no standing against a third that contradicts them
-        if followed.placed >= _SETTLED and followed.refused + 1 < params.restart_after:
-            shown = evolve(with_place(followed.track, filtered, followed.placed), measured=False)
-            return evolve(followed, track=shown, refused=followed.refused + 1)
-        filtered = None
-    elif filtered is not None:
-        filtered = place_filter.update(filtered, sighting)
-        if not _is_plausible(filtered, ego_speed_mps):
+    filtered, placed = None, followed.placed + 1
+    if followed.place_filter is not None:
+        filtered, nis = place_filter.update(followed.place_filter, sighting)
+        if nis > params.max_nis:
+            # one or two sightings have no standing against a third that contradicts them
+            if followed.placed >= _SETTLED and followed.refused + 1 < params.restart_after:
+                shown = with_place(followed.track, followed.place_filter, followed.placed, measured=False)
+                return evolve(followed, track=shown, refused=followed.refused + 1)
+            filtered = None
+        elif not _is_plausible(filtered, ego_speed_mps):
             filtered = None
     if filtered is None:
         filtered, placed = place_filter.start(sighting, guess.along_mps, guess.sigma_mps), 1
-    shown = with_place(followed.track, filtered, placed, share)
-    track = evolve(shown, returns=seen.returns, height_from=_height_from(followed))
+    height_from = _height_from(followed)
+    track = with_place(followed.track, filtered, placed, share, returns=seen.returns, height_from=height_from)
     return evolve(followed, track=track, place_filter=filtered, placed=placed, unplaced_s=0.0, refused=0)
 
 
@@ -153,8 +172,8 @@ def learned(followed: Followed, range_m: float, sigma_m: float, params: VisionTr
 
 
 def _hinted(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
-    """The object with what this image's box tells of its height while no range has: by its shape, and by where it
-    meets the road. Its place moves with that, so that it is no motion."""
+    """The object with this sighting, and with what its box tells of the height while no range has: by its shape, and by
+    where it meets the road. Its place moves with that, so that it is no motion."""
     by_class_m = seen.distance_as(followed.track.label)
     shape, contact = followed.shape, followed.contact
     if params.use_aspect:
@@ -162,16 +181,15 @@ def _hinted(followed: Followed, seen: VisionMeasurement, params: VisionTrackingP
     if seen.contact_m is not None and by_class_m is not None:
         log_ratio = math.log(seen.contact_m / by_class_m)
         contact = contact.seen(log_ratio, seen.contact_share, seen.contact_noise_share)
-    followed = evolve(followed, shape=shape, contact=contact)
     if followed.height.is_ranged:
-        return followed
+        return evolve(followed, seen=seen, shape=shape, contact=contact)
     label = followed.track.label
     factor = max(seen.class_factors.get(label, 1.0), 1.0)
     height = hinted(shape if label == "car" else BoxShape(), contact, seen.size_share or 0.0, factor)
     place = followed.place_filter
     if place is not None and height.mean != followed.height.mean:
         place = place_filter.scaled(place, height.factor / followed.height.factor)
-    return evolve(followed, height=height, place_filter=place)
+    return evolve(followed, seen=seen, shape=shape, contact=contact, height=height, place_filter=place)
 
 
 def _height_from(followed: Followed) -> HeightFrom:
@@ -203,23 +221,27 @@ def _is_plausible(place: CvState, ego_speed_mps: float | None) -> bool:
     return -FASTEST_ONCOMING_MPS - spare <= along_mps + own <= FASTEST_OVER_GROUND_MPS + spare
 
 
-def with_place(track: VisionTrack, place: CvState, placed: int, share: float | None = None) -> VisionTrack:
+def with_place(
+    track: VisionTrack, place: CvState, placed: int, share: float | None = None, **others: Any
+) -> VisionTrack:
     """The track with its public numbers, from its filter. ``share``: sigma over distance of the measurement taken in.
+    ``others``: fields that change with them.
 
     The sigma shown never falls below that of one sighting: most of it is the object's own unknown height, an error
     that no number of sightings averages out.
     """
     x, y, vx, vy = place.mean.tolist()
-    range_m, filter_sigma = math.hypot(x, y), place_filter.range_sigma_m(place)
+    range_m, (range_sigma, speed_sigma) = math.hypot(x, y), place_filter.radial_sigmas(place)
     if share is None:
         share = track.sigma_m / track.distance_m if track.sigma_m and track.distance_m else 0.0
     return evolve(
         track,
         distance_m=range_m,
-        sigma_m=max(filter_sigma, share * range_m),
+        sigma_m=max(range_sigma, share * range_m),
         position=(x, y),
         velocity_mps=(vx, vy) if placed >= 2 else None,
         # what stays wrong with the distance is wrong with its change in the same proportion
-        speed_sigma_mps=math.hypot(place_filter.speed_sigma_mps(place), share * math.hypot(vx, vy)),
+        speed_sigma_mps=math.hypot(speed_sigma, share * math.hypot(vx, vy)),
         ranges=placed,
+        **others,
     )

@@ -54,15 +54,11 @@ def start(seen: PlaceMeasurement, along_mps: float, speed_sigma_mps: float) -> C
     return CvState(np.array([seen.range_m * c, seen.range_m * s, along_mps, 0.0]), cov)
 
 
-def surprise(state: CvState, seen: PlaceMeasurement) -> float:
-    """The NIS of a measurement: χ² with 2 degrees of freedom if the model holds."""
-    return float(_innovate(state.mean, state.cov, *seen)[2])
-
-
-def update(state: CvState, seen: PlaceMeasurement) -> CvState:
-    """The state updated by a measurement."""
-    mean, cov, _ = _innovate(state.mean, state.cov, *seen)
-    return CvState(mean, cov)
+def update(state: CvState, seen: PlaceMeasurement) -> tuple[CvState, float]:
+    """The state updated by a measurement, and the NIS of that measurement: χ² with 2 degrees of freedom if the model
+    holds."""
+    mean, cov, nis = _innovate(state.mean, state.cov, *seen)
+    return CvState(mean, cov), nis
 
 
 def scaled(state: CvState, factor: float) -> CvState:
@@ -71,18 +67,14 @@ def scaled(state: CvState, factor: float) -> CvState:
     return CvState(state.mean * factor, state.cov * factor**2)
 
 
-def range_sigma_m(state: CvState) -> float:
-    """Standard deviation of the range."""
+def radial_sigmas(state: CvState) -> tuple[float, float]:
+    """Standard deviations of the range, m, and of the radial velocity, m/s."""
     x, y = state.mean[:2].tolist()
-    (xx, xy), (_, yy) = state.cov[:2, :2].tolist()
-    return math.sqrt(max(x * x * xx + 2 * x * y * xy + y * y * yy, 0.0)) / math.hypot(x, y)
-
-
-def speed_sigma_mps(state: CvState) -> float:
-    """Standard deviation of the radial velocity."""
-    x, y = state.mean[:2].tolist()
-    (xx, xy), (_, yy) = state.cov[2:, 2:].tolist()
-    return math.sqrt(max(x * x * xx + 2 * x * y * xy + y * y * yy, 0.0)) / math.hypot(x, y)
+    (xx, xy, _, _), (_, yy, _, _), (_, _, uu, uv), (_, _, _, vv) = state.cov.tolist()
+    range_var = x * x * xx + 2 * x * y * xy + y * y * yy
+    speed_var = x * x * uu + 2 * x * y * uv + y * y * vv
+    range_m = math.hypot(x, y)
+    return math.sqrt(max(range_var, 0.0)) / range_m, math.sqrt(max(speed_var, 0.0)) / range_m
 
 
 def position(state: CvState) -> Point2:

@@ -13,18 +13,29 @@ filter.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from pipeline.common import kalman
 from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64, iou_matrix
+from pipeline.common.kalman import CvState
 from pipeline.params import VisionTrackingParams
 from pipeline.types import Box, VisionMeasurement, VisionTrack
 from pipeline.vision.association import Expected, match, same_kind
-from pipeline.vision.followed import Followed, SpeedGuess, learned, predict_place, renamed, take_place, with_place
+from pipeline.vision.followed import (
+    Followed,
+    PredictedPlace,
+    SpeedGuess,
+    learned,
+    predict_places,
+    renamed,
+    take_place,
+    with_place,
+)
 
 SPEED_SIGMA_MPS = 8.0
 """Standard deviation of a new object's relative speed before a second sighting."""
@@ -59,14 +70,15 @@ def track(
     the first tick. ``ego_speed_mps``: used to guess the speed of a new object. Tracks are returned by id."""
     # Predict every track to now; without an image that is all
     guess = _first_guess(ego_speed_mps)
-    expected = [_predict(followed, dt_s or 0.0, params) for followed in state.followed]
+    expected = _predict(state.followed, dt_s or 0.0, params)
     if measurements is None:
         kept = tuple(followed for followed in expected if followed.unseen_s <= params.max_missed_s)
         return evolve(state, followed=kept), tuple(followed.track for followed in kept)
     # Match tracks and boxes one-to-one; a track without a box was missed in this image
     partner = match([_expected(followed, params) for followed in expected], measurements, params)
+    corrected = _correct(expected, measurements, partner, params)
     kept_list = [
-        _seen(followed, measurements[partner[row]], guess, ego_speed_mps, params)
+        _seen(followed, measurements[partner[row]], corrected[row], guess, ego_speed_mps, params)
         if row in partner
         else _missed(followed)
         for row, followed in enumerate(expected)
@@ -106,7 +118,7 @@ def learn_heights(
 
 def _expected(followed: Followed, params: VisionTrackingParams) -> Expected:
     """The prediction that the next box of an object is compared with."""
-    noise = _box_noise(followed.track.bbox, params)[0, 0]
+    noise = _centre_variance(followed.track.bbox, params)
     return Expected(
         followed.track, math.sqrt(followed.box_filter.cov[0, 0] + noise), math.sqrt(noise), followed.unseen_s
     )
@@ -123,22 +135,59 @@ def _without_ghosts(alive: tuple[Followed, ...], params: VisionTrackingParams) -
     return tuple(followed for followed in alive if followed.track.id not in ghosts) if ghosts else alive
 
 
-def _predict(followed: Followed, dt_s: float, params: VisionTrackingParams) -> Followed:
-    """The object predicted to now; it counts as carried until a box confirms it."""
-    aged = evolve(followed, unseen_s=followed.unseen_s + dt_s, unplaced_s=followed.unplaced_s + dt_s, seen=None)
+def _predict(followed: Sequence[Followed], dt_s: float, params: VisionTrackingParams) -> list[Followed]:
+    """The objects predicted to now; each counts as carried until a box confirms it. All filters of a kind are predicted
+    together."""
     if params.filter == "queue":
-        return evolve(aged, track=evolve(followed.track, carried=True, measured=False, returns=0))
-    box = followed.track.bbox
-    lively = params.accel_sigma_mps2 * _width(box) / _CAR_WIDTH_M + _TURN_PXPS2
-    moved = kalman.predict(followed.box_filter, dt_s, lively)
-    place, scale = predict_place(aged, dt_s, params)
-    track = evolve(followed.track, carried=True, measured=False, returns=0, bbox=_around(moved.mean, box, scale))
+        tracks = [evolve(each.track, carried=True, measured=False, returns=0) for each in followed]
+        return [_aged(each, dt_s, track=track) for each, track in zip(followed, tracks, strict=True)]
+    lively = [params.accel_sigma_mps2 * _width(each.track.bbox) / _CAR_WIDTH_M + _TURN_PXPS2 for each in followed]
+    boxes = kalman.predict(kalman.stacked([each.box_filter for each in followed]), dt_s, lively)
+    places = predict_places(followed, dt_s, params)
+    return [
+        _predicted(each, box, place, dt_s)
+        for each, box, place in zip(followed, kalman.unstacked(boxes), places, strict=True)
+    ]
+
+
+def _predicted(followed: Followed, moved: CvState, predicted: PredictedPlace, dt_s: float) -> Followed:
+    place, growth = predicted
+    unseen: dict[str, Any] = {
+        "carried": True,
+        "measured": False,
+        "returns": 0,
+        "bbox": _around(moved.mean, followed.track.bbox, growth),
+    }
     if place is not None:
-        track = with_place(track, place, followed.placed)
+        track = with_place(followed.track, place, followed.placed, **unseen)
     elif followed.place_filter is not None:
-        track = evolve(track, distance_m=None, sigma_m=None, position=None, velocity_mps=None)
+        track = evolve(followed.track, **unseen, distance_m=None, sigma_m=None, position=None, velocity_mps=None)
+    else:
+        track = evolve(followed.track, **unseen)
     placed = followed.placed if place is not None or followed.place_filter is None else 0
-    return evolve(aged, box_filter=moved, place_filter=place, placed=placed, track=track)
+    return _aged(followed, dt_s, box_filter=moved, place_filter=place, placed=placed, track=track)
+
+
+def _aged(followed: Followed, dt_s: float, **changes: Any) -> Followed:
+    """The object ``dt_s`` later, not seen yet, with these fields changed."""
+    unseen_s, unplaced_s = followed.unseen_s + dt_s, followed.unplaced_s + dt_s
+    return evolve(followed, unseen_s=unseen_s, unplaced_s=unplaced_s, seen=None, **changes)
+
+
+def _correct(
+    expected: Sequence[Followed],
+    measurements: Sequence[VisionMeasurement],
+    partner: Mapping[int, int],
+    params: VisionTrackingParams,
+) -> dict[int, CvState]:
+    """The box filters of all matched objects, by their row in ``expected``, updated together by their boxes."""
+    if params.filter == "queue":
+        return {row: expected[row].box_filter for row in partner}
+    boxes = [measurements[column].detection.bbox for column in partner.values()]
+    noise = [_box_noise(box, params, expected[row].track.bbox) for row, box in zip(partner, boxes, strict=True)]
+    before = kalman.stacked([expected[row].box_filter for row in partner])
+    after = kalman.update(before, [_centre(box) for box in boxes], np.array(noise).reshape(-1, 2, 2))
+    return dict(zip(partner, kalman.unstacked(after), strict=True))
 
 
 def _first_guess(ego_speed_mps: float | None) -> SpeedGuess:
@@ -167,8 +216,8 @@ def _new(track_id: int, seen: VisionMeasurement, guess: SpeedGuess, params: Visi
         measured=seen.distance_m is not None,
         ranges=int(seen.distance_m is not None),
     )
-    noise, speed_sigma = _box_noise(detection.bbox, params), _box_speed_sigma(detection.bbox)
-    box_filter = kalman.start(_centre(detection.bbox), noise, speed_sigma)
+    noise = _centre_variance(detection.bbox, params) * np.eye(2)
+    box_filter = kalman.start(_centre(detection.bbox), noise, _box_speed_sigma(detection.bbox))
     votes = ((detection.label, detection.score),)
     followed = Followed(shown, 0.0, 0.0 if seen.position else math.inf, 0, box_filter, None, votes)
     return take_place(followed, seen, guess, None, params) if params.filter == "kalman" else followed
@@ -177,20 +226,19 @@ def _new(track_id: int, seen: VisionMeasurement, guess: SpeedGuess, params: Visi
 def _seen(
     followed: Followed,
     seen: VisionMeasurement,
+    box_filter: CvState,
     guess: SpeedGuess,
     ego_speed_mps: float | None,
     params: VisionTrackingParams,
 ) -> Followed:
-    """The object updated by this image's box and distance."""
+    """The object updated by this image's box and distance. box_filter: its filter, already updated by the box."""
     detection = seen.detection
-    label, votes, box_filter, slip = detection.label, followed.votes, followed.box_filter, 0.0
+    label, votes, slip = detection.label, followed.votes, 0.0
     if params.filter == "kalman":
         tally = dict(votes)
         tally[label] = tally.get(label, 0.0) + detection.score
         label, votes = max(tally, key=lambda name: tally[name]), tuple(tally.items())
         slip = _slip_px(detection.bbox, followed.track.bbox, 0) / _width(detection.bbox)
-        noise = _box_noise(detection.bbox, params, followed.track.bbox)
-        box_filter = kalman.update(box_filter, _centre(detection.bbox), noise)
     track = evolve(
         followed.track,
         bbox=detection.bbox,
@@ -214,11 +262,16 @@ def _missed(followed: Followed) -> Followed:
     return evolve(followed, track=evolve(followed.track, missed=followed.track.missed + 1))
 
 
-def _box_noise(box: Box, params: VisionTrackingParams, expected: Box | None = None) -> F64:
-    """Covariance (2, 2) of a box's centre, including the deviation of its size from the expected size, if known."""
-    variance = max(_CENTRE_NOISE * _width(box), _EDGE_PX) ** 2 + params.shift_px**2
-    slips = [_slip_px(box, expected, axis) if expected is not None else 0.0 for axis in (0, 1)]
-    return np.diag([variance + slip**2 for slip in slips])
+def _centre_variance(box: Box, params: VisionTrackingParams) -> float:
+    """Variance of a box's centre along each axis of the image, as far as its width tells."""
+    return float(max(_CENTRE_NOISE * _width(box), _EDGE_PX) ** 2 + params.shift_px**2)
+
+
+def _box_noise(box: Box, params: VisionTrackingParams, expected: Box) -> tuple[tuple[float, float], ...]:
+    """Covariance (2, 2) of a box's centre, including the deviation of its size from the expected size."""
+    variance = _centre_variance(box, params)
+    across, down = (variance + _slip_px(box, expected, axis) ** 2 for axis in (0, 1))
+    return (across, 0.0), (0.0, down)
 
 
 def _slip_px(box: Box, expected: Box, axis: int) -> float:

@@ -13,8 +13,7 @@ from pipeline.alignment.projection import project_cuboid, resolve
 from pipeline.common.geometry import iou_matrix
 from pipeline.common.stopwatch import Stopwatch
 from pipeline.detection import Detectors, detect
-from pipeline.fusion.ground_contact import measure_contacts
-from pipeline.lidar.road_profile import road_ahead
+from pipeline.fusion.ground_contact import measure_contacts, road_ahead
 from pipeline.lidar.segmentation import segment
 from pipeline.params import Params
 from pipeline.sources import open_source
@@ -50,7 +49,10 @@ def placed(folder: Path) -> Iterator[Placed]:
         law = frame.raw_boxes.law
         boxes = measure(nms.select(frame.raw_boxes, params.detection), aligned, frame.camera, params.distance, law)
         sweep = segment(frame.sweep, frame.ego, params, Stopwatch())
-        boxes = measure_contacts(boxes, road_ahead(sweep.points, sweep.ground), aligned, params.fusion) or ()
+        boxes = (
+            measure_contacts(boxes, road_ahead(sweep.points, sweep.ground, boxes, aligned), aligned, params.fusion)
+            or ()
+        )
         truth = [item for item in source.truth(index) or () if item.label in VEHICLES]
         corners = [item.cuboid.corners() for item in truth]
         drawn = [project_cuboid(aligned, each, width, height) or (0.0, 0.0, 0.0, 0.0) for each in corners]

@@ -1,4 +1,4 @@
-"""Scores of real drives against their own labels, with floors that a change may not sink below."""
+"""Scores of real drives against their own labels, with minimums that a change must not fall below."""
 
 from __future__ import annotations
 

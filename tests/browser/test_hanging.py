@@ -1,4 +1,4 @@
-"""What hangs is said on every page that shows the drive."""
+"""A hang is reported on every page that shows the drive."""
 
 from __future__ import annotations
 

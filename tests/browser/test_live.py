@@ -1,4 +1,4 @@
-"""Live sensors at the pages: a real source on loopback, to which a simulated car sends."""
+"""Live sensors on the pages: a real source on loopback that a simulated car sends to."""
 
 from __future__ import annotations
 

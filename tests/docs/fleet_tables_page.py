@@ -26,14 +26,14 @@ def _tables_lines(made: str) -> Iterator[str]:
         "| file | contains |",
         "|---|---|",
         "| `tables/TABLE/run=RUN/drive=DRIVE/part.parquet` | the rows of one drive |",
-        "| `packed/TABLE/run=RUN/NUMBER.parquet` | the same rows of some hundred drives, with a column `drive` |",
+        "| `packed/TABLE/run=RUN/NUMBER.parquet` | the same rows of a few hundred drives, with a column `drive` |",
         "| `done/run=RUN/DRIVE.MARK.json` | marks that all files of a drive are complete |",
         "| `aside/run=RUN/DRIVE.MARK.json` | the reason why a recording was set aside |",
         "| `runs/RUN.json` | the code, networks and parameters of a run |",
         "| `boxes/MARK/…` | the networks' detections in a recording's images |",
         "| `results/run=RUN/DRIVE.jsonl.zst` | with `--results`: the JSON lines of `cipv run`, without timings |",
         "",
-        "A missing value is null. Equal recordings, code, parameters and networks give equal bytes in every file",
+        "A missing value is null. The same recordings, code, parameters and networks give the same bytes in every file",
         "except those of `timings`, whatever the number of workers.",
     )
     for table in TABLES:

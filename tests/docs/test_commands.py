@@ -1,4 +1,4 @@
-"""Commands and parameters that the documentation names are there."""
+"""The commands and parameters named in the documentation exist."""
 
 from __future__ import annotations
 

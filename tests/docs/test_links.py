@@ -1,4 +1,4 @@
-"""No link, anchor or image of the documentation leads nowhere."""
+"""No broken link, anchor or image in the documentation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is made from the code is up to date, and what is written by hand says the same as the code."""
+"""Generated pages are up to date, and handwritten ones agree with the code."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 import pytest
 
 from pipeline.decision.gates import CONDITIONS
+from pipeline.labels.formats.registry import FORMATS
 from tests.docs.pages import DOCS, code_spans
 from tests.docs.reference_pages import pages
 from tests.pipeline.types.test_result_json import FIELDS
@@ -31,3 +32,7 @@ def test_every_condition_of_a_lead_is_explained_in_its_order() -> None:
     table = (DOCS / "reference/results.md").read_text(encoding="utf-8").partition("### gates")[2].partition("\n## ")[0]
     assert [name for name in re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE) if name in names] == names
     assert set(names) <= set(code_spans("docs/guides/why.md"))
+
+
+def test_every_label_format_is_in_the_guide() -> None:
+    assert set(FORMATS) <= set(code_spans("docs/guides/label.md"))

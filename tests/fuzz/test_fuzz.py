@@ -1,4 +1,4 @@
-"""That the fuzzer finds what is wrong, and that nothing that it has found comes back."""
+"""The fuzzer finds planted faults, and no earlier finding comes back."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ def fused(
         lidar_points=0 if source == "V" else 40,
         lidar_track=None,
         vision_track=None,
-        lidar_hits=0 if source == "V" else hits,
-        lidar_steady=0 if source == "V" else hits,
+        ranged_hits=0 if source == "V" else hits,
+        ranged_steady=0 if source == "V" else hits,
         camera_ranges=0 if source == "L" else hits,
     )

@@ -1,4 +1,4 @@
-"""The whole line on a small scene: the same inputs give the same bytes, and a missing branch never stops it."""
+"""The whole pipeline on a small scene: the same inputs give the same bytes, and a missing branch never stops it."""
 
 from __future__ import annotations
 

@@ -43,6 +43,8 @@ from tests.conftest import ROOT
 from tests.pipeline.recording.frames import PERIOD_NS
 
 _ANSWER_S = 20.0
+_FULL_S = 600.0
+"""A disk is full after a second. A machine whose processors are taken needs minutes to start Python."""
 _JUMPS_S = (-86_400.0, -30.0, 30.0, 86_400.0)
 _FRAMES = 30
 _RECOVERY_S = 60.0
@@ -228,7 +230,7 @@ def record(folder: Path, chance: random.Random, figures: Figures) -> None:
     command = [sys.executable, "-c", _RECORD, str(path), str(limit)]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         if is_full:
-            told, _ = process.communicate(timeout=120)
+            told, _ = process.communicate(timeout=_FULL_S)
             if "recording stopped" not in told:
                 figures.wrong.append("a full disk is not said")
         else:

@@ -22,8 +22,8 @@ from pipeline.common.fast_replace import evolve
 from pipeline.common.stopwatch import Stopwatch
 from pipeline.experiments.robustness import traffic
 from pipeline.fusion.drift.follow import Drift, DriftState, Seen, follow
+from pipeline.fusion.ground_contact import road_ahead
 from pipeline.lidar import segmentation, tracking
-from pipeline.lidar.road_profile import road_ahead
 from pipeline.params import Params
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.rig import SensorRig
@@ -121,7 +121,8 @@ def drive(seed: int, number: int) -> tuple[float, dict[str, Outcome]]:
         last_ns = frame.t_ns
         sweep = segmentation.segment(lidar.disturbed(frame.sweep, index), frame.ego, params, Stopwatch(), tracked, dt_s)
         tracked, tracks = tracking.track(tracked, sweep.obstacles, dt_s, params.lidar_tracking)
-        road = road_ahead(sweep.points, sweep.ground, frame.ego.speed_mps if frame.ego is not None else None)
+        speed_mps = frame.ego.speed_mps if frame.ego is not None else None
+        aligned = resolve(params.alignment, rig.camera)
         camera = rig.camera
         plain = (
             each.visible > SIGHT_SHARE and np.hypot(*each.actor.cuboid.center[:2]) < SIGHT_M
@@ -132,6 +133,7 @@ def drive(seed: int, number: int) -> tuple[float, dict[str, Outcome]]:
         for watch in watches.values():
             raw = watch.boxes(blind, now)
             boxes = _measured(raw, params) if raw is not None else None
+            road = road_ahead(sweep.points, sweep.ground, boxes, aligned, speed_mps)
             seen = Seen(frame.t_ns, frame.name, tracks, boxes, road, (camera.width, camera.height))
             watch.take(seen, camera, now.t_s, traffic_s)
     km = (now.s_m - scene.ego.start_m) / 1000.0

@@ -95,9 +95,9 @@ class LabelEffort:
 
 @dataclass(frozen=True)
 class LabelQueue:
-    """List the recordings to label, most valuable first: assignee, state, how much is labelled and reviewed, and worth
-    (uncertain proposals and unclear leads per frame). With --drive and --assign or --state: change one. The person who
-    labels a recording cannot mark it as done.
+    """List the recordings to label, most valuable first: assignee, state, how much is labelled and reviewed, and
+    priority (uncertain proposals and unclear leads per frame). With --drive and --assign or --state: change one. The
+    person who labels a recording cannot mark it as done.
 
     Example: cipv labels queue --drive "Astyx HiRes2019" --assign Ada
     """
@@ -135,7 +135,7 @@ class LabelQueue:
             print(
                 f"{each.title}: {each.state}, {each.person or 'unassigned'}; labelled {percent(each.labelled)}, "
                 f"reviewed {percent(each.reviewed)}, proposals {each.proposals:,}, frames to label next {each.asked:,}"
-                f", worth {each.worth:.2f}"
+                f", priority {each.worth:.2f}"
             )
         if not found:
             say("no recordings yet: open one and label it, or run `cipv labels propose`")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from app.commands.support.progress_bars import frames_progress, task_progress
 from pipeline.detection import Detectors, detector_for, lanes_for
 from pipeline.params import Params
 from pipeline.run import run
@@ -15,10 +16,14 @@ STARTED = ("app.cli", "app.commands.serve", "app.web.server", "app.views.scene_f
 
 def main() -> None:
     """Import the dashboard's modules and run the pipeline on one frame of the demo."""
-    for name in STARTED:
-        import_module(name)
-    source = open_source("sim:straight")
-    next(iter(run(source, Params(), Detectors(detector_for(source), lanes_for(source)))))
+    with frames_progress() as bar:
+        progress = task_progress(bar, "compiling", len(STARTED) + 1)
+        for done, name in enumerate(STARTED):
+            progress(done, len(STARTED) + 1)
+            import_module(name)
+        progress(len(STARTED), len(STARTED) + 1)
+        source = open_source("sim:straight")
+        next(iter(run(source, Params(), Detectors(detector_for(source), lanes_for(source)))))
 
 
 if __name__ == "__main__":

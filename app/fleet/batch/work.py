@@ -122,9 +122,11 @@ def _before(job: Job) -> Outcome | None:
 
 def _check(job: Job) -> None:
     if code_digest() != job.key.code:
-        raise WrongWorker("a worker runs another version of CIPV Studio, or other libraries, than `cipv batch`")
+        raise WrongWorker(
+            "a worker does not have the same version of CIPV Studio, or of its libraries, as `cipv batch`"
+        )
     if networks_digest(job.choice) != job.key.networks:
-        raise WrongWorker("a worker has other networks installed than the machine of `cipv batch`")
+        raise WrongWorker("a worker does not have the same networks as the machine that runs `cipv batch`")
 
 
 def _missing_pieces(source: Source, detectors: Detectors, job: Job) -> bool:

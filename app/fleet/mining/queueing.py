@@ -47,7 +47,7 @@ class MiningQueue:
             def tag(draft: Draft, seconds: list[ChosenSecond] = seconds) -> str:
                 for each in seconds:
                     put_tag(draft, FrameTag(each.first, each.last, NEXT_TAG, Origin("pipeline", each.text, now_ms)))
-                return f"asked for labels of {len(seconds)} seconds"
+                return f"queued {len(seconds)} seconds for labeling"
 
             self._of(address).log.act("tag", person, tag)
         return len(by_address)

@@ -191,7 +191,7 @@ class LabelDesk:
             if acted is None and way == "undo" and self._forget_tried(act_id):
                 from app.labels.store.act_log import Acted
 
-                return ActDone(Acted(labels.revision, None, "what was being tried"), labels)
+                return ActDone(Acted(labels.revision, None, "the parameters being tried"), labels)
             if acted is None:
                 acted = labels.log.move(way, person, self._control.check, act_id=act_id)
             if acted.params:

@@ -21,7 +21,7 @@ LabelKey = tuple[ItemKind, int]
 """Kind and id of a label."""
 _NOTHING: dict[What, str] = {
     "unlabelled": "the lead is labelled in every frame there",
-    "asked": "no more frames are asked for there",
+    "asked": "no frames there are tagged to be labelled next",
     "disagreement": "the pipeline and the accepted labels agree there",
     "proposed": "no proposals there",
     "sent_back": "no labels sent back there",
@@ -112,7 +112,7 @@ def _asked(labels: DriveLabels) -> list[WorkPlace]:
     unlabelled = {place.frame for place in _unlabelled(labels)}
     tags = sorted((cast("FrameTag", item.value) for item in labels.items("tag").values()), key=lambda tag: tag.first)
     return [
-        WorkPlace(first, f"asked for: {tag.origin.name}")
+        WorkPlace(first, f"queued: {tag.origin.name}")
         for tag in tags
         if tag.tag == NEXT_TAG
         and (first := next((n for n in range(tag.first, tag.last + 1) if n in unlabelled), None)) is not None

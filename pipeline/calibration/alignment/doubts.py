@@ -45,7 +45,7 @@ def warnings_of(
     if len(best.rows) < FEW_PAIRS:
         warnings.append(f"both sensors see only {len(best.rows)} vehicles")
     if far < SAME_RANGE * near:
-        warnings.append(f"all vehicles are {near:.0f}–{far:.0f} m away: an angle and an offset look alike there")
+        warnings.append(f"all vehicles are {near:.0f}–{far:.0f} m away: angle and offset cannot be told apart")
     if bearing_deg.std() < SAME_BEARING_DEG:
         warnings.append("all vehicles are in one direction: roll and resolution need vehicles to the sides")
     for name, sigma in sigmas.items():

@@ -128,7 +128,7 @@ def fit_alignment(
     spread = _bootstrap(table, model, vector, blocks, rolls, progress)
     warnings = warnings_of(table, model, found, model.spread(spread))
     if looks_undistorted(table, model, vector, blocks):
-        warnings += ("the boxes fit better without the lens distortion: are the images undistorted already?",)
+        warnings += ("the boxes fit better without lens distortion: are the images already undistorted?",)
     judged = PairTable.of([scenes[k] for k in held]) if held else table
     start = model.vector(present)
     after, *before = _overlaps(judged, model, [vector, *([start] if start is not None else [])])

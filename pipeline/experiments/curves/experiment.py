@@ -72,7 +72,7 @@ def as_drive(case: CurveCase, outcome: CurveOutcome) -> ExperimentDrive:
         f"curves_{case.kind}_{case.layout}_{case.seed}",
         f"{scenarios.LAYOUTS[case.layout].title}: "
         f"{'cut-in' if case.kind == 'cut_in' else 'following'}, run {case.seed}",
-        (f"All path sources fused: right in {100.0 * share:.1f} % of {frames} decidable frames.",),
+        (f"All path sources fused: correct in {100.0 * share:.1f} % of {frames} decidable frames.",),
         _scenario(case)[0],
         Params(),
         "both",
@@ -149,7 +149,7 @@ def report(cases: Sequence[CurveCase], outcomes: Sequence[CurveOutcome]) -> Repo
             *(_verdict(name, drives) for name, drives in follows.items()),
         ),
         (
-            Table("CIPV right, % of decidable frames", _CHOICE_COLUMNS, tuple(_choice_rows(follows)), decimals=1),
+            Table("CIPV correct, % of decidable frames", _CHOICE_COLUMNS, tuple(_choice_rows(follows)), decimals=1),
             Table("Path compared with the path actually driven", _PATH_COLUMNS, tuple(_path_rows(follows)), decimals=2),
             Table(
                 "Cut-in: recognised before its wheel crosses the line, s",
@@ -169,7 +169,7 @@ def report(cases: Sequence[CurveCase], outcomes: Sequence[CurveOutcome]) -> Repo
     )
 
 
-_CHOICE_COLUMNS = ("road", "sources", "to 60 m", "frames", "to the reach", "frames", "reach m", "longest on a decoy s")
+_CHOICE_COLUMNS = ("road", "sources", "to 60 m", "frames", "to the reach", "frames", "reach m", "longest decoy lead s")
 _PATH_COLUMNS = ("road", "sources", "10 m", "30 m", "60 m", "100 m", "error/σ at 30 m", "error/σ at 60 m")
 
 
@@ -250,7 +250,7 @@ def _verdict(layout: str, by_source: dict[str, list[SourceFrames]]) -> str:
     alone = share_right(by_source[LIDAR_ALONE])[0]
     better = "better than" if far > alone + 0.005 else "no better than"
     return (
-        f"{kind.title}: right in {100 * near:.1f} % to 60 m and {100 * far:.1f} % to {kind.reach_m:.0f} m, "
+        f"{kind.title}: correct in {100 * near:.1f} % to 60 m and {100 * far:.1f} % to {kind.reach_m:.0f} m, "
         f"at most {wrong_s:.1f} s on a decoy: {held}; {better} the LiDAR alone ({100 * alone:.1f} %)."
     )
 

@@ -106,7 +106,7 @@ def as_drive(case: ChoiceCase, frames: list[ChoiceFrame]) -> ExperimentDrive:
     return ExperimentDrive(
         case.name,
         f"{SCENARIOS[case.scene].capitalize()}: {SENSORS[case.sensors]}, run {case.seed}",
-        (f"Right in {100.0 * _share_correct([frames]):.1f} % of {counted} decidable frames.",),
+        (f"Correct in {100.0 * _share_correct([frames]):.1f} % of {counted} decidable frames.",),
         _scenario(case),
         Params(),
         case.sensors,
@@ -185,7 +185,7 @@ def report(cases: Sequence[ChoiceCase], runs: Sequence[list[ChoiceFrame]]) -> Re
         ),
         tuple(_chart(scene, groups) for scene in scenes),
         tuple(
-            f"{SCENARIOS[scene].capitalize()}: fused is not right in every decidable frame"
+            f"{SCENARIOS[scene].capitalize()}: fused is not correct in every decidable frame"
             for scene in scenes
             if groups[scene, "both"] and _share_correct(groups[scene, "both"]) < 1.0
         ),
@@ -241,7 +241,7 @@ def _verdict(scene: str, groups: dict[ChoiceKey, list[list[ChoiceFrame]]]) -> st
     share = {sensors: 100.0 * _share_correct(groups[scene, sensors]) for sensors in SENSORS}
     better = "better than" if share["both"] > share["lidar"] + 0.5 else "no better than"
     return (
-        f"{SCENARIOS[scene].capitalize()}: fused is right in {share['both']:.1f} % of the frames, {better} the LiDAR "
+        f"{SCENARIOS[scene].capitalize()}: fused is correct in {share['both']:.1f} % of the frames, {better} the LiDAR "
         f"alone ({share['lidar']:.1f} %); the camera alone {share['camera']:.1f} %."
     )
 

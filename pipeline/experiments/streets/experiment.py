@@ -63,7 +63,7 @@ def as_drive(case: StreetCase, outcome: StreetOutcome) -> ExperimentDrive:
     return ExperimentDrive(
         f"street_{street.radius_m:.0f}_{street.beside}_{street.ahead}_{case.seed}",
         f"{street.title}, run {case.seed}",
-        (f"Right in {100.0 * share:.1f} % of {frames} decidable frames.",),
+        (f"Correct in {100.0 * share:.1f} % of {frames} decidable frames.",),
         scenarios.scenario(street, case.seed),
         with_changes(Params(), SETTINGS[WITH]),
         "both",
@@ -83,7 +83,7 @@ def report(cases: Sequence[StreetCase], outcomes: Sequence[StreetOutcome]) -> Re
         ),
         (
             Table(
-                "CIPV right, % of decidable frames",
+                "CIPV correct, % of decidable frames",
                 ("beside the road", "ahead", "path", "right, %", "frames", "longest wrong, s", "path error at 30 m, m"),
                 tuple(_rows(cases, outcomes)),
                 decimals=2,

@@ -106,7 +106,7 @@ def _read_profile(file: BinaryIO) -> str:
         file.seek(0, io.SEEK_END)
         file.seek(max(0, file.tell() - len(MAGIC)))
         if file.read() == MAGIC:
-            raise Unreadable("a damaged MCAP file: its beginning is overwritten")
+            raise Unreadable("a damaged MCAP file: its beginning was overwritten")
         raise Unreadable("not an MCAP file")
     try:
         opcode, _ = RECORD_HEAD.unpack_from(start, len(MAGIC))

@@ -100,7 +100,7 @@ export function within(event, selector) {
 /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2DSettings} [settings] */
 export function context(canvas, settings) {
   const ctx = canvas.getContext("2d", settings);
-  if (!ctx) throw new Error("this browser draws no canvas");
+  if (!ctx) throw new Error("this browser does not support canvas");
   return ctx;
 }
 

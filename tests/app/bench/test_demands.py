@@ -1,4 +1,4 @@
-"""What is demanded of the stages: what does not hold, or was not measured, is said."""
+"""Requirements on the stages: one that is missed or was not measured is reported."""
 
 from __future__ import annotations
 

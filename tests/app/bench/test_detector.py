@@ -1,4 +1,5 @@
-"""The shape of the bench's figures, and the fairness of its turns; how fast anything is, the bench itself says."""
+"""The form of the detector benchmark's figures, and that it alternates fairly; speed itself is left to the
+benchmark."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bench's own way to a browser."""
+"""The benchmark's own connection to a browser."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bench of the LiDAR branch: the shape that is printed, honest peers, and a sentence where a peer is missing."""
+"""The LiDAR benchmark: what it prints, equal work for its peers, and a sentence where a peer is missing."""
 
 from __future__ import annotations
 

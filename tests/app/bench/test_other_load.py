@@ -1,4 +1,4 @@
-"""A loaded machine is recognised by what others took of it, and an idle one is not accused."""
+"""A busy machine is recognised by the processor time of other programs, and an idle one is not reported."""
 
 from __future__ import annotations
 

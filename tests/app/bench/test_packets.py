@@ -1,4 +1,4 @@
-"""The bench of the packet decoder: the shape that is printed, and peers that do the same work."""
+"""The packet decoder benchmark: what it prints, and peers that do the same work."""
 
 from __future__ import annotations
 

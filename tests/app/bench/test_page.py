@@ -1,4 +1,4 @@
-"""The page's bench, as far as it needs no browser of its own."""
+"""The parts of the page benchmark that need no browser."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bench of the whole step: alone, beside a network that really runs meanwhile, and with it."""
+"""The benchmark of the whole step: alone, beside a running network, and including it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The newest wish wins, and each is served once."""
+"""The newest request wins, and each is served once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Detections are kept by what the detector was given, and a disk that fails only costs time."""
+"""Detections are cached by the detector's input, and a failing disk only costs time."""
 
 from __future__ import annotations
 

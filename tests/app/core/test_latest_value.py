@@ -1,4 +1,4 @@
-"""The newest-only hand-over."""
+"""A hand-over that holds only the newest value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The cache is bounded and forgets what was not used for longest."""
+"""The cache is bounded and evicts what was not used for longest."""
 
 from __future__ import annotations
 

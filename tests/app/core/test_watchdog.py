@@ -1,4 +1,4 @@
-"""Who takes longer than ever is noticed; who is slow by habit, who waits, and a machine that slept are not blamed."""
+"""An operation that takes longer than ever is reported; habitual slowness, waiting and a suspended machine are not."""
 
 from __future__ import annotations
 

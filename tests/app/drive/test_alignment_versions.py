@@ -1,4 +1,4 @@
-"""Saved alignments are there tomorrow; what is damaged or no longer applies is left out."""
+"""Saved alignments persist; damaged ones and those that no longer apply are left out."""
 
 from __future__ import annotations
 

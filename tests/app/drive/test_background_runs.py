@@ -1,4 +1,4 @@
-"""Whole drives in the background: the newest wish first, runs that are kept, what goes wrong."""
+"""Whole drives in the background: the newest request first, saved runs, and failures."""
 
 from __future__ import annotations
 

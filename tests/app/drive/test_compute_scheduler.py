@@ -1,4 +1,4 @@
-"""Who may work: what is in front goes first, a hand that moves too, and nobody waits for ever."""
+"""Who may compute: interactive requests and slider drags take priority, and nothing waits for ever."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run keeps of its results is enough to score it, and to propose labels from it."""
+"""What a run stores of its results is enough to score it and to propose labels from it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What looks at a source's images, and what the page says about it."""
+"""Which detectors process a source's images, and what the page says about it."""
 
 from __future__ import annotations
 

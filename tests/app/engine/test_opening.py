@@ -1,4 +1,4 @@
-"""Recordings and detectors that come, take long, fail, and are asked for again."""
+"""Opening recordings and detectors: slow ones, failures and repeated requests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A network or a disk that hangs for ever: said, and gone on without, while the recording goes on."""
+"""A network or a disk that hangs for ever is reported and replaced, while recording continues."""
 
 from __future__ import annotations
 

@@ -131,7 +131,7 @@ def test_one_undo_goes_across_labels_parameters_and_calibration(engine: Engine, 
 def test_a_slider_that_is_only_tried_is_undone_first(engine: Engine, client: httpx.Client) -> None:
     act(client, kind="tag", first=3, last=3, tag="night")
     client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 9}, "final": False})
-    assert move(client, "undo", "Ada").json()["what"] == "what was being tried"
+    assert move(client, "undo", "Ada").json()["what"] == "the parameters being tried"
     assert engine.control.peek().params.cipv.confirm_hits == 3
     assert len(labels(client)["tags"]) == 1
 

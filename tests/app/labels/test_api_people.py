@@ -45,7 +45,7 @@ def test_what_is_sent_again_is_answered_as_before_and_done_once(engine: Engine, 
     engine.wait_for(lambda shown: shown.labels.task is not None and not shown.labels.task.running, WAIT_S)
     number = next(numbers)
     client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 9}, "final": False})
-    assert [sent("undo").json()["what"] for _ in range(2)] == ["what was being tried"] * 2
+    assert [sent("undo").json()["what"] for _ in range(2)] == ["the parameters being tried"] * 2
 
 
 def test_what_was_meant_for_another_recording_is_not_done_to_this_one(client: httpx.Client) -> None:

@@ -1,4 +1,4 @@
-"""The page's files stay readable: short lines, and folders that one look takes in."""
+"""The page's source files stay readable: short lines, small folders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words that the page has too are those of the program."""
+"""Names that the page repeats are those of the program."""
 
 from __future__ import annotations
 

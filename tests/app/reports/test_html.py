@@ -1,4 +1,4 @@
-"""The report shows every number, loads nothing, and takes no text for markup."""
+"""The report shows every number, loads nothing, and escapes all text."""
 
 from __future__ import annotations
 

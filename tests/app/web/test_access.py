@@ -1,4 +1,4 @@
-"""Who is let in: names of this machine, pages of the same origin, and programs."""
+"""Which requests are accepted: names of this machine, pages of the same origin, and programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who changed, opened or exported something stands in the audit log, and nothing else does."""
+"""The audit log records who changed, opened or exported something, and nothing else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Clients that never say what they want cost nobody else anything."""
+"""Clients that never finish a request do not affect others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whoever may only look holds nobody else up, and work ends when nobody waits for it."""
+"""Read-only clients do not delay anyone, and work ends when nobody waits for it."""
 
 from __future__ import annotations
 

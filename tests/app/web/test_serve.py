@@ -201,7 +201,7 @@ def test_disks_and_databases_that_hang_for_ever_keep_neither_the_recording_open_
                 program.send_signal(signal.SIGTERM)
                 _, errors = program.communicate(timeout=60)
         assert program.returncode == 0
-        assert errors.splitlines()[-1] == "cipv: ended without waiting for work that hangs; the recording is closed"
+        assert errors.splitlines()[-1] == "cipv: exited without waiting for hung work; the recording is closed"
         (session,) = tmp_path.iterdir()
         assert session.read_bytes().endswith(b"\x89MCAP0\r\n"), "its index and its end are there"
     finally:

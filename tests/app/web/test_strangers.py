@@ -1,4 +1,4 @@
-"""Other websites, names bound anew to this machine, paths outside the page: all refused."""
+"""Other websites, rebound host names, and paths outside the page: all refused."""
 
 from __future__ import annotations
 

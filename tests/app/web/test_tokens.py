@@ -1,4 +1,4 @@
-"""Tokens: whose they are, and that a wrong one takes the same way as a right one."""
+"""Tokens: which role each has, and that a wrong one is handled exactly like a right one."""
 
 from __future__ import annotations
 

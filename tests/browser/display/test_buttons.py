@@ -1,4 +1,4 @@
-"""Marking, recording, and what a display may not do."""
+"""Marking, recording, and what a display is not allowed to do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is too old is covered at once, and a connection that has died is left for another."""
+"""Outdated content is covered at once, and a dead connection is replaced."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The alignment score is highest at the true mount, falls to all sides, and is none where nothing can be told."""
+"""The alignment score peaks at the true mount, falls on all sides, and is None where nothing can be determined."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arrows of regions point to where the points belong; what cannot tell says nothing."""
+"""Arrows of regions point to where the points belong; regions without evidence show none."""
 
 from __future__ import annotations
 

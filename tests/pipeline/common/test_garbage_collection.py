@@ -1,4 +1,4 @@
-"""The collector of cycles rests while somebody wants it to, and no longer."""
+"""Garbage collection is paused for as long as requested, and no longer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Boxes and what they have in common."""
+"""Boxes and their overlap."""
 
 from __future__ import annotations
 

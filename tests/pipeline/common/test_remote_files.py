@@ -1,4 +1,4 @@
-"""Files in stores: what is an address, what is asked again, what is said."""
+"""Files in stores: valid addresses, retries and error messages."""
 
 from __future__ import annotations
 

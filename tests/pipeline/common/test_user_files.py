@@ -1,4 +1,4 @@
-"""What is no regular file is neither waited for nor read, whoever asks for it and however."""
+"""Anything but a regular file is refused without waiting for it or reading it."""
 
 from __future__ import annotations
 

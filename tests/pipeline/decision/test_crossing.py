@@ -1,4 +1,4 @@
-"""What crosses the path is in it only if it is still there when the car arrives."""
+"""A crossing object is in the path only if it will still be there when the car arrives."""
 
 from __future__ import annotations
 

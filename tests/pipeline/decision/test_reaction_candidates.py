@@ -34,12 +34,12 @@ def judged(item: FusedObject, ego_mps: float | None = 20.0) -> FusedObject:
         pytest.param(fused(1, 15.0, 3.0, source="V"), False, id="camera alone: its speed comes from a box height"),
         pytest.param(fused(1, 15.0, 3.0, source="L", hits=2), False, id="a blob seen twice"),
         pytest.param(
-            dataclasses.replace(fused(1, 15.0, 3.0, hits=40), lidar_steady=2),
+            dataclasses.replace(fused(1, 15.0, 3.0, hits=40), ranged_steady=2),
             False,
             id="followed by the camera for long, by the LiDAR only since the sweep before",
         ),
         pytest.param(
-            dataclasses.replace(fused(1, 15.0, 3.0, hits=40), lidar_steady=0),
+            dataclasses.replace(fused(1, 15.0, 3.0, hits=40), ranged_steady=0),
             False,
             id="followed for long, but another part of it was seen",
         ),

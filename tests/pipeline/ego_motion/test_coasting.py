@@ -1,4 +1,4 @@
-"""The own motion while nobody measures it."""
+"""Ego motion while it is not measured."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Own motion from poses of somebody else."""
+"""Ego motion from recorded poses."""
 
 from __future__ import annotations
 

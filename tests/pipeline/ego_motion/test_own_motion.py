@@ -90,8 +90,8 @@ def test_a_yaw_rate_of_the_wrong_sign_is_contradicted_and_a_late_receiver_is_not
 @pytest.mark.parametrize(
     ("source", "recorded", "gnss_mps", "says"),
     [
-        ("can", None, 12.0, "ego motion: nothing from CAN; there is GNSS, not used"),
-        ("gnss", CAN, None, "ego motion: nothing from GNSS; there is CAN, not used"),
+        ("can", None, 12.0, "ego motion: no data from CAN; GNSS available but not used"),
+        ("gnss", CAN, None, "ego motion: no data from GNSS; CAN available but not used"),
         ("gnss", None, None, None),
         ("off", CAN, 12.0, None),
     ],

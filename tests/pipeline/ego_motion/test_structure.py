@@ -1,4 +1,4 @@
-"""What carries odometry."""
+"""Which structure constrains odometry."""
 
 from __future__ import annotations
 

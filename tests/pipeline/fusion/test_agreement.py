@@ -1,4 +1,4 @@
-"""Camera and LiDAR that see cars in different places."""
+"""Camera and LiDAR see cars in different places."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What speaks for an object and what against it, and what a sensor cannot know."""
+"""Evidence for and against an object, and what a sensor cannot observe."""
 
 from __future__ import annotations
 

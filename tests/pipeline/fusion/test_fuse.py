@@ -79,7 +79,7 @@ def test_one_car_seen_by_both_is_one_row_with_the_lidars_place_and_the_cameras_n
     _, result = joined([track], [vision_track(1, box_of(track), 21.0)])
     (item,) = result.objects
     assert (item.source, item.label, item.distance_m) == ("VL", "car", pytest.approx(np.hypot(20.0, 1.0)))
-    assert item.lidar_hits == track.hits
+    assert item.ranged_hits == track.hits
     assert item.velocity_mps == (-2.0, 0.0)
     assert item.bbox == result.lidar_boxes[item.id]
     assert result.vision_boxes[item.id] == box_of(track)

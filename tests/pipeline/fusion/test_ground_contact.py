@@ -7,8 +7,8 @@ import pytest
 
 from pipeline.alignment.projection import Alignment, Angular, resolve
 from pipeline.common.geometry import F64
-from pipeline.fusion.ground_contact import measure_contacts
-from pipeline.lidar.road_profile import RoadProfile, road_ahead
+from pipeline.fusion.ground_contact import measure_contacts, road_ahead
+from pipeline.lidar.road_profile import RoadProfile
 from pipeline.params import AlignmentParams, FusionParams
 from pipeline.types import F32, Box, CameraCalibration, Detection, Ground, VisionMeasurement
 from tests.pipeline.lidar.test_road_profile import road
@@ -25,12 +25,12 @@ def aligned() -> Alignment:
     return found
 
 
-def swept(points: F32 | None = None) -> RoadProfile | None:
+def swept(points: F32 | None = None, *boxes: VisionMeasurement) -> RoadProfile | None:
+    """The road in these returns, behind boxes or else behind one in the sky."""
     points = road() if points is None else points
     planes: F64 = np.array([[0.0, 0.0, 1.0, 0.8]])
-    return road_ahead(
-        points, Ground(np.ones(len(points), dtype=np.bool_), planes, np.array([0.0, 60.0]), np.array([True]))
-    )
+    ground = Ground(np.ones(len(points), dtype=np.bool_), planes, np.array([0.0, 60.0]), np.array([True]))
+    return road_ahead(points, ground, boxes or (seen((0.0, 0.0, 10.0, 10.0), 40.0),), aligned())
 
 
 def box_of(range_m: float, height_m: float = 1.5, y_m: float = 0.0, width_m: float = 1.8) -> Box:
@@ -115,7 +115,21 @@ def test_without_what_it_rests_on_boxes_stay_as_they_are() -> None:
     params, angular = FusionParams(), Angular(0.001, 0.001, MIDDLE_PX, HORIZON_PX)
     assert measure_contacts(None, swept(), aligned(), params) is None
     assert measure_contacts(boxes, swept(road()[:10]), aligned(), params) == boxes
-    assert measure_contacts(boxes, road_ahead(road(), None), aligned(), params) == boxes
+    assert measure_contacts(boxes, road_ahead(road(), None, boxes, aligned()), aligned(), params) == boxes
     assert measure_contacts(boxes, swept(), None, params) == boxes
     assert measure_contacts(boxes, swept(), angular, params) == boxes, "its rays do not start at the camera"
     assert measure_contacts(boxes, swept(), aligned(), FusionParams(use_ground_contact=False)) == boxes
+
+
+def test_returns_on_a_vehicle_are_no_road() -> None:
+    """Behind a crest, a ring on its rear lies where the flat road would be: the road is not measured there."""
+    near = road()[road()[:, 0] < 12.0]
+    rear = np.array([(28.0, y, -0.8, 0.0) for y in np.linspace(-0.9, 0.9, 15)], dtype=np.float32)
+    points, vehicle = np.concatenate([near, rear]), seen(box_of(28.0), 28.0)
+    lower = vehicle.detection.bbox[3]
+    hanging = seen((*vehicle.detection.bbox[:3], lower + 20.0), 28.0)
+    at = np.array([28.0])
+    known, unknown = swept(points), swept(points, hanging)
+    assert known is not None
+    assert unknown is not None
+    assert unknown.height_sigma_m(at)[0] > 2.0 * known.height_sigma_m(at)[0]

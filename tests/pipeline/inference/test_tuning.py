@@ -9,9 +9,10 @@ from time import sleep
 import numpy as np
 import pytest
 
+from pipeline.common.fast_replace import evolve
 from pipeline.inference import tuning
 from pipeline.inference.runtime import open_session, ways_of
-from pipeline.inference.tuning import RunSettings, Trial, fastest, keep, kept_way, tune, untuned
+from pipeline.inference.tuning import RunSettings, Trial, fastest, is_tuned, keep, keep_fastest, kept_way, tune, untuned
 from pipeline.types import F32
 from tests.pipeline.vision import networks
 
@@ -71,7 +72,7 @@ def test_a_way_that_cannot_be_gone_is_not(network: Path, way: RunSettings) -> No
 
 
 def test_every_way_of_a_real_network_is_tried_and_gives_its_outputs(network: Path) -> None:
-    trials = list(tune(ways_of(network), 2))
+    trials = list(tune(ways_of(network), 2, rounding=True))
     assert trials[0].way == untuned(2)
     assert len({trial.way for trial in trials}) == len(trials) >= 4
     assert not [trial for trial in trials if trial.best_ms is None]
@@ -97,11 +98,38 @@ def test_the_faster_one_is_chosen_unless_its_outputs_differ() -> None:
     def is_slow(way: RunSettings) -> bool:
         return way.optimisation != "ORT_ENABLE_BASIC"
 
-    honest = list(tune(_made(is_slow, lambda _: 1.0), 2))
+    honest = list(tune(_made(is_slow, lambda _: 1.0), 2, rounding=True))
     assert fastest(honest).way.optimisation == "ORT_ENABLE_BASIC"
-    wrong = list(tune(_made(is_slow, lambda way: 1.0 if is_slow(way) else 1.1), 2))
+    wrong = list(tune(_made(is_slow, lambda way: 1.0 if is_slow(way) else 1.1), 2, rounding=True))
     assert fastest(wrong).way.optimisation != "ORT_ENABLE_BASIC"
     assert {trial.refused for trial in wrong if not is_slow(trial.way)} == {"its outputs differ"}
+
+
+def test_results_do_not_depend_on_tuning_unless_rounding_is_permitted() -> None:
+    """The outputs of one thread differ in their last bit."""
+
+    def is_slow(way: RunSettings) -> bool:
+        return way.threads != 1 and way.arena
+
+    def output(way: RunSettings) -> float:
+        return 1.0 if way.threads != 1 else float(np.nextafter(np.float32(1.0), np.float32(2.0)))
+
+    trials = list(tune(_made(is_slow, output), 2))
+    assert {(trial.way.optimisation, trial.way.providers) for trial in trials} == {
+        (untuned(2).optimisation, untuned(2).providers)
+    }
+    assert {trial.refused for trial in trials if trial.way.threads == 1} == {"its outputs differ"}
+    assert fastest(trials).way == evolve(untuned(2), arena=False)
+    assert fastest(list(tune(_made(is_slow, output), 2, rounding=True))).way.threads == 1
+
+
+def test_threads_and_arena_leave_the_outputs_of_a_network_as_they_are(network: Path) -> None:
+    trials = list(tune(ways_of(network), 2))
+    assert len(trials) >= 3
+    assert not [trial for trial in trials if trial.refused]
+    best = keep_fastest(network, trials)
+    assert is_tuned(network)
+    assert kept_way(network, 2) == best.way
 
 
 def test_a_gain_within_the_spread_changes_nothing() -> None:

@@ -1,4 +1,4 @@
-"""Who is who over time where labels do not say it."""
+"""Linking objects over time where labels have no identities."""
 
 from __future__ import annotations
 

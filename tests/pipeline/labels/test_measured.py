@@ -135,7 +135,7 @@ def test_without_points_it_is_as_far_as_it_looks(frame: Frame) -> None:
 def test_where_nothing_tells_it_is_said(frame: Frame) -> None:
     with pytest.raises(NothingThere, match="draw a box around it"):
         lift(frame, Params(), "car", pixel=(3.0, 3.0))
-    with pytest.raises(NothingThere, match="such a box of a person gives no distance"):
+    with pytest.raises(NothingThere, match="such a box gives no distance for a person"):
         lift(replace(frame, sweep=None), Params(), "person", bbox=BOX)
     with pytest.raises(NothingThere, match="not calibrated"):
         lift(replace(frame, camera=None), Params(), "car", bbox=BOX)

@@ -1,4 +1,4 @@
-"""What in labels can hardly be so."""
+"""Implausible labels."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_a_lead_is_there_and_ahead_of_us() -> None:
 
 def test_a_box_that_somebody_set_elsewhere_is_found() -> None:
     track = LabelTrack(1, "car", (Sighting(0, CAR, (5.0, 5.0, 60.0, 50.0), box_set=True),), "accepted", BY)
-    assert found(track) == [(0, "#1 car: its box is not where its cuboid is")]
+    assert found(track) == [(0, "#1 car: its box does not match its cuboid")]
     assert found(replace(track, sightings=(replace(track.sightings[0], box_set=False),))) == [], "one that follows is"
 
 

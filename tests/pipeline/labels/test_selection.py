@@ -1,4 +1,4 @@
-"""Which labels leave the house."""
+"""Which labels are exported."""
 
 from __future__ import annotations
 

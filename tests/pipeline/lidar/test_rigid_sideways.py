@@ -1,4 +1,4 @@
-"""What swerves, and what only seems to: a footprint that grows as it is passed."""
+"""Real swerves, and apparent ones: a footprint that grows while it is passed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tracks in words: who is whom, how fast, and what is carried or given up."""
+"""LiDAR tracks: identity, speed, carrying and dropping."""
 
 from __future__ import annotations
 

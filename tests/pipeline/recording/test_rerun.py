@@ -1,4 +1,4 @@
-"""rerun opens a session as it is: its own loader finds points, images, the camera and how they hang together."""
+"""rerun opens a session as it is: its own loader finds points, images, the camera and their transforms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The line believes the same of a session as of the recording that it was made from."""
+"""The pipeline gives the same results for a session as for the recording that it was made from."""
 
 from __future__ import annotations
 

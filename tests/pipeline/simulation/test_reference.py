@@ -1,4 +1,4 @@
-"""The reference of scenario files says what the code says: every key, every default, and an example that plays."""
+"""The reference of scenario files agrees with the code: every key, every default, and an example that runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One door to every kind of recording, and what it says when there is nothing behind it."""
+"""Opening every kind of recording, and the error if there is none."""
 
 from __future__ import annotations
 

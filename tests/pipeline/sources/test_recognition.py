@@ -1,4 +1,4 @@
-"""A path without a scheme: opened by what is in it, or answered with what it looks like and what to do."""
+"""A path without a scheme is opened by its content, or answered with what it seems to be and what to do."""
 
 from __future__ import annotations
 
@@ -214,7 +214,7 @@ OTHERS: dict[str, tuple[Write, str]] = {
         lambda folder: copies(write_astyx)(folder / "a" / "b").parent,
         r"it holds recordings; open one of them, for example .*/a/b/one$",
     ),
-    "a link to itself": (link_to_itself, "a link that leads nowhere|cannot be read"),
+    "a link to itself": (link_to_itself, "a broken link|cannot be read"),
     "a folder in itself": (folder_in_itself, "it holds folders again"),
     "a pipe": (pipe, "not a file or folder"),
     "a video's first bytes": (some_file("a", b"\0\0\0\x20ftypisom"), "a: not a readable video: cut off, or something"),

@@ -1,4 +1,4 @@
-"""Which followed object a box is: the most likely one, which is not always the least surprised one."""
+"""Which track a box belongs to: the most likely one, which is not always the nearest in sigmas."""
 
 from __future__ import annotations
 

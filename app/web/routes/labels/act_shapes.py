@@ -14,7 +14,7 @@ from app.labels.store.values import LONGEST_ITEM
 from app.web.routes.labels.shapes import ItemKey, LabelChanges
 from app.web.routes.shapes.common import ApiModel
 
-DriveKey = Annotated[str, Field(max_length=LONGEST_ITEM, description="Id of the recording, of GET /api/labels")]
+DriveKey = Annotated[str, Field(max_length=LONGEST_ITEM, description="Id of the recording, from GET /api/labels")]
 
 
 class Sent(Strict):

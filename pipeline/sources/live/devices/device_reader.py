@@ -71,7 +71,7 @@ class Reader:
         hangs_s = now_s - self._stop.asked_s
         if not self._thread.is_alive() or hangs_s <= HANGS_S or self._stop:
             return
-        logger.error("%s hangs for %.0f s and is restarted", self._name, hangs_s)
+        logger.error("%s has not responded for %.0f s; restarting it", self._name, hangs_s)
         self._stop.set()
         self.hung, self._stop = self.hung + 1, ReaderStop()
         self._thread = self._fresh()

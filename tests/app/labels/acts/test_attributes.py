@@ -1,4 +1,4 @@
-"""What is said of a track besides its class."""
+"""Attributes of a track."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Proposals and labels from elsewhere, beside what people have said already."""
+"""Proposals and imported labels, added to labels that people have already made."""
 
 from __future__ import annotations
 

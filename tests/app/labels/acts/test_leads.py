@@ -1,4 +1,4 @@
-"""Who leads, from when to when."""
+"""Lead ranges: which vehicle leads, from when to when."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is measured for a person becomes an act only when a person could have made it."""
+"""A measured shape is stored only if a person could have drawn it."""
 
 from __future__ import annotations
 

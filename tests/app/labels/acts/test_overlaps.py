@@ -1,4 +1,4 @@
-"""Two people act on the same frames: nothing that one said goes without the other hearing of it."""
+"""Two people change the same frames: neither's change is overwritten without the other being told."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What makes no sense is refused."""
+"""Invalid changes are refused."""
 
 from __future__ import annotations
 

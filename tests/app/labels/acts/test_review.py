@@ -1,4 +1,4 @@
-"""What a person says of labels, and who reviews them."""
+"""Accepting, rejecting and reviewing labels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which tracks there are."""
+"""Adding, splitting, merging and deleting tracks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can hardly be so, by what the sensors saw."""
+"""Implausible labels, judged by the sensors' data."""
 
 from __future__ import annotations
 

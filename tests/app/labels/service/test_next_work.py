@@ -1,4 +1,4 @@
-"""Where there is something to do."""
+"""Finding the next frame that needs work."""
 
 from __future__ import annotations
 

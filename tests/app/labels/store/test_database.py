@@ -1,4 +1,4 @@
-"""The database itself: its schema, how it is opened, and what is said when it cannot be."""
+"""The database: its schema, how it is opened, and the error if it cannot be opened."""
 
 from __future__ import annotations
 

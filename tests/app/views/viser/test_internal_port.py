@@ -1,4 +1,4 @@
-"""viser's own port: whoever finds it gets nothing from it."""
+"""viser's own port answers no one but the proxy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Edges of boxes and clusters: what counts as off, who belongs to whom."""
+"""Edges of boxes and clusters: outliers, and which box belongs to which cluster."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What later measurements say of earlier distances."""
+"""What later measurements reveal about earlier distances."""
 
 from __future__ import annotations
 

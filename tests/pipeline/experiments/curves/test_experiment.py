@@ -107,7 +107,7 @@ def test_a_cut_in_is_told_before_the_wheel_is_over_the_line(outcomes: dict[Curve
 
 def test_the_report_says_what_held(outcomes: dict[CurveCase, CurveOutcome]) -> None:
     section = experiment.report(list(outcomes), list(outcomes.values()))
-    assert any(text.startswith("R = 125 m, 70 km/h: right in ") for text in section.text)
+    assert any(text.startswith("R = 125 m, 70 km/h: correct in ") for text in section.text)
     choice, path, cut_in = section.tables
     assert [row[1] for row in choice.rows] == list(SOURCES)
     errors = {row[1]: row[4] for row in path.rows}

@@ -1,4 +1,4 @@
-"""What the pedals do to the car: in words, signs and limits."""
+"""How the pedals move the car: in words, signs and limits."""
 
 from __future__ import annotations
 

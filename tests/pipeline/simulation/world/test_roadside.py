@@ -1,4 +1,4 @@
-"""What stands beside a road stands on no road."""
+"""Roadside objects never stand on a road."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sensors come and go: each trouble by name, and that all is well again within a second of its end."""
+"""Sensors come and go: each fault is named, and everything works again within a second of its end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A driver or a decoder that hangs for ever: another thread reads on, and the one that hangs does nothing more."""
+"""A driver or a decoder that hangs for ever: another thread takes over, and the hung one does nothing more."""
 
 from __future__ import annotations
 

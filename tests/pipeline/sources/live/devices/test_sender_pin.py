@@ -1,4 +1,4 @@
-"""One sender a port: others are refused, named, and cost the first one nothing."""
+"""One sender per port: others are refused, named, and do not affect the first one."""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ class Batch:
             if len(found) > _MOST_REASONS:
                 print(f"cipv: {word}: {len(found) - _MOST_REASONS} more, see aside/run={run}", file=sys.stderr)
         print(
-            f"cipv: run {run}: {tally.done} drives done, {tally.before} done before, {len(tally.aside)} set aside, "
+            f"cipv: run {run}: {tally.done} drives done, {tally.before} already done, {len(tally.aside)} set aside, "
             f"{len(tally.failed)} failed; {tally.frames} frames in {seconds:.0f} s",
             file=sys.stderr,
         )

@@ -62,7 +62,7 @@ class Scores:
         tables = [Table("Scores without labels", ("score", "unit", *names), by_run, decimals=3)]
         if against:
             heads = ("score", "against labels", "drives", "pairs", "rank correlation", "95 % low", "high", "over runs")
-            tables.append(Table("Beside the labels", heads, against))
+            tables.append(Table("Compared with labels", heads, against))
         show([ReportSection("scores", "Scores of a fleet", (), tuple(tables))])
         return 0
 
