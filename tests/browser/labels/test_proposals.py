@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from typing import Any
-
 import pytest
 from playwright.sync_api import expect
 
@@ -23,6 +20,8 @@ HEAR = """() => {
   };
 }"""
 """Keeps what the page tells the server from now on."""
+NEWEST = "Object.assign({}, ...window.said.map((each) => JSON.parse(each)))"
+"""The newest of each word that it told."""
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
 
@@ -51,21 +50,13 @@ def test_the_3d_view_is_told_of_labels_with_class_number_and_state_and_of_the_se
     page.evaluate("async (index) => (await import('/js/drive/seek.js')).seekTo(index)", START)
     is_at(page, START)
     made = draw(hand, labels)
+    text = f"#{made} car, corrected"
     page.get_by_role("tab", name="3D").click()
-
-    def told() -> dict[str, Any]:
-        """The newest of each word."""
-        return {word: value for each in page.evaluate("window.said") for word, value in json.loads(each).items()}
-
-    def drawn(_: Labels) -> bool:
-        shown = (told().get("labels_3d") or {}).get("labels", [])
-        return [each["text"] for each in shown] == [f"#{made} car, corrected"]
-
-    labels.wait_for(drawn)
-    assert told()["labels_3d"]["alone"], "the pipeline's objects are hidden"
-    assert told()["held"]["track"] == made, "the camera goes to it"
-    assert told()["held"]["frame"] == START
+    page.wait_for_function(f"(text) => {NEWEST}.labels_3d?.labels.map((each) => each.text).join() === text", arg=text)
+    told = page.evaluate(NEWEST)
+    assert told["labels_3d"]["alone"], "the pipeline's objects are hidden"
+    assert (told["held"]["track"], told["held"]["frame"]) == (made, START), "the camera goes to it"
     hand.keys("Escape")
-    labels.wait_for(lambda _: told()["held"] is None)
+    page.wait_for_function(f"() => {NEWEST}.held === null")
     page.get_by_role("tab", name="Plan").click()
-    labels.wait_for(lambda _: told()["labels_3d"] is None)
+    page.wait_for_function(f"() => {NEWEST}.labels_3d === null")

@@ -72,8 +72,8 @@ function row(project, control) {
     facts(`${progress} · ${done} of ${drives} recordings done${sampling ? ` · ${sampling}` : ""}`),
     ...people.map(({ person, acts, active_s, acts_per_frame, s_per_frame }) =>
       facts(
-        `${person}: ${acts} ${acts === 1 ? "change" : "changes"} (${acts_per_frame.toFixed(1)} a frame), ${Math.round(active_s / 60)} min ` +
-          `(${s_per_frame.toFixed(1)} s a frame)`,
+        `${person}: ${acts} ${acts === 1 ? "change" : "changes"} (${acts_per_frame.toFixed(1)} a frame), ` +
+          `${Math.round(active_s / 60)} min (${s_per_frame.toFixed(1)} s a frame)`,
       ),
     ),
     ...control.map(controlFacts),
