@@ -68,7 +68,7 @@ def test_what_the_drive_lacks_is_said():
     assert aligned is not None
     alike = drive(aligned, frames=30, cars=1, walls=1, ranges_m=(20.0, 22.0), bearing_deg=2.0)
     said = " ".join(fit_alignment(alike, "pinhole", AlignmentParams()).warnings)
-    assert "an angle and an offset look alike" in said
+    assert "angle and offset cannot be told apart" in said
     assert "one direction" in said
     assert "only" in said
 
