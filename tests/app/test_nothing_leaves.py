@@ -88,6 +88,7 @@ TYPED: dict[str, list[list[str]]] = {
         ["info", "b.mcap"],
         ["recover", "b.mcap"],
         ["keys", "new", "key"],
+        ["accounts", "--add", "Ada", "--role", "labeler"],
         ["params", "--yaml"],
         ["models", "list"],
     ],

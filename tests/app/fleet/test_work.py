@@ -148,7 +148,7 @@ def test_a_name_that_is_no_text_is_set_aside(fleet: Path, tmp_path: Path):
 
 def test_a_worker_with_other_code_or_networks_is_told(fleet: Path, tmp_path: Path):
     job = job_of(str(fleet / "near-0.mcap"), tmp_path)
-    with pytest.raises(WrongWorker, match="another version"):
+    with pytest.raises(WrongWorker, match="does not have the same version"):
         run_drive(replace(job, key=replace(job.key, code="other")))
     with pytest.raises(WrongWorker, match="networks"):
         look_at_piece(replace(job, key=replace(job.key, networks="other")), 0)

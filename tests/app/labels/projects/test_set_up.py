@@ -55,7 +55,7 @@ def test_a_sample_is_in_the_queue_until_it_is_labelled_and_a_new_one_keeps_what_
     assert (work.project, work.sampled) == ("Winter", seconds + 1)
     place, why, _ = where_next(there, LabelScores(), None, Asked("asked", 0, 1))
     assert place is not None
-    assert (place.frame, why) == (10, "asked for: Winter: one frame every 1 s")
+    assert (place.frame, why) == (10, "queued: Winter: one frame every 1 s")
     act(there, "Ada", kind="set_lead", first=0, last=10, lead="none")
     (now,) = progress(there._database)
     assert (now.sampled, now.asked) == (seconds + 1, seconds - 1)

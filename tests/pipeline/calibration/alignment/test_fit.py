@@ -94,7 +94,7 @@ def test_undistorted_images_with_the_distortion_of_raw_ones_are_noticed(are_undi
     seen = resolve(AlignmentParams(), CAMERA if are_undistorted else bent)
     assert seen is not None
     warnings = fit_alignment(drive(seen, camera=bent), "pinhole", AlignmentParams()).warnings
-    assert any("undistorted already" in each for each in warnings) == are_undistorted
+    assert any("already undistorted" in each for each in warnings) == are_undistorted
 
 
 def test_a_fit_in_words():
