@@ -8,7 +8,7 @@ import { attachMenu, refill } from "../../workspace/menu.js";
 import { act } from "../acts/queue.js";
 import { propose, say } from "../acts/commands.js";
 import { personName } from "../state/person.js";
-import * as queue from "../work/queue_list.js";
+import * as queue from "../queue/queue_list.js";
 
 /** @typedef {import("../state/types.js").Version} Version */
 
