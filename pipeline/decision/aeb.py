@@ -83,9 +83,8 @@ def guard(
     # The threat that requires the hardest braking determines the stage, which is held until the danger has passed
     threats = find_threats(situation, params)
     worst = max(threats, key=lambda threat: (_level(threat, params), threat.required_mps2), default=None)
-    state = _next(
-        _tracked(state, threats, situation.now.dt_s or 0.0), threats, worst, ego, situation.now.dt_s or 0.0, params
-    )
+    dt_s = situation.now.dt_s or 0.0
+    state = _next(_tracked(state, threats, dt_s), threats, worst, ego, dt_s, params)
     return state, _stronger(command, state, params, pedals)
 
 

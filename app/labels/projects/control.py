@@ -7,11 +7,12 @@ sampled: a dense run of requested frames would give them away. Only reviewers se
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, cast
 
 from sqlalchemy import select
 
+from app.labels.projects.results import ControlResult
 from app.labels.store.database import Database
 from app.labels.store.drive_labels import DriveInfo, DriveLabels
 from app.labels.store.tables import ControlRow, DriveRow, ProjectDriveRow
@@ -21,36 +22,6 @@ from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange
 
 _COUNTED = ("accepted", "corrected")
-
-
-@dataclass(frozen=True)
-class ControlResult:
-    """One person's labels in the control frames of one recording. Shares are None if there is nothing to compare."""
-
-    project: str
-    """The project that the recording is in."""
-    title: str
-    """The recording."""
-    person: str
-    """Who labelled."""
-    first: int
-    """First control frame."""
-    last: int
-    """Last control frame, included."""
-    leads: int
-    """Frames among these in which both the truth and the person have a lead."""
-    lead_share: float | None
-    """Share of these in which both give the same."""
-    vehicles: int
-    """True cuboids that the person has labelled."""
-    missed: int
-    """True cuboids that nobody has labelled, in frames with labelled cuboids."""
-    extra: int
-    """Cuboids of the person that are no true vehicles."""
-    iou: float | None
-    """Median overlap of the labelled ones with the truth, seen from above."""
-    class_share: float | None
-    """Share of the labelled ones with the right class."""
 
 
 def pack_truth(truth: LabelSet, first: int, last: int) -> bytes:

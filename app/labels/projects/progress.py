@@ -3,54 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from app.labels.projects.results import PersonEffort, ProjectProgress
 from app.labels.projects.store import projects
 from app.labels.store.database import Database
 from app.labels.store.effort import Effort, efforts
 from app.labels.store.work import Work, queue
-
-
-@dataclass(frozen=True)
-class PersonEffort:
-    """One person's work on a project."""
-
-    person: str
-    """Name."""
-    acts: int
-    """Changes of labels, including undo and redo."""
-    active_s: float
-    """Time between acts, without pauses of more than two minutes."""
-    frames: int
-    """Frames of the recordings that they worked on."""
-    acts_per_frame: float
-    """Changes per frame of these recordings."""
-    s_per_frame: float
-    """Active time per frame of these recordings."""
-
-
-@dataclass(frozen=True)
-class ProjectProgress:
-    """Progress of one project."""
-
-    name: str
-    """The project."""
-    sampling: str
-    """Its sampling in words; empty if it has none."""
-    drives: int
-    """Number of its recordings."""
-    done: int
-    """Number of those that are done."""
-    frames: int
-    """Number of frames of all."""
-    labelled: float
-    """Share of these whose lead a person has set."""
-    sampled: int
-    """Frames requested for labeling."""
-    asked: int
-    """Number of these whose lead is not labelled."""
-    people: tuple[PersonEffort, ...]
-    """Everybody who has labelled in it."""
 
 
 def progress(database: Database) -> list[ProjectProgress]:

@@ -8,15 +8,9 @@ from fastapi import APIRouter, Request
 
 from app.core.client_role import account_of
 from app.labels.permissions import check_work
+from app.labels.projects.results import ControlResult, ProjectProgress
 from app.labels.service.desk import LabelDesk
-from app.web.routes.labels.work_shapes import (
-    ControlResultJson,
-    EffortJson,
-    PersonEffortJson,
-    ProjectProgressJson,
-    WorkChange,
-    WorkJson,
-)
+from app.web.routes.labels.work_shapes import EffortJson, WorkChange, WorkJson
 from app.web.routes.refusals import refusing
 
 if TYPE_CHECKING:
@@ -49,27 +43,20 @@ def label_work_router(desk: LabelDesk) -> APIRouter:
             return _queue(database)
 
     @router.get("/projects")
-    def projects() -> list[ProjectProgressJson]:
+    def projects() -> list[ProjectProgress]:
         """List the projects with their progress, and each person's changes and active time."""
         from app.labels.projects.progress import progress
 
         with refusing():
-            found = progress(desk.kept.opened())
-        return [
-            ProjectProgressJson(
-                **(vars(each) | {"people": [PersonEffortJson(**vars(person)) for person in each.people]})
-            )
-            for each in found
-        ]
+            return progress(desk.kept.opened())
 
     @router.get("/control")
-    def control() -> list[ControlResultJson]:
+    def control() -> list[ControlResult]:
         """Compare each person's labels in the control frames with their truth. Accounts need the role reviewer."""
         from app.labels.projects.control import control_results
 
         with refusing():
-            found = control_results(desk.kept.opened(), desk.default_classes)
-        return [ControlResultJson(**vars(each)) for each in found]
+            return control_results(desk.kept.opened(), desk.default_classes)
 
     return router
 

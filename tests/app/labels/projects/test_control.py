@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from app.labels.projects.control import ControlResult, control_results, pack_truth
+from app.labels.projects.control import control_results, pack_truth
 from app.labels.projects.project_file import ProjectEntries, ProjectFile
+from app.labels.projects.results import ControlResult
 from app.labels.projects.store import ControlSpan, put_project
 from app.labels.store.database import Database
 from app.labels.store.drive_labels import DriveLabels

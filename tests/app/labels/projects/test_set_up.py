@@ -8,8 +8,9 @@ from typing import cast
 import pytest
 import yaml
 
-from app.labels.projects.progress import ProjectProgress, progress
+from app.labels.projects.progress import progress
 from app.labels.projects.project_file import read_project
+from app.labels.projects.results import ProjectProgress
 from app.labels.projects.set_up import set_up
 from app.labels.service.next_work import Asked, where_next
 from app.labels.service.scoring import LabelScores
