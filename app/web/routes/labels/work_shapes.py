@@ -44,11 +44,11 @@ class WorkJson(ApiModel):
     proposals: int
     """Proposals that nobody has looked at."""
     asked: int
-    """Frames asked for whose lead is not labelled."""
+    """Queued frames whose lead is not labelled."""
     worth: float
     """Expected value of a label per frame."""
     sampled: int
-    """Frames asked for, whether labelled since or not."""
+    """Frames queued by hand or by sampling, whether labelled since or not."""
     project: str
     """The project that it is in; empty if none."""
     efforts: list[EffortJson]

@@ -148,7 +148,7 @@ export function setUp() {
       el(
         "span",
         { class: "joined", aria: { role: "group", label: "Go to next" } },
-        next("Asked for", "Next frame tagged to be labelled next (Shift M)", "asked"),
+        next("Queued", "Next frame queued for labeling (Shift M)", "asked"),
         next("Unlabelled", "Next unlabelled frame (N)", "unlabelled"),
         next("Disagreement", "Next disagreement between labels and pipeline (V)", "disagreement"),
         next("Proposed", "Next proposal (B)", "proposed"),
