@@ -21,7 +21,7 @@ LabelKey = tuple[ItemKind, int]
 """Kind and id of a label."""
 _NOTHING: dict[What, str] = {
     "unlabelled": "the lead is labelled in every frame there",
-    "asked": "no frames there are tagged to be labelled next",
+    "asked": "no frames there are queued for labeling",
     "disagreement": "the pipeline and the accepted labels agree there",
     "proposed": "no proposals there",
     "sent_back": "no labels sent back there",

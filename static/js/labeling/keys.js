@@ -139,7 +139,7 @@ export const labelKeys = () => [
         (d) => commands.goTo("disagreement", d),
         "next disagreement",
       ),
-      key("Shift+M", "Shift M", "next frame tagged to be labelled next", () => commands.goTo("asked", 1)),
+      key("Shift+M", "Shift M", "next queued frame", () => commands.goTo("asked", 1)),
       ...pair("B", "next proposal", (d) => commands.goTo("proposed", d), "next proposal"),
     ],
   },
