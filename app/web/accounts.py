@@ -20,6 +20,7 @@ from app.core.client_role import Account, AccountRole
 from app.core.session_folder import SESSIONS
 from app.labels.acts.request_fields import Person
 from pipeline.common.errors import BadInput
+from pipeline.common.user_file_errors import first_complaint
 
 logger = logging.getLogger("cipv.web")
 
@@ -93,7 +94,7 @@ def add_account(name: str, role: AccountRole, file: Path = FILE) -> str:
     try:
         made = StoredAccount(name=name, role=role, sha256=_digest(token))
     except ValidationError as error:
-        raise BadInput(f"{name!r}: invalid name: {error.errors()[0]['msg']}") from None
+        raise BadInput(first_complaint(error, StoredAccount)) from None
     others = [each for each in read_accounts(file) if each.name != made.name]
     if len(others) >= _MOST:
         raise BadInput(f"{file}: more than {_MOST:,} accounts")

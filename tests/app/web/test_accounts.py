@@ -52,7 +52,7 @@ def test_a_running_server_notices_what_is_changed_and_a_damaged_file_lets_nobody
 def test_who_is_not_there_cannot_be_removed(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no such account"):
         remove_account("Ada", tmp_path / "accounts.json")
-    with pytest.raises(BadInput, match="invalid name"):
+    with pytest.raises(BadInput, match="a name is needed"):
         add_account(" ", "labeler", tmp_path / "accounts.json")
 
 
