@@ -46,14 +46,28 @@ def _fit(parts: list[F32], edges: F64, params: GroundParams) -> tuple[F64, Mask]
     if not fitted.any():
         return np.full_like(planes, np.nan), fitted
     root = int(np.argmin(raggedness))
+    placed: set[int] = set()
+    for s in np.argsort(raggedness, kind="stable").tolist():
+        if fitted[s] and _meets_placed(s, planes[s], planes, edges, placed, params):
+            placed.add(s)
     for s in [*range(root + 1, params.segments), *range(root - 1, -1, -1)]:
-        neighbour, shared_x = (planes[s - 1], edges[s]) if s > root else (planes[s + 1], edges[s + 1])
-        if fitted[s] and _meets(planes[s], neighbour, shared_x, params):
+        if s in placed:
             continue
-        plane, ragged = _refine(parts[s], neighbour, params)
-        fitted[s] = np.isfinite(ragged) and _meets(plane, neighbour, shared_x, params)
-        planes[s] = plane if fitted[s] else neighbour
+        nearer = s - 1 if s > root else s + 1
+        placed.add(nearer)
+        if not (fitted[s] and _meets_placed(s, planes[s], planes, edges, placed, params)):
+            plane, ragged = _refine(parts[s], planes[nearer], params)
+            fitted[s] = np.isfinite(ragged) and _meets_placed(s, plane, planes, edges, placed, params)
+            planes[s] = plane if fitted[s] else planes[nearer]
     return planes, fitted
+
+
+def _meets_placed(s: int, plane: F64, planes: F64, edges: F64, placed: set[int], params: GroundParams) -> bool:
+    behind = max((each for each in placed if each < s), default=None)
+    ahead = min((each for each in placed if each > s), default=None)
+    return (behind is None or _meets(plane, planes[behind], (edges[behind + 1] + edges[s]) / 2, params)) and (
+        ahead is None or _meets(plane, planes[ahead], (edges[s + 1] + edges[ahead]) / 2, params)
+    )
 
 
 def _meets(plane: F64, neighbour: F64, x: float, params: GroundParams) -> bool:
@@ -68,7 +82,7 @@ def _refine(part: F32, prior: F64, params: GroundParams) -> tuple[F64, float]:
     levels = np.clip(raised.astype(int), 0, plane_kernels.HEIGHT_BINS - 1)
     centimetres = np.partition(levels, wanted - 1)[:wanted] if len(part) else levels
     mean_m = (centimetres.mean() + 0.5) / plane_kernels.BINS_PER_M + plane_kernels.HEIGHT_LOW_M if len(part) else 0.0
-    plane, ragged = prior, np.inf
+    plane, across, seen = prior, 0.0, 0
     low, high = mean_m - params.seed_height_m, mean_m + params.seed_height_m
     for k in range(1, params.iterations + 1):
         height = _heights(part, plane)
@@ -81,11 +95,14 @@ def _refine(part: F32, prior: F64, params: GroundParams) -> tuple[F64, float]:
         if values[1] < plane_kernels.MIN_SPREAD_M**2 or normal[2] < np.cos(np.radians(params.max_slope_deg)):
             return plane, np.inf
         plane = np.append(normal, -normal @ center)
-        ragged = float(np.sqrt(values[2])) * len(part) / len(seeds)
+        across, seen = float(values[2]), len(seeds)
         left = max(params.iterations - 1 - k, 0) / max(params.iterations - 1, 1)
         high = params.distance_m + max(params.seed_height_m - params.distance_m, 0.0) * left
         low = -high
-    return plane, ragged
+    depth = -_heights(part, plane)
+    below = np.minimum(depth[depth > params.distance_m], max(params.seed_height_m, params.distance_m))
+    off = np.sqrt((across * seen + float((below**2).sum())) / (seen + len(below)))
+    return plane, float(off) * len(part) / seen
 
 
 def _heights(xyz: F32, planes: F64) -> F32:

@@ -9,8 +9,9 @@ Choices that the two papers leave open, made on real 16-channel sweeps:
   from the second one on, and then keeps to the strip of a tilted road that its lowest points came from.
 * Segments hold equal numbers of points, not equal lengths: rings of the road lie ever further apart with distance.
 * The least ragged plane is taken for the road: the side of a truck, or the ego's own body, also holds a plane, but its
-  points fill the whole band around it and are few of what is there. From it outwards each plane must meet its
-  neighbour's at their common edge.
+  points fill the whole band around it and are few of what is there, and others lie below it. In order of raggedness
+  each plane must meet those before it, at their common edge or, across a more ragged one, halfway between them: a plane
+  that a hedge beside the car tilts meets the road behind, but not the one ahead.
 * A plane that does not, that is too steep, or that rests on too few or nearly collinear points (a single ring across
   the road) is fitted once more from the neighbour's, which then says what "low" means (a mount may be tilted: Astyx by
   6°), and failing that is the neighbour's.

@@ -106,17 +106,50 @@ def _fit(
         planes[:] = np.nan
         return planes, edges, fitted
     root = int(np.argmin(raggedness))
+    placed = _agreeing(planes, edges, raggedness, distance_m)
     for k in range(1, segments):  # outwards from the root: first ahead, then back
         s = root + k if root + k < segments else segments - 1 - k
-        neighbour = planes[s - 1] if s > root else planes[s + 1]
-        shared = edges[s] if s > root else edges[s + 1]
-        if fitted[s] and _meets(planes[s], neighbour, shared, distance_m):
+        if placed[s]:
             continue
-        a, b = starts[s], starts[s + 1]
-        plane, ragged = refine(x[a:b], y[a:b], z[a:b], neighbour, iterations, lowest, seed_m, distance_m, min_nz)
-        fitted[s] = np.isfinite(ragged) and _meets(plane, neighbour, shared, distance_m)
-        _set_row(planes, s, plane if fitted[s] else neighbour)
+        neighbour = planes[s - 1] if s > root else planes[s + 1]
+        placed[s - 1 if s > root else s + 1] = True
+        if not (fitted[s] and _meets_placed(s, planes[s], planes, edges, placed, distance_m)):
+            a, b = starts[s], starts[s + 1]
+            plane, ragged = refine(x[a:b], y[a:b], z[a:b], neighbour, iterations, lowest, seed_m, distance_m, min_nz)
+            fitted[s] = np.isfinite(ragged) and _meets_placed(s, plane, planes, edges, placed, distance_m)
+            _set_row(planes, s, plane if fitted[s] else neighbour)
     return planes, edges, fitted
+
+
+@numba.njit(cache=True, nogil=True)
+def _agreeing(planes: F64, edges: F64, raggedness: F64, distance_m: float) -> Mask:
+    """(S,) bool: the least ragged plane, and in order of raggedness those that meet the ones before them, also across a
+    more ragged one between them: that is then judged by both."""
+    agreeing = np.zeros(len(planes), dtype=np.bool_)
+    waiting = np.isfinite(raggedness)
+    for _ in range(len(planes)):
+        best = -1
+        for s in range(len(planes)):
+            if waiting[s] and (best < 0 or raggedness[s] < raggedness[best]):
+                best = s
+        if best < 0:
+            break
+        waiting[best] = False
+        agreeing[best] = _meets_placed(best, planes[best], planes, edges, agreeing, distance_m)
+    return agreeing
+
+
+@numba.njit(cache=True, nogil=True)
+def _meets_placed(s: int, plane: F64, planes: F64, edges: F64, placed: Mask, distance_m: float) -> bool:
+    """Whether a plane of segment ``s`` meets the nearest placed ones behind and ahead, halfway between them."""
+    behind, ahead = s - 1, s + 1
+    while behind >= 0 and not placed[behind]:
+        behind -= 1
+    while ahead < len(planes) and not placed[ahead]:
+        ahead += 1
+    if behind >= 0 and not _meets(plane, planes[behind], 0.5 * (edges[behind + 1] + edges[s]), distance_m):
+        return False
+    return ahead == len(planes) or _meets(plane, planes[ahead], 0.5 * (edges[s + 1] + edges[ahead]), distance_m)
 
 
 @numba.njit(cache=True, nogil=True)
