@@ -44,6 +44,9 @@ class Outline:
     """Ends that faced the sensor in at least one sweep."""
     firm: tuple[EndsSeen, EndsSeen]
     """Ends that were seen in many sweeps and have points along them, so that a cuboid can be fitted to them."""
+    far_end_rad: tuple[float, float]
+    """Per axis, the largest angle between the side along it and the beams to that side's far end, in the sweep that saw
+    it best; 0 if no sweep saw that side. A side seen at a small angle has few points towards its far end."""
 
     @property
     def span(self) -> F64:
@@ -64,7 +67,15 @@ def outline(points: F32, eyes: F64, yaw_rad: float) -> Outline:
         on_low = int((np.abs(flat[:, axis] - low[axis]) < _ON_SIDE_M).sum()) >= _FEWEST_ON_SIDE
         on_high = int((np.abs(flat[:, axis] - high[axis]) < _ON_SIDE_M).sum()) >= _FEWEST_ON_SIDE
         firm.append(_side(before.mean() > _SHARE_OF_EYES and on_low, behind.mean() > _SHARE_OF_EYES and on_high))
-    return Outline(axes, low, high, (seen[0], seen[1]), (firm[0], firm[1]))
+    far = (_far_end_rad(from_where, low, high), _far_end_rad(from_where[:, ::-1], low[::-1], high[::-1]))
+    return Outline(axes, low, high, (seen[0], seen[1]), (firm[0], firm[1]), far)
+
+
+def _far_end_rad(eyes: F64, low: F64, high: F64) -> float:
+    """eyes: (K, 2) along and across a side. low, high: (2,) extent of the points."""
+    beside = np.maximum(low[1] - eyes[:, 1], eyes[:, 1] - high[1])
+    along = np.maximum(np.abs(eyes[:, 0] - low[0]), np.abs(eyes[:, 0] - high[0]))
+    return float(np.maximum(np.arctan2(beside, along), 0.0).max())
 
 
 def placed(

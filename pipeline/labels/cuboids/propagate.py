@@ -42,6 +42,9 @@ _STEPS = 6
 """Number of last frames used for the velocity."""
 _HELD_M = 0.4
 """Maximum offset of a hand-drawn cuboid from the points that is preserved."""
+_FEWEST_COMMON = 3
+"""Standing and moving are compared over the frames in which both were found; over fewer, either may fit by chance.
+Afterwards, one that follows a row of bushes may well go farther than the parked car that is soon hidden."""
 _ORIGIN = np.zeros((1, 2))
 
 
@@ -56,10 +59,10 @@ class _At:
 
 @dataclass(frozen=True)
 class _Run:
-    """Result of tracking, and the mean deviation from the prediction."""
+    """Result of tracking, and the deviation from the prediction in each frame with points."""
 
     found: tuple[Sighting, ...]
-    off_m: float
+    off_m: tuple[float, ...]
 
 
 def propagated(
@@ -89,9 +92,10 @@ def propagated(
         _carried(start, cuboid, past, frames, t_ns, sweeps, poses)
         for past in ([stands], [stands, _along_with_us(cuboid, start, frames, t_ns, poses)])
     ]
-    longest = max(len(each.found) for each in runs)
-    likely = (each for each in runs if 2 * len(each.found) >= longest)
-    return min(likely, key=lambda each: each.off_m).found
+    common = min(len(each.off_m) for each in runs)
+    if common < _FEWEST_COMMON:
+        return max(runs, key=lambda each: len(each.off_m)).found
+    return min(runs, key=lambda each: sum(each.off_m[:common])).found
 
 
 def _carried(
@@ -126,7 +130,7 @@ def _carried(
         now = _mixed(expected, laid, _GAIN) if laid is not None else expected
         found.append(Sighting(frame, _stood(now, sweep), keyframe=False))
         track = [*track[-_STEPS + 1 :], _over_ground(now, pose, t_ns[frame])]
-    return _Run(tuple(found[:seen]), float(np.mean(off_m)) if off_m else math.inf)
+    return _Run(tuple(found[:seen]), tuple(off_m))
 
 
 def _laid(expected: Cuboid, points: F32 | None, held: F64, near_m: float) -> Cuboid | None:

@@ -2,10 +2,10 @@
 
 The non-ground points in and near it are clustered; the cluster with most points in it (or else near it) is the vehicle.
 Several placements are tried: the visible sides fitted to the points, with the yaw kept or taken from the points. The
-best one is used only if it fits the points of this sweep and of the sweeps around it clearly better than the original.
-Otherwise the cuboid is left unchanged: a dozen points beyond 35 m are no better than a person's judgement of the image.
-A vehicle is never seen completely, so the size only grows to contain its points; where both of its ends were seen, in
-one sweep or over several, the measured size is used. The cuboid stands on the ground.
+best one is used only if it fits the points of this sweep and of the sweeps around it clearly better than the original,
+and both place it alike. Otherwise the cuboid is left unchanged: a dozen points beyond 35 m are no better than a
+person's judgement of the image. A vehicle is never seen completely, so the size only grows to contain its points; where
+both of its ends were seen, in one sweep or over several, the measured size is used. The cuboid stands on the ground.
 
 The yaw comes from the closeness fit of the pipeline (``pipeline.lidar.boxes``). Open3D's minimal oriented box, which
 fits all three axes or, on flattened points, the smallest area, is less accurate on every real recording available: the
@@ -15,6 +15,7 @@ median error of the yaw of 65 labelled cars of Astyx is 3° to 5° (flattened 2.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +38,11 @@ _BETTER_M = 0.05
 hand-drawn one. With 0.02 over all sweeps, more boxes got worse on each of the labelled drives."""
 _TURN_COSTS_M = 0.04
 """A rotation must improve the fit by this much more: of a few points, the closest yaw is often not the vehicle's."""
+_AGREE_M = 0.15
+"""The placements from this sweep and from all sweeps must be this close to each other: the accuracy of a side with
+points on it. If they differ, something beside the vehicle moved one of them. This almost halved how often boxes of
+KITTI drive 0009 and of Astyx got worse."""
+_SAME_YAW_RAD = 1e-6
 _GROWN_M = 0.1
 """Points must extend this far beyond a side to lengthen it."""
 _RAISED_M = 0.1
@@ -83,21 +89,41 @@ def refit(sweep: F32 | Clustered, cuboid: Cuboid, around: Aggregate | None = Non
         )
     own = Aggregate(-1, points, np.zeros((1, 2)), {})
     every = around if around is not None else own
-    flat, is_better = cuboid, False
-    if len(points) >= _ENOUGH_POINTS:
-        best = 0.0
-        for one in (own, every) if every is not own else (own,):
-            for turn_rad in dict.fromkeys((0.0, _shape_turn_rad(one.points, known.ground, cuboid))):
-                tried = _laid_on(one, cuboid, cuboid.yaw_rad + turn_rad)
-                better_m = misfit_m(own.points, own.eyes, cuboid) - misfit_m(own.points, own.eyes, tried)
-                around_m = misfit_m(every.points, every.eyes, cuboid) - misfit_m(every.points, every.eyes, tried)
-                gain_m = better_m + around_m - (_TURN_COSTS_M if turn_rad else 0.0)
-                if min(better_m, around_m) > _BETTER_M and gain_m > best and _is_near(tried, cuboid):
-                    flat, best, is_better = tried, gain_m, True
+    found = _best(own, every, known.ground, cuboid) if len(points) >= _ENOUGH_POINTS else None
+    flat, is_better = found or cuboid, found is not None
     upright = _stood(flat, points, known.ground)
     if not is_better and abs(upright.center[2] - cuboid.center[2]) < _RAISED_M:
         return Refitted(cuboid, len(points), False, max(len(every.placed), 1), is_better=False)
-    return Refitted(upright, len(points), flat.yaw_rad != cuboid.yaw_rad, max(len(every.placed), 1))
+    turned = found is not None and abs(_wrapped(flat.yaw_rad - cuboid.yaw_rad)) > _SAME_YAW_RAD
+    return Refitted(upright, len(points), turned, max(len(every.placed), 1))
+
+
+def _best(own: Aggregate, every: Aggregate, ground: Ground, cuboid: Cuboid) -> Cuboid | None:
+    """The placement that fits the points of this sweep and of all sweeps best; None if it is not clearly better than
+    the cuboid, or if this sweep and all sweeps do not agree on it."""
+    sources = (own, every) if every is not own else (own,)
+    tried = [
+        [(_laid_on(one, cuboid, cuboid.yaw_rad + turn_rad), turn_rad) for turn_rad in turns]
+        for one in sources
+        for turns in [dict.fromkeys((0.0, _shape_turn_rad(one.points, ground, cuboid)))]
+    ]
+    best, best_m = None, 0.0
+    for source, placements in enumerate(tried):
+        others = [each for other, there in enumerate(tried) if other != source for each, _ in there]
+        for one, turn_rad in placements:
+            own_m, every_m = (
+                misfit_m(a.points, a.eyes, cuboid) - misfit_m(a.points, a.eyes, one) for a in (own, every)
+            )
+            gain_m = own_m + every_m - (_TURN_COSTS_M if turn_rad else 0.0)
+            is_better = min(own_m, every_m) > _BETTER_M and gain_m > best_m
+            if is_better and _is_near(one, cuboid) and (not others or _apart_m(one, others) <= _AGREE_M):
+                best, best_m = one, gain_m
+    return best
+
+
+def _apart_m(one: Cuboid, others: Sequence[Cuboid]) -> float:
+    """Distance of its centre from the nearest of the others."""
+    return min(math.dist(one.center[:2], each.center[:2]) for each in others)
 
 
 def _laid_on(one: Aggregate, cuboid: Cuboid, yaw_rad: float) -> Cuboid:

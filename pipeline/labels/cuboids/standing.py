@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,24 +33,63 @@ def held_still(
         points: number of points that each was fitted to; frames without are moved along.
         poses: own motion by frame, if known.
     """
-    frames = [frame for frame in sorted(points) if frame in poses and frame in cuboids]
-    if len(frames) < _FEWEST or len({poses[frame].stretch for frame in frames}) > 1:
+    stands = _standing(cuboids, points, poses)
+    if stands is None:
         return dict(cuboids)
+    return {
+        frame: cuboid._replace(center=(*in_ego(*stands.at(pose), pose), cuboid.center[2]))
+        if (pose := poses.get(frame)) is not None and pose.stretch == stands.stretch
+        else cuboid
+        for frame, cuboid in cuboids.items()
+    }
+
+
+def strays(cuboids: Mapping[int, Cuboid], poses: Mapping[int, Pose]) -> set[int]:
+    """Frames in which the track of a standing vehicle was on something else: the middle of its cuboid is outside the
+    vehicle. cuboids: as seen in single sweeps, by frame. poses: own motion by frame, if known."""
+    frames = [frame for frame in cuboids if frame in poses]
+    if len(frames) < _FEWEST or len({poses[frame].stretch for frame in frames}) > 1:
+        return set()
+    where = np.array([over_ground(cuboids[frame], poses[frame]) for frame in frames])
+    # the middle value: a line would follow strays at the end of a track
+    off_m = np.hypot(*(where - np.median(where, axis=0)).T)
+    if float(np.median(off_m)) > _LOOSE_M:
+        return set()
+    return {frame for frame, off in zip(frames, off_m, strict=True) if off > cuboids[frame].size[0] / 2}
+
+
+@dataclass(frozen=True)
+class _Standing:
+    """Position of a standing vehicle over ground, which drifts with the error of the own speed."""
+
+    stretch: int
+    line: F64
+    """(2, 2) position and velocity."""
+    middle_s: float
+    """Time of the position."""
+
+    def at(self, pose: Pose) -> tuple[float, float]:
+        """x, y over ground at the time of a pose."""
+        x, y = self.line[0] + (pose.t_s - self.middle_s) * self.line[1]
+        return float(x), float(y)
+
+
+def _standing(
+    cuboids: Mapping[int, Cuboid], weights: Mapping[int, float], poses: Mapping[int, Pose]
+) -> _Standing | None:
+    """None if it does not certainly stand. weights: of the frames to be used."""
+    frames = [frame for frame in sorted(weights) if frame in poses and frame in cuboids]
+    if len(frames) < _FEWEST or len({poses[frame].stretch for frame in frames}) > 1:
+        return None
     here = [poses[frame] for frame in frames]
     times = np.array([pose.t_s for pose in here])
     middle_s = float(times.mean())
     where = np.array([over_ground(cuboids[frame], pose) for frame, pose in zip(frames, here, strict=True)])
-    line, off_m = _line(times - middle_s, where, np.array([points[frame] for frame in frames], dtype=float))
+    line, off_m = _line(times - middle_s, where, np.array([weights[frame] for frame in frames], dtype=float))
     own_mps = abs(here[-1].way_m - here[0].way_m) / max(float(np.ptp(times)), 1e-9)
     if math.hypot(*line[1]) > _DRIFT_SHARE * own_mps + _DRIFT_MPS or float(np.median(off_m)) > _LOOSE_M:
-        return dict(cuboids)
-    found = dict(cuboids)
-    for frame, cuboid in cuboids.items():
-        pose = poses.get(frame)
-        if pose is not None and pose.stretch == here[0].stretch:
-            x, y = line[0] + (pose.t_s - middle_s) * line[1]
-            found[frame] = cuboid._replace(center=(*in_ego(float(x), float(y), pose), cuboid.center[2]))
-    return found
+        return None
+    return _Standing(here[0].stretch, line, middle_s)
 
 
 def _line(times: F64, where: F64, weights: F64) -> tuple[F64, F64]:

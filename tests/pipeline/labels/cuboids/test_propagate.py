@@ -104,5 +104,5 @@ def test_a_street_is_labelled_from_one_frame_a_car(data_dir: Path) -> None:
         wanted += len(near) - 1
         overlaps += [iou(each.cuboid, near[each.frame]) for each in found if each.cuboid and each.frame in near]
     assert len(overlaps) > 0.5 * wanted, (len(overlaps), wanted)
-    assert float(np.median(overlaps)) > 0.85
-    assert float((np.array(overlaps) > 0.7).mean()) > 0.85
+    assert float(np.median(overlaps)) > 0.88
+    assert float((np.array(overlaps) > 0.7).mean()) > 0.95, "parked cars do not move along with us"

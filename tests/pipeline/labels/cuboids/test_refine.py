@@ -105,6 +105,30 @@ def test_what_is_nearly_along_the_road_is_turned_along_it() -> None:
     assert facing.sightings[0].cuboid.yaw_rad == pytest.approx(0.2 - math.pi, abs=0.05), "it keeps facing us"
 
 
+def test_a_side_seen_to_its_end_says_how_long_a_small_car_is() -> None:
+    """Of one whose rear alone is seen, the usual length is assumed; of a hidden part of a side as well."""
+    small = (3.3, 1.6, 1.5)
+    cars = {at: standing(14.0 - 1.0 * at, 4.0, size=small) for at in range(8)}
+    boxes = {at: replace_size(car, (4.5, 1.8, 1.5), 0.3) for at, car in cars.items()}
+
+    def fitted(faces: str) -> tuple[float, float]:
+        seen = {at: clustered(sweep_of(car, faces=faces)) for at, car in cars.items()}
+        (after,) = refined([track_of(boxes)], seen.get, driving(1.0, 8))
+        assert after.sightings[0].cuboid is not None
+        return after.sightings[0].cuboid.size[:2]
+
+    assert fitted("both") == pytest.approx((3.6, 1.7), abs=0.15)
+    assert fitted("rear")[0] == pytest.approx(4.1)
+
+
+def test_a_track_that_went_on_to_the_next_parked_car_ends_before_it() -> None:
+    cars = {at: standing(20.0 - 1.0 * at, 4.0) for at in range(12)}
+    seen = {at: clustered(sweep_of(car)) for at, car in cars.items()}
+    boxes = {at: car if at < 9 else replace_size(car, car.size, 6.0) for at, car in cars.items()}
+    (after,) = refined([track_of(boxes)], seen.get, driving(1.0, 12))
+    assert [each.frame for each in after.sightings] == list(range(9))
+
+
 def replace_size(cuboid: Cuboid, size: tuple[float, float, float], along_m: float) -> Cuboid:
     x, y, z = cuboid.center
     return Cuboid((x + along_m, y, z), size, cuboid.yaw_rad)
@@ -183,5 +207,5 @@ def test_a_snap_seldom_makes_a_real_box_worse(data_dir: Path) -> None:
     gains = np.array(change)
     assert len(gains) >= 50
     assert float((gains > 0.02).mean()) > 0.2
-    assert float((gains < -0.02).mean()) < 0.13
+    assert float((gains < -0.02).mean()) < 0.09
     assert float((gains < -0.1).mean()) < 0.02

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from pipeline.common.geometry import Cuboid
-from pipeline.labels.cuboids.standing import held_still
+from pipeline.labels.cuboids.standing import held_still, strays
 from pipeline.labels.headings import Pose
 
 SIZE = (4.2, 1.8, 1.5)
@@ -61,3 +61,11 @@ def test_without_own_motion_or_over_a_gap_nothing_is_known_to_stand() -> None:
 
 def later(pose: Pose) -> Pose:
     return Pose(2, pose.x, pose.y, pose.yaw_rad, pose.way_m, pose.t_s)
+
+
+def test_a_parked_cars_track_that_went_on_to_the_next_one_is_known_to_stray() -> None:
+    seen = {at: parked(at, 0.3 * (-1) ** at, moved_m=0.0 if at < 15 else 5.5) for at in range(20)}
+    assert strays(seen, POSES) == {15, 16, 17, 18, 19}
+    assert strays({at: parked(at, 0.3 * (-1) ** at) for at in range(20)}, POSES) == set()
+    assert strays(seen, {}) == set(), "without own motion nothing is known to stand"
+    assert strays({at: parked(at, moved_m=1.0 * at) for at in range(20)}, POSES) == set(), "it drives"
