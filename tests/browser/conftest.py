@@ -17,9 +17,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.bench.page.devtools import CHROMIUM, FLAGS
 from app.core.server_address import listen_socket
+from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder
 from app.fleet.desk import FleetDesk
+from app.views.lazy_scene import LateScene
 from app.web.server import Server, create_app
 from pipeline.detection import detector_for
 from pipeline.inference.runtime import DetectorMissing
@@ -84,6 +86,9 @@ class Site:
     port: int
     detectors: list[CountedDetector] = field(default_factory=list)
     fleet: FleetDesk | None = None
+    looks: SharedViewState | None = None
+    scene: LateScene | None = None
+    """The 3D view, for tests that look at it; it needs ``looks``."""
     _server: Server | None = None
     _thread: threading.Thread | None = None
 
@@ -98,7 +103,8 @@ class Site:
     def start(self) -> None:
         bound, is_ready = listen_socket("127.0.0.1", self.port, strict=True), threading.Event()
         self.port = bound.getsockname()[1]
-        app = create_app(self.engine, fleet=self.fleet)
+        viser_port = self.scene.port if self.scene is not None else lambda: None
+        app = create_app(self.engine, viser_port, looks=self.looks, fleet=self.fleet)
         app.add_middleware(FilesStay)
         server = Server(app, self.address, lambda _: is_ready.set())
         self._server, self._thread = server, threading.Thread(target=lambda: server.run(sockets=[bound]))
@@ -220,16 +226,20 @@ def opening(pages: Pages, site: Site) -> Iterator[OpenPage]:
     ) -> Page:
         own = (address or site.address).partition("/#")[0]
 
+        def complain(text: str) -> None:
+            if not any(words in text for words in expects):
+                complaints.append(text)
+
         def said(message: ConsoleMessage) -> None:
-            if message.type in ("error", "warning") and not any(words in message.text for words in expects):
-                complaints.append(message.text)
+            if message.type in ("error", "warning"):
+                complain(message.text)
 
         def asked(request: Request) -> None:
             if _leaves(request.url, own):
                 complaints.append(request.url)
 
         page = pages.take(width, height, color_scheme, **context)
-        listeners = {"console": said, "request": asked, "pageerror": lambda error: complaints.append(str(error))}
+        listeners = {"console": said, "request": asked, "pageerror": lambda error: complain(str(error))}
         opened.append((page, listeners, own == site.address and not context))
         page.set_default_timeout(WAIT_MS)
         for event, listener in listeners.items():
