@@ -20,13 +20,14 @@ from app.labels.project_classes import project_classes
 from app.reports.html import html
 from app.reports.terminal_tables import show
 from pipeline.common.errors import BadInput
+from pipeline.common.user_file_errors import given_path
 from pipeline.detection import Detectors
 from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive
 from pipeline.evaluation.scores.report import as_json, sections
 from pipeline.evaluation.scores.results_file import EMPTY, read_results
 from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels, of_source
-from pipeline.labels.classes import as_bases
+from pipeline.labels.classes import ClassList, as_bases, read_classes
 from pipeline.labels.formats import native
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.params import Params, from_yaml, preset
@@ -52,6 +53,9 @@ class Evaluate:
     """Labelled recordings; with two or more, figures get confidence intervals"""
     truth: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FILE")] = ("native",)
     """native: the labels that come with a recording; or one file of labels (cipv-labels JSON) per recording"""
+    classes: Annotated[Path | None, option("FILE")] = None
+    """A class list (YAML), by which sub-classes in the labels are scored as their parents; default: the one that
+    `cipv labels classes` lists"""
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     sensors: Literal["lidar", "camera", "both"] = "both"
     """Ablation: run as if the car had this sensor only"""
@@ -128,12 +132,15 @@ class Evaluate:
             return of_source(source, rules.lead)
         file = Path(self.truth[n])
         known = native.from_json(read_bytes(file), str(file))
-        truth = of_labels(as_bases(known, project_classes()), rules.lead)
+        truth = of_labels(as_bases(known, self._classes()), rules.lead)
         ticks = tuple(source.t_ns(index) for index in range(len(source)))
         frames = {tick: frame for tick, frame in truth.frames.items() if tick in set(ticks)}
         if not frames:
             raise NoTruth(f"{file}: labels of another recording ({truth.uri}): no frame in common")
         return replace(truth, uri=source.uri, ticks=ticks, frames=frames)
+
+    def _classes(self) -> ClassList:
+        return read_classes(given_path(self.classes)) if self.classes is not None else project_classes()
 
     def _run(self, source: Source, wanted: list[Params]) -> list[list[Result]]:
         """Run the pipeline with each set of parameters. The networks run once per image."""

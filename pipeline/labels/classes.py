@@ -52,6 +52,15 @@ class ClassList:
         lowered = word.strip().lower().replace("_", " ")
         return lowered if lowered in self.classes else canonical(word)
 
+    def read_as(self, word: str, export: str) -> str | None:
+        """The class for a name in an import: the class of this name, else the first with this name in the format; None
+        if there is none."""
+        lowered = word.strip().lower().replace("_", " ")
+        if lowered in self.classes:
+            return lowered
+        called = (name for name, known in self.classes.items() if known.exports.get(export, "").lower() == lowered)
+        return next(called, None)
+
     def base(self, name: str) -> str:
         """The class as which it is scored."""
         known = self.classes.get(name)
@@ -61,6 +70,10 @@ class ClassList:
         """Its name in an export format."""
         known = self.classes.get(name)
         return known.exports.get(export, known.of or name) if known is not None else name
+
+
+NO_CLASSES = ClassList({}, {})
+"""For files whose names are read as detectors name things."""
 
 
 @cache

@@ -20,7 +20,7 @@ from app.labels.project_classes import project_classes
 from app.labels.wording import WORKING
 from pipeline.common.garbage_collection import gc_paused
 from pipeline.common.user_file_errors import given_path
-from pipeline.labels.classes import ClassList
+from pipeline.labels.classes import ClassList, read_classes
 from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.native import from_json, onto
 from pipeline.labels.formats.reading import read_bytes
@@ -104,22 +104,30 @@ class ImportLabels:
     """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
     person: Person = field(default_factory=getpass.getuser)
     """Author of the change, who can undo it in the dashboard"""
+    classes: Annotated[Path | None, option("FILE")] = None
+    """A class list (YAML), by which names in the file are read; default: that of the recording's project in the
+    database, then the one that `cipv labels classes` lists"""
 
     def __call__(self) -> int:
         source = opened_recording(self.source)
         drive = _drive(source)
         file = given_path(self.file)
         origin = Origin("import", file.name, file.stat().st_mtime_ns // 1_000_000)
-        found = import_labels(file, drive, self.format, origin)
         if self.out is not None:
+            found = import_labels(file, drive, self.format, origin, self._classes() or project_classes())
             export_labels(found.labels, drive, "native", self.out)
             say(*found.notes, f"{self.out}: {_amount(found.labels)}")
             return 0
         with _kept(source, drive, self.database) as kept:
             from app.labels.acts.bulk import importing  # imported only if needed
 
+            classes = self._classes() or kept.classes() or project_classes()
+            found = import_labels(file, drive, self.format, origin, classes)
             say(importing(kept, found.labels, self.person, found.notes))
         return 0
+
+    def _classes(self) -> ClassList | None:
+        return read_classes(given_path(self.classes)) if self.classes is not None else None
 
 
 @contextmanager

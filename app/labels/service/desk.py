@@ -220,7 +220,9 @@ class LabelDesk:
         from app.labels.transfer.files import importing_file
 
         recording, labels = self._open.named(drive)
-        return self.tasks.begin("import", importing_file(labels, recording, person, file, name))
+        return self.tasks.begin(
+            "import", importing_file(labels, recording, person, file, name, labels.classes() or self.default_classes)
+        )
 
     def possible(self, person: str) -> tuple[bool, bool]:
         """(can undo, can redo) for a person; both false while the database fails, so that changing parameters does not

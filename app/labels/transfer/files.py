@@ -67,9 +67,9 @@ def exported(
 
 
 def importing_file(
-    labels: DriveLabels, recording: OpenRecording, person: str, file: Path, name: FormatName
+    labels: DriveLabels, recording: OpenRecording, person: str, file: Path, name: FormatName, classes: ClassList
 ) -> TaskWork:
-    """Import an uploaded file; a format that is a folder is uploaded as a .zip."""
+    """Import an uploaded file; a format that is a folder is uploaded as a .zip. classes: of the recording's project."""
 
     def work(progress: Progress) -> str:
         with _removed(file), tempfile.TemporaryDirectory(prefix="cipv-import-") as folder:
@@ -77,7 +77,7 @@ def importing_file(
             drive = drive_for(recording, progress)
             origin = Origin("import", f"{name} file of {person}", int(time.time() * 1000))
             try:
-                found = import_labels(path, drive, name, origin)
+                found = import_labels(path, drive, name, origin, classes)
             except BadInput as error:  # do not reveal its temporary path
                 raise ActRefused(str(error).replace(str(path), "the file")) from None
             return importing(labels, found.labels, person, found.notes, progress)

@@ -11,9 +11,11 @@ from pipeline.alignment.projection import Pinhole, project_cuboids
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid, corners_of
 from pipeline.common.progress import Progress, silent
+from pipeline.labels.classes import NO_CLASSES, ClassList
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.types import F32, F64, Box, CameraCalibration, EgoState, Frame
 from pipeline.types.source import InParts, Rectified, Source
+from pipeline.vision.classes import canonical
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 _FEWEST_PAIRS = 3
@@ -52,6 +54,13 @@ class LabeledDrive:
     """Every frame, in order."""
     points: Callable[[int], F32 | None] = field(default=_no_points, compare=False)
     """Returns the (N, 4) float32 x y z intensity of a frame's sweep, None without one; read on demand."""
+    classes: ClassList = field(default=NO_CLASSES, compare=False)
+    """The class list by which an import reads the names in a file."""
+
+    def class_of(self, word: str, export: str, otherwise: Callable[[str], str] = canonical) -> str:
+        """The class for a name in a file. export: its format, one of ``EXPORTS``. otherwise: for a name that the class
+        list does not have."""
+        return self.classes.read_as(word, export) or otherwise(word)
 
     @property
     def frames(self) -> tuple[str, ...]:

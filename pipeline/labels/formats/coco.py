@@ -88,7 +88,7 @@ def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     """Boxes without ``track_id`` become separate tracks."""
     coco = parse_as(_FILE, read_bytes(path), str(path))
     frames = _frames(coco.images, drive, str(path))
-    categories = {each.id: canonical(each.name) for each in coco.categories}
+    categories = {each.id: drive.class_of(each.name, "coco") for each in coco.categories}
     found: dict[int, tuple[str, dict[int, Sighting]]] = {}
     alone: list[tuple[str, Sighting]] = []
     for each in coco.annotations:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pipeline.common.errors import BadInput
 from pipeline.common.garbage_collection import gc_paused
-from pipeline.labels.classes import ClassList, as_written, default_classes
+from pipeline.labels.classes import NO_CLASSES, ClassList, as_written, default_classes
 from pipeline.labels.formats.base import Imported, LabeledDrive, ReadLabels, Write, check_extrinsic
 from pipeline.labels.formats.parts import EVERYTHING, Part, reduce
 from pipeline.labels.model import LabelSet, Origin
@@ -116,14 +116,17 @@ def export_labels(
         return (*placed.notes, *lost, *renamed, *kind.write(kept, drive, out))
 
 
-def import_labels(path: Path, drive: LabeledDrive, name: FormatName, origin: Origin) -> Imported:
+def import_labels(
+    path: Path, drive: LabeledDrive, name: FormatName, origin: Origin, classes: ClassList = NO_CLASSES
+) -> Imported:
     """Read a file or folder as labels of a drive. BadInput in one sentence if it does not have this format, or belongs
-    to another drive."""
+    to another drive. classes: the project's, whose names in this format are read back; without it, names are read as
+    detectors name things."""
     kind = FORMATS[name]
     if not path.exists():
         raise BadInput(f"{path}: no such file")
     with gc_paused():
-        found = kind.read(path, drive, origin)
+        found = kind.read(path, replace(drive, classes=classes), origin)
         labels = check(found.labels, str(path))
         check_extrinsic(labels, drive, str(path))
         return replace(found, labels=labels)

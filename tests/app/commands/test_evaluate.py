@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import parse_qs
 
@@ -12,7 +13,7 @@ import pytest
 from app.cli import main
 from app.commands.evaluate import dashboard_link
 from pipeline.labels.formats import native
-from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
+from pipeline.labels.model import WHOLE_TAG, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, Sighting
 from pipeline.sources import open_source
 from pipeline.types.source import Source
 
@@ -72,6 +73,26 @@ def test_results_against_a_file_of_labels(results: Path, truth: Path, capsys: py
     assert evaluate(SOURCE, "--results", str(results), "--truth", str(truth), "--json") == 0
     (drive,) = json.loads(capsys.readouterr().out)["drives"]
     assert (drive["frames"], drive["judged"]) == (FRAMES, FRAMES - 3)
+
+
+def test_labels_of_a_sub_class_are_scored_as_its_parent(
+    results: Path, truth: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    of_taxis, classes = tmp_path / "taxis.json", tmp_path / "labels.yaml"
+    labels = native.from_json(truth.read_bytes(), "truth")
+    (track,) = labels.tracks
+    whole = FrameTag(0, FRAMES - 4, WHOLE_TAG, track.origin)
+    of_taxis.write_bytes(native.to_json(replace(labels, tracks=(replace(track, label="taxi"),), tags=(whole,))))
+    classes.write_text("classes: {car: , taxi: {of: car}}", encoding="utf-8")
+
+    def recall(*more: str) -> float | None:
+        assert evaluate(SOURCE, "--results", str(results), "--truth", str(of_taxis), "--json", *more) == 0
+        return json.loads(capsys.readouterr().out)["figures"]["recall"]["value"]
+
+    assert recall() is None, "nobody said what a taxi is"
+    assert recall("--classes", str(classes)) is not None
+    assert evaluate(SOURCE, "--truth", str(truth), "--classes", str(tmp_path / "none.yaml")) == 2
+    assert "none.yaml" in capsys.readouterr().err
 
 
 def test_a_report_that_compares_two_runs(

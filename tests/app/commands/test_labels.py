@@ -31,6 +31,18 @@ def drive(tmp_path: Path) -> Path:
     return write(tmp_path / "drive.mcap", [full(index) for index in range(3)])
 
 
+def test_names_in_a_file_are_read_by_the_class_list(drive: Path, tmp_path: Path) -> None:
+    classes = tmp_path / "labels.yaml"
+    classes.write_text("classes: {car: , taxi: {of: car, exports: {coco: automobile}}}", encoding="utf-8")
+    assert cipv("labels", "export", drive, "--format", "coco", "--out", tmp_path / "out.json") == 0
+    file = tmp_path / "out.json"
+    file.write_text(file.read_text().replace('"car"', '"automobile"'))
+    more = ("--format", "coco", "--classes", classes, "--out", tmp_path / "in.json")
+    assert cipv("labels", "import", drive, file, *more) == 0
+    labels = json.loads((tmp_path / "in.json").read_text())
+    assert {track["label"] for track in labels["labels"]["tracks"]} == {"taxi"}
+
+
 def test_truth_goes_out_and_comes_back(drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cipv("labels", "export", drive, "--format", "openlabel", "--out", tmp_path / "out.json") == 0
     assert "tracks 1, sightings 3, lead ranges 0" in capsys.readouterr().err

@@ -74,6 +74,20 @@ def test_a_projects_own_list_is_what_its_exports_say(tmp_path: Path) -> None:
     assert [track.label for track in back.tracks] == ["taxi"]
 
 
+@pytest.mark.parametrize("name", ["kitti", "kitti-tracking", "coco", "nuscenes", "openlabel"])
+def test_a_projects_names_in_a_file_are_read_back_as_its_classes(name: str, tmp_path: Path) -> None:
+    own = classes_of(
+        tmp_path / "labels.yaml",
+        "classes: {car: , taxi: {of: car, exports: {kitti: Cab, coco: cab, nuscenes: vehicle.cab}}, van: {of: car}}",
+    )
+    export_labels(labelled("taxi", "car"), drive(), name, tmp_path / "out", own)
+    back = import_labels(tmp_path / "out", drive(), name, IMPORT, own).labels
+    assert sorted(track.label for track in back.tracks) == ["car", "taxi"]
+    as_detectors = import_labels(tmp_path / "out", drive(), name, IMPORT).labels
+    assert name == "openlabel" or "taxi" not in {track.label for track in as_detectors.tracks}
+    assert (own.read_as("Van", name), own.read_as("Cyclist", name)) == ("van", None)
+
+
 BILLIONS = "a: &a [1, 1]\n" + "".join(f"{b}: &{b} [*{a}, *{a}, *{a}]\n" for a, b in pairwise("abcdefghijklmnop"))
 
 

@@ -82,7 +82,7 @@ def read_objects(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     rows: dict[int, list[LabelRow]] = {}
     for frame, (name, file) in sorted(known.items()):
         T_rect_ego, camera = _view_beside(home, name, drive.shots[frame])
-        rows[frame] = [kitti_rows.from_fields(fields, T_rect_ego, camera, what) for fields, what in _lines(file)]
+        rows[frame] = [_row(fields, T_rect_ego, camera, drive, what) for fields, what in _lines(file)]
     objects = {
         frame: tuple(truth_of(row, row.cuboid) for row in found if row.cuboid is not None)
         for frame, found in rows.items()
@@ -118,10 +118,10 @@ def read_tracking(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     for (frame_text, id_text, *fields), what in _lines(file, skip=2):
         frame = _whole(frame_text, len(drive.shots), what)
         if id_text == _NO_TRACK:
-            regions.append((frame, kitti_rows.from_fields(fields, T_rect_ego, camera, what)))
+            regions.append((frame, _row(fields, T_rect_ego, camera, drive, what)))
             continue
         number = _whole(id_text, _LARGEST_ID, what)
-        row = kitti_rows.from_fields(fields, T_rect_ego, camera, what)
+        row = _row(fields, T_rect_ego, camera, drive, what)
         label, sightings = found.setdefault(number, (row.label, {}))
         if label == UNLABELLED:  # a track may begin with sightings only in the image
             label = row.label
@@ -192,6 +192,14 @@ def _lines(file: Path, skip: int = 0) -> Iterator[tuple[list[str], str]]:
             raise BadInput(f"{what}: not a KITTI label")
         if fields:
             yield fields, what
+
+
+def _row(
+    fields: list[str], T_rect_ego: F64, camera: CameraCalibration | None, drive: LabeledDrive, what: str
+) -> LabelRow:
+    """A line with the drive's class for its type."""
+    row = kitti_rows.from_fields(fields, T_rect_ego, camera, what)
+    return row._replace(label=drive.class_of(row.kind, "kitti", lambda _: row.label))
 
 
 def _whole(text: str, limit: int, what: str) -> int:

@@ -109,7 +109,11 @@ def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
             raise BadInput(f"{path}: instance {token[:40]} refers to a missing category")
         if sightings:
             in_order = tuple(sightings[frame] for frame in sorted(sightings))
-            tracks.append(LabelTrack(numbers[token], _label(category.name), in_order, "accepted", origin))
+            tracks.append(
+                LabelTrack(
+                    numbers[token], drive.class_of(category.name, "nuscenes", _label), in_order, "accepted", origin
+                )
+            )
     tracks.sort(key=lambda track: track.id)
     note = (f"{outside:,} annotations belong to samples that are not frames of this recording",) if outside else ()
     return Imported(replace(drive.empty(), tracks=tuple(tracks)), note)

@@ -31,7 +31,6 @@ from pipeline.labels.model import (
     State,
 )
 from pipeline.types import F64, Point2
-from pipeline.vision.classes import canonical
 
 _STATE: TypeAdapter[State] = TypeAdapter(State)
 _HEADING: TypeAdapter[Heading] = TypeAdapter(Heading)
@@ -96,7 +95,7 @@ class _Reading:
         for uid, number in self.numbers.items():
             each = self.content.objects[uid]
             state, origin = self._made(each.object_data)
-            label = each.type if self.is_ours else canonical(each.type)
+            label = each.type if self.is_ours else self.drive.class_of(each.type, "openlabel")
             seen_in_order = tuple(sorted(sightings[uid], key=lambda s: s.frame))
             data = each.object_data
             yield LabelTrack(number, label, seen_in_order, state, origin, *_reviewed(data), *self._sureness(data))

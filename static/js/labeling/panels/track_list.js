@@ -91,6 +91,7 @@ export function setUp(parent) {
     const found = fitting();
     text(count, found.length > MOST ? `${MOST} of ${found.length}` : String(found.length));
     list.show(found.slice(0, MOST));
+    for (const row of body.querySelectorAll("[aria-selected=true]")) markSelected(/** @type {HTMLElement} */ (row));
     if (get("track") !== scrolledTo) bringIntoView();
     scrolledTo = get("track") ?? null;
     nothing.hidden = found.length > 0;
@@ -102,6 +103,11 @@ export function setUp(parent) {
 /** The selected row; again when the details below it take its place. Out of sight, it does not know yet that it is. */
 function bringIntoView() {
   list.rowOf(get("track") ?? -1)?.scrollIntoView({ block: "nearest" });
+}
+
+/** Also of a row out of sight, which is otherwise drawn later. @param {HTMLElement} row */
+function markSelected(row) {
+  row.setAttribute("aria-selected", String(Number(row.dataset.id) === get("track")));
 }
 
 /** The threshold and what it leaves, while there are proposals it applies to. */
@@ -154,7 +160,7 @@ function create() {
 /** @param {HTMLElement} row @param {LabelTrack} track */
 function update(row, track) {
   const { id, label, state, first, last, keyframes, origin, comment, reviewer, confidence } = track;
-  row.setAttribute("aria-selected", String(id === get("track")));
+  markSelected(row);
   row.dataset.state = isSentBack(track) ? "sent-back" : state;
   const [mark, name, what, frames, who] = [...row.children];
   text(name, `#${id}`);
