@@ -46,9 +46,11 @@ _HIDDEN_SHARE = 0.3
 _EMPTY_S = 1.0
 """Time constant for forgetting that rays passed through the object's position: ten images at 10 Hz, in which the camera
 measures the position again."""
-_CLUSTER, _STOPPED, _PIERCED, _SILENT, _TAKEN = 2.0, 1.0, -3.0, -2.0, -2.0
-"""Log-odds added by one sweep, in this order: a cluster on the object; rays that ended at its position; rays that
-passed through it; rays without a return; close to the car, rays that ended there but in the cluster of another object.
+_CLUSTER, _RETURNS, _PIERCED, _SILENT, _TAKEN = 2.0, 1.0, -3.0, -2.0, -2.0
+"""Log-odds added by one sweep, in this order: a cluster on the object; single returns that range it; rays that passed
+through it; rays without a return; close to the car, rays that ended there but in the cluster of another object. Rays
+that ended somewhere in the range that a box leaves open say nothing: that happened to 4 of 154 boxes on labelled
+vehicles without a cluster, and to 4 of 284 other boxes, on Astyx and KITTI.
 Of 394 labelled vehicles within 30 m in 126 frames of a VLP-16, with the position uncertainty of a box, none was passed
 through and 6 returned no rays; with the smallest position uncertainty, none and 10. The values are lower than these
 counts suggest, because successive sweeps are not independent."""
@@ -176,13 +178,11 @@ def _said_by_lidar(item: FusedObject, rays: Rays | None, was_followed: bool) -> 
     if rays is not None and rays.is_free:
         return _PIERCED
     if item.returns:
-        return _STOPPED
+        return _RETURNS
     if rays is None:
         return 0.0
     if rays.is_silent:
         return _SILENT
-    if rays.is_stopped:
-        return _STOPPED
     is_near = (item.distance_m or 0.0) < NEAR_M
     return _TAKEN if is_near and rays.is_taken and not was_followed else 0.0
 

@@ -147,6 +147,12 @@ def test_a_vague_distance_needs_rays_through_all_of_it() -> None:
     assert gate(after(camera_car(sigma_m=4.0), wall)) is True
 
 
+def test_rays_that_end_somewhere_in_a_vague_distance_do_not_speak_for_it() -> None:
+    """A weak box at 40 ± 8 m and a hedge at 35 m."""
+    weak = camera_car(40.0, sigma_m=8.0, score=0.35)
+    assert after(weak, Rays(returns(35.0)), frames=20).existence == after(weak, Rays(NOTHING)).existence
+
+
 def test_a_surer_box_is_likelier_there_and_repeating_it_does_not_help() -> None:
     nothing = Rays(NOTHING)
     by_score = [after(camera_car(score=score), nothing).existence for score in (0.3, 0.45, 0.6, 0.9)]
