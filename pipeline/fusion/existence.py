@@ -74,15 +74,17 @@ class Existence(NamedTuple):
     """Its distance when the camera's position was initialised; None before that."""
     travelled_m: float = 0.0
     """Distance driven by the car since then."""
+    judged_m: float = 0.0
+    """The part of it that was driven until its distance was last measured."""
     shrunk_m: float = 0.0
-    """Decrease of its distance since then."""
+    """Decrease of its distance meanwhile."""
     cluster_s: float = 0.0
     """Total time that the LiDAR has seen it."""
 
     @property
     def goes_along(self) -> bool:
         """Whether its distance has shrunk by less than that of a static object would have: see ``_ALONG``."""
-        return self.travelled_m >= _ALONG_AFTER_M and self.shrunk_m < _ALONG_SHARE * self.travelled_m
+        return self.judged_m >= _ALONG_AFTER_M and self.shrunk_m < _ALONG_SHARE * self.judged_m
 
 
 @dataclass(frozen=True)
@@ -153,16 +155,16 @@ def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bo
     if lidar < 0.0:
         # evidence that a place is empty does not apply to another place, and decays as the object moves on
         lidar = 0.0 if is_begun_anew else lidar * math.exp(-dt_s / _EMPTY_S)
-    from_m, travelled_m, shrunk_m = before.from_m, before.travelled_m, before.shrunk_m
+    from_m, travelled_m, judged_m, shrunk_m = before.from_m, before.travelled_m, before.judged_m, before.shrunk_m
     if is_begun_anew or from_m is None or now.speed_mps is None:
-        from_m, travelled_m, shrunk_m = item.distance_m, 0.0, 0.0
+        from_m, travelled_m, judged_m, shrunk_m = item.distance_m, 0.0, 0.0, 0.0
     else:
         travelled_m += now.speed_mps * dt_s
         if item.measured and item.distance_m is not None:
-            shrunk_m = from_m - item.distance_m
+            judged_m, shrunk_m = travelled_m, from_m - item.distance_m
     cluster_s = before.cluster_s + (dt_s if item.seen_by_lidar else 0.0)
     lidar = _bounded(lidar + _said_by_lidar(item, rays, cluster_s >= _FOLLOWED_S))
-    return Existence(score, lidar, item.camera_ranges, age_s, from_m, travelled_m, shrunk_m, cluster_s)
+    return Existence(score, lidar, item.camera_ranges, age_s, from_m, travelled_m, judged_m, shrunk_m, cluster_s)
 
 
 def _weight(dt_s: float, mean_s: float) -> float:

@@ -86,7 +86,7 @@ def track(
     # Start a new track for every unmatched box; end tracks that were missed for too long
     taken = set(partner.values())
     fresh = [measurement for column, measurement in enumerate(measurements) if column not in taken]
-    on = first_box_on(fresh, [each.track for each in kept_list], params)
+    on = first_box_on(fresh, [each.track for each in kept_list])
     kept_list += [_new(state.next_id + n, *each, guess, params) for n, each in enumerate(zip(fresh, on, strict=True))]
     alive = tuple(
         followed

@@ -278,6 +278,16 @@ def test_a_weak_box_that_goes_along_is_a_vehicle(case: str, closing_mps: float, 
     assert begun == pytest.approx(0.5), "a place begun anew may be another thing"
 
 
+def test_what_is_only_predicted_does_not_go_along() -> None:
+    """A weak box on something that stands, seen for 0.4 s; then the car drives 36 m without measuring it again."""
+    state = ExistenceState()
+    for k in range(18):
+        car = replace(camera_car(60.0 - 2.0 * min(k, 4), score=0.45), seen_by="V" if k < 5 else "", measured=k < 5)
+        now = moment(EgoState(0, 20.0), 0.1 if k else None)
+        state, _ = weigh(state, (car,), Rays(NOTHING), FRAME, now, PARAMS)
+    assert not state.known[1].goes_along
+
+
 def test_switched_off_nothing_is_said() -> None:
     found = after(camera_car(), Rays(returns(40.0)), params=ExistenceParams(enabled=False))
     assert (found.existence, gate(found)) == (None, None)

@@ -51,8 +51,8 @@ def test_the_only_box_is_the_vehicles_and_not_its_doubles(began_on: int | None, 
 
 
 def test_an_object_that_has_left_the_one_it_began_on_is_no_double() -> None:
-    followed = [expected(1, 610.0, 5.0), expected(2, 590.0, 5.0, double_of=1)]
-    assert match(followed, [box(595.0)], VisionTrackingParams()) == {1: 0}
+    followed = [expected(1, 610.0, 5.0), expected(2, 588.0, 5.0, double_of=1)]
+    assert match(followed, [box(593.0)], VisionTrackingParams()) == {1: 0}
 
 
 def test_a_vague_prediction_takes_what_nobody_else_wants() -> None:

@@ -238,7 +238,7 @@ def test_a_standing_car_ahead_of_a_fast_ego_car_is_soon_known_to_stand() -> None
 @pytest.mark.parametrize("images", [1, 3, 20], ids=lambda images: f"{images} double boxes")
 def test_a_vehicle_keeps_its_number_however_long_it_had_two_boxes(images: int) -> None:
     """The detector then draws only the box that was the second one."""
-    first, second = _car(40.0), _car(39.0, -0.2)
+    first, second = _car(40.0), _car(39.0, -0.6)
     shown = _drive([(first,)] * 10 + [(first, second)] * images + [(second,)] * 10, KALMAN)
     assert [len(tracks) for tracks in shown[10:-10]] == [2] * images
     assert [[each.id for each in tracks] for tracks in shown[-5:]] == [[1]] * 5
