@@ -19,8 +19,8 @@ _MAX_GROWTH = 3.0
 """The outer gate is tuned for images 0.1 s apart; it widens with the time since the last sighting, by this factor at
 most."""
 _DOUBLE_IOU = 0.25
-"""A new box that overlaps a tracked one by more is its double, or the nearer of the two vehicles mostly hides the other.
-With an overlap between this and ``detection.nms_iou``, YOLOX-nano draws a second box on 2.6 % of clearly visible
+"""A new box that overlaps a tracked one by more is its double, or one of the two vehicles mostly hides the other. With
+an overlap between this and ``detection.nms_iou``, YOLOX-nano draws a second box on 2.6 % of clearly visible
 vehicles (``pipeline.experiments.robustness.measure``)."""
 _ESTABLISHED_HITS = 3
 """Number of sightings after which an object's motion is measured instead of assumed."""
