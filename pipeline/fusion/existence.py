@@ -151,12 +151,13 @@ def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bo
         score = item.score if score is None else score + _weight(dt_s, _MEAN_S) * (item.score - score)
     elif missed and score is not None:
         score -= _weight(dt_s, min(max(age_s, _MEAN_S), _LONGEST_MEAN_S)) * score
-    is_begun_anew = item.camera_ranges < before.camera_ranges
-    if lidar < 0.0:
-        # evidence that a place is empty does not apply to another place, and decays as the object moves on
-        lidar = 0.0 if is_begun_anew else lidar * math.exp(-dt_s / _EMPTY_S)
+    is_elsewhere = item.is_placed_anew(before.camera_ranges)
+    if is_elsewhere:
+        lidar = 0.0  # what the LiDAR saw at one place says nothing about another
+    elif lidar < 0.0:
+        lidar *= math.exp(-dt_s / _EMPTY_S)  # the object moves on
     from_m, travelled_m, judged_m, shrunk_m = before.from_m, before.travelled_m, before.judged_m, before.shrunk_m
-    if is_begun_anew or from_m is None or now.speed_mps is None:
+    if is_elsewhere or from_m is None or now.speed_mps is None:
         from_m, travelled_m, judged_m, shrunk_m = item.distance_m, 0.0, 0.0, 0.0
     else:
         travelled_m += now.speed_mps * dt_s

@@ -203,6 +203,13 @@ def test_that_a_place_was_empty_says_nothing_of_another_place() -> None:
     assert existence_after(begun, replace(car, camera_ranges=1)) > 0.85
 
 
+@pytest.mark.parametrize(("ranges", "kept"), [(21, True), (1, False)], ids=["followed on", "begun anew"])
+def test_that_a_place_was_taken_says_nothing_of_another_place(ranges: int, kept: bool) -> None:
+    car = replace(camera_car(45.0, score=0.4), camera_ranges=ranges)
+    known = ExistenceState({1: Existence(0.4, 4.0, camera_ranges=20)})
+    assert (existence_after(known, car) > 0.9) == kept
+
+
 def test_an_empty_place_is_forgotten_where_the_lidar_cannot_tell_any_more() -> None:
     car = camera_car(45.0, score=0.7)
     assert existence_after(seen_through(), car, 5) < 0.5
