@@ -20,5 +20,5 @@ def outside_text(first: int, last: int, count: int) -> str:
 
 
 def lead_text(lead: Lead) -> str:
-    """A lead as text: the id of its track, "none" or "can't tell"."""
-    return f"#{lead}" if isinstance(lead, int) else {"none": "none", "unknown": "can't tell"}[lead]
+    """A lead as text: the id of its track, "none" or "unclear"."""
+    return f"#{lead}" if isinstance(lead, int) else {"none": "none", "unknown": "unclear"}[lead]

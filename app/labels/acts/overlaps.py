@@ -78,7 +78,7 @@ def _word(value: Value) -> object:
 
 def _called(item: Item) -> str:
     if isinstance(item.value, LeadRange):
-        return f"lead {lead_text(item.value.lead)} of {frames_text(item.value.first, item.value.last)}"
+        return f"lead {lead_text(item.value.lead)} in {frames_text(item.value.first, item.value.last)}"
     return f"the {item.kind} of {frames_text(cast('PathLabel | EventLabel', item.value).frame)}"
 
 

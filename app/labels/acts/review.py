@@ -108,7 +108,7 @@ def _name(value: Value) -> str:
     if isinstance(value, FrameTag):
         return f"{value.tag} of {frames_text(value.first, value.last)}"
     if isinstance(value, LeadRange):
-        return f"lead {lead_text(value.lead)} of {frames_text(value.first, value.last)}"
+        return f"lead {lead_text(value.lead)} in {frames_text(value.first, value.last)}"
     if isinstance(value, PathLabel):
         return f"the path of {frames_text(value.frame)}"
     return f"{value.kind.replace('_', '-')} in {frames_text(value.frame)}"

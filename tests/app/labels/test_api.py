@@ -30,7 +30,7 @@ def test_the_pipelines_opinion_is_proposed_accepted_and_scored(engine: Engine, c
     score = client.get("/api/labels/score").json()
     assert (score["judged"], score["metrics"]) == (0, [])
     items = [ref(track), {"kind": "lead", "id": lead["id"], "revision": lead["revision"]}]
-    said = f"accepted #{track['id']}, lead #{track['id']} of frames 1–30"
+    said = f"accepted #{track['id']}, lead #{track['id']} in frames 1–30"
     assert act(client, kind="accept", items=items).json()["what"] == said
     score = ScoreJson.model_validate(client.get("/api/labels/score").json())
     named = {metric.name: metric.run for metric in score.metrics}

@@ -80,7 +80,7 @@ def test_what_was_reviewed_is_cut_only_with_a_word(labels: DriveLabels) -> None:
     (number,) = (n for n, item in labels.items("lead").items() if getattr(item.value, "first", None) == 30)
     act(labels, "Bob", kind="review_ok", items=[("lead", number)])
     for over in ({"kind": "set_lead", "lead": 1}, {"kind": "clear_lead"}):
-        with pytest.raises(Stale, match="Bob has reviewed lead #2 of frames 31–41"):
+        with pytest.raises(Stale, match="Bob has reviewed lead #2 in frames 31–41"):
             act(labels, "Ada", **over, first=38, last=50, seen=labels.revision)
     act(labels, "Ada", kind="set_lead", lead=1, first=38, last=50, seen=labels.revision, over_reviewed=True)
     assert [each[:3] for each in leads(labels)] == [(10, 20, 1), (30, 37, 2), (38, 50, 1)]

@@ -75,7 +75,7 @@ def said_of(labels: DriveLabels, kind: Any) -> tuple[str, str, str]:
 
 @pytest.mark.parametrize(
     ("kind", "what"),
-    [("lead", "lead #1 of frames 11–21"), ("path", "the path of frame 13"), ("event", "cut-in in frame 12")],
+    [("lead", "lead #1 in frames 11–21"), ("path", "the path of frame 13"), ("event", "cut-in in frame 12")],
 )
 def test_the_lead_paths_and_events_are_sent_back_and_reviewed(labels: DriveLabels, kind: str, what: str) -> None:
     act(labels, kind="set_path", frame=12, left=[[0, 1], [5, 1]], right=None)
