@@ -21,6 +21,7 @@ from pipeline.types import U8, RawBoxes, RawLanes
 from pipeline.vision.detector import Detector
 from pipeline.vision.far_view import FarView
 
+_COMMAND = (sys.executable, "-m", "app.drive.look_ahead.process")
 _CPU = "CPUExecutionProvider"
 
 
@@ -91,7 +92,7 @@ class NetworkProcess:
     def _start(self) -> None:
         self.is_opening = True
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "app.drive.look_ahead.process"],
+            _COMMAND,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
