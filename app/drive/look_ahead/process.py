@@ -27,6 +27,8 @@ _STARTS_AT = 10
 """Niceness until the networks are open."""
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 """A terminal or a supervisor sends these to the whole group; the server decides when this process ends."""
+_KILLED_FIRST = Path("/proc/self/oom_score_adj"), "1000"
+"""If memory runs out, the system kills this process instead of the server (Linux)."""
 
 
 def main() -> None:
@@ -34,6 +36,8 @@ def main() -> None:
     for name in _SIGNALS:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
+    with suppress(OSError):
+        _KILLED_FIRST[0].write_text(_KILLED_FIRST[1], encoding="ascii")
     with suppress(OSError, AttributeError):
         os.nice(_STARTS_AT)
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")

@@ -91,6 +91,8 @@ def test_all_its_threads_have_idle_priority_and_it_ends_with_the_server(
     assert child.stdin is not None
     threads = [int(each) for each in os.listdir(f"/proc/{child.pid}/task")]
     assert {os.sched_getscheduler(each) for each in threads} == {os.SCHED_IDLE}
+    killed_first = Path(f"/proc/{child.pid}/oom_score_adj").read_text(encoding="ascii")
+    assert killed_first.strip() == "1000", "before the server, if memory runs out"
     child.stdin.close()  # as the system does when the server ends, however it ends
     assert child.wait(WAIT_S) == 0
     process.close()
