@@ -12,7 +12,7 @@ import numpy as np
 
 from app.core.kept_detections import answer_of
 from app.core.watchdog import at_work
-from app.drive.look_ahead.messages import Answer, NetworkFile, Networks, Picture, PipeClosed, receive, send
+from app.drive.look_ahead.messages import ImageHeader, NetworkFile, NetworkReply, Networks, PipeClosed, receive, send
 from pipeline.common.errors import BadInput
 from pipeline.detection import Detectors
 from pipeline.inference.model_registry import EMBEDDED_FILE
@@ -30,7 +30,7 @@ class ProcessEnded(Exception):
 
 
 class NetworkFailed(BadInput):
-    """A network cannot be opened in the process, or failed on a picture there; the text gives the reason."""
+    """A network cannot be opened in the process, or failed on an image there; the text gives the reason."""
 
 
 def is_worth_a_process(detectors: Detectors) -> bool:
@@ -42,7 +42,7 @@ def is_worth_a_process(detectors: Detectors) -> bool:
 
 
 class NetworkProcess:
-    """Runs the networks of ``detectors`` in a process, which starts at the first picture. For one thread; ``end`` from
+    """Runs the networks of ``detectors`` in a process, which starts at the first image. For one thread; ``end`` from
     any."""
 
     def __init__(self, detectors: Detectors) -> None:
@@ -68,13 +68,13 @@ class NetworkProcess:
         if self._process is None:
             self._start()
         image = np.ascontiguousarray(bgr)
-        answer = self._ask(Picture(number, image.shape[0], image.shape[1]), image.data, self._networks[number].name)
+        answer = self._ask(ImageHeader(number, image.shape[0], image.shape[1]), image.data, self._networks[number].name)
         if answer.row is None:
             raise NetworkFailed(answer.error)
         return answer_of(answer.row)
 
     def end(self) -> None:
-        """End the process; a picture in progress is dropped."""
+        """End the process; an image in progress is dropped."""
         self._has_ended = True
         process = self._process
         if process is not None:
@@ -86,7 +86,7 @@ class NetworkProcess:
         self.end()
         process = self._process
         for stream in (process.stdin, process.stdout) if process is not None else ():
-            with suppress(OSError):  # a picture could not be delivered
+            with suppress(OSError):  # an image could not be delivered
                 _pipe(stream).close()
 
     def _start(self) -> None:
@@ -104,13 +104,13 @@ class NetworkProcess:
             raise NetworkFailed(answer.error)
         self.is_opening = False
 
-    def _ask(self, message: Networks | Picture, pixels: memoryview | bytes, what: str) -> Answer:
+    def _ask(self, message: Networks | ImageHeader, pixels: memoryview | bytes, what: str) -> NetworkReply:
         process = self._process
         assert process is not None
         try:
             with at_work(f"{what} in the background", process.pid):
                 send(_pipe(process.stdin), message, pixels)
-                return receive(_pipe(process.stdout), Answer)
+                return receive(_pipe(process.stdout), NetworkReply)
         except (PipeClosed, OSError, ValueError):
             raise ProcessEnded from None
 

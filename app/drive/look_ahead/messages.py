@@ -1,6 +1,6 @@
 """Messages between the server and its process for background networks, over two pipes.
 
-Every message is its length, four bytes, and msgpack. The pixels of a picture follow its message, so that they are not
+Every message is its length, four bytes, and msgpack. The pixels of an image follow its message, so that they are not
 copied into it.
 """
 
@@ -39,7 +39,7 @@ class Networks(msgspec.Struct):
     """All networks that it will run."""
 
 
-class Picture(msgspec.Struct):
+class ImageHeader(msgspec.Struct):
     """An image for a network. Its pixels follow the message."""
 
     network: int
@@ -50,7 +50,7 @@ class Picture(msgspec.Struct):
     """Columns."""
 
 
-class Answer(msgspec.Struct):
+class NetworkReply(msgspec.Struct):
     """The process's reply to every message."""
 
     row: DetectionRow | None = None

@@ -1,5 +1,5 @@
 """``python -m app.drive.look_ahead.process``: runs networks at idle priority for the server that started it, one
-picture after another, and ends with it.
+image after another, and ends with it.
 
 It starts at a moderate niceness, because imports and opening networks take a second or two of processor time; from
 then on it computes only while no other program wants the processor.
@@ -17,7 +17,16 @@ from typing import IO
 import numpy as np
 
 from app.core.kept_detections import row_of
-from app.drive.look_ahead.messages import Answer, NetworkFile, Networks, Picture, PipeClosed, exactly, receive, send
+from app.drive.look_ahead.messages import (
+    ImageHeader,
+    NetworkFile,
+    NetworkReply,
+    Networks,
+    PipeClosed,
+    exactly,
+    receive,
+    send,
+)
 from pipeline.common.errors import BadInput
 from pipeline.common.idle_priority import take_idle_priority
 from pipeline.lanes.network import LaneNetwork, load_lane_network
@@ -51,22 +60,22 @@ def _serve(requests: IO[bytes], answers: IO[bytes]) -> None:
     try:
         networks = [_opened(file) for file in receive(requests, Networks).files]
     except (BadInput, OSError) as error:
-        send(answers, Answer(error=str(error)))
+        send(answers, NetworkReply(error=str(error)))
         return
     take_idle_priority()
-    send(answers, Answer())
+    send(answers, NetworkReply())
     while True:
-        picture = receive(requests, Picture)
-        pixels = exactly(requests, picture.height * picture.width * 3)
-        bgr = np.frombuffer(pixels, np.uint8).reshape(picture.height, picture.width, 3)
-        send(answers, _answer(networks[picture.network], bgr))
+        header = receive(requests, ImageHeader)
+        pixels = exactly(requests, header.height * header.width * 3)
+        bgr = np.frombuffer(pixels, np.uint8).reshape(header.height, header.width, 3)
+        send(answers, _answer(networks[header.network], bgr))
 
 
-def _answer(network: Detector | LaneNetwork, bgr: np.ndarray) -> Answer:
+def _answer(network: Detector | LaneNetwork, bgr: np.ndarray) -> NetworkReply:
     try:
-        return Answer(row_of(0, network.name, network.detect(bgr)))
+        return NetworkReply(row_of(0, network.name, network.detect(bgr)))
     except Exception as error:  # a network may fail in any way; the server runs it again, and reports what it finds
-        return Answer(error=f"{type(error).__name__}: {error}")
+        return NetworkReply(error=f"{type(error).__name__}: {error}")
 
 
 def _opened(file: NetworkFile) -> Detector | LaneNetwork:

@@ -70,7 +70,7 @@ class LookAhead:
         return work.take(index) if work is not None and work.recording is recording else None
 
     def end(self) -> None:
-        """End the process, if any. A picture in progress is dropped."""
+        """End the process, if any. An image in progress is dropped."""
         with self._lock:
             work, self._work, self._ends = self._work, None, (None, 0)
         if work is not None:

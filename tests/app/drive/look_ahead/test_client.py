@@ -111,7 +111,7 @@ def test_only_networks_that_are_worth_it_get_a_process(detectors: Detectors) -> 
     assert not is_worth_a_process(replace(detectors, boxes=on_a_card))
 
 
-def test_a_network_that_fails_says_why_and_the_next_picture_is_looked_at(process: NetworkProcess) -> None:
+def test_a_network_that_fails_says_why_and_the_next_image_is_looked_at(process: NetworkProcess) -> None:
     with pytest.raises(NetworkFailed, match=r"expected an image of \(H, W, 3\) uint8"):
         process.detect(0, np.zeros((0, 320, 3), np.uint8))
     assert _detect(process).model != ""
