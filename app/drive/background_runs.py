@@ -191,7 +191,9 @@ class BackgroundRuns:
 
     def _look_ahead(self, recording: OpenRecording, run: DriveRun) -> None:
         """Wait for the detections of a run's next frame as long as it is worth it, and this run is still the next."""
-        if recording.has_been_looked_at(run.done):
+        is_seen = recording.has_been_looked_at(run.done)
+        self._phase = "run" if is_seen else "detect"
+        if is_seen:
             return
         with self._condition:
             if recording is self._recording and not self._ended:
@@ -209,7 +211,6 @@ class BackgroundRuns:
     def _advance(self, recording: OpenRecording, run: DriveRun) -> None:
         """Process one frame. If this is stopped, the run is unchanged."""
         began = time.perf_counter()
-        self._phase = "run" if recording.has_been_looked_at(run.done) else "detect"
         try:
             recording.advance(run, self._ahead.take(recording, run.done))
         except Stopped:
