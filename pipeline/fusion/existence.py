@@ -93,6 +93,8 @@ class ExistenceState:
 
     known: dict[int, Existence] = field(default_factory=dict)
     """By object id."""
+    by_vision: dict[int, int] = field(default_factory=dict)
+    """Object id of each vision track."""
     looks_far: bool = False
     """Whether far parts of images are processed a second time, at least in some frames."""
 
@@ -120,14 +122,25 @@ def weigh(
     known: dict[int, Existence] = {}
     judged = []
     for item in objects:
-        before = state.known.get(item.id, Existence(None, 0.0))
+        before = _before(state, item)
         found = _updated(before, item, rays.get(item.id), item.id in missed, now)
         known[item.id] = found
         camera = (found.score - _EVEN_SCORE) * _SCORE_SLOPE if found.score is not None else 0.0
         camera += _ALONG if found.goes_along else 0.0
         odds = _bounded(_bounded(camera) + found.lidar)
         judged.append(_told(item, 1.0 / (1.0 + math.exp(-odds)), rays.get(item.id)))
-    return ExistenceState(known, looks_far), tuple(judged)
+    by_vision = {item.vision_track: item.id for item in objects if item.vision_track is not None}
+    return ExistenceState(known, by_vision, looks_far), tuple(judged)
+
+
+def _before(state: ExistenceState, item: FusedObject) -> Existence:
+    """Evidence about an object until now. If its id went to another part of it, its boxes are still the same: what they
+    said, and what the LiDAR said against them, still holds. What it said for them was about the other part."""
+    known = state.known.get(item.id)
+    if known is None and item.vision_track in state.by_vision:
+        before = state.known[state.by_vision[item.vision_track]]
+        known = before._replace(lidar=min(before.lidar, 0.0))
+    return known if known is not None else Existence(None, 0.0)
 
 
 def _missed(objects: tuple[FusedObject, ...], size: tuple[int, int] | None) -> frozenset[int]:
