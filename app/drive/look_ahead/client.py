@@ -112,7 +112,7 @@ class NetworkProcess:
                 send(_pipe(process.stdin), message, pixels)
                 return receive(_pipe(process.stdout), NetworkReply)
         except (PipeClosed, OSError, ValueError):
-            raise ProcessEnded from None
+            raise ProcessEnded("its process ended") from None
 
     def _there(self, network: Any) -> Any:
         """The detector with its network in the process; anything else, such as the classical lanes, stays."""

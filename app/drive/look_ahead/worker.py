@@ -17,6 +17,7 @@ from app.drive.compute_scheduler import ComputeScheduler
 from app.drive.frame_inputs import without_pixels
 from app.drive.look_ahead.client import NetworkProcess, ProcessEnded, is_worth_a_process
 from app.drive.open_recording import OpenRecording
+from pipeline.common.errors import first_line
 from pipeline.common.user_files import Overloaded
 from pipeline.detection import Detectors
 from pipeline.types import Frame
@@ -80,26 +81,25 @@ class LookAhead:
         try:
             with watchdog.watching("the process for networks", lambda stuck: self._on_stuck(work, stuck)):
                 work.do()
-        except (ProcessEnded, Overloaded):
-            self._failed(work)
-        except Exception:  # the run reports what is wrong with a recording or a network
-            logger.warning("looking ahead in %s failed", work.recording.setup.uri, exc_info=True)
-            self._failed(work, is_final=True)
+        except (ProcessEnded, Overloaded) as error:
+            self._failed(work, first_line(error))
+        except Exception as error:  # the run reports what is wrong with a recording or a network
+            self._failed(work, first_line(error), is_final=True)
         finally:
             work.close()
             self._on_progress()
 
     def _on_stuck(self, work: _Work, stuck: Stuck) -> None:
         work.end()
-        self._failed(work)
+        self._failed(work, f"{stuck.doing} hangs")
 
-    def _failed(self, work: _Work, *, is_final: bool = False) -> None:
+    def _failed(self, work: _Work, why: str, *, is_final: bool = False) -> None:
         """The work ended before its time; it may begin again unless that was so often enough."""
         with self._lock:
             if self._work is work:
                 self._work = None
                 self._ends = work.recording, _MOST_ENDS if is_final else self._ends[1] + 1
-                logger.warning("the process for networks ended unexpectedly (%d)", self._ends[1])
+                logger.warning("looking ahead in %s ended: %s", work.recording.setup.uri, why)
 
 
 class _Work:
