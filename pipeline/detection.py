@@ -52,6 +52,8 @@ class Detectors:
     """Processes the far part of the image a second time; None without a second pass."""
     far_every: int = 1
     """The far view runs in every n-th frame by its index."""
+    left_out: tuple[str, ...] = ()
+    """What does not run because the machine is too slow, as notes of the frame."""
 
     def looks_for_lanes(self, index: int) -> bool:
         """Whether lane lines are detected in the frame with this index."""
@@ -68,6 +70,7 @@ class Detectors:
         return self.far is not None and index % self.far_every == 0
 
 
+_FAR_LEFT_OUT = "the far view was left out, because sensor data was dropped: this machine is too slow for all networks"
 CALM_TICKS = 50
 """Number of ticks without a dropped one after which the far view runs in every tick again: 5 s at 10 Hz."""
 
@@ -90,7 +93,8 @@ class LiveDetectors:
         self._since_lanes = 1 if is_due else self._since_lanes + 1
         lanes = self._detectors.lanes if is_due else None
         far = self._detectors.far if self._has_time_to_look_far(frame) else None
-        return replace(self._detectors, lanes=lanes, lanes_every=1, far=far, far_every=1)
+        left_out = (_FAR_LEFT_OUT,) if far is not self._detectors.far and frame.image is not None else ()
+        return replace(self._detectors, lanes=lanes, lanes_every=1, far=far, far_every=1, left_out=left_out)
 
     def _has_time_to_look_far(self, frame: Frame) -> bool:
         dropped = self._last_index is not None and frame.index > self._last_index + 1
@@ -117,6 +121,8 @@ def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
     if frame.image is None or frame.detections_given:
         return frame
     bgr = frame.image.bgr
+    if detectors.left_out:
+        frame = replace(frame, notes=(*frame.notes, *detectors.left_out))
     if detectors.boxes is not None:
         frame = replace(frame, raw_boxes=ask(detectors.boxes, frame, bgr))
     if detectors.far is not None and detectors.looks_far(frame.index):

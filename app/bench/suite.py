@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from typing import Any
 
 from app.bench import detector as detector_bench
@@ -10,6 +11,7 @@ from app.bench import lidar as lidar_bench
 from app.bench import packets as packets_bench
 from app.bench import simulation as simulation_bench
 from app.bench import whole_pipeline as pipeline_bench
+from app.bench.calibration import Calibration
 from app.web.source_catalog import recordings
 from pipeline.detection import Detectors, detector_for, lanes_for
 from pipeline.inference.runtime import DetectorMissing
@@ -23,13 +25,15 @@ from pipeline.vision.detector import Detector
 BUDGET_S = {"decode": 1.5, "lidar": 8.0, "lidar@kitti": 6.5, "line": 10.0, "detector": 3.0, "simulation": 3.0}
 """Wall time of each part; together with loading and compiling they stay below 45 s."""
 FRAMES = 40
+CALIBRATION = "calibration"
 SWEEPS_HZ = 10.0
 """Frame rate of a VLP-16. A recording may have fewer frames per second (Astyx 3.3), but the pipeline must keep up with
 the sensor, so the lane network runs as often as it would then."""
 
 
 def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, Any]]:
-    """The object of docs/reference/results.md: stage → median_ms, p99_ms and peers with their ratios.
+    """The object of docs/reference/results.md: stage → median_ms, p99_ms and peers with their ratios, and under
+    ``CALIBRATION`` a fixed loop that was measured between them (``app.bench.calibration``).
 
     Where a KITTI drive is available, the LiDAR stages are repeated as ``stage@kitti``: its sweeps, reduced to the rings
     of a VLP-16, are twice as dense."""
@@ -38,15 +42,21 @@ def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, An
     frames = [source.frame(i) for i in range(min(FRAMES, len(source)))]
     images = [frame.image.bgr for frame in frames if frame.image is not None]
     network, lanes = _detector(detector_spec, source), lanes_for(source)
-    figures = packets_bench.stages(BUDGET_S["decode"])
-    figures |= lidar_bench.stages(_sweeps(source), BUDGET_S["lidar"], params)
-    figures |= _dense_sweeps(params)
     looking = Detectors(network, lanes, usual_every(lanes, SWEEPS_HZ))
-    figures |= pipeline_bench.stages(source, len(frames), params, looking, BUDGET_S["line"])
-    if network is not None:
-        figures |= detector_bench.stages(images, network, BUDGET_S["detector"])
-    figures |= simulation_bench.stages(BUDGET_S["simulation"])
-    return figures
+    parts: list[Callable[[], dict[str, dict[str, Any]]]] = [
+        lambda: packets_bench.stages(BUDGET_S["decode"]),
+        lambda: lidar_bench.stages(_sweeps(source), BUDGET_S["lidar"], params),
+        lambda: _dense_sweeps(params),
+        lambda: pipeline_bench.stages(source, len(frames), params, looking, BUDGET_S["line"]),
+        lambda: detector_bench.stages(images, network, BUDGET_S["detector"]) if network is not None else {},
+        lambda: simulation_bench.stages(BUDGET_S["simulation"]),
+    ]
+    figures: dict[str, dict[str, Any]] = {}
+    calibration = Calibration()
+    for part in parts:
+        figures |= part()
+        calibration.sample()
+    return figures | {CALIBRATION: calibration.row()}
 
 
 def _source() -> Source:

@@ -12,10 +12,11 @@ from rich.console import Console
 from rich.table import Table
 
 from app.bench import clients as clients_bench
+from app.bench.calibration import speed_warning
 from app.bench.demands import PAGE_DEMANDS, broken, page_rows
 from app.bench.other_load import load_warning, read_cpu_times
 from app.bench.page import measure as page_bench
-from app.bench.suite import run_all
+from app.bench.suite import CALIBRATION, run_all
 from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions
 from app.fleet.extra import need_extra
@@ -54,6 +55,7 @@ class Bench:
             need_extra()
             print(json.dumps(fleet_tables.figures(self.drives), indent=1))
             return 0
+        before = read_cpu_times()
         if self.clients or self.page is not None:
             live: dict[str, Any] = {}
             if self.clients:
@@ -61,17 +63,23 @@ class Bench:
             if self.page is not None:
                 live["page"] = page_bench.figures(self.page, PAGE_S)
             print(json.dumps(live, indent=1))
+            _warn(load_warning(before, read_cpu_times()))
             return _judge(broken(page_rows(live["page"]), PAGE_DEMANDS) if "page" in live else ())
-        before = read_cpu_times()
         figures = run_all(self.pipeline.parameters(), self.pipeline.detector)
         warning = load_warning(before, read_cpu_times())
         if self.json:
             print(json.dumps(figures, indent=1))
         else:
             Console().print(_table(figures))
-        if warning is not None:
-            print(f"cipv: {warning}", file=sys.stderr)
+        _warn(warning)
+        _warn(speed_warning(figures[CALIBRATION]))
         return _judge(broken(figures))
+
+
+def _warn(warning: str | None) -> None:
+    """Say what makes figures doubtful, if anything."""
+    if warning is not None:
+        print(f"cipv: {warning}", file=sys.stderr)
 
 
 def _judge(failures: Iterable[str]) -> int:

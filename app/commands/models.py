@@ -15,7 +15,7 @@ from pipeline.common.errors import BadInput
 from pipeline.inference.model_registry import ModelEntry, known_model, list_models, own_file, pull, register, store
 from pipeline.inference.model_registry import find as find_model
 from pipeline.inference.runtime import ways_of
-from pipeline.inference.tuning import USUAL_THREADS, keep_fastest, tune
+from pipeline.inference.tuning import USUAL_THREADS, is_tuned, keep_fastest, kept_gain, kept_way, tune
 from pipeline.lanes.network import open_lane_network
 from pipeline.types import REAL_VEHICLES
 from pipeline.vision.detector import open_detector
@@ -114,11 +114,8 @@ class TuneModel:
             trials.append(trial)
             took = f"{trial.best_ms:8.1f} ms" if trial.best_ms is not None else f"not used: {trial.refused}"
             print(f"{took}  {trial.way}")
-        usual, best = trials[0], keep_fastest(path, trials)
-        if best is usual or usual.best_ms is None or best.best_ms is None:
-            print(f"{path.stem}: nothing is faster than the default")
-        else:
-            print(f"{path.stem}: {best.way}, {usual.best_ms / best.best_ms:.2f} times as fast as the default")
+        keep_fastest(path, trials)
+        print(f"{path.stem}: {_tuned(path)}")
         return 0
 
 
@@ -150,13 +147,25 @@ def _listed(entries: tuple[ModelEntry, ...]) -> Iterator[str]:
 
 
 def _where(entry: ModelEntry) -> Iterator[str]:
-    """The path of the file, or how to get it."""
+    """The path of the file and how it runs, or how to get it."""
     if entry.path is not None:
         yield f"installed: {entry.path}"
+        if is_tuned(entry.path):
+            yield f"tuned for this machine: {_tuned(entry.path)}"
     elif entry.url is not None:
         known = known_model(entry.name)
         yield f"not installed: {known.remedy}"
         yield entry.url
+
+
+def _tuned(path: Path) -> str:
+    """What tuning a network's file chose, and what that gained."""
+    gain, way = kept_gain(path), kept_way(path, USUAL_THREADS)
+    if gain is None:
+        return str(way)
+    if gain.best_ms >= gain.usual_ms:
+        return f"nothing is faster than the default ({way})"
+    return f"{way}, {gain.usual_ms / gain.best_ms:.2f} times as fast as the default"
 
 
 def _law(entry: ModelEntry) -> str:

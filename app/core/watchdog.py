@@ -19,6 +19,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 
 logger = logging.getLogger("cipv.watchdog")
 
@@ -62,9 +63,11 @@ class _Heart:
     since_s: float = 0.0
     retired: bool = False
     native_id: int = field(default_factory=threading.get_native_id)
+    process: int | None = None
+    """The process that the current operation waits for; None if the thread does it itself."""
     delayed_s: float | None = None
-    """Time that its thread had waited for a processor at the last check; None before that, or if the system does not
-    report it."""
+    """Time that whoever does the operation had waited for a processor at the last check; None before that, or if the
+    system does not report it."""
     starved_s: float = 0.0
     """How much of the time since ``since_s`` that was."""
 
@@ -74,6 +77,16 @@ def waited_s(native_id: int) -> float | None:
     try:
         with open(f"/proc/self/task/{native_id}/schedstat", encoding="ascii") as file:
             return int(file.read().split()[1]) / 1e9
+    except (OSError, ValueError, IndexError):
+        return None
+
+
+def process_waited_s(process: int) -> float | None:
+    """Total time that the threads of a process have waited for a processor (Linux), that is more than the time that
+    passed if several waited at once; None if the system does not report it."""
+    try:
+        files = list(Path(f"/proc/{process}/task").glob("*/schedstat"))
+        return sum(int(file.read_text(encoding="ascii").split()[1]) for file in files) / 1e9 if files else None
     except (OSError, ValueError, IndexError):
         return None
 
@@ -96,19 +109,20 @@ _of_thread = _OfThread()
 
 
 @contextmanager
-def at_work(doing: str) -> Iterator[None]:
+def at_work(doing: str, process: int | None = None) -> Iterator[None]:
     """Names this thread's current operation during the block; a nested block overrides the outer one. No effect on a
-    thread that is not watched. Raises Retired if it took too long."""
+    thread that is not watched. Raises Retired if it took too long. process: the child process that does the operation,
+    if the thread only waits for it."""
     heart, watchdog = _of_thread.heart, _of_thread.watchdog
     if heart is None or watchdog is None:
         yield
         return
-    outer = heart.doing
-    watchdog.begins(heart, doing)
+    outer = heart.doing, heart.process
+    watchdog.begins(heart, doing, process)
     try:
         yield
     finally:
-        watchdog.begins(heart, outer)
+        watchdog.begins(heart, *outer)
         if heart.retired:
             raise Retired
 
@@ -152,18 +166,22 @@ class Watchdog:
             with self._lock:
                 self._hearts.discard(heart)
 
-    def begins(self, heart: _Heart, doing: str | None) -> None:
-        """A worker begins an operation and has thereby ended the previous one."""
+    def begins(self, heart: _Heart, doing: str | None, process: int | None = None) -> None:
+        """A worker begins an operation and has thereby ended the previous one. process: see ``at_work``."""
         now_s = time.monotonic()
         with self._lock:
             if heart.doing is not None:
                 self._took_s.setdefault(heart.doing, deque(maxlen=_KEPT)).append(now_s - heart.since_s)
             heart.doing, heart.since_s, heart.starved_s = doing, now_s, 0.0
+            if process != heart.process:
+                heart.process, heart.delayed_s = process, None
 
-    def allowed_s(self, doing: str) -> float:
-        """Time limit of an operation."""
+    def allowed_s(self, doing: str, process: int | None = None) -> float:
+        """Time limit of an operation. A process at idle priority may not run for a while, and nobody waits for it, so
+        it always has the time of a first run."""
         took_s = self._took_s.get(doing, ())
-        idle_s = max(took_s) + self._patience_s if len(took_s) >= _FEWEST else self._first_s
+        is_known = len(took_s) >= _FEWEST and process is None
+        idle_s = max(took_s) + self._patience_s if is_known else self._first_s
         return idle_s * max(1.0, busy_share())
 
     def look(self, now_s: float, late_s: float = 0.0) -> list[Stuck]:
@@ -176,7 +194,7 @@ class Watchdog:
                 _count_starved(heart)
                 if heart.doing is None or heart.retired:
                     continue
-                if now_s - heart.since_s - heart.starved_s <= self.allowed_s(heart.doing):
+                if now_s - heart.since_s - heart.starved_s <= self.allowed_s(heart.doing, heart.process):
                     continue
                 heart.retired = True
                 found.append((heart, Stuck(heart.name, heart.doing, now_s - heart.since_s, heart.thread_id)))
@@ -197,7 +215,7 @@ class Watchdog:
 
 
 def _count_starved(heart: _Heart) -> None:
-    delayed_s = waited_s(heart.native_id)
+    delayed_s = waited_s(heart.native_id) if heart.process is None else process_waited_s(heart.process)
     if delayed_s is not None and heart.delayed_s is not None:
         heart.starved_s += delayed_s - heart.delayed_s
     heart.delayed_s = delayed_s

@@ -14,6 +14,7 @@ from app.core.detection_cache import DetectionCache
 from app.core.watchdog import Stuck, Watchdog
 from app.drive.compute_scheduler import ComputeScheduler
 from app.drive.full_run import DriveRun
+from app.drive.look_ahead.worker import LookAhead
 from app.drive.open_recording import OpenRecording, RunSetup
 from pipeline.common.errors import BadInput
 from pipeline.common.user_files import Overloaded
@@ -70,6 +71,7 @@ class BackgroundRuns:
         self.watchdog = Watchdog()
         self._detections = detections
         self._condition = threading.Condition(threading.RLock())
+        self._ahead = LookAhead(self.turn, self._wake)
         self._recording: OpenRecording | None = None
         self._ended = False
         self._revision = 0
@@ -112,6 +114,7 @@ class BackgroundRuns:
         with self._condition:
             self._ended = True
             self._condition.notify_all()
+            self._ahead.end()
         self.turn.end()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(patience_s)
@@ -119,6 +122,7 @@ class BackgroundRuns:
     def open(self, setup: RunSetup | None) -> None:
         """Switch to another recording, or none."""
         with self._condition:
+            self._ahead.end()
             number = self._recording.runs.next_number if self._recording else 1
             self._recording = OpenRecording(setup, self._detections, number) if setup is not None else None
             self.changed()
@@ -169,6 +173,7 @@ class BackgroundRuns:
 
     def _run_all(self) -> None:
         while (work := self._next()) is not None:
+            self._look_ahead(*work)
             with suppress(Stopped), self.turn.background():
                 self._advance(*work)
             del work  # do not keep a closed recording in memory while idle
@@ -184,12 +189,30 @@ class BackgroundRuns:
                 self._condition.wait()
             return None
 
+    def _look_ahead(self, recording: OpenRecording, run: DriveRun) -> None:
+        """Wait for the detections of a run's next frame as long as it is worth it, and this run is still the next."""
+        is_seen = recording.has_been_looked_at(run.done)
+        self._phase = "run" if is_seen else "detect"
+        if is_seen:
+            return
+        with self._condition:
+            if recording is self._recording and not self._ended:
+                self._ahead.begin(recording, run.done, self.watchdog)
+            while not self._ended and recording is self._recording and recording.runs.unfinished() is run:
+                left_s = self._ahead.worth_waiting_s(recording, run.done)
+                if left_s <= 0:
+                    return
+                self._condition.wait(left_s)
+
+    def _wake(self) -> None:
+        with self._condition:
+            self._condition.notify_all()
+
     def _advance(self, recording: OpenRecording, run: DriveRun) -> None:
         """Process one frame. If this is stopped, the run is unchanged."""
         began = time.perf_counter()
-        self._phase = "run" if recording.has_been_looked_at(run.done) else "detect"
         try:
-            recording.advance(run)
+            recording.advance(run, self._ahead.take(recording, run.done))
         except Stopped:
             raise
         except Overloaded as error:  # not a problem of the frame: it is read again, and until then nothing is final

@@ -16,7 +16,7 @@ from app.drive.frame_inputs import InputStore
 from app.drive.full_run import DriveRun, KnownState, calibration_digest, digest
 from app.drive.run_registry import RunRegistry
 from pipeline.common.progress import Progress
-from pipeline.detection import Detectors
+from pipeline.detection import Detectors, Look
 from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.params import Params
 from pipeline.run import Sensors, sensed
@@ -73,10 +73,11 @@ class OpenRecording:
         self.described: LabeledDrive | None = None
         """Description of the drive for label files, once requested; ``describing`` is locked while it is made."""
 
-    def advance(self, run: DriveRun) -> None:
-        """Process the next frame of a run. Raises whatever a source or a network raises."""
+    def advance(self, run: DriveRun, frame: Frame | None = None) -> None:
+        """Process the next frame of a run. frame: it as input of ``step``, if it is at hand. Raises whatever a source
+        or a network raises."""
         index = run.done
-        run.add(self.input(index), self.truth(index), RULE)
+        run.add(frame or self.input(index), self.truth(index), RULE)
 
     def state_before(self, index: int, params: Params) -> State | None:
         """The state before a frame in the run with these parameters; None if it has not got that far."""
@@ -101,9 +102,18 @@ class OpenRecording:
 
     def frame(self, index: int) -> Frame:
         """A frame as input of ``step``, read from the source, with its image."""
-        frame = sensed(self.as_read(index), self.setup.detectors, self.setup.sensors, self._ask)
-        self.inputs.offer(frame)
-        return frame
+        return self.look(self.as_read(index), self.setup.detectors, self._ask)
+
+    def look(self, frame: Frame, detectors: Detectors, ask: Look) -> Frame:
+        """A frame as read from the source as input of ``step``. detectors: the recording's, wherever they run. ask: see
+        ``detections``."""
+        seen = sensed(frame, detectors, self.setup.sensors, ask)
+        self.inputs.offer(seen)
+        return seen
+
+    def detections(self) -> Look:
+        """How another thread calls detectors: through the same cache."""
+        return self._ask.clone()
 
     def with_boxes(self, index: int) -> Frame:
         """A frame read from its source, only with the detector's boxes: no lanes, no far view."""

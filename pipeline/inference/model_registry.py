@@ -30,7 +30,8 @@ from pipeline.types import DistanceLaw
 
 EMBEDDED = "embedded"
 """Name of the built-in detector."""
-_EMBEDDED_FILE = Path(__file__).parents[1] / "vision" / "embedded" / "simulated_vehicles.onnx"
+EMBEDDED_FILE = Path(__file__).parents[1] / "vision" / "embedded" / "simulated_vehicles.onnx"
+"""Its file."""
 _LARGEST_BYTES = 2 << 30
 """Limit of protobuf."""
 _CHUNK = 1 << 16
@@ -161,8 +162,8 @@ def read_verified(path: Path) -> bytes:
 
 
 def _expected_sha256(path: Path) -> str | None:
-    if _same(path, _EMBEDDED_FILE):
-        return str(json.loads(law_file(_EMBEDDED_FILE).read_text(encoding="utf-8"))["network_sha256"])
+    if _same(path, EMBEDDED_FILE):
+        return str(json.loads(law_file(EMBEDDED_FILE).read_text(encoding="utf-8"))["network_sha256"])
     if not _same(path.parent, store()):
         return None
     registered = _read_registry().models.get(path.stem)
@@ -232,7 +233,7 @@ def _download(known: KnownModel, size: int, part: Path, progress: Progress) -> N
 
 def _located(name: str) -> Path | None:
     if name == EMBEDDED:
-        return _EMBEDDED_FILE
+        return EMBEDDED_FILE
     candidates = (folder / f"{name}.onnx" for folder in (store(), data_dir() / "models"))
     return next((path for path in candidates if path.is_file()), None)
 

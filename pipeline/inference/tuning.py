@@ -39,7 +39,7 @@ _AGREE = 1e-3
 of summation, but no lower precision."""
 _WORTH = 0.97
 """To be preferred, settings must take less than this share of the best time so far: smaller differences are noise."""
-_ROUNDS = 7
+_ROUNDS, _ROUNDS_IN_TURNS = 7, 15
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,16 @@ class RunSettings:
     def __str__(self) -> str:
         level = self.optimisation.removeprefix("ORT_").replace("_", " ").lower()
         return f"{_short(self.providers[0])}, {self.threads} threads, {level}, {'with' if self.arena else 'no'} arena"
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Times of a run, measured in turns. Both are equal if nothing was faster than the default settings."""
+
+    usual_ms: float
+    """With the default settings."""
+    best_ms: float
+    """With the stored ones."""
 
 
 @dataclass(frozen=True)
@@ -97,22 +107,34 @@ def is_tuned(path: Path) -> bool:
     return _key(path) in _read(_file())
 
 
-def keep(path: Path, way: RunSettings) -> None:
+def keep(path: Path, way: RunSettings, gain: Gain | None = None) -> None:
     """Use these settings for this file's network from now on. OSError if the store cannot be written."""
     file = _file()
-    replace_text(file, json.dumps(_read(file) | {_key(path): asdict(way)}, indent=1, sort_keys=True) + "\n")
+    row = asdict(way) | (asdict(gain) if gain is not None else {})
+    replace_text(file, json.dumps(_read(file) | {_key(path): row}, indent=1, sort_keys=True) + "\n")
+
+
+def kept_gain(path: Path) -> Gain | None:
+    """What the stored settings for a network's file gained on this machine; None if nothing is stored."""
+    row = _read(_file()).get(_key(path), {})
+    try:
+        return Gain(float(row["usual_ms"]), float(row["best_ms"]))
+    except (KeyError, TypeError, ValueError, OverflowError):
+        return None
 
 
 def tune(
     run: Callable[[RunSettings], Callable[[], Sequence[F32]]], threads: int, rounding: bool = False
 ) -> Iterator[Trial]:
-    """Try all settings, the default first; then the best so far is varied in one setting at a time.
+    """Try all settings, the default first; then the best so far is varied in one setting at a time. At the end, the
+    best is measured again in turns with the default, because a machine is not equally fast all the time.
 
     run: returns for given settings a function that runs the network once on a fixed input; either may raise. rounding:
     also try settings that round differently, and accept outputs that differ by that.
     """
     agree = _agree if rounding else _are_equal
-    best, expected = _timed(run, untuned(threads), None, agree)
+    usual = untuned(threads)
+    best, expected = _timed(run, usual, None, agree)
     yield best
     exact, others = (_other_threads, _no_arena), (_other_providers, _other_levels)
     for vary in (*others, *exact) if rounding else exact:
@@ -121,23 +143,47 @@ def tune(
             yield trial
             if trial.best_ms is not None and best.best_ms is not None and trial.best_ms < _WORTH * best.best_ms:
                 best = trial
+    if best.way != usual:
+        yield from _in_turns(run, (usual, best.way))
 
 
 def fastest(trials: Sequence[Trial]) -> Trial:
     """The trial to keep: the first one that no later one beats by more than the noise."""
-    best = trials[0]
-    for each in trials[1:]:
+    best, *others = _comparable(trials)
+    for each in others:
         if each.best_ms is not None and best.best_ms is not None and each.best_ms < _WORTH * best.best_ms:
             best = each
     return best
 
 
+def _comparable(trials: Sequence[Trial]) -> Sequence[Trial]:
+    """The trials that decide, the default first: the two that were measured in turns if there are such."""
+    was_in_turns = len(trials) > 2 and trials[-2].way == trials[0].way
+    return trials[-2:] if was_in_turns else trials
+
+
 def keep_fastest(path: Path, trials: Sequence[Trial]) -> Trial:
     """Use the fastest trial's settings for this file's network from now on; returns it. OSError if the store cannot be
     written."""
-    best = fastest(trials)
-    keep(path, best.way)
+    usual, best = _comparable(trials)[0], fastest(trials)
+    known = usual.best_ms is not None and best.best_ms is not None
+    keep(path, best.way, Gain(usual.best_ms or 0.0, best.best_ms or 0.0) if known else None)
     return best
+
+
+def _in_turns(
+    run: Callable[[RunSettings], Callable[[], Sequence[F32]]], ways: Sequence[RunSettings]
+) -> Iterator[Trial]:
+    """Settings that are known to work, measured alternately."""
+    opened = [run(way) for way in ways]
+    taken: list[list[float]] = [[] for _ in ways]
+    for turn in range(1 + _ROUNDS_IN_TURNS):
+        for once, spent in zip(opened, taken, strict=True):
+            start = perf_counter()
+            once()
+            if turn > 0:  # the first run allocates
+                spent.append(perf_counter() - start)
+    yield from (Trial(way, min(spent) * 1e3) for way, spent in zip(ways, taken, strict=True))
 
 
 def _timed(

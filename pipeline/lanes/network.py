@@ -114,11 +114,12 @@ def open_lane_network(
             f"{what}: run `cipv models pull twinlitenet`, or give an ONNX file with `--lanes PATH`, "
             "or use `--lanes classical`, which needs none."
         )
-    return _loaded(path, threads, horizon_share(camera))
+    return load_lane_network(path, threads, horizon_share(camera))
 
 
-def _loaded(path: Path, threads: int, horizon: float) -> LaneNetwork:
-    """The network, tested by running it on a grey image."""
+def load_lane_network(path: Path, threads: int, horizon: float) -> LaneNetwork:
+    """The network in a file, tested by running it on a grey image. horizon: row of the horizon in the camera's image,
+    as a share of its height. DetectorError if it is not a lane network that can be run."""
     model = with_empty_masks(read_graph(path))
     try:
         own = input_size(model)

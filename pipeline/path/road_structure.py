@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from itertools import chain
 from typing import NamedTuple
 
+import cv2
 import numba
 import numpy as np
-from scipy.ndimage import label
 
 from pipeline.common.made_sweeps import made_sweeps
 from pipeline.path import vanished
@@ -139,9 +139,9 @@ def thinned(cells: Cells) -> Cells:
         return cells
     at = np.floor(cells.xy / CELL_M).astype(np.int64)
     at -= at.min(axis=0)
-    taken = np.zeros(at.max(axis=0) + 1, np.bool_)
-    taken[at[:, 0], at[:, 1]] = True
-    number = label(taken, np.ones((3, 3)))[0][at[:, 0], at[:, 1]] - 1
+    taken = np.zeros(at.max(axis=0) + 1, np.uint8)
+    taken[at[:, 0], at[:, 1]] = 1
+    number = cv2.connectedComponents(taken, connectivity=8)[1][at[:, 0], at[:, 1]] - 1
     order = np.lexsort((at[:, 1], at[:, 0], number))
     count = np.bincount(number)
     first = np.cumsum(count) - count

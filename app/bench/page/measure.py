@@ -26,6 +26,16 @@ _ALL_SEEN_WITHIN_S, _ASK_EVERY_S = 120.0, 0.5
 _SETTLE_BRIEFLY_S = 1.0
 _PARAMETER_EVERY_S = 0.23
 _PARAMETER_VALUES = (0.65, 0.75)
+_SERVER = """
+import sys
+from pathlib import Path
+from app.core import session_folder
+session_folder.SESSIONS = Path(sys.argv.pop(1))
+from app.cli import main
+sys.exit(main())
+"""
+"""The command line with its own folder of sessions: it leaves the user's labels and settings alone, and knows no
+detections of earlier starts."""
 _REVISION = re.compile(rb'"params_revision":([0-9]+)')
 
 
@@ -50,10 +60,9 @@ def figures(source: str, for_s: float) -> dict[str, Any]:
 @contextmanager
 def _dashboard(source: str) -> Iterator[str]:
     """The address of a dashboard that plays a recording, in its own process."""
-    code = "import sys; from app.cli import main; sys.exit(main())"
     folder = tempfile.TemporaryDirectory(prefix="cipv-bench-")
-    labels = f"sqlite:///{folder.name}/labels.db"  # leaves the user's own labels and settings alone
-    command = [sys.executable, "-c", code, "serve", source, "--port", "0", "--labels", labels]
+    labels = f"sqlite:///{folder.name}/labels.db"
+    command = [sys.executable, "-c", _SERVER, folder.name, "serve", source, "--port", "0", "--labels", labels]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     try:

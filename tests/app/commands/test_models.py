@@ -10,6 +10,7 @@ import pytest
 from app.commands.models import ListModels, RegisterModel
 from pipeline.inference import model_registry
 from pipeline.inference.known_networks import Task
+from pipeline.inference.tuning import Gain, RunSettings, keep
 
 
 def test_the_printed_list_has_every_address_and_command_whole(
@@ -32,3 +33,22 @@ def test_a_missing_file_to_register_is_just_missing(task: Task, path: str) -> No
     with pytest.raises(model_registry.ModelError) as refused:
         RegisterModel(Path(path), "mine", task)()
     assert str(refused.value) == f"no file at {path}"
+
+
+@pytest.mark.parametrize(
+    ("gain", "said"),
+    [
+        (Gain(12.0, 8.0), "CPU, 1 threads, enable all, with arena, 1.50 times as fast as the default"),
+        (Gain(8.0, 8.0), "nothing is faster than the default (CPU, 1 threads, enable all, with arena)"),
+        (None, "CPU, 1 threads, enable all, with arena"),
+    ],
+)
+def test_the_list_says_what_tuning_chose_and_gained(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, gain: Gain | None, said: str
+) -> None:
+    monkeypatch.setenv("CIPV_HOME", str(tmp_path))
+    assert ListModels()() == 0
+    assert "tuned" not in capsys.readouterr().out
+    keep(model_registry.EMBEDDED_FILE, RunSettings(("CPUExecutionProvider",), 1), gain)
+    assert ListModels()() == 0
+    assert f"\n    tuned for this machine: {said}" in capsys.readouterr().out

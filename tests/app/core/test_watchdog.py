@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from pathlib import Path
 
 import pytest
 
-from app.core.watchdog import Retired, Stuck, Watchdog, at_work, waited_s
+from app.core.watchdog import Retired, Stuck, Watchdog, at_work, process_waited_s, waited_s
 
 
 @pytest.fixture(autouse=True)
@@ -100,3 +101,36 @@ def test_what_is_done_within_something_else_counts_for_itself() -> None:
 def test_a_thread_that_nobody_watches_may_say_what_it_likes() -> None:
     with at_work("anything"):
         pass
+
+
+def test_who_waits_for_a_process_is_given_the_time_of_a_first_run_and_the_processs_own_waiting(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    waits_s = iter((3.0, 3.0, 11.0, 11.0))
+    monkeypatch.setattr("app.core.watchdog.process_waited_s", lambda process: next(waits_s))
+    watchdog = Watchdog(first_s=30.0)
+    monkeypatch.setattr("app.core.watchdog.busy_share", lambda: 0.0)
+    with watchdog.watching("a worker", lambda stuck: None):
+        for _ in range(30):
+            with at_work("looking"):
+                pass
+        with pytest.raises(Retired):
+            _waits_for_a_process(watchdog)
+
+
+def _waits_for_a_process(watchdog: Watchdog) -> None:
+    with at_work("looking", 4711):
+        start_s = time.monotonic()
+        assert watchdog.look(start_s) == []
+        assert watchdog.look(start_s + 29.0) == [], "the usual time of the operation does not count"
+        assert watchdog.look(start_s + 37.0) == [], "8 of the 37 s it waited for a processor"
+        assert [each.doing for each in watchdog.look(start_s + 39.0)] == ["looking"]
+
+
+def test_the_system_tells_how_long_a_process_waited_for_a_processor() -> None:
+    if not Path("/proc/self/schedstat").exists():
+        pytest.skip("only Linux tells")
+    waited = process_waited_s(os.getpid())
+    assert waited is not None
+    assert waited >= 0.0
+    assert process_waited_s(2**30) is None

@@ -9,23 +9,25 @@ from tests.app.engine.recording_helpers import Recording
 from tests.browser.conftest import Site
 from tests.browser.display.conftest import OpenDisplay, is_now, keep
 
-COVERED_WITHIN_MS = 300
+LOOKS = 60
+"""The page is looked at every 5 ms, and covers itself within 50. A busy machine delays both, so turns are counted, not
+milliseconds."""
 
-WATCH = """async (within) => {
+WATCH = """async (looks) => {
   const { get } = await import("/js/core/store.js");
   const { serverNow } = await import("/js/core/connection.js");
   const { mayBeMs } = await import("/drive/freshness.js");
-  window.worst = { fresh: 0, covered: 0 };
+  window.seen = { fresh: 0, covered: 0 };
   const cover = document.querySelector("#cover");
   const look = () => {
     const beyond = serverNow() - get("frame").madeUnixMs - mayBeMs(get("state"));
     const kind = cover.checkVisibility() && cover.dataset.kind !== "paused" ? "covered" : "fresh";
-    window.worst[kind] = Math.max(window.worst[kind], beyond);
-    document.body.dataset.wasLate = window.worst.covered > within;
+    if (beyond > 0) window.seen[kind] += 1;
+    document.body.dataset.wasLate = window.seen.covered > looks;
   };
   setInterval(look, 5);
 }"""
-"""Milliseconds beyond its age at which a frame was still shown as fresh, by the page's own clock."""
+"""How often a frame beyond its age, by the page's own clock, was seen as fresh, and how often covered."""
 
 ENDS = {"the line stands still": "stale", "the server is gone": "lost"}
 
@@ -38,7 +40,7 @@ def test_what_is_too_old_is_covered_at_once_and_comes_back(
     page = open_display(site.address, quiet=ENDS[how] == "stale")
     is_now(page, "fresh")
     expect(page.locator("#distance")).not_to_have_text("–")
-    page.evaluate(WATCH, COVERED_WITHIN_MS)
+    page.evaluate(WATCH, LOOKS)
     if ENDS[how] == "stale":
         recording.gate.clear()
     else:
@@ -48,7 +50,7 @@ def test_what_is_too_old_is_covered_at_once_and_comes_back(
     for figure in ("#distance", "#closing", "#acc-word", "#ttc-value", "#road", "#plan", "#sensors"):
         expect(page.locator(figure)).to_be_hidden()
     expect(page.locator("body")).to_have_attribute("data-was-late", "true")
-    assert page.evaluate("window.worst.fresh") <= COVERED_WITHIN_MS
+    assert page.evaluate("window.seen.fresh") <= LOOKS
     keep(page, f"drive_{ENDS[how]}")
     if ENDS[how] == "stale":
         recording.gate.set()

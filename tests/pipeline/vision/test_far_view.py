@@ -137,5 +137,8 @@ def test_where_ticks_are_dropped_the_far_view_sits_out_every_other_one() -> None
     tick = Frame(0, "0", 0, image=CameraImage(0, bright_at()))
     looked = [asked.of(replace(tick, index=index)).far is not None for index in (0, 1, 2, 4, 5, 6, 7, 9, 10)]
     assert looked == [True, True, True, False, True, False, True, False, True]
-    calm = [asked.of(replace(tick, index=index)).far is not None for index in range(11, 11 + 2 * CALM_TICKS)]
+    for index, notes in ((11, 1), (12, 0), (13, 1)):
+        live = asked.of(replace(tick, index=index))
+        assert len(detect(replace(tick, index=index), live).notes) == notes, "the result says what was left out"
+    calm = [asked.of(replace(tick, index=index)).far is not None for index in range(14, 14 + 2 * CALM_TICKS)]
     assert all(calm[CALM_TICKS:]), "once nothing is dropped for a while, every tick again"
