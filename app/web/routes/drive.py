@@ -19,9 +19,8 @@ from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
 from app.web.routes.names import one_of
 from app.web.routes.refusals import open_recording, refusing
-from app.web.routes.shapes.common import ApiModel, StatusJson
+from app.web.routes.shapes.common import ApiModel, ObjectSource, StatusJson
 from pipeline.common.clips import first_frames
-from pipeline.types import ObjectSource
 
 
 class Columns(ApiModel):
@@ -55,7 +54,7 @@ class Curve(ApiModel):
     index: list[int]
     """Numbers of the frames; all lists have this length."""
     source: list[ObjectSource]
-    """V, L or VL."""
+    """The letters of its sensors: V, L or VL."""
     carried: list[bool]
     """Predicted, not seen in that frame."""
     in_path: list[bool]

@@ -165,8 +165,9 @@ function update() {
     : null;
   list.show(order.map((item) => ({ item, why: reasons.get(item.id) ?? "" })));
   if (focused !== null) list.rowOf(focused)?.focus({ preventScroll: true });
-  const count = (/** @type {string} */ source) => objects.filter((o) => o.source === source).length;
-  text($("#object-facts"), `${objects.length}: ${count("VL")} VL · ${count("V")} V · ${count("L")} L`);
+  const sources = new Set(["VL", "V", "L", ...objects.map(({ source }) => source)]);
+  const counts = [...sources].map((source) => `${objects.filter((o) => o.source === source).length} ${source}`);
+  text($("#object-facts"), `${objects.length}: ${counts.join(" · ")}`);
 }
 
 /**

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from app.web.routes.shapes.common import CuboidJson, Exact, Point
-from pipeline.types import ObjectSource
+from app.web.routes.shapes.common import CuboidJson, Exact, ObjectSource, Point
 
 
 class GateJson(Exact):
@@ -44,8 +43,9 @@ class ObjectJson(Exact):
     """Horizontal range from the ego origin to the nearest point; null when unknown."""
     distance_sigma_m: float | None
     """Standard deviation of the distance."""
-    distance_from: Literal["cluster", "returns", "box"] | None
-    """What measured the distance in this frame; null when nothing did."""
+    distance_from: str | None
+    """What measured the distance in this frame: cluster, returns, box or the name of a further ranging sensor; null when
+    nothing did."""
     height_from: Literal["class", "shape", "road", "range"] | None
     """V: what the height that the distance rests on was taken from; null otherwise."""
     velocity_mps: Point | None

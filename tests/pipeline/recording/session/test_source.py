@@ -25,6 +25,7 @@ from pipeline.types import (
     EgoState,
     Frame,
     GnssFix,
+    RangeScan,
     RawBoxes,
     RawLanes,
     Route,
@@ -92,11 +93,12 @@ def test_every_field_is_written() -> None:
     """A field that someone adds must be written too; then this list grows."""
     known = {
         Frame: "index name t_ns sweep image camera ego raw_boxes notes gnss raw_lanes route streams timing_ms "
-        "detections_given",
+        "detections_given scans",
         Sweep: "t_ns points ring channels time_s origin",
         CameraImage: "t_ns bgr encoded",
         CameraCalibration: "K distortion T_camera_ego width height road_z_m",
         Route: "name lat_deg lon_deg sigma_m",
+        RangeScan: "t_ns points values",
     }
     for kind, names in known.items():
         assert {field.name for field in fields(kind)} == set(names.split()), kind
