@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Literal
 
-from pipeline.common.user_files import Overloaded
+from pipeline.common.files.user_files import Overloaded
 from pipeline.detection import Detectors, LiveDetectors, Look, detect, look
 from pipeline.params import Params
 from pipeline.step import State, measure_own_motion, step

@@ -20,7 +20,7 @@ from app.core.client_role import Account, AccountRole
 from app.core.session_folder import SESSIONS
 from app.labels.acts.request_fields import Person
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import first_complaint
+from pipeline.common.files.user_file_errors import first_complaint
 
 logger = logging.getLogger("cipv.web")
 

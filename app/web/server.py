@@ -45,7 +45,7 @@ from app.web.routers import ROUTERS, Services
 from app.web.routes.labels.files import IMPORT
 from app.web.tokens import Tokens
 from pipeline.common.errors import BadInput
-from pipeline.common.user_files import Overloaded
+from pipeline.common.files.user_files import Overloaded
 
 _BACKLOG = 100
 """Connections queued by the system until they are accepted. When file descriptors run out, Python 3.11 tries to accept

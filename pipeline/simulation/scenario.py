@@ -12,13 +12,13 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import first_complaint, given_path, parse_yaml, read_yaml
+from pipeline.common.files.user_file_errors import first_complaint, given_path, parse_yaml, read_yaml
 from pipeline.simulation.built_in import FOLDER, names
 from pipeline.simulation.drawing.lens import ORDINARY, CameraModel
 from pipeline.simulation.sensors.detection_model import Detections
 from pipeline.simulation.sensors.faults import NONE, Faults
 from pipeline.simulation.sensors.gnss_model import MEASURED, RTK, GnssModel, OdometryModel
-from pipeline.simulation.sensors.lidar_model import VLP16, LidarModel
+from pipeline.simulation.sensors.lidar.model import VLP16, LidarModel
 from pipeline.simulation.world.actors import Actor, Motion, Script, motion
 from pipeline.simulation.world.intersection_ways import CrossingActor, CrossingWay, route
 from pipeline.simulation.world.roads import Road, ScenarioPart

@@ -18,8 +18,8 @@ from tests.app.engine.recording_helpers import CountingDetector
 from tests.browser.conftest import WAIT_MS, OpenPage, Site
 from tests.browser.display.conftest import keep
 from tests.pipeline.sources.live.rig import Replaying
-from tests.soak import live_car
-from tests.soak.live_run import config_file
+from tests.soak.live import car as live_car
+from tests.soak.live.run import config_file
 
 SENDS_S, CLIP = 240.0, 6
 """Longer than the test waits for anything; frames of the clip, played to and fro."""

@@ -24,7 +24,7 @@ from app.drive.marks import Marks
 from app.labels.transfer.files import _unzipped
 from app.streaming.scene_requests import hear
 from app.streaming.stream import _object
-from pipeline.common.image_decoding import check_budget
+from pipeline.common.files.image_decoding import check_budget
 from pipeline.detection import Detectors
 from pipeline.evaluation.scores.results_file import read_results
 from pipeline.formats.calibration_files import FORMATS as CALIBRATIONS

@@ -14,9 +14,9 @@ from unittest.mock import patch
 import cv2
 import numpy as np
 
-from pipeline.common import image_decoding
-from pipeline.common.image_decoding import decode_within_budget
-from pipeline.common.user_file_errors import parse_yaml
+from pipeline.common.files import image_decoding
+from pipeline.common.files.image_decoding import decode_within_budget
+from pipeline.common.files.user_file_errors import parse_yaml
 from pipeline.formats.kitti_records import parse_timestamps
 from pipeline.formats.nmea import NmeaReader
 from pipeline.formats.velodyne.decoder import VelodyneDecoder

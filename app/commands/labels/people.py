@@ -14,7 +14,7 @@ import tyro
 from app.commands.labels.files import Database, Person, say
 from app.commands.support.arguments import option
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import given_path
+from pipeline.common.files.user_file_errors import given_path
 from pipeline.labels.formats.native import from_json
 from pipeline.labels.formats.reading import read_bytes
 

@@ -12,7 +12,7 @@ from app.commands.labels.files import Database, Person, say
 from app.commands.labels.people import percent
 from app.commands.support.arguments import option
 from app.labels.project_classes import project_classes
-from pipeline.common.user_file_errors import given_path
+from pipeline.common.files.user_file_errors import given_path
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from typing import Any, get_args, get_type_hints
 import numpy as np
 
 from pipeline.common.errors import BadInput
+from pipeline.common.files.user_file_errors import reason_of
+from pipeline.common.files.user_files import open_regular
 from pipeline.common.geometry import Cuboid
-from pipeline.common.user_file_errors import reason_of
-from pipeline.common.user_files import open_regular
 from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Layers, Path, Result, SensorHealth, object_sources
 from pipeline.types.result_json import VERSION
 

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.common.files.image_decoding import TooMuch, decode_within_budget
 from pipeline.common.geometry import inverse
-from pipeline.common.image_decoding import TooMuch, decode_within_budget
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
 from pipeline.types import CameraCalibration, CameraImage, GnssFix, Sweep

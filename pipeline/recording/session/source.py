@@ -10,9 +10,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from pipeline.common.files.remote_files import is_remote
+from pipeline.common.files.user_file_errors import given_path
 from pipeline.common.progress import Progress, silent
-from pipeline.common.remote_files import is_remote
-from pipeline.common.user_file_errors import given_path
 from pipeline.params import Params, ParamsError, with_changes
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged

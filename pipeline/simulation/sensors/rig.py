@@ -13,7 +13,7 @@ from pipeline.common.fast_replace import evolve
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import gnss
 from pipeline.simulation.sensors.camera import DrawnCamera, calibration
-from pipeline.simulation.sensors.lidar import Lidar
+from pipeline.simulation.sensors.lidar.sensor import Lidar
 from pipeline.simulation.world.planned_route import planned_route
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.simulation.world.world_state import World

@@ -14,7 +14,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from app.cli import main
-from pipeline.common.data_dir import file_sha256
+from pipeline.common.files.data_dir import file_sha256
 from pipeline.inference.model_registry import EMBEDDED, find
 from pipeline.recording.info import info
 from pipeline.recording.session.source import SessionSource

@@ -16,7 +16,7 @@ from app.drive.frame_inputs import InputStore, without_pixels
 from app.drive.full_run import DriveRun, digest
 from app.drive.open_recording import OpenRecording, RunSetup
 from app.drive.run_registry import MOST_KEPT, MOST_UNKEPT, NoSuchRun, RunRefused, RunRegistry
-from pipeline.common.user_files import Overloaded
+from pipeline.common.files.user_files import Overloaded
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
 from pipeline.run import Sensors, run

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from pipeline.lidar.deskew import deskew
 from pipeline.params import DeskewParams
-from pipeline.simulation.sensors.lidar import Lidar
-from pipeline.simulation.sensors.lidar_model import LidarModel
-from pipeline.simulation.sensors.lidar_scene import WALL
+from pipeline.simulation.sensors.lidar.model import LidarModel
+from pipeline.simulation.sensors.lidar.scene import WALL
+from pipeline.simulation.sensors.lidar.sensor import Lidar
 from pipeline.types import F64, EgoState, Sweep
 
 ON = DeskewParams(enabled=True)

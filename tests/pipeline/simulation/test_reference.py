@@ -15,7 +15,7 @@ from pipeline.simulation.scenario import Ego, Scenario
 from pipeline.simulation.sensors.detection_model import BoxNoise, Detections, LineNoise
 from pipeline.simulation.sensors.faults import Faults, Knock
 from pipeline.simulation.sensors.gnss_model import GnssModel, OdometryModel
-from pipeline.simulation.sensors.lidar_model import LidarModel
+from pipeline.simulation.sensors.lidar.model import LidarModel
 from pipeline.simulation.world.actors import Actor, Brake
 from pipeline.simulation.world.intersection_ways import CrossingActor
 from pipeline.simulation.world.roads import Beacon, Crossing, Road, Segment, Strip

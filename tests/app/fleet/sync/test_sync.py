@@ -18,8 +18,8 @@ from app.fleet.sync.pace import Pace
 from app.fleet.sync.s3_parts import PART_BYTES
 from app.fleet.sync.sending import BLOCK_BYTES, sender
 from app.fleet.sync.sync import Sync, SyncOptions, SyncTally
-from pipeline.common import remote_files
 from pipeline.common.errors import BadInput
+from pipeline.common.files import remote_files
 from pipeline.common.progress import silent
 from pipeline.recording.session.source import SessionSource
 from tests.app.fleet.s3 import BUCKET, Unsteady, s3_server

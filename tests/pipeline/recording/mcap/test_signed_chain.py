@@ -9,7 +9,7 @@ import pytest
 
 from app.cli import main
 from pipeline.common.errors import BadInput
-from pipeline.common.signing import SIGNING_VARIABLE, new_keys
+from pipeline.common.files.signing import SIGNING_VARIABLE, new_keys
 from pipeline.recording.mcap.chain import NAME, ChainWriter, verify
 from pipeline.recording.mcap.index import MAGIC, summary_start
 from pipeline.recording.mcap.reader import McapFile

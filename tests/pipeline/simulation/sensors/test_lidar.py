@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.sensors import lidar_rays
-from pipeline.simulation.sensors.lidar import Lidar
-from pipeline.simulation.sensors.lidar_model import LidarModel
-from pipeline.simulation.sensors.lidar_scene import PAINT, WALL
+from pipeline.simulation.sensors.lidar import rays as lidar_rays
+from pipeline.simulation.sensors.lidar.model import LidarModel
+from pipeline.simulation.sensors.lidar.scene import PAINT, WALL
+from pipeline.simulation.sensors.lidar.sensor import Lidar
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.types import F64, Sweep

@@ -11,8 +11,8 @@ from pipeline.recording.session.frame_record import frame_record_from
 from pipeline.recording.session.source import SessionSource
 from pipeline.recording.topics import FRAMES, IMAGE, POINTS
 from pipeline.replay.faults import Fault
-from tests.soak import live_car
-from tests.soak.live_watch import Memory, Shown, Watcher
+from tests.soak.live import car as live_car
+from tests.soak.live.watch import Memory, Shown, Watcher
 
 QUIET_S = 4.0
 """Length of the end of a soak, which has no faults."""

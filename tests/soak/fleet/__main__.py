@@ -28,12 +28,12 @@ import psutil
 from app.bench.fleet_sessions import make_sessions
 from app.core.server_address import listen_socket
 from app.fleet.batch.schedule import SchedulerLost, Tally, client_of, run_batch
-from pipeline.common.data_dir import data_dir
+from pipeline.common.files.data_dir import data_dir
 from pipeline.recording.save import save
 from pipeline.sources import open_source
 from tests.app.fleet.fleets import begun, contents, plan_of
 from tests.conftest import ROOT
-from tests.soak.fleet_store import BUCKET, ENVIRONMENT, s3_process
+from tests.soak.fleet.store import BUCKET, ENVIRONMENT, s3_process
 
 REAL_FRAMES, REAL_STEP = 12, 3
 REAL = {

@@ -15,8 +15,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import given_path, reason_of
-from pipeline.common.user_files import read_regular
+from pipeline.common.files.user_file_errors import given_path, reason_of
+from pipeline.common.files.user_files import read_regular
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey

@@ -10,7 +10,7 @@ import pytest
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import did_you_mean, first_complaint
+from pipeline.common.files.user_file_errors import did_you_mean, first_complaint
 from pipeline.params import Params, from_yaml
 from pipeline.replay import faults
 from pipeline.simulation import scenario

@@ -1,6 +1,6 @@
 """Measures the cost of a batch: fits processor time to measured drives, and predicts that of 10,000 hours.
 
-    python -m tests.soak.fleet_cost FOLDER
+    python -m tests.soak.fleet.cost FOLDER
 
 FOLDER holds sessions of ``tests.soak.fleet``. Parts of 10, 25 and 50 frames of simulated ones, whose detections are
 given, and real ones, whose images a network looks at, run one after another in this process. Processor time counts, so

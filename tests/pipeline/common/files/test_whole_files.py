@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.common.whole_files import replace_text, replacing, set_aside
+from pipeline.common.files.whole_files import replace_text, replacing, set_aside
 
 
 def test_the_old_content_is_there_until_the_new_one_is_whole(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """An S3 server in its own process, which stores objects on disk and fails every n-th request.
 
-python -m tests.soak.fleet_store EVERY
+python -m tests.soak.fleet.store EVERY
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ ENVIRONMENT = {
 def s3_process(every: int) -> Iterator[str]:
     """The address of a server with one empty bucket, to be set as ``AWS_ENDPOINT_URL``. every: every n-th request
     fails, 0 for none; POST /every/N changes it."""
-    typed = [sys.executable, "-m", "tests.soak.fleet_store", str(every)]
+    typed = [sys.executable, "-m", "tests.soak.fleet.store", str(every)]
     environment = os.environ | ENVIRONMENT | {"PYTHONPATH": str(ROOT)}
     with subprocess.Popen(typed, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True) as server:
         try:

@@ -2,7 +2,7 @@
 chooses.
 
     cipv batch FOLDER --out DIR --results --lanes off --far-view-px 0
-    python -m tests.soak.fleet_mining DIR
+    python -m tests.soak.fleet.mining DIR
 
 Prints, for each reason, how many seconds have it, and in what share of them the lead is missed, false or wrong in at
 least one frame; and the same of all seconds, and of those that would be chosen.

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.common.image_decoding import MOST_PIXELS, TooMuch, decode_within_budget
+from pipeline.common.files.image_decoding import MOST_PIXELS, TooMuch, decode_within_budget
 
 GREY = np.full((24, 40, 3), 90, np.uint8)
 
@@ -64,7 +64,7 @@ def test_every_decoder_of_images_is_behind_it():
     """A decoder that somebody calls elsewhere has no budget."""
     from pathlib import Path
 
-    root = Path(__file__).resolve().parents[3]
+    root = Path(__file__).resolve().parents[4]
     calls = ("cv2.imdecode", "cv2.imread", "Image.open", "imageio")
     found = {
         str(path.relative_to(root))
@@ -72,6 +72,6 @@ def test_every_decoder_of_images_is_behind_it():
         for path in (root / folder).rglob("*.py")
         if any(call in path.read_text(encoding="utf-8") for call in calls)
     }
-    assert found - {"pipeline/common/image_decoding.py"} <= {
+    assert found - {"pipeline/common/files/image_decoding.py"} <= {
         path for path in found if path.startswith("pipeline/training/")
     }

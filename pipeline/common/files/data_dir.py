@@ -6,7 +6,7 @@ import hashlib
 import os
 from pathlib import Path
 
-_PROJECT = Path(__file__).resolve().parents[2]
+_PROJECT = Path(__file__).resolve().parents[3]
 
 
 def data_dir() -> Path:

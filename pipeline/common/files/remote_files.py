@@ -13,7 +13,7 @@ from typing import Any, BinaryIO, TypeVar
 from urllib.parse import unquote
 
 from pipeline.common.errors import BadInput, first_line
-from pipeline.common.user_files import FOLDERS_VARIABLE, Overloaded
+from pipeline.common.files.user_files import FOLDERS_VARIABLE, Overloaded
 
 ADDRESSES_VARIABLE = "CIPV_ADDRESSES"
 """Stores, or folders in them, that may be opened if ``CIPV_FOLDERS`` is set: addresses separated by spaces."""

@@ -9,7 +9,7 @@ import pytest
 
 from app.cli import main
 from pipeline.common.errors import BadInput
-from pipeline.common.signing import (
+from pipeline.common.files.signing import (
     SIGNING_VARIABLE,
     Signature,
     SignatureCheck,

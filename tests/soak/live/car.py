@@ -1,4 +1,4 @@
-"""A car for the soak: `python -m tests.soak.live_car CONFIG SECONDS FAULTS`.
+"""A car for the soak: `python -m tests.soak.live.car CONFIG SECONDS FAULTS`.
 
 In its own process, like real sensors: LiDAR at 10 Hz, camera 1280×720 at 30 Hz, GNSS at 10 Hz, from two seconds of a
 simulated drive that is played back and forth. Prints its start time (unix ns) on a line and, at the end, what it sent,

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.simulation.sensors.lidar_rays import BOX_FIELDS
+from pipeline.simulation.sensors.lidar.rays import BOX_FIELDS
 from pipeline.simulation.world.actors import VehicleKind
 from pipeline.simulation.world.roadside import Roadside, Thing
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, ActorState, World

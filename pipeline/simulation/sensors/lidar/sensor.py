@@ -18,9 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.simulation.sensors.lidar_model import VLP16, LidarModel
-from pipeline.simulation.sensors.lidar_rays import CHANNELS, COLUMNS_PER_RAD, cast, directions, firing_times_s
-from pipeline.simulation.sensors.lidar_scene import MATERIALS, MAX_RANGE_M, ROAD, scene_boxes
+from pipeline.simulation.sensors.lidar.model import VLP16, LidarModel
+from pipeline.simulation.sensors.lidar.rays import CHANNELS, COLUMNS_PER_RAD, cast, directions, firing_times_s
+from pipeline.simulation.sensors.lidar.scene import MATERIALS, MAX_RANGE_M, ROAD, scene_boxes
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, World
 from pipeline.types import F32, F64, I64, Sweep

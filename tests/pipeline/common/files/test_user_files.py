@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.common import user_files
 from pipeline.common.errors import BadInput
-from pipeline.common.user_files import FOLDERS_VARIABLE, Overloaded, open_regular, read_regular
+from pipeline.common.files import user_files
+from pipeline.common.files.user_files import FOLDERS_VARIABLE, Overloaded, open_regular, read_regular
 from pipeline.evaluation.scores.results_file import read_results
 from pipeline.formats.calibration_files import opencv
 from pipeline.labels.classes import read_classes

@@ -12,7 +12,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
+from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
 
 _MOST_NODES = 200_000
 """Maximum number of values in a YAML document; a few dozen bytes of aliases can expand to billions."""

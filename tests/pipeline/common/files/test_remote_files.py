@@ -8,9 +8,9 @@ from pathlib import Path
 import fsspec
 import pytest
 
-from pipeline.common import remote_files
-from pipeline.common.remote_files import NotReachable, is_remote, open_remote, patiently
-from pipeline.common.user_files import Overloaded
+from pipeline.common.files import remote_files
+from pipeline.common.files.remote_files import NotReachable, is_remote, open_remote, patiently
+from pipeline.common.files.user_files import Overloaded
 from pipeline.recording.session.source import SessionSource
 from pipeline.sources import SourceError, open_source
 from pipeline.sources.fingerprint import fingerprint

@@ -18,7 +18,7 @@ import yaml
 
 from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder
-from pipeline.common.data_dir import data_dir
+from pipeline.common.files.data_dir import data_dir
 from pipeline.detection import detector_for, lanes_for
 from pipeline.inference.model_registry import EMBEDDED
 from pipeline.lanes.classical import NAME as CLASSICAL
@@ -29,9 +29,9 @@ from pipeline.sources import open_any
 from pipeline.types.source import AnySource
 from tests.conftest import ROOT
 from tests.pipeline.sources.live.rig import loopback_config
-from tests.soak import live_car
-from tests.soak.live_report import QUIET_S, report
-from tests.soak.live_watch import Memory, Watcher
+from tests.soak.live import car as live_car
+from tests.soak.live.report import QUIET_S, report
+from tests.soak.live.watch import Memory, Watcher
 
 KINDS = (
     ("lidar", "silence"), ("camera", "disconnect"), ("gnss", "silence"), ("lidar", "garbage"), ("camera", "silence"),
@@ -140,7 +140,7 @@ def _soak(folder: Path, seconds: float, networks: Networks, others: list[int]) -
     engine.listen(watcher)
     engine.start()
     engine.wait_for(lambda s: s.live, PATIENCE_S)
-    command = [sys.executable, "-m", "tests.soak.live_car", str(config), str(seconds), str(faults_path)]
+    command = [sys.executable, "-m", "tests.soak.live.car", str(config), str(seconds), str(faults_path)]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as car:
         os.sched_setaffinity(car.pid, others)
         watcher.start_ns = int(_line(car.stdout))
