@@ -47,9 +47,11 @@ _HIDDEN_SHARE = 0.3
 _EMPTY_S = 1.0
 """Time constant for forgetting that rays passed through the object's position: ten images at 10 Hz, in which the camera
 measures the position again."""
-_CLUSTER, _STOPPED, _PIERCED, _SILENT, _TAKEN = 2.0, 1.0, -3.0, -2.0, -2.0
-"""Log-odds added by one sweep, in this order: a cluster on the object; rays that ended at its position; rays that
-passed through it; rays without a return; close to the car, rays that ended there but in the cluster of another object.
+_CLUSTER, _RETURNS, _PIERCED, _SILENT, _TAKEN = 2.0, 1.0, -3.0, -2.0, -2.0
+"""Log-odds added by one sweep, in this order: a cluster on the object; single returns that range it; rays that passed
+through it; rays without a return; close to the car, rays that ended there but in the cluster of another object. Rays
+that ended somewhere in the range that a box leaves open say nothing: that happened to 4 of 154 boxes on labelled
+vehicles without a cluster, and to 4 of 284 other boxes, on Astyx and KITTI.
 Of 394 labelled vehicles within 30 m in 126 frames of a VLP-16, with the position uncertainty of a box, none was passed
 through and 6 returned no rays; with the smallest position uncertainty, none and 10. The values are lower than these
 counts suggest, because successive sweeps are not independent."""
@@ -73,15 +75,17 @@ class Existence(NamedTuple):
     """Its distance when the camera's position was initialised; None before that."""
     travelled_m: float = 0.0
     """Distance driven by the car since then."""
+    judged_m: float = 0.0
+    """The part of it that was driven until its distance was last measured."""
     shrunk_m: float = 0.0
-    """Decrease of its distance since then."""
+    """Decrease of its distance meanwhile."""
     cluster_s: float = 0.0
     """Total time that the LiDAR has seen it."""
 
     @property
     def goes_along(self) -> bool:
         """Whether its distance has shrunk by less than that of a static object would have: see ``_ALONG``."""
-        return self.travelled_m >= _ALONG_AFTER_M and self.shrunk_m < _ALONG_SHARE * self.travelled_m
+        return self.judged_m >= _ALONG_AFTER_M and self.shrunk_m < _ALONG_SHARE * self.judged_m
 
 
 @dataclass(frozen=True)
@@ -152,16 +156,16 @@ def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bo
     if lidar < 0.0:
         # evidence that a place is empty does not apply to another place, and decays as the object moves on
         lidar = 0.0 if is_begun_anew else lidar * math.exp(-dt_s / _EMPTY_S)
-    from_m, travelled_m, shrunk_m = before.from_m, before.travelled_m, before.shrunk_m
+    from_m, travelled_m, judged_m, shrunk_m = before.from_m, before.travelled_m, before.judged_m, before.shrunk_m
     if is_begun_anew or from_m is None or now.speed_mps is None:
-        from_m, travelled_m, shrunk_m = item.distance_m, 0.0, 0.0
+        from_m, travelled_m, judged_m, shrunk_m = item.distance_m, 0.0, 0.0, 0.0
     else:
         travelled_m += now.speed_mps * dt_s
         if item.measured and item.distance_m is not None:
-            shrunk_m = from_m - item.distance_m
+            judged_m, shrunk_m = travelled_m, from_m - item.distance_m
     cluster_s = before.cluster_s + (dt_s if item.seen_by_lidar else 0.0)
     lidar = _bounded(lidar + _said_by_lidar(item, rays, cluster_s >= _FOLLOWED_S) + _said_by_others(item))
-    return Existence(score, lidar, item.camera_ranges, age_s, from_m, travelled_m, shrunk_m, cluster_s)
+    return Existence(score, lidar, item.camera_ranges, age_s, from_m, travelled_m, judged_m, shrunk_m, cluster_s)
 
 
 def _weight(dt_s: float, mean_s: float) -> float:
@@ -177,13 +181,11 @@ def _said_by_lidar(item: FusedObject, rays: Rays | None, was_followed: bool) -> 
     if rays is not None and rays.is_free:
         return _PIERCED
     if item.returns:
-        return _STOPPED
+        return _RETURNS
     if rays is None:
         return 0.0
     if rays.is_silent:
         return _SILENT
-    if rays.is_stopped:
-        return _STOPPED
     is_near = (item.distance_m or 0.0) < NEAR_M
     return _TAKEN if is_near and rays.is_taken and not was_followed else 0.0
 

@@ -18,6 +18,10 @@ _NOMINAL_DT_S = 0.1
 _MAX_GROWTH = 3.0
 """The outer gate is tuned for images 0.1 s apart; it widens with the time since the last sighting, by this factor at
 most."""
+_DOUBLE_IOU = 0.25
+"""A new box that overlaps a tracked one by more is its double, or one of the two vehicles mostly hides the other. With
+an overlap between this and ``detection.nms_iou``, YOLOX-nano draws a second box on 2.6 % of clearly visible
+vehicles (``pipeline.experiments.robustness.measure``)."""
 _ESTABLISHED_HITS = 3
 """Number of sightings after which an object's motion is measured instead of assumed."""
 
@@ -33,6 +37,8 @@ class Expected(NamedTuple):
     """The part of it due to the box's own noise, which remains even with a perfect prediction."""
     unseen_s: float
     """Time since its last sighting."""
+    double_of: int | None = None
+    """Id of the object on which its first box lay; None if it lay on none."""
 
 
 def match(
@@ -40,12 +46,12 @@ def match(
     measurements: Sequence[VisionMeasurement],
     params: VisionTrackingParams,
 ) -> dict[int, int]:
-    """Index of tracked object → index of measurement. If a network briefly draws a second box on a vehicle, this starts
-    a duplicate track. So that it cannot take over the vehicle's id, duplicates choose last among the remaining boxes.
+    """Index of tracked object → index of measurement. If a network draws a second box on a vehicle, this starts a
+    duplicate track. So that it cannot take the vehicle's only box, duplicates choose last among the remaining boxes.
     """
     if params.filter == "queue":
         return _assign(range(len(expected)), range(len(measurements)), expected, measurements, params)
-    doubles = _doubles(expected, params)
+    doubles = _doubles(expected)
     first = [row for row in range(len(expected)) if row not in doubles]
     found = _assign(first, range(len(measurements)), expected, measurements, params)
     taken = set(found.values())
@@ -53,15 +59,25 @@ def match(
     return found | _assign(sorted(doubles), left, expected, measurements, params)
 
 
-def _doubles(expected: Sequence[Expected], params: VisionTrackingParams) -> set[int]:
-    """Objects seen only once or twice whose box overlaps that of an established object."""
-    young = [row for row, each in enumerate(expected) if each.track.hits < _ESTABLISHED_HITS]
-    old = [row for row, each in enumerate(expected) if each.track.hits >= _ESTABLISHED_HITS]
-    if not young or not old:
+def first_box_on(boxes: Sequence[VisionMeasurement], tracks: Sequence[VisionTrack]) -> list[int | None]:
+    """For each first box of a new object: the id of the established object that it lies on, or None."""
+    old = [track for track in tracks if track.hits >= _ESTABLISHED_HITS]
+    if not old or not boxes:
+        return [None] * len(boxes)
+    overlap = iou_matrix(np.array([each.detection.bbox for each in boxes]), np.array([track.bbox for track in old]))
+    best = overlap.argmax(axis=1).tolist()
+    return [old[k].id if overlap[row, k] > _DOUBLE_IOU else None for row, k in enumerate(best)]
+
+
+def _doubles(expected: Sequence[Expected]) -> set[int]:
+    """Objects that began on an established one, for as long as they overlap it. Some networks draw two boxes on a
+    vehicle for seconds, so the number of sightings does not make such an object another vehicle; leaving it does."""
+    row_of = {each.track.id: row for row, each in enumerate(expected)}
+    pairs = [(row, row_of[each.double_of]) for row, each in enumerate(expected) if each.double_of in row_of]
+    if not pairs:
         return set()
     boxes = np.array([each.track.bbox for each in expected])
-    on_another = iou_matrix(boxes[young], boxes[old]).max(axis=1) > params.ghost_iou
-    return {young[index] for index in np.flatnonzero(on_another).tolist()}
+    return {young for young, old in pairs if iou_matrix(boxes[[young]], boxes[[old]])[0, 0] > _DOUBLE_IOU}
 
 
 def _assign(

@@ -53,6 +53,8 @@ class Followed:
     """Where its boxes meet the road; likewise."""
     seen: VisionMeasurement | None = None
     """This image's sighting with a distance; None without one."""
+    double_of: int | None = None
+    """Id of the track on which its first box lay; None if it lay on none."""
 
 
 class SpeedGuess(NamedTuple):

@@ -25,7 +25,7 @@ from pipeline.common.geometry import F64, iou_matrix
 from pipeline.common.kalman import CvState
 from pipeline.params import VisionTrackingParams
 from pipeline.types import Box, VisionMeasurement, VisionTrack
-from pipeline.vision.association import Expected, match, same_kind
+from pipeline.vision.association import Expected, first_box_on, match, same_kind
 from pipeline.vision.followed import (
     Followed,
     PredictedPlace,
@@ -86,7 +86,8 @@ def track(
     # Start a new track for every unmatched box; end tracks that were missed for too long
     taken = set(partner.values())
     fresh = [measurement for column, measurement in enumerate(measurements) if column not in taken]
-    kept_list += [_new(state.next_id + index, measurement, guess, params) for index, measurement in enumerate(fresh)]
+    on = first_box_on(fresh, [each.track for each in kept_list])
+    kept_list += [_new(state.next_id + n, *each, guess, params) for n, each in enumerate(zip(fresh, on, strict=True))]
     alive = tuple(
         followed
         for followed in kept_list
@@ -119,9 +120,8 @@ def learn_heights(
 def _expected(followed: Followed, params: VisionTrackingParams) -> Expected:
     """The prediction that the next box of an object is compared with."""
     noise = _centre_variance(followed.track.bbox, params)
-    return Expected(
-        followed.track, math.sqrt(followed.box_filter.cov[0, 0] + noise), math.sqrt(noise), followed.unseen_s
-    )
+    spread = math.sqrt(followed.box_filter.cov[0, 0] + noise)
+    return Expected(followed.track, spread, math.sqrt(noise), followed.unseen_s, followed.double_of)
 
 
 def _without_ghosts(alive: tuple[Followed, ...], params: VisionTrackingParams) -> tuple[Followed, ...]:
@@ -199,7 +199,9 @@ def _first_guess(ego_speed_mps: float | None) -> SpeedGuess:
     return SpeedGuess(-ego_speed_mps / 2, max(SPEED_SIGMA_MPS, ego_speed_mps / 2))
 
 
-def _new(track_id: int, seen: VisionMeasurement, guess: SpeedGuess, params: VisionTrackingParams) -> Followed:
+def _new(
+    track_id: int, seen: VisionMeasurement, double_of: int | None, guess: SpeedGuess, params: VisionTrackingParams
+) -> Followed:
     detection = seen.detection
     shown = VisionTrack(
         id=track_id,
@@ -219,7 +221,8 @@ def _new(track_id: int, seen: VisionMeasurement, guess: SpeedGuess, params: Visi
     noise = _centre_variance(detection.bbox, params) * np.eye(2)
     box_filter = kalman.start(_centre(detection.bbox), noise, _box_speed_sigma(detection.bbox))
     votes = ((detection.label, detection.score),)
-    followed = Followed(shown, 0.0, 0.0 if seen.position else math.inf, 0, box_filter, None, votes)
+    unplaced_s = 0.0 if seen.position else math.inf
+    followed = Followed(shown, 0.0, unplaced_s, 0, box_filter, None, votes, double_of=double_of)
     return take_place(followed, seen, guess, None, params) if params.filter == "kalman" else followed
 
 

@@ -2,9 +2,9 @@
 previous record, and of that record's own hash.
 
 This detects and locates changed bytes and removed or inserted parts. Anyone can build the chain of a changed file
-again; nobody can sign it again without the key, where it is signed (``pipeline.common.files.signing``). The signature of the
-last record is of the whole file, since each hash is over the one before. Other programs ignore these records; they are
-not in the file's index.
+again; nobody can sign it again without the key, where it is signed (``pipeline.common.files.signing``). The signature
+of the last record is of the whole file, since each hash is over the one before. Other programs ignore these records;
+they are not in the file's index.
 """
 
 from __future__ import annotations

@@ -147,6 +147,12 @@ def test_a_vague_distance_needs_rays_through_all_of_it() -> None:
     assert gate(after(camera_car(sigma_m=4.0), wall)) is True
 
 
+def test_rays_that_end_somewhere_in_a_vague_distance_do_not_speak_for_it() -> None:
+    """A weak box at 40 ± 8 m and a hedge at 35 m."""
+    weak = camera_car(40.0, sigma_m=8.0, score=0.35)
+    assert after(weak, Rays(returns(35.0)), frames=20).existence == after(weak, Rays(NOTHING)).existence
+
+
 def test_a_surer_box_is_likelier_there_and_repeating_it_does_not_help() -> None:
     nothing = Rays(NOTHING)
     by_score = [after(camera_car(score=score), nothing).existence for score in (0.3, 0.45, 0.6, 0.9)]
@@ -270,6 +276,16 @@ def test_a_weak_box_that_goes_along_is_a_vehicle(case: str, closing_mps: float, 
     now = moment(EgoState(0, 20.0), 0.1)
     begun = weigh(state, (again,), Rays(NOTHING), FRAME, now, PARAMS)[1][0].existence
     assert begun == pytest.approx(0.5), "a place begun anew may be another thing"
+
+
+def test_what_is_only_predicted_does_not_go_along() -> None:
+    """A weak box on something that stands, seen for 0.4 s; then the car drives 36 m without measuring it again."""
+    state = ExistenceState()
+    for k in range(18):
+        car = replace(camera_car(60.0 - 2.0 * min(k, 4), score=0.45), seen_by="V" if k < 5 else "", measured=k < 5)
+        now = moment(EgoState(0, 20.0), 0.1 if k else None)
+        state, _ = weigh(state, (car,), Rays(NOTHING), FRAME, now, PARAMS)
+    assert not state.known[1].goes_along
 
 
 def test_switched_off_nothing_is_said() -> None:

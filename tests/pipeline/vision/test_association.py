@@ -14,9 +14,9 @@ from pipeline.vision.tracking import VisionTrackerState, track
 NOISE_PX = 4.5
 
 
-def expected(track_id: int, u: float, sigma_px: float, hits: int = 10) -> Expected:
+def expected(track_id: int, u: float, sigma_px: float, double_of: int | None = None) -> Expected:
     (shown,) = track(VisionTrackerState(track_id), (box(u),), None, VisionTrackingParams())[1]
-    return Expected(replace(shown, hits=hits), sigma_px, NOISE_PX, 0.1)
+    return Expected(replace(shown, hits=10), sigma_px, NOISE_PX, 0.1, double_of)
 
 
 def box(u: float, size_px: float = 30.0) -> VisionMeasurement:
@@ -37,9 +37,22 @@ def test_a_vague_prediction_does_not_outbid_a_sure_one(vague_at: float, partner:
     assert match(followed, [box(602.0)], VisionTrackingParams()) == {partner: 0}
 
 
-def test_a_second_box_on_a_vehicle_does_not_take_over_its_number() -> None:
-    followed = [expected(1, 610.0, 5.0), expected(2, 603.0, 5.0, hits=1)]
-    assert match(followed, [box(602.0)], VisionTrackingParams()) == {0: 0}
+@pytest.mark.parametrize(
+    ("began_on", "partner"),
+    [
+        pytest.param(1, 0, id="began as a second box on it"),
+        pytest.param(None, 1, id="another vehicle that came in front of it"),
+        pytest.param(7, 1, id="the object it began on is gone"),
+    ],
+)
+def test_the_only_box_is_the_vehicles_and_not_its_doubles(began_on: int | None, partner: int) -> None:
+    followed = [expected(1, 610.0, 5.0), expected(2, 603.0, 5.0, began_on)]
+    assert match(followed, [box(602.0)], VisionTrackingParams()) == {partner: 0}
+
+
+def test_an_object_that_has_left_the_one_it_began_on_is_no_double() -> None:
+    followed = [expected(1, 610.0, 5.0), expected(2, 588.0, 5.0, double_of=1)]
+    assert match(followed, [box(593.0)], VisionTrackingParams()) == {1: 0}
 
 
 def test_a_vague_prediction_takes_what_nobody_else_wants() -> None:

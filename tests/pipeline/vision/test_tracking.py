@@ -235,6 +235,15 @@ def test_a_standing_car_ahead_of_a_fast_ego_car_is_soon_known_to_stand() -> None
     assert closing_mps(None) < 24.0
 
 
+@pytest.mark.parametrize("images", [1, 3, 20], ids=lambda images: f"{images} double boxes")
+def test_a_vehicle_keeps_its_number_however_long_it_had_two_boxes(images: int) -> None:
+    """The detector then draws only the box that was the second one."""
+    first, second = _car(40.0), _car(39.0, -0.6)
+    shown = _drive([(first,)] * 10 + [(first, second)] * images + [(second,)] * 10, KALMAN)
+    assert [len(tracks) for tracks in shown[10:-10]] == [2] * images
+    assert [[each.id for each in tracks] for tracks in shown[-5:]] == [[1]] * 5
+
+
 def test_a_carried_box_on_a_seen_one_is_a_ghost() -> None:
     """A car jumps in the image by more than the gate and gets a new number: the old one must not stay beside it."""
     gone = [(_car(20.0, 0.0),)] * 3 + [(_car(20.0, 0.0), _car(20.0, 6.0))] * 2

@@ -44,8 +44,8 @@ class ObjectJson(Exact):
     distance_sigma_m: float | None
     """Standard deviation of the distance."""
     distance_from: str | None
-    """What measured the distance in this frame: cluster, returns, box or the name of a further ranging sensor; null when
-    nothing did."""
+    """What measured the distance in this frame: cluster, returns, box or the name of a further ranging sensor; null
+    when nothing did."""
     height_from: Literal["class", "shape", "road", "range"] | None
     """V: what the height that the distance rests on was taken from; null otherwise."""
     velocity_mps: Point | None
