@@ -31,8 +31,8 @@ class Simulator(Protocol):
 
 
 class SensorRig:
-    """LiDAR, camera, speedometer, GNSS and the scenario's further sensors. end_m: the farthest position of the ego vehicle
-    along the road; the roadside ends 600 m beyond. The same world and index give the same frame."""
+    """LiDAR, camera, speedometer, GNSS and the scenario's further sensors. end_m: the farthest position of the ego
+    vehicle along the road; the roadside ends 600 m beyond. The same world and index give the same frame."""
 
     def __init__(self, scenario: Scenario, end_m: float) -> None:
         self._scenario = scenario

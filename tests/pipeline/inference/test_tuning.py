@@ -21,7 +21,7 @@ CPU = "CPUExecutionProvider"
 
 @pytest.fixture
 def network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A small network, and a store of its own."""
+    """A small network in its own store."""
     monkeypatch.setenv("CIPV_HOME", str(tmp_path / "home"))
     return networks.yolox(tmp_path / "tiny.onnx")
 
