@@ -58,7 +58,7 @@ def test_who_is_not_there_cannot_be_removed(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def people(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, httpx.Client]]:
-    """A client of each role; ``person`` has the token with full access."""
+    """A client for each role; ``person`` has the token with full access."""
     file = tmp_path_factory.mktemp("accounts") / "accounts.json"
     tokens = Tokens("person-0123456789abcdef", "display-0123456789abcde", accounts=Accounts(file))
     known = {role: add_account(role.title(), role, file) for role in ACCOUNT_ROLES} | {"person": tokens.person}

@@ -35,7 +35,7 @@ def address(log: Path) -> Iterator[str]:
 
 
 def entries(log: Path, count: int) -> list[dict[str, Any]]:
-    """What stands in it as soon as ``count`` entries do: one is written after its answer has left."""
+    """The entries, as soon as there are ``count``: an entry is written after its response was sent."""
     assert wait_until(lambda: log.exists() and log.read_text(encoding="utf-8").count("\n") >= count)
     return [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()]
 

@@ -50,7 +50,7 @@ Visitor = Callable[[str], httpx.Client]
 
 @pytest.fixture(scope="module")
 def visitor(address: str) -> Iterator[Visitor]:
-    """A client that came by the link of a role, or by none."""
+    """A client that used the link of a role, or none."""
     clients: list[httpx.Client] = []
 
     def come(role: str) -> httpx.Client:

@@ -28,7 +28,7 @@ def half_open(address: str, said: bytes = b"GET /healthz HTTP/1.1\r\nHost: 127.0
 
 
 def hangs_up(client: socket.socket) -> bool:
-    """Waits until the server says or does something."""
+    """Whether the server closes the connection."""
     try:
         return client.recv(100) == b""
     except ConnectionResetError:

@@ -55,7 +55,7 @@ def as_role(role: str) -> dict[str, str]:
 
 
 class Slow:
-    """Writing a replay that never ends by itself."""
+    """A replay export that never ends by itself."""
 
     def __init__(self) -> None:
         self.begun, self.cancelled = threading.Semaphore(0), threading.Semaphore(0)

@@ -84,7 +84,7 @@ WELCOME: dict[Rule, set[str]] = {
 
 @pytest.fixture(scope="module")
 def tokens(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The token of each role; for accounts from a file."""
+    """The token of each role, for accounts from a file."""
     file = tmp_path_factory.mktemp("accounts") / "accounts.json"
     made = {role: add_account(f"a {role}", role, file) for role in ACCOUNT_ROLES}
     return made | {"person": TOKENS.person, "display": TOKENS.display, "file": str(file)}
@@ -112,7 +112,7 @@ async def _inside(_: Scope, receive: Receive, send: Send) -> None:
 
 
 def lets_in(door: str, token: str | None, guarded: Tokens) -> bool:
-    """Whether the request comes through to what is behind the guard."""
+    """Whether the request passes the guard."""
     method, _, path = door.partition(" ")
     path = re.sub(r"\{[^}]*\}", "1", path)
     headers = [(b"host", b"127.0.0.1:8420")] + ([(b"authorization", f"Bearer {token}".encode())] if token else [])
@@ -146,7 +146,7 @@ def test_the_guard_lets_in_whom_the_rules_do_and_nobody_else(role: str, tokens: 
 
 
 ACTS: dict[str, AccountRole] = {"review_ok": "reviewer", "send_back": "reviewer", "import": "reviewer"}
-"""All other acts are for every account."""
+"""Every account may do all other acts."""
 
 
 @pytest.mark.parametrize("role", ACCOUNT_ROLES)
@@ -186,7 +186,7 @@ def test_every_word_of_the_stream_has_a_rule():
 
 
 class _Page:
-    """A WebSocket of a role that sends one message and leaves."""
+    """A WebSocket of a role that sends one message and disconnects."""
 
     def __init__(self, role: Role, said: dict[str, object]) -> None:
         self.scope = {"type": "websocket", "state": {"role": role}}

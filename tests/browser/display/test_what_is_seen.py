@@ -24,7 +24,7 @@ STREAMS = """async () => {
   return [...document.querySelectorAll("#sensors li")].map((one) =>
     [one.textContent, getComputedStyle(one).color, one.querySelector("path").getAttribute("d")]);
 }"""
-"""How sensors look in one that is well, one that is late and one that is silent."""
+"""The states of a sensor that works, one that is late and one that is silent."""
 
 
 @pytest.mark.usefixtures("paused_in_traffic")
@@ -42,7 +42,7 @@ CUT_OFF = """() => {
   return [...document.querySelectorAll(".figure small")].filter((node) => node.getBoundingClientRect().right > right)
     .map((node) => node.textContent);
 }"""
-"""Units that large figures have pushed out of sight."""
+"""Units that large numbers have pushed out of view."""
 
 
 @pytest.mark.usefixtures("paused_in_traffic")
@@ -115,7 +115,7 @@ SHOW = """async (change) => {
   hold();
   await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
 }"""
-"""Another command with the shown frame, also when the server sends that again with an image of another size."""
+"""Another command with the shown frame, even if the server sends the frame again with an image of another size."""
 
 ALARM_PIXELS = """(selector) => {
   const canvas = document.querySelector(selector), ctx = canvas.getContext("2d");

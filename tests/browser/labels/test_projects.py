@@ -43,7 +43,7 @@ def test_projects_are_shown_with_progress_people_and_results_of_control_frames(h
 
 
 def test_who_signed_in_has_the_name_and_role_of_the_account(hand: Hand, labels: Labels):
-    """The server's answer to a labeler's page."""
+    """What the server tells a labeler's page."""
     page = hand.page
     page.route("**/api/account", lambda route: route.fulfill(json={"name": "Rita", "role": "labeler"}))
     page.route("**/api/labels/queue", lambda route: route.fulfill(json=[{**_WORK, "person": "Bob"}]))
