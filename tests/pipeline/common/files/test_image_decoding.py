@@ -16,7 +16,7 @@ GREY = np.full((24, 40, 3), 90, np.uint8)
 
 
 def png_of(width: int, height: int) -> bytes:
-    """A PNG that says it is so large, and holds next to nothing."""
+    """A PNG that claims this size and contains almost nothing."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
@@ -27,7 +27,7 @@ def png_of(width: int, height: int) -> bytes:
 
 
 def jpeg_of(width: int, height: int) -> bytes:
-    """A JPEG that says so."""
+    """A JPEG that claims this size."""
     data = bytearray(cv2.imencode(".jpg", GREY)[1].tobytes())
     at = data.index(b"\xff\xc0") + 5
     data[at : at + 4] = struct.pack(">HH", height, width)
@@ -61,7 +61,7 @@ def test_what_would_take_more_than_a_camera_image_may_is_refused_unseen(name: st
 
 
 def test_every_decoder_of_images_is_behind_it():
-    """A decoder that somebody calls elsewhere has no budget."""
+    """A decoder called elsewhere would have no budget."""
     from pathlib import Path
 
     root = Path(__file__).resolve().parents[4]

@@ -21,7 +21,7 @@ ADDRESS = "memory://fleet/a.mcap"
 
 @pytest.fixture
 def session(tmp_path):
-    """A session in a store in memory, and the same on the disk."""
+    """A session in a store in memory, and the same session on disk."""
     path = write(tmp_path / "a.mcap", [full(index) for index in range(6)])
     store = fsspec.filesystem("memory")
     store.pipe_file("/fleet/a.mcap", path.read_bytes())
@@ -92,7 +92,7 @@ def test_a_store_that_goes_on_failing_is_overloaded_and_says_nothing_of_the_file
 
 
 def test_a_chunk_that_a_store_does_not_give_is_no_damage(session, in_no_time, monkeypatch: pytest.MonkeyPatch):
-    """It is asked for again with the next frame; the file is not believed to be damaged."""
+    """It is requested again with the next frame; the file is not reported as damaged."""
     monkeypatch.setattr(remote_files, "BLOCK_BYTES", 16)  # so that nothing of a chunk is known yet
     source = open_source(ADDRESS)
     store = fsspec.filesystem("memory")

@@ -74,7 +74,7 @@ def test_what_is_near_is_proposed() -> None:
 ALIASES = b"a0: &a0 [1, 2]\n" + b"".join(
     b"a%d: &a%d [%s]\n" % (n, n, b", ".join([b"*a%d" % (n - 1)] * 9)) for n in range(1, 12)
 )
-"""A few hundred bytes that stand for thirty thousand million numbers."""
+"""A few hundred bytes that represent thirty billion numbers."""
 
 
 @pytest.mark.parametrize(
