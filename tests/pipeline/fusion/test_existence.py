@@ -279,7 +279,7 @@ def test_a_weak_box_that_goes_along_is_a_vehicle(case: str, closing_mps: float, 
 
 
 def test_what_is_only_predicted_does_not_go_along() -> None:
-    """A weak box on something that stands, seen for 0.4 s; then the car drives 36 m without measuring it again."""
+    """A weak box on a static object, seen for 0.4 s; then the car drives 36 m without measuring it again."""
     state = ExistenceState()
     for k in range(18):
         car = replace(camera_car(60.0 - 2.0 * min(k, 4), score=0.45), seen_by="V" if k < 5 else "", measured=k < 5)
