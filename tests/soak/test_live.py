@@ -25,7 +25,7 @@ P99_MS, RECOVERY_S = 150.0, 1.0
 
 
 def judge(report: dict[str, Any]) -> None:
-    """What holds on any machine."""
+    """Check what holds on any machine."""
     assert report["errors"] == []
     assert all(each["seconds"] is not None for each in report["recoveries"]), "every sensor came back"
     recording = report["recording"]

@@ -45,7 +45,7 @@ PARTS: dict[str, type[BaseModel]] = {
 
 
 def documented(part: str) -> dict[str, str]:
-    """Default by key, as the table has them."""
+    """Default by key, as in the table."""
     body = TEXT.split(f"\n## {part}\n")[1].split("\n## ")[0]
     rows = re.findall(r"^\| ([a-z0-9_, ]+) \| ([^|]*)\|", body, re.MULTILINE)
     return {key: default.strip() for keys, default in rows for key in keys.split(", ") if key != "key"}

@@ -20,7 +20,7 @@ from tests.pipeline.sources.test_radiate import write_radiate
 
 
 def small_bag(folder: Path, kind: Kind = "db3") -> Path:
-    """A folder that is a bag, or, of ROS 1, has one in it."""
+    """A folder that is a ROS 2 bag or contains a ROS 1 bag."""
     if kind == "ros1":
         folder.mkdir()
         write_bag(folder / "drive.bag", kind, sweeps=2, every=50)

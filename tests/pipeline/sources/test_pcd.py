@@ -156,7 +156,7 @@ def test_no_clouds(tmp_path: Path) -> None:
 
 
 def test_nebula(data_dir: Path, tmp_path: Path) -> None:
-    """Another program's file: its rings, its times."""
+    """A file of another program, with its rings and times."""
     name = "nebula_1673400472138016708.pcd"
     (tmp_path / "1673400472138016708.pcd").symlink_to(data_dir / "vlp16_packets" / name)
     frame = open_source(f"pcd:{tmp_path}").frame(0)

@@ -20,7 +20,7 @@ from tests.pipeline.sources.clouds_on_disk import write_clouds
 from tests.pipeline.sources.conftest import write_astyx, write_kitti, write_kitti_raw
 
 Write = Callable[[Path], Path]
-"""Takes a folder that is not there yet, and gives what a person types."""
+"""Functions that create a recording in a new folder and return what a user types."""
 
 
 def capture(folder: Path) -> Path:

@@ -71,8 +71,8 @@ def for_real_roads(lanes: str = OURS.lanes) -> Networks:
 
 @contextmanager
 def on_two_cores() -> Iterator[list[int]]:
-    """This thread and those that it starts. Gives the cores that are left for others, the same two where there are no
-    more."""
+    """Bind this thread and those that it starts to two cores. Returns the remaining cores, or the same two if there are
+    no others."""
     here = sorted(os.sched_getaffinity(0))
     os.sched_setaffinity(0, here[:CORES])
     try:
@@ -82,7 +82,7 @@ def on_two_cores() -> Iterator[list[int]]:
 
 
 def faults_for(seconds: float) -> list[Fault]:
-    """One after the other, as often as they fit; the end is quiet."""
+    """The faults one after the other, as often as they fit, with a quiet end."""
     count = int((seconds - FIRST_S - QUIET_S) / EVERY_S)
     return [
         Fault.model_validate(
@@ -111,7 +111,7 @@ def config_file(folder: Path) -> Path:
 
 
 def soak(folder: Path, seconds: float, networks: Networks = OURS) -> dict[str, Any]:
-    """Run it and measure."""
+    """Run the soak and measure."""
     with on_two_cores() as others:
         return _soak(folder, seconds, networks, others)
 

@@ -79,8 +79,8 @@ class Memory:
         self._thread.join()
 
     def grown(self) -> tuple[float, float]:
-        """Bytes from the second fifth to the last, and those of the second; medians, so that one frame more or less in
-        the recorder's queue is no matter."""
+        """Growth in bytes from the second fifth to the last, and the size in the second; medians, so that one frame
+        more or less in the recorder's queue does not matter."""
         values = np.array([resident for _, resident in self.samples], dtype=np.float64)
         fifth = max(1, len(values) // 5)
         before, after = np.median(values[fifth : 2 * fifth]), np.median(values[-fifth:])

@@ -40,7 +40,7 @@ def with_camera(distortion: int) -> Frame:
 
 
 def loose_rotation() -> CameraCalibration:
-    """What a file with four decimals gives: no quaternion stands for it exactly."""
+    """A rotation read from a file with four decimals, which no quaternion represents exactly."""
     T_camera_ego = CAMERA.T_camera_ego.copy()
     T_camera_ego[0, 0] = 3.3e-4
     return replace(CAMERA, T_camera_ego=T_camera_ego)
@@ -90,7 +90,7 @@ def test_a_frame_comes_back_to_the_last_bit(frame: Frame, tmp_path: Path) -> Non
 
 
 def test_every_field_is_written() -> None:
-    """A field that someone adds must be written too; then this list grows."""
+    """A new field must be written too, and added to this list."""
     known = {
         Frame: "index name t_ns sweep image camera ego raw_boxes notes gnss raw_lanes route streams timing_ms "
         "detections_given scans",
