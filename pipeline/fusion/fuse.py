@@ -17,10 +17,11 @@ from scipy.optimize import linear_sum_assignment
 
 from pipeline.alignment.projection import Alignment, project_cuboids
 from pipeline.common.geometry import F64, corners_of, iou_matrix
-from pipeline.fusion.ranged_rows import Row, Tracks, ranged_row, with_ranged
+from pipeline.fusion.ranged_rows import TrackIndices, ranged_row, with_ranged
 from pipeline.fusion.rows import L, V, box_row, hit_row, lidar_sigma_m, quad, range_m
 from pipeline.fusion.vehicle_sizes import LONGEST_M
 from pipeline.params import FusionParams
+from pipeline.ranging.further import Tracks
 from pipeline.types import VEHICLES, Box, FusedObject, Gate, LidarTrack, Mask, Point2, RangedTrack, VisionTrack
 
 _SURELY_ONE = 0.5
@@ -102,7 +103,7 @@ def fuse(
     nearest_of_vision, nearest_of_lidar = _most_overlapping(overlap), _most_overlapping(overlap.T)
 
     # Every pair and every unmatched track is one object, under the id that its tracks had before
-    rows: list[Row] = [{V: i, L: partner[i]} if i in partner else {V: i} for i in range(len(vision))]
+    rows: list[TrackIndices] = [{V: i, L: partner[i]} if i in partner else {V: i} for i in range(len(vision))]
     claimed = set(partner.values())
     rows += [{L: j} for j in range(len(lidar)) if j not in claimed]
     if ranged:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,13 +11,12 @@ from scipy.optimize import linear_sum_assignment
 
 from pipeline.common.fast_replace import evolve
 from pipeline.fusion.rows import UNKNOWN, L, V, lidar_sigma_m, typical_footprint
+from pipeline.ranging.further import Tracks
 from pipeline.types import FusedObject, LidarTrack, Point2, RangedTrack, VisionTrack
 from pipeline.types.sensors import joined
 
-Row = dict[str, int]
+TrackIndices = dict[str, int]
 """One object: index of its track, by the sensor's letter."""
-Tracks = Mapping[str, tuple[RangedTrack, ...]]
-"""Tracks of each further ranging sensor, by its letter."""
 
 _GATE = 3.0
 """Standard deviations within which two positions may be of one object: 99.7 % of a normal distribution."""
@@ -35,8 +34,8 @@ class _Place(NamedTuple):
 
 
 def with_ranged(
-    rows: list[Row], vision: Sequence[VisionTrack], lidar: Sequence[LidarTrack], ranged: Tracks
-) -> list[Row]:
+    rows: list[TrackIndices], vision: Sequence[VisionTrack], lidar: Sequence[LidarTrack], ranged: Tracks
+) -> list[TrackIndices]:
     """The rows with the indices of further sensors' tracks: of those at their place, one-to-one; every other track is
     a row of its own."""
     rows = [dict(row) for row in rows]
@@ -84,7 +83,7 @@ def _bearing_rad(place: _Place) -> float:
     return math.atan2(place.position[1], place.position[0])
 
 
-def ranged_row(object_id: int, item: FusedObject | None, row: Row, ranged: Tracks) -> FusedObject:
+def ranged_row(object_id: int, item: FusedObject | None, row: TrackIndices, ranged: Tracks) -> FusedObject:
     """An object with its further sensors' tracks. item: what camera and LiDAR know of it; None if they do not have
     it."""
     item = evolve(UNKNOWN, id=object_id, source="") if item is None else item

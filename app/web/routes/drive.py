@@ -19,7 +19,7 @@ from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
 from app.web.routes.names import one_of
 from app.web.routes.refusals import open_recording, refusing
-from app.web.routes.shapes.common import ApiModel, ObjectSource, StatusJson
+from app.web.routes.shapes.common import ApiModel, SensorLetters, StatusJson
 from pipeline.common.clips import first_frames
 
 
@@ -53,7 +53,7 @@ class Curve(ApiModel):
     """Number of the run."""
     index: list[int]
     """Numbers of the frames; all lists have this length."""
-    source: list[ObjectSource]
+    source: list[SensorLetters]
     """The letters of its sensors: V, L or VL."""
     carried: list[bool]
     """Predicted, not seen in that frame."""

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from pipeline.types import object_sources
 
-ObjectSource = Annotated[str, Field(json_schema_extra={"enum": list(object_sources())})]
+SensorLetters = Annotated[str, Field(json_schema_extra={"enum": list(object_sources())})]
 Point = tuple[float, float]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from app.web.routes.shapes.common import CuboidJson, Exact, ObjectSource, Point
+from app.web.routes.shapes.common import CuboidJson, Exact, Point, SensorLetters
 
 
 class GateJson(Exact):
@@ -25,7 +25,7 @@ class ObjectJson(Exact):
 
     id: int
     """The same for as long as the object is tracked; never reused within a run."""
-    source: ObjectSource
+    source: SensorLetters
     """Which sensors' tracks it is made of: V camera, L LiDAR, VL both."""
     type: str | None
     """Class by the detector; null for L."""
@@ -66,7 +66,7 @@ class ObjectJson(Exact):
     """Time to collision; null when the gap does not shrink."""
     carried: bool
     """Not seen in this frame: its position is predicted."""
-    seen_by: ObjectSource | Literal[""]
+    seen_by: SensorLetters | Literal[""]
     """Which sensors saw it in this frame; empty when carried."""
     hits: int
     """Sightings so far."""
