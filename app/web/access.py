@@ -143,7 +143,7 @@ class Guard:
             return JSONResponse({"detail": "not allowed for the in-vehicle display"}, 403)
         needed = _LABEL_ROLES.get((connection.scope.get("method", "WEBSOCKET"), connection.scope["path"]))
         if needed is not None and not includes(account, needed):
-            return JSONResponse({"detail": f"only for accounts with the role {needed}"}, 403)
+            return JSONResponse({"detail": f"requires the role {needed}"}, 403)
         set_client(connection, role, account)
         return None
 

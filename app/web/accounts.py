@@ -89,7 +89,7 @@ def read_accounts(file: Path = FILE) -> list[StoredAccount]:
 
 
 def add_account(name: str, role: AccountRole, file: Path = FILE) -> str:
-    """Make an account, or give an existing one another role and token; returns the token, which is not stored."""
+    """Create an account, or give an existing one another role and token; returns the token, which is not stored."""
     token = secrets.token_urlsafe(_BYTES)
     try:
         made = StoredAccount(name=name, role=role, sha256=_digest(token))

@@ -53,7 +53,7 @@ class LabelProjects:
         for each in found:
             print(
                 f"{each.name}: {each.done} of {each.drives} recordings done, lead labelled in {percent(each.labelled)} "
-                f"of {each.frames:,} frames, {each.asked:,} of {each.sampled:,} requested frames left"
+                f"of {each.frames:,} frames, {each.asked:,} of {each.sampled:,} queued frames left"
                 f"{f' ({each.sampling})' if each.sampling else ''}"
             )
             for one in each.people:

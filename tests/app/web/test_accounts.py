@@ -117,7 +117,7 @@ def test_a_labeler_does_not_review_and_a_reviewer_does_not_assign(people: dict[s
     approve = {"kind": "review_ok", "items": [{"kind": "lead", "id": lead["id"], "revision": lead["revision"]}]}
     for refused in (approve, {"kind": "import"}):
         answer = act(labeler, "Labeler", refused)
-        assert (answer.status_code, answer.json()["detail"]) == (403, "only for accounts with the role reviewer")
+        assert (answer.status_code, answer.json()["detail"]) == (403, "requires the role reviewer")
     assert act(reviewer, "Reviewer", approve).status_code == 200
 
     def change(client: httpx.Client, person: str, **to: str) -> int:
