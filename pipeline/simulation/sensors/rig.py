@@ -14,7 +14,7 @@ from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import gnss
 from pipeline.simulation.sensors.camera import DrawnCamera, calibration
 from pipeline.simulation.sensors.lidar.sensor import Lidar
-from pipeline.simulation.world.planned_route import planned_route
+from pipeline.simulation.sensors.planned_route import planned_route
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.simulation.world.world_state import World
 from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, RangeScan, Route, Sweep

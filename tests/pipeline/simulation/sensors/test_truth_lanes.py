@@ -11,9 +11,9 @@ from pipeline.simulation import scenario
 from pipeline.simulation.sensors import gnss
 from pipeline.simulation.sensors.camera import calibration
 from pipeline.simulation.sensors.detection_model import LineNoise
+from pipeline.simulation.sensors.planned_route import planned_route
 from pipeline.simulation.sensors.truth_lanes import lane_points
 from pipeline.simulation.world import world_state
-from pipeline.simulation.world.planned_route import planned_route
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M
 from tests.pipeline.simulation.worlds import with_actors
 
