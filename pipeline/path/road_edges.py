@@ -96,16 +96,17 @@ def follow(
     cells = road_structure.merged(before, _seen(around))
     drove_s = _drove_s(state.drove_s, around.objects, dt_s or 0.0)
     cells = road_structure.without(cells, [item for item in around.objects if _is_traffic(item, drove_s)])
-    if is_shown or len(cells.xy) < _FEWEST_CELLS:
+    used = cells if is_shown else road_structure.thinned(cells)
+    if is_shown or len(used.xy) < _FEWEST_CELLS:
         return EdgeState(cells, drove_s=drove_s), None
     # The shape with the most structure at a constant distance is the road's, and the nearest structure limits the free
     # width
     starts = road_shape.begin(state.shape, ego, dt_s, state.turn == 0, params)
-    shape, sigma_m = road_shape.fitted(cells.xy, cells.blocks, starts, ego, params)
+    shape, sigma_m = road_shape.fitted(used.xy, used.blocks, starts, ego, params)
     room_m = road_shape.room(shape, cells.xy[cells.stands], params.half_width_m)
     left_m, right_m = (np.full(len(shape), each) for each in room_m)
     path = PathEstimate("edges", shape, sigma_m, left_m, right_m)
-    edges = Edges(path, cells.xy)
+    edges = Edges(path, used.xy)
     return EdgeState(cells, shape, (state.turn + 1) % _ANEW_EVERY, edges, drove_s), edges
 
 

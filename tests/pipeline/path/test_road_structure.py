@@ -64,3 +64,33 @@ def test_one_cell_of_the_grid_is_one_vote() -> None:
     fresh = Cells(np.array([[10.2, 2.2], [10.3, 2.3]]), np.ones(2), np.zeros(2), np.ones(2, np.bool_), np.zeros(2))
     merged = road_structure.merged(before, fresh)
     assert sorted(merged.age_s.tolist()) == [0.0, 0.5]
+
+
+def grid(x: tuple[float, float], y: tuple[float, float]) -> Cells:
+    """A cell in every square of the grid in a rectangle."""
+    xy = np.stack(np.meshgrid(np.arange(*x, 0.5), np.arange(*y, 0.5)), axis=-1).reshape(-1, 2) + 0.25
+    count = len(xy)
+    return Cells(xy, np.ones(count), np.zeros(count), np.ones(count, np.bool_), np.zeros(count))
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "kept"),
+    [
+        pytest.param((10.0, 30.0), (4.0, 4.5), 40, id="all of a wall"),
+        pytest.param((10.0, 30.0), (4.0, 5.0), 40, id="half of a hedge that is two cells thick"),
+        pytest.param((10.0, 13.0), (4.0, 7.0), 8, id="eight of the 36 cells of a bush"),
+        pytest.param((10.0, 10.5), (4.0, 4.5), 1, id="a post"),
+    ],
+)
+def test_what_stands_counts_by_its_length(x: tuple[float, float], y: tuple[float, float], kept: int) -> None:
+    found = road_structure.thinned(grid(x, y))
+    assert len(found.xy) == kept
+    assert np.ptp(found.xy[:, 0]) >= 0.7 * (x[1] - x[0] - 0.5), "evenly over its length"
+
+
+def test_objects_are_thinned_apart_from_each_other() -> None:
+    bush, post = grid((10.0, 13.0), (4.0, 7.0)), grid((20.0, 20.5), (-5.0, -4.5))
+    both = Cells(*(np.concatenate(pair) for pair in zip(bush, post, strict=True)))
+    found = road_structure.thinned(both)
+    assert [int((found.xy[:, 0] < 15.0).sum()), int((found.xy[:, 0] > 15.0).sum())] == [8, 1]
+    assert len(road_structure.thinned(road_structure.NONE).xy) == 0
