@@ -113,7 +113,7 @@ def sensors_in_words(source: str) -> str:
     """``camera only``, ``LiDAR only``, ``both sensors``; with further sensors, ``camera and radar``."""
     if not are_several(source):
         return f"{_titles(source)} only" if source else ""
-    return "both sensors" if len(source) == len(SENSOR_KINDS) == 2 else _titles(source)
+    return "both sensors" if source == CAMERA.letter + LIDAR.letter else _titles(source)
 
 
 def seeing_sensors_in_words(sensors: str) -> str:

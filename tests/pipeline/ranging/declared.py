@@ -13,9 +13,9 @@ from tests.pipeline.ranging.radar import RADAR
 
 @contextmanager
 def radar_declared() -> Iterator[None]:
-    """Within it, ``RADAR`` is appended to ``SENSOR_KINDS``."""
+    """Within it, ``RADAR`` is the only kind besides camera and LiDAR."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sensors, "SENSOR_KINDS", (*sensors.SENSOR_KINDS, RADAR))
+        patch.setattr(sensors, "SENSOR_KINDS", (sensors.CAMERA, sensors.LIDAR, RADAR))
         _forget()
         try:
             yield

@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.common import kalman
 from pipeline.params import Params
 from pipeline.simulation.world.world_state import ActorState, World
-from pipeline.types import F64, Moment, Point2, RangedTrack, RangeScan
+from pipeline.types import F32, F64, Moment, Point2, RangedTrack, RangeScan
 from pipeline.types.sensors import SensorKind
 
 RADAR = SensorKind(
@@ -33,7 +33,7 @@ _SAME = 13.82
 _CARRIED_S = 0.5
 
 
-class Followed(NamedTuple):
+class RadarTrack(NamedTuple):
     """A track with its filter."""
 
     id: int
@@ -50,7 +50,7 @@ class Followed(NamedTuple):
 class RadarState:
     """The tracks of one frame."""
 
-    followed: tuple[Followed, ...] = ()
+    followed: tuple[RadarTrack, ...] = ()
     """In order of their ids."""
     next_id: int = 1
     """Of the next new track."""
@@ -69,23 +69,23 @@ def follow(
         if scan is not None and found is not None and _apart(ahead, scan.points[found]) <= _SAME:
             left.remove(found)
             seen = kalman.update(ahead, scan.points[found, :2], _noise(scan.points[found]))
-            followed.append(Followed(track.id, seen, track.hits + 1, 0.0))
+            followed.append(RadarTrack(track.id, seen, track.hits + 1, 0.0))
         elif track.unseen_s + dt_s <= _CARRIED_S:
             followed.append(track._replace(filter=ahead, unseen_s=track.unseen_s + dt_s))
     for place, detection in enumerate(left):
         assert scan is not None
         begun = _begun(scan.points[detection], float(scan.values["range_rate_mps"][detection]))
-        followed.append(Followed(state.next_id + place, begun, 1, 0.0))
+        followed.append(RadarTrack(state.next_id + place, begun, 1, 0.0))
     return RadarState(tuple(followed), state.next_id + len(left)), tuple(map(_track, followed))
 
 
-def _begun(point: F64, rate_mps: float) -> kalman.CvState:
+def _begun(point: F32, rate_mps: float) -> kalman.CvState:
     begun = kalman.start(point[:2], _noise(point), _SPEED_SIGMA_MPS)
     begun.mean[2:] = rate_mps * np.asarray(point[:2]) / np.hypot(*point[:2])
     return begun
 
 
-def _noise(point: F64) -> F64:
+def _noise(point: F32) -> F64:
     """(2, 2) covariance of a detection in ego x, y: range and bearing are measured."""
     x, y = float(point[0]), float(point[1])
     range_m = math.hypot(x, y)
@@ -93,11 +93,11 @@ def _noise(point: F64) -> F64:
     return turn @ np.diag([RANGE_SIGMA_M**2, (range_m * BEARING_SIGMA_RAD) ** 2]) @ turn.T
 
 
-def _apart(ahead: kalman.CvState, point: F64) -> float:
+def _apart(ahead: kalman.CvState, point: F32) -> float:
     return kalman.mahalanobis2(ahead, point[:2], _noise(point))
 
 
-def _track(each: Followed) -> RangedTrack:
+def _track(each: RadarTrack) -> RangedTrack:
     x, y, vx, vy = each.filter.mean.tolist()
     along = np.array([x, y]) / math.hypot(x, y)
     across = np.array([-along[1], along[0]])

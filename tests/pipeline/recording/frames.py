@@ -60,7 +60,7 @@ def image(index: int = 0, kind: str = ".jpg", t_ns: int | None = None) -> Camera
 
 
 def scan(index: int, t_ns: int) -> RangeScan:
-    """A random scan of a radar, the same for the same index."""
+    """A random scan of a sensor that this program does not know, the same for the same index."""
     random = np.random.default_rng(index)
     points = random.normal(0.0, 50.0, (3, 3)).astype(np.float32)
     return RangeScan(t_ns - 5, points, {"range_rate_mps": random.normal(0.0, 9.0, 3).astype(np.float32)})
@@ -81,7 +81,7 @@ def full(index: int) -> Frame:
         route=ROUTE,
         streams=(StreamHealth("camera", "stale", 29.97, 12.5, 1.0, 3, "cable?"),),
         timing_ms={"arrival": 12.25},
-        scans={"radar": scan(index, t_ns)},
+        scans={"sonar": scan(index, t_ns)},
     )
 
 

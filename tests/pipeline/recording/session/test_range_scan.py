@@ -21,14 +21,14 @@ SCAN = scan(0, 1000)
 
 
 def test_a_scan_is_read_as_it_was_written() -> None:
-    assert same(range_scan_from("radar", range_scan_message("radar", SCAN), SCAN.t_ns), SCAN)
+    assert same(range_scan_from("sonar", range_scan_message("sonar", SCAN), SCAN.t_ns), SCAN)
     empty = replace(SCAN, points=np.zeros((0, 3), np.float32), values={})
-    assert same(range_scan_from("radar", range_scan_message("radar", empty), SCAN.t_ns), empty)
+    assert same(range_scan_from("sonar", range_scan_message("sonar", empty), SCAN.t_ns), empty)
 
 
 def test_viewers_can_draw_it() -> None:
-    message = topics.message_class("/radar/points").FromString(range_scan_message("radar", SCAN))
-    assert topics.channel("/radar/points").schema_name == "foxglove.PointCloud"
+    message = topics.message_class("/sonar/points").FromString(range_scan_message("sonar", SCAN))
+    assert topics.channel("/sonar/points").schema_name == "foxglove.PointCloud"
     assert [field.name for field in message.fields] == ["x", "y", "z", "range_rate_mps"]
 
 
@@ -36,13 +36,13 @@ def test_viewers_can_draw_it() -> None:
     "damaged",
     [
         b"\xff",
-        range_scan_message("radar", replace(SCAN, points=np.full((3, 3), np.nan, np.float32))),
-        topics.message_class("/radar/points")(point_stride=12).SerializeToString(),
+        range_scan_message("sonar", replace(SCAN, points=np.full((3, 3), np.nan, np.float32))),
+        topics.message_class("/sonar/points")(point_stride=12).SerializeToString(),
     ],
 )
 def test_a_damaged_scan_is_refused(damaged: bytes) -> None:
-    with pytest.raises(Damaged, match="/radar/points"):
-        range_scan_from("radar", damaged, SCAN.t_ns)
+    with pytest.raises(Damaged, match="/sonar/points"):
+        range_scan_from("sonar", damaged, SCAN.t_ns)
 
 
 def test_a_session_with_a_sensor_that_this_program_does_not_know_opens(tmp_path: Path) -> None:
