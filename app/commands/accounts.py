@@ -27,7 +27,7 @@ class ListAccounts:
     """Remove an account; its labels stay"""
 
     def __call__(self) -> int:
-        from app.web.accounts import add_account, read_accounts, remove_account
+        from app.web.guards.accounts import add_account, read_accounts, remove_account
 
         if (self.add is None) != (self.role is None):
             raise BadInput("--add and --role must be given together")

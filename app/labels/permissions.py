@@ -1,5 +1,5 @@
-"""What accounts may do with labels, where it depends on the request's content. ``app.web.access`` has the rules by
-address.
+"""What accounts may do with labels, where it depends on the request's content. ``app.web.guards.access`` has the rules
+by address.
 
 A labeler labels, and takes recordings from the queue. A reviewer also approves labels and sends them back, marks
 recordings as done, imports labels, freezes versions, and sees the results of control frames. An admin also assigns

@@ -40,8 +40,8 @@ from tests.fuzz.target import Target
 from tests.pipeline.formats.velodyne.streams import drive
 from tests.pipeline.formats.velodyne.test_models import stream
 from tests.pipeline.recording.frames import ABOUT, TRUTH, full, write
-from tests.pipeline.sources.bags import Kind, write_bag, write_packet_bag
 from tests.pipeline.sources.live.devices.test_wires import DBC
+from tests.pipeline.sources.made.bags import Kind, write_bag, write_packet_bag
 from tests.pipeline.sources.test_fuzz import FILES
 from tests.pipeline.sources.test_route_files import GGA, GPX, POINTS, RMC
 

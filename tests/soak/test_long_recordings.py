@@ -42,7 +42,7 @@ def _main(kind: str, folder: Path, rounds: int) -> dict[str, float]:
     import numpy as np
 
     from pipeline.sources import open_source
-    from tests.pipeline.sources import bags, captures
+    from tests.pipeline.sources.made import bags, captures
     from tests.pipeline.sources.pcap.test_source import later
 
     path = folder / ("long.pcap" if kind == "pcap" else "long")

@@ -17,9 +17,9 @@ from app.drive.marks import LIVE, LONGEST_TEXT, MarkRefused, Marks
 from app.drive.open_recording import OpenRecording
 from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
-from app.web.routes.names import one_of
-from app.web.routes.refusals import open_recording, refusing
+from app.web.refusals import open_recording, refusing
 from app.web.routes.shapes.common import ApiModel, SensorLetters, StatusJson
+from app.web.routes.shapes.names import one_of
 from pipeline.common.clips import first_frames
 
 

@@ -6,10 +6,10 @@ import httpx
 import pytest
 
 from app.engine.engine import Engine
+from app.web.guards.tokens import Tokens
 from app.web.routes.labels.score_shapes import ScoreJson
 from app.web.routes.labels.sighting_shapes import Window
 from app.web.server import create_app
-from app.web.tokens import Tokens
 from pipeline.labels.model import WHOLE_TAG
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import Recording, opener

@@ -13,7 +13,7 @@ import pytest
 
 from app.engine.engine import Engine
 from app.labels.transfer import files
-from app.web.limits import LARGEST_FILE
+from app.web.guards.limits import LARGEST_FILE
 from pipeline.common.progress import Progress
 from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.native import from_json

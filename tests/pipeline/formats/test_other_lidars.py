@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.formats.other_lidars import maker_of
 from pipeline.sources import SourceError, open_source
-from tests.pipeline.sources.captures import ethernet, pcap
+from tests.pipeline.sources.made.captures import ethernet, pcap
 
 MAKERS = {
     "Ouster by port": (b"\0" * 100, 7502, 6464, "Ouster"),

@@ -11,7 +11,7 @@ import pytest
 from pipeline.formats import video_file
 from pipeline.formats.video_file import VideoFile
 from pipeline.sources import SourceError
-from tests.pipeline.sources.captures import write_video
+from tests.pipeline.sources.made.captures import write_video
 
 IMAGES = 12
 

@@ -13,7 +13,7 @@ import pytest
 from pipeline.params import Params
 from pipeline.sources import SourceError, open_source
 from pipeline.step import State, step
-from tests.pipeline.sources.captures import sentences
+from tests.pipeline.sources.made.captures import sentences
 
 GPX = """<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/1" version="1.1" creator="test"><trk><trkseg>
 {}</trkseg></trk></gpx>"""

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from pipeline.formats.pcd_file import parse_pcd
 from pipeline.sources import SourceError, open_source
 from tests.pipeline.formats.velodyne.streams import ring_wall
-from tests.pipeline.sources.captures import RIG
-from tests.pipeline.sources.clouds_on_disk import DTYPE, STAMPS_NS, lzf, pcd, rows_of, write_clouds
+from tests.pipeline.sources.made.captures import RIG
+from tests.pipeline.sources.made.clouds_on_disk import DTYPE, STAMPS_NS, lzf, pcd, rows_of, write_clouds
 
 ENCODINGS = ("ascii", "binary", "binary_compressed")
 ROWS = rows_of(ring_wall(0))[::37]

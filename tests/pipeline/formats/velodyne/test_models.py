@@ -21,8 +21,8 @@ from pipeline.formats.velodyne.models import HDL32E, MODELS, PUCK_HI_RES, VLP32C
 from pipeline.sources import open_source
 from pipeline.types import Sweep
 from tests.pipeline.formats.velodyne.streams import START_NS, decoded, drive
-from tests.pipeline.sources.bags import HEADER_NS, BagWriter
-from tests.pipeline.sources.captures import pcap
+from tests.pipeline.sources.made.bags import HEADER_NS, BagWriter
+from tests.pipeline.sources.made.captures import pcap
 
 OTHERS = [PUCK_HI_RES, HDL32E, VLP32C]
 RANGE_STEP_M = {"VLP-32C": 0.004}

@@ -14,7 +14,7 @@ from pipeline.params import Params
 from pipeline.run import run
 from pipeline.sources import Source, SourceError, open_source
 from tests.pipeline.formats.velodyne.streams import PRODUCT, START_NS, STEP_NS, mrpt, with_byte
-from tests.pipeline.sources.captures import RIG, lidar, pcap, pcapng, sentences, write_capture, write_video
+from tests.pipeline.sources.made.captures import RIG, lidar, pcap, pcapng, sentences, write_capture, write_video
 
 
 def opened(folder: Path, data: bytes, options: str = "") -> Source:

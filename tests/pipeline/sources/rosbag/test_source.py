@@ -15,7 +15,7 @@ from pipeline.params import Params
 from pipeline.run import run
 from pipeline.sources import SourceError, open_source
 from tests.pipeline.formats.velodyne.streams import PRODUCT, START_NS, ring_wall, with_byte
-from tests.pipeline.sources.bags import (
+from tests.pipeline.sources.made.bags import (
     HEADER_NS,
     HEIGHT,
     POINT,

@@ -12,7 +12,7 @@ import pytest
 from fastapi import FastAPI
 
 from app.labels.service.desk import LabelDesk
-from app.web.limits import BodyLimit
+from app.web.guards.limits import BodyLimit
 from app.web.routes.labels.files import IMPORT, label_files_router
 from tests.app.waiting import loop_apart
 

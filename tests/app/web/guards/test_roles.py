@@ -25,10 +25,10 @@ from app.labels.permissions import check_act
 from app.streaming.scene_requests import hear
 from app.streaming.slot import FrameCounts, Slot
 from app.streaming.stream import MAY_SAY, Stream
-from app.web.access import Access, Guard
-from app.web.accounts import Accounts, add_account
+from app.web.guards.access import Access, Guard
+from app.web.guards.accounts import Accounts, add_account
+from app.web.guards.tokens import Tokens
 from app.web.server import create_app
-from app.web.tokens import Tokens
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import Recording, opener
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from starlette.datastructures import Headers
 
-from app.web.access import Access
+from app.web.guards.access import Access
 
 CASES = {
     "the page itself": ("127.0.0.1:8420", "http://127.0.0.1:8420", True, True),

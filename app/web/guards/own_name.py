@@ -10,7 +10,7 @@ from starlette.requests import HTTPConnection, Request
 from app.core.client_role import account_of
 from app.labels.acts.request_fields import clean
 from app.labels.permissions import check_name
-from app.web.routes.refusals import refusing
+from app.web.refusals import refusing
 
 _NAME = "person"
 """The field and query parameter in which requests name a person."""

@@ -6,7 +6,7 @@ import hmac
 
 import pytest
 
-from app.web.tokens import Guesses, Tokens
+from app.web.guards.tokens import Guesses, Tokens
 from pipeline.common.errors import BadInput
 
 PERSON, DISPLAY = "person-0123456789abcdef", "display-0123456789abcde"

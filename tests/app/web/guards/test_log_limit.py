@@ -6,11 +6,11 @@ import logging
 
 import pytest
 
-from app.web import log_limit
-from app.web.log_limit import OncePerPeriod
+from app.web.guards import log_limit
+from app.web.guards.log_limit import OncePerPeriod
 from app.web.server import create_app
+from tests.app.web.guards.test_connections import half_open, hangs_up
 from tests.app.web.serving import running, serving
-from tests.app.web.test_connections import half_open, hangs_up
 
 
 def record(text: str) -> logging.LogRecord:

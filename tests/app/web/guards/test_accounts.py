@@ -12,9 +12,9 @@ import httpx
 import pytest
 
 from app.core.client_role import ACCOUNT_ROLES, Account
-from app.web.accounts import Accounts, add_account, read_accounts, remove_account
+from app.web.guards.accounts import Accounts, add_account, read_accounts, remove_account
+from app.web.guards.tokens import Tokens
 from app.web.server import create_app
-from app.web.tokens import Tokens
 from pipeline.common.errors import BadInput
 from tests.app.web.serving import WAIT_S, running, serving
 

@@ -18,10 +18,10 @@ from websockets.sync.client import connect
 
 from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder
-from app.web.limits import LARGEST_BODY, LARGEST_FILE
+from app.web.guards.limits import LARGEST_BODY, LARGEST_FILE
+from app.web.guards.tokens import Tokens
 from app.web.routes.labels.files import IMPORT
 from app.web.server import create_app
-from app.web.tokens import Tokens
 from tests.app.web.serving import WAIT_S, running, serving
 
 TOKENS = Tokens("person-0123456789abcdef", "display-0123456789abcde")

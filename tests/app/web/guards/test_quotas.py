@@ -21,10 +21,10 @@ from websockets.sync.client import connect
 from app.core.jobs import Cancelled
 from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
-from app.web import quotas
+from app.web.guards import quotas
+from app.web.guards.tokens import Tokens
 from app.web.routes import rerun
 from app.web.server import create_app
-from app.web.tokens import Tokens
 from pipeline.common.progress import Progress
 from tests.app.waiting import wait_until
 from tests.app.web.serving import WAIT_S, running, serving

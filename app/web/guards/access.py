@@ -24,7 +24,7 @@ from starlette.websockets import WebSocket
 
 from app.core.client_role import AccountRole, includes, set_client
 from app.core.server_address import LOOPBACK_HOSTS, WILDCARDS, is_address
-from app.web.tokens import Guesses, Tokens
+from app.web.guards.tokens import Guesses, Tokens
 
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _OWN_SITES = (None, "same-origin", "none")

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from app.web import connections
+from app.web.guards import connections
 from app.web.server import create_app
 from tests.app.web.serving import WAIT_S, running, serving
 

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from app.core.client_role import Account, Role
-from app.web.accounts import Accounts
+from app.web.guards.accounts import Accounts
 from pipeline.common.errors import BadInput
 
 _BYTES = 24

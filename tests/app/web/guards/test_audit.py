@@ -12,9 +12,9 @@ import pytest
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-from app.web import audit
+from app.web.guards import audit
+from app.web.guards.tokens import Tokens
 from app.web.server import create_app
-from app.web.tokens import Tokens
 from tests.app.waiting import wait_until
 from tests.app.web.serving import WAIT_S, running, serving
 
