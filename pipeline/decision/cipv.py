@@ -39,6 +39,8 @@ class CipvState:
     """The CIPV."""
     odds: dict[int, float] = field(default_factory=dict)
     """By object id, running mean of the log-odds that the object is in the path."""
+    camera_ranges: dict[int, int] = field(default_factory=dict)
+    """By object id, number of distances that the camera's position was based on."""
 
 
 class Choice(NamedTuple):
@@ -87,7 +89,8 @@ def choose(
         rejected=tuple(_rejections(judged, lead)),
     )
     odds = {each.item.id: each.odds for each in judged if each.odds is not None}
-    return CipvState(lead.id if lead is not None else None, odds), choice
+    ranges = {each.item.id: each.item.camera_ranges for each in judged}
+    return CipvState(lead.id if lead is not None else None, odds, ranges), choice
 
 
 def _judge(
@@ -100,14 +103,15 @@ def _judge(
 ) -> _Judged:
     """Judge one object. placed: its position relative to the path, and when it will cross the edge."""
     where, crossing_s = placed if placed is not None else (None, None)
-    leads, widening_m, odds = item.id == state.lead_id, 0.0, None
+    is_elsewhere = item.is_placed_anew(state.camera_ranges.get(item.id, 0))
+    leads, widening_m, odds = item.id == state.lead_id and not is_elsewhere, 0.0, None
     clears_s = clears_path_s(where, item, moment.speed_mps, params)
     if where is not None:
         moving_mps = where.believed_mps
         decide_s = min(params.decide_s, _BLUR_M / max(abs(moving_mps), 1e-3))
         widening_m = _widening_m(leads, moving_mps, params)
         now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY) if clears_s is None else -SURE
-        before = state.odds.get(item.id, now)
+        before = now if is_elsewhere else state.odds.get(item.id, now)
         odds = before + _fresh(moment.dt_s, decide_s) * (now - before)
     is_ahead = where is not None and where.ahead_m > 0.0
     probability = 1.0 / (1.0 + exp(-odds)) if is_ahead and odds is not None else 0.0

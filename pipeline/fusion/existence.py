@@ -94,6 +94,8 @@ class ExistenceState:
 
     known: dict[int, Existence] = field(default_factory=dict)
     """By object id."""
+    by_vision: dict[int, int] = field(default_factory=dict)
+    """Object id of each vision track."""
     looks_far: bool = False
     """Whether far parts of images are processed a second time, at least in some frames."""
 
@@ -121,14 +123,25 @@ def weigh(
     known: dict[int, Existence] = {}
     judged = []
     for item in objects:
-        before = state.known.get(item.id, Existence(None, 0.0))
+        before = _before(state, item)
         found = _updated(before, item, rays.get(item.id), item.id in missed, now)
         known[item.id] = found
         camera = (found.score - _EVEN_SCORE) * _SCORE_SLOPE if found.score is not None else 0.0
         camera += _ALONG if found.goes_along else 0.0
         odds = _bounded(_bounded(camera) + found.lidar)
         judged.append(_told(item, 1.0 / (1.0 + math.exp(-odds)), rays.get(item.id)))
-    return ExistenceState(known, looks_far), tuple(judged)
+    by_vision = {item.vision_track: item.id for item in objects if item.vision_track is not None}
+    return ExistenceState(known, by_vision, looks_far), tuple(judged)
+
+
+def _before(state: ExistenceState, item: FusedObject) -> Existence:
+    """Evidence about an object until now. If its id went to another part of it, its boxes are still the same: what they
+    said, and what the LiDAR said against them, still holds. What it said for them was about the other part."""
+    known = state.known.get(item.id)
+    if known is None and item.vision_track in state.by_vision:
+        before = state.known[state.by_vision[item.vision_track]]
+        known = before._replace(lidar=min(before.lidar, 0.0))
+    return known if known is not None else Existence(None, 0.0)
 
 
 def _missed(objects: tuple[FusedObject, ...], size: tuple[int, int] | None) -> frozenset[int]:
@@ -152,12 +165,13 @@ def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bo
         score = item.score if score is None else score + _weight(dt_s, _MEAN_S) * (item.score - score)
     elif missed and score is not None:
         score -= _weight(dt_s, min(max(age_s, _MEAN_S), _LONGEST_MEAN_S)) * score
-    is_begun_anew = item.camera_ranges < before.camera_ranges
-    if lidar < 0.0:
-        # evidence that a place is empty does not apply to another place, and decays as the object moves on
-        lidar = 0.0 if is_begun_anew else lidar * math.exp(-dt_s / _EMPTY_S)
+    is_elsewhere = item.is_placed_anew(before.camera_ranges)
+    if is_elsewhere:
+        lidar = 0.0  # what the LiDAR saw at one place says nothing about another
+    elif lidar < 0.0:
+        lidar *= math.exp(-dt_s / _EMPTY_S)  # the object moves on
     from_m, travelled_m, judged_m, shrunk_m = before.from_m, before.travelled_m, before.judged_m, before.shrunk_m
-    if is_begun_anew or from_m is None or now.speed_mps is None:
+    if is_elsewhere or from_m is None or now.speed_mps is None:
         from_m, travelled_m, judged_m, shrunk_m = item.distance_m, 0.0, 0.0, 0.0
     else:
         travelled_m += now.speed_mps * dt_s

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
@@ -34,6 +35,8 @@ IMAGES = Path(__file__).resolve().parents[2] / "docs" / "img"
 SOURCE = "sim:straight"
 MOMENT = 60
 """A frame with traffic around and a lead."""
+FAR_SOURCE, FAR_OFF, RANGED = "sim:ccrs_100", 24, 40
+"""A car that stands on the road; the frames in which it is 95 m ahead, and in which one LiDAR return ranges it."""
 QUALITY = 78
 """JPEG quality: a whole page stays below 300 kB with legible text."""
 WAIT_MS = 600_000
@@ -41,6 +44,22 @@ WAIT_MS = 600_000
 SESSIONS, SECONDS = 40, 5.0
 """Number of sessions of the fleet, and their length."""
 DESK, DISPLAY = (1440, 900), (1024, 600)
+
+
+class Part(NamedTuple):
+    """Neighbouring panes of a page."""
+
+    page: Page
+    """The page."""
+    panes: tuple[str, ...]
+    """Their selectors."""
+
+    def screenshot(self, **how: Any) -> bytes:
+        """Take a picture of the rectangle around them."""
+        boxes = [box for pane in self.panes if (box := self.page.locator(pane).bounding_box()) is not None]
+        x, y = min(box["x"] for box in boxes), min(box["y"] for box in boxes)
+        right, below = max(box["x"] + box["width"] for box in boxes), max(box["y"] + box["height"] for box in boxes)
+        return self.page.screenshot(clip={"x": x, "y": y, "width": right - x, "height": below - y}, **how)
 
 
 def main() -> None:
@@ -84,7 +103,38 @@ def main() -> None:
             page.get_by_role("button", name="Fleet", exact=True).click()
             expect(page.locator("#fleet-dialog")).to_have_attribute("aria-busy", "false")
             save(page, "fleet")
+            page.close()
+        with dashboard(FAR_SOURCE, FAR_OFF) as distant:
+            far_away(browser, distant)
         browser.close()
+
+
+def far_away(browser: Browser, site: Site) -> None:
+    """A car far ahead without and with the far view, and nearer, with a single LiDAR return that ranges it."""
+    with looking_ahead(browser, site, far_view=False, moment=FAR_OFF) as view:
+        save(view, "far-without")
+    with looking_ahead(browser, site, far_view=True, moment=FAR_OFF) as view:
+        save(view, "far-with")
+    with looking_ahead(browser, site, far_view=True, moment=RANGED) as view:
+        save(view, "far-returns")
+
+
+@contextmanager
+def looking_ahead(browser: Browser, site: Site, far_view: bool, moment: int) -> Iterator[Part]:
+    """Camera and plan of a moment, with the image zoomed to the end of the road and the CIPV selected."""
+    site.engine.control.set_params(with_changes(Params(), {"detection.far_view": far_view}), "default")
+    site.engine.control.change(target=moment)
+    page = opened(browser, site)
+    expect(page.locator("#transport")).to_contain_text(f"{moment:06d}")
+    if far_view:
+        page.locator("#objects tbody tr.is-cipv").click()
+    image = page.locator(".camera-pane canvas").first.bounding_box()
+    assert image is not None
+    page.mouse.move(image["x"] + image["width"] / 2, image["y"] + image["height"] * 0.45)
+    page.mouse.wheel(0, -700)
+    painted(page)
+    yield Part(page, (".camera-pane", ".bev-pane"))
+    page.close()
 
 
 @contextmanager
@@ -106,14 +156,14 @@ def fleet_of(site: Site) -> Iterator[Site]:
 
 
 @contextmanager
-def dashboard() -> Iterator[Site]:
-    """The dashboard on the simulated drive, paused at ``MOMENT``, with sessions and labels of its own."""
+def dashboard(uri: str = SOURCE, moment: int = MOMENT) -> Iterator[Site]:
+    """The dashboard on a simulated drive, paused at a moment, with sessions and labels of its own."""
     with tempfile.TemporaryDirectory() as folder:
         engine = Engine(
             open_source,
             detector_for,
             Params(),
-            uri=SOURCE,
+            uri=uri,
             whole_drives=True,
             open_lanes=lanes_for,
             far_view_px=WINDOW_PX,
@@ -121,8 +171,8 @@ def dashboard() -> Iterator[Site]:
             labels=LabelDesk(Database.in_file(Path(folder) / "labels.db")),
         )
         engine.start()
-        engine.control.change(target=MOMENT)
-        engine.wait_for(lambda shown: shown.processed is not None and shown.index == MOMENT, WAIT_MS / 1e3)
+        engine.control.change(target=moment)
+        engine.wait_for(lambda shown: shown.processed is not None and shown.index == moment, WAIT_MS / 1e3)
         site = Site(engine, 0)
         site.start()
         try:
@@ -190,7 +240,7 @@ def painted(page: Page) -> None:
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
-def save(what: Page | Locator, name: str) -> None:
+def save(what: Page | Locator | Part, name: str) -> None:
     """Write an image of the page, or of a part of it."""
     path = IMAGES / f"{name}.jpg"
     what.screenshot(path=path, type="jpeg", quality=QUALITY)

@@ -108,7 +108,7 @@ def test_every_screenshot_is_made_by_the_script() -> None:
     pytest.importorskip("playwright")
     importlib.import_module("tests.docs.screenshots")
     script = (ROOT / "tests" / "docs" / "screenshots.py").read_text(encoding="utf-8")
-    made = set(re.findall(r'save\(.*, "(\w+)"\)', script))
+    made = set(re.findall(r'save\(.*, "([\w-]+)"\)', script))
     assert made == {image.stem for image in (DOCS / "img").glob("*.jpg")}
 
 

@@ -105,6 +105,22 @@ def test_a_camera_track_whose_place_was_reset_must_be_seen_again() -> None:
     assert decide(dataclasses.replace(fused(1, 20.0, source="L", hits=29)))[0] is not None, "the LiDAR counts its own"
 
 
+@pytest.mark.parametrize(
+    ("ranges", "source", "leads"),
+    [
+        pytest.param(21, "V", True, id="followed on"),
+        pytest.param(1, "V", False, id="its place was reset: it may be another vehicle"),
+        pytest.param(1, "VL", True, id="the LiDAR follows it"),
+    ],
+)
+def test_a_lead_whose_place_was_reset_has_no_privilege(ranges: int, source: Any, leads: bool) -> None:
+    """At the edge of the path, where only the current lead may stay."""
+    followed = dataclasses.replace(fused(1, 20.0, 1.7, source=source, hits=20), camera_ranges=20)
+    state = CipvState(1, camera_ranges={1: 20})
+    lead = choose(state, (dataclasses.replace(followed, camera_ranges=ranges),), PATH, moment(), PARAMS)[1].lead
+    assert (lead is not None) == leads
+
+
 def test_hysteresis_holds_the_lead_at_the_edge_but_takes_in_nobody_new() -> None:
     at_edge = fused(1, 20.0, 1.7)
     assert decide(at_edge, last=None)[0] is None

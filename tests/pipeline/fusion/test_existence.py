@@ -203,6 +203,28 @@ def test_that_a_place_was_empty_says_nothing_of_another_place() -> None:
     assert existence_after(begun, replace(car, camera_ranges=1)) > 0.85
 
 
+def test_a_box_that_gets_another_number_is_no_more_credible() -> None:
+    """The LiDAR looked through it for seconds; then its number went to the cluster of its neighbour."""
+    box = replace(camera_car(45.0, score=0.7), vision_track=7)
+    state = ExistenceState(seen_through().known, {7: 1})
+    assert existence_after(state, replace(box, id=2)) < 0.5
+    assert existence_after(ExistenceState(state.known), replace(box, id=2)) > 0.85, "without its track, it is new"
+
+
+def test_a_box_that_gets_another_number_leaves_what_the_lidar_saw_to_the_old_one() -> None:
+    box = replace(camera_car(45.0, score=0.4), vision_track=7, id=2)
+    state = ExistenceState({1: Existence(0.4, 4.0)}, {7: 1})
+    assert existence_after(state, box) < 0.5
+    assert existence_after(state, replace(box, id=1)) > 0.9
+
+
+@pytest.mark.parametrize(("ranges", "kept"), [(21, True), (1, False)], ids=["followed on", "begun anew"])
+def test_that_a_place_was_taken_says_nothing_of_another_place(ranges: int, kept: bool) -> None:
+    car = replace(camera_car(45.0, score=0.4), camera_ranges=ranges)
+    known = ExistenceState({1: Existence(0.4, 4.0, camera_ranges=20)})
+    assert (existence_after(known, car) > 0.9) == kept
+
+
 def test_an_empty_place_is_forgotten_where_the_lidar_cannot_tell_any_more() -> None:
     car = camera_car(45.0, score=0.7)
     assert existence_after(seen_through(), car, 5) < 0.5
