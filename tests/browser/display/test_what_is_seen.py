@@ -37,6 +37,21 @@ def test_a_sensor_that_fails_is_seen_by_colour_word_and_shape(open_display: Open
         assert len({works[column], late[column], gone[column]}) == 3
 
 
+@pytest.mark.usefixtures("paused_in_traffic")
+def test_a_further_sensor_is_named(open_display: OpenDisplay, site: Site):
+    page = open_display(site.address)
+    expect(page.locator("#sensors li")).to_have_count(3)
+    page.evaluate(
+        """async () => {
+          const { get, set } = await import("/js/core/store.js");
+          const frame = get("frame"), { result } = frame;
+          const sensors = { ...result.sensors, radar: { age_ms: 0, points: 3 } };
+          set("frame", { ...frame, result: { ...result, sensors } });
+        }"""
+    )
+    expect(page.locator("#sensors li")).to_have_text(["LiDAR", "Camera", "Ego speed", "Radar"])
+
+
 CUT_OFF = """() => {
   const { right } = document.querySelector(".lead").getBoundingClientRect();
   return [...document.querySelectorAll(".figure small")].filter((node) => node.getBoundingClientRect().right > right)
