@@ -39,7 +39,12 @@ class KeptLabels:
 
     def of(self, uri: str, recording: OpenRecording | None) -> DriveLabels:
         """Labels of a recording, or the log of a source without frames to label. BadInput if the database cannot be
-        opened."""
+        opened.
+
+        Loads the acts as well: an act must not fail because no file can be opened at that moment.
+        """
+        import app.labels.acts.measured
+        import app.labels.acts.registry  # noqa: F401
         from app.labels.store.drive_labels import DriveLabels
 
         return DriveLabels(self.opened(), _info(uri, recording), self.station)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sqlite3
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -215,3 +217,15 @@ def test_what_could_not_be_written_is_said_until_it_can(
     until(desk, lambda: not desk.state.trouble)
     assert desk.possible("") == (True, False)
     desk.stop()
+
+
+ACTS = (
+    "import sys; from app.labels.service.desk import LabelDesk; desk = LabelDesk(); before = set(sys.modules);"
+    "desk.open('live:a car', None); desk.refresh(); print(*sorted(set(sys.modules) - before))"
+)
+
+
+def test_once_labels_are_open_an_act_loads_no_module() -> None:
+    """It must not fail because the process has no file descriptor left at that moment."""
+    loaded = subprocess.run([sys.executable, "-c", ACTS], capture_output=True, text=True, check=True).stdout.split()
+    assert {"app.labels.acts.registry", "app.labels.acts.scope", "app.labels.acts.measured"} <= set(loaded)
