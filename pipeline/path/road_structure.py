@@ -137,7 +137,6 @@ def thinned(cells: Cells) -> Cells:
     """
     if not len(cells.xy):
         return cells
-    from scipy.ndimage import label  # takes 0.1 s to import; ``warm_up`` does it before the first frame
 
     at = np.floor(cells.xy / CELL_M).astype(np.int64)
     at -= at.min(axis=0)
