@@ -116,7 +116,7 @@ def _path(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Path] | None:
 
 
 def _given(text: str) -> Path:
-    from pipeline.common.user_file_errors import given_path  # pydantic, which the list of commands does not need
+    from pipeline.common.files.user_file_errors import given_path  # pydantic, which the list of commands does not need
 
     return given_path(text)
 

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Literal
 
-from pipeline.common.user_files import Overloaded
+from pipeline.common.files.user_files import Overloaded
 from pipeline.detection import Detectors, LiveDetectors, Look, detect, look
 from pipeline.params import Params
 from pipeline.step import State, measure_own_motion, step
@@ -28,9 +28,9 @@ def only(frame: Frame, sensors: Sensors) -> Frame:
     """The frame as a car with only these sensors would have it. The image stays, so that it can be displayed;
     detections in it are removed."""
     if sensors == "lidar":
-        return replace(frame, raw_boxes=None, raw_lanes=None)
+        return replace(frame, raw_boxes=None, raw_lanes=None, scans={})
     if sensors == "camera":
-        return replace(frame, sweep=None)
+        return replace(frame, sweep=None, scans={})
     return frame
 
 

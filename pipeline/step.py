@@ -2,6 +2,7 @@
 
     LiDAR:  deskew → down-sample → ground → cluster → boxes → tracks ─┐
     camera: (raw boxes) → select → distance → tracks ─────────────────┼→ fuse → motion → path → CIPV → ACC, AEB
+    further ranging sensors: (scans) → tracks ────────────────────────┤
     ego ──────────────────────────────────────────────────────────────┘
 
 Stages have no hidden state: everything that the next frame needs is in ``State``. A frame can therefore be run again
@@ -26,6 +27,7 @@ from pipeline.lidar import segmentation
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.params import Params
 from pipeline.path import corridor, road_edges, traffic, yaw_rate
+from pipeline.ranging import further
 from pipeline.types import (
     VEHICLES,
     Box,
@@ -56,6 +58,8 @@ class State:
     """Tracks of the LiDAR's clusters."""
     vision: vision_tracking.VisionTrackerState = vision_tracking.VisionTrackerState()
     """Tracks of the camera's boxes."""
+    ranging: further.RangingState = further.RangingState()
+    """Tracks of further ranging sensors."""
     fusion: fusion.FusionState = fusion.FusionState()
     """Which object each track belongs to."""
     existence: existence.ExistenceState = existence.ExistenceState()
@@ -112,9 +116,12 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
     )
     clock.lap("vision_tracking")
 
-    # Fusion: a cluster and a box that overlap in the image are one object
+    # Further ranging sensors, such as a radar: their detections, tracked from scan to scan
+    ranging_state, ranged = further.follow(state.ranging, frame.scans, now, params)
+
+    # Fusion: a cluster and a box that overlap in the image are one object, and so is what a ranging sensor has there
     fusion_state, fused = fusion.fuse(
-        state.fusion, lidar_tracks, vision_tracks, aligned, frame.image_size, params.fusion
+        state.fusion, lidar_tracks, vision_tracks, aligned, frame.image_size, params.fusion, ranged
     )
     vision_state = vision_tracking.learn_heights(vision_state, fused.ranged_boxes(), params.vision_tracking)
     # A knocked mount: both sensors see the same vehicles, but with an angle between them
@@ -194,6 +201,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         t_ns=frame.t_ns,
         lidar=lidar_state,
         vision=vision_state,
+        ranging=ranging_state,
         fusion=fusion_state,
         existence=existence_state,
         agreement=agreement_state,

@@ -12,7 +12,7 @@ from hypothesis import settings
 from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
 
-from pipeline.common.data_dir import data_dir as recordings
+from pipeline.common.files.data_dir import data_dir as recordings
 
 # No deadline, so that a slow machine fails no example. In CI, the examples are the same in every run.
 settings.register_profile("desk", deadline=None)

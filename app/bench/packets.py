@@ -13,7 +13,7 @@ import numpy as np
 from velodyne_decoder import Config, Model, StreamDecoder
 
 from app.bench.timing import figures, interleaved
-from pipeline.common.data_dir import data_dir
+from pipeline.common.files.data_dir import data_dir
 from pipeline.formats.velodyne import PACKET_BYTES, RotationCutter, SensorClock, VelodyneDecoder
 from pipeline.formats.velodyne.encode import packets_of
 from pipeline.formats.velodyne.packet import BLOCK_US

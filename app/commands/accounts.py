@@ -13,21 +13,21 @@ from pipeline.common.errors import BadInput
 
 @dataclass(frozen=True)
 class ListAccounts:
-    """List the accounts of people who label on this server. With --add: make one, and print its token, which is not
+    """List the accounts of people who label on this server. With --add: create one, and print its token, which is not
     stored anywhere; the person opens the server's link with it. A running server notices changes.
 
     Example: cipv accounts --add Ada --role labeler
     """
 
     add: Annotated[str | None, option("NAME")] = None
-    """Make an account, or give an existing one a new token and role"""
-    role: AccountRole | None = None
+    """Create an account, or give an existing one a new token and role"""
+    role: Annotated[AccountRole | None, option("labeler|reviewer|admin")] = None
     """labeler: labels. reviewer: also approves labels and imports. admin: also assigns recordings to others"""
     remove: Annotated[str | None, option("NAME")] = None
     """Remove an account; its labels stay"""
 
     def __call__(self) -> int:
-        from app.web.accounts import add_account, read_accounts, remove_account
+        from app.web.guards.accounts import add_account, read_accounts, remove_account
 
         if (self.add is None) != (self.role is None):
             raise BadInput("--add and --role must be given together")

@@ -20,7 +20,7 @@ from app.labels.project_classes import project_classes
 from app.reports.html import html
 from app.reports.terminal_tables import show
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import given_path
+from pipeline.common.files.user_file_errors import given_path
 from pipeline.detection import Detectors
 from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive

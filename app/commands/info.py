@@ -14,8 +14,8 @@ from rich.table import Table
 
 from app.commands.support.arguments import option
 from pipeline.common.errors import BadInput
-from pipeline.common.signing import expected_key
-from pipeline.common.user_file_errors import given_path
+from pipeline.common.files.signing import expected_key
+from pipeline.common.files.user_file_errors import given_path
 from pipeline.recording.info import Info, Rhythm, info, info_of_source
 
 _WIDE = 120

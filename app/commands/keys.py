@@ -8,8 +8,8 @@ from typing import Annotated
 
 import tyro
 
-from pipeline.common.signing import PUBLIC_VARIABLE, SIGNING_VARIABLE, expected_key, new_keys
-from pipeline.common.user_file_errors import given_path
+from pipeline.common.files.signing import PUBLIC_VARIABLE, SIGNING_VARIABLE, expected_key, new_keys
+from pipeline.common.files.user_file_errors import given_path
 
 
 @dataclass(frozen=True)

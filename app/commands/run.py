@@ -18,7 +18,7 @@ from app.commands.support.sensor_wait import Waiting
 from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.run import run, run_live
-from pipeline.types import MOST_SENSORS_FIRST, Frame, Result
+from pipeline.types import Frame, Result, most_sensors_first
 from pipeline.types.result_json import write_line
 from pipeline.types.source import AnySource, Source, is_live_source
 
@@ -118,7 +118,7 @@ class _Tally:
         self.sources.update(item.source for item in result.objects)
 
     def sentence(self) -> str:
-        kinds = ", ".join(f"{self.sources[kind]} {kind}" for kind in MOST_SENSORS_FIRST)
+        kinds = ", ".join(f"{self.sources[kind]} {kind}" for kind in most_sensors_first())
         hurt = f"; {self.degraded} degraded frames" if self.degraded else ""
         mean = self.step_ms / max(self.frames, 1)
         return f"cipv: {self.frames} frames, {self.with_lead} with a CIPV; {kinds}; {mean:.1f} ms per step{hurt}"

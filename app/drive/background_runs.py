@@ -17,7 +17,7 @@ from app.drive.full_run import DriveRun
 from app.drive.look_ahead.worker import LookAhead
 from app.drive.open_recording import OpenRecording, RunSetup
 from pipeline.common.errors import BadInput
-from pipeline.common.user_files import Overloaded
+from pipeline.common.files.user_files import Overloaded
 from pipeline.inference.cancellation import Stopped
 from pipeline.params import Params
 from pipeline.step import State

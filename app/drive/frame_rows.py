@@ -18,10 +18,9 @@ from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.evaluation.lead_verdict import Judged
 from pipeline.fusion.rows import LIDAR_RANGE_SIGMA_M
 from pipeline.path.yaw_rate import usable_rate
-from pipeline.types import OBJECT_SOURCES, VEHICLES, Frame, FusedObject, Result, VisionTrack
+from pipeline.types import VEHICLES, Frame, FusedObject, Result, VisionTrack, object_sources
 from pipeline.vision.classes import COCO_80
 
-SOURCES = ("", *OBJECT_SOURCES)
 LABELS = ("", *COCO_80)
 """An object of any other class is stored without a class."""
 _DECIMALS = 4
@@ -53,11 +52,16 @@ OBJECT = np.dtype(
         ("score", "f4"),
     ]
 )
-"""``source`` is an index into ``SOURCES``; ``vehicle``: of a vehicle class, or without a class; ``vl_gap``: camera's
+"""``source`` is an index into ``sources()``; ``vehicle``: of a vehicle class, or without a class; ``vl_gap``: camera's
 minus LiDAR's distance of a VL object, also in standard deviations of both. ``label`` is an index into ``LABELS``.
 ``cuboid``: center x y z, length, width, height, yaw; ``bev``: x y of four corners. ``score``: the detector's score of
 its class."""
 Objects = npt.NDArray[np.void]
+
+
+def sources() -> tuple[str, ...]:
+    """The sources of objects by their number in ``OBJECT``."""
+    return ("", *object_sources())
 
 
 class Row(NamedTuple):
@@ -68,7 +72,7 @@ class Row(NamedTuple):
     cipv_id: int | None
     """Object id in this run."""
     source: str | None
-    """V, L or VL."""
+    """The letters of its sensors: V, L or VL."""
     carried: bool | None
     """Predicted instead of seen in this frame."""
     distance_m: float | None
@@ -150,13 +154,13 @@ def lead_reach_m(frame: Frame, result: Result) -> float:
 
 def objects_of(result: Result) -> Objects:
     """(N,) ``OBJECT`` records of one frame, in the result's order."""
-    tracks = _by_id(result)
+    tracks, numbered = _by_id(result), sources()
     records = np.zeros(len(result.objects), OBJECT)
     for place, item in enumerate(result.objects):
         gap, sigmas = _vl_gap(item, tracks) or (math.nan, math.nan)
         records[place] = (
             item.id,
-            SOURCES.index(item.source),
+            numbered.index(item.source),
             item.carried,
             item.in_path,
             item.label is None or item.label in VEHICLES,
@@ -194,7 +198,7 @@ def object_json(frames: Iterable[tuple[int, Objects]], object_id: int) -> dict[s
     present = [(index, match[0]) for index, match in found if len(match)]
     curve: dict[str, list[Any]] = {
         "index": [index for index, _ in present],
-        "source": [SOURCES[int(record["source"])] for _, record in present],
+        "source": [sources()[int(record["source"])] for _, record in present],
     }
     for name in ("carried", "in_path"):
         curve[name] = [bool(record[name]) for _, record in present]

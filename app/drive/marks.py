@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.common.errors import BadInput
-from pipeline.common.whole_files import replace_text, set_aside
+from pipeline.common.files.whole_files import replace_text, set_aside
 
 MOST_MARKS = 10_000
 LONGEST_TEXT = 200

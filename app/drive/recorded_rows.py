@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from app.drive.frame_rows import OBJECT, SOURCES, Objects, Row
+from app.drive.frame_rows import OBJECT, Objects, Row, sources
 from pipeline.types import VEHICLES
 
 _SENSORS = ("lidar", "camera", "ego")
@@ -51,7 +51,7 @@ def recorded_objects(result: Mapping[str, Any]) -> Objects:
         records[field] = math.nan
     for record, item in zip(records, result["objects"], strict=True):
         record["id"], record["hits"] = item["id"], item["hits"]
-        record["source"] = SOURCES.index(item["source"])
+        record["source"] = sources().index(item["source"])
         record["carried"], record["in_path"] = item["carried"], item["in_path"]
         record["vehicle"] = item["type"] is None or item["type"] in VEHICLES
         for field in ("distance_m", "ttc_s", "path_offset_m"):

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
-from app.drive.frame_rows import LABELS, SOURCES, Objects, Row
+from app.drive.frame_rows import LABELS, Objects, Row, sources
 from app.drive.full_run import DriveRun
 from pipeline.common.geometry import Cuboid
 from pipeline.evaluation.scores.results_file import EMPTY, NO_HEALTH, NO_PATH
@@ -72,7 +72,7 @@ def _result(index: int, row: Row, records: Objects) -> Result:
 
 
 def _object(record: Any) -> FusedObject:
-    source = cast("Any", SOURCES[record["source"]])
+    source = sources()[record["source"]]
     corners = record["bev"].reshape(4, 2)
     vx, vy = (float(value) for value in record["velocity_mps"])
     return FusedObject(

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.common.errors import BadInput
-from pipeline.common.remote_files import NotReachable, file_system, is_remote, patiently
-from pipeline.common.whole_files import replacing
+from pipeline.common.files.remote_files import NotReachable, file_system, is_remote, patiently
+from pipeline.common.files.whole_files import replacing
 
 _BLOCK_BYTES = 1 << 20
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import parse_yaml
+from pipeline.common.files.user_file_errors import parse_yaml
 from pipeline.params import ParamsError
 
 MOST_POINTS = 1000

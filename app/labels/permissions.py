@@ -1,5 +1,5 @@
-"""What accounts may do with labels, where it depends on the request's content. ``app.web.access`` has the rules by
-address.
+"""What accounts may do with labels, where it depends on the request's content. ``app.web.guards.access`` has the rules
+by address.
 
 A labeler labels, and takes recordings from the queue. A reviewer also approves labels and sends them back, marks
 recordings as done, imports labels, freezes versions, and sees the results of control frames. An admin also assigns
@@ -29,15 +29,15 @@ def check_act(account: Account | None, kind: str) -> None:
     """NotAllowed if the account's role does not include the act."""
     needed = ACT_ROLES.get(kind)
     if needed is not None and not includes(account, needed):
-        raise NotAllowed(f"only for accounts with the role {needed}")
+        raise NotAllowed(f"requires the role {needed}")
 
 
 def check_work(account: Account | None, assigned: str, person: str | None, state: State | None) -> None:
     """NotAllowed if the account may not change a recording of the queue so. assigned: its present assignee; person: the
     new one, empty for nobody; None to leave it."""
     if state == "done" and not includes(account, "reviewer"):
-        raise NotAllowed("only for accounts with the role reviewer")
+        raise NotAllowed("requires the role reviewer")
     if person is None or account is None or includes(account, "admin"):
         return
     if person not in ("", account.name) or assigned not in ("", account.name):
-        raise NotAllowed("only for accounts with the role admin")
+        raise NotAllowed("requires the role admin")

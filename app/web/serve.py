@@ -20,8 +20,8 @@ from app.drive.alignment_versions import AlignmentVersions
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.fleet.desk import FleetDesk
-from app.web.accounts import Accounts
-from app.web.tokens import Tokens
+from app.web.guards.accounts import Accounts
+from app.web.guards.tokens import Tokens
 from pipeline.common.garbage_collection import freeze_loaded_objects
 
 

@@ -32,20 +32,20 @@ from app.streaming.stream import Stream
 from app.views.colors import palette_css
 from app.views.rerun.web import ViewerFiles
 from app.views.viser.proxy import viser_router
-from app.web.access import Access, Guard
 from app.web.api_description import REFUSALS, titled
-from app.web.audit import Audit
-from app.web.connections import LimitedProtocol
-from app.web.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
-from app.web.log_limit import limit_logs
+from app.web.guards.access import Access, Guard
+from app.web.guards.audit import Audit
+from app.web.guards.connections import LimitedProtocol
+from app.web.guards.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
+from app.web.guards.log_limit import limit_logs
+from app.web.guards.own_name import own_name
+from app.web.guards.quotas import RoleQuota
+from app.web.guards.tokens import Tokens
 from app.web.metrics import Metrics
-from app.web.own_name import own_name
-from app.web.quotas import RoleQuota
 from app.web.routers import ROUTERS, Services
 from app.web.routes.labels.files import IMPORT
-from app.web.tokens import Tokens
 from pipeline.common.errors import BadInput
-from pipeline.common.user_files import Overloaded
+from pipeline.common.files.user_files import Overloaded
 
 _BACKLOG = 100
 """Connections queued by the system until they are accepted. When file descriptors run out, Python 3.11 tries to accept

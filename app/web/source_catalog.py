@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from app.core.session_folder import SESSIONS
-from pipeline.common.data_dir import data_dir
+from pipeline.common.files.data_dir import data_dir
 from pipeline.source_kinds import built_in, looks_like
 
 

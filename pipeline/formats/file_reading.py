@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.common.image_decoding import TooMuch, decode_within_budget
-from pipeline.common.user_file_errors import given_path, reason_of
-from pipeline.common.user_files import check_allowed, read_regular
+from pipeline.common.files.image_decoding import TooMuch, decode_within_budget
+from pipeline.common.files.user_file_errors import given_path, reason_of
+from pipeline.common.files.user_files import check_allowed, read_regular
 from pipeline.formats.extrinsic_mistakes import likely_mistake, looks_ahead
 from pipeline.types import F64, U8, CameraCalibration, CameraImage
 from pipeline.types.source import SourceError

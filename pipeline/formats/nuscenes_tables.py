@@ -12,9 +12,9 @@ from typing import TypeVar
 import msgspec
 import numpy as np
 
+from pipeline.common.files.user_file_errors import reason_of
+from pipeline.common.files.user_files import read_regular
 from pipeline.common.geometry import Cuboid, inverse, transform
-from pipeline.common.user_file_errors import reason_of
-from pipeline.common.user_files import read_regular
 from pipeline.formats.file_reading import camera_matrix
 from pipeline.types import F64
 from pipeline.types.source import SourceError, TruthObject

@@ -9,11 +9,11 @@ from threading import Lock
 import av
 import numpy as np
 
-from pipeline.common.image_decoding import MOST_PIXELS, check_pixels
+from pipeline.common.files.image_decoding import MOST_PIXELS, check_pixels
+from pipeline.common.files.user_file_errors import reason_of
+from pipeline.common.files.user_files import check_regular, overload_told_apart
 from pipeline.common.nearest_in_time import Times
 from pipeline.common.progress import Progress, silent
-from pipeline.common.user_file_errors import reason_of
-from pipeline.common.user_files import check_regular, overload_told_apart
 from pipeline.types import U8
 from pipeline.types.source import SourceError
 

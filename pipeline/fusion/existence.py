@@ -24,6 +24,7 @@ from pipeline.common.geometry import covered_share
 from pipeline.fusion.free_road import CLEAR_SHARE, MIN_RAYS, NEAR_M, Rays, SweepRays, rays_to
 from pipeline.params import ExistenceParams
 from pipeline.types import Frame, FusedObject, Gate, Moment
+from pipeline.types.sensors import further_sensors
 
 SURE = 4.0
 """Limit of the log-odds of each sensor and of their sum, 98 %: without it, evidence of long ago would outweigh that of
@@ -65,7 +66,7 @@ class Existence(NamedTuple):
     score: float | None
     """Running mean of its boxes' scores; None before the first box."""
     lidar: float
-    """The LiDAR's log-odds."""
+    """Log-odds of the LiDAR and of other ranging sensors."""
     camera_ranges: int = 0
     """Number of consecutive distances that the camera's position is based on."""
     age_s: float = 0.0
@@ -177,7 +178,7 @@ def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bo
         if item.measured and item.distance_m is not None:
             judged_m, shrunk_m = travelled_m, from_m - item.distance_m
     cluster_s = before.cluster_s + (dt_s if item.seen_by_lidar else 0.0)
-    lidar = _bounded(lidar + _said_by_lidar(item, rays, cluster_s >= _FOLLOWED_S))
+    lidar = _bounded(lidar + _said_by_lidar(item, rays, cluster_s >= _FOLLOWED_S) + _said_by_others(item))
     return Existence(score, lidar, item.camera_ranges, age_s, from_m, travelled_m, judged_m, shrunk_m, cluster_s)
 
 
@@ -189,7 +190,7 @@ def _weight(dt_s: float, mean_s: float) -> float:
 def _said_by_lidar(item: FusedObject, rays: Rays | None, was_followed: bool) -> float:
     """Log-odds added by this sweep. If the LiDAR has tracked the object and its returns now belong to another cluster,
     the two clusters have merged; if the LiDAR never tracked it, it is a second box on the neighbour."""
-    if item.ranged_now:
+    if item.seen_by_lidar:
         return _CLUSTER
     if rays is not None and rays.is_free:
         return _PIERCED
@@ -201,6 +202,11 @@ def _said_by_lidar(item: FusedObject, rays: Rays | None, was_followed: bool) -> 
         return _SILENT
     is_near = (item.distance_m or 0.0) < NEAR_M
     return _TAKEN if is_near and rays.is_taken and not was_followed else 0.0
+
+
+def _said_by_others(item: FusedObject) -> float:
+    """Log-odds added by the sightings of further ranging sensors in this frame."""
+    return sum([kind.sighting_odds for kind in further_sensors() if kind.letter in item.seen_by])
 
 
 def _told(item: FusedObject, probability: float, rays: Rays | None) -> FusedObject:

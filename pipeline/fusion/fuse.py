@@ -1,13 +1,15 @@
-"""Merges LiDAR and vision tracks into one list of objects: V, VL, L (paper, Algorithm 2 and Table 3).
+"""Merges the tracks of all sensors into one list of objects: V, VL, L (paper, Algorithm 2 and Table 3).
 
 The printed algorithm swaps its indices and emits an "only LiDAR" row for every pair that is not the maximum. This
 module implements the intended algorithm: every LiDAR track and every vision track appears in exactly one row, matched
-pairs in a common row, so V + VL = vision tracks and L + VL = LiDAR tracks, always.
+pairs in a common row, so V + VL = vision tracks and L + VL = LiDAR tracks, always. Tracks of further ranging sensors
+join these rows by their place, or get a row of their own.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,15 +17,18 @@ from scipy.optimize import linear_sum_assignment
 
 from pipeline.alignment.projection import Alignment, project_cuboids
 from pipeline.common.geometry import F64, corners_of, iou_matrix
-from pipeline.fusion.rows import box_row, hit_row, lidar_sigma_m, quad, range_m
+from pipeline.fusion.ranged_rows import TrackIndices, ranged_row, with_ranged
+from pipeline.fusion.rows import L, V, box_row, hit_row, lidar_sigma_m, quad, range_m
 from pipeline.fusion.vehicle_sizes import LONGEST_M
 from pipeline.params import FusionParams
-from pipeline.types import VEHICLES, Box, FusedObject, Gate, LidarTrack, Mask, Point2, VisionTrack
+from pipeline.ranging.further import Tracks
+from pipeline.types import VEHICLES, Box, FusedObject, Gate, LidarTrack, Mask, Point2, RangedTrack, VisionTrack
 
 _SURELY_ONE = 0.5
 _KEPT_IOU = 0.2
 """Another cluster must overlap a box by this much more than the one it was joined with: with a VLP-16's few rings,
 overlaps vary by as much from frame to frame."""
+NO_TRACKS: Tracks = {}
 _TAKES_OVER_HITS = 2
 """Sightings of a cluster before it may replace one that still exists: a spurious cluster lasts for one sweep."""
 
@@ -34,10 +39,12 @@ class FusionState:
 
     next_id: int = 1
     """Id of the next new object; ids are never reused."""
-    by_lidar: dict[int, int] = field(default_factory=dict)
-    """Object id of each LiDAR track id, in the last frame."""
-    by_vision: dict[int, int] = field(default_factory=dict)
-    """Object id of each camera track id, in the last frame."""
+    by_track: Mapping[str, Mapping[int, int]] = field(default_factory=dict)
+    """Object id of each track id in the last frame, by the sensor's letter."""
+
+    def objects_of(self, letter: str) -> Mapping[int, int]:
+        """Object id of each of this sensor's track ids, in the last frame."""
+        return self.by_track.get(letter, {})
 
 
 @dataclass(frozen=True)
@@ -77,9 +84,11 @@ def fuse(
     alignment: Alignment | None,
     image_size: tuple[int, int] | None,
     params: FusionParams,
+    ranged: Tracks = NO_TRACKS,
 ) -> tuple[FusionState, Fusion]:
     """One row per physical object. ``image_size`` is (width, height) in pixels; without it or without an alignment
-    nothing can be compared, and every track gets its own row."""
+    boxes and clusters cannot be compared, and each gets its own row. ranged: tracks of further ranging sensors, by
+    letter."""
     # LiDAR cuboids are projected into the image to compare them with boxes
     corners = corners_of([track.obstacle.cuboid for track in lidar])
     ranges_m, sigmas_m = [range_m(track) for track in lidar], [lidar_sigma_m(track) for track in lidar]
@@ -94,36 +103,45 @@ def fuse(
     nearest_of_vision, nearest_of_lidar = _most_overlapping(overlap), _most_overlapping(overlap.T)
 
     # Every pair and every unmatched track is one object, under the id that its tracks had before
-    pairs: list[tuple[int | None, int | None]] = [(i, partner.get(i)) for i in range(len(vision))]
+    rows: list[TrackIndices] = [{V: i, L: partner[i]} if i in partner else {V: i} for i in range(len(vision))]
     claimed = set(partner.values())
-    pairs += [(None, j) for j in range(len(lidar)) if j not in claimed]
-
-    keys = [(vision[i].id if i is not None else None, lidar[j].id if j is not None else None) for i, j in pairs]
+    rows += [{L: j} for j in range(len(lidar)) if j not in claimed]
+    if ranged:
+        rows = with_ranged(rows, vision, lidar, ranged)
+    tracks: dict[str, Sequence[LidarTrack | VisionTrack | RangedTrack]] = {V: vision, L: lidar, **ranged}
+    keys = [{letter: tracks[letter][place].id for letter, place in row.items()} for row in rows]
     state, ids = _identities(state, keys)
+
     footprints = corners[:, :4, :2].tolist()
     sides = _box_sides(
         vision, [ranges_m[partner[i]] if i in partner else v.distance_m for i, v in enumerate(vision)], alignment
     )
-    objects = []
-    for object_id, (i, j) in zip(ids, pairs, strict=True):
-        # for an object seen by only one sensor: the tests of the partner with the largest overlap, which explain why
-        # they were not joined
-        compared = (i if i is not None else nearest_of_lidar[j or 0], j if j is not None else nearest_of_vision[i or 0])
-        tested = gates.get(compared, ())
+    objects: list[FusedObject] = []
+    for object_id, row in zip(ids, rows, strict=True):
+        item: FusedObject | None = None
+        i, j = row.get(V), row.get(L)
         seen = vision[i] if i is not None else None
         side = sides.get(i) if i is not None else None
+        # for an object seen by only one of the two: the tests of the partner with the largest overlap, which explain
+        # why they were not joined
         if j is not None:
-            footprint = quad(footprints[j])
-            objects.append(
-                hit_row(object_id, seen, lidar[j], projected[j], footprint, ranges_m[j], sigmas_m[j], tested, side)
+            tested = gates.get((i if i is not None else nearest_of_lidar[j], j), ())
+            item = hit_row(
+                object_id, seen, lidar[j], projected[j], quad(footprints[j]), ranges_m[j], sigmas_m[j], tested, side
             )
-        elif seen is not None:
-            objects.append(box_row(object_id, seen, tested, side))
-    objects.sort(key=lambda o: (o.distance_m is None, o.distance_m or 0.0, o.id))
-    numbered = list(zip(ids, pairs, strict=True))
-    lidar_boxes = {number: box for number, (_, j) in numbered if j is not None and (box := projected[j]) is not None}
-    vision_boxes = {number: vision[i].bbox for number, (i, _) in numbered if i is not None}
-    return state, Fusion(tuple(objects), lidar_boxes, vision_boxes)
+        elif i is not None and seen is not None:
+            item = box_row(object_id, seen, gates.get((i, nearest_of_vision[i]), ()), side)
+        if ranged or item is None:
+            item = ranged_row(object_id, item, row, ranged)
+        objects.append(item)
+    numbered = list(zip(ids, rows, strict=True))
+    lidar_boxes = {number: box for number, row in numbered if L in row and (box := projected[row[L]]) is not None}
+    vision_boxes = {number: vision[row[V]].bbox for number, row in numbered if V in row}
+    return state, Fusion(_nearest_first(objects), lidar_boxes, vision_boxes)
+
+
+def _nearest_first(objects: list[FusedObject]) -> tuple[FusedObject, ...]:
+    return tuple(sorted(objects, key=lambda o: (o.distance_m is None, o.distance_m or 0.0, o.id)))
 
 
 def _box_sides(
@@ -161,8 +179,8 @@ def _overlap(vision: tuple[VisionTrack, ...], projected: list[Box | None]) -> F6
 
 def _were_one(state: FusionState, vision: tuple[VisionTrack, ...], lidar: tuple[LidarTrack, ...]) -> Mask:
     """(n, m) bool: the pairs that were one object in the last frame."""
-    hits = np.array([state.by_lidar.get(each.id, -1) for each in lidar])
-    seen = np.array([state.by_vision.get(each.id, -2) for each in vision])
+    hits = np.array([state.objects_of(L).get(each.id, -1) for each in lidar])
+    seen = np.array([state.objects_of(V).get(each.id, -2) for each in vision])
     return np.asarray(seen[:, None] == hits[None])
 
 
@@ -230,23 +248,22 @@ def _assign(overlap: F64, joinable: np.ndarray, params: FusionParams) -> dict[in
     return chosen
 
 
-def _identities(state: FusionState, keys: list[tuple[int | None, int | None]]) -> tuple[FusionState, list[int]]:
-    """The object id of each (vision track, LiDAR track) row. A row inherits the oldest id of its tracks that is not yet
-    taken; pairs choose first, so that a single fragment never takes over the id of a whole object."""
-    order = sorted(range(len(keys)), key=lambda k: (None in keys[k], k))
+def _identities(state: FusionState, keys: list[dict[str, int]]) -> tuple[FusionState, list[int]]:
+    """The object id of each row. keys: the track id of each of its sensors, by letter. A row inherits the oldest id of
+    its tracks that is not yet taken; rows of more sensors choose first, so that a single fragment never takes over the
+    id of a whole object."""
+    order = sorted(range(len(keys)), key=lambda k: (-len(keys[k]), k))
     ids = [0] * len(keys)
     taken: set[int] = set()
     next_id = state.next_id
     for k in order:
-        seen, hit = keys[k]
-        known = [
-            table[track]
-            for table, track in ((state.by_lidar, hit), (state.by_vision, seen))
-            if track is not None and track in table and table[track] not in taken
-        ]
+        before = [state.objects_of(letter).get(track) for letter, track in keys[k].items()]
+        known = [each for each in before if each is not None and each not in taken]
         ids[k] = min(known) if known else next_id
         next_id += not known
         taken.add(ids[k])
-    by_lidar = {hit: ids[k] for k, (_, hit) in enumerate(keys) if hit is not None}
-    by_vision = {seen: ids[k] for k, (seen, _) in enumerate(keys) if seen is not None}
-    return FusionState(next_id, by_lidar, by_vision), ids
+    by_track: dict[str, dict[int, int]] = {}
+    for object_id, key in zip(ids, keys, strict=True):
+        for letter, track in key.items():
+            by_track.setdefault(letter, {})[track] = object_id
+    return FusionState(next_id, by_track), ids

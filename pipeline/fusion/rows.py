@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 from pipeline.common.fast_replace import evolve
 from pipeline.fusion.vehicle_sizes import usual_size_m
 from pipeline.types import Box, FusedObject, Gate, LidarTrack, Point2, VisionTrack
+from pipeline.types.sensors import CAMERA, LIDAR
 
 LIDAR_RANGE_SIGMA_M = 0.2
 """Standard deviation of a cluster's nearest point as an estimate of the vehicle's nearest point: the VLP-16's ±3 cm,
@@ -16,12 +16,13 @@ plus where its beams hit the bumper and grille. Compared with the nearest corner
 
 CARRIED_SPEED_SIGMA_MPS, CARRIED_ACCEL_SIGMA_MPS2 = 0.5, 3.0
 
+V, L = CAMERA.letter, LIDAR.letter
 Quad = tuple[Point2, Point2, Point2, Point2]
 Sides = tuple[Point2, Point2]
 
-_UNKNOWN = FusedObject(
+UNKNOWN = FusedObject(
     id=0,
-    source="V",
+    source=V,
     label=None,
     score=None,
     bbox=None,
@@ -54,19 +55,19 @@ def hit_row(
 ) -> FusedObject:
     """Table 3 for an object seen by the LiDAR: position, distance and velocity are from the LiDAR, the class is from
     the camera. sides: as ``FusedObject.box_sides``."""
-    seen_by_lidar: Literal["L", ""] = "" if hit.carried else "L"
+    seen_by_lidar = "" if hit.carried else L
     by_camera = (
-        {"source": "L", "bbox": box, "velocity_mps": hit.velocity_mps, "seen_by": seen_by_lidar, "hits": hit.hits}
+        {"source": L, "bbox": box, "velocity_mps": hit.velocity_mps, "seen_by": seen_by_lidar, "hits": hit.hits}
         if seen is None
         else {
-            "source": "VL",
+            "source": V + L,
             "label": seen.label,
             "score": seen.score,
             "bbox": box if box is not None else seen.bbox,
             # in the one frame in which the LiDAR finds an object that the camera already follows, the velocity is the
             # camera's, so that braking for it does not lose its speed
             "velocity_mps": hit.velocity_mps if hit.velocity_mps is not None else seen.velocity_mps,
-            "seen_by": seen_by_lidar if seen.carried else "V" if hit.carried else "VL",
+            "seen_by": seen_by_lidar if seen.carried else V + seen_by_lidar,
             "hits": max(hit.hits, seen.hits),
             "vision_track": seen.id,
             "camera_ranges": seen.ranges,
@@ -74,7 +75,7 @@ def hit_row(
         }
     )
     return evolve(
-        _UNKNOWN,
+        UNKNOWN,
         id=object_id,
         bev=footprint,
         cuboid=hit.obstacle.cuboid,
@@ -96,17 +97,17 @@ def box_row(object_id: int, seen: VisionTrack, gates: tuple[Gate, ...], sides: S
     """Table 3 for an object seen only by the camera. sides: as ``FusedObject.box_sides``."""
     place = seen.position
     return evolve(
-        _UNKNOWN,
+        UNKNOWN,
         id=object_id,
         label=seen.label,
         score=seen.score,
         bbox=seen.bbox,
-        bev=_typical_footprint(place, seen.label) if place is not None else None,
+        bev=typical_footprint(place, seen.label) if place is not None else None,
         closest_point=(*place, 0.0) if place is not None else None,
         distance_m=seen.distance_m,
         distance_sigma_m=seen.sigma_m,
         velocity_mps=seen.velocity_mps,
-        seen_by="" if seen.carried else "V",
+        seen_by="" if seen.carried else V,
         measured=seen.measured,
         hits=seen.hits,
         vision_track=seen.id,
@@ -125,7 +126,7 @@ def range_m(track: LidarTrack) -> float:
     return math.hypot(x, y)
 
 
-def _typical_footprint(near_face: Point2, label: str) -> Quad:
+def typical_footprint(near_face: Point2, label: str) -> Quad:
     """A rectangle of a class's usual size behind a measured nearest face. Its orientation is unknown: vehicles ahead
     are drawn along ego x."""
     length, width, _ = usual_size_m(label)

@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from pipeline.common.data_dir import file_sha256
 from pipeline.common.errors import BadInput
-from pipeline.common.whole_files import replace_text
+from pipeline.common.files.data_dir import file_sha256
+from pipeline.common.files.whole_files import replace_text
 from pipeline.types import DistanceLaw
 
 

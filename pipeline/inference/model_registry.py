@@ -18,12 +18,12 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from pipeline.common.data_dir import data_dir, file_sha256
 from pipeline.common.errors import BadInput
+from pipeline.common.files.data_dir import data_dir, file_sha256
+from pipeline.common.files.user_file_errors import given_path
+from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
+from pipeline.common.files.whole_files import replace_text
 from pipeline.common.progress import Progress, silent
-from pipeline.common.user_file_errors import given_path
-from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
-from pipeline.common.whole_files import replace_text
 from pipeline.inference.distance_laws import find_law, law_file
 from pipeline.inference.known_networks import KNOWN, KnownModel, Task
 from pipeline.types import DistanceLaw

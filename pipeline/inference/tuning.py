@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 import onnxruntime as ort
 
-from pipeline.common.data_dir import file_sha256
 from pipeline.common.fast_replace import evolve
-from pipeline.common.whole_files import replace_text
+from pipeline.common.files.data_dir import file_sha256
+from pipeline.common.files.whole_files import replace_text
 from pipeline.inference.model_registry import store
 from pipeline.types import F32
 

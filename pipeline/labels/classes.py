@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import parse_yaml, read_yaml
+from pipeline.common.files.user_file_errors import parse_yaml, read_yaml
 from pipeline.labels.model import LabelSet
 from pipeline.vision.classes import canonical
 

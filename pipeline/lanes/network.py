@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import onnxruntime as ort
 
-from pipeline.common.data_dir import file_sha256
+from pipeline.common.files.data_dir import file_sha256
 from pipeline.inference.graph import Size, input_size, with_empty_masks, with_input_size
 from pipeline.inference.runtime import (
     DetectorError,

@@ -14,7 +14,7 @@ import yaml
 from pydantic import ValidationError
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import did_you_mean, read_yaml
+from pipeline.common.files.user_file_errors import did_you_mean, read_yaml
 from pipeline.params.declare import Section
 from pipeline.params.driving import (
     AccParams,

@@ -137,6 +137,7 @@ def thinned(cells: Cells) -> Cells:
     """
     if not len(cells.xy):
         return cells
+
     at = np.floor(cells.xy / CELL_M).astype(np.int64)
     at -= at.min(axis=0)
     taken = np.zeros(at.max(axis=0) + 1, np.uint8)
@@ -189,12 +190,13 @@ def _kerbs(xy: F64, ring: U8, above: F64, height_m: float) -> F64:
 
 
 def warm_up() -> None:
-    """Compile the kernels, or load them from numba's cache."""
+    """Compile the kernels, or load them from numba's cache; import what is imported on use."""
     planes, edges, kind = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0]), np.zeros(2, np.int32)
     for points, ring in made_sweeps():
         _, _, low, low_ring, low_above = _sorted(points, kind, ring, planes, edges, np.zeros(1, np.bool_))
         _kerbs(low, low_ring, low_above, 1.0)
     _is_beside_none(np.zeros((1, 2)), np.zeros((1, 9)), _MARGIN_M)
+    thinned(Cells(np.zeros((1, 2)), np.zeros(1), np.zeros(1), np.zeros(1, np.bool_), np.zeros(1)))
     vanished.warm_up()
 
 

@@ -17,8 +17,8 @@ from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC, Writer
 
 from pipeline.common.errors import BadInput
+from pipeline.common.files.signing import configured_signer
 from pipeline.common.progress import Progress, silent
-from pipeline.common.signing import configured_signer
 from pipeline.recording import topics
 from pipeline.recording.mcap.chain import ChainWriter, link_at
 from pipeline.recording.mcap.index import read_summary, summary_start

@@ -18,7 +18,8 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory  # 
 from pipeline.formats.velodyne.ros import PACKET_DEFINITION, SCAN, SCAN_DEFINITION
 
 FRAMES = "/frames"
-POINTS = "/lidar/points"
+_POINTS_SUFFIX = "/points"
+POINTS = f"/lidar{_POINTS_SUFFIX}"
 PACKETS = "/lidar/packets"
 IMAGE = "/camera/image"
 CALIBRATION = "/camera/calibration"
@@ -74,7 +75,6 @@ class Channel:
 
 
 _WELL_KNOWN: dict[str, Any] = {
-    POINTS: foxglove.PointCloud,
     IMAGE: foxglove.CompressedImage,
     CALIBRATION: foxglove.CameraCalibration,
     GNSS: foxglove.LocationFix,
@@ -85,6 +85,17 @@ _WELL_KNOWN: dict[str, Any] = {
     MARKS: foxglove.Log,
     NOTES: foxglove.Log,
 }
+
+
+def scan_topic(sensor: str) -> str:
+    """The topic of a further ranging sensor's scans, by ``SensorKind.name``."""
+    return f"/{sensor}{_POINTS_SUFFIX}"
+
+
+def _well_known(topic: str) -> Any:
+    """The Foxglove message of a topic; None for a topic with another schema."""
+    return foxglove.PointCloud if topic.endswith(_POINTS_SUFFIX) else _WELL_KNOWN.get(topic)
+
 
 _SCAN_SCHEMA = f"\n{'=' * 80}\n".join(
     (
@@ -130,8 +141,8 @@ _JSON_NUMBERS: dict[str, dict[str, Any]] = {
 @cache
 def channel(topic: str) -> Channel:
     """The channel of one of this module's topics. KeyError for another."""
-    if topic in _WELL_KNOWN:
-        schema = _WELL_KNOWN[topic].get_schema()
+    if (message := _well_known(topic)) is not None:
+        schema = message.get_schema()
         return Channel(topic, "protobuf", schema.name, schema.encoding, schema.data)
     if topic == PACKETS:
         return Channel(topic, "cdr", SCAN, "ros2msg", _SCAN_SCHEMA.encode())
@@ -142,7 +153,7 @@ def channel(topic: str) -> Channel:
 @cache
 def message_class(topic: str) -> Any:
     """The protobuf class of a topic in a well-known schema."""
-    schema = _WELL_KNOWN[topic].get_schema()
+    schema = _well_known(topic).get_schema()
     return protobuf_class(schema.name, schema.data)
 
 

@@ -10,7 +10,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import first_complaint, read_yaml
+from pipeline.common.files.user_file_errors import first_complaint, read_yaml
 from pipeline.replay.wire import WireEvent
 from pipeline.sources.live.health import Sensor
 

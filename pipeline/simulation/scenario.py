@@ -12,17 +12,18 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import first_complaint, given_path, parse_yaml, read_yaml
+from pipeline.common.files.user_file_errors import first_complaint, given_path, parse_yaml, read_yaml
 from pipeline.simulation.built_in import FOLDER, names
 from pipeline.simulation.drawing.lens import ORDINARY, CameraModel
 from pipeline.simulation.sensors.detection_model import Detections
 from pipeline.simulation.sensors.faults import NONE, Faults
 from pipeline.simulation.sensors.gnss_model import MEASURED, RTK, GnssModel, OdometryModel
-from pipeline.simulation.sensors.lidar_model import VLP16, LidarModel
+from pipeline.simulation.sensors.lidar.model import VLP16, LidarModel
 from pipeline.simulation.world.actors import Actor, Motion, Script, motion
 from pipeline.simulation.world.intersection_ways import CrossingActor, CrossingWay, route
 from pipeline.simulation.world.roads import Road, ScenarioPart
 from pipeline.types import F64
+from pipeline.types.sensors import SensorKind, further_sensors
 
 _GAP_STEP_S, _GAP_HALVINGS = 0.25, 10
 
@@ -70,7 +71,9 @@ class Scenario(ScenarioPart):
     crossing_actors: tuple[CrossingActor, ...] = ()
     """Vehicles that come from a crossing's other arms."""
     sensors: Literal["lidar", "camera", "both"] = "both"
-    """Sensors available to the pipeline."""
+    """Which of LiDAR and camera are available to the pipeline."""
+    further_sensors: tuple[str, ...] = ()
+    """Names of further ranging sensors that the car has (``pipeline.types.sensors``)."""
     detections: Detections | None = None
     """Simulated detections in the images; None to run the detectors."""
     faults: Faults = NONE
@@ -92,7 +95,16 @@ class Scenario(ScenarioPart):
             raise ValueError("two actors have the same id")
         for actor in self.crossing_actors:
             route(actor, self.road)
+        self.further_kinds()
         return self
+
+    def further_kinds(self) -> tuple[SensorKind, ...]:
+        """The kinds of ``further_sensors``. ValueError for one that cannot be simulated."""
+        known = {kind.name: kind for kind in further_sensors() if kind.simulator}
+        for name in self.further_sensors:
+            if name not in known:
+                raise ValueError(f"no simulated sensor {name!r}; available: {', '.join(known) or 'none'}")
+        return tuple(known[name] for name in self.further_sensors)
 
     def frame_count(self) -> int:
         return max(1, round(self.duration_s * self.rate_hz))

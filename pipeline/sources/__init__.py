@@ -7,8 +7,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import cast
 
+from pipeline.common.files.remote_files import is_remote
 from pipeline.common.progress import Progress, silent
-from pipeline.common.remote_files import is_remote
 from pipeline.source_kinds import SourceKind, is_live, kind_named, kind_of_bare, looks_like, usages
 from pipeline.sources.recognition import about_path, recording_at
 from pipeline.types.source import AnySource, LiveSource, Opening, Source, SourceError, TruthObject

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.common.files.user_files import open_regular
 from pipeline.common.geometry import Cuboid, inverse, transform
-from pipeline.common.user_files import open_regular
 from pipeline.formats.file_reading import (
     camera_matrix,
     check_looks_ahead,

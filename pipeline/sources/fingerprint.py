@@ -10,7 +10,7 @@ from urllib.parse import parse_qsl
 
 import numpy as np
 
-from pipeline.common.remote_files import facts, is_remote, version_of
+from pipeline.common.files.remote_files import facts, is_remote, version_of
 from pipeline.types import Frame
 
 

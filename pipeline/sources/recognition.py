@@ -9,8 +9,8 @@ from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
-from pipeline.common.user_file_errors import reason_of
-from pipeline.common.user_files import Overloaded, check_allowed, open_regular
+from pipeline.common.files.user_file_errors import reason_of
+from pipeline.common.files.user_files import Overloaded, check_allowed, open_regular
 from pipeline.source_kinds import KINDS, SourceKind, kind_by_first_bytes, kind_named, kind_of_bare, looks_like, usages
 
 _FIRST_BYTES = 64

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from pipeline.common.user_file_errors import first_complaint, read_yaml
+from pipeline.common.files.user_file_errors import first_complaint, read_yaml
 from pipeline.formats.file_reading import check_looks_ahead
 from pipeline.sources.live.config import CalibrationConfig, ConfigPart, Mount, OffsetMs
 from pipeline.types import CameraCalibration, CameraImage

@@ -20,8 +20,8 @@ import numpy as np
 from pyproj import Transformer
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import given_path
-from pipeline.common.user_files import read_regular
+from pipeline.common.files.user_file_errors import given_path
+from pipeline.common.files.user_files import read_regular
 from pipeline.formats.nmea import parse_sentence
 from pipeline.formats.xml_text import parse_xml
 from pipeline.types import GnssFix, Route

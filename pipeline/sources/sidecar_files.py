@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from pipeline.common.fast_replace import evolve
+from pipeline.common.files.user_file_errors import given_path, reason_of
+from pipeline.common.files.user_files import open_regular
 from pipeline.common.nearest_in_time import Timeline, nearest
 from pipeline.common.progress import Progress, silent
-from pipeline.common.user_file_errors import given_path, reason_of
-from pipeline.common.user_files import open_regular
 from pipeline.ego_motion.from_gnss import MotionFromGnss
 from pipeline.formats import video_file as video_files
 from pipeline.formats.file_reading import files_by_name

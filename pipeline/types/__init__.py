@@ -31,12 +31,13 @@ from pipeline.types.frame import (
     MotionEstimate,
     MotionSource,
     OwnMotion,
+    RangeScan,
     Route,
     StreamHealth,
     Sweep,
 )
 from pipeline.types.measurements import Detection, Ground, Obstacle, VisionMeasurement
-from pipeline.types.objects import FusedObject, HeightFrom, LidarTrack, VisionTrack
+from pipeline.types.objects import FusedObject, HeightFrom, LidarTrack, RangedTrack, VisionTrack
 from pipeline.types.result import (
     DROPPED,
     GROUND,
@@ -51,10 +52,10 @@ from pipeline.types.result import (
     SensorHealth,
 )
 from pipeline.types.sensors import (
-    MOST_SENSORS_FIRST,
-    OBJECT_SOURCES,
     ObjectSource,
     are_several,
+    most_sensors_first,
+    object_sources,
     seeing_sensors_in_words,
     sensors_in_words,
 )
@@ -67,8 +68,6 @@ __all__ = [
     "GROUND",
     "I32",
     "I64",
-    "MOST_SENSORS_FIRST",
-    "OBJECT_SOURCES",
     "REAL_VEHICLES",
     "U8",
     "UNCLUSTERED",
@@ -106,6 +105,8 @@ __all__ = [
     "PixelWindow",
     "Point2",
     "Point3",
+    "RangeScan",
+    "RangedTrack",
     "RawBoxes",
     "RawLanes",
     "Rejection",
@@ -118,6 +119,8 @@ __all__ = [
     "VisionMeasurement",
     "VisionTrack",
     "are_several",
+    "most_sensors_first",
+    "object_sources",
     "seeing_sensors_in_words",
     "sensors_in_words",
 ]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.common.image_decoding import TooMuch, check_pixels, decode_within_budget
+from pipeline.common.files.image_decoding import TooMuch, check_pixels, decode_within_budget
 from pipeline.types import U8
 
 _JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"

@@ -29,6 +29,19 @@ class Sweep:
 
 
 @dataclass(frozen=True)
+class RangeScan:
+    """The detections of one tick by a ranging sensor other than the LiDAR, such as a radar."""
+
+    t_ns: int
+    """When it was measured."""
+    points: F32
+    """(N, 3) float32 ``x y z`` of each detection in the ego frame, finite."""
+    values: Mapping[str, F32] = field(default_factory=dict)
+    """(N,) float32 each, finite: what else the sensor measures of each detection, by name with unit, for example
+    ``range_rate_mps``."""
+
+
+@dataclass(frozen=True)
 class CameraImage:
     """One camera image."""
 
@@ -219,6 +232,8 @@ class Frame:
     """Of a live source: latency of its data, by stage."""
     detections_given: bool = False
     """The recording contains detections, so no detector runs."""
+    scans: Mapping[str, RangeScan] = field(default_factory=dict)
+    """Of further ranging sensors, by ``SensorKind.name``."""
 
     @property
     def image_size(self) -> tuple[int, int] | None:

@@ -9,7 +9,7 @@ from pipeline.common.geometry import Cuboid
 from pipeline.types.arrays import Box, Point2, Point3
 from pipeline.types.conditions import Braking, Eligibility, Gate
 from pipeline.types.measurements import Obstacle
-from pipeline.types.sensors import ObjectSource, are_several, is_camera_in, is_lidar_in, is_ranging_in
+from pipeline.types.sensors import ObjectSource, are_several, is_camera_in, is_lidar_in, is_ranging_in, kinds_in
 
 HeightFrom = Literal["class", "shape", "road", "range"] | None
 """Of a vehicle that the camera sees: the usual height of its class; the shape of its boxes; where they meet the road;
@@ -78,8 +78,28 @@ class VisionTrack:
     velocity."""
 
 
-DistanceFrom = Literal["cluster", "returns", "box"] | None
-"""A LiDAR cluster; single LiDAR returns inside its image box; the height of that box; None: nothing in this frame."""
+class RangedTrack(NamedTuple):
+    """What a ranging sensor other than the LiDAR, such as a radar, has followed over time."""
+
+    id: int
+    """Never given twice by its sensor."""
+    position: Point2
+    """Ego x, y of its nearest point, filtered."""
+    sigma_m: Point2
+    """Standard deviation of the position along the line of sight and across it."""
+    velocity_mps: Point2 | None
+    """Relative to ego, x and y; None until it is known."""
+    hits: int
+    """Sightings so far."""
+    carried: bool
+    """Not seen in this frame."""
+    steady: int = 1
+    """Sightings in a row, with the first one, that lay where the track was expected."""
+
+
+DistanceFrom = str | None
+"""``cluster``: a LiDAR cluster; ``returns``: single LiDAR returns inside its image box; ``box``: the height of that
+box; the name of another ranging sensor; None: nothing in this frame."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +136,7 @@ class FusedObject:
     """Standard deviation of the distance."""
     velocity_mps: Point2 | None
     """Relative to ego, x and y; None until it can be told."""
-    seen_by: ObjectSource | Literal[""]
+    seen_by: ObjectSource
     """Which of its sensors saw it in this frame; none: it is carried."""
     hits: int
     """Sightings so far, by the sensor that has more of them."""
@@ -155,7 +175,7 @@ class FusedObject:
     """How long before the car arrives it will have left the path that it crosses; None for one that does not cross, or
     that the car might meet."""
     ranged_hits: int = 0
-    """Sightings of its track by the sensor that measures range, today the LiDAR; 0 without one."""
+    """Sightings by the sensor that measures range, by the one that has more of them; 0 without one."""
     ranged_steady: int = 0
     """The most recent of these in a row that were where the track was expected."""
     justifies: Braking = Braking.FULL
@@ -185,6 +205,8 @@ class FusedObject:
             return None
         if self.seen_by_lidar:
             return "cluster"
+        if self.ranged_now:
+            return next(kind.name for kind in kinds_in(self.seen_by) if kind.is_ranging)
         return "returns" if self.returns else "box"
 
     @property
@@ -194,8 +216,8 @@ class FusedObject:
 
     @property
     def ranged(self) -> bool:
-        """A sensor that measures range follows it, today the LiDAR. Otherwise its distance and speed come from the
-        height of its image box, and are much less sure."""
+        """A sensor that measures range follows it. Otherwise its distance and speed come from the height of its image
+        box, and are much less sure."""
         return is_ranging_in(self.source)
 
     @property

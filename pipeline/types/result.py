@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -97,6 +98,16 @@ class AccCommand:
 
 
 @dataclass(frozen=True)
+class ScanHealth:
+    """How fresh a further ranging sensor's data is."""
+
+    age_ms: float
+    """Age of the scan."""
+    points: int
+    """Detections in it."""
+
+
+@dataclass(frozen=True)
 class SensorHealth:
     """How fresh each sensor's data is. Ages are against the frame's tick; None when the sensor delivered nothing."""
 
@@ -112,6 +123,8 @@ class SensorHealth:
     """Age of own motion."""
     far_view: PixelWindow | None = None
     """The image region that the detector processed a second time, in native pixels; None without a second pass."""
+    scans: Mapping[str, ScanHealth] = field(default_factory=dict)
+    """Of further ranging sensors that delivered, by ``SensorKind.name``."""
 
     @staticmethod
     def of(frame: Frame) -> SensorHealth:
@@ -129,6 +142,9 @@ class SensorHealth:
             camera_skew_ms=(image_ns - sweep.t_ns) / 1e6 if image_ns is not None and sweep is not None else None,
             ego_age_ms=age_ms(frame.ego.t_ns if frame.ego is not None else None),
             far_view=frame.raw_boxes.far if frame.raw_boxes is not None else None,
+            scans={
+                name: ScanHealth((frame.t_ns - scan.t_ns) / 1e6, len(scan.points)) for name, scan in frame.scans.items()
+            },
         )
 
 

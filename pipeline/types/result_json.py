@@ -84,6 +84,8 @@ def _sensors(health: SensorHealth, streams: tuple[StreamHealth, ...]) -> dict[st
         },
         "ego": {"age_ms": _number(health.ego_age_ms)},
     }
+    for name, scan in health.scans.items():
+        sensors[name] = {"age_ms": _number(scan.age_ms), "points": scan.points}
     for name, stream in streams_json(streams).items():
         sensors[name] = {**stream, **sensors.get(name, {})}
     return sensors

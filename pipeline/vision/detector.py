@@ -15,7 +15,7 @@ import numpy as np
 import onnx
 import onnxruntime as ort
 
-from pipeline.common.data_dir import file_sha256
+from pipeline.common.files.data_dir import file_sha256
 from pipeline.inference import model_registry
 from pipeline.inference.distance_laws import find_law
 from pipeline.inference.graph import MULTIPLE, Size, fitting_size, input_size, with_input_size, with_unit_image

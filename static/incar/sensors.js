@@ -30,8 +30,10 @@ function update() {
    * The sensors that the frame has data of. Ages alone are not enough, since a recording may have no timestamps.
    * @type {Record<string, boolean>}
    */
-  const held = { lidar: Boolean(sensors.lidar?.points), camera: frame.image !== null, ego: ego !== null };
-  const keys = Object.keys(NAMES).filter((key) => key in held || key in streams);
+  const held = { lidar: false, camera: frame.image !== null, ego: ego !== null };
+  for (const [key, { points }] of Object.entries(sensors)) if (points !== undefined) held[key] = Boolean(points);
+  const known = new Set([...Object.keys(NAMES), ...Object.keys(held)]);
+  const keys = [...known].filter((key) => key in held || key in streams);
   keyed(
     list,
     keys.map((key) => look(key, held[key] ?? false, streams[key])),
@@ -78,6 +80,6 @@ function show(li, { key, health, detail }) {
     svg.firstElementChild?.setAttribute("d", LOOKS[health].shape);
   }
   mark(li, "health", health);
-  text(name, NAMES[key]);
+  text(name, NAMES[key] ?? key[0].toUpperCase() + key.slice(1));
   text(small, detail);
 }

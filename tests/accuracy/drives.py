@@ -105,7 +105,7 @@ def all_scored(of: Drive) -> Iterator[Judged]:
 
 
 def made_up_leads(of: Drive) -> int:
-    """Number of frames, of the five of the empty clip, with a near lead."""
+    """Number of frames with a near lead, out of the five of the empty clip."""
     leads = [of.results[f"{number:06d}"].cipv for number in EMPTY_CLIP]
     return sum(lead is not None and lead.distance_m <= _FAR_M for lead in leads)
 

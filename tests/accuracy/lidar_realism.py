@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.common.geometry import Cuboid
-from pipeline.simulation.sensors.lidar import Lidar
-from pipeline.simulation.sensors.lidar_model import LidarModel
-from pipeline.simulation.sensors.lidar_rays import BOX_FIELDS
-from pipeline.simulation.sensors.lidar_scene import vehicle_boxes
+from pipeline.simulation.sensors.lidar.model import LidarModel
+from pipeline.simulation.sensors.lidar.rays import BOX_FIELDS
+from pipeline.simulation.sensors.lidar.scene import vehicle_boxes
+from pipeline.simulation.sensors.lidar.sensor import Lidar
 from pipeline.simulation.world.actors import Vehicle, VehicleKind
 from pipeline.simulation.world.world_state import ActorState
 from pipeline.sources.astyx import AstyxSource, parse_calibration

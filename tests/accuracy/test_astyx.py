@@ -20,8 +20,8 @@ def test_the_labelled_lead_is_the_cipv(data_dir: Path) -> None:
 
 
 def test_no_lead_is_made_up_on_an_empty_road(data_dir: Path) -> None:
-    """A car 71–81 m ahead in the next lane, and nothing else. One sighting by one sensor is not enough, and what is too
-    wide for a vehicle is divided: without both rules the LiDAR brakes for a sign beside the road."""
+    """There is only a car 71–81 m ahead in the next lane. One sighting by one sensor is not enough, and clusters too
+    wide for a vehicle are divided: without both rules the LiDAR brakes for a sign beside the road."""
     assert made_up_leads(drive(data_dir, "astyx")) == 0
     assert made_up_leads(drive(data_dir, "astyx", sensors="lidar")) == 0
     without = (("cipv.confirm_hits", 1), ("cluster.divide_m", 0.9))
@@ -29,7 +29,8 @@ def test_no_lead_is_made_up_on_an_empty_road(data_dir: Path) -> None:
 
 
 def test_camera_alone_estimates_distance_with_a_law_fitted_elsewhere(data_dir: Path) -> None:
-    """Of the six that are missed, five wait for their third sighting; the sixth ends a lane change, 1.2 m aside."""
+    """Of the six missed leads, five wait for their third sighting; the sixth is completing a lane change, 1.2 m to the
+    side."""
     total = score(camera_alone_without_own_clip(data_dir))
     assert total.frames == 31
     assert total.correct >= 25

@@ -22,7 +22,7 @@ from pipeline.simulation.sensors.gnss_model import MEASURED, RTK
 from pipeline.types import F64, EgoState, GnssFix, Route
 
 LATENCY_S = 0.2
-"""The receiver's speed lags the car's own by this much: a fix says where the car was."""
+"""By how much the receiver's speed lags behind the car's own: a fix gives a past position."""
 SIGMA_M = 1.5
 SETTLED_S = 6.0
 PARAMS = PathParams()
@@ -69,9 +69,9 @@ def drive(data_dir: Path) -> Drive:
 
 
 def predicted(drive: Drive) -> tuple[F64, F64, F64]:
-    """(N, 3) sideways distance of the place 1, 2, 3 s later from the path predicted, and from straight ahead; (N, 3)
-    the predicted path's sigma there. The pose is the filter's; where the car was later is told by later fixes, which
-    lag as much."""
+    """(N, 3) lateral distance of the position 1, 2 and 3 s later from the predicted path, and from straight ahead; (N,
+    3) the predicted path's sigma there. The pose is the filter's; later positions come from later fixes, which lag by
+    the same amount."""
     lat, lon = np.array([[fix.lat_deg, fix.lon_deg] for fix in drive.fixes]).T
     route = Route("so that the pose is kept", lat, lon, SIGMA_M)
     state, yaw, rows = GnssState(), None, []
@@ -128,7 +128,8 @@ def test_the_simulators_noise_is_what_was_measured(drive: Drive) -> None:
 
 
 def test_a_jump_of_five_metres_is_not_believed(drive: Drive) -> None:
-    """All fixes of the real drive pass; one that jumps 5 m aside is refused, and the pose stays where it was."""
+    """All fixes of the real drive pass; a fix that jumps 5 m to the side is rejected, and the pose stays where it
+    was."""
     lat, lon = np.array([[fix.lat_deg, fix.lon_deg] for fix in drive.fixes]).T
     route = Route("drive", lat, lon, SIGMA_M)
     state, said = GnssState(), []

@@ -34,7 +34,7 @@ class Labelled(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """A vehicle that the camera has alone, beside its label."""
+    """A vehicle seen only by the camera, with its label."""
 
     true_m: float
     distance_m: float
@@ -58,7 +58,7 @@ def test_no_car_is_nearer_than_half_its_true_distance(data_dir: Path) -> None:
 
 
 def test_the_sigma_of_a_cars_distance_is_no_fiction(data_dir: Path) -> None:
-    """Two sigma hold nine tenths of the errors, in each 20 m with enough of them."""
+    """90 % of the errors are within two sigmas, in each 20 m bin with enough of them."""
     cells = defaultdict(list)
     for each in _placed(data_dir):
         cells[int(each.true_m // 20)].append(abs(each.distance_m - each.true_m) < 2 * each.sigma_m)
@@ -68,7 +68,7 @@ def test_the_sigma_of_a_cars_distance_is_no_fiction(data_dir: Path) -> None:
 
 
 def _placed(folder: Path) -> Iterator[Placed]:
-    """Each labelled vehicle that the camera alone has, in each frame."""
+    """Each labelled vehicle seen only by the camera, in each frame."""
     labels = _labels(folder)
     for index, result in enumerate(drive(folder, "street", sensors="camera").results.values()):
         seen = [item for item in result.objects if not item.carried and item.distance_m and item.distance_sigma_m]
@@ -86,7 +86,7 @@ def _placed(folder: Path) -> Iterator[Placed]:
 
 @cache
 def _labels(folder: Path) -> list[list[Labelled]]:
-    """By frame, from the drive's labels in the form of KITTI's tracking benchmark."""
+    """By frame, from the drive's labels in the format of KITTI's tracking benchmark."""
     source = open_source(f"kitti:{folder / FOLDERS['street']}")
     assert isinstance(source, KittiSource)
     lines = defaultdict(list)

@@ -47,7 +47,7 @@ def detector(folder: Path, kind: str) -> Detects[RawLanes]:
 
 @cache
 def photographs(folder: Path, kind: str) -> tuple[tuple[str, U8, EgoLane | None, list[Miss]], ...]:
-    """Each photograph with its lane drawn in, its lane, and how far that is from the marks, where it has any."""
+    """Each photograph with its lane drawn in, the lane, and its distance from the marks, if it has any."""
     found = []
     for path in sorted((folder / "lane_images").glob("*.jpg")):
         bgr = cv2.imread(str(path)).astype(np.uint8)
@@ -102,8 +102,8 @@ def test_both_lines_are_seen_in_every_photograph(data_dir: Path, kind: str) -> N
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_lane_is_kept_through_the_video(data_dir: Path, kind: str) -> None:
-    """38 frames on a motorway: both lines in every one, and none jumps by more than a decimetre or two. The network
-    looks at every third."""
+    """38 frames on a motorway: both lines in every frame, without jumps of more than a decimetre or two. The network
+    processes every third frame."""
     video = cv2.VideoCapture(str(data_dir / "lane_images" / "test_video.mp4"))
     state, drawn, widths, places = LaneState(), [], [], []
     for index in range(38):
@@ -130,7 +130,7 @@ def test_the_lane_is_kept_through_the_video(data_dir: Path, kind: str) -> None:
 
 
 ASTYX_CLEAR = {"on a country road": range(47, 52), "two lanes at a light": range(57, 63)}
-"""Astyx frames whose two lines an eye sees clearly."""
+"""Astyx frames with two clearly visible lines."""
 
 
 @cache
@@ -161,7 +161,7 @@ def test_metres_on_the_astyx_road(data_dir: Path, clip: str) -> None:
 
 @pytest.mark.parametrize("kind", ["astyx", "kitti"])
 def test_the_road_lies_where_the_calibration_has_it_without_a_sweep(data_dir: Path, kind: str) -> None:
-    """What a recording's own sweeps say of the road's height, and the lanes that the camera alone sees on it."""
+    """The road's height from a recording's own sweeps, and the lanes that the camera alone sees on it."""
     planes = [road_plane(result.layers.ground) for result in drive(data_dir, kind).results.values()]
     camera = open_source(f"{kind}:{data_dir / FOLDERS[kind]}").frame(0).camera
     assert camera is not None
@@ -173,8 +173,8 @@ def test_the_road_lies_where_the_calibration_has_it_without_a_sweep(data_dir: Pa
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_paint_shines_in_the_lidar_where_the_camera_saw_it(data_dir: Path, side: str) -> None:
-    """Paint throws back more light than asphalt: bright returns of the ground near a line lie on it, to a decimetre.
-    Measured medians: left −0.06 m, right +0.03 m."""
+    """Paint reflects more light than asphalt: bright ground returns near a line lie on it, to a decimetre. Measured
+    medians: left −0.06 m, right +0.03 m."""
     off = []
     for _, frame, result in astyx(data_dir, "two lanes at a light"):
         lane = result.layers.lanes
@@ -188,7 +188,7 @@ def test_paint_shines_in_the_lidar_where_the_camera_saw_it(data_dir: Path, side:
 
 
 def _bright_ground(frame: Frame, result: Result) -> F64:
-    """(N, 2) ego x, y of ground returns 3–22 m ahead that outshine those of their own ring."""
+    """(N, 2) ego x, y of ground returns 3–22 m ahead that are brighter than others on their ring."""
     assert frame.sweep is not None
     points = frame.sweep.points.astype(np.float64)
     near = (result.layers.kind == GROUND) & (points[:, 0] > 3.0) & (points[:, 0] < 22.0) & (np.abs(points[:, 1]) < 6.0)
@@ -204,16 +204,17 @@ def _bright_ground(frame: Frame, result: Result) -> F64:
     ("kind", "every", "least"), [("twinlitenet", None, 31), ("twinlitenet", 3, 30), ("classical", None, 29)]
 )
 def test_the_lead_is_still_right_on_astyx(data_dir: Path, kind: str, every: int | None, least: int) -> None:
-    """As without lanes, although half of the clip "lead near 20 m" is a lane change without any own motion recorded,
-    and snow shines like paint. With three frames a second a network looks at every one: lines a second old are those
-    of the lane that the car has left by then."""
+    """As without lanes, although half of the clip "lead near 20 m" is a lane change without recorded ego motion, and
+    snow is as bright as paint. At three frames per second, a network processes every frame: lines one second old belong
+    to the lane that the car has left by then."""
     judged = list(all_scored(drive(data_dir, "astyx", lanes=kind, lanes_every=every)))
     assert sum(each.verdict == "correct" for each in judged) >= least
 
 
 @pytest.mark.parametrize("light", [0.1, 0.03])
 def test_a_dark_image_ends_in_less_confidence_and_no_wrong_lead(data_dir: Path, light: float) -> None:
-    """A real drive at night through the whole pipeline: the box network and the classical lanes see next to nothing."""
+    """A real drive at night through the whole pipeline: the vehicle detector and classical lane detection find almost
+    nothing."""
     source = open_source(f"astyx:{data_dir / 'astyx'}")
     eyes = Detectors(open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (2048, 618)), open_classical(None))
     part = _Part(source, SCORED_CLIPS["following at 22–24 m"])
@@ -239,7 +240,7 @@ def _darker(frame: Frame, light: float) -> Frame:
 
 @pytest.mark.parametrize("lanes", ["off", "classical"])
 def test_the_lead_is_still_right_on_kitti(data_dir: Path, lanes: str) -> None:
-    """As with the network, which is judged with the rest of the drive: one lead under one number in all 23 frames."""
+    """As with the network, which is scored with the rest of the drive: one lead with one id in all 23 frames."""
     as_seen = drive(data_dir, "kitti", lanes=lanes)
     leads = [result.cipv.id for result in as_seen.results.values() if result.cipv is not None]
     assert len(leads) == 23
@@ -279,7 +280,7 @@ def test_a_network_that_looks_at_every_third_image_keeps_the_lane(data_dir: Path
 
 @pytest.mark.parametrize("light", [0.03, 0.0])
 def test_at_night_there_is_no_wrong_lane(data_dir: Path, light: float) -> None:
-    """A photograph so dark that nothing shows: no pair of lines is believed by either."""
+    """A photograph so dark that nothing is visible: neither detector reports a pair of lines."""
     bgr = cv2.imread(str(data_dir / "lane_images" / "solidWhiteCurve.jpg"))
     dark = (bgr * light).astype(np.uint8)
     for kind in KINDS:

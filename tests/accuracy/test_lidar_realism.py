@@ -13,7 +13,7 @@ from tests.accuracy.lidar_realism import BIN_M, CarSeen, Pair, cars_seen, ground
 from tests.conftest import ROOT
 
 ON_THE_ROAD_M = 8.0
-"""Parked cars farther to the side stand behind a hedge that nobody labelled."""
+"""Parked cars farther to the side stand behind an unlabelled hedge."""
 SHOWN = "000417"
 
 
@@ -58,7 +58,7 @@ def test_from_10_to_40_m_points_and_rings_on_cars_agree_within_their_spread(
 
 
 def test_nearer_than_10_m_a_simulated_car_has_a_sixth_more_points(cars: list[CarSeen]) -> None:
-    """Three sightings of one car: on as many rings."""
+    """Three sightings of one car, on the same number of rings."""
     near = within(cars, 0.0)
     real, simulated = medians(near, "points")
     assert 1.0 < simulated / real < 1.25

@@ -23,7 +23,7 @@ LOOK_AHEAD_M = 30.0
 
 
 class Driven(NamedTuple):
-    """The street's frames, and the pose of each by its inertial unit."""
+    """The street's frames, and the pose of each from the inertial unit."""
 
     frames: tuple[Frame, ...]
     own: tuple[EgoState, ...]
@@ -48,7 +48,7 @@ def street(data_dir: Path) -> Driven:
 
 @cache
 def results(data_dir: Path, source: str) -> tuple[Result, ...]:
-    """LiDAR and own motion from that source only; without lane lines."""
+    """LiDAR, and ego motion from this source only; without lane lines."""
     frames = street(data_dir).frames
     if source != "can":
         frames = tuple(replace(frame, ego=None, gnss=None) for frame in frames)
@@ -57,7 +57,7 @@ def results(data_dir: Path, source: str) -> tuple[Result, ...]:
 
 
 def aside_m(data_dir: Path, source: str) -> F64:
-    """How far aside of the predicted path the car is 30 m later, where the recording goes on as far."""
+    """Lateral distance of the car from the predicted path 30 m later, if the recording continues that far."""
     poses, found = street(data_dir).poses, []
     for k, result in enumerate(results(data_dir, source)):
         x, y, heading = poses[k]

@@ -16,7 +16,7 @@ from tests.accuracy.drives import all_scored, camera_alone_without_own_clip, dri
 from tests.conftest import ROOT
 
 LANES = "twinlitenet"
-"""What the command line looks for lane lines with where it is installed."""
+"""The lane network that the command line uses if it is installed."""
 BEST = "**default, both sensors**"
 ROWS: tuple[tuple[str, str, Sensors, str, tuple[tuple[str, object], ...]], ...] = (
     (BEST, "default", "both", LANES, ()),

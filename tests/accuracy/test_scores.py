@@ -20,7 +20,7 @@ AT_LEAST = {
     "kitti": {"cipv_correct": 100.0, "recall": 70.0, "idf1": 50.0, "hota": 54.0},
 }
 _WELL_KNOWN = 20
-"""Errors in a cell of a table from which a share is worth something."""
+"""Number of errors in a table cell from which a share is meaningful."""
 AT_MOST = {
     "astyx": {"lead_missed": 0.0, "lead_distance": 0.1, "switches": 0.0, "drop_outs": 0.0, "distance": 1.3},
     "kitti": {"lead_distance": 0.1, "switches": 0.0, "distance": 0.5, "lateral": 0.5},
@@ -45,7 +45,7 @@ def test_floors(data_dir: Path, kind: str) -> None:
 
 
 def test_sigmas_are_honest(data_dir: Path) -> None:
-    """Two sigmas hold nine of ten errors, for each sensor and every 20 m that are well known."""
+    """90 % of the errors are within two sigmas, for each sensor and each 20 m bin with enough errors."""
     rows = sigma_rows([score_of(data_dir, "astyx"), score_of(data_dir, "kitti")])
     well_known = [row for row in rows if row[0] != "all" and row[2] >= _WELL_KNOWN]
     print(*rows, sep="\n")

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(cannot_watch() is not None, reason=cannot_watch(
 
 @pytest.fixture
 def at_home(tmp_path: Path) -> dict[str, Any]:
-    """How to start a program of a person whose home is empty."""
+    """The environment of a program whose user has an empty home folder."""
     home = {"HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / ".cache"), "CIPV_HOME": str(tmp_path / "cipv")}
     return {
         "cwd": ROOT,
@@ -37,7 +37,7 @@ def at_home(tmp_path: Path) -> dict[str, Any]:
 
 
 def left_behind(home: Path) -> list[Path]:
-    """What looks like telemetry in a home: files with a device's or user's identity, or a queue of events."""
+    """Files in a home folder that look like telemetry: a device's or user's identity, or a queue of events."""
     names = ("deviceid", "onnxruntime.db", "analytics.json")
     return [path for path in home.rglob("*") if path.name in names or "Microsoft" in path.parts]
 
@@ -79,7 +79,7 @@ if __name__ == "__main__":
         except SystemExit as end:
             print(json.dumps([typed[0], end.code]), file=sys.stderr)
 """
-"""Several commands in one process: importing them takes longer than most of them do."""
+"""Several commands in one process, since importing takes longer than running most of them."""
 TYPED: dict[str, list[list[str]]] = {
     "sessions": [
         ["record", "sim:scene.yaml", "--out", "a.mcap"],
@@ -118,9 +118,9 @@ TYPED: dict[str, list[list[str]]] = {
         ["compare", "--out", "tables", "--base", "no such run"],
     ],
 }
-"""What else a person may type, besides ``run`` and ``demo``, which is ``serve`` on the simulator."""
+"""Other commands that a user may type, besides ``run`` and ``demo``, which is ``serve`` on the simulator."""
 ENDS = {"live": 1, "compare": 2}
-"""Exit codes that are not 0: no sensor is there, there is no such run."""
+"""Exit codes other than 0: no sensor is connected, the run does not exist."""
 
 
 def test_every_command_is_watched_here():

@@ -40,4 +40,4 @@ SMALL_TARGETS = """() => [...document.querySelectorAll("button, select, input:no
   .map((node) => [node, node.getBoundingClientRect()])
   .filter(([, box]) => box.width > 0 && box.height < 40)
   .map(([node, { width, height }]) => `${Math.round(width)}×${Math.round(height)} ${node.id || node.outerHTML}`)"""
-"""Controls that are too low for a finger."""
+"""Controls that are too small for a finger."""

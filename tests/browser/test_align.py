@@ -36,7 +36,7 @@ actors:
 
 @pytest.fixture(scope="module")
 def knocked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    """A dashboard on a drive whose camera is turned against its calibration."""
+    """A dashboard on a drive whose camera is rotated relative to its calibration."""
     scene = tmp_path_factory.mktemp("scene") / "knocked.yaml"
     scene.write_text(SCENE)
     engine = Engine(open_source, CountedDetector, Params(), uri=f"sim:{scene}", whole_drives=True)

@@ -285,7 +285,7 @@ def test_what_the_server_refuses_is_said_each_time_and_can_be_dismissed(open_pag
 
 
 def test_a_lost_connection_is_said_and_found_again(browser, site: Site):
-    """Old data never looks fresh. The browser itself complains about refused connections here, so no quiet page."""
+    """Old data never looks fresh. The browser logs refused connections here, so the console is not checked."""
     recording = Recording()
     engine = Engine(opener(recording), lambda _: CountingDetector(), Params(), uri=recording.uri)
     engine.start()

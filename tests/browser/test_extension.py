@@ -1,8 +1,9 @@
-"""What a contributor adds to the page appears after one call: a lane of the timeline, a layer of the camera."""
+"""What a contributor adds appears in the page: a lane of the timeline, a layer of the camera, a sensor's objects."""
 
 from __future__ import annotations
 
 import pytest
+from playwright.sync_api import expect
 
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.looks import box_of, wait_for_frame, whole_drive
@@ -62,6 +63,23 @@ def test_a_camera_layer_is_added_by_one_call(open_page: OpenPage) -> None:
     page.wait_for_function("() => window.layer !== undefined")
     assert page.evaluate("window.layer.frame") == START
     assert page.evaluate("window.layer.scale") > 0
+
+
+def test_objects_of_a_further_sensor_are_shown_by_letter_and_colour(open_page: OpenPage) -> None:
+    page = open_page()
+    wait_for_frame(page, START)
+    page.evaluate(
+        """async () => {
+          const { get, set } = await import("/js/core/store.js");
+          const frame = get("frame");
+          const [first, second, ...rest] = frame.result.objects;
+          const objects = [{ ...first, source: "VR" }, { ...second, source: "R" }, ...rest];
+          set("frame", { ...frame, result: { ...frame.result, objects } });
+        }"""
+    )
+    expect(page.locator("#object-facts")).to_contain_text("1 VR · 1 R")
+    for source, role in (("VR", "fused"), ("R", "lidar")):
+        expect(page.locator("#objects .pill").get_by_text(source, exact=True)).to_have_attribute("data-role", role)
 
 
 def test_help_opens_in_a_new_tab(open_page: OpenPage) -> None:

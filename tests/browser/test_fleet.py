@@ -38,7 +38,7 @@ def tables(out: Path) -> FleetTables:
 
 @pytest.fixture(scope="module")
 def fleet_site(site: Site, out: Path) -> Iterator[Site]:
-    """The same dashboard with a fleet; afterwards it shows what it showed before."""
+    """The same dashboard with a fleet, restored afterwards."""
     before = site.engine.snapshot.uri
     running = Site(site.engine, 0, fleet=FleetDesk(str(out)))
     running.start()
@@ -66,7 +66,7 @@ def settled(page: Page) -> None:
 
 
 def found(page: Page) -> int:
-    """How many rows the view says there are."""
+    """Number of rows stated by the view."""
     settled(page)
     return int(page.inner_text("#fleet-facts").split()[0])
 

@@ -16,7 +16,8 @@ from tests.browser.conftest import WAIT_MS, Site
 WAIT_S = WAIT_MS / 1e3
 
 PAGES = {"/": "#notices", "/drive/": "#notes"}
-"""The dashboard, in which labels are edited too, and the in-vehicle display, with where each says it."""
+"""The dashboard, in which labels are edited, and the in-vehicle display, each with the element that shows the
+message."""
 
 
 @pytest.fixture

@@ -18,16 +18,16 @@ from tests.app.engine.recording_helpers import CountingDetector
 from tests.browser.conftest import WAIT_MS, OpenPage, Site
 from tests.browser.display.conftest import keep
 from tests.pipeline.sources.live.rig import Replaying
-from tests.soak import live_car
-from tests.soak.live_run import config_file
+from tests.soak.live import car as live_car
+from tests.soak.live.run import config_file
 
 SENDS_S, CLIP = 240.0, 6
-"""Longer than the test waits for anything; frames of the clip, played to and fro."""
+"""Longer than any wait of the test; the frames of the clip, played back and forth."""
 
 
 @pytest.fixture(scope="module")
 def car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Site, Replaying]]:
-    """A dashboard on live sensors, and the car that sends."""
+    """A dashboard on live sensors, and the sending car."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(live_car, "SPAN", CLIP)
         clip = live_car.clip()
@@ -45,7 +45,7 @@ def car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Site, Replay
 
 
 def until(page: Page, holds: str, gives: str = "get('frame').state.sequence") -> Any:
-    """Wait until something holds of the store, and what it gives then: both are expressions of ``get``."""
+    """Wait until a condition on the store holds, and return a value from it; both are expressions of ``get``."""
     return page.evaluate(
         f"""async () => {{
           const {{ get, on }} = await import('/js/core/store.js');

@@ -14,7 +14,7 @@ from tests.browser.looks import pixels, repainted, wait_for_frame, whole_drive
 
 WAIT_S = WAIT_MS / 1e3
 SCREENS = Path(__file__).resolve().parents[2] / "build" / "screens"
-"""Images of each view, kept as build output."""
+"""Images of each view, saved as build output."""
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
@@ -236,7 +236,7 @@ def test_a_gate_leads_to_the_parameter_behind_its_limit(open_page: OpenPage, sit
 
 
 def test_live_sensors_draw_what_came_and_let_go_of_the_oldest(open_page: OpenPage, site: Site):
-    """As if the shown frame had come from live sensors, again and again: what the stream's messages do to the page."""
+    """The shown frame arrives repeatedly as if from live sensors, through the messages of the stream."""
     page = open_page()
     wait_for_frame(page, START)
     whole_drive(page, site)  # the server says nothing more that would undo this

@@ -15,14 +15,14 @@ from tests.browser.looks import COUNT, box_of, go_to, on_timeline, pixels, repai
 
 WAIT_S = WAIT_MS / 1e3
 WIDE = {"path.half_width_m": 3.5}
-"""So wide a corridor takes in the next lane's cars."""
+"""A corridor this wide includes the cars in the next lane."""
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
 
 @pytest.fixture
 def page(open_page: OpenPage, site: Site, paused_in_traffic: None) -> Page:
-    """The dashboard with its whole drive computed."""
+    """The dashboard after the whole drive was computed."""
     site.engine.wait_for(lambda s: s.drive.done == s.drive.total == COUNT, WAIT_S)
     recording = site.engine.drives.recording
     assert recording is not None
@@ -213,7 +213,7 @@ def test_the_ribbon_selects_who_was_the_lead(page: Page, site: Site):
 
 
 def test_a_change_that_is_taken_back_while_its_figures_are_on_their_way_is_no_complaint(page: Page, site: Site):
-    """The run is gone when the server is asked about it; the fixture sees that nothing was refused."""
+    """The run no longer exists when the server is asked about it; the fixture checks that nothing was refused."""
     recording = site.engine.drives.recording
     assert recording is not None
     registry = recording.runs

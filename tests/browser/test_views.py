@@ -17,18 +17,18 @@ pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 COLOURS = ("object", "range", "height", "intensity", "ring", "cluster", "ground")
 """``age`` needs a recording that says when each point was measured."""
 HOLD_PX = 24
-"""How far from where it was set a tape's end may be: the nearest point holds it."""
+"""Maximum distance of a tape's end from where it was set, since it snaps to the nearest point."""
 AHEAD_M, FROM_M, HALF_WIDTH_M, TOOLS_PX = 79.0, -5.0, 13.0, 36
-"""What the plan shows until somebody moves it (viewport.js)."""
+"""Initial extent of the plan (viewport.js)."""
 
 
 def of_store(page: Page, words: str) -> Any:
-    """Something about the page's state: ``words`` is an expression of ``get``."""
+    """A value from the page's state: ``words`` is an expression of ``get``."""
     return page.evaluate(f"async () => {{ const {{ get }} = await import('/js/core/store.js'); return {words}; }}")
 
 
 def on_plan(page: Page, x_m: float, y_m: float) -> tuple[float, float]:
-    """Where a place of the fitted plan is on the screen."""
+    """Screen position of a position in the fitted plan."""
     box = box_of(page.locator("#bev"))
     per_metre = min((box["height"] - TOOLS_PX) / AHEAD_M, box["width"] / (2 * HALF_WIDTH_M))
     return box["x"] + box["width"] / 2 - y_m * per_metre, box["y"] + box["height"] - TOOLS_PX - (
@@ -37,7 +37,7 @@ def on_plan(page: Page, x_m: float, y_m: float) -> tuple[float, float]:
 
 
 def in_image(page: Page, u: float, v: float) -> tuple[float, float]:
-    """Where a pixel of the sent image is on the screen."""
+    """Screen position of a pixel of the sent image."""
     box = box_of(page.locator("#camera"))
     place = page.evaluate("async () => (await import('/js/views/camera.js')).place()")
     return box["x"] + place["x"] + u * place["scale"], box["y"] + place["y"] + v * place["scale"]
@@ -52,7 +52,7 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
 
 
 def opened(open_page: OpenPage, site: Site) -> Page:
-    """The page once it shows the frame as the whole drive has it: until then, views change by themselves."""
+    """The page once it shows the frame of the whole drive: until then, views change by themselves."""
     page = open_page()
     wait_for_frame(page, START)
     whole_drive(page, site)
@@ -156,7 +156,7 @@ def test_what_lies_under_the_pointer_is_named(open_page: OpenPage, site: Site):
 
 
 def test_a_failed_test_of_the_selected_object_is_drawn_with_its_number(open_page: OpenPage, site: Site):
-    """In the image at its box, in the plan as a dimension from the path's middle."""
+    """In the image at its box, in the plan as a distance from the centre of the path."""
     page = opened(open_page, site)
     tick = site.engine.snapshot.processed
     assert tick is not None
@@ -221,7 +221,7 @@ def test_the_plan_shows_all_around_and_ahead_again(open_page: OpenPage, site: Si
 
 
 def test_no_wider_image_is_sent_than_is_shown(open_page: OpenPage, site: Site):
-    """And a wider one as soon as the pane grows, though nothing plays."""
+    """A wider one is sent as soon as the pane grows, even while paused."""
     page = opened(open_page, site)
     shown = box_of(page.locator("#camera"))["width"]
     sent = of_store(page, "get('frame').image.width")
@@ -240,7 +240,7 @@ def test_no_wider_image_is_sent_than_is_shown(open_page: OpenPage, site: Site):
 
 
 def test_a_message_that_cannot_be_read_does_not_end_the_stream(browser: Browser, site: Site):
-    """The page says so in its console, so this is no quiet page."""
+    """The page logs it, so the console is not checked."""
     page = browser.new_page()
     try:
         page.add_init_script("""

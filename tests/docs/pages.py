@@ -22,7 +22,7 @@ _PROGRAM = ("cipv", ".venv/bin/cipv")
 
 
 class Link(NamedTuple):
-    """A link or an image."""
+    """A link or image."""
 
     target: str
     is_image: bool

@@ -50,7 +50,7 @@ def test_every_parameter_exists(file: str) -> None:
 
 
 def parameters(file: str) -> Iterator[str]:
-    """What looks like a parameter: in backticks, and given to ``--set``."""
+    """Texts that look like parameters: in backticks, and after ``--set``."""
     for span in code_spans(file):
         match = PARAMETER.fullmatch(span)
         if not match or match[1] not in Params.model_fields or match[2] in FILE_ENDINGS:

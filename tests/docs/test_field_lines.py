@@ -49,7 +49,7 @@ def field_classes() -> frozenset[str]:
 
 
 def fields(file: Path) -> Iterator[tuple[str, ast.AnnAssign, str | None]]:
-    """(where it is, the field, its line of documentation) of the public types of a file."""
+    """(location, field, documentation) of the public types in a file."""
     for each in classes(file):
         is_dataclass = "dataclass" in {name_of(decorator) for decorator in each.decorator_list}
         if each.name.startswith("_") or not (is_dataclass or each.name in field_classes()):
@@ -65,7 +65,7 @@ def fields(file: Path) -> Iterator[tuple[str, ast.AnnAssign, str | None]]:
 
 
 def says_itself(item: ast.AnnAssign) -> bool:
-    """It is declared with its text, carries that of its type, or has one possible value: the tag of a union."""
+    """It is declared with its text, has the text of its type, or has only one possible value, as the tag of a union."""
     annotation = ast.unparse(item.annotation)
     if annotation in OPTION_GROUPS or "tyro.conf.subcommand" in annotation or "description=" in annotation:
         return True
@@ -104,7 +104,7 @@ def test_modules_beside_the_packages_too() -> None:
 
 
 def test_it_counts_what_there_is() -> None:
-    """Were the fields not found, nothing would be missing."""
+    """If no fields were found, none would be missing."""
     found = [where for package in PACKAGES for file in package.rglob("*.py") for where, _, _ in fields(file)]
     assert len(found) > 2000
     bare, named = ast.parse("bare: int\nname: str\n").body

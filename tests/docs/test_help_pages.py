@@ -10,8 +10,8 @@ import pytest
 
 from app.engine.engine import Engine
 from app.web import help_pages
+from app.web.guards.tokens import Tokens
 from app.web.server import create_app
-from app.web.tokens import Tokens
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 from tests.app.web.serving import WAIT_S, serving

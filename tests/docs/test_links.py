@@ -16,8 +16,8 @@ LARGEST_IMAGE_BYTES = 300_000
 PACKAGES = ("app", "pipeline", "static", "tests")
 IN_THIS_REPOSITORY = re.compile(r"(app|pipeline|static|tests|docs|\.ci)/[\w./-]*|(app|pipeline)(\.[a-z_0-9]+)+")
 A_FILE = re.compile(r"[\w-]+\.(py|js|html|css|svg|toml|lock|ini)")
-TO_BE_WRITTEN = {"pipeline/radar"}
-"""What a guide tells its reader to make."""
+TO_BE_WRITTEN = {"pipeline/ranging/radar.py", "pipeline/simulation/sensors/radar.py"}
+"""Files that a guide tells its reader to create."""
 CITED_CODE = re.compile(r"(?<![\w/.-])(?:app|pipeline|static|tests)/[\w/-]+(?:\.(?:py|js|css|html))?(?![\w-])")
 CITED_PAGE = re.compile(r"(?<![\w/])docs/[\w/-]+\.md\b")
 

@@ -18,7 +18,7 @@ SHARED = {
     "Database": "the labels' database, and the option that names it",
     "Person": "who labels, and the option that names them",
 }
-"""Those that still do, and as what."""
+"""Names that are still shared, with their meanings."""
 A_TYPE = re.compile(r"[A-Z][a-z]\w*")
 A_PICTURE = re.compile("picture", re.IGNORECASE)
 
@@ -70,7 +70,7 @@ SAY_PICTURE = {
     "static/js/core/protocol.js": "a field of the stream",
     "static/js/core/connection.js": "a message of the page, picture_px",
 }
-"""Where a camera's image is still called a picture, and as what: names that are stored or sent cannot change."""
+"""Places where a camera image is still called a picture: names that are stored or sent cannot change."""
 
 
 @pytest.mark.parametrize("suffix", ["py", "js"])

@@ -34,5 +34,9 @@ def test_every_condition_of_a_lead_is_explained_in_its_order() -> None:
     assert set(names) <= set(code_spans("docs/guides/why.md"))
 
 
+def test_no_option_shows_pythons_none() -> None:
+    assert "None" not in (DOCS / "reference/cli.md").read_text(encoding="utf-8")
+
+
 def test_every_label_format_is_in_the_guide() -> None:
     assert set(FORMATS) <= set(code_spans("docs/guides/label.md"))

@@ -24,7 +24,7 @@ from app.drive.marks import Marks
 from app.labels.transfer.files import _unzipped
 from app.streaming.scene_requests import hear
 from app.streaming.stream import _object
-from pipeline.common.image_decoding import check_budget
+from pipeline.common.files.image_decoding import check_budget
 from pipeline.detection import Detectors
 from pipeline.evaluation.scores.results_file import read_results
 from pipeline.formats.calibration_files import FORMATS as CALIBRATIONS
@@ -47,9 +47,9 @@ from tests.fuzz.target import Target
 from tests.pipeline.calibration.alignment.made_drive import CAMERA
 from tests.pipeline.labels.formats.sets import IMPORT, drive
 from tests.pipeline.labels.formats.test_round_trip import full_set
-from tests.pipeline.sources.captures import RIG, lidar, pcapng, write_video
 from tests.pipeline.sources.conftest import object_calibration, write_kitti
 from tests.pipeline.sources.live.devices.test_mjpeg import MULTIPART, StopAtLook, part
+from tests.pipeline.sources.made.captures import RIG, lidar, pcapng, write_video
 from tests.pipeline.vision.networks import yolox
 
 _PART_OF_MANY = 0.25

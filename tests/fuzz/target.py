@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from pipeline.common.errors import BadInput
-from pipeline.common.image_decoding import TooMuch
+from pipeline.common.files.image_decoding import TooMuch
 from pipeline.recording.errors import Damaged
 from pipeline.sources.live.devices.device_reader import DeviceLost
 from pipeline.sources.live.devices.mjpeg import NotMjpeg

@@ -14,9 +14,9 @@ from unittest.mock import patch
 import cv2
 import numpy as np
 
-from pipeline.common import image_decoding
-from pipeline.common.image_decoding import decode_within_budget
-from pipeline.common.user_file_errors import parse_yaml
+from pipeline.common.files import image_decoding
+from pipeline.common.files.image_decoding import decode_within_budget
+from pipeline.common.files.user_file_errors import parse_yaml
 from pipeline.formats.kitti_records import parse_timestamps
 from pipeline.formats.nmea import NmeaReader
 from pipeline.formats.velodyne.decoder import VelodyneDecoder
@@ -40,8 +40,8 @@ from tests.fuzz.target import Target
 from tests.pipeline.formats.velodyne.streams import drive
 from tests.pipeline.formats.velodyne.test_models import stream
 from tests.pipeline.recording.frames import ABOUT, TRUTH, full, write
-from tests.pipeline.sources.bags import Kind, write_bag, write_packet_bag
 from tests.pipeline.sources.live.devices.test_wires import DBC
+from tests.pipeline.sources.made.bags import Kind, write_bag, write_packet_bag
 from tests.pipeline.sources.test_fuzz import FILES
 from tests.pipeline.sources.test_route_files import GGA, GPX, POINTS, RMC
 

@@ -26,8 +26,8 @@ EVERY = 5
 
 @pytest.fixture(scope="module")
 def drive() -> dict[str, list[dict[str, Any]]]:
-    """The line's results under each preset with the LiDAR alone, and under the default one with both sensors. Drawing
-    the drive is what takes long: it is done once, and all three go through it side by side."""
+    """Results of each preset with the LiDAR alone, and of the default one with both sensors. Rendering takes most of
+    the time, so all three share it."""
     source = open_source("sim:straight")
     lines = {
         "default": ("default", Detectors()),
@@ -41,12 +41,12 @@ def drive() -> dict[str, list[dict[str, Any]]]:
 
 
 def summary(results: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Every fifth frame: who leads, how far, why, and what ACC does."""
+    """Every fifth frame: the lead, its distance, the reason, and the ACC command."""
     return [_decisions(each) for each in results[::EVERY]]
 
 
 def _decisions(full: dict[str, Any]) -> dict[str, Any]:
-    """Without the objects' numbers: one roadside cluster more, on another processor, would shift them all."""
+    """Without object ids: one more roadside cluster, on another processor, would shift them all."""
     lead, command = full["cipv"] or {}, full["acc"]
     return {
         "frame": full["frame"],
@@ -68,7 +68,7 @@ def test_golden(drive: dict[str, list[dict[str, Any]]], name: str) -> None:
 
 
 def same(a: Any, b: Any) -> bool:
-    """Equal, floats to the centimetre."""
+    """Whether both are equal, floats to the centimetre."""
     if isinstance(a, dict) and isinstance(b, dict):
         return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
     if isinstance(a, list) and isinstance(b, list):
@@ -79,7 +79,7 @@ def same(a: Any, b: Any) -> bool:
 
 
 def test_nothing_brakes_hard_on_a_drive_that_needs_none(drive: dict[str, list[dict[str, Any]]]) -> None:
-    """With both sensors and the embedded detector: neither ACC's TTC rule nor emergency braking finds a phantom."""
+    """With both sensors and the embedded detector, neither ACC's TTC rule nor emergency braking reacts to a phantom."""
     commands = {result["frame"]: result["acc"] for result in drive["both sensors"]}
     assert len(commands) == 200
     phantoms = {frame: c["reason"] for frame, c in commands.items() if c["state"] not in ("cruise", "follow")}

@@ -58,7 +58,7 @@ def test_nothing_looks_for_lanes_in_a_recording_without_images() -> None:
 
 
 class _Seen:
-    """A detector that says which images it was asked about."""
+    """A detector that records the images that it processed."""
 
     notes = ()
 

@@ -17,7 +17,7 @@ from pipeline.types.result_json import write_line
 
 @pytest.fixture(scope="module")
 def frames() -> list[Frame]:
-    """Eight simulated frames with boxes where a detector that sees everything would put them."""
+    """Eight simulated frames with the boxes of a perfect detector."""
     source = open_source("sim:straight")
     return [dataclasses.replace(source.frame(i), raw_boxes=_perfect_boxes(source, i)) for i in range(8)]
 
@@ -61,7 +61,7 @@ def test_the_same_input_twice_gives_the_same_bytes(frames: list[Frame], name: st
 
 
 def test_a_frame_can_be_run_again_from_the_state_before_it(frames: list[Frame]) -> None:
-    """What a slider on a paused frame does: nothing that happened in between leaves a trace."""
+    """As with a slider on a paused frame: runs in between have no effect."""
     state = State()
     for frame in frames[:-1]:
         state, _ = step(state, frame, Params())
@@ -112,7 +112,7 @@ def test_no_ego_state_no_speed_over_ground_and_no_pedals(frames: list[Frame]) ->
 
 
 def test_the_lidar_gives_own_motion_where_nothing_else_does(frames: list[Frame]) -> None:
-    """At 20 m/s behind a car as fast: without own speed nothing says that it drives."""
+    """At 20 m/s behind a car of the same speed: without ego speed, nothing shows that it drives."""
     last = drive([dataclasses.replace(frame, ego=None, gnss=None) for frame in frames], Params())[-1]
     assert last.own_motion is not None
     assert last.own_motion.speed.source == "lidar"

@@ -28,7 +28,7 @@ from pipeline.sources.live.config import load
 from pipeline.types.source import is_live_source
 from tests.conftest import ROOT
 from tests.soak.chaos import Figures
-from tests.soak.live_run import KINDS, config_file
+from tests.soak.live.run import KINDS, config_file
 
 _SENSORS = ("lidar", "camera", "gnss")
 _DRIVE_S = 40.0
@@ -63,7 +63,7 @@ class LiveCar:
         faults = self._folder / "faults.yaml"
         while not stop.is_set():
             faults.write_text(yaml.safe_dump([each.model_dump() for each in self._random_faults()]))
-            command = [sys.executable, "-m", "tests.soak.live_car", self._config, str(_DRIVE_S), faults]
+            command = [sys.executable, "-m", "tests.soak.live.car", self._config, str(_DRIVE_S), faults]
             with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as self._car:
                 begins = threading.Thread(target=self._hear_it_begin, args=(self._car,))
                 begins.start()

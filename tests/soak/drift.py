@@ -53,9 +53,9 @@ class Outcome(NamedTuple):
     traffic_s: float
     """Seconds of traffic after the knock."""
     wrong_at_s: float | None
-    """When something was reported that was not so."""
+    """Times of false reports."""
     wrong: Drift | None
-    """What that was."""
+    """Their texts."""
 
 
 class Watch:
@@ -103,7 +103,7 @@ class Watch:
 
 
 def drive(seed: int, number: int) -> tuple[float, dict[str, Outcome]]:
-    """Kilometres, and what became of each variant."""
+    """Kilometres driven, and the outcome of each variant."""
     scene = traffic.scenario(seed, number)
     assert scene.detections is not None
     detections = scene.detections.model_copy(update={"lines": None})
@@ -145,7 +145,7 @@ def _measured(raw: RawBoxes, params: Params) -> tuple[VisionMeasurement, ...]:
 
 
 def drives(seed: int, km: float) -> Iterator[tuple[int, float, dict[str, Outcome]]]:
-    """As many drives as make so many kilometres."""
+    """As many drives as needed for this number of kilometres."""
     whole, number = 0.0, 0
     while whole < km:
         driven, outcomes = drive(seed, number)

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.alignment.projection import Alignment, project_cuboid, resolve
-from pipeline.common.data_dir import data_dir
+from pipeline.common.files.data_dir import data_dir
 from pipeline.common.geometry import F64, iou_matrix
 from pipeline.detection import Detectors, detect
 from pipeline.inference.model_registry import EMBEDDED

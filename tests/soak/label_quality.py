@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from app.drive.frame_rows import lead_reach_m
-from pipeline.common.data_dir import data_dir
+from pipeline.common.files.data_dir import data_dir
 from pipeline.common.geometry import Cuboid
 from pipeline.detection import Detectors
 from pipeline.labels.agreement import bev_iou, pairs

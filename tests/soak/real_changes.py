@@ -77,7 +77,7 @@ def noisy(sigma: float) -> Change:
 
 
 def shifted(x_px: int, y_px: int) -> Change:
-    """By whole pixels; the calibration stays, as when a mount trembles."""
+    """Shifted by whole pixels with the same calibration, as when a mount vibrates."""
     return _on_image(lambda bgr: np.roll(bgr, (y_px, x_px), axis=(0, 1)))
 
 
@@ -111,7 +111,7 @@ def cropped(frame: Frame) -> Frame:
 
 
 def turned(yaw_deg: float = 0.0, pitch_deg: float = 0.0) -> Change:
-    """The camera's calibration wrong by these angles."""
+    """The camera's calibration is wrong by these angles."""
     T = np.eye(4)
     T[:3, :3] = cv2.Rodrigues(np.radians([pitch_deg, yaw_deg, 0.0]))[0]
 
@@ -141,7 +141,7 @@ def _kept(which: Callable[[Frame], Mask]) -> Change:
 
 
 def thinned(share: float) -> Change:
-    """Without a random share of the points."""
+    """A random share of the points is removed."""
     return _kept(lambda frame: np.random.default_rng(frame.index).random(len(frame.sweep.points)) >= share)  # type: ignore[union-attr]
 
 

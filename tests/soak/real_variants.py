@@ -75,7 +75,7 @@ class Row(NamedTuple):
     said: str
     """Its figures, in words."""
     wrong: bool
-    """Whether something appeared from nothing."""
+    """Whether there was a phantom."""
 
 
 def run(folder: Path, kind: str, name: str, change: Change, sensors: Sensors) -> Row:

@@ -29,7 +29,7 @@ from tests.soak.chaos_live import LiveCar
 SECONDS = float(os.environ.get("CIPV_CHAOS_SECONDS", "3600"))
 CHECK_EVERY_S = 60.0
 GROWN_MB = 150.0
-"""A server's resident size from the least to the most of its checks: whole drives that are held, and Python's own."""
+"""Range of the server's resident size over all checks: drives held in memory, and Python's overhead."""
 
 
 @pytest.mark.soak

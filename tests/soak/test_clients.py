@@ -12,7 +12,7 @@ from app.bench.clients import figures
 
 CLIENTS, EACH_S = 50, 10.0
 CHEAPER = 40.0
-"""Than the same frames through uvicorn's default, compressed WebSocket."""
+"""Compared with the same frames through uvicorn's default, compressed WebSocket."""
 GROWTH_MS = 20.0
 
 

@@ -32,28 +32,28 @@ pytestmark = pytest.mark.soak
 
 BUILD = Path(__file__).resolve().parents[2] / "build"
 FEWEST_POINTS = 5
-"""With fewer, neither a person nor the pipeline could say where a vehicle is."""
+"""Minimum number of points: with fewer, neither a person nor the pipeline could locate a vehicle."""
 SAME_PLACE_M = 2.5
 GOOD_ENOUGH = 0.7
-"""A person corrects a track whose overlap with the truth is less, where it is seen best."""
+"""A person corrects a track whose overlap with the truth is lower, in the frame in which it is seen best."""
 BEST_SEEN_M = 15.0
 HALF_M = 50.0
-"""The plan shows this far in every direction, when it is asked to."""
+"""Extent of the plan in every direction when the whole surroundings are shown."""
 CLIP = range(414, 426)
-"""Astyx frames in which we come up to a lead."""
+"""Astyx frames in which the car approaches a lead."""
 
 
 @dataclass
 class Person:
-    """Who labels a drive: hands, and the truth in mind."""
+    """A person who labels a drive and knows the truth."""
 
     hand: Hand
     labels: Labels
     count: int
     truth: dict[int, dict[int, Cuboid]]
-    """Of each vehicle, where it is, by frame: to 50 m and with points on it."""
+    """Cuboids of each vehicle by frame, up to 50 m and with points on it."""
     seen: dict[str, int] = field(default_factory=dict)
-    """What was done, in words."""
+    """The acts, in words."""
 
     @property
     def page(self) -> Page:
@@ -63,7 +63,7 @@ class Person:
         self.seen[what] = self.seen.get(what, 0) + 1
 
     def around(self, x: float, y: float) -> tuple[float, float]:
-        """The pixel of a place of the plan that shows what is around."""
+        """Page pixel of a position in the plan of the whole surroundings."""
         box = box_of(self.page.locator("#bev"))
         scale = min(box["height"], box["width"]) / (2 * HALF_M)
         return box["x"] + box["width"] / 2 - y * scale, box["y"] + box["height"] / 2 - x * scale
@@ -83,7 +83,7 @@ class Person:
         expect(row).to_have_attribute("aria-selected", "true")
 
     def cuboids(self, state: tuple[str, ...]) -> dict[int, dict[int, Any]]:
-        """Of each track in one of these states, its cuboids by frame."""
+        """Cuboids by frame of each track in one of these states."""
         wanted = {number for number, track in self.labels.tracks.items() if track["state"] in state}
         found: dict[int, dict[int, Any]] = {number: {} for number in wanted}
         rows = self.labels.get(f"/frames?first=0&last={self.count - 1}")["sightings"]
@@ -96,7 +96,7 @@ class Person:
         return found
 
     def whose(self, cuboids: dict[int, Cuboid]) -> int | None:
-        """The vehicle that a track is on, in most of its frames with a vehicle in mind."""
+        """The vehicle that a track matches in most of its frames."""
         votes: list[int | None] = []
         for frame, cuboid in cuboids.items():
             there = [
@@ -118,7 +118,7 @@ class Person:
         self.wait_changed(track, revision)
 
     def draw(self, frame: int, true: Cuboid, track: int | None) -> int:
-        """From its rear to its front; a new one, or the selected one anew."""
+        """Draw a cuboid from its rear to its front: a new track, or the selected one again."""
         self.go_to(frame)
         c, s = math.cos(true.yaw_rad), math.sin(true.yaw_rad)
         half = true.size[0] / 2
@@ -138,12 +138,12 @@ class Person:
 
 
 def best_frame(true: dict[int, Cuboid], among: set[int]) -> int:
-    """Where a vehicle is seen well."""
+    """The frame in which a vehicle is seen best."""
     return min(among, key=lambda at: abs(math.hypot(*true[at].center[:2]) - BEST_SEEN_M))
 
 
 def label_everything(person: Person) -> None:
-    """From the pipeline's proposals."""
+    """Label the whole drive from the pipeline's proposals."""
     hand, labels, page = person.hand, person.labels, person.page
     hand.keys("p")
     labels.wait_for(lambda now: len(now.leads) > 0)
@@ -207,7 +207,7 @@ def label_everything(person: Person) -> None:
 
 
 def judged(person: Person) -> dict[str, Any]:
-    """The labels against the truth."""
+    """Figures of the labels compared with the truth."""
     mine = person.cuboids(("accepted", "corrected"))
     overlaps, turned, wanted = [], 0, 0
     for frame in range(person.count):
@@ -249,7 +249,7 @@ def seen_vehicles(name: str, site: Site) -> dict[int, dict[int, Cuboid]]:
 
 @pytest.fixture(params=["astyx", "0009"])
 def desk(request: pytest.FixtureRequest, data_dir: Path, tmp_path: Path) -> Iterator[tuple[str, Site]]:
-    """The drive, computed and paused at its start."""
+    """A page with the drive computed, paused at its start."""
     scheme, path = DRIVES[request.param].split(":")
     folder = data_dir / path
     if request.param == "astyx":

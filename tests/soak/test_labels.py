@@ -39,7 +39,7 @@ pytestmark = pytest.mark.soak
 KILLS = 100
 FRAMES, TRACKS, LIFE = 4000, 1000, 100
 SEEK_S, EXPORT_S = 0.15, 10.0
-"""An export also as a whole command, from its first import to its end."""
+"""Limits of an export as a whole command, from its first import to its end."""
 COUNTING_S = 15.0
 """nuScenes: points are counted by two threads, so that the command takes less time than CPU."""
 BY = Origin("import", "made up", 1)
@@ -118,8 +118,8 @@ def test_a_hundred_thousand_labels_in_one_drive(kind: str, request: pytest.Fixtu
 
 @pytest.mark.timeout(3600)
 def test_a_hundred_thousand_labels_of_a_real_session_go_out_by_the_command_line(data_dir: Path, tmp_path: Path) -> None:
-    """Frames of a real drive, over and over: camera, points and calibration are there. Every format, in a process of
-    its own; nuScenes counts the points in each cuboid, and a session is written whole."""
+    """Frames of a real drive, repeated, with camera, points and calibration. Every format in its own process; nuScenes
+    counts the points in each cuboid, and a whole session is written."""
     session, labels = tmp_path / "drive.mcap", tmp_path / "labels.json"
     _write_session(session, data_dir / "kitti_0052")
     drive = drive_of(open_source(str(session)))
@@ -135,7 +135,7 @@ def test_a_hundred_thousand_labels_of_a_real_session_go_out_by_the_command_line(
 
 
 def _cpu_s(command: list[Any]) -> float:
-    """Seconds of CPU that a command takes, of all its threads."""
+    """CPU time of a command in seconds, over all threads."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([sys.executable, "-c", "from app.cli import main; main()", *map(str, command)], check=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -158,7 +158,7 @@ def _write_session(path: Path, folder: Path) -> None:
 
 
 def _with_boxes(labels: LabelSet) -> LabelSet:
-    """Each sighting with a box of the image too."""
+    """Each sighting with an image box too."""
     box = (500.0, 150.0, 600.0, 220.0)
     return replace(
         labels,

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from tests.conftest import ROOT
-from tests.soak.live_run import KINDS, for_real_roads, soak
+from tests.soak.live.run import KINDS, for_real_roads, soak
 
 ALLOWED_SHARE, ALLOWED_BYTES = 0.02, 32e6
 """Of growth, in ten minutes; in half a minute, which has hardly a warm-up: on a busy machine 8 MB are a queue that was
@@ -25,7 +25,7 @@ P99_MS, RECOVERY_S = 150.0, 1.0
 
 
 def judge(report: dict[str, Any]) -> None:
-    """What holds on any machine."""
+    """Check what holds on any machine."""
     assert report["errors"] == []
     assert all(each["seconds"] is not None for each in report["recoveries"]), "every sensor came back"
     recording = report["recording"]

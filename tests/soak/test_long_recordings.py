@@ -12,9 +12,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 ALLOWED_MB = 150.0
-"""What opening and reading may add; the files are 70 and 16 times as large."""
+"""Maximum growth due to opening and reading; the files are 70 and 16 times as large."""
 ALLOWED_CPU_S_PER_GB, ALLOWED_SEEK_CPU_MS = 12.0, 50.0
-"""Twice what it takes; CPU time, which another program on the machine does not change much."""
+"""Twice the CPU time that it takes, which other programs on the machine hardly change."""
 ROUNDS = {"pcap": 5_600, "rosbag": 250}  # of 20 sweeps, and of 3
 
 
@@ -23,7 +23,7 @@ ROUNDS = {"pcap": 5_600, "rosbag": 250}  # of 20 sweeps, and of 3
 @pytest.mark.skipif(sys.platform != "linux", reason="resident size is in kB on Linux only")
 @pytest.mark.parametrize("kind", ROUNDS)
 def test_longer_than_memory(kind: str, tmp_path: Path) -> None:
-    """In a process of its own, so that its greatest size is this work's."""
+    """In its own process, so that the peak size is that of this work."""
     command = [sys.executable, __file__, kind, str(tmp_path), str(ROUNDS[kind])]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
     report = json.loads(done.stdout)
@@ -42,7 +42,7 @@ def _main(kind: str, folder: Path, rounds: int) -> dict[str, float]:
     import numpy as np
 
     from pipeline.sources import open_source
-    from tests.pipeline.sources import bags, captures
+    from tests.pipeline.sources.made import bags, captures
     from tests.pipeline.sources.pcap.test_source import later
 
     path = folder / ("long.pcap" if kind == "pcap" else "long")

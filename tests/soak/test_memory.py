@@ -22,7 +22,7 @@ from tests.conftest import ROOT
 PAGE = os.sysconf("SC_PAGE_SIZE")
 ALLOWED_SHARE = 0.02
 ALLOWED_BYTES = 8e6
-"""A malloc arena or two; a frame's image alone is 3 MB."""
+"""One or two malloc arenas; a frame's image alone is 3 MB."""
 
 
 def resident_bytes() -> int:
@@ -31,7 +31,7 @@ def resident_bytes() -> int:
 
 
 def play(pipeline: SeekablePipeline, encoder: Encoder, frames: range) -> int:
-    """One round; the bytes that a browser would have got."""
+    """Play one round; returns the number of bytes that a browser would receive."""
     sent = 0
     for index in frames:
         tick = pipeline.advance(index, Params())
@@ -41,7 +41,7 @@ def play(pipeline: SeekablePipeline, encoder: Encoder, frames: range) -> int:
 
 
 def growth(uri: str, detector: Detector | None, frames: int | None, warm_up: int, rounds: int) -> tuple[float, int]:
-    """Bytes grown after the first ``warm_up`` rounds, and the resident size then."""
+    """Growth in bytes after the first ``warm_up`` rounds, and the resident size at that time."""
     source = open_source(uri)
     pipeline, encoder = SeekablePipeline(source, Detectors(detector), DetectionCache(), "both"), Encoder()
     shown = range(min(frames or len(source), len(source)))

@@ -103,7 +103,7 @@ FRAME_BYTES = 900_000, 1_200_000
 
 @pytest.mark.timeout(3600)
 def test_any_frame_of_an_hour_is_near_and_memory_is_bounded(tmp_path: Path) -> None:
-    """An hour at 10 Hz of full sweeps and images, 36 GB: larger than the memory that holds files."""
+    """An hour of full sweeps and images at 10 Hz, 36 GB: larger than the page cache."""
     free = shutil.disk_usage(tmp_path).free
     if free < 1.1 * FRAMES * FRAME_BYTES[1]:
         pytest.skip(f"an hour of full frames takes 36 GB, and {free / 1e9:.0f} GB are free in {tmp_path}")
@@ -138,7 +138,7 @@ for index in range(10**9):
 
 @pytest.mark.timeout(600)
 def test_killed_again_and_again(tmp_path: Path) -> None:
-    """After any number of bytes, up to 6 MB: every frame that was in a complete chunk is there."""
+    """After any number of bytes up to 6 MB, every frame in a complete chunk is readable."""
     random, saved = np.random.default_rng(2), []
     for kill in range(KILLS):
         path, out = tmp_path / f"{kill}.mcap", tmp_path / f"{kill}_recovered.mcap"

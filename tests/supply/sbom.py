@@ -25,7 +25,7 @@ _SAYS_ITS_VERSION = {
     b"OpenSSL ": re.compile(rb"OpenSSL (\d+\.\d+\.\d+[a-z]*) +\d+ "),
     b"x264 - core ": re.compile(rb"x264 - core (\d+)"),
 }
-"""What stands in a library, to be told which it is."""
+"""Texts by which a library is recognised."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Pin:
 
 
 def pins(lock: Path) -> Iterator[Pin]:
-    """The packages of a lock."""
+    """The packages in a lock file."""
     for line in lock.read_text(encoding="utf-8").splitlines():
         found = _PINNED.match(line)
         if found is not None:
@@ -64,7 +64,7 @@ def bundled(package: Distribution) -> list[dict[str, str]]:
 
 
 def licence_of(package: Distribution) -> str:
-    """As the package states it; ``not stated`` where it does not."""
+    """The licence stated by the package; ``not stated`` without one."""
     about = package.metadata
     classifiers = about.get_all("Classifier") or ()
     classified = [text.rpartition(" :: ")[2] for text in classifiers if text.startswith("License")]
@@ -105,7 +105,7 @@ def _plain(name: str) -> str:
 
 
 def write(folder: Path) -> None:
-    """Both files."""
+    """Write both files."""
     found = components()
     bom = {
         "bomFormat": "CycloneDX",

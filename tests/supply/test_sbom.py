@@ -34,7 +34,7 @@ def test_everything_is_accounted_for_with_what_the_wheels_bundle(tmp_path: Path)
 
 
 def test_no_wheel_bundles_an_openssl_without_support():
-    """Of 1.1.1 there are no more corrections since September 2023. Optional and development packages count, too."""
+    """OpenSSL 1.1.1 has had no security fixes since September 2023. Optional and development packages count too."""
     found = {
         (package.name, part["name"]): part.get("version", "not stated")
         for package in distributions()

@@ -17,9 +17,9 @@ from urllib.request import Request, urlopen
 import numpy as np
 from websockets.sync.client import connect
 
-from app.bench.labelled import labelled
 from app.bench.page.browser import Waits, first_views_ms, paused, playing
 from app.bench.page.devtools import FLAGS, Browser, browser
+from app.bench.page.labelled import labelled
 from pipeline.common.errors import BadInput
 
 _ALL_SEEN_WITHIN_S, _ASK_EVERY_S = 120.0, 0.5

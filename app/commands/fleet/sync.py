@@ -17,8 +17,8 @@ from app.commands.support.progress_bars import bytes_progress, task_progress
 from app.core.session_folder import SESSIONS
 from app.core.terminal import one_line
 from pipeline.common.errors import BadInput
+from pipeline.common.files.user_files import Overloaded
 from pipeline.common.progress import Progress
-from pipeline.common.user_files import Overloaded
 
 if TYPE_CHECKING:
     from app.fleet.sync.sync import SyncTally

@@ -18,8 +18,8 @@ from app.commands.support.options import RecordingName
 from app.commands.support.progress_bars import frames_progress, task_progress
 from app.labels.project_classes import project_classes
 from app.labels.wording import WORKING
+from pipeline.common.files.user_file_errors import given_path
 from pipeline.common.garbage_collection import gc_paused
-from pipeline.common.user_file_errors import given_path
 from pipeline.labels.classes import ClassList, read_classes
 from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.native import from_json, onto

@@ -14,7 +14,7 @@ import tyro
 from app.commands.labels.files import Database, Person, say
 from app.commands.support.arguments import option
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import given_path
+from pipeline.common.files.user_file_errors import given_path
 from pipeline.labels.formats.native import from_json
 from pipeline.labels.formats.reading import read_bytes
 
@@ -106,7 +106,7 @@ class LabelQueue:
     """Title, address or key of the recording to change"""
     assign: Annotated[str | None, option("PERSON")] = None
     """Assign it to this person"""
-    state: State | None = None
+    state: Annotated[State | None, option("open|labeling|review|done")] = None
     """Its new state"""
     database: Database = None
     """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
@@ -134,7 +134,7 @@ class LabelQueue:
         for each in found:
             print(
                 f"{each.title}: {each.state}, {each.person or 'unassigned'}; labelled {percent(each.labelled)}, "
-                f"reviewed {percent(each.reviewed)}, proposals {each.proposals:,}, frames to label next {each.asked:,}"
+                f"reviewed {percent(each.reviewed)}, proposals {each.proposals:,}, queued frames {each.asked:,}"
                 f", priority {each.worth:.2f}"
             )
         if not found:

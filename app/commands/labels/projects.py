@@ -12,7 +12,7 @@ from app.commands.labels.files import Database, Person, say
 from app.commands.labels.people import percent
 from app.commands.support.arguments import option
 from app.labels.project_classes import project_classes
-from pipeline.common.user_file_errors import given_path
+from pipeline.common.files.user_file_errors import given_path
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class LabelProjects:
         for each in found:
             print(
                 f"{each.name}: {each.done} of {each.drives} recordings done, lead labelled in {percent(each.labelled)} "
-                f"of {each.frames:,} frames, {each.asked:,} of {each.sampled:,} requested frames left"
+                f"of {each.frames:,} frames, {each.asked:,} of {each.sampled:,} queued frames left"
                 f"{f' ({each.sampling})' if each.sampling else ''}"
             )
             for one in each.people:

@@ -12,7 +12,7 @@ import tyro
 
 from app.commands.support.arguments import option
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import parse_yaml
+from pipeline.common.files.user_file_errors import parse_yaml
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
 from pipeline.source_kinds import usages
 

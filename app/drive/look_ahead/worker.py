@@ -18,7 +18,7 @@ from app.drive.frame_inputs import without_pixels
 from app.drive.look_ahead.client import NetworkProcess, ProcessEnded, is_worth_a_process
 from app.drive.open_recording import OpenRecording
 from pipeline.common.errors import first_line
-from pipeline.common.user_files import Overloaded
+from pipeline.common.files.user_files import Overloaded
 from pipeline.detection import Detectors
 from pipeline.types import Frame
 

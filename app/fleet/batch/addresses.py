@@ -11,8 +11,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from pipeline.common.errors import BadInput
-from pipeline.common.remote_files import NotReachable, file_system, is_remote, patiently, version_of
-from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
+from pipeline.common.files.remote_files import NotReachable, file_system, is_remote, patiently, version_of
+from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.source_kinds import is_live, kind_named, looks_like
 from pipeline.sources.fingerprint import fingerprint
 

@@ -13,6 +13,7 @@ from pipeline.evaluation.scores.figures import FIGURES, ratio
 from pipeline.evaluation.scores.truth import of_source
 from pipeline.params import Params
 from pipeline.types import Result
+from pipeline.types.sensors import CAMERA
 from pipeline.types.source import Source
 
 LABELLED = "labelled."
@@ -32,7 +33,7 @@ def scores_of(history: History, labelled: Sequence[Result], source: Source, para
 def labelled_scores(drive: DriveScore) -> DriveScores:
     """The figures of ``cipv evaluate`` that are sums divided by counts, and those of the camera alone."""
     scores = {figure.name: figure.part(drive) for figure in FIGURES if figure.whole is ratio}
-    errors = [error for frame in drive.frames for error in frame.errors if error.source == "V"]
+    errors = [error for frame in drive.frames for error in frame.errors if error.source == CAMERA.letter]
     shares = [100.0 * abs(error.distance_m) / error.range_m for error in errors if error.range_m > 1.0]
     speeds = [abs(error.speed_mps) for error in errors if error.speed_mps is not None]
     correct, judged = scores["cipv_correct"]

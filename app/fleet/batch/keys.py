@@ -9,7 +9,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from pipeline.common.data_dir import file_sha256
+from pipeline.common.files.data_dir import file_sha256
 from pipeline.detection import DetectorChoice
 from pipeline.inference.distance_laws import law_file
 from pipeline.inference.model_registry import EMBEDDED, default_model, find

@@ -18,7 +18,7 @@ from distributed import Client, KilledWorker, LocalCluster, as_completed
 from app.fleet.batch.job import Job, Outcome, TooLong
 from app.fleet.batch.work import WrongWorker, look_at_piece, run_drive, set_aside
 from pipeline.common.errors import BadInput, first_line
-from pipeline.common.user_files import Overloaded
+from pipeline.common.files.user_files import Overloaded
 
 IN_FLIGHT_A_THREAD = 3
 """Pieces of work submitted to Dask at once, per worker thread: one runs, the others are ready."""

@@ -11,7 +11,7 @@ from app.drive.events import event_kinds
 from app.fleet.compare.changes import EventChange
 from app.fleet.compare.paired import PairedScore, known_scores
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import did_you_mean, first_complaint, read_yaml
+from pipeline.common.files.user_file_errors import did_you_mean, first_complaint, read_yaml
 
 
 class Rule(BaseModel):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_files import open_regular
+from pipeline.common.files.user_files import open_regular
 from pipeline.recording.mcap.index import MAGIC
 from pipeline.recording.mcap.reader import McapFile, NotMcap
 

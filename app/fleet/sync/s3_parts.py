@@ -12,8 +12,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from app.fleet.sync.pace import Pace
+from pipeline.common.files.remote_files import patiently
 from pipeline.common.progress import Progress
-from pipeline.common.remote_files import patiently
 
 PART_BYTES = 5 << 20
 """The smallest part that S3 accepts: what an interruption can cost, and what is sent in one go where a rate is set."""

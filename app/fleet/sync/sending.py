@@ -15,9 +15,9 @@ from app.fleet.store import Store
 from app.fleet.sync.pace import Pace
 from app.fleet.sync.s3_parts import PartedUpload, part_bytes
 from pipeline.common.errors import BadInput
+from pipeline.common.files.remote_files import patiently
+from pipeline.common.files.user_files import open_regular
 from pipeline.common.progress import Progress
-from pipeline.common.remote_files import patiently
-from pipeline.common.user_files import open_regular
 
 BLOCK_BYTES = 1 << 20
 _READ_ONLY = ("http://", "https://")

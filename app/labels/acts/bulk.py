@@ -14,10 +14,10 @@ from app.labels.acts.around import sweeps_of
 from app.labels.acts.leads import clear
 from app.labels.acts.tags import put_tag
 from app.labels.errors import ActRefused
-from app.labels.service.tasks import TaskWork
 from app.labels.store.draft import Draft
 from app.labels.store.drive_labels import DriveLabels
 from app.labels.store.frame_ranges import free_spans
+from app.labels.tasks import TaskWork
 from app.labels.wording import frames_text, outside_text
 from pipeline.common.progress import Progress, silent
 from pipeline.labels.cuboids.refine import refined

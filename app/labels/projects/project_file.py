@@ -11,8 +11,8 @@ from pydantic import Field, ValidationError
 from app.labels.acts.request_fields import Person, Strict
 from app.labels.projects.sampling import Sampling
 from pipeline.common.errors import BadInput
-from pipeline.common.user_file_errors import first_complaint, given_path, read_yaml
-from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
+from pipeline.common.files.user_file_errors import first_complaint, given_path, read_yaml
+from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.labels.classes import read_classes
 from pipeline.labels.formats.native import from_json
 from pipeline.labels.formats.reading import read_bytes

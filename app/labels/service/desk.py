@@ -20,7 +20,7 @@ from app.labels.acts.requests import Import, Lift, Propagate, Propose, Refit
 from app.labels.service.opened import KeptLabels, Opened
 from app.labels.service.param_write_queue import SettlingQueue
 from app.labels.service.state import LabelState
-from app.labels.service.tasks import Tasks
+from app.labels.tasks import Tasks
 from pipeline.common.errors import BadInput
 from pipeline.labels.classes import ClassList, default_classes
 from pipeline.labels.formats.registry import FormatName

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from app.labels.service.tasks import TaskState
+from app.labels.tasks import TaskState
 
 
 @dataclass(frozen=True)

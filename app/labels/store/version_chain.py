@@ -1,7 +1,7 @@
 """Frozen versions chained by hash: each holds the SHA-256 of its content and of the version before it.
 
 A version that was changed in the database, or whose predecessor was removed, is rejected when it is read. Anyone who
-can write the database can build the chain again, but not sign it again: see ``pipeline.common.signing``.
+can write the database can build the chain again, but not sign it again: see ``pipeline.common.files.signing``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sqlalchemy import Connection, select
 
 from app.labels.errors import ActRefused
 from app.labels.store.tables import VersionRow
-from pipeline.common.signing import Signature, check_signature, configured_signer, expected_key
+from pipeline.common.files.signing import Signature, check_signature, configured_signer, expected_key
 
 _SAID = ("name", "person", "t_unix_ms", "tracks", "frames")
 

@@ -15,8 +15,8 @@ from typing import IO
 from app.drive.open_recording import OpenRecording
 from app.labels.acts.bulk import importing
 from app.labels.errors import ActRefused, BadAct
-from app.labels.service.tasks import TaskWork
 from app.labels.store.drive_labels import DriveLabels
+from app.labels.tasks import TaskWork
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
 from pipeline.labels.classes import ClassList

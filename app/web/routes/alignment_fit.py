@@ -12,7 +12,7 @@ from pydantic import ConfigDict, Field
 from app.core.jobs import JobState
 from app.drive.alignment_fit import AlignmentFitting, FitJob
 from app.engine.engine import Engine
-from app.web.routes.refusals import open_recording, refusing
+from app.web.refusals import open_recording, refusing
 from app.web.routes.shapes.common import ApiModel, StatusJson, file_of
 from pipeline.calibration.alignment.fit import AlignmentFit, overlap_sentence
 from pipeline.calibration.alignment.models import ModelName

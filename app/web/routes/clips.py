@@ -13,9 +13,9 @@ from app.clips.export_queue import ExportQueue, ExportStatus
 from app.clips.exports import EXPORTERS, submit
 from app.core.jobs import JobState
 from app.engine.engine import Engine
-from app.web.routes.names import one_of
-from app.web.routes.refusals import open_recording, refusing
+from app.web.refusals import open_recording, refusing
 from app.web.routes.shapes.common import ApiModel, StatusJson, file_of
+from app.web.routes.shapes.names import one_of
 
 ClipKind = Annotated[str, *one_of(EXPORTERS)]
 

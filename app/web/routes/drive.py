@@ -17,11 +17,10 @@ from app.drive.marks import LIVE, LONGEST_TEXT, MarkRefused, Marks
 from app.drive.open_recording import OpenRecording
 from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
-from app.web.routes.names import one_of
-from app.web.routes.refusals import open_recording, refusing
-from app.web.routes.shapes.common import ApiModel, StatusJson
+from app.web.refusals import open_recording, refusing
+from app.web.routes.shapes.common import ApiModel, SensorLetters, StatusJson
+from app.web.routes.shapes.names import one_of
 from pipeline.common.clips import first_frames
-from pipeline.types import ObjectSource
 
 
 class Columns(ApiModel):
@@ -54,8 +53,8 @@ class Curve(ApiModel):
     """Number of the run."""
     index: list[int]
     """Numbers of the frames; all lists have this length."""
-    source: list[ObjectSource]
-    """V, L or VL."""
+    source: list[SensorLetters]
+    """The letters of its sensors: V, L or VL."""
     carried: list[bool]
     """Predicted, not seen in that frame."""
     in_path: list[bool]

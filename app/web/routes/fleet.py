@@ -9,7 +9,7 @@ from pydantic import Field
 
 from app.drive.events import event_kinds
 from app.fleet.desk import FleetDesk
-from app.web.routes.refusals import refusing
+from app.web.refusals import refusing
 from app.web.routes.shapes.common import ApiModel
 
 MOST_ROWS, LONGEST_CONDITION = 1000, 4000

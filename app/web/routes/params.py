@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 
 from app.engine.engine import Engine
 from app.labels.acts.request_fields import PersonOrNobody
-from app.web.routes.refusals import refusing
+from app.web.refusals import refusing
 from app.web.routes.shapes.common import ApiModel, file_of
 from app.web.routes.shapes.parameters import ParamsJson
 from pipeline.alignment.projection import angular_from_calibration

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from fastapi import APIRouter
 
 from app.engine.engine import Engine
-from app.web.routes.refusals import refusing
+from app.web.refusals import refusing
 from app.web.routes.shapes.common import ApiModel
 from app.web.routes.shapes.state import RecordingJson
 

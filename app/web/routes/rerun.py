@@ -17,9 +17,9 @@ from app.clips.exports import write_clip
 from app.engine.engine import Engine
 from app.views.rerun.start_options import RerunStartOptions
 from app.views.rerun.web import FILES, ViewerFiles
-from app.web.quotas import while_waited_for
+from app.web.guards.quotas import while_waited_for
+from app.web.refusals import open_recording, refusing
 from app.web.routes.clips import clip_of
-from app.web.routes.refusals import open_recording, refusing
 from app.web.routes.shapes.common import ApiModel, file_of
 from pipeline.common.progress import Progress
 

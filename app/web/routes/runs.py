@@ -17,8 +17,8 @@ from app.drive.run_registry import LONGEST_NAME
 from app.engine.engine import Engine
 from app.labels.errors import DatabaseError
 from app.labels.service.desk import LabelDesk
+from app.web.refusals import open_recording, refusing
 from app.web.routes.drive import Columns, columns_of, current
-from app.web.routes.refusals import open_recording, refusing
 from app.web.routes.shapes.common import ApiModel, MetricJson, file_of
 from pipeline.params import changes_of, to_yaml
 

@@ -27,8 +27,8 @@ SIGHTING = np.dtype(
         ("closing_mps", "f4"),
     ]
 )
-"""One object in one frame. ``ranged``: its distance was measured by LiDAR in this frame; ``by_camera``: only the camera
-sees it, and its distance was measured from its image box in this frame. NaN: unknown."""
+"""One object in one frame. ``ranged``: its distance was measured by the LiDAR or another ranging sensor in this frame;
+``by_camera``: only the camera sees it, and its distance was measured from its image box in this frame. NaN: unknown."""
 SightingRecords = npt.NDArray[np.void]
 
 
@@ -78,7 +78,7 @@ def _sighting(frame: int, item: FusedObject) -> tuple[object, ...]:
     return (
         frame,
         item.id,
-        measured and item.distance_from in ("cluster", "returns"),
+        measured and item.distance_from not in (None, "box"),
         measured and item.distance_from == "box" and not item.tracked_by_two_sensors,
         item.carried,
         item.tracked_by_two_sensors,

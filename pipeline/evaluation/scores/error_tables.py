@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pipeline.evaluation.report_sections import Cell, Chart, ReportSection, Series, Table
 from pipeline.evaluation.scores.figures import Drives
 from pipeline.evaluation.scores.matching import MAX_RANGE_M, Error
-from pipeline.types import MOST_SENSORS_FIRST
+from pipeline.types import most_sensors_first
 
 BIN_M = 10
 _ERRORS = ("distance_m", "lateral_m", "longitudinal_m", "speed_mps")
@@ -66,7 +66,7 @@ _CHARTS = {
 def _scatter(title: str, unit: str, name: str, errors: Sequence[Error]) -> Chart:
     """One error of every vehicle in every frame, by sensor."""
     lines = []
-    for source in MOST_SENSORS_FIRST:
+    for source in most_sensors_first():
         pairs = [(e.range_m, value) for e in errors if e.source == source and (value := getattr(e, name)) is not None]
         lines.append(Series.of_points(source, pairs))
     return Chart(title, "true range m", f"estimated − true {unit}", tuple(lines))
@@ -76,12 +76,12 @@ def error_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:
     """By sensor over all ranges, then for each range bin in total and by sensor. Empty groups are omitted."""
     every = _all_errors(run)
     groups: list[tuple[str, str, list[Error]]] = [("all", "any", every)]
-    groups += [("all", source, [e for e in every if e.source == source]) for source in MOST_SENSORS_FIRST]
+    groups += [("all", source, [e for e in every if e.source == source]) for source in most_sensors_first()]
     for low in range(0, int(MAX_RANGE_M), BIN_M):
         inside = [error for error in every if low <= error.range_m < low + BIN_M]
         name = f"{low}–{low + BIN_M} m"
         groups.append((name, "any", inside))
-        groups += [(name, source, [e for e in inside if e.source == source]) for source in MOST_SENSORS_FIRST]
+        groups += [(name, source, [e for e in inside if e.source == source]) for source in most_sensors_first()]
     return tuple((name, source, len(errors), *_table_4(errors)) for name, source, errors in groups if errors)
 
 
@@ -89,11 +89,11 @@ def sigma_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:
     """The share of distance errors within 1, 2 and 3 of their sigmas, in %: by sensor over all ranges, then by range
     and sensor. Empty groups are omitted."""
     every = [error for error in _all_errors(run) if error.distance_sigma_m]
-    groups = [("all", source, [e for e in every if e.source == source]) for source in MOST_SENSORS_FIRST]
+    groups = [("all", source, [e for e in every if e.source == source]) for source in most_sensors_first()]
     for low in range(0, int(MAX_RANGE_M), SIGMA_BIN_M):
         inside = [error for error in every if low <= error.range_m < low + SIGMA_BIN_M]
         name = f"{low}–{low + SIGMA_BIN_M} m"
-        groups += [(name, source, [e for e in inside if e.source == source]) for source in MOST_SENSORS_FIRST]
+        groups += [(name, source, [e for e in inside if e.source == source]) for source in most_sensors_first()]
     return tuple((name, source, len(errors), *_within(errors)) for name, source, errors in groups if errors)
 
 

@@ -11,10 +11,10 @@ from typing import Any, get_args, get_type_hints
 import numpy as np
 
 from pipeline.common.errors import BadInput
+from pipeline.common.files.user_file_errors import reason_of
+from pipeline.common.files.user_files import open_regular
 from pipeline.common.geometry import Cuboid
-from pipeline.common.user_file_errors import reason_of
-from pipeline.common.user_files import open_regular
-from pipeline.types import OBJECT_SOURCES, AccCommand, Cipv, EgoState, FusedObject, Layers, Path, Result, SensorHealth
+from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Layers, Path, Result, SensorHealth, object_sources
 from pipeline.types.result_json import VERSION
 
 EMPTY = Layers(np.zeros((0, 4), np.float32), np.zeros(0, np.int32))
@@ -99,7 +99,7 @@ def _object(row: dict[str, Any]) -> FusedObject:
     if bev is not None and len(bev) != 4:
         raise ValueError("four corners")
     box = row["cuboid"]
-    if row["source"] not in OBJECT_SOURCES:
+    if row["source"] not in object_sources():
         raise ValueError(row["source"])
     if row["type"] is not None and not isinstance(row["type"], str):
         raise ValueError(row["type"])

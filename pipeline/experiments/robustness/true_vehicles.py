@@ -14,7 +14,7 @@ from pipeline.experiments.true_lead import range_m, same_place
 from pipeline.simulation.sensors.truth_boxes import in_image
 from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.types import CameraCalibration, FusedObject, Point2
-from pipeline.types.sensors import SENSOR_NAMES, are_several
+from pipeline.types.sensors import are_several, kinds_in
 
 _PARKED, _ONCOMING, _BESIDE, _CROSSING = 100, 1000, 2000, 3000
 """First number of each part of the random traffic (``traffic``)."""
@@ -83,7 +83,7 @@ def seen_by(item: FusedObject | None) -> str:
     """The sensors that an object is based on."""
     if item is None:
         return "nobody"
-    return "both" if are_several(item.source) else SENSOR_NAMES[item.source]
+    return "both" if are_several(item.source) else kinds_in(item.source)[0].title
 
 
 def why_missed(lead: ActorState, chosen: FusedObject | None) -> str:

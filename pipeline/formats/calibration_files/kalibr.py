@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import yaml
 
+from pipeline.common.files.user_file_errors import read_yaml
 from pipeline.common.geometry import inverse
-from pipeline.common.user_file_errors import read_yaml
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError

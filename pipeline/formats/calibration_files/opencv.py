@@ -12,7 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from pipeline.common.user_file_errors import parse_yaml
+from pipeline.common.files.user_file_errors import parse_yaml
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, read_bytes, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from pipeline.common.errors import BadInput
-from pipeline.common.user_files import read_regular
+from pipeline.common.files.user_files import read_regular
 
 _LARGEST_BYTES = 1 << 30
 T = TypeVar("T")

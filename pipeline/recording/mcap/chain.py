@@ -2,9 +2,9 @@
 previous record, and of that record's own hash.
 
 This detects and locates changed bytes and removed or inserted parts. Anyone can build the chain of a changed file
-again; nobody can sign it again without the key, where it is signed (``pipeline.common.signing``). The signature of the
-last record is of the whole file, since each hash is over the one before. Other programs ignore these records; they are
-not in the file's index.
+again; nobody can sign it again without the key, where it is signed (``pipeline.common.files.signing``). The signature
+of the last record is of the whole file, since each hash is over the one before. Other programs ignore these records;
+they are not in the file's index.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import DataEnd, Metadata
 
+from pipeline.common.files.signing import Signature, SignatureCheck, Signer, check_signature
+from pipeline.common.files.user_files import open_regular
 from pipeline.common.progress import Progress, silent
-from pipeline.common.signing import Signature, SignatureCheck, Signer, check_signature
-from pipeline.common.user_files import open_regular
 from pipeline.recording.mcap.chunk import unpack
 from pipeline.recording.mcap.index import MAGIC, RECORD_HEAD, Directory, Unreadable, read_directory, record_at
 

@@ -18,7 +18,7 @@ from mcap.reader import SeekingReader
 from mcap.records import Channel, Header, Schema
 from mcap.summary import Summary
 
-from pipeline.common.user_files import Overloaded
+from pipeline.common.files.user_files import Overloaded
 from pipeline.recording import topics
 
 MAGIC = b"\x89MCAP0\r\n"

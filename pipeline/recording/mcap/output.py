@@ -14,7 +14,7 @@ from mcap.records import DataEnd, Footer
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from pipeline.common.errors import BadInput
-from pipeline.common.signing import configured_signer
+from pipeline.common.files.signing import configured_signer
 from pipeline.recording.mcap.chain import ChainWriter
 from pipeline.recording.topics import PROFILE, Channel
 

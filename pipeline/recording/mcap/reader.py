@@ -18,9 +18,9 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 
 from pipeline.common.errors import BadInput
+from pipeline.common.files.remote_files import is_remote, open_remote
+from pipeline.common.files.user_files import Overloaded, open_regular
 from pipeline.common.progress import Progress, silent
-from pipeline.common.remote_files import is_remote, open_remote
-from pipeline.common.user_files import Overloaded, open_regular
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
 from pipeline.recording.mcap.chunk import NOTHING, UnpackedChunk, unpack

@@ -52,6 +52,16 @@ class ImageRef:
 
 
 @dataclass(frozen=True)
+class ScanRef:
+    """Reference to the scan of a further ranging sensor, stored as a separate message."""
+
+    at_ns: Nanoseconds
+    """Log time of the message."""
+    t_ns: Nanoseconds
+    """When it was measured, by the drive's clock."""
+
+
+@dataclass(frozen=True)
 class PacketsRef:
     """A sweep stored as the sensor's packets, received shortly before the tick."""
 
@@ -108,7 +118,7 @@ class CameraRecord:
         return CameraCalibration(K, np.array(self.distortion), T_camera_ego, self.width, self.height, self.road_z_m)
 
 
-R = TypeVar("R", SweepRef | None, ImageRef | None, CameraRecord | None)
+R = TypeVar("R", SweepRef | None, ImageRef | None, CameraRecord | None, ScanRef)
 
 
 @dataclass(frozen=True)
@@ -145,6 +155,8 @@ class FrameRecord:
     """Its labels; None if it is not labelled."""
     given: Given | None = None
     """Recorded detections; None if networks run again."""
+    scans: dict[str, ScanRef] = field(default_factory=dict)
+    """Of further ranging sensors, by ``SensorKind.name``."""
 
     def references(self) -> dict[str, int]:
         """Topic → log time of every other message that this tick needs."""
@@ -155,6 +167,7 @@ class FrameRecord:
             topics.TF: self.camera.at_ns if self.camera else None,
             topics.ROUTE: self.route_at_ns,
             topics.PARAMS: self.params_at_ns,
+            **{topics.scan_topic(sensor): ref.at_ns for sensor, ref in self.scans.items()},
         }
         return {topic: at_ns for topic, at_ns in named.items() if at_ns is not None}
 
@@ -174,6 +187,7 @@ class FrameRecord:
             camera=moved_ref(self.camera),
             route_at_ns=at(self.route_at_ns),
             params_at_ns=at(self.params_at_ns),
+            scans={sensor: moved_ref(ref) for sensor, ref in self.scans.items()},
         )
 
 
@@ -190,8 +204,8 @@ _EGO, _STREAMS = TypeAdapter(EgoState), TypeAdapter(dict[str, tuple[StreamHealth
 
 
 def frame_record_message(tick: FrameRecord) -> bytes:
-    """JSON. Non-finite numbers become null."""
-    return _FRAME_RECORD.dump_json(tick)
+    """JSON. Non-finite numbers become null. Without scans, it does not mention them."""
+    return _FRAME_RECORD.dump_json(tick, exclude=None if tick.scans else {"scans"})
 
 
 def frame_record_from(data: bytes) -> FrameRecord:

@@ -7,9 +7,10 @@ from typing import Any, Literal
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
+from pipeline.common.files.image_decoding import TooMuch, decode_within_budget
 from pipeline.common.geometry import inverse
-from pipeline.common.image_decoding import TooMuch, decode_within_budget
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
 from pipeline.types import CameraCalibration, CameraImage, GnssFix, Sweep
@@ -37,14 +38,19 @@ def points_message(sweep: Sweep) -> bytes:
     packed["ring"] = sweep.ring
     if sweep.time_s is not None:
         packed["time"] = sweep.time_s
+    return cloud_message(topics.POINTS, packed, sweep.t_ns)
+
+
+def cloud_message(topic: str, packed: npt.NDArray[np.void], t_ns: int) -> bytes:
+    """``foxglove.PointCloud`` in the ego frame of points with named fields."""
     return to_bytes(
-        topics.message_class(topics.POINTS)(
-            timestamp=stamp(sweep.t_ns),
+        topics.message_class(topic)(
+            timestamp=stamp(t_ns),
             frame_id=topics.EGO_FRAME,
             pose={"position": {}, "orientation": {"w": 1.0}},
             point_stride=packed.dtype.itemsize,
             fields=[
-                {"name": name, "offset": offset, "type": kind} for name, offset, kind in _packed_fields(packed.dtype)
+                {"name": name, "offset": offset, "type": kind} for name, offset, kind in packed_fields(packed.dtype)
             ],
             data=packed.tobytes(),
         )
@@ -53,9 +59,9 @@ def points_message(sweep: Sweep) -> bytes:
 
 def sweep_from(data: bytes, t_ns: int, channels: int, origin: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Sweep:
     """The sweep from a message of ``points_message``. Damaged if it is invalid."""
-    message = _parse(topics.POINTS, data)
+    message = parsed(topics.POINTS, data)
     given = [(field.name, field.offset, field.type) for field in message.fields]
-    layout = next((layout for layout in (_POINT, _TIMED_POINT) if _packed_fields(layout) == given), None)
+    layout = next((layout for layout in (_POINT, _TIMED_POINT) if packed_fields(layout) == given), None)
     if layout is None or message.point_stride != layout.itemsize or len(message.data) % layout.itemsize:
         raise Damaged("the point cloud's fields are not those of a session")
     packed = np.frombuffer(message.data, dtype=layout)
@@ -99,7 +105,7 @@ def _compressed(data: bytes, kind: Literal["jpeg", "png"], t_ns: int) -> bytes:
 
 def image_from(data: bytes, t_ns: int | None) -> CameraImage:
     """The image from a message of ``image_message``. Damaged if it cannot be decoded."""
-    message = _parse(topics.IMAGE, data)
+    message = parsed(topics.IMAGE, data)
     try:
         pixels = decode_within_budget(message.data)
     except TooMuch as error:
@@ -183,10 +189,10 @@ def log_message(topic: str, text: str, t_ns: int, *, warning: bool = False) -> b
 
 def log_text(topic: str, data: bytes) -> str:
     """The text of a message of ``log_message``."""
-    return str(_parse(topic, data).message)
+    return str(parsed(topic, data).message)
 
 
-def _packed_fields(layout: np.dtype[np.void]) -> list[tuple[str, int, int]]:
+def packed_fields(layout: np.dtype[np.void]) -> list[tuple[str, int, int]]:
     """(name, offset, numeric type) of each field."""
     fields = dict(layout.fields or {})
     return [(name, fields[name][1], _NUMERIC_TYPE[fields[name][0]]) for name in layout.names or ()]
@@ -203,7 +209,7 @@ def to_bytes(message: Any) -> bytes:
     return bytes(message.SerializeToString(deterministic=True))
 
 
-def _parse(topic: str, data: bytes) -> Any:
+def parsed(topic: str, data: bytes) -> Any:
     """The parsed message; protobuf's own DecodeError is not public in all versions."""
     try:
         return topics.message_class(topic).FromString(data)

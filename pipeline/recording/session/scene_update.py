@@ -7,11 +7,12 @@ from typing import Any
 
 from pipeline.recording import topics
 from pipeline.recording.session.messages import stamp, to_bytes
+from pipeline.types.sensors import are_several, is_camera_in
 
 _DELETE_ALL = 1
 _CIPV_COLOR = "#4ade80"
-_COLOR = {"V": "#22d3ee", "L": "#ff4dd8", "VL": "#c4b5fd"}
-"""Camera, LiDAR, both, as on the dashboard."""
+_CAMERA_COLOR, _RANGING_COLOR, _SEVERAL_COLOR = "#22d3ee", "#ff4dd8", "#c4b5fd"
+"""Of objects by the sensors that see them, as on the dashboard."""
 _OPACITY = 0.45
 _FLAT_M = 0.1
 """Height used to draw an object for which only the footprint is known."""
@@ -45,10 +46,16 @@ def _box(each: dict[str, Any]) -> tuple[list[float], list[float], float] | None:
 def _entity(
     each: dict[str, Any], box: tuple[list[float], list[float], float], *, is_lead: bool, t_ns: int
 ) -> dict[str, Any]:
-    color = _CIPV_COLOR if is_lead else _COLOR.get(each["source"], _COLOR["VL"])
+    color = _CIPV_COLOR if is_lead else _color_of(each["source"])
     distance = "" if each.get("distance_m") is None else f" {each['distance_m']:.1f} m"
     name = f"{'CIPV ' if is_lead else ''}#{each['id']} {each.get('type') or each['source']}{distance}"
     return box_entity(str(each["id"]), box, color, name, t_ns)
+
+
+def _color_of(source: str) -> str:
+    if are_several(source):
+        return _SEVERAL_COLOR
+    return _CAMERA_COLOR if is_camera_in(source) else _RANGING_COLOR
 
 
 def scene_message(topic: str, entities: list[dict[str, Any]], t_ns: int) -> bytes:

@@ -4,24 +4,33 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import chain, repeat
 from typing import Any, TypeVar
 
 import numpy as np
 
+from pipeline.common.files.remote_files import is_remote
+from pipeline.common.files.user_file_errors import given_path
 from pipeline.common.progress import Progress, silent
-from pipeline.common.remote_files import is_remote
-from pipeline.common.user_file_errors import given_path
 from pipeline.params import Params, ParamsError, with_changes
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
 from pipeline.recording.mcap.reader import McapFile, NotMcap
 from pipeline.recording.session.frame_list import I64, listed_records, listed_times
-from pipeline.recording.session.frame_record import CameraRecord, FrameRecord, ImageRef, frame_record_from, route_from
+from pipeline.recording.session.frame_record import (
+    CameraRecord,
+    FrameRecord,
+    ImageRef,
+    ScanRef,
+    frame_record_from,
+    route_from,
+)
 from pipeline.recording.session.messages import image_from, log_text, sweep_from
 from pipeline.recording.session.provenance import VERSION, About
+from pipeline.recording.session.range_scan import range_scan_from
 from pipeline.recording.session.velodyne_scan import sweep_of_packets
-from pipeline.types import CameraCalibration, CameraImage, Frame, GnssFix, Route, Sweep
+from pipeline.types import CameraCalibration, CameraImage, Frame, GnssFix, RangeScan, Route, Sweep
 from pipeline.types.source import Mark, Opening, SourceError, TruthObject
 
 _T = TypeVar("_T")
@@ -96,6 +105,7 @@ class SessionSource:
             route=_or_note(lambda: self._read_route(tick.route_at_ns), notes) if is_whole else None,
             streams=tick.streams,
             timing_ms=tick.timing_ms,
+            scans=self._read_scans(tick, notes) if is_whole else {},
             **_given(tick, notes),
             notes=(*tick.notes, *notes),  # evaluated last, because reading the parts adds notes
         )
@@ -209,6 +219,15 @@ class SessionSource:
             return None
         ref = tick.sweep
         return sweep_from(self.file.message(topics.POINTS, ref.at_ns).data, ref.t_ns, ref.channels, ref.origin)
+
+    def _read_scans(self, tick: FrameRecord, notes: list[str]) -> dict[str, RangeScan]:
+        """Those that can be read, in the order in which they were written."""
+
+        def scan(sensor: str, ref: ScanRef) -> RangeScan:
+            return range_scan_from(sensor, self.file.message(topics.scan_topic(sensor), ref.at_ns).data, ref.t_ns)
+
+        read = {sensor: _or_note(partial(scan, sensor, ref), notes) for sensor, ref in tick.scans.items()}
+        return {sensor: each for sensor, each in read.items() if each is not None}
 
     def _read_image(self, ref: ImageRef | None) -> CameraImage | None:
         """An image shared by several ticks is returned as the same object."""

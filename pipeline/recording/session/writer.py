@@ -16,6 +16,7 @@ from pipeline.recording.session.frame_record import (
     CameraRecord,
     FrameRecord,
     ImageRef,
+    ScanRef,
     SweepRef,
     ego_message,
     frame_record_message,
@@ -34,9 +35,10 @@ from pipeline.recording.session.messages import (
     transform_messages,
 )
 from pipeline.recording.session.provenance import About
+from pipeline.recording.session.range_scan import range_scan_message
 from pipeline.recording.session.scene_update import objects_message
 from pipeline.recording.session.velodyne_scan import RawLidar, scan_message
-from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, GnssFix, Result, Route, Sweep
+from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, GnssFix, RangeScan, Result, Route, Sweep
 from pipeline.types.camera_shot import Shot
 from pipeline.types.result_json import encoded, to_json
 from pipeline.types.source import TruthObject
@@ -131,6 +133,7 @@ class SessionWriter:
             params_at_ns=self._put_params(params, at_ns),
             truth=truth,
             given=given_of(frame),
+            scans={sensor: self._put_scan(sensor, scan, at_ns) for sensor, scan in frame.scans.items()},
         )
         self._put_small(frame, at_ns)
         if result is not None:
@@ -221,6 +224,10 @@ class SessionWriter:
     def _add_sweep(self, sweep: Sweep, at_ns: int) -> None:
         self._add(topics.POINTS, at_ns, points_message(sweep), sweep.t_ns)
         self._sweeps.add(sweep.points, at_ns)
+
+    def _put_scan(self, sensor: str, scan: RangeScan, at_ns: int) -> ScanRef:
+        self._add(topics.scan_topic(sensor), at_ns, range_scan_message(sensor, scan), scan.t_ns)
+        return ScanRef(at_ns, scan.t_ns)
 
     def _put_image(self, image: CameraImage | None, at_ns: int) -> ImageRef | None:
         if image is None:

@@ -5,6 +5,7 @@ and closed loops both use it, so both see the same.
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -12,18 +13,26 @@ from pipeline.common.fast_replace import evolve
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import gnss
 from pipeline.simulation.sensors.camera import DrawnCamera, calibration
-from pipeline.simulation.sensors.lidar import Lidar
-from pipeline.simulation.world.planned_route import planned_route
+from pipeline.simulation.sensors.lidar.sensor import Lidar
+from pipeline.simulation.sensors.planned_route import planned_route
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.simulation.world.world_state import World
-from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, Route, Sweep
+from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, RangeScan, Route, Sweep
 
 _BEFORE_M, _BEYOND_M = 100.0, 600.0
 
 
+class Simulator(Protocol):
+    """Computes the scan of a further ranging sensor: the function that ``SensorKind.simulator`` names."""
+
+    def __call__(self, now: World, seed: int, index: int, t_ns: int) -> RangeScan:
+        """The scan of frame ``index``; the same arguments give the same scan."""
+        ...
+
+
 class SensorRig:
-    """LiDAR, camera, speedometer and GNSS. end_m: the farthest position of the ego vehicle along the road; the roadside
-    ends 600 m beyond. The same world and index give the same frame."""
+    """LiDAR, camera, speedometer, GNSS and the scenario's further sensors. end_m: the farthest position of the ego
+    vehicle along the road; the roadside ends 600 m beyond. The same world and index give the same frame."""
 
     def __init__(self, scenario: Scenario, end_m: float) -> None:
         self._scenario = scenario
@@ -40,6 +49,10 @@ class SensorRig:
             sweep=self.sweep(now, index, t_ns),
             image=CameraImage(t_ns, self._camera.image(now)) if image else None,
             route=self._route,
+            scans={
+                kind.name: kind.simulate(now, self._scenario.seed, index, t_ns)
+                for kind in self._scenario.further_kinds()
+            },
         )
 
     def outline(self, now: World, index: int, t_ns: int) -> Frame:

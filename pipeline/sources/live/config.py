@@ -10,9 +10,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
+from pipeline.common.files.user_file_errors import first_complaint, given_path, parse_yaml
+from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.common.geometry import inverse, rotation
-from pipeline.common.user_file_errors import first_complaint, given_path, parse_yaml
-from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.formats.file_reading import check_looks_ahead
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError

@@ -15,8 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from pipeline.common.user_file_errors import reason_of
-from pipeline.common.user_files import open_regular
+from pipeline.common.files.user_file_errors import reason_of
+from pipeline.common.files.user_files import open_regular
 from pipeline.types.source import SourceError
 
 _MAX_RECORD = 1 << 18

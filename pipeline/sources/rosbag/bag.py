@@ -10,8 +10,8 @@ from weakref import finalize
 
 from rosbags.highlevel import AnyReader
 
-from pipeline.common.user_file_errors import given_path
-from pipeline.common.user_files import check_regular
+from pipeline.common.files.user_file_errors import given_path
+from pipeline.common.files.user_files import check_regular
 from pipeline.formats.velodyne.ros import typestore
 from pipeline.sources.rosbag import unpack_budget
 from pipeline.types.source import SourceError

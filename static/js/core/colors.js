@@ -1,7 +1,7 @@
 /** Colours of roles, from the palette that all views share (/palette.css). */
+import { isImaged, isTrackedByTwo } from "./object_sources.js";
 import { get } from "./store.js";
 
-const ROLE_OF_SOURCE = { L: "lidar", V: "vision", VL: "fused" };
 /** @type {Map<string, string>} */
 const cache = new Map();
 
@@ -28,7 +28,10 @@ function read(name) {
 }
 
 /** @param {import("./types.js").FusedObject} item @param {number|null} cipvId */
-export const roleOf = (item, cipvId) => (item.id === cipvId ? "cipv" : ROLE_OF_SOURCE[item.source]);
+export function roleOf(item, cipvId) {
+  if (item.id === cipvId) return "cipv";
+  return isTrackedByTwo(item) ? "fused" : isImaged(item) ? "vision" : "lidar";
+}
 
 /** Id of the CIPV in the current frame. */
 export const cipvId = () => get("frame")?.result.cipv?.id ?? null;

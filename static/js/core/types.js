@@ -4,7 +4,7 @@
  *
  * @typedef {[number, number]} Point2
  * @typedef {(Point2|null)[]} Pixels
- * @typedef {"V"|"L"|"VL"} ObjectSource
+ * @typedef {string} ObjectSource  letters of the sensors: V camera, L LiDAR, VL both
  *
  * @typedef {object} Gate
  * @property {string} name
@@ -35,7 +35,7 @@
  * @property {""|ObjectSource} seen_by
  * @property {number} hits
  * @property {number} lidar_points
- * @property {"cluster"|"returns"|"box"|null} distance_from  what measured it in this frame
+ * @property {string|null} distance_from  what measured it in this frame
  * @property {"class"|"shape"|"road"|"range"|null} height_from  what its height, on which that rests, was taken from
  * @property {number|null} lateral_mps
  * @property {number|null} crossing_s

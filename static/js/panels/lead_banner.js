@@ -1,6 +1,7 @@
 /**
  * The lead banner: CIPV, distance, closing speed, time to collision and ACC state.
  */
+import { roleOf } from "../core/colors.js";
 import { get, on } from "../core/store.js";
 import { $, el, mark, text } from "../core/dom.js";
 import { DASH, kmh, num, signed, ttc as ttcWords } from "../core/format.js";
@@ -72,7 +73,7 @@ function update() {
   mark(lead, "lead", cipv ? "yes" : "no");
   source.hidden = !item;
   if (item) {
-    mark(source, "source", item.source);
+    mark(source, "role", roleOf(item, null));
     text(source, item.source);
   }
   text(name, cipv ? `#${cipv.id} ${item?.type ?? "obstacle"}` : "No vehicle in path");

@@ -1,5 +1,5 @@
 /** The table of fused objects, with the reason why each is or is not the CIPV. */
-import { cipvId } from "../core/colors.js";
+import { cipvId, roleOf } from "../core/colors.js";
 import { $, el, mark, text, within } from "../core/dom.js";
 import { DASH, kmh, num, side, signed } from "../core/format.js";
 import { LongList } from "../core/long_list.js";
@@ -165,8 +165,9 @@ function update() {
     : null;
   list.show(order.map((item) => ({ item, why: reasons.get(item.id) ?? "" })));
   if (focused !== null) list.rowOf(focused)?.focus({ preventScroll: true });
-  const count = (/** @type {string} */ source) => objects.filter((o) => o.source === source).length;
-  text($("#object-facts"), `${objects.length}: ${count("VL")} VL · ${count("V")} V · ${count("L")} L`);
+  const sources = new Set(["VL", "V", "L", ...objects.map(({ source }) => source)]);
+  const counts = [...sources].map((source) => `${objects.filter((o) => o.source === source).length} ${source}`);
+  text($("#object-facts"), `${objects.length}: ${counts.join(" · ")}`);
 }
 
 /**
@@ -190,7 +191,7 @@ function fill(row, { item, why }) {
   row.classList.toggle("is-carried", item.carried);
   row.setAttribute("aria-selected", String(item.id === get("selection")));
   for (const { key, words } of COLUMNS) text(cells[key], words(item));
-  mark(cells.source, "source", item.source);
+  mark(cells.source, "role", roleOf(item, null));
   cells.inPath.className = item.in_path ? "yes" : "no";
   const words = item.carried ? `carried, not detected in this frame · ${why}` : why;
   if (reason.title === words) return;

@@ -2,7 +2,7 @@
  * Explains the selected object, or else the CIPV: for the CIPV the ranking of all candidates, for others the gate that
  * rejected them.
  */
-import { cipvId } from "../core/colors.js";
+import { cipvId, roleOf } from "../core/colors.js";
 import { $, el, keyed, mark, text, within } from "../core/dom.js";
 import { DASH, num } from "../core/format.js";
 import { LongList } from "../core/long_list.js";
@@ -65,7 +65,7 @@ function update() {
   hideObject(false);
   text(number, `#${item.id}`);
   text(source, item.source);
-  mark(source, "source", item.source);
+  mark(source, "role", roleOf(item, null));
   lead.hidden = !isLead;
   text(type, `${item.type ?? "obstacle"}${item.distance_m === null ? "" : ` at ${num(item.distance_m)} m`}`);
   text(

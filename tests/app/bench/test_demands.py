@@ -11,7 +11,7 @@ from app.bench.demands import DEMANDS, PAGE_DEMANDS, Requirement, broken, page_r
 
 
 def figures(demands: tuple[Requirement, ...] = DEMANDS) -> dict[str, dict[str, Any]]:
-    """Each just as good as demanded."""
+    """Each figure exactly at its requirement."""
     made: dict[str, dict[str, Any]] = {}
     for demand in demands:
         row = made.setdefault(demand.stage, {"peers": {}})

@@ -30,7 +30,7 @@ def test_what_others_took_is_said(after: CpuTimes | None, said: tuple[str, ...])
 
 
 def test_columns_are_the_systems() -> None:
-    """user nice system idle iowait irq softirq steal guest guest_nice; guest time is in user time already."""
+    """user nice system idle iowait irq softirq steal guest guest_nice; user time already includes guest time."""
     times = parse_cpu_times("cpu  100 20 30 1000 50 5 5 40 60 10", 10, 7.0)
     assert times == CpuTimes(125.0, 16.0, 4.0, 7.0)
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from app.bench.labelled import many
 from app.bench.page import devtools
+from app.bench.page.labelled import many
 from app.bench.page.measure import _revision_of, _spread, figures
 from pipeline.common.errors import BadInput
 from pipeline.labels.model import LabelSet

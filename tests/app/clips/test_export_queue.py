@@ -18,7 +18,7 @@ WAIT_S = 180.0
 
 
 class Ended:
-    """Counts jobs that ended, and lets a test wait for one."""
+    """Counts jobs that ended; a test can wait for one."""
 
     def __init__(self) -> None:
         self._condition = threading.Condition()
@@ -52,7 +52,7 @@ def writes(path: Path, report: Progress) -> None:
 
 
 class Held:
-    """Work that waits in the middle until it is let go."""
+    """Work that pauses halfway until it is released."""
 
     def __init__(self) -> None:
         self.began, self.go = threading.Event(), threading.Event()
@@ -132,7 +132,7 @@ def test_a_cancelled_job_stops_and_leaves_no_file(jobs: ExportQueue, ended: Ende
 
 
 def test_a_jobs_work_is_let_go_when_it_has_ended_or_was_cancelled(jobs: ExportQueue, ended: Ended):
-    """It holds a whole recording."""
+    """The work holds a whole recording in memory."""
     held, waiting = Held(), Held()
     first, second = submit(jobs, held), submit(jobs, waiting)
     assert held.began.wait(WAIT_S)
@@ -148,7 +148,7 @@ def test_a_jobs_work_is_let_go_when_it_has_ended_or_was_cancelled(jobs: ExportQu
 
 
 def let_go(what: weakref.ref[Held]) -> bool:
-    """Look again and again: the worker ends its call a moment after it has told so."""
+    """Poll, because the worker's call returns a moment after it reports the end."""
     looking = threading.Event()
     for _ in range(round(WAIT_S / 0.01)):
         gc.collect()

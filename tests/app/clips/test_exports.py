@@ -44,7 +44,7 @@ def results() -> Results:
 
 @pytest.fixture
 def clip() -> Clip:
-    """Eight frames out of the middle; no run of the whole drive has been made yet."""
+    """Eight frames from the middle; the whole drive has not been computed yet."""
     source = Recording()
     times = timeline_s([source.t_ns(i) for i in range(len(source))], source.rate_hz)
     setup = RunSetup(source, times, Detectors(CountingDetector()), "both")
@@ -54,7 +54,7 @@ def clip() -> Clip:
 
 @pytest.fixture
 def written(clip: Clip, tmp_path: Path) -> Callable[[str], Path]:
-    """Writes the clip; progress ends at the whole."""
+    """Write the clip; progress ends at its total."""
 
     def write(kind: str) -> Path:
         told: list[tuple[int, int]] = []

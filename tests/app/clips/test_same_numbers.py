@@ -17,7 +17,7 @@ from pipeline.params import Params
 from pipeline.sources import open_source
 
 SCENARIO = "sim:cut_in"
-"""Objects come and go, so that numbers given from a later start would be others."""
+"""Objects appear and disappear, so ids assigned from a later start would differ."""
 FIRST, LAST = 15, 17
 Numbers = list[tuple[str, int, str]]
 
@@ -55,7 +55,7 @@ def test_the_command_the_dashboard_and_a_whole_run_agree(tmp_path: Path) -> None
 
 
 def test_the_dashboards_clip_is_the_commands(tmp_path: Path) -> None:
-    """With the LiDAR alone, as no network is needed to tell numbers apart."""
+    """With the LiDAR alone, since ids can be compared without a network."""
     source = open_source(SCENARIO)
     write_clip(Clip.of_source(source, Params(), FIRST, LAST, Detectors()), "csv", tmp_path / "page.csv", silent)
     cipv("run", SCENARIO, "--frames", LAST + 1, "--out", tmp_path / "run.jsonl", "--sensors", "lidar")

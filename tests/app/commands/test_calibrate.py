@@ -18,7 +18,7 @@ from pipeline.inference.distance_laws import find_law
 from pipeline.inference.model_registry import EMBEDDED, find
 from pipeline.params import Params, from_yaml
 from pipeline.sources import open_source
-from tests.pipeline.sources.clouds_on_disk import pcd, rows_of
+from tests.pipeline.sources.made.clouds_on_disk import pcd, rows_of
 
 SCENE = """
 title: cars ahead

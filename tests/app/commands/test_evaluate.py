@@ -23,7 +23,7 @@ FRAMES = 12
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What the LiDAR alone believes of the first frames of a drive."""
+    """Results of the LiDAR alone for the first frames of a drive."""
     file = tmp_path_factory.mktemp("ran") / "results.jsonl"
     with pytest.raises(SystemExit) as ended:
         main(["run", SOURCE, "--sensors", "lidar", "--frames", str(FRAMES), "--out", str(file)])
@@ -33,7 +33,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def truth(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The simulator's truth of those frames as a file of labels, the lead named in all but the last three."""
+    """Ground truth of those frames as a label file, with the lead labelled in all but the last three."""
     source = open_source(SOURCE)
     (key,) = {item.id for index in range(FRAMES) for item in source.truth(index) or ()}
     assert key is not None
@@ -118,7 +118,7 @@ def test_a_report_that_compares_two_runs(
 def test_the_line_with_two_sets_of_parameters(
     results: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The base is what the results above came from, so it must score the same."""
+    """The results above were computed with the base parameters, so they must score the same."""
     monkeypatch.setattr(
         "app.commands.support.options.SourceOptions.open", lambda options: _Short(open_source(options.source))
     )

@@ -22,7 +22,7 @@ def cipv(*arguments: str | Path) -> int:
 
 @pytest.fixture(autouse=True)
 def database(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without labels, and nobody else's."""
+    """A database without labels, used by this test only."""
     monkeypatch.setenv("CIPV_LABELS_URL", f"sqlite:///{tmp_path}/labels.db")
 
 

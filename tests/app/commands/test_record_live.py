@@ -21,7 +21,7 @@ from tests.pipeline.sources.live.rig import Replaying, loopback_config
 
 
 class Unplugged(Sensors):
-    """Sensors that give two frames and then make the pipeline fail."""
+    """Sensors that deliver two frames and then make the pipeline fail."""
 
     lidar_mount = None
 
@@ -45,7 +45,7 @@ def test_what_was_recorded_until_an_error_is_a_whole_session(tmp_path: Path, mon
 
 
 class Silent(Sensors):
-    """Sensors that give nothing; at the second look somebody presses Ctrl-C."""
+    """Sensors that deliver nothing; at the second poll, Ctrl-C is pressed."""
 
     lidar_mount = None
     looks = 0
@@ -72,7 +72,7 @@ def test_sensors_that_give_nothing_are_said_and_leave_no_file(
 
 
 class Overwhelming(Sensors):
-    """Sensors that tick thrice for every frame that is taken, until somebody presses Ctrl-C."""
+    """Sensors that tick three times for every processed frame, until Ctrl-C is pressed."""
 
     lidar_mount = None
 

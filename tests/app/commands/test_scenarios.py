@@ -105,7 +105,7 @@ def test_bad_usage_is_named_before_anything_is_driven(
 def test_a_demand_that_does_not_hold_fails_the_command(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], failures: tuple[str, ...], code: int
 ) -> None:
-    """The figures are written all the same."""
+    """The figures are written nevertheless."""
     section = ReportSection("choosing", "Choosing", failures=failures)
     monkeypatch.setattr(scenarios, "run_all", lambda *_: [section])
     with pytest.raises(SystemExit) as ended:

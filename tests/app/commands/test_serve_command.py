@@ -22,7 +22,7 @@ Opened = list[str]
 
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch) -> Opened:
-    """The URIs that are opened, one after the other; each is a recording of its own."""
+    """URIs in the order in which they were opened; each is a separate recording."""
     uris: Opened = []
 
     def open_any(uri: str, *, rings: int, progress: Progress) -> AnySource:

@@ -14,7 +14,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from app.cli import main
-from pipeline.common.data_dir import file_sha256
+from pipeline.common.files.data_dir import file_sha256
 from pipeline.inference.model_registry import EMBEDDED, find
 from pipeline.recording.info import info
 from pipeline.recording.session.source import SessionSource
@@ -110,7 +110,7 @@ def test_export_writes_a_clip_in_each_form(recorded: Path, tmp_path: Path) -> No
 
 
 def test_export_of_a_session_without_results_runs_the_line(recorded: Path, tmp_path: Path) -> None:
-    """The table made from the inputs alone equals the table of the recorded results: the pipeline is the same."""
+    """The table computed from the inputs equals the table of the recorded results, since the pipeline is the same."""
     assert cipv("export", recorded, "--csv", tmp_path / "recorded.csv", *LIDAR_ONLY) == 0
     assert cipv("export", "sim:straight", "--to", 1, "--csv", tmp_path / "anew.csv", *LIDAR_ONLY) == 0
     assert (tmp_path / "recorded.csv").read_text() == (tmp_path / "anew.csv").read_text()
@@ -136,7 +136,7 @@ def test_info_prints_topics_rates_and_duration(
 
 
 def test_info_says_what_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Of ten a second every fourth is missing."""
+    """At 10 Hz, every fourth frame is missing."""
     path = write(tmp_path / "a.mcap", [full(index) for index in range(32) if index % 4 != 3])
     assert cipv("info", path) == 0
     said = capsys.readouterr().out

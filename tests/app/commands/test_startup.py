@@ -25,13 +25,13 @@ SERVING = LABELS | RECORDING | {"open3d", "dask", "scipy.ndimage", "viser", "rer
 
 
 def run(program: str) -> str:
-    """Standard output of a fresh interpreter."""
+    """Standard output of a new interpreter."""
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
     return done.stdout
 
 
 def imported(program: str) -> set[str]:
-    """The modules that are there when a program has run."""
+    """The modules that are loaded after a program has run."""
     return set(json.loads(run(f"{program}\nimport json, sys\nprint(json.dumps(sorted(sys.modules)))").splitlines()[-1]))
 
 
@@ -58,7 +58,7 @@ USED_EVERY_DAY = ("serve", "run", "evaluate", "record", "sessions", "labels.file
 
 
 def test_a_users_process_has_neither_the_experiments_nor_what_trains_the_detector() -> None:
-    """One process for all: what none of them imports, they do not import together."""
+    """All commands in one process: a module that is then not loaded is imported by none of them."""
     there = imported(
         "\n".join(f"import app.commands.{command}" for command in USED_EVERY_DAY) + "\nimport app.web.server"
     )

@@ -38,7 +38,7 @@ def frame(shade: int = 0, **fields: object) -> Frame:
 
 
 def ask(file: Path, detector: Counting, seen: Frame) -> RawBoxes | RawLanes:
-    """As a new start of the program would: with nothing in memory."""
+    """Ask with an empty memory, like a program that was just started."""
     kept = KeptDetections(file)
     assert seen.image is not None
     find: Any = DetectionCache(kept=kept).look_at("test:made")

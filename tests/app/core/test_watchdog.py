@@ -24,7 +24,7 @@ def test_on_a_busy_machine_everything_may_take_longer(monkeypatch: pytest.Monkey
 
 
 def worked(watchdog: Watchdog, doing: str, took_s: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each began and ended, on a clock that is put."""
+    """Each job began and ended, on a clock set by the test."""
     for took in took_s:
         with monkeypatch.context() as patch:
             times = iter([0.0, took])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from app.drive.frame_rows import OBJECT, SOURCES, Objects, Row
+from app.drive.frame_rows import OBJECT, Objects, Row, sources
 
 PERIOD_NS = 100_000_000
 
@@ -28,7 +28,7 @@ def objects(*records: dict[str, Any]) -> Objects:
     """The objects of one frame. By default, an object is an L object in the path at 30 m."""
     made = np.zeros(len(records), OBJECT)
     for place, given in enumerate(records):
-        plain = {"source": SOURCES.index("L"), "in_path": True, "vehicle": True, "distance_m": 30.0}
+        plain = {"source": sources().index("L"), "in_path": True, "vehicle": True, "distance_m": 30.0}
         unknown = dict.fromkeys(("closing_speed_mps", "ttc_s", "path_offset_m", "vl_gap_m", "vl_gap_sigmas"), math.nan)
         for name, value in (plain | unknown | given).items():
             made[place][name] = value

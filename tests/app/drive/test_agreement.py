@@ -118,7 +118,7 @@ def test_a_simulated_drive_agrees():
 
 
 def test_a_real_drive_agrees_with_other_parameters_too(data_dir: Path):
-    """Runs with minutes between them: trackers start anew, numbers go on."""
+    """Clips with minutes between them: trackers restart, ids continue."""
     source = open_source(f"astyx:{data_dir / 'astyx'}")
     detector = yolox_nano(data_dir, 2048, 618)
     other = with_changes(Params(), {"cipv.confirm_hits": 5, "cluster.tolerance_m": 0.7})

@@ -16,7 +16,7 @@ from app.drive.frame_inputs import InputStore, without_pixels
 from app.drive.full_run import DriveRun, digest
 from app.drive.open_recording import OpenRecording, RunSetup
 from app.drive.run_registry import MOST_KEPT, MOST_UNKEPT, NoSuchRun, RunRefused, RunRegistry
-from pipeline.common.user_files import Overloaded
+from pipeline.common.files.user_files import Overloaded
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
 from pipeline.run import Sensors, run
@@ -48,7 +48,7 @@ def drives() -> Iterator[BackgroundRuns]:
 
 
 def wait_done(drives: BackgroundRuns) -> DriveRun:
-    """The run of the newest wish, once it is done; woken by the drives themselves."""
+    """The most recently requested run, once it is done; the drives signal this themselves."""
     assert drives.recording is not None
     with drives._condition:
         assert drives._condition.wait_for(lambda: not drives.state.running, WAIT_S)
@@ -58,7 +58,7 @@ def wait_done(drives: BackgroundRuns) -> DriveRun:
 
 
 def completed(recording: OpenRecording, params: Params) -> DriveRun:
-    """The run of these parameters, computed here to its end."""
+    """The run with these parameters, computed to its end in this thread."""
     recording.runs.want(params, "default")
     run_ = recording.runs.current
     assert run_ is not None
@@ -250,7 +250,7 @@ def book() -> RunRegistry:
 
 
 def begun(of: RunRegistry, hits: int) -> DriveRun:
-    """A run that has come some way."""
+    """A partly computed run."""
     of.want(with_hits(hits), "default")
     assert of.current is not None
     of.current._head = of.current._head._replace(at=5)
@@ -294,7 +294,7 @@ def test_no_more_than_a_dozen_runs_are_kept():
 
 
 class Starved(Recording):
-    """Too many files are open when frame 3 is read for the first two times."""
+    """Too many files are open during the first two reads of frame 3."""
 
     def frame(self, index: int) -> Frame:
         if index == 3 and self.reads.count(3) < 2:
@@ -320,7 +320,7 @@ def test_what_could_not_be_read_for_a_moment_is_no_frames_final_result(
 
 @dataclass
 class Hanging(CountingDetector):
-    """Hangs in these of its calls until ``gate`` is set."""
+    """Hangs in the given calls until ``gate`` is set."""
 
     at: tuple[int, ...] = ()
     gate: threading.Event = field(default_factory=threading.Event)

@@ -21,13 +21,12 @@ from tests.app.engine.test_live_engine import Sensors
 WAIT_S = 180.0
 FOR_EVER_S = 1e6
 A_WHILE_S = 0.05
-"""Somebody who does not wait has gone on by then. Where a machine is too slow for that, a test sees nothing wrong."""
+"""Time within which a thread that is not blocked has continued. On a slower machine, the test can only miss a fault."""
 
 
 class Piece:
-    """Somebody in the background who works on one piece, with a network that runs until it is told to end.
-
-    begun: the piece may begin. options: of the network's run. ended: how the piece did, ``done`` or ``stopped``."""
+    """A background worker on one piece of work, with a network that runs until it is told to end. begun: the piece has
+    begun. options: of the network's run. ended: how the piece ended, ``done`` or ``stopped``."""
 
     def __init__(self, turn: ComputeScheduler, *, to_the_end: bool = False) -> None:
         self.begun, self.answer, self.options, self.ended = threading.Event(), threading.Event(), Options(), ""
@@ -40,7 +39,7 @@ class Piece:
         return not self.begun.wait(A_WHILE_S)
 
     def finish(self) -> str:
-        """Let the network answer."""
+        """Let the network return."""
         self.answer.set()
         self._thread.join(WAIT_S)
         return self.ended
@@ -60,7 +59,7 @@ class Piece:
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No time runs out, unless a test lets it."""
+    """No timeout expires unless a test wants it to."""
     for name in ("HAND_RESTS_S", "_LONGEST_FRONT_S", "_LONGEST_WAIT_S"):
         monkeypatch.setattr(turn_module, name, FOR_EVER_S)
 
@@ -74,7 +73,7 @@ def turn() -> Iterator[ComputeScheduler]:
 
 @contextmanager
 def hand_rests(turn: ComputeScheduler, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The time in which a hand moves is over after what is done here."""
+    """After this block, the user's input counts as stopped."""
     monkeypatch.setattr(turn_module, "HAND_RESTS_S", 0.0)
     with turn.foreground():
         turn.asked()
@@ -169,7 +168,7 @@ def test_work_in_front_that_never_ends_does_not_stop_the_background(
 def test_a_hand_that_never_rests_does_not_stop_the_background(
     turn: ComputeScheduler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What has waited for so long, also by being stopped again and again, is stopped no more."""
+    """Work that has waited too long, even if only because it was stopped repeatedly, is no longer stopped."""
     monkeypatch.setattr(turn_module, "_LONGEST_FRONT_S", 0.01)
     turn.asked()
     piece = Piece(turn)
@@ -216,7 +215,7 @@ def test_while_a_drive_plays_the_background_pays_for_its_work_and_goes_on_after_
 def test_a_drive_that_plays_without_showing_frames_stops_nobody(
     turn: ComputeScheduler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As one whose frames are read too slowly."""
+    """As when frames are read too slowly."""
     monkeypatch.setattr(turn_module, "_LONGEST_WAIT_S", 0.01)
     turn.playing(True)
     turn._credit_s = -0.01
@@ -234,7 +233,7 @@ def test_who_ends_lets_everybody_go(turn: ComputeScheduler) -> None:
 
 
 class WhileWaiting(Sensors):
-    """Sensors that let somebody in the background work while they are waited for."""
+    """Sensors that let a background worker run while they are waited for."""
 
     engine: Engine
     let_through: threading.Event

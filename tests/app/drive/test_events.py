@@ -26,7 +26,7 @@ NO_OBJECTS = objects()
 
 
 def found(rows: list[Row], frames: dict[int, Objects] | None = None, kind: str | None = None) -> list[Event]:
-    """Events of a drive; ``frames`` gives the objects where there are any."""
+    """Events of a drive; ``frames`` gives the objects of frames that have any."""
     held = [(frames or {}).get(index, NO_OBJECTS) for index in range(len(rows))]
     return [event for event in find_events(rows, held, Params()) if kind is None or event.kind == kind]
 
@@ -215,7 +215,7 @@ def test_the_simulated_cut_in_is_found():
 
 
 def test_real_drives_tell_of_their_gaps_and_of_who_was_acquired(data_dir: Path):
-    """Astyx: five runs of frames with seconds to minutes between them; the lead of each is acquired once."""
+    """Astyx: five clips with seconds to minutes between them; the lead of each is acquired once."""
     events = events_of(f"astyx:{data_dir / 'astyx'}", str(data_dir / "models" / "yolox_nano.onnx"))
     jumps = [event.index for event in events if event.kind == "sensor_gap"]
     assert jumps == [5, 14, 17, 27]

@@ -42,7 +42,7 @@ def test_a_runs_score_is_the_one_of_its_results(data_dir: Path) -> None:
 
 
 def test_every_object_comes_back() -> None:
-    """Of both sensors, one of them, and none: what labels and scores read of it."""
+    """Objects of both sensors, of one and of none: the fields that labels and scores read."""
     recording, detector = Recording(), CountingDetector()
     kept = DriveRun(1, Params(), "default", 6)
     state, wanted = State(), []

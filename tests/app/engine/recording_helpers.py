@@ -18,7 +18,7 @@ FOCAL_PX = 250.0
 GROUND_M = -0.6
 PERIOD_NS = 100_000_000
 HANGS_S = 600.0
-"""A hanging disk hangs for longer than any test waits, even on a busy machine."""
+"""A hung disk hangs for longer than any test waits, even on a busy machine."""
 
 
 @dataclass

@@ -30,7 +30,7 @@ WAIT_S = 180.0
 
 
 class Sensors:
-    """Live sensors whose ticks the test gives: frames of a recording, the newest only."""
+    """Live sensors whose ticks come from the test: frames of a recording, only the newest."""
 
     rate_hz = 10.0
 
@@ -77,7 +77,7 @@ class Sensors:
 
 
 class NoLanes:
-    """Finds none, and counts how often it was asked."""
+    """Finds no lanes, and counts its calls."""
 
     name, notes, calls = "none", (), 0
 
@@ -210,7 +210,7 @@ def test_a_session_of_them_is_on_their_own_steady_timeline(start: Start, tmp_pat
 
 
 def test_what_comes_between_ticks_is_recorded_until_the_end(start: Start, tmp_path: Path) -> None:
-    """``now_ns`` of these sensors is their ticks' time and 10¹⁸."""
+    """``now_ns`` of these sensors is the time of their ticks plus 10¹⁸."""
     engine, sensors, _ = start(SessionRecorder(tmp_path))
     engine.desk.start(engine.source)
     tap = sensors.tapped

@@ -27,7 +27,7 @@ WAIT_S = 180.0
 
 
 class Car:
-    """A server on live sensors, at which a recording of the same time can be opened."""
+    """A server on live sensors that can open a recording of the same time."""
 
     def __init__(self, sessions: Path, marks: Path | None) -> None:
         self.sensors, self.recording = Sensors(), Recording()

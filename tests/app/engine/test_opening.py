@@ -23,7 +23,7 @@ from tests.app.engine.running import WAIT_S, Start, at
 
 
 class Slowly:
-    """Opens "test:long" word by word, each when the test lets it; anything else at once."""
+    """Opens "test:long" in steps, each when the test allows it; anything else at once."""
 
     def __init__(self) -> None:
         self.goes_on = threading.Semaphore(0)
@@ -90,7 +90,7 @@ def test_while_kernels_compile_the_first_frame_is_announced(
 
 
 def test_with_another_recording_nothing_of_the_old_one_is_told():
-    """A page would ask for a drive that is gone, and draw it under the new name."""
+    """A page would request a drive that no longer exists, and draw it under the new name."""
     engine = Engine(
         opener(Recording(), Recording("test:other")),
         lambda _: CountingDetector(),
@@ -190,7 +190,7 @@ def test_a_car_with_only_one_sensor_is_told_on_the_page(start: Start, sensors: s
 
 
 def test_the_detector_is_asked_for_again_where_images_are_drawn():
-    """A network for real images is not the one for the simulator, even when the images are equally large."""
+    """The network for real images is not the one for the simulator, even if the images have the same size."""
     asked: list[str] = []
 
     def open_detector(source: Source) -> CountingDetector:

@@ -15,7 +15,7 @@ WAIT_S = 180.0
 
 @dataclass
 class Work:
-    """What was prepared. ``gate``: cleared, preparing waits."""
+    """Records what was prepared. ``gate``: while it is cleared, preparing waits."""
 
     done: list[int] = field(default_factory=list)
     gate: threading.Event = field(default_factory=threading.Event)
@@ -64,7 +64,7 @@ def test_a_newer_wish_replaces_one_that_was_not_begun(work: Work):
 
 
 def test_what_cannot_be_prepared_is_ready_all_the_same(work: Work):
-    """Reading it in earnest says what is wrong."""
+    """Reading it for display then reports the error."""
     work.gate.set()
     ahead = ReadAhead(work.prepare, work.told.release)
     ahead.want(-1)

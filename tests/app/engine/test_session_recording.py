@@ -42,7 +42,7 @@ def engine(tmp_path: Path) -> Iterator[Engine]:
 
 
 class Client:
-    """Asks the application itself, without a network."""
+    """Calls the application directly, without a network."""
 
     def __init__(self, engine: Engine, run: Runs) -> None:
         self._app, self._run = create_app(engine), run
@@ -69,7 +69,7 @@ def client(engine: Engine) -> Iterator[Client]:
 
 
 def show(engine: Engine, index: int) -> dict[str, Any]:
-    """Seek, wait, and what is believed of the frame once all is known of it."""
+    """Seek, wait, and return the frame's final result."""
     engine.control.seek(index)
     shown = engine.wait_for(
         lambda shown: shown.processed is not None and shown.index == index and shown.processed.whole, WAIT_S

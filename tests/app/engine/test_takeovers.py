@@ -26,7 +26,7 @@ FIRST_S = 2.0
 
 @dataclass
 class Hanging(CountingDetector):
-    """Hangs in its third call, until ``gate`` is set."""
+    """Hangs in its third call until ``gate`` is set."""
 
     gate: threading.Event = field(default_factory=threading.Event)
     hangs: threading.Event = field(default_factory=threading.Event)
@@ -47,7 +47,7 @@ def hanging() -> Iterator[Hanging]:
 
 
 def engine_on(source: Sensors | Recording, first: CountingDetector, folder: Path) -> Engine:
-    """Its first detector is the one given; those after are well."""
+    """An engine whose first detector is the given one; later ones work."""
     opened = iter([first, *(CountingDetector(f"fresh {k}") for k in range(9))])
 
     def open_source(uri: str, *, progress: Progress) -> AnySource:

@@ -25,7 +25,7 @@ BAD = "torn.mcap"
 
 
 def make_fleet(folder: Path, copies: int = 1) -> Path:
-    """Sessions of eight frames, ``copies`` of each drive, and one file that is none."""
+    """Sessions of eight frames, ``copies`` of each drive, and one file that is not a session."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, (uri, first, last) in DRIVES.items():
         save(open_source(uri), folder / f"{name}-0.mcap", first, last)
@@ -41,7 +41,7 @@ def plan_of(*addresses: object, params: Params | None = None, sensors: str = "bo
 
 
 def begun(plan: Plan, out: object) -> PlannedWork:
-    """What is to be done of a batch that has been written down."""
+    """The jobs of a batch after its plan was written."""
     store = Store(str(out))
     work = work_of(plan, store)
     begin(plan, work, store)
@@ -56,8 +56,8 @@ def job_of(address: str, out: object, **more: object) -> Job:
 
 
 def contents(out: object) -> dict[str, str]:
-    """Name → SHA-256 of every file of a batch that equal inputs give in equal bytes: all but the timings, and what
-    names the folder's own place."""
+    """Name → SHA-256 of every file of a batch that is reproducible: all except timings and files that contain the
+    folder's path."""
     store = Store(str(out))
     names = [name for name in store.names("") if f"/{TIMINGS.name}/" not in name and name != "batch.json"]
     return {name: hashlib.sha256(store.read(name) or b"").hexdigest() for name in names}

@@ -14,7 +14,7 @@ BUCKET = "fleet"
 
 
 class Unsteady:
-    """A WSGI program of which every n-th request fails. It counts."""
+    """A WSGI program in which every n-th request fails. It counts requests."""
 
     def __init__(self, program: Callable[..., Iterable[bytes]], every: int) -> None:
         self._program, self._lock = program, threading.Lock()
@@ -36,7 +36,7 @@ class Unsteady:
 
 @contextmanager
 def s3_server(monkeypatch: Any, every: int) -> Iterator[Unsteady]:
-    """A server with one empty bucket; programs that are started now use it."""
+    """A server with one empty bucket; programs started meanwhile use it."""
     program = Unsteady(DomainDispatcherApplication(create_backend_app), 0)
     server = make_server("127.0.0.1", 0, program, threaded=True)
     thread = threading.Thread(target=server.serve_forever)

@@ -15,7 +15,7 @@ ODD = ("a b#1.mcap", "q?x.mcap", "pct%20.mcap", "[x].mcap", "star*.mcap", "line\
 
 
 def test_recordings_have_the_same_address_from_any_folder(fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """A worker of another machine's cluster, or the command that resumes a batch, may have another working folder."""
+    """A worker on another machine, or the command that resumes a batch, may have a different working folder."""
     monkeypatch.chdir(fleet.parent)
     relative = (fleet.name, f"{fleet.name}/near-*.mcap", f"mcap:{fleet.name}/near-0.mcap")
     here = recordings(relative[:2])

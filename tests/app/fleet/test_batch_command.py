@@ -66,7 +66,7 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
 
 
 def test_a_scheduler_that_is_killed_and_the_batch_resumed(fleet: Path, tmp_path: Path):
-    """Some drives are done when the scheduler ends; another one gets the rest."""
+    """Some drives are done when the scheduler ends; a new scheduler gets the rest."""
     out, expected = tmp_path / "out", tmp_path / "expected"
     for job in begun(plan_of(fleet, sensors="lidar", results=True), expected).jobs:
         run_drive(job)

@@ -43,8 +43,8 @@ def test_two_workers_give_the_bytes_of_none(fleet: Path, tmp_path: Path, expecte
 def test_a_store_that_fails_every_twentieth_request_and_workers_that_are_killed_change_nothing(
     fleet: Path, monkeypatch: pytest.MonkeyPatch, expected: dict[str, str]
 ):
-    """Recordings and tables are in S3. Whenever a drive has ended, a worker ends in the middle of another one. The
-    names of drives are of their addresses, so contents alone are compared."""
+    """Recordings and tables are in S3. Whenever a drive is done, a worker is killed in the middle of another one.
+    Drives are named after their addresses, so only contents are compared."""
     killed = set[int]()
 
     def kill_one(now: Tally) -> None:

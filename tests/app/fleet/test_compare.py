@@ -24,12 +24,12 @@ from pipeline.params import Params, with_changes
 from tests.app.fleet.fleets import begun, plan_of
 
 BLIND = {"cluster.min_points": 50, "cluster.max_range_m": 10.0}
-"""So that the LiDAR alone sees hardly anything."""
+"""With these parameters, the LiDAR alone sees hardly anything."""
 
 
 @pytest.fixture(scope="module")
 def runs(fleet: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
-    """The folder of a batch with two runs, and their names: as by default, and nearly blind."""
+    """The folder of a batch with two runs, and their names: one with default parameters, one nearly blind."""
     out = tmp_path_factory.mktemp("runs")
     sane = _ran(plan_of(fleet, sensors="lidar"), out)
     blind = _ran(plan_of(fleet, sensors="lidar", params=with_changes(Params(), BLIND)), out)

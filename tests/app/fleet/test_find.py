@@ -121,7 +121,7 @@ def test_a_question_without_end_is_stopped(batch: Path):
 
 
 def test_ctrl_c_ends_a_question(batch: Path):
-    """The key is pressed again and again, because an interrupt that comes while a library is being imported is lost."""
+    """The key is pressed repeatedly, because an interrupt during the import of a library is lost."""
     endless = "(SELECT sum(a.range * b.range) FROM range(10000000) a, range(10000000) b) > 0"
     tables, is_over = FleetTables(Store(str(batch)), most_s=60.0), threading.Event()
 
@@ -251,7 +251,7 @@ def _cipv(*arguments: object) -> int:
 
 
 def test_made_up_tables_are_as_real_ones(tmp_path: Path):
-    """What the benchmark asks of them."""
+    """Checked with the benchmark's queries."""
     rows = make_tables(tmp_path, 3)
     tables = FleetTables(Store(str(tmp_path)))
     assert tables.find("", "frames").total == rows["frames"] == 1800

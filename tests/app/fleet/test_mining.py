@@ -28,7 +28,7 @@ RATE_HZ = 10
 
 
 def frames_of(drives: int, seconds: int, **changed: object) -> FleetFrames:
-    """Drives that follow a car at 30 m, which comes nearer by 1 m/s."""
+    """Drives behind a car at 30 m, whose distance shrinks by 1 m/s."""
     count = drives * seconds * RATE_HZ
     drive = np.repeat(np.arange(drives), seconds * RATE_HZ)
     t_s = np.tile(np.arange(seconds * RATE_HZ) / RATE_HZ, drives)

@@ -40,7 +40,7 @@ def test_ranges_of_whole_parameters_are_whole_numbers():
 
 
 def tried_all(axes: list[Axis], count: int) -> list[Tried]:
-    """A search where both scores are least near x = 0.7, y = b and n = 3; the second set has no scores."""
+    """A search in which both scores are lowest near x = 0.7, y = b and n = 3; the second set has no scores."""
     propose, tried = searching(axes, count), list[Tried]()
     while (found := propose(tried)) is not None:
         off = abs(found["x"] - 0.7) + (found["y"] != "b") + abs(found["n"] - 3)
@@ -91,7 +91,7 @@ def test_the_front_is_what_no_other_one_beats():
 
 
 def test_a_sweep_saves_the_best_as_a_preset(fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    """A LiDAR that takes fewer than 50 points for nothing misses leads that the other one finds."""
+    """A LiDAR that ignores clusters of fewer than 50 points misses leads that the other one finds."""
     typed = ["sweep", str(fleet / "far-0.mcap"), str(fleet / "left-0.mcap"), "--out", str(tmp_path / "out")]
     typed += ["--over", "cluster.min_points=50,4", "--sensors", "lidar", "--lanes", "off", "--far-view-px", "0"]
     typed += ["--save", str(tmp_path / "best.yaml"), "--report", str(tmp_path / "sweep.html"), "--json"]

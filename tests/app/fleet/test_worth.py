@@ -23,7 +23,7 @@ LATE = next(score for score in SCORES if score.name == "late_leads")
 
 
 def rows(free: list[float], labelled: list[float]) -> list[tuple[str, str, float, float]]:
-    """Two scores of drives, each over ten frames."""
+    """Two scores per drive, each over ten frames."""
     pairs = [(LATE.name, free), (LABELLED + LATE.counterpart, labelled)]
     return [(f"d{n:02d}", name, 10.0 * value, 10.0) for name, values in pairs for n, value in enumerate(values)]
 
@@ -55,7 +55,7 @@ def test_few_drives_tell_nothing():
 
 
 def test_runs_are_ranked_by_the_whole_fleet():
-    """Within each run drives differ the wrong way round; between runs the score follows the labels."""
+    """Within each run, the score ranks drives in the wrong order; between runs, it agrees with the labels."""
     runs = {f"r{n}": rows([10.0 * n, 10.0 * n + 1.0], [10.0 * n + 1.0, 10.0 * n]) for n in range(5)}
     (worth,) = worths(runs, [LATE])
     assert worth.over_runs == pytest.approx(1.0)

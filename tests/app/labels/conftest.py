@@ -21,7 +21,7 @@ _numbers = itertools.count()
 
 
 def fresh() -> DriveInfo:
-    """A recording that no other test has."""
+    """A recording that no other test uses."""
     return info(f"drive {next(_numbers)}")
 
 
@@ -33,7 +33,7 @@ def info(key: str, count: int = COUNT) -> DriveInfo:
 
 @pytest.fixture(scope="session")
 def postgres_url() -> Iterator[str]:
-    """Of a server that runs for these tests alone; skipped without PostgreSQL's programs, but never in CI."""
+    """URL of a server that runs only for these tests; skipped without PostgreSQL's programs, but never in CI."""
     found = postgres.binaries()
     if found is None:
         assert os.environ.get("CIPV_BROWSER_TESTS") != "1", "PostgreSQL is not installed, and these tests may not skip"
@@ -58,14 +58,14 @@ def postgres_database(postgres_url: str) -> Iterator[Database]:
 
 @pytest.fixture(params=["sqlite", "postgres"])
 def database(request: pytest.FixtureRequest) -> Database:
-    """Both, one after the other."""
+    """Both databases, one after the other."""
     found: Database = request.getfixturevalue(f"{request.param}_database")
     return found
 
 
 @pytest.fixture
 def labels(database: Database) -> DriveLabels:
-    """A drive that nobody has labelled."""
+    """A drive without labels."""
     return DriveLabels(database, fresh(), station="here")
 
 

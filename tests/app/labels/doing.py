@@ -27,7 +27,7 @@ def act(labels: DriveLabels, person: str, doing: object) -> Acted:
 
 
 def add(labels: DriveLabels, person: str = "Ada", x: float = 20.0) -> int:
-    """Its number."""
+    """Add a track; returns its id."""
     before = set(labels.items("track"))
     act(labels, person, AddTrack(kind="add_track", label="car", frame=10, cuboid=cuboid(x)))
     (number,) = set(labels.items("track")) - before

@@ -19,11 +19,12 @@ from tests.app.web.serving import WAIT_S
 CUBOID = {"center": [20.0, 0.0, 0.7], "size": [4.0, 1.8, 1.5], "yaw_rad": 0.0}
 _LONGEST_S = 0.05
 _MOST_BEFORE = 12
-"""A moment is random by answers and by time: on a slow machine nothing is answered in any given time."""
+"""The random moment depends on the number of answers and on time: on a slow machine, no fixed time guarantees an
+answer."""
 
 
 def kill_again_and_again(file: Path, kills: int, seed: int) -> tuple[int, int]:
-    """(acts that were answered as done, of these lost or half done). Each server is killed at a random moment."""
+    """(number of acts confirmed, number of those lost or half done). Each server is killed at a random moment."""
     chance, answered, lost = random.Random(seed), 0, 0
     with forking() as context:
         for turn in range(kills):
@@ -37,7 +38,7 @@ def kill_again_and_again(file: Path, kills: int, seed: int) -> tuple[int, int]:
 
 
 def _label_until_it_dies(address: str, turn: int, killer: threading.Timer, after: int) -> list[tuple[int, int]]:
-    """Act and frame of each answer. Every act is a track of its own. The killer is let loose after some answers."""
+    """Act and frame of each answer. Every act creates its own track. The killer starts after some answers."""
     said: list[tuple[int, int]] = []
     with httpx.Client(base_url=address, timeout=WAIT_S) as client:
         drive = client.get("/api/labels").json()["drive"]["id"]
@@ -56,7 +57,7 @@ def _label_until_it_dies(address: str, turn: int, killer: threading.Timer, after
 
 
 def _lost(file: Path, said: list[tuple[int, int]]) -> int:
-    """Acts whose row, track or sighting is not there; and the database must be whole."""
+    """Acts whose row, track or sighting is missing. The database itself must be intact."""
     database = Database.in_file(file)
     try:
         with database.reading() as connection:

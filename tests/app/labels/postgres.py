@@ -12,12 +12,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 _USERS = ("postgres", "nobody")
-"""Root may not run it."""
+"""Root is not allowed to run it."""
 _PATIENCE_S = 60
 
 
 def binaries() -> Path | None:
-    """The folder of ``initdb`` and ``pg_ctl``, the newest one; null when there is none."""
+    """The newest folder with ``initdb`` and ``pg_ctl``; None without one."""
     on_path = shutil.which("initdb")
     if on_path is not None:
         return Path(on_path).parent
@@ -27,7 +27,7 @@ def binaries() -> Path | None:
 
 @contextmanager
 def running(folder_of_binaries: Path) -> Iterator[str]:
-    """Its address."""
+    """The address of a running server."""
     folder = Path(tempfile.mkdtemp(prefix="cipv-pg-"))
     user = _somebody() if os.geteuid() == 0 else None
     if user is not None:

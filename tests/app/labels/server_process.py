@@ -47,14 +47,14 @@ def _serve(file: Path | str, tell: Connection, ahead_s: Any) -> None:
 
 @contextmanager
 def forking() -> Iterator[ForkServerContext]:
-    """Where servers come from."""
+    """The process that forks servers."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["tests.app.labels.server_process"])
     yield context
 
 
 def _set_clock(ahead_s: Any) -> None:
-    """The system's clock, as this process sees it, is so much ahead, also when that changes."""
+    """Let this process see the system clock ahead by a value that may change."""
     seconds, nanoseconds = time.time, time.time_ns
     time.time = lambda: seconds() + ahead_s.value
     time.time_ns = lambda: nanoseconds() + round(ahead_s.value * 1e9)

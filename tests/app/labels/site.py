@@ -35,7 +35,7 @@ class Labelled(Recording):
 
 @contextmanager
 def team(database: Database | None = None) -> Iterator[tuple[Engine, httpx.Client]]:
-    """A server on a recording whose whole drive is computed."""
+    """A server on a recording whose drive is completely computed."""
     recording = Labelled()
     desk = LabelDesk(database)
     engine = Engine(
@@ -51,7 +51,7 @@ def team(database: Database | None = None) -> Iterator[tuple[Engine, httpx.Clien
 
 
 def drive(client: httpx.Client) -> str | None:
-    """The id of what is open; null where nothing can be labelled."""
+    """Id of the open recording; None if it cannot be labelled."""
     answer = client.get("/api/labels")
     return answer.json()["drive"]["id"] if answer.is_success else None
 
@@ -66,7 +66,7 @@ def move(client: httpx.Client, way: str, person: str = "Ada") -> httpx.Response:
 
 
 def task(engine: Engine, begun: httpx.Response) -> str:
-    """Wait for what was begun; what it says in the end."""
+    """Wait for a task that was started; returns its final message."""
     assert begun.status_code == 202, begun.text
 
     def ended(shown: Snapshot) -> bool:
@@ -79,7 +79,7 @@ def task(engine: Engine, begun: httpx.Response) -> str:
 
 
 def proposed(engine: Engine, client: httpx.Client) -> dict[str, Any]:
-    """The one track that the pipeline proposes."""
+    """The only track that the pipeline proposes."""
     task(engine, act(client, kind="propose", **{"from": "run"}))
     (track,) = labels(client)["tracks"]
     return track

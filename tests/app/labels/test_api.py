@@ -6,10 +6,10 @@ import httpx
 import pytest
 
 from app.engine.engine import Engine
+from app.web.guards.tokens import Tokens
 from app.web.routes.labels.score_shapes import ScoreJson
 from app.web.routes.labels.sighting_shapes import Window
 from app.web.server import create_app
-from app.web.tokens import Tokens
 from pipeline.labels.model import WHOLE_TAG
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import Recording, opener
@@ -47,7 +47,7 @@ def test_the_pipelines_opinion_is_proposed_accepted_and_scored(engine: Engine, c
 def test_a_lead_whose_track_is_only_proposed_judges_nothing_and_it_is_said(
     engine: Engine, client: httpx.Client
 ) -> None:
-    """Nor do labels of a frame in which other vehicles may be: nothing there is detected falsely."""
+    """Nor do labels of a frame that may contain other vehicles: no detection there counts as false."""
     track = proposed(engine, client)
     (lead,) = labels(client)["leads"]
     done = act(client, kind="accept", items=[{"kind": "lead", "id": lead["id"], "revision": lead["revision"]}]).json()
@@ -62,7 +62,7 @@ def test_a_lead_whose_track_is_only_proposed_judges_nothing_and_it_is_said(
 
 
 def test_a_wrong_lead_is_among_the_worst_frames(engine: Engine, client: httpx.Client) -> None:
-    """Drawn by hand a lane beside; what else is there is not known."""
+    """A label drawn by hand one lane to the side; the rest of the frame is unlabelled."""
     beside = CUBOID | {"center": [CUBOID["center"][0], 3.5, CUBOID["center"][2]]}
     act(client, kind="add_track", label="car", frame=4, cuboid=beside, bbox=None)
     (track,) = labels(client)["tracks"]

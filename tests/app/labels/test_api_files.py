@@ -13,7 +13,7 @@ import pytest
 
 from app.engine.engine import Engine
 from app.labels.transfer import files
-from app.web.limits import LARGEST_FILE
+from app.web.guards.limits import LARGEST_FILE
 from pipeline.common.progress import Progress
 from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.native import from_json
@@ -115,7 +115,7 @@ def packed(method: int = zipfile.ZIP_DEFLATED, **files: str) -> bytes:
 
 
 def spoilt(at: int, in_directory: int | None, value: int, method: int = zipfile.ZIP_DEFLATED) -> bytes:
-    """A .zip of one file whose byte ``at`` of its header is another one; also in the directory at the end."""
+    """A .zip of one file in which byte ``at`` of the header is changed, here and in the directory at the end."""
     body = bytearray(packed(method, **{"a.txt": "x"}))
     body[at] = value
     if in_directory is not None:
@@ -124,7 +124,7 @@ def spoilt(at: int, in_directory: int | None, value: int, method: int = zipfile.
 
 
 def nameless() -> bytes:
-    """A .zip of one file that has no name."""
+    """A .zip of one file without a name."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as made:
         made.writestr(zipfile.ZipInfo(""), "x")
@@ -132,7 +132,7 @@ def nameless() -> bytes:
 
 
 FLAGS, METHOD, DATA = (6, 8), (8, 10), 30 + len("a.txt")
-"""Where they are: before the file, and in the directory at the end (PKWARE's APPNOTE, 4.3.7 and 4.3.12)."""
+"""Offsets in the header before the file, and in the directory at the end (PKWARE's APPNOTE, 4.3.7 and 4.3.12)."""
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ def test_what_was_meant_for_another_recording_is_not_done_to_this_one(client: ht
 def test_an_act_is_answered_from_the_recording_that_it_was_done_to(
     engine: Engine, client: httpx.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Something else is opened between the commit and the answer."""
+    """Another recording is opened between the commit and the answer."""
     opened = engine.labels._open
     do = Log.act
 

@@ -56,7 +56,7 @@ def test_something_else_ends_what_could_be_redone(labels: DriveLabels) -> None:
 def test_whether_there_is_a_step_is_one_question_that_was_worded_before(
     labels: DriveLabels, database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each move of a slider asks it, beside the frame that is run again."""
+    """Each slider movement sends this query, in addition to running the frame again."""
     add(labels)
     monkeypatch.setattr(Steps, "_mine", None)
     asked: list[str] = []
@@ -207,7 +207,7 @@ def test_going_back_is_possible_after_a_restart(file: Path) -> None:
     moves=st.lists(st.tuples(st.sampled_from(["Ada", "Bob"]), st.sampled_from(["act", "undo", "redo"])), max_size=15)
 )
 def test_a_persons_steps_are_a_list_with_a_cursor(sqlite_database: Database, moves: list[tuple[str, str]]) -> None:
-    """Two people on labels of their own, in any order: neither moves the other's cursor."""
+    """Two people work on their own labels, in any order: neither moves the other's cursor."""
     labels = DriveLabels(sqlite_database, fresh(), "here")
     stacks: dict[str, list[int]] = {"Ada": [], "Bob": []}
     cursor = {"Ada": 0, "Bob": 0}

@@ -20,7 +20,7 @@ from tests.app.web.serving import WAIT_S
 
 _LISTS = {"track": "tracks", "lead": "leads", "path": "paths", "event": "events", "tag": "tags"}
 _REFRESH = 0.15
-"""Of the acts are made on what was just asked for; the others on what is some acts old."""
+"""Share of the acts that use the current state; the others use a state that is some acts old."""
 
 
 @dataclass
@@ -31,16 +31,16 @@ class Hand:
     address: str
     seed: int
     known: dict[tuple[str, int], dict[str, Any]] = field(default_factory=dict)
-    """What the page shows, by kind and number."""
+    """The items that the page shows, by kind and id."""
     seen: int = 0
-    """The revision of that."""
+    """The revision of these items."""
     done: list[tuple[int, int, dict[str, Any]]] = field(default_factory=list)
-    """(act, revision that was seen, body) of what was done."""
+    """(act, revision seen, body) of each completed act."""
     told: Counter[str] = field(default_factory=Counter)
-    """How often each answer came."""
+    """Number of answers of each kind."""
 
     def work(self, count: int) -> None:
-        """So many acts at random."""
+        """Do this number of random acts."""
         rng = random.Random(self.seed)
         with httpx.Client(base_url=self.address, timeout=WAIT_S) as client:
             drive = client.get("/api/labels").json()["drive"]["id"]
@@ -52,7 +52,7 @@ class Hand:
             self.look(client)
 
     def look(self, client: httpx.Client) -> None:
-        """What changed since."""
+        """Fetch the changes since the last call."""
         answer = client.get("/api/labels", params={"since": self.seen}).json()
         for gone in answer["removed"]:
             self.known.pop((gone["kind"], gone["id"]), None)
@@ -127,12 +127,12 @@ class Hand:
 
 
 def _normal(body: dict[str, Any], yours: dict[str, Any]) -> dict[str, Any]:
-    """What was sent, with what the server fills in."""
+    """The request with the values that the server fills in."""
     return yours if all(yours.get(key) is not None or value is None for key, value in body.items()) else body
 
 
 def at_once(hands: Sequence[Hand], count: int) -> None:
-    """All of them, each in a thread; what one raises is raised."""
+    """Run all of them, each in its own thread; an exception in one is raised again."""
     raised: list[BaseException] = []
 
     def work(hand: Hand) -> None:
@@ -151,8 +151,8 @@ def at_once(hands: Sequence[Hand], count: int) -> None:
 
 
 def check_the_end(hands: Sequence[Hand]) -> None:
-    """Both pages show what the database holds; every act that was answered is in the log, once; and nobody changed a
-    track without having seen what the other had made of it."""
+    """Both pages show the content of the database; every confirmed act is in the log exactly once; and nobody changed a
+    track without having seen the other's last change."""
     everything = []
     for hand in hands:
         with httpx.Client(base_url=hand.address, timeout=WAIT_S) as client:
@@ -178,7 +178,7 @@ def check_the_end(hands: Sequence[Hand]) -> None:
 
 
 def _check_seen(each: dict[str, Any], past: list[dict[str, Any]], by_act: dict[int, tuple[str, int, Any]]) -> None:
-    """The other's newest change before an act on a track is one that its person had seen."""
+    """Before an act on a track, its person had seen the other's last change to it."""
     name, _, body = by_act.get(each["act"], ("", 0, {}))
     if "track" not in body:
         return

@@ -25,7 +25,7 @@ JS = Path(__file__).resolve().parents[3] / "static" / "js"
 
 
 def typedefs(text: str) -> dict[str, set[str]]:
-    """The keys of each ``@typedef {object} Name``, by its name."""
+    """The keys of each ``@typedef {object} Name``, by name."""
     found: dict[str, set[str]] = {}
     name = ""
     for line in text.splitlines():
@@ -39,7 +39,7 @@ def typedefs(text: str) -> dict[str, set[str]]:
 
 @pytest.fixture(scope="module")
 def sent(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
-    """One real message of each kind, by the name of its type."""
+    """One real message of each type, by the type's name."""
     desk = SessionRecorder(tmp_path_factory.mktemp("sessions"))
     with running(desk, whole_drives=True, source=Recording(count=30)) as engine:
         engine.control.seek(28)
@@ -48,7 +48,7 @@ def sent(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
 
 
 def is_compared(shown: Snapshot) -> bool:
-    """The shown frame is the run's own, and so is a second run of the whole drive."""
+    """The shown frame comes from this run, and the whole drive has a second run."""
     drive = shown.state_json()["drive"]
     return not drive["running"] and drive["done"] == drive["total"] == 30 and drive["run"] != drive["base"]
 
@@ -110,7 +110,7 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
 
 
 def labelled(engine: Engine, client: httpx.Client) -> dict[str, Any]:
-    """Whatever is sent of labels."""
+    """Every message about labels."""
 
     drive = client.get("/api/labels").json()["drive"]["id"]
 
@@ -167,7 +167,7 @@ def labelled(engine: Engine, client: httpx.Client) -> dict[str, Any]:
 
 
 MADE_BY_THE_PAGE = {"Frame", "Series", "Drive"}
-"""Put together in the page from messages."""
+"""Types that the page builds from messages."""
 
 ALL_TYPES = (JS / "core" / "types.js", JS / "drive" / "types.js", JS / "labeling" / "state" / "types.js")
 KNOWN = {name: keys for file in ALL_TYPES for name, keys in typedefs(file.read_text(encoding="utf-8")).items()}

@@ -38,7 +38,7 @@ _ARRAYS = (
 
 
 def snapshot(params: Params | None = None, index: int = 3, **frame_changes: Any) -> Snapshot:
-    """What the engine shows at a frame; ``frame_changes`` replace parts of it."""
+    """The engine's snapshot at a frame; ``frame_changes`` replaces parts of the frame."""
     params = params or Params()
     recording = Recording()
     original = recording.frame
@@ -144,7 +144,7 @@ def test_an_image_is_encoded_when_it_must_be_and_never_too_wide(width: int, own_
 
 
 def _wide() -> U8:
-    """An image of twice the width that is sent, with one red car."""
+    """An image twice as wide as the one that is sent, with one red car."""
     bgr: U8 = np.zeros((360, 2560, 3), np.uint8)
     bgr[100:200, 600:900] = (20, 20, 220)
     return bgr

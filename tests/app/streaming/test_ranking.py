@@ -20,7 +20,7 @@ def result_of(**changes) -> Result:
 
 
 def with_objects() -> Result:
-    """#1 leads at 20 m, #2 passed every test behind it, #3 and #4 were stopped, #3 nearer."""
+    """#1 is the lead at 20 m, #2 behind it passed every test, #3 and #4 failed one, #3 is nearer."""
     base = result_of()
     item = base.objects[0]
     ok = Gate("hits", 5, 3, True)

@@ -25,7 +25,7 @@ async def _now(slot: Slot) -> list[str | bytes] | None:
 
 @pytest.fixture
 def taken() -> Iterator[Taken]:
-    """What a slot gives now; null when it would wait."""
+    """The slot's current item; None if it would wait."""
     with loop_apart() as run:
         yield lambda slot: run(_now(slot))
 
@@ -72,7 +72,7 @@ def test_a_paced_client_gets_no_frame_ahead_of_what_it_has_painted(taken: Taken)
 
 
 def test_the_newest_state_comes_last_also_when_a_frame_had_to_wait(taken: Taken):
-    """Else the frame, made before it, would have a page take what was for what is."""
+    """Otherwise the older frame would make the page show an outdated state."""
     slot = Slot(paced=True)
     for number in range(FRAMES_UNDER_WAY):
         slot.put("frame", b"%d" % number, number)

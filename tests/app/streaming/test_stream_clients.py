@@ -35,12 +35,12 @@ from tests.app.engine.recording_helpers import CountingDetector, Recording
 
 WAIT_S = 180.0
 FAST_FRAMES = 40
-"""More than the system's buffers between a server and a client that does not read can hold."""
+"""More than the system's buffers hold between a server and a client that does not read."""
 
 
 @dataclass
 class Site:
-    """A server of nothing but the stream; ``show(n)`` publishes frame n, as an engine's thread does."""
+    """A server with only the stream; ``show(n)`` publishes frame n, as an engine's thread does."""
 
     stream: Stream
     port: int
@@ -50,7 +50,7 @@ class Site:
         self.stream.publish(replace(self.first, sequence=sequence, index=sequence, **changes))
 
     def connected(self, query: str = "") -> AbstractContextManager[ClientConnection]:
-        """A client with little room for what it has not read yet, and that does not wait long to be let go."""
+        """A client with a small receive buffer and a short closing timeout."""
         end = socket.socket()
         end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 16)
         end.connect(("127.0.0.1", self.port))
@@ -78,7 +78,7 @@ def site() -> Iterator[Site]:
 
 
 def _first() -> Snapshot:
-    """A frame with an image wider than any page needs, of noise: its JPEG is large."""
+    """A frame with a noise image wider than any page needs, whose JPEG is large."""
     pipeline = _pipeline()
     tick = pipeline.seek(0, Params())
     assert tick is not None
@@ -161,7 +161,7 @@ def test_who_joins_late_sees_the_present_frame_and_the_present_state(site: Site)
 
 
 def test_the_image_is_as_wide_as_the_widest_page_shows_it(site: Site):
-    """Also while nothing plays; a page may say so as it comes."""
+    """Also while paused; a page may state its width when it connects."""
 
     def width(header: dict[str, Any]) -> int:
         return int(header["picture"]["width"])
@@ -184,7 +184,7 @@ def test_the_image_is_as_wide_as_the_widest_page_shows_it(site: Site):
 
 
 def test_a_pause_is_heard_while_the_image_is_made_wider(site: Site, monkeypatch: pytest.MonkeyPatch):
-    """The frame, which says that it plays, comes late; a page must not believe it."""
+    """The frame, which says that it is playing, arrives late; the page must ignore this."""
     encode, begun, gate = site.stream._encoder.message, threading.Event(), threading.Event()
 
     def slowly(snapshot: Snapshot, width_px: int) -> bytes | None:
@@ -206,8 +206,8 @@ def test_a_pause_is_heard_while_the_image_is_made_wider(site: Site, monkeypatch:
 
 
 def believed(client: ClientConnection) -> bool:
-    """Whether a page takes it to play: the last message holds. Asked twice: the first answer may stand before a state
-    that goes out with it."""
+    """Whether a page would show it as playing: the last message counts. Asked twice, because the first answer may
+    precede a state in the same batch."""
     playing, answers = True, 0
     client.send(json.dumps({"ping": 1}))
     while answers < 2:
@@ -224,7 +224,7 @@ def believed(client: ClientConnection) -> bool:
 
 
 def shown_next(site: Site, client: ClientConnection, sequence: int) -> dict[str, Any]:
-    """Publish a frame, and what the client gets of it."""
+    """Publish a frame; returns what the client receives."""
     site.show(sequence)
     return header_where(client, lambda header: sequence_of(header) == sequence)
 
@@ -318,7 +318,7 @@ def _texts(client: ClientConnection) -> Iterator[dict[str, Any]]:
 
 
 def _heard(client: ClientConnection) -> None:
-    """Wait until the server has read everything that was sent before."""
+    """Wait until the server has read everything sent so far."""
     client.send(json.dumps({"ping": 1}))
     while isinstance(message := client.recv(WAIT_S), bytes) or json.loads(message)["type"] != "pong":
         pass

@@ -106,7 +106,7 @@ def test_a_slider_of_the_3d_view_reaches_the_engine(engine: Engine, open_scene: 
 
 
 def _is_cloud(message: dict[str, Any]) -> bool:
-    """A cloud made or a cloud changed."""
+    """Whether the message creates or changes a cloud."""
     return str(message.get("name", "")).startswith("/points")
 
 

@@ -20,7 +20,7 @@ from tests.app.web.asking import WAIT_S
 
 @pytest.fixture(scope="module")
 def engine() -> Iterator[Engine]:
-    """Two recordings, the first one open."""
+    """An engine with two recordings, the first one open."""
     first, second = Recording(), Recording("test:other", count=5)
     engine = Engine(opener(first, second), lambda _: CountingDetector(), Params(), uri=first.uri)
     engine.start()
@@ -36,7 +36,7 @@ def looks() -> SharedViewState:
 
 @pytest.fixture(scope="module")
 def address(engine: Engine, looks: SharedViewState) -> Iterator[str]:
-    """The address of a real server."""
+    """Address of a real server."""
     bound = listen_socket("127.0.0.1", 0)
     address = f"http://127.0.0.1:{bound.getsockname()[1]}"
     is_ready = threading.Event()

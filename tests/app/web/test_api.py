@@ -48,7 +48,7 @@ def test_every_parameter_is_described_with_bounds_unit_and_help(client: httpx.Cl
 
 
 def test_what_never_changes_is_described_once(client: httpx.Client, monkeypatch: pytest.MonkeyPatch):
-    """A slider that is dragged asks ten times a second, while the frame that it changes is run again."""
+    """A dragged slider sends ten requests per second, while the frame is run again."""
     first = client.get("/api/params").json()
     described: list[str] = []
     monkeypatch.setattr(params, "describe", lambda: described.append("sections"))

@@ -36,9 +36,9 @@ FILES = {
     "/help",
     "/help/{address:path}",
 }
-"""Parts of pages and of foreign viewers, which are no API."""
+"""Parts of pages and of other programs' viewers, which are not API."""
 BYTES = {"type": "string", "format": "binary"}
-"""A file as OpenAPI calls it."""
+"""A file in OpenAPI's terms."""
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def operations(app: FastAPI) -> dict[str, dict[str, Any]]:
 
 
 def routes_of(routes: list[BaseRoute]) -> Iterator[Route]:
-    """Every one, also of routers that are kept as they were included."""
+    """All routes, including those of routers that are stored as included."""
     for route in routes:
         inner = getattr(route, "original_router", None)
         if inner is not None:
@@ -88,7 +88,8 @@ def test_every_route_is_described(app: FastAPI):
 
 
 def test_a_route_that_reads_its_body_itself_says_what_it_takes(app: FastAPI):
-    """The framework describes what it reads for a route; of one that takes the whole request it knows nothing."""
+    """The framework describes only what it reads for a route itself, not the body of one that takes the whole
+    request."""
     bare = {
         name
         for route in routes_of(app.routes)
@@ -154,7 +155,7 @@ def test_a_body_that_is_none_is_said_in_words(client: httpx.Client, body: bytes,
 
 
 def _is_typed(schema: dict[str, Any]) -> bool:
-    """A model of ours, a list of one, or null beside one."""
+    """A model of this project, a list of one, or an optional one."""
     return (
         "$ref" in schema or "$ref" in schema.get("items", {}) or any("$ref" in one for one in schema.get("anyOf", []))
     )

@@ -12,7 +12,7 @@ from tests.app.waiting import loop_apart
 
 
 def test_small_messages_are_not_held_back():
-    """asyncio sets TCP_NODELAY on what it accepts only where the listening socket names its protocol."""
+    """asyncio sets TCP_NODELAY on accepted sockets only if the listening socket specifies its protocol."""
 
     async def accepted_delay() -> int:
         loop = asyncio.get_running_loop()

@@ -42,7 +42,7 @@ serve(engine, port=int(sys.argv[1]), host=sys.argv[2])
 
 @pytest.fixture
 def taken_port() -> Iterator[int]:
-    """A port that somebody else listens on."""
+    """A port that another program listens on."""
     with listen_socket("127.0.0.1", 0) as held:
         held.listen()
         yield held.getsockname()[1]

@@ -34,7 +34,7 @@ FEED = """async (count) => {
     if (i % 5 === 0) await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
   }
 }"""
-"""The newest message again and again, as the stream would bring it, painted every few times."""
+"""Deliver the newest message repeatedly, as the stream would; the page paints every few of them."""
 
 
 def used_bytes(devtools: CDPSession) -> tuple[float, dict[str, int]]:
@@ -73,7 +73,7 @@ def test_a_long_day_leaves_nothing_behind(fed: Page):
 @pytest.mark.soak
 @pytest.mark.timeout(4 * 3600)
 def test_a_whole_day_of_frames_leaves_nothing_behind(fed: Page):
-    """As many as ten a second make in a day, each one drawn or skipped as a page in the car would."""
+    """As many frames as in a day at ten per second, each drawn or skipped as on a page in the car."""
     devtools, used = fed.context.new_cdp_session(fed), []
     for hour in range(HOURS):
         for _ in range(FRAMES_AN_HOUR // SLICE):

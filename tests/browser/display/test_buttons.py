@@ -11,8 +11,8 @@ from playwright.sync_api import expect
 
 from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder
+from app.web.guards.tokens import Tokens
 from app.web.server import create_app
-from app.web.tokens import Tokens
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import Recording, opener
 from tests.app.web.serving import serving

@@ -77,7 +77,7 @@ def test_a_paused_recording_is_not_old_but_says_so(open_display: OpenDisplay, ow
 
 
 def test_a_connection_that_says_nothing_any_more_is_left_for_another(browser: Browser, own: tuple[Site, Recording]):
-    """As when a cable is pulled: the system takes the connection for open, and no end of it ever comes."""
+    """As when a cable is unplugged: to the system, the connection stays open for ever."""
     site, _ = own
     context = browser.new_context()
     page = context.new_page()

@@ -24,7 +24,7 @@ STREAMS = """async () => {
   return [...document.querySelectorAll("#sensors li")].map((one) =>
     [one.textContent, getComputedStyle(one).color, one.querySelector("path").getAttribute("d")]);
 }"""
-"""How sensors look in one that is well, one that is late and one that is silent."""
+"""The states of a sensor that works, one that is late and one that is silent."""
 
 
 @pytest.mark.usefixtures("paused_in_traffic")
@@ -37,12 +37,27 @@ def test_a_sensor_that_fails_is_seen_by_colour_word_and_shape(open_display: Open
         assert len({works[column], late[column], gone[column]}) == 3
 
 
+@pytest.mark.usefixtures("paused_in_traffic")
+def test_a_further_sensor_is_named(open_display: OpenDisplay, site: Site):
+    page = open_display(site.address)
+    expect(page.locator("#sensors li")).to_have_count(3)
+    page.evaluate(
+        """async () => {
+          const { get, set } = await import("/js/core/store.js");
+          const frame = get("frame"), { result } = frame;
+          const sensors = { ...result.sensors, radar: { age_ms: 0, points: 3 } };
+          set("frame", { ...frame, result: { ...result, sensors } });
+        }"""
+    )
+    expect(page.locator("#sensors li")).to_have_text(["LiDAR", "Camera", "Ego speed", "Radar"])
+
+
 CUT_OFF = """() => {
   const { right } = document.querySelector(".lead").getBoundingClientRect();
   return [...document.querySelectorAll(".figure small")].filter((node) => node.getBoundingClientRect().right > right)
     .map((node) => node.textContent);
 }"""
-"""Units that large figures have pushed out of sight."""
+"""Units that large numbers have pushed out of view."""
 
 
 @pytest.mark.usefixtures("paused_in_traffic")
@@ -115,7 +130,7 @@ SHOW = """async (change) => {
   hold();
   await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
 }"""
-"""Another command with the shown frame, also when the server sends that again with an image of another size."""
+"""Another command with the shown frame, even if the server sends the frame again with an image of another size."""
 
 ALARM_PIXELS = """(selector) => {
   const canvas = document.querySelector(selector), ctx = canvas.getContext("2d");

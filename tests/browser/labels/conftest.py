@@ -14,14 +14,14 @@ from tests.browser.labels.hands import Hand, Labels, begin, is_at
 from tests.browser.looks import COUNT
 
 REFUSED = ("status of 409", "status of 500", "status of 503", "ERR_FAILED")
-"""What a browser's console says of requests that are refused."""
+"""What the browser's console logs for refused requests."""
 
 
 @dataclass
 class Line:
-    """Between a page and its server. Put there when the page opens: a busy browser may let a request through that comes
-    right after. full: acts find no room on the server's disk. broken: the server fails at them. mute: they are done,
-    and the answer is lost. deaf: the page does not hear what changed."""
+    """A faulty connection between a page and its server, installed when the page opens, since a busy browser may let
+    through a request made right afterwards. full: the server's disk is full. broken: acts fail on the server. mute:
+    acts are done but their responses are lost. deaf: the page receives no changes."""
 
     full: bool = False
     broken: bool = False
@@ -48,7 +48,7 @@ class Line:
 
 @pytest.fixture(scope="module")
 def desk(pages: Pages, site: Site) -> Iterator[tuple[Page, Line]]:
-    """One page in the labeling mode, for all who label here."""
+    """One page in labeling mode, used by all tests in this folder."""
     line = Line()
     with opening(pages, site) as open_page:
         page = open_page(expects=REFUSED)
@@ -65,7 +65,7 @@ def line(desk: tuple[Page, Line]) -> Line:
 
 @pytest.fixture
 def hand(desk: tuple[Page, Line], site: Site) -> Hand:
-    """Nothing is labelled, nothing is selected, and the page is at ``START``."""
+    """A page at ``START`` without labels and selection."""
     page, line = desk
     line.full = line.broken = line.mute = line.deaf = False
     Labels(page, site.address).clear(COUNT)

@@ -14,21 +14,21 @@ from tests.browser.conftest import WAIT_MS
 from tests.browser.looks import box_of
 
 FROM_M, TO_M, HALF_M, TOOLS_PX = -5.0, 74.0, 13.0, 36
-"""What the plan shows until a person moves it (static/js/views/drawing/viewport.js)."""
+"""Initial extent of the plan (static/js/views/drawing/viewport.js)."""
 KEYSTROKE_S = {"key": 0.28, "press": 0.20, "point": 1.10, "decide": 1.35}
-"""Seconds of the keystroke-level model (Card, Moran and Newell 1980): a key, a mouse button down and up, pointing at
-something, and making up one's mind before an act. For a person's time, which no test can measure."""
+"""Times in seconds of the keystroke-level model (Card, Moran and Newell 1980): key press, mouse click, pointing, and
+mental preparation before an act. They estimate a person's time, which no test can measure."""
 LEAD_X, LEAD_Y = 34.6, 0.0
-"""Where the simulated lead's middle is in the shown frame."""
+"""Position of the simulated lead's centre in the shown frame."""
 LEADS_Y = 50
-"""The middle of the leads' row on the timeline, below one row of tags (static/js/timeline/rows.js)."""
+"""Centre of the leads' row on the timeline, below one row of tags (static/js/timeline/rows.js)."""
 
 Spot = tuple[float, float]
 
 
 @dataclass
 class Hand:
-    """Keys, presses and drags on a page, counted."""
+    """Counts keys, clicks and drags on a page."""
 
     page: Page
     counts: dict[str, int] = field(default_factory=lambda: {"keys": 0, "presses": 0, "drags": 0, "acts": 0})
@@ -55,7 +55,7 @@ class Hand:
 
     @property
     def modelled_s(self) -> float:
-        """What the keystroke-level model gives for these hands."""
+        """Time of these acts by the keystroke-level model."""
         of, n = KEYSTROKE_S, self.counts
         return (
             n["acts"] * of["decide"]
@@ -65,14 +65,14 @@ class Hand:
         )
 
     def plan(self, x: float, y: float) -> Spot:
-        """The pixel of a place of the plan."""
+        """Page pixel of a position in the plan."""
         box = box_of(self.page.locator("#bev"))
         scale = min((box["height"] - TOOLS_PX) / (TO_M - FROM_M), box["width"] / (2 * HALF_M))
         middle = FROM_M + (box["height"] / 2 - TOOLS_PX) / scale
         return box["x"] + box["width"] / 2 - y * scale, box["y"] + box["height"] / 2 - (x - middle) * scale
 
     def image(self, u: float, v: float, width: int, height: int) -> Spot:
-        """The pixel of the page where a pixel of the camera's image of that size is."""
+        """Page pixel of a pixel of a camera image of that size."""
         box = box_of(self.page.locator("#camera"))
         scale = min(box["width"] / width, box["height"] / height)
         left, top = (box["width"] - width * scale) / 2, (box["height"] - height * scale) / 2
@@ -80,7 +80,7 @@ class Hand:
 
 
 class Labels:
-    """What the server at an address knows."""
+    """The labels on a server."""
 
     def __init__(self, page: Page, address: str) -> None:
         self._page, self._address = page, address
@@ -97,7 +97,7 @@ class Labels:
         return answer.json()
 
     def ask(self, path: str, body: dict[str, Any]) -> Any:
-        """What a route beside the labels' own answers."""
+        """Response of a route other than those of labels."""
         answer = self._page.request.post(f"{self._address}/api/{path}", data=body)
         assert answer.ok, (path, answer.text())
         return answer.json()
@@ -121,7 +121,7 @@ class Labels:
         return sorted((each["first"], each["last"], each["tag"]) for each in self.everything["tags"])
 
     def sighting(self, track: int, frame: int) -> Any:
-        """Where a track is in a frame; null where it is not."""
+        """A track's sighting in a frame; None without one."""
         rows = self.get(f"/frames?first={frame}&last={frame}")["sightings"].get(str(frame), [])
         return next((row for row in rows if row["track"] == track), None)
 
@@ -130,14 +130,14 @@ class Labels:
         return None if found is None else found["cuboid"]
 
     def wait_for(self, holds: Callable[[Labels], bool]) -> None:
-        """Until the server knows it; the page's answers come on their own time."""
+        """Wait until the server has it, since the page's requests are asynchronous."""
         deadline = time.monotonic() + WAIT_MS / 1e3
         while not holds(self):
             assert time.monotonic() < deadline, json.dumps(self.everything)[:2000]
             self._page.evaluate("() => new Promise((done) => setTimeout(done, 20))")
 
     def clear(self, count: int) -> None:
-        """Nothing is labelled."""
+        """Remove all labels."""
         held = self.everything
         self._remove([("track", each) for each in held["tracks"]])
         held = self.everything
@@ -152,7 +152,7 @@ class Labels:
 
 
 def begin(page: Page, person: str = "Ada") -> Hand:
-    """The labeling mode, with who labels known."""
+    """Enter labeling mode under a name."""
     page.evaluate(f"localStorage.setItem('cipv.person', JSON.stringify('{person}'))")
     expect(page.locator("#label-button")).to_be_enabled()
     page.keyboard.press("Shift+L")
@@ -161,17 +161,17 @@ def begin(page: Page, person: str = "Ada") -> Hand:
 
 
 def is_at(page: Page, index: int) -> None:
-    """The page has painted the frame: the next act is about it."""
+    """Wait until the page has painted the frame, so the next act refers to it."""
     expect(page.locator("#label-bar")).to_have_attribute("data-frame", str(index))
 
 
 def is_saved(page: Page) -> None:
-    """Every act so far has been answered."""
+    """Wait until every act has been answered."""
     expect(page.locator(".saved")).to_have_attribute("data-state", "saved")
 
 
 def draw(hand: Hand, labels: Labels) -> int:
-    """A cuboid on the simulated lead, drawn from its rear to its front; the new track's number."""
+    """Draw a cuboid on the simulated lead, from its rear to its front; returns the new track's id."""
     before = set(labels.tracks)
     hand.keys("g")
     hand.drag(hand.plan(LEAD_X - 2.2, LEAD_Y), hand.plan(LEAD_X + 2.2, LEAD_Y))

@@ -41,7 +41,7 @@ BUILD = Path(__file__).resolve().parents[3] / "build"
 
 @pytest.fixture(scope="module")
 def clip(data_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The URI of these frames of Astyx alone, by links."""
+    """URI of a folder with only these Astyx frames, as links."""
     folder = tmp_path_factory.mktemp("astyx")
     for part in (each for each in (data_dir / "astyx").iterdir() if each.is_dir()):
         (folder / part.name).mkdir()
@@ -74,14 +74,14 @@ def astyx(clip: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]
 
 @pytest.fixture(scope="module")
 def objects(clip: str) -> list[tuple[TruthObject, ...]]:
-    """What is there, frame by frame, as Astyx says."""
+    """The objects in each frame, by the labels of Astyx."""
     source = open_source(clip)
     return [source.truth(index) or () for index in range(COUNT)]
 
 
 @pytest.fixture(scope="module")
 def truth(objects: list[tuple[TruthObject, ...]]) -> list[Cuboid]:
-    """Where the car ahead is."""
+    """True position of the car ahead."""
     return [ahead(each).cuboid for each in objects]
 
 
@@ -95,7 +95,7 @@ def wait_for_frame(page: Page, index: int) -> None:
 
 
 def errors_m(labels: Labels, track: int, truth: list[Cuboid]) -> dict[str, float]:
-    """How far the labelled car is from the true one, over its frames: of its middle, and of its rear face."""
+    """Distances of the labelled car from the true one in all its frames: of its centre, and of its rear face."""
     held = [labels.cuboid(track, index) for index in range(COUNT)]
     assert all(each is not None for each in held), "it is labelled in every frame"
     middle = [
@@ -115,8 +115,8 @@ def errors_m(labels: Labels, track: int, truth: list[Cuboid]) -> dict[str, float
 
 
 def judge_the_rest(hand: Hand, labels: Labels, objects: list[tuple[TruthObject, ...]]) -> None:
-    """Every track that is left, from the list of what is to do: accepted where a vehicle is, rejected where none is. A
-    box in the image is taken for one: what the camera has named is there."""
+    """Go through the remaining tracks in the list of work: accept real vehicles and reject the others. A track with a
+    box in the image counts as real, since the camera has classified it."""
     page = hand.page
     page.get_by_role("button", name="To do", exact=True).click()
     page.get_by_label("Minimum confidence of proposals").fill("0")
@@ -145,7 +145,7 @@ def on_a_vehicle(cuboid: Any, objects: tuple[TruthObject, ...]) -> bool:
 
 
 def score_of(page: Page, labels: Labels) -> dict[str, str]:
-    """What the Score tab shows of the present run, by the figure's title."""
+    """Values in the Score tab for the current run, by title."""
     page.get_by_role("tab", name="Score").click()
     expect(page.locator(".label-score")).to_have_attribute("data-revision", str(labels.everything["revision"]))
     rows = page.locator(".label-score .comparison table:not(.errors) tbody tr")
@@ -154,7 +154,7 @@ def score_of(page: Page, labels: Labels) -> dict[str, str]:
 
 
 def exported_score(engine: Engine, labels: Labels) -> dict[str, str]:
-    """The same figures of the labels as a file."""
+    """The same figures, computed from the exported labels."""
     known = of_labels(from_json(json.dumps(labels.get("/export?format=native")).encode(), "the export"), RULE)
     run = engine.labels.recording.runs.current
     assert run is not None
@@ -178,8 +178,8 @@ def work(hand: Hand, started: float, errors: dict[str, float]) -> dict[str, Any]
 
 
 def from_proposals(hand: Hand, labels: Labels, truth: list[Cuboid]) -> tuple[int, dict[str, float]]:
-    """The pipeline has found the car's rear in every frame, but a LiDAR behind it cannot see how long it is: its
-    front is drawn in one frame, and that size is taken along. Returns the lead, and how far off the proposals were."""
+    """The pipeline has found the car's rear in every frame, but a LiDAR behind it cannot see its length: the front is
+    drawn in one frame, and that size is used for all. Returns the lead, and the errors of the proposals."""
     page = hand.page
     hand.keys("p")
     labels.wait_for(lambda now: len(now.leads) > 0)
@@ -211,7 +211,7 @@ def from_proposals(hand: Hand, labels: Labels, truth: list[Cuboid]) -> tuple[int
 
 
 def from_nothing(hand: Hand, labels: Labels, truth: list[Cuboid]) -> int:
-    """Drawn in the first frame, and put right in a few others; between them it follows."""
+    """Drawn in the first frame and corrected in a few others, with interpolation between them."""
     page = hand.page
     first = truth[0]
     hand.keys("g")
@@ -238,7 +238,7 @@ def from_nothing(hand: Hand, labels: Labels, truth: list[Cuboid]) -> int:
 
 
 def tag_all(hand: Hand, labels: Labels) -> None:
-    """Every frame is said to be labelled whole with one key, which is taken back and done again."""
+    """All frames are marked as completely labelled with one key, which is undone and redone."""
     page = hand.page
     notes = page.locator(".label-score .notes")
     assert not score_of(page, labels).keys() & WHOLE_ONLY

@@ -19,7 +19,7 @@ LOADED = "(image) => image.complete && image.naturalWidth > 0"
 
 
 def canvas_per_pixel(page: Page) -> float:
-    """How large a pixel of the camera is."""
+    """Size of a camera pixel on the canvas."""
     return page.evaluate(
         """async () => {
           const { place } = await import("/js/views/camera.js"), { get } = await import("/js/core/store.js");
@@ -29,7 +29,7 @@ def canvas_per_pixel(page: Page) -> float:
 
 
 def whole(page: Page) -> None:
-    """Zoomed out as far as it goes."""
+    """Zoom out completely."""
     for _ in range(14):
         page.keyboard.press("<")
 

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
 
 def border(hand: Hand, frame: int) -> tuple[float, float]:
-    """The pixel of the border before a frame, in the row of the leads."""
+    """Pixel of the border before a frame, in the leads' row."""
     front = box_of(hand.page.locator("#timeline-front"))
     middles = on_timeline(hand.page, frame - 1), on_timeline(hand.page, frame)
     return front["x"] + sum(middles) / 2, front["y"] + LEADS_Y

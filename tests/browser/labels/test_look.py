@@ -46,7 +46,7 @@ def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, hei
 
 
 def nameless(page: Page) -> list[str]:
-    """Controls of the mode that a screen reader has no name for."""
+    """Controls without a name for screen readers."""
     return page.evaluate(
         """() => [...document.querySelectorAll("#label-bar button, #label-pane :is(button, select, input)")]
           .filter((node) => node.checkVisibility() && !(node.textContent.trim() || node.getAttribute("aria-label")))

@@ -31,7 +31,7 @@ def test_projects_are_shown_with_progress_people_and_results_of_control_frames(h
 
     page.get_by_role("tab", name="Files").click()
     row = page.locator(".project-row[data-project=Winter]")
-    expect(row).to_contain_text("2 of 4 requested frames labelled · 0 of 1 recordings done · one frame every 2 s")
+    expect(row).to_contain_text("2 of 4 queued frames labelled · 0 of 1 recordings done · one frame every 2 s")
     expect(row).to_contain_text("Bob: ")
     expect(row).to_contain_text("lead right in 100 % of 2 frames")
     expect(row.get_by_role("progressbar", name="Progress of Winter")).to_have_js_property("value", 2)
@@ -43,7 +43,7 @@ def test_projects_are_shown_with_progress_people_and_results_of_control_frames(h
 
 
 def test_who_signed_in_has_the_name_and_role_of_the_account(hand: Hand, labels: Labels):
-    """The server's answer to a labeler's page."""
+    """What the server tells a labeler's page."""
     page = hand.page
     page.route("**/api/account", lambda route: route.fulfill(json={"name": "Rita", "role": "labeler"}))
     page.route("**/api/labels/queue", lambda route: route.fulfill(json=[{**_WORK, "person": "Bob"}]))
@@ -54,7 +54,7 @@ def test_who_signed_in_has_the_name_and_role_of_the_account(hand: Hand, labels: 
     expect(row.get_by_role("button", name="Bob")).to_be_disabled()
     assert row.locator("option[value=done]").evaluate("(node) => node.disabled")
     page.keyboard.press("Shift+R")
-    expect(page.locator(".said")).to_have_text("Only for accounts with the role reviewer")
+    expect(page.locator(".said")).to_have_text("Requires the role reviewer")
     page.unroute("**/api/account")
     page.unroute("**/api/labels/queue")
     page.reload()

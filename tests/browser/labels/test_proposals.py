@@ -10,7 +10,7 @@ from tests.browser.labels.hands import Hand, Labels, begin, draw, is_at
 from tests.browser.looks import COUNT
 
 NO_VISER = ("status of 502",)
-"""The server of these tests has no 3D view of its own."""
+"""The server in these tests has no 3D view."""
 HEAR = """() => {
   window.said = [];
   const { send } = WebSocket.prototype;
@@ -19,14 +19,14 @@ HEAR = """() => {
     return send.call(this, message);
   };
 }"""
-"""Keeps what the page tells the server from now on."""
+"""Records what the page sends to the server from now on."""
 NEWEST = "Object.assign({}, ...window.said.map((each) => JSON.parse(each)))"
-"""The newest of each word that it told."""
+"""The newest message of each kind."""
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
 
 def test_the_next_unlabelled_frame_is_one_whose_lead_is_only_proposed(hand: Hand, labels: Labels):
-    """Sent back, a label is a proposal again."""
+    """A label that is returned becomes a proposal again."""
     page = hand.page
     labels.act("Bob", {"kind": "set_lead", "first": 0, "last": COUNT - 1, "lead": "none"})
     hand.keys("n")

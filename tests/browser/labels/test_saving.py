@@ -140,7 +140,7 @@ def test_what_follows_an_undo_that_waits_is_no_conflict_with_oneself(hand: Hand,
 
 
 def test_the_labels_of_another_database_are_read_anew(hand: Hand, labels: Labels):
-    """As after a restart of the server: it knows less than the page does."""
+    """As after a restart of the server, when it has less than the page."""
     page = hand.page
     made = draw(hand, labels)
     is_saved(page)
@@ -160,8 +160,8 @@ def test_the_labels_of_another_database_are_read_anew(hand: Hand, labels: Labels
 
 
 def test_the_small_rules_of_sending(hand: Hand):
-    """Where a page has no ``randomUUID``; two that ask for nothing in particular while one is under way; two items of
-    one number."""
+    """A page without ``randomUUID``; two requests without parameters while one is pending; two items with the same
+    id."""
     page = hand.page
     made = page.evaluate(
         """async () => {

@@ -47,7 +47,7 @@ def test_a_cuboid_is_drawn_moved_turned_and_resized_in_the_plan(hand: Hand, labe
 
 
 def test_a_hand_in_the_3d_view_moves_it_in_every_view(hand: Hand, labels: Labels):
-    """What the server says of a drag there, as ``app/streaming/stream.py`` sends it."""
+    """The server's message about a drag there, as sent by ``app/streaming/stream.py``."""
     page = hand.page
     made = draw(hand, labels)
     is_saved(page)
@@ -153,7 +153,7 @@ def test_what_the_image_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, si
 
 
 def foot_of(labels: Labels, cuboid: dict[str, Any]) -> tuple[float, float]:
-    """The pixel of the middle of its bottom."""
+    """Pixel of the centre of its bottom."""
     flat = {**cuboid, "size": [0.01, 0.01, cuboid["size"][2]]}
     corners = labels.ask("project", {"cuboids": [flat]})["pixels"][0][:4]
     return sum(u for u, _ in corners) / 4, sum(v for _, v in corners) / 4
@@ -187,7 +187,7 @@ def test_a_cuboid_is_dragged_over_the_road_in_the_image(hand: Hand, labels: Labe
 
 
 def test_a_ray_meets_the_ground_where_it_is_seen_first(hand: Hand):
-    """The road rises by 5 % from 20 m on, seen from 1.5 m up: (how far down, how high above the ground, where)."""
+    """The road rises by 5 % beyond 20 m, seen from a height of 1.5 m: (angle down, height above ground, position)."""
     cases = [(0.1, 0.0, 15.0), (0.1, 0.5, 10.0), (0.05, 0.0, 25.0), (-0.01, 0.0, 62.5), (-0.2, 0.0, None)]
     found = hand.page.evaluate(
         """async (cases) => {
@@ -275,11 +275,11 @@ EDGES = [
     ("left", (10.0, 2.0), (10.0, 0.5), (4.0, 3.0)),
     ("right", (10.0, 0.0), (10.0, 0.5), (4.0, 1.0)),
 ]
-"""An edge, where it is dragged to, and the middle and the size that come of it."""
+"""An edge, where it is dragged to, and the resulting centre and size."""
 
 
 def test_the_opposite_face_is_held_whatever_the_heading(hand: Hand):
-    """A cuboid of 4 m by 2 m at (10, 0), each edge dragged; and the same turned by any angle about its middle."""
+    """A cuboid of 4 m × 2 m at (10, 0), each edge dragged; then the same at any heading."""
     page = hand.page
     found = page.evaluate(
         """async (angles) => {

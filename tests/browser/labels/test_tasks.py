@@ -91,7 +91,7 @@ def test_the_lead_is_painted_by_keys_by_number_and_by_a_drag(hand: Hand, labels:
 
 
 def test_everything_said_of_a_frame_has_a_history(hand: Hand, labels: Labels):
-    """Also more of it than is shown at first, and what was done while it is looked at."""
+    """Including entries that are hidden at first, and new ones while it is open."""
     page = hand.page
     made = draw(hand, labels)
     for label in ("truck", "bus") * 4:
@@ -148,7 +148,7 @@ def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, 
 
 
 def only_sure_ones_are_listed(hand: Hand, labels: Labels) -> None:
-    """The slider, from nothing to everything; one is turned round, and taken back."""
+    """The slider from none to all; one heading is reversed, and this is undone."""
     page, count = hand.page, len(labels.tracks)
     slider = page.get_by_label("Minimum confidence of proposals")
     slider.fill("1")

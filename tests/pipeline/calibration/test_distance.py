@@ -79,7 +79,7 @@ def test_the_camera_alone_with_a_law_that_never_saw_the_drive(astyx: Recording, 
 
 
 def _lead_errors(recording: Recording, frames: tuple[int, int], params: Params) -> list[float]:
-    """Relative error of the track whose box lies best on the labelled lead, camera only, frame by frame."""
+    """Relative error of the track whose box fits the labelled lead best, with the camera alone, by frame."""
     state, before_ns, errors = tracking.VisionTrackerState(), None, []
     for index in (k for k, name in enumerate(recording.names) if _within(name, frames)):
         frame = recording.source.frame(index)
@@ -104,7 +104,7 @@ def _lead_errors(recording: Recording, frames: tuple[int, int], params: Params) 
 
 
 def test_the_lidar_can_stand_in_for_labels(kitti: Recording) -> None:
-    """Laws from the LiDAR's own boxes agree with those from labels to a fifth, on frames that nobody labelled."""
+    """Laws fitted to the LiDAR's boxes agree with those fitted to labels within 20 %, on unlabelled frames."""
     by_lidar = collect_pairs(kitti.source, kitti.detector, "lidar")
     assert len({pair.frame for pair in by_lidar}) > 10
     lidar, labels = (fit_laws(pairs, exponent=-1.0)["car"].law for pairs in (by_lidar, kitti.pairs))

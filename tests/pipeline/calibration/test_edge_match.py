@@ -117,7 +117,7 @@ def elsewhere(drive: list[Seen]) -> list[Seen]:
 
 @pytest.mark.parametrize("made", [another_moment, elsewhere])
 def test_images_of_something_else_have_no_score(drive: list[Seen], made: Callable[[list[Seen]], list[Seen]]):
-    """Edges are everywhere, and what lies on one lies there by chance."""
+    """Edges are everywhere, so points lie on edges by chance."""
     found = edge_score(made(drive), with_mount())
     assert found.score is None
     assert found.borders >= FEWEST
@@ -136,7 +136,8 @@ ANGULAR = {"model": "angular", "h_res_deg": 0.1, "v_res_deg": 0.1, "cx_px": 320.
 
 
 def posts(true: AlignmentParams, camera: CameraCalibration | None, frames: int = 4) -> list[Seen]:
-    """Bright posts of all heights, 12 m to 25 m ahead, as 16 rings and an image under the true alignment see them."""
+    """Bright posts of various heights, 12 m to 25 m ahead, seen by 16 rings and, with the true alignment, by the
+    camera."""
     aligned, rng = resolve(true, camera), np.random.default_rng(0)
     assert aligned is not None
     scenes: list[Seen] = []

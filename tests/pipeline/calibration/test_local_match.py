@@ -20,7 +20,7 @@ PX_PER_DEG = CAMERA.K[0, 0] * np.pi / 180.0
 
 
 def poles(seed: int, borders: int = 400) -> Seen:
-    """A frame with posts all over the view: each is a bright bar in the image, and borders in depth at its side."""
+    """A frame full of posts: each is a bright bar in the image, with depth edges at its sides."""
     rng = np.random.default_rng(seed)
     range_m, bearing = rng.uniform(5.0, 45.0, borders // 5), np.radians(rng.uniform(-35.0, 35.0, borders // 5))
     x, y = range_m * np.cos(bearing), range_m * np.sin(bearing)

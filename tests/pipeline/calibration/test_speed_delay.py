@@ -10,7 +10,7 @@ from pipeline.common.geometry import rotation
 
 
 def pairs(late_ms: float, accel: float = 1.5, seconds: float = 40.0, noise_m: float = 0.02) -> list[SpeedPair]:
-    """A speed that swings, seen by an odometry whose places are off by some centimetres."""
+    """An oscillating speed, measured by odometry whose positions have errors of some centimetres."""
     rng, t_s = np.random.default_rng(5), np.arange(0.0, seconds, 0.1)
 
     def speed(at: np.ndarray) -> np.ndarray:

@@ -23,7 +23,7 @@ LATER_MS = 35.0
 
 
 def drive(later_ms: float) -> Callable[[int], Frame]:
-    """Frames of a bend whose images show the world that much after their times."""
+    """Frames of a bend whose images were taken later than their timestamps, by this delay."""
     scene = load("curve_125")
     sensors = SensorRig(scene, world_state.at(scene, scene.duration_s).s_m)
 

@@ -26,7 +26,7 @@ def test_first_frames():
 
 
 def test_the_pipeline_starts_anew_where_a_clip_begins():
-    """Own motion is carried on for up to two seconds: not into another clip that lies a second before."""
+    """Ego motion is predicted for up to two seconds, but not into another clip that begins a second earlier."""
     ticks = [10 * S, 11 * S, 10 * S, 11 * S]
     frames = [Frame(n, str(n), t, ego=EgoState(t, 20.0) if n == 1 else None) for n, t in enumerate(ticks)]
     state, commands = State(), []

@@ -24,7 +24,7 @@ PATH = corridor(None, PathParams(half_width_m=1.5))
 
 
 def test_a_single_sweep_does_not_brake_for_what_is_beside_the_path() -> None:
-    """The corner of a parked car that comes into view jumps sideways once."""
+    """When the corner of a parked car comes into view, the track jumps sideways once."""
     swerving = (fused(1, 15.0, 3.0, velocity=(-12.0, -2.0)),)
     ego = EgoState(0, 20.0)
     objects = choose(CipvState(), describe(swerving, ego, MotionParams()), PATH, moment(ego), CipvParams())[1].objects
@@ -156,8 +156,8 @@ def test_approaching_a_standing_car_from_100_m_at_72_km_h_the_car_stops_before_i
 
 
 def test_on_an_unknown_path_acc_does_not_accelerate() -> None:
-    """Whoever may lead on an unknown path: with the set speed far above, the car holds its speed and says why; slowing
-    down for a lead comes first all the same, and from standstill it may creep on."""
+    """With any lead on an unknown path, and a much higher set speed, the car holds its speed and gives the reason;
+    slowing down for the lead still has priority, and from standstill it may creep."""
     vague = dataclasses.replace(PATH, usable=False, reach_m=12.0, doubt="path known only 12 m ahead")
     limits = ((20.0, 20.0, "ACC will not accelerate"), (0.0, 3.0, "ACC will not exceed 11 km/h"))
     for speed_mps, wanted_mps, limit in limits:
@@ -225,7 +225,7 @@ def test_acc_brakes_hard_only_where_that_avoids_a_collision(
 
 
 def accelerations(ego: EgoState, lead: Cipv, frames: int, params: AccParams = PARAMS) -> list[float]:
-    """Commanded in each of so many frames in which nothing changes."""
+    """Commanded accelerations in a number of frames without changes."""
     state, given = AccState(), []
     for _ in range(frames):
         state, result = control(state, Situation(moment(ego, 0.1), PATH, (), lead), params, EMERGENCY)
@@ -243,7 +243,7 @@ def accelerations(ego: EgoState, lead: Cipv, frames: int, params: AccParams = PA
     ],
 )
 def test_braking_for_comfort_sets_in_gently(speed_mps: float, jerk_mps3: float) -> None:
-    """What leads for three frames slows the car by less than 0.2 m/s."""
+    """An object that is the lead for three frames slows the car by less than 0.2 m/s."""
     lead = Cipv(1, 6.0 + 0.5 * speed_mps, 0.0, None, "")
     gentle = accelerations(EgoState(0, speed_mps), lead, 3)
     assert gentle == pytest.approx([-jerk_mps3 * 0.1 * n for n in (1, 2, 3)])

@@ -14,7 +14,7 @@ from tests.pipeline.build import fused
 PARAMS = ExistenceParams()
 CAMERA = replace(fused(1, 30.0, source="V"), existence=0.95, in_path_probability=0.95)
 RANGED = replace(CAMERA, camera_ranges=8, height_from="range", velocity_mps=(-24.0, 0.0), camera_speed_sigma_mps=2.5)
-"""The camera has followed it for long, and single LiDAR returns have ranged it."""
+"""The camera has tracked it for a long time, and single LiDAR returns have ranged it."""
 BOTH = replace(fused(1, 30.0), existence=0.95, ranged_hits=5)
 
 

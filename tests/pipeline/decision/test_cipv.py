@@ -139,7 +139,7 @@ def test_a_carried_object_may_stay_the_lead_but_not_become_it() -> None:
 
 
 def test_a_box_too_near_to_be_measured_does_not_become_the_lead() -> None:
-    """The image's edge cuts a passing car's box: it is seen, but how far it is now is only predicted."""
+    """The edge of the image cuts a passing car's box: the car is seen, but its distance is only predicted."""
     cut = dataclasses.replace(fused(1, 1.5, source="V"), measured=False)
     lead, why_not = decide(cut)
     assert lead is None
@@ -223,7 +223,8 @@ def test_a_decoy_whose_place_sways_does_not_take_over() -> None:
 
 
 def test_one_that_moves_over_is_told_before_and_leads_when_it_is_in() -> None:
-    """A car 25 m ahead comes over from 3.5 m aside at 1.2 m/s; its wheel is on the edge when its middle is at 2.4 m."""
+    """A car 25 m ahead, 3.5 m to the side, moves over at 1.2 m/s; its wheel is on the edge when its centre is at 2.4
+    m."""
     frames = []
     for k in range(40):
         y = max(3.5 - 0.12 * k, 0.0)
@@ -271,7 +272,7 @@ def ids(choice: Choice) -> set[int]:
 
 
 def sightings(*places: FusedObject) -> list[Choice]:
-    """What is chosen while one object is seen here and there, every 0.1 s, from a car at 20 m/s."""
+    """The choice in each frame while one object is seen at these positions every 0.1 s, from a car at 20 m/s."""
     state, ego, found = CipvState(), EgoState(0, 20.0, 0.0), []
     for item in places:
         seen = describe([item], ego, MotionParams())
@@ -282,7 +283,7 @@ def sightings(*places: FusedObject) -> list[Choice]:
 
 @given(st.lists(st.floats(-4.0, 4.0), min_size=1, max_size=8))
 def test_the_gates_value_and_limit_say_what_it_decides(asides: list[float]) -> None:
-    """Wherever it was seen before: over the limit is out, and the odds say the same."""
+    """Regardless of earlier positions, a value over the limit means out, and the odds agree."""
     for choice in sightings(*[fused(1, 20.0, y) for y in asides]):
         gates = {gate.name: gate for gate in choice.objects[0].gates}
         offset = gates["path_offset"]
@@ -292,7 +293,7 @@ def test_the_gates_value_and_limit_say_what_it_decides(asides: list[float]) -> N
 
 
 def test_what_falls_behind_the_bumper_fails_for_that_alone() -> None:
-    """Its offset is one that may lead, and says so."""
+    """Its offset permits leading, and the gate says so."""
     (item,) = sightings(*[fused(1, 6.0, 0.2)] * 6, fused(1, -6.0, 0.2))[-1].objects
     assert not item.in_path
     assert [gate.name for gate in item.gates if not gate.passed] == ["ahead"]
@@ -310,7 +311,7 @@ def test_what_crosses_fast_is_judged_where_it_is_now() -> None:
 
 
 def test_the_lidar_has_just_lost_what_the_camera_sees() -> None:
-    """It may become the lead while its tracked distance is known well, and not when it has drifted."""
+    """It may become the lead while its tracked distance is accurate, but not after it has drifted."""
     lost = dataclasses.replace(fused(1, 20.0), seen_by="V", measured=False)
     assert decide(dataclasses.replace(lost, distance_sigma_m=0.2))[0] is not None
     lead, why_not = decide(dataclasses.replace(lost, distance_sigma_m=0.8))

@@ -23,7 +23,7 @@ PATH = corridor(None, PathParams(half_width_m=1.5))
 
 
 def chosen(item: FusedObject, ego_mps: float | None, params: CipvParams | None = None) -> Choice:
-    """Judged in three frames in a row, so that an object seen by one sensor is confirmed."""
+    """The choice after three consecutive frames, so that an object seen by one sensor is confirmed."""
     ego = EgoState(0, ego_mps, 0.0) if ego_mps is not None else None
     (seen,) = describe([item], ego, MotionParams())
     state = CipvState()
@@ -75,7 +75,7 @@ def test_what_will_cross_is_not_the_next_lead() -> None:
 
 @pytest.mark.parametrize(("width", "leads"), [(1.8, True), (4.5, False)])
 def test_without_ego_speed_only_what_shows_its_flank_crosses(width: float, leads: bool) -> None:
-    """In a bend, a lead that the car follows seems to move sideways as well."""
+    """In a bend, the lead in front seems to move sideways too."""
     item = dataclasses.replace(fused(1, 15.0, 0.0, width=width), velocity_mps=(0.0, 5.0))
     assert (chosen(item, None).lead is not None) is leads
 
@@ -111,7 +111,7 @@ def frames_with_a_lead(sensors: str, knows_speed: bool, params: Params) -> int:
 @pytest.mark.parametrize("knows_speed", [True, False])
 @pytest.mark.parametrize("sensors", ["both", "camera", "lidar"])
 def test_at_a_red_light_cross_traffic_does_not_lead(sensors: str, knows_speed: bool) -> None:
-    """In 120 frames, but for the first sightings of a vehicle, before its speed is known."""
+    """In 120 frames, except for the first sightings of a vehicle, before its speed is known."""
     assert frames_with_a_lead(sensors, knows_speed, Params()) <= 5
 
 

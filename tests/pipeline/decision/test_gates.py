@@ -61,7 +61,7 @@ def test_decisions_stay_when_every_shown_gate_has_another_name(
 
 
 def test_the_scenes_ask_for_braking_and_for_a_next_lead() -> None:
-    """Or the test above would compare nothing."""
+    """Otherwise the test above would compare nothing."""
     cuts_in, _, _ = decide(SCENES["a lead, one cuts in, one stands aside"])
     assert cuts_in.lead is not None
     assert cuts_in.next_lead is not None
@@ -107,7 +107,7 @@ def test_a_new_lead_has_to_be_probable_as_a_whole(
 
 @pytest.mark.parametrize(("speed_mps", "leads"), [(0.0, False), (9.0, True), (-9.0, False), (None, True)])
 def test_at_the_edge_only_what_goes_along_leads(speed_mps: float | None, leads: bool) -> None:
-    """In the path with 51 %: on a bend that is not known well every parked and every oncoming car is."""
+    """In the path with a probability of 51 %, like every parked or oncoming car in a bend of uncertain shape."""
     vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 1.5))
     item = dataclasses.replace(fused(1, 30.0, 1.2), existence=0.98)
     velocity = None if speed_mps is None else (speed_mps - EGO.speed_mps, 0.0)
@@ -120,7 +120,7 @@ def test_at_the_edge_only_what_goes_along_leads(speed_mps: float | None, leads: 
 
 
 def fused_place(x: float, y: float) -> dict[str, object]:
-    """Where a vehicle is, to be put into another one."""
+    """The position fields of a vehicle, to be copied to another one."""
     there = fused(1, x, y)
     return {name: getattr(there, name) for name in ("bev", "cuboid", "closest_point", "distance_m")}
 
@@ -133,7 +133,8 @@ def fused_place(x: float, y: float) -> dict[str, object]:
     ],
 )
 def test_a_speed_that_is_mostly_noise_makes_no_traffic(sigma: float, leads: bool) -> None:
-    """A camera-only car at the path's edge, in the path by 60 %, that seems to drive off at 8 m/s."""
+    """A camera-only car at the edge of the path, in it with a probability of 60 %, that seems to drive away at 8
+    m/s."""
     item = fused(1, 40.0, 1.1, source="V", velocity=(8.0 - 15.0, 0.0), length=4.3)
     seen = dataclasses.replace(item, camera_speed_sigma_mps=sigma, distance_sigma_m=2.0)
     path = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 1.2))

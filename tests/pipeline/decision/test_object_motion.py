@@ -49,7 +49,8 @@ def test_over_ground(
 
 
 def test_a_parked_car_aside_stands_still_while_we_turn() -> None:
-    """In a frame that turns by 0.1 rad/s what stands at (20, 8) seems to go 0.8 m/s ahead and 2 m/s to the right."""
+    """In a frame that turns at 0.1 rad/s, an object standing at (20, 8) seems to move at 0.8 m/s forwards and 2 m/s to
+    the right."""
     (item,) = describe([fused(1, 20.0, 8.0, velocity=(-10.0 + 0.8, -2.0))], EgoState(0, 10.0, 0.1), PARAMS)
     assert item.closest_point is not None
     assert item.closest_point[:2] == (20.0, 8.0)

@@ -45,7 +45,7 @@ def test_how_far_aside_it_is_still_in_the_path(width: float, limit_m: float) -> 
 
 
 def test_lines_need_not_be_parallel_to_the_centre() -> None:
-    """A lane that widens to the left: what is out of it at 20 m is in it at 60 m."""
+    """A lane that widens to the left: an offset outside it at 20 m is inside at 60 m."""
     center = STRAIGHT.center
     left = center + np.column_stack([np.zeros(len(center)), 1.5 + 0.03 * center[:, 0]])
     path = dataclasses.replace(STRAIGHT, left=left)
@@ -54,7 +54,7 @@ def test_lines_need_not_be_parallel_to_the_centre() -> None:
 
 
 def test_a_finer_path_is_looked_up_by_path_length(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A point every half metre: the edges at 20 m are those of its fortieth."""
+    """With a point every half metre, the edges at 20 m are those of the fortieth point."""
     monkeypatch.setattr(path_position, "STEP_M", 0.5)
     center, _ = arc(0.0, samples(100.0) / 2)
     aside = np.column_stack([np.zeros(len(center)), 1.5 + 0.03 * center[:, 0]])
@@ -66,7 +66,7 @@ def test_a_finer_path_is_looked_up_by_path_length(monkeypatch: pytest.MonkeyPatc
 
 
 def test_what_stands_across_the_path_is_in_it_while_any_of_it_reaches_in() -> None:
-    """A car turns out of the path: its front is 2.5 m aside, its tail still in the middle."""
+    """A car turns out of the path: its front is 2.5 m to the side, its tail still in the middle."""
     turned = Cuboid((20.0, 1.2, 0.2), (4.5, 1.8, 1.5), 0.75)
     corners = tuple((float(x), float(y)) for x, y in turned.footprint())
     item = dataclasses.replace(fused(1, 20.0, 1.2), cuboid=turned, bev=corners)
@@ -149,7 +149,7 @@ def test_a_whole_car_is_placed_by_its_rear(x: float, y: float) -> None:
 
 
 def crossing_car(x: float, from_m: float, to_m: float) -> FusedObject:
-    """One that stands square across, of whose flank the LiDAR sees only the first metre and a half."""
+    """A car perpendicular to the path; the LiDAR sees only the first 1.5 m of its side."""
     item = fused(1, x, from_m + 0.75, length=0.1, width=1.5)
     return dataclasses.replace(item, box_sides=((x, to_m), (x, from_m)))
 
@@ -170,7 +170,7 @@ def test_a_box_of_which_one_edge_is_nowhere_says_nothing(edge: tuple[float, floa
 
 
 def test_the_flank_of_a_car_in_the_next_lane_does_not_widen_it() -> None:
-    """Its box covers rear and flank: from 4.4 m aside at its rear to 2.6 m at its front, which is farther away."""
+    """Its box covers rear and side: from 4.4 m to the side at its rear to 2.6 m at its front, which is farther away."""
     item = fused(1, 15.0, 3.5, length=4.5)
     beside = dataclasses.replace(item, box_sides=((15.0, 4.4), (15.0, 2.0)))
     assert placed(beside)[0].middle_m == pytest.approx(3.5, abs=0.02)
@@ -178,7 +178,7 @@ def test_the_flank_of_a_car_in_the_next_lane_does_not_widen_it() -> None:
 
 @pytest.mark.parametrize("way", [-1.0, 1.0])
 def test_the_nose_of_one_that_moves_over_is_farther_that_way(way: float) -> None:
-    """2 m/s sideways at 15 m/s, of which 1.5 are believed: 0.45 m over a car's length."""
+    """2 m/s sideways at 15 m/s, of which 1.5 m/s count: 0.45 m over a car's length."""
     steady, _ = placed(fused(1, 20.0, 3.0, velocity=(-5.0, 0.0)))
     moving, _ = placed(fused(1, 20.0, 3.0, velocity=(-5.0, 2.0 * way)))
     gained = moving.high_m - steady.high_m if way > 0.0 else steady.low_m - moving.low_m
@@ -190,8 +190,8 @@ def test_the_nose_of_one_that_moves_over_is_farther_that_way(way: float) -> None
 
 
 def by_its_box(x: float, y: float, yaw_rad: float = 0.0) -> FusedObject:
-    """A car whose rear's middle is at (x, y), as the camera has it: at its range along the bearing of its box's middle,
-    the box being that of all its corners."""
+    """A car with the centre of its rear at (x, y), as seen by the camera: at its range, on the bearing of the centre of
+    its box, which encloses all its corners."""
     car = Cuboid((x + 2.15 * math.cos(yaw_rad), y + 2.15 * math.sin(yaw_rad), 0.75), (4.3, 1.8, 1.5), yaw_rad)
     bearings = [math.atan2(b, a) for a, b in car.footprint()]
     middle, range_m = (max(bearings) + min(bearings)) / 2, math.hypot(x, y)

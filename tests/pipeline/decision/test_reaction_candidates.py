@@ -77,9 +77,9 @@ def test_enters_corridor(item: FusedObject, ego_mps: float | None, enters: bool)
 
 
 OVER_THERE = fused(1, 30.0, -8.0, velocity=(-20.0, 6.0))
-"""Crosses, and will be in the corridor."""
+"""It crosses and will enter the corridor."""
 IN_OUR_LANE = fused(1, 30.0, 0.2, velocity=(-35.0, 0.0))
-"""Comes towards us."""
+"""It is oncoming."""
 STANDS = fused(1, 30.0, 0.2, velocity=(-20.0, 0.0))
 
 

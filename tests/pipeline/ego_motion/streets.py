@@ -34,7 +34,7 @@ def tunnel() -> F64:
 
 
 def seen(world: F64, x_m: float, y_m: float, heading_rad: float, t_ns: int) -> Sweep:
-    """The sweep of a LiDAR at this pose, with 2 cm of noise that is new in each sweep."""
+    """The sweep of a LiDAR at this pose, with 2 cm of independent noise."""
     c, s = np.cos(heading_rad), np.sin(heading_rad)
     local = (world - [x_m, y_m]) @ np.array([[c, -s], [s, c]])
     local = local[np.hypot(local[:, 0], local[:, 1]) < 45.0]

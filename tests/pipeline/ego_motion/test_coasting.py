@@ -21,7 +21,7 @@ def test_what_is_measured_is_taken_as_it_is() -> None:
 
 @pytest.mark.parametrize("step_s", [0.1, 0.5, 2.0])
 def test_errors_grow_with_age_however_often_a_frame_comes(step_s: float) -> None:
-    """After 2 s: 2 m/s and 2 m of way, 0.04 rad/s and 0.04 rad."""
+    """After 2 s: 2 m/s and 2 m travelled, 0.04 rad/s and 0.04 rad."""
     own: EgoState | None = DRIVING
     way = turn = rate = 0.0
     for _ in range(round(2.0 / step_s)):

@@ -40,7 +40,7 @@ def test_noise_of_a_receiver_is_smoothed() -> None:
 
 @pytest.mark.parametrize("rate_hz", [1.0, 2.0, 4.0, 5.0, 10.0, 20.0])
 def test_a_turn_is_known_at_every_usual_rate_as_late_as_said(rate_hz: float) -> None:
-    """The course of a turn that tightens evenly: the line's slope is the yaw rate of its middle."""
+    """Course during a turn that tightens steadily: the slope of the line is the yaw rate at its middle."""
     courses = [-0.05 * (k / rate_hz) ** 2 for k in range(round(3 * rate_hz) + 1)]
     known = [state.yaw_rate_radps for state in drive(list(courses), step_s=1.0 / rate_hz)]
     lag_s = yaw_rate_lag_s(rate_hz)

@@ -16,7 +16,7 @@ STREET = street()
 def drive(
     world: object, speed_mps: float, yaw_rate_radps: float = 0.0, sweeps: int = 8, prior: EgoState | None = None
 ) -> list[OdometryStep]:
-    """Odometry along a road at a steady speed, a sweep each 0.1 s."""
+    """Odometry along a road at constant speed, with a sweep every 0.1 s."""
     found = [OdometryStep(OdometryState(), None)]
     x = y = heading = 0.0
     for k in range(sweeps):

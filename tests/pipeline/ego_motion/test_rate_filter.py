@@ -8,7 +8,7 @@ from pipeline.ego_motion import rate_filter
 
 
 def test_a_braking_car_has_its_speed_of_now_and_not_of_half_a_step_ago() -> None:
-    """20 m/s, braking at 3 m/s²: the mean of the last 0.1 s is 0.15 m/s more than the speed at its end."""
+    """Braking at 3 m/s² from 20 m/s, the mean of the last 0.1 s is 0.15 m/s higher than the speed at its end."""
     now = rate_filter.start(20.0 * 0.1, 0.1, 0.01, 3.0)
     speed = 20.0
     for _ in range(20):

@@ -57,7 +57,7 @@ def test_one_at_the_edge_is_doubtful() -> None:
 
 
 def test_what_has_just_come_into_sight_cannot_be_confirmed_yet() -> None:
-    """A car behind another one is hidden, and in sight from when that one has moved over."""
+    """A car is hidden behind another one until that one has changed lanes."""
     scene = with_actors(
         "{id: 1, kind: car, lane: -2, ahead_m: 50, speed_mps: {0: 20}},"
         "{id: 2, kind: truck, lane: -2, ahead_m: 15, speed_mps: {0: 20}, "

@@ -24,7 +24,7 @@ RMC_NS = 764_426_119_000_000_000
 
 
 def whole(body: str) -> str:
-    """A sentence with its checksum."""
+    """The sentence with its checksum."""
     return f"${body}*{reduce(xor, body.encode()):02X}"
 
 

@@ -8,7 +8,7 @@ import pytest
 from pipeline.common.geometry import rotation
 from pipeline.formats.nuscenes_tables import AnnotationRow, SceneRow, parse_table, pose_of, truth_object
 from pipeline.types.source import SourceError
-from tests.pipeline.sources.nuscenes_on_disk import quaternion
+from tests.pipeline.sources.made.nuscenes_on_disk import quaternion
 
 
 @pytest.mark.parametrize("angles", [(0.0, 0.0, 0.0), (0.1, -0.2, 3.0), (0.0, 0.0, -1.5), (3.1, 0.0, 0.4)])

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.formats.other_lidars import maker_of
 from pipeline.sources import SourceError, open_source
-from tests.pipeline.sources.captures import ethernet, pcap
+from tests.pipeline.sources.made.captures import ethernet, pcap
 
 MAKERS = {
     "Ouster by port": (b"\0" * 100, 7502, 6464, "Ouster"),
@@ -37,7 +37,7 @@ def test_a_capture_of_one_says_so_in_one_line(name: str, tmp_path: Path) -> None
 
 
 def test_an_ousters_datagrams_come_in_parts(tmp_path: Path) -> None:
-    """6464 bytes do not fit into one Ethernet frame: the capture holds the first 1472 and the rest apart."""
+    """6464 bytes do not fit into one Ethernet frame: the capture contains the first 1472 and the rest separately."""
     frame = bytearray(ethernet(7502, bytes(1472)))
     struct.pack_into(">H", frame, 14 + 6, 0x2000)  # more to come
     struct.pack_into(">H", frame, 14 + 20 + 4, 8 + 6464)

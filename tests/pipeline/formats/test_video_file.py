@@ -11,7 +11,7 @@ import pytest
 from pipeline.formats import video_file
 from pipeline.formats.video_file import VideoFile
 from pipeline.sources import SourceError
-from tests.pipeline.sources.captures import write_video
+from tests.pipeline.sources.made.captures import write_video
 
 IMAGES = 12
 
@@ -59,7 +59,7 @@ def test_two_who_read_by_turns_do_not_make_each_other_seek(tmp_path: Path) -> No
 def test_images_larger_than_a_cameras_are_refused_before_they_are_decoded(
     codec: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """48 × 80 pixels are, where the budget is one less."""
+    """48 × 80 pixels are too large for a budget of one pixel less."""
     write_video(tmp_path / "a.avi", 3, codec=codec)
     monkeypatch.setattr(video_file, "MOST_PIXELS", 100_000)  # FFmpeg counts a margin of 128 pixels too
     assert VideoFile(tmp_path / "a.avi").image(1).shape == (48, 80, 3)

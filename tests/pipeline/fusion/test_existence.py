@@ -20,13 +20,13 @@ ROAD = Ground(np.zeros(0, bool), np.array([[0.0, 0.0, 1.0, -ROAD_M]]), np.array(
 
 @dataclass(frozen=True)
 class Rays:
-    """A sweep as far as rays matter."""
+    """The parts of a sweep that matter for rays."""
 
     points: F32
     ground: Ground | None = ROAD
     origin: Point3 = (0.0, 0.0, 0.0)
     cluster: int = -2
-    """Of every point; negative: none."""
+    """Cluster of every point; negative: none."""
 
     @property
     def kind(self) -> I32:
@@ -34,12 +34,12 @@ class Rays:
 
     @property
     def ring(self) -> U8:
-        """Each height is a ring."""
+        """Rays in which each height is a ring."""
         return np.unique(self.points[:, 2], return_inverse=True)[1].astype(np.uint8)
 
 
 def returns(range_m: float, bearing_deg: float = 0.0, height_m: float = 0.6) -> F32:
-    """Eleven rays in a fan of 2°, each ending at that range and that height over the road."""
+    """Eleven rays in a fan of 2°, each ending at this range and height above the road."""
     turn = np.radians(bearing_deg + np.linspace(-1.0, 1.0, 11))
     z = np.full(11, ROAD_M + height_m)
     return np.stack([range_m * np.cos(turn), range_m * np.sin(turn), z, np.zeros(11)], axis=1).astype(np.float32)
@@ -60,7 +60,7 @@ def after(item: FusedObject, rays: Rays, frames: int = 5, params: ExistenceParam
 
 
 def gate(item: FusedObject) -> bool | None:
-    """What the gate on the free road says; None where it says nothing."""
+    """Whether the ``free_road`` gate passed; None without the gate."""
     return next((each.passed for each in item.gates if each.name == "free_road"), None)
 
 
@@ -83,9 +83,9 @@ def test_what_a_working_lidar_would_have_to_see(points: F32, exists: bool, said:
 
 
 ASIDE = np.concatenate([returns(30.0, bearing_deg=side) for side in (-20.0, 20.0)])
-"""A ring at body height, of which nothing comes back from straight ahead."""
+"""A ring at body height without returns from straight ahead."""
 TARMAC = returns(6.0, height_m=0.0)
-"""The road before the place, which proves that the sensor looks there."""
+"""Returns from the road in front of the position, which prove that the sensor sees in that direction."""
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_silence_speaks_against_it(points: list[F32], range_m: float, exists: bo
     ("range_m", "exists"), [pytest.param(12.0, False, id="near"), pytest.param(30.0, True, id="too far to have one")]
 )
 def test_near_by_a_vehicle_has_a_cluster_of_its_own(range_m: float, exists: bool) -> None:
-    """A second box beside a parked car: what rays find there is the parked car, which another object is."""
+    """A second box beside a parked car: the rays there hit the parked car, which is another object."""
     found = after(camera_car(range_m), Rays(returns(range_m + 0.5), cluster=3))
     assert found.existence is not None
     assert (found.existence > 0.5) == exists
@@ -120,8 +120,8 @@ def test_near_by_a_vehicle_has_a_cluster_of_its_own(range_m: float, exists: bool
     ("seconds", "exists"), [pytest.param(1.0, True, id="was followed"), pytest.param(0.1, False, id="for one sweep")]
 )
 def test_a_lead_whose_cluster_was_joined_with_its_neighbours_is_still_there(seconds: float, exists: bool) -> None:
-    """A van that the LiDAR followed stops beside a parked car: their points are one cluster, the parked car's. A box
-    that was joined with a cluster once is no van."""
+    """A van that the LiDAR tracked stops beside a parked car: their points form one cluster, that of the parked car. A
+    box that was joined with a cluster only once is not such a van."""
     van, rays = camera_car(8.0), Rays(returns(8.5), cluster=3)
     ranged = replace(van, source="VL", seen_by="VL")
     state = ExistenceState({van.id: Existence(0.8, 0.0)})
@@ -134,14 +134,14 @@ def test_a_lead_whose_cluster_was_joined_with_its_neighbours_is_still_there(seco
 
 
 def test_rays_start_at_the_sensor() -> None:
-    """A ray from a roof passes over the place although its return, behind, is at body height."""
+    """A ray from the roof passes over the position, although its return behind is at body height."""
     high = Rays(returns(40.0, height_m=0.6), origin=(0.0, 0.0, 3.0))
     assert gate(after(camera_car(), high)) is None
     assert gate(after(camera_car(), Rays(returns(40.0, height_m=0.6)))) is False
 
 
 def test_a_vague_distance_needs_rays_through_all_of_it() -> None:
-    """12 ± 1.2 m and a wall at 17 m: the car cannot be there. 12 ± 4 m: it may be the wall that was taken for it."""
+    """At 12 ± 1.2 m with a wall at 17 m, the car cannot exist. At 12 ± 4 m, it may be the wall."""
     wall = Rays(returns(17.0))
     assert gate(after(camera_car(sigma_m=1.2), wall)) is False
     assert gate(after(camera_car(sigma_m=4.0), wall)) is True
@@ -195,7 +195,7 @@ def existence_after(state: ExistenceState, item: FusedObject, frames: int = 1) -
 
 
 def test_that_a_place_was_empty_says_nothing_of_another_place() -> None:
-    """The camera's place began anew, far from where the LiDAR looked through it."""
+    """The camera's position was reset to one far from where the LiDAR looked through it."""
     car = camera_car(45.0, score=0.7)
     kept = seen_through()
     assert existence_after(kept, car) < 0.5
@@ -237,7 +237,7 @@ IMAGE = Frame(0, "0", 0, image=CameraImage(None, np.zeros((720, 1280, 3), np.uin
 
 
 def unseen(followed: int, images: int, frame: Frame = IMAGE, *others: FusedObject, u: float = 600.0) -> float:
-    """Existence of a camera car 50 m away, seen in so many images with a score of 0.7, then in none of the next."""
+    """Existence of a camera-only car 50 m away, seen in this many images with a score of 0.7, then missed."""
     car = replace(camera_car(50.0, score=0.7), bbox=(u, 350.0, u + 30.0, 375.0))
     state = ExistenceState()
     for k in range(followed):
@@ -286,7 +286,7 @@ def test_where_the_far_view_sits_out_a_frame_nothing_is_missed() -> None:
     [("it keeps its distance", 0.0, True), ("it is slower by 5 m/s", 5.0, True), ("it stands", 20.0, False)],
 )
 def test_a_weak_box_that_goes_along_is_a_vehicle(case: str, closing_mps: float, exists: bool) -> None:
-    """At 72 km/h, with scores that half of the time are of nothing."""
+    """At 72 km/h, with scores at which half of all boxes are false."""
     state = ExistenceState()
     for k in range(16):
         car = replace(camera_car(60.0 - 0.1 * closing_mps * k, score=0.45), camera_ranges=k + 1)
@@ -301,7 +301,7 @@ def test_a_weak_box_that_goes_along_is_a_vehicle(case: str, closing_mps: float, 
 
 
 def test_what_is_only_predicted_does_not_go_along() -> None:
-    """A weak box on something that stands, seen for 0.4 s; then the car drives 36 m without measuring it again."""
+    """A weak box on a static object, seen for 0.4 s; then the car drives 36 m without measuring it again."""
     state = ExistenceState()
     for k in range(18):
         car = replace(camera_car(60.0 - 2.0 * min(k, 4), score=0.45), seen_by="V" if k < 5 else "", measured=k < 5)

@@ -60,7 +60,8 @@ def test_every_track_lands_in_exactly_one_row(
 
 
 def test_where_the_sight_lines_past_a_box_end() -> None:
-    """At the LiDAR's distance where it has one, at the camera's else; nowhere for what the camera does not see now."""
+    """At the LiDAR's distance if there is one, otherwise at the camera's; None for objects that the camera does not see
+    now."""
     near, far = lidar_track(1, 20.0), vision_track(2, (300.0, 330.0, 400.0, 390.0), 40.0)
     lost = evolve(vision_track(3, (900.0, 330.0, 950.0, 390.0), 30.0), carried=True)
     u1, v1, u2, v2 = box_of(near)
@@ -86,7 +87,7 @@ def test_one_car_seen_by_both_is_one_row_with_the_lidars_place_and_the_cameras_n
 
 
 def test_a_far_cluster_of_one_ring_still_meets_its_cars_box() -> None:
-    """At 40 m rings lie 1.4 m apart: one ring on a car is a line, and only the gap beyond it makes it a box."""
+    """At 40 m, rings are 1.4 m apart: one ring on a car is a line, and only the gaps above and below make it a box."""
     line = lidar_track(1, 40.0, height=0.1)
     whole = vision_track(1, box_of(lidar_track(2, 40.0, height=1.5)), 40.0)
     _, result = joined([line], [whole])
@@ -102,7 +103,7 @@ def test_boxes_apart_stay_two_objects() -> None:
 
 
 def test_a_far_car_over_the_roof_of_a_near_one_is_not_joined_with_it() -> None:
-    """Their boxes overlap in the image, their ranges do not; the L row says which test kept them apart."""
+    """Their boxes overlap in the image, but their ranges do not; the L row says which test kept them apart."""
     near = lidar_track(1, 15.0)
     x1, y1, x2, y2 = box_of(near)
     far = vision_track(1, (x1 + 20, y1 - 10, x2 - 25, (y1 + y2) / 2), 50.0, sigma_m=3.0)
@@ -134,7 +135,7 @@ def test_boxes_of_one_place_and_size_are_one_object_though_the_height_law_errs()
 def test_a_box_stays_with_the_cluster_that_it_was_joined_with(
     hits: int, carried: bool, params: FusionParams, ranged_m: float
 ) -> None:
-    """A box that was drawn too tall for once fits a spurious cluster before the lead better than the lead's own."""
+    """A box that is too tall in one image fits a spurious cluster in front of the lead better than the lead's own."""
     lead, spurious = lidar_track(1, 40.0), lidar_track(2, 20.0)._replace(hits=hits)
     state, result = joined([lead], [vision_track(1, box_of(lead), 40.0)], params)
     assert [item.source for item in result.objects] == ["VL"]
@@ -150,7 +151,8 @@ def test_a_box_stays_with_the_cluster_that_it_was_joined_with(
     ("label", "carried", "who"), [("suitcase", False, 1), ("suitcase", True, 2), ("car", False, 2)]
 )
 def test_the_cluster_of_a_vehicle_that_is_still_boxed_becomes_nothing_else(label: str, carried: bool, who: int) -> None:
-    """A network saw a suitcase in the rear of the lead, in a box that fitted its cluster better than the lead's own."""
+    """A network took the rear of the lead for a suitcase, with a box that fitted the cluster better than the lead's
+    own."""
     lead = lidar_track(1, 7.0)
     x1, y1, x2, y2 = box_of(lead)
     car = vision_track(1, (x1, y1, x2, y2), 7.0)
@@ -191,7 +193,7 @@ HEDGE_M, LORRY_M = 35.0, 16.5
 def test_what_is_longer_than_any_of_its_class_is_not_joined(
     label: str, length_m: float, params: FusionParams, sources: list[str]
 ) -> None:
-    """A hedge beside the road fills the box of the car before it; the row of either says how long it is."""
+    """A hedge beside the road fills the box of the car in front of it; both rows state the hedge's length."""
     track = lidar_track(1, 12.0, 3.0, length=length_m)
     _, result = joined([track], [vision_track(1, box_of(track), None, label=label)], params)
     assert sorted(item.source for item in result.objects) == sources
@@ -202,7 +204,8 @@ def test_what_is_longer_than_any_of_its_class_is_not_joined(
 
 
 def test_optimal_assignment_beats_first_come_first_served() -> None:
-    """Two cars side by side, one box between: greedily it takes the better half and leaves the other car's alone."""
+    """Two cars side by side, and one box across both: greedy assignment gives it the better half, and the other car's
+    box gets nothing."""
     left, right = lidar_track(1, 20.0, 1.1), lidar_track(2, 20.0, -1.1)
     a, b = box_of(left), box_of(right)
     shift = (b[0] - a[0]) * 0.45
@@ -237,7 +240,7 @@ def test_an_object_keeps_its_number_from_v_to_vl_to_l() -> None:
 
 
 def test_a_fragment_does_not_take_the_number_of_the_whole() -> None:
-    """The box that the car had is a fragment now, and a new one has its cluster: the number goes with the cluster."""
+    """The car's former box is now a fragment, and a new box has its cluster: the id stays with the cluster."""
     track = lidar_track(1, 20.0)
     state, first = joined([track], [vision_track(1, box_of(track))])
     assert [item.source for item in first.objects] == ["VL"]

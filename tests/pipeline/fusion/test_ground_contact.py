@@ -26,7 +26,7 @@ def aligned() -> Alignment:
 
 
 def swept(points: F32 | None = None, *boxes: VisionMeasurement) -> RoadProfile | None:
-    """The road in these returns, behind boxes or else behind one in the sky."""
+    """The road profile from these returns, without those on the boxes; by default, the only box is in the sky."""
     points = road() if points is None else points
     planes: F64 = np.array([[0.0, 0.0, 1.0, 0.8]])
     ground = Ground(np.ones(len(points), dtype=np.bool_), planes, np.array([0.0, 60.0]), np.array([True]))
@@ -34,7 +34,7 @@ def swept(points: F32 | None = None, *boxes: VisionMeasurement) -> RoadProfile |
 
 
 def box_of(range_m: float, height_m: float = 1.5, y_m: float = 0.0, width_m: float = 1.8) -> Box:
-    """Of an upright thing on a flat road."""
+    """Box of an upright object on a flat road."""
     u, half = MIDDLE_PX - FOCAL_PX * y_m / range_m, FOCAL_PX * width_m / range_m / 2
     bottom = HORIZON_PX + FOCAL_PX * EYE_M / range_m
     return u - half, bottom - FOCAL_PX * height_m / range_m, u + half, bottom
@@ -47,7 +47,7 @@ def seen(bbox: Box, distance_m: float | None, label: str = "car") -> VisionMeasu
 
 
 def contact(*boxes: VisionMeasurement, points: F32 | None = None) -> VisionMeasurement:
-    """The first box, measured among the others."""
+    """The measured contact of the first box, given the others."""
     found = measure_contacts(boxes, swept(points), aligned(), FusionParams())
     assert found is not None
     return found[0]
@@ -122,7 +122,7 @@ def test_without_what_it_rests_on_boxes_stay_as_they_are() -> None:
 
 
 def test_returns_on_a_vehicle_are_no_road() -> None:
-    """Behind a crest, a ring on its rear lies where the flat road would be: the road is not measured there."""
+    """Beyond a crest, a ring on the vehicle's rear lies where a flat road would be: the road is not measured there."""
     near = road()[road()[:, 0] < 12.0]
     rear = np.array([(28.0, y, -0.8, 0.0) for y in np.linspace(-0.9, 0.9, 15)], dtype=np.float32)
     points, vehicle = np.concatenate([near, rear]), seen(box_of(28.0), 28.0)

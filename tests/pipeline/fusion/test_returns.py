@@ -14,7 +14,7 @@ from pipeline.types import F32, I32, CameraCalibration, Detection, Ground, Point
 
 AT_M = 50.0
 BOX = (980.0, 270.0, 1044.0, 330.0)
-"""What a car 50 m ahead looks like: 1.8 m across, 1.7 m high, its wheels 0.8 m below the camera."""
+"""Box of a car 50 m ahead: 1.8 m wide, 1.7 m high, its wheels 0.8 m below the camera."""
 
 
 def aligned() -> Alignment:

@@ -20,7 +20,7 @@ ONE = np.ones(1, np.float32)
 
 
 def counting(path: Path) -> ort.InferenceSession:
-    """A network that counts to its input, one after the other."""
+    """A network that counts up to its input, one step after the other."""
     value = helper.make_tensor_value_info
     one = helper.make_tensor("one", TensorProto.FLOAT, [1], [1.0])
     body = helper.make_graph(

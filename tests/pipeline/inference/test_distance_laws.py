@@ -88,7 +88,7 @@ def test_a_place_that_cannot_be_written_to_is_named(network: Path) -> None:
 
 @given(st.floats(200.0, 4000.0), st.floats(10.0, 300.0), st.floats(-1.5, -0.7))
 def test_a_law_says_the_same_for_every_camera(focal_px: float, height_px: float, exponent: float) -> None:
-    """A camera of twice the focal length sees boxes twice as tall, and the same distances."""
+    """A camera with twice the focal length sees boxes twice as tall, at the same distances."""
     law = DistanceLaw(1300.0, exponent, 1000.0, 1.0, 1.0, 1.0)
     other = law.at_focal(focal_px)
     seen_px = height_px * focal_px / law.focal_px

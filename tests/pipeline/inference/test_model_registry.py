@@ -18,7 +18,7 @@ CONTENT = bytes(range(256)) * 1000
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """Answers by the path's first word."""
+    """Answers by the first part of the path."""
 
     def do_GET(self) -> None:
         kind = self.path.strip("/")
@@ -53,7 +53,7 @@ def _own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _known(monkeypatch: pytest.MonkeyPatch, url: str) -> None:
-    """yolox_nano as if its official file were at ``url``."""
+    """The entry of yolox_nano, as if its official file were at ``url``."""
     nano = replace(model_registry.KNOWN[0], url=url, size=len(CONTENT), sha256=hashlib.sha256(CONTENT).hexdigest())
     monkeypatch.setattr(model_registry, "KNOWN", (nano, *model_registry.KNOWN[1:]))
 

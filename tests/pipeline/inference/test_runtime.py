@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="niceness is a p
 
 
 def _niceness() -> dict[int, int]:
-    """Of each thread of this process; those that end meanwhile are left out."""
+    """Niceness of each thread of this process, without threads that end meanwhile."""
     found = {}
     for each in map(int, os.listdir("/proc/self/task")):
         with suppress(ProcessLookupError):

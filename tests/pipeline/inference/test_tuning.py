@@ -33,7 +33,7 @@ CPU = "CPUExecutionProvider"
 
 @pytest.fixture
 def network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A small network, and a store of its own."""
+    """A small network in its own store."""
     monkeypatch.setenv("CIPV_HOME", str(tmp_path / "home"))
     return networks.yolox(tmp_path / "tiny.onnx")
 
@@ -95,7 +95,7 @@ def test_every_way_of_a_real_network_is_tried_and_gives_its_outputs(network: Pat
 def _made(
     slow: Callable[[RunSettings], bool], output: Callable[[RunSettings], float]
 ) -> Callable[[RunSettings], Callable[[], Sequence[F32]]]:
-    """Ways that take 5 ms or nothing, and give one number."""
+    """Settings that take 5 ms or no time, and return one number."""
 
     def run(way: RunSettings) -> Callable[[], Sequence[F32]]:
         def once() -> Sequence[F32]:
@@ -120,7 +120,7 @@ def test_the_faster_one_is_chosen_unless_its_outputs_differ() -> None:
 
 
 def test_results_do_not_depend_on_tuning_unless_rounding_is_permitted() -> None:
-    """The outputs of one thread differ in their last bit."""
+    """With one thread, outputs differ in the last bit."""
 
     def is_slow(way: RunSettings) -> bool:
         return way.threads != 1 and way.arena

@@ -15,18 +15,18 @@ from tests.pipeline.labels.formats.sets import camera, drive
 BY = Origin("person", "Ada", 1)
 CAR = Cuboid((20.0, 0.0, 0.5), (4.0, 1.8, 1.5), 0.1)
 BESIDE = Cuboid((4.5, 3.0, 0.5), (4.0, 1.8, 1.5), 0.0)
-"""Near, and cut by the left side of the image."""
+"""Near, and cut by the left edge of the image."""
 
 
 def sighting(cuboid: Cuboid | None, **more: object) -> Sighting:
-    """As the one frame of a track gives it to an export."""
+    """The sighting in a track's only frame, as passed to an export."""
     here = drive()
     track = LabelTrack(1, "car", (Sighting(0, cuboid, **more),), "accepted", BY)  # type: ignore[arg-type]
     return following(replace(here.empty(), tracks=(track,)), here).tracks[0].sightings[0]
 
 
 def around(cuboid: Cuboid) -> tuple[float, ...] | None:
-    """The box around the corners, by hand; None outside the image."""
+    """The box around the corners, computed here; None outside the image."""
     eye = camera()
     seen = eye.T_camera_ego @ np.column_stack([cuboid.corners(), np.ones(8)]).T
     u, v = (eye.K @ seen[:3])[:2] / seen[2]
@@ -36,7 +36,7 @@ def around(cuboid: Cuboid) -> tuple[float, ...] | None:
 
 
 def test_a_detectors_box_gives_way_to_the_cuboids_projection() -> None:
-    """Of 200 cuboids all round, those in the image have the box around their corners, cut at its edges."""
+    """Of 200 cuboids in all directions, those in the image get the box around their corners, cut at its edges."""
     rng = np.random.default_rng(3)
     cuboids = [
         Cuboid((float(x), float(y), 0.5), (4.0, 1.8, 1.5), float(yaw))

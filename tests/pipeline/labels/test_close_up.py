@@ -18,7 +18,7 @@ CAR = Cuboid((20.0, 2.0, 0.5), (4.0, 1.8, 1.5), 0.3)
 
 
 def cloud(*own: tuple[float, float, float]) -> np.ndarray:
-    """Points given along the car's length, width and height from its middle."""
+    """Points given along the car's length, width and height from its centre."""
     c, s = math.cos(CAR.yaw_rad), math.sin(CAR.yaw_rad)
     x, y, z = CAR.center
     return np.array([(x + c * a - s * b, y + s * a + c * b, z + h, 9.0) for a, b, h in own], dtype=np.float32)
@@ -33,7 +33,7 @@ def test_points_beside_a_cuboid_are_a_misfit_and_those_of_the_road_are_not() -> 
 
 
 def test_four_views_show_image_and_points_on_their_side() -> None:
-    """What is at the rear is left in the views from above and from the side; what is on the left, from behind."""
+    """The rear is on the left in the views from above and from the side; the left side is, seen from behind."""
     eye = camera()
     image = CameraImage(0, np.full((eye.height, eye.width, 3), 77, dtype=np.uint8), b"")
     sweep = Sweep(0, cloud((-2.0, 0.8, 0.5)), np.zeros(1, np.uint8), 16)

@@ -51,7 +51,7 @@ def test_one_step_may_be_from_one_vehicle_to_the_next() -> None:
 
 
 def test_what_stands_still_while_we_turn_drives_nowhere() -> None:
-    """Ego at 10 m/s on a curve of 20 m: a parked car swings sideways by metres in the ego frame."""
+    """At 10 m/s on a curve of 20 m radius, a parked car moves sideways by metres in the ego frame."""
     turn = own_poses(moments(10.0, 0.5))
     seen = []
     for n, pose in turn.items():
@@ -93,7 +93,7 @@ def test_the_side_of_oncoming_traffic_is_that_on_which_somebody_came() -> None:
 
 
 def test_own_motion_is_not_carried_over_a_gap() -> None:
-    """A clip that begins 10 s later has nothing to do with the one before."""
+    """A clip that begins 10 s later is unrelated to the previous one."""
     here = moments(10.0, count=4)
     later = {n + 4: Moment(int(10e9) + n * PERIOD_NS, 10.0, 0.0, 80.0) for n in range(4)}
     poses = own_poses(here | later)

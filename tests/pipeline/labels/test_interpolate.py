@@ -39,7 +39,7 @@ def cuboid(found: dict[int, Sighting], frame: int) -> Cuboid:
 
 
 SEEN = track(*(at(frame, 20.0 + frame, key=False) for frame in range(10)))
-"""The pipeline's: one metre a frame."""
+"""The pipeline's track: one metre per frame."""
 
 
 # ------------------------------------------------------------ between
@@ -193,7 +193,7 @@ def test_a_wider_car_straight_ahead_stays_straight_ahead() -> None:
 
 
 def _offset(box: Cuboid) -> tuple[float, float]:
-    """Where we are, in the cuboid's own axes."""
+    """Position of the ego origin in the cuboid's frame."""
     c, s = math.cos(box.yaw_rad), math.sin(box.yaw_rad)
     x, y, _ = box.center
     return -(x * c + y * s), x * s - y * c

@@ -47,7 +47,7 @@ def test_nobody_is_who_they_were_after_a_gap() -> None:
 
 
 def test_in_the_simulators_traffic_nobody_is_taken_for_another() -> None:
-    """An oncoming column too. Its own numbers, taken away and linked again."""
+    """Including a column of oncoming traffic. The simulator's ids are removed and linked again."""
     source = open_source("sim:straight")
     truth = {source.t_ns(index): source.truth(index) or () for index in range(80)}
     found = linked({tick: tuple(replace(item, id=None) for item in items) for tick, items in truth.items()})

@@ -22,7 +22,7 @@ GROUND_M = -0.6
 
 
 def sweep_of(car: Cuboid, *, faces: str = "both") -> F32:
-    """A flat road, and the faces of a car that are turned to us: its rear, or its right side too."""
+    """A flat road, and the visible faces of a car: its rear, or its right side too."""
     x, y = np.meshgrid(np.arange(2.0, 40.0, 0.4), np.arange(-8.0, 8.01, 0.4))
     road = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, GROUND_M)])
     (cx, cy, _), (length, width, height), yaw_rad = car
@@ -38,7 +38,7 @@ def sweep_of(car: Cuboid, *, faces: str = "both") -> F32:
 
 
 def box_in_image(frame: Frame, cuboid: Cuboid) -> Box | None:
-    """Where a cuboid is in the image; null outside it."""
+    """The box of a cuboid in the image; None outside it."""
     assert frame.camera is not None
     alignment = resolve(Params().alignment, frame.camera)
     assert alignment is not None
@@ -142,7 +142,7 @@ def test_where_nothing_tells_it_is_said(frame: Frame) -> None:
 
 
 def test_real_cars_are_found_where_the_labels_have_them(data_dir: Path) -> None:
-    """Astyx: every fifth frame's cars that the LiDAR sees, from a box around them and from a hand that is half a metre
+    """Astyx: the cars in every fifth frame that the LiDAR sees, from a box around them and from a point half a metre
     off."""
     source = open_source(f"astyx:{data_dir / 'astyx'}")
     lifted, fitted = [], []

@@ -20,7 +20,7 @@ CAR = Cuboid((20.0, 0.0, 0.5), (4.0, 1.8, 1.5), 0.0)
 
 
 def driven(number: int = 1, y_m: float = 0.0, **odd: Cuboid) -> LabelTrack:
-    """A car that comes nearer by 0.5 m a frame, but where ``f2=…`` says otherwise."""
+    """A car that approaches by 0.5 m per frame, except in frames given as ``f2=…``."""
     sightings = []
     for frame in range(COUNT):
         x, _, z = CAR.center

@@ -84,7 +84,7 @@ def test_nobody_leads_only_where_that_could_be_seen(objects: list[Seen], reach_m
 
 
 def test_a_lead_that_is_no_vehicle_for_sure_is_not_proposed() -> None:
-    """The pipeline brakes for what it does not know; a label says what it is."""
+    """The pipeline also brakes for unknown objects; a label states the class."""
     life = {index: [seen(7, label=None, in_path=True)] for index in range(4)}
     found = propose(life, dict.fromkeys(range(4), 7), BY, {index: moment(index) for index in range(4)})
     assert found.tracks == ()
@@ -92,7 +92,8 @@ def test_a_lead_that_is_no_vehicle_for_sure_is_not_proposed() -> None:
 
 
 def test_what_drives_steadily_is_proposed_without_a_camera_and_a_flickering_wall_is_not() -> None:
-    """Both go along with us at 10 m/s; the one is always as large as a car's rear, the other now a metre, now three."""
+    """Both move along at 10 m/s; one always has the size of a car's rear, the other varies between one and three
+    metres."""
     rear = [seen(7, label=None, cuboid=Cuboid((20.0, 3.5, 0.6), (0.4, 1.6, 1.2), 0.0)) for _ in range(8)]
     wall = [seen(8, label=None, cuboid=Cuboid((20.0, 9.0, 0.6), (1.0 + 2 * (n % 2), 0.3, 1.2), 0.0)) for n in range(8)]
     frames = {index: [rear[index], wall[index]] for index in range(8)}
@@ -144,7 +145,7 @@ def test_a_vehicle_is_proposed_whole_and_of_one_size_and_what_was_seen_of_it_sta
 def test_a_cluster_larger_than_any_of_its_class_has_a_box_alone(
     label: str, size: tuple[float, float, float], is_kept: bool
 ) -> None:
-    """Its middle is that of the hedge beside it."""
+    """Its centre is that of the hedge beside it."""
     large, box = Cuboid((27.0, 9.0, 0.7), size, 0.0), (500.0, 300.0, 560.0, 340.0)
     life = {index: [seen(7, label=label, bbox=box, in_path=True)] for index in range(4)}
     life[2] = [seen(7, label=label, bbox=box, cuboid=large)]
@@ -156,7 +157,7 @@ def test_a_cluster_larger_than_any_of_its_class_has_a_box_alone(
 
 
 def test_one_size_is_no_larger_than_the_class() -> None:
-    """A door that stands open, in every frame."""
+    """A car with an open door in every frame."""
     wide = Cuboid((20.0, 0.0, 0.7), (4.0, 3.0, 1.5), 0.0)
     (track,) = propose({index: [seen(7, cuboid=wide)] for index in range(3)}, {}, BY).tracks
     assert {each.cuboid.size for each in track.sightings if each.cuboid is not None} == {(4.5, 2.6, 1.5)}

@@ -26,7 +26,7 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
     source = open_source(str(write(tmp_path / "drive.mcap", [full(index) for index in range(3)])))
 
     class Partly:
-        """The middle frame is not labelled; nobody has an id in the others."""
+        """The middle frame is not labelled; in the others, objects have no ids."""
 
         uri = source.uri
         t_ns = source.t_ns

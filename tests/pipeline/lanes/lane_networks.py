@@ -25,7 +25,7 @@ def _saved(path: Path, nodes: list, weights: dict[str, np.ndarray], outputs: lis
 
 
 def _linear(name: str, rows: list[tuple[float, float, float, float]]) -> tuple[onnx.NodeProto, dict[str, np.ndarray]]:
-    """Each output channel a·first + b·second + c·third + d of a pixel's channels."""
+    """Each output channel is a·first + b·second + c·third + d of a pixel's channels."""
     weight = np.array([row[:3] for row in rows]).reshape(len(rows), 3, 1, 1)
     bias = np.array([row[3] for row in rows])
     node = helper.make_node("Conv", ["images", f"{name}_w", f"{name}_b"], [name])

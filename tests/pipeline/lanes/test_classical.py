@@ -19,7 +19,7 @@ _PAINT_M = 0.15
 
 
 def road(left=WHITE, right=WHITE, *, light: float = 1.0, noise: float = 3.0, lines=STRAIGHT) -> U8:
-    """An image of a road with two painted lines; null leaves one out. light: 1 is day."""
+    """An image of a road with two painted lines; None omits one. light: 1 is daylight."""
     bgr = np.full((HEIGHT, WIDTH, 3), ASPHALT, np.uint8)
     bgr[: HEIGHT // 2] = (230, 200, 170)
     x = 1.0 / np.linspace(1 / 3.0, 1 / 60.0, 80)

@@ -141,7 +141,7 @@ def _recognise(answer: LaneOutputs) -> LaneHead | None:
 
 
 def test_a_head_is_added_by_a_file_and_one_entry(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the two functions above hold is all that a new form of answer takes."""
+    """The two functions above are all that a new form of output needs."""
     table = np.array([[[0.25, 0.5, 0.9]]], np.float32)
     with pytest.raises(UnknownLaneHead):
         pick_head([table], ["points"])

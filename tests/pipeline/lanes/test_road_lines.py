@@ -96,7 +96,7 @@ def test_clutter_does_not_move_a_line() -> None:
 
 
 def test_clutter_alone_is_no_lane() -> None:
-    """Points anywhere, others in each image: a line found by chance in one is weak, and gone in the next."""
+    """Random points, different in each image: a line found by chance in one is weak, and gone in the next."""
     state, sure = LaneState(), 0
     for seed in range(12):
         raw = paint((), clutter=150, seed=seed)
@@ -124,7 +124,7 @@ WRONG = {
 
 @pytest.mark.parametrize("wrong", WRONG)
 def test_a_wrong_calibration_gives_no_lane_rather_than_a_wrong_one(wrong: str) -> None:
-    """What the pitch search can mend may end on the paint."""
+    """An error that the pitch search can correct may still give lines on the paint."""
     lane = seen(paint(), through=WRONG[wrong]())
     if lane.left is not None and lane.right is not None:
         assert lane.left.y_m([5.0, 15.0]) == pytest.approx(1.75, abs=0.2)
@@ -250,8 +250,8 @@ def test_the_same_image_gives_the_same_lane() -> None:
 
 @pytest.mark.parametrize("curvature", [0.0, 1 / 125.0, -1 / 250.0])
 def test_the_pitch_stays_where_it_is(curvature: float) -> None:
-    """Four lines of a road of known camera, seen to 55 m for two seconds: nothing draws the pitch away from zero, in a
-    bend neither, and so the lines reach as far as they are seen."""
+    """Four lines of a road seen to 55 m for two seconds by a known camera: the pitch stays at zero, in a bend too, so
+    the lines reach as far as they are seen."""
     bends = [curvature / (1.0 - curvature * y) / 2.0 for y in (-5.25, -1.75, 1.75, 5.25)]
     lines = tuple((y, 0.0, bend, 0.0) for y, bend in zip((-5.25, -1.75, 1.75, 5.25), bends, strict=True))
     state = LaneState()

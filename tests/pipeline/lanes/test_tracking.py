@@ -50,7 +50,7 @@ def test_a_line_is_the_same_line_after_driving_on(c0: float, c1: float, c2: floa
 
 
 def test_driving_along_an_arc_keeps_its_line_beside_the_car() -> None:
-    """A left bend of 200 m radius, the line 1.75 m to the left of the driven arc: it stays there."""
+    """In a left bend of 200 m radius, a line 1.75 m to the left of the driven arc stays there."""
     radius, speed = 200.0, 15.0
     ego = EgoState(0, speed, speed / radius)
     tracks = tracked(FittedLine(np.array([1.75, 0.0, 0.5 / (radius - 1.75), 0.0]), COVARIANCE, 0.0, 40.0, 0.9))
@@ -116,7 +116,7 @@ def test_lines_are_smoothed() -> None:
 
 
 def test_a_lane_change_hands_the_lane_over_at_the_line() -> None:
-    """The car drifts to the left by 3.5 m: the left line becomes the right one when the car's middle is over it."""
+    """The car drifts to the left by 3.5 m: the left line becomes the right one when the car's centre is over it."""
     at_change, tracks = None, LaneTracks()
     for step in range(71):
         drift = 0.05 * step
@@ -180,7 +180,7 @@ def test_covariances_stay_symmetric_and_positive() -> None:
 
 @pytest.mark.parametrize("y_m", [-0.6, -0.1, 0.4])
 def test_a_line_alone_under_the_car_says_nothing(y_m: float) -> None:
-    """On which side of it would the lane be? A shadow or a track in snow lies there as well."""
+    """It is unknown on which side of it the lane is, and it may be a shadow or a track in snow."""
     assert places(tracked(found(y_m))) == (None, None)
     assert places(tracked(found(y_m), found(y_m - np.copysign(3.5, y_m)))) != (None, None), (
         "with another one a lane away it is a lane"

@@ -44,7 +44,7 @@ def test_an_l_of_two_sides_gives_the_turn_and_size_of_a_long_vehicle(yaw_deg: fl
 
 @pytest.mark.parametrize("yaw_deg", [-20.0, 0.0, 6.0, 30.0])
 def test_a_rear_alone_is_wide_not_long(yaw_deg: float) -> None:
-    """Seen from behind a car is a wall 1.6 m wide: its length axis still looks along the road."""
+    """Seen from behind, a car is a wall 1.6 m wide; its long axis still points along the road."""
     wall = np.array([(0.0, y, z) for y in np.linspace(-0.8, 0.8, 15) for z in (-0.6, 0.3)])
     box = _fit(wall @ rotation(0.0, 0.0, np.radians(yaw_deg)).T + [18.0, 0.0, 0.0]).cuboid
     assert np.degrees(box.yaw_rad) == pytest.approx(yaw_deg, abs=1.01)

@@ -21,7 +21,7 @@ ALL = {"min_points": 1, "max_points": 50000, "max_range_m": 120.0, "front_only":
 
 
 def _kd_tree(points: F32, tolerance_m: float, z_weight: float) -> I32:
-    """Components by a KD-tree, numbered by first point."""
+    """Components from a KD-tree, numbered by their first point."""
     scaled = points[:, :3].astype(np.float64) * [1.0, 1.0, z_weight]
     pairs = cKDTree(scaled).query_pairs(tolerance_m, output_type="ndarray")
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
@@ -83,7 +83,7 @@ def _along(start: tuple[float, float], end: tuple[float, float], step_m: float =
 
 
 def test_a_lead_and_the_row_parked_beside_it_are_two() -> None:
-    """0.8 m apart, which the tolerance bridges: together they are wider than any vehicle."""
+    """They are 0.8 m apart, less than the tolerance; together they are wider than any vehicle."""
     lead, parked = _along((12.0, -1.0), (12.0, 1.0)), _along((10.5, -1.8), (15.0, -1.8))
     points = np.concatenate([lead, parked])
     assert set(_cluster(points, tolerance_m=0.9)) == {0}

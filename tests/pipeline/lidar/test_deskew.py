@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from pipeline.lidar.deskew import deskew
 from pipeline.params import DeskewParams
-from pipeline.simulation.sensors.lidar import Lidar
-from pipeline.simulation.sensors.lidar_model import LidarModel
-from pipeline.simulation.sensors.lidar_scene import WALL
+from pipeline.simulation.sensors.lidar.model import LidarModel
+from pipeline.simulation.sensors.lidar.scene import WALL
+from pipeline.simulation.sensors.lidar.sensor import Lidar
 from pipeline.types import F64, EgoState, Sweep
 
 ON = DeskewParams(enabled=True)
@@ -19,9 +19,8 @@ FLAT = np.array([-1.5, 0.0, 0.0, 0.0])
 
 
 def seen(x: float, y: float, yaw: float, speed_mps: float, yaw_rate_radps: float) -> Sweep:
-    """The raw sweep of a standing box, 4.5 m by 1.8 m, from a car that drives and turns, without noise.
-
-    What stands moves in the ego frame: by −v, and turned about the ego origin by −ω."""
+    """The raw sweep of a static box, 4.5 m by 1.8 m, from a car that drives and turns, without noise. In the ego frame,
+    static objects move by −v and rotate about the origin by −ω."""
     velocity = (yaw_rate_radps * y - speed_mps, -yaw_rate_radps * x)
     box = np.array(
         [[x, y, -0.7, 2.25, 0.9, 0.8, np.cos(yaw), np.sin(yaw), WALL, *velocity, -yaw_rate_radps, 3.0]],
@@ -35,7 +34,7 @@ def seen(x: float, y: float, yaw: float, speed_mps: float, yaw_rate_radps: float
 
 
 def off_the_box_m(sweep: Sweep, x: float, y: float, yaw: float) -> F64:
-    """How far each point is from the outline of the box where it stands at the tick."""
+    """Distance of each point from the outline of the box at the tick."""
     c, s = np.cos(yaw), np.sin(yaw)
     dx, dy = sweep.points[:, 0] - x, sweep.points[:, 1] - y
     along, across = np.abs(dx * c + dy * s) - 2.25, np.abs(dy * c - dx * s) - 0.9
@@ -67,7 +66,7 @@ def test_a_standing_car_gets_its_outline_back(
 
 
 def test_a_rear_seen_aslant_becomes_straight() -> None:
-    """The rear of a car that stands across the view, 40° to the left at 25 m/s: its points lie on one line again."""
+    """The rear of a car standing at an angle, 40° to the left at 25 m/s: its points lie on one line again."""
     raw = seen(7.0, 6.0, 0.0, 25.0, 0.0)
     straight = deskew(raw, EgoState(0, 25.0), ON)
     assert straight is not None

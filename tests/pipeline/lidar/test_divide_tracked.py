@@ -31,7 +31,7 @@ def wall(start: tuple[float, float], end: tuple[float, float], step_m: float = 0
 def track(
     number: int, rear: tuple[float, float], size: tuple[float, float], velocity: tuple[float, float], hits: int = 10
 ) -> LidarTrack:
-    """As it was a sweep ago. rear: x of the near side and y of the middle, now. size: length, width."""
+    """The track of the previous sweep. rear: x of the near side and y of its centre, now. size: length, width."""
     x, y = rear[0] + size[0] / 2 - velocity[0] * DT_S, rear[1] - velocity[1] * DT_S
     cuboid = Cuboid((x, y, -0.6), (*size, 1.5), 0.0)
     return LidarTrack(number, Obstacle(0, cuboid, (x, y, -0.6), 50, 10.0, (1.0, 1.0, 1.0)), velocity, hits, 0, False)
@@ -44,7 +44,7 @@ def filters(count: int, speed_sigma: float = 0.2) -> kalman.CvState:
 
 
 def sightings(tracks: list[LidarTrack]) -> F64:
-    """(T, 10, 5) a second of them: each as it is, moved at its velocity."""
+    """(T, 10, 5) sightings of the last second: the current ones, moved by their velocities."""
     history = np.empty((len(tracks), 10, 5))
     for each, rows in zip(tracks, history, strict=True):
         ago_s = np.arange(9, -1, -1) * DT_S
@@ -73,7 +73,7 @@ def divided(
 LEAD, PARKED = wall((12.0, -1.0), (12.0, 1.0)), wall((10.0, -3.5), (10.0, -1.6))
 FLANK = wall((10.1, -1.6), (13.5, -1.6))
 BESIDE = np.vstack([LEAD, PARKED, FLANK])
-"""A lead's rear, and beside it, 0.6 m away, a parked car whose flank has come into view."""
+"""A lead's rear, and a parked car 0.6 m beside it whose side has come into view."""
 LEAD_TRACK, PARKED_TRACK = ((12.0, 0.0), (0.1, 2.0)), ((10.0, -2.55), (1.0, 1.9))
 
 
@@ -89,7 +89,7 @@ def test_a_lead_and_the_parked_car_beside_it_are_two(what: str, lead_velocity: t
 
 
 def test_a_flank_that_was_joined_with_the_lead_comes_home():
-    """The parked car's rear has a cluster; of its flank only what lies beside the lead was seen."""
+    """The parked car's rear has its own cluster; of its side, only the part beside the lead was seen."""
     flank = wall((11.8, -1.6), (12.2, -1.6))
     points = np.vstack([LEAD, flank, PARKED])
     tracks = [track(1, *LEAD_TRACK, DRIVES), track(2, (10.0, -2.55), (2.5, 1.8), STANDS)]
@@ -118,7 +118,7 @@ def test_what_a_known_vehicle_cannot_have_grown_by_is_something_else(tracks: lis
 
 
 def test_what_no_track_follows_yet_stays_where_it_is():
-    """It belongs to no other cluster, wherever that is."""
+    """It does not go to any other cluster, wherever it is."""
     elsewhere = wall((8.0, 6.0), (8.0, 7.5))
     tracks = [track(1, (8.0, 6.75), (0.1, 1.5), STANDS), track(2, *LEAD_TRACK, DRIVES)]
     _, after = divided(np.vstack([elsewhere, BESIDE]), tracks)
@@ -127,7 +127,7 @@ def test_what_no_track_follows_yet_stays_where_it_is():
 
 
 def test_a_moment_in_which_they_were_one_is_forgotten():
-    """In the last two sweeps the lead's cluster had taken the parked car's flank."""
+    """In the last two sweeps, the lead's cluster included the parked car's side."""
     tracks = [track(1, (12.0, -0.3), (1.5, 2.6), DRIVES), track(2, *PARKED_TRACK, STANDS)]
     history = sightings([track(1, *LEAD_TRACK, DRIVES), tracks[1]])
     history[0, -2:, 3] -= 0.7
@@ -164,7 +164,7 @@ def test_what_may_be_one_stays_one(case: str):
 
 
 def test_speeds_known_too_poorly_set_nothing_apart():
-    """Two halves of one car, one of which seems to move at 3 m/s, give or take 2."""
+    """Two halves of one car, one of which seems to move at 3 ± 2 m/s."""
     points = np.vstack([wall((10.0, -0.9), (10.0, 0.9)), wall((10.6, -0.9), (10.6, 0.9))])
     tracks = [track(1, (10.0, 0.0), (0.1, 1.8), STANDS), track(2, (10.6, 0.0), (0.1, 1.8), (-4.0, 0.0))]
     unsure, sure = (divided(points, tracks, speed_sigma=sigma)[1] for sigma in (2.0, 0.2))

@@ -125,7 +125,7 @@ def test_compiled_and_plain_numpy_agree(
 
 
 def test_every_real_sweep(data_dir: Path) -> None:
-    """Height and tilt on every frame; the same mask as plain numpy; the road where labelled vehicles stand."""
+    """Height and tilt in every frame; the same mask as in plain numpy; the road below labelled vehicles."""
     under_vehicles = []
     for frame, truth in real_frames(data_dir):
         assert frame.sweep is not None

@@ -71,7 +71,7 @@ def test_the_lead_is_one_cluster_at_its_labels_distance(data_dir: Path) -> None:
 
 
 def test_nothing_stands_between_ego_and_its_lead(data_dir: Path) -> None:
-    """No piece of road becomes an obstacle in the lane."""
+    """No part of the road becomes an obstacle in the lane."""
     for name, points, truth, lead in _following(data_dir):
         _, labels, obstacles = _see(points)
         rear_m = lead.center[0] - lead.size[0] / 2

@@ -9,7 +9,7 @@ from pipeline.lidar.track_history import rigid_sideways
 
 
 def history(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """(1, H, 5) of sides along time, ten sightings a second."""
+    """(1, H, 5) sides over time, ten sightings per second."""
     t = np.arange(len(low)) * 0.1
     return np.stack([t, t * 0, (low + high) / 2, low, high], axis=1)[None]
 

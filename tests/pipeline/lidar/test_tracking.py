@@ -115,13 +115,13 @@ def test_each_gate_makes_another_object_of_it_and_opening_the_gate_does_not(name
 
 
 def test_a_few_points_more_or_less_are_no_other_object() -> None:
-    """One ring more or less doubles the count of a far car."""
+    """One ring more or less changes the number of points on a far car by a factor of two."""
     seen = _drive([(_car(35.0, points=2),), (_car(35.0, points=10),)], LidarTrackingParams())
     assert [t.id for t in seen[-1]] == [1]
 
 
 def test_least_total_distance_one_to_one() -> None:
-    """The nearest pair alone would leave the other track a partner beyond its gate."""
+    """Taking the nearest pair first would leave the other track with a partner outside its gate."""
     params = LidarTrackingParams(gate_m=1.3, start_speed_mps=1.0, max_missed_s=0.0)
     seen = _drive([(_car(20.0), _car(21.0)), (_car(21.1), _car(21.9))], params)
     assert [(t.id, t.obstacle.closest_point[0]) for t in seen[-1]] == [(1, 21.1), (2, 21.9)]
@@ -160,7 +160,7 @@ def test_what_is_followed_is_the_middle_of_the_rear(cuboid: Cuboid, expected: tu
 
 
 def test_a_flank_coming_into_view_is_no_motion() -> None:
-    """The reason for following the rear: the centre would jump by 2 m here."""
+    """This is why the rear is tracked: the centre would jump by 2 m here."""
     lengths = [0.3] * 6 + [4.3] * 3
     params = LidarTrackingParams(max_spread_change_m=5.0)
     seen = _drive([(_car(15.0, length_m=length),) for length in lengths], params)
@@ -193,7 +193,7 @@ def test_every_obstacle_is_in_exactly_one_track(
 
 @pytest.mark.parametrize("filter_name", FILTERS)
 def test_a_rear_with_and_without_a_bit_of_flank_is_one_car(filter_name: str) -> None:
-    """The flank makes the footprint, and with it the density, twenty times as large or small."""
+    """The side changes the footprint, and with it the density, by a factor of twenty."""
     params = LidarTrackingParams(filter=filter_name)  # type: ignore[arg-type]
     thin, thick = (
         _car(20.0, length_m=length)._replace(density=24 / (1.8 * length), points=24) for length in (0.1, 1.5)

@@ -12,7 +12,7 @@ from tests.pipeline.lidar.scenes import scan
 
 
 def _compiled() -> dict[str, int]:
-    """Signatures of every kernel that Python calls; those that only kernels call are compiled into them."""
+    """Signatures of all kernels called from Python; those called only by kernels are compiled into them."""
     return {
         f"{module.__name__}.{name}": len(thing.signatures)
         for module in (boxes, cluster, ground_kernels, plane_kernels)

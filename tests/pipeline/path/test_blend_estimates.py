@@ -90,7 +90,7 @@ def test_the_mean_lies_between_its_sources(things: list[tuple[float, float]], cu
 
 
 def test_a_path_moves_with_the_car() -> None:
-    """The arc that the car drives on looks the same from every place on it."""
+    """The driven arc looks the same from every position on it."""
     radius = 125.0
     path, _ = fused(estimate("yaw_rate", 0.0, 0.2, 1.0 / radius))
     moved = blend_estimates.moved(path, 2.0, 2.0 / radius, 0.1)

@@ -24,7 +24,7 @@ from pipeline.types import CameraCalibration, Frame, Result
 from pipeline.warm_up import warm_up
 
 BREAKS_S, ENDS_S = 4.0, 7.0
-"""In the bend from 3 s on."""
+"""In the bend, from 3 s on."""
 PARAMS = Params()
 Break = Callable[[Frame], Frame]
 
@@ -39,7 +39,7 @@ def drive(layout: str = "r250", ends_s: float = ENDS_S) -> list[CurveFrame]:
 def driven(
     broken: Break, from_start: bool = False, moments: Callable[[], list[CurveFrame]] = drive
 ) -> tuple[list[Result], list[str]]:
-    """The results from the break on, and what was chosen in each: right, missed, decoy, …"""
+    """Results from the fault on, and the verdict of each choice: right, missed, decoy, …"""
     state, results, verdicts = State(), [], []
     for moment in moments():
         after = moment.now.t_s >= BREAKS_S
@@ -61,7 +61,7 @@ def missed_while_usable(results: list[Result], verdicts: list[str]) -> int:
 
 
 def largest_step_m(results: list[Result]) -> float:
-    """Of the centre 40 m ahead, from frame to frame."""
+    """Largest change of the path's centre 40 m ahead from frame to frame."""
     return float(np.abs(np.diff([result.path.center[40, 1] for result in results])).max())
 
 
@@ -82,13 +82,13 @@ def yaw_rate(value: float | None, *also: str) -> Break:
 
 
 def jumped(frame: Frame) -> Frame:
-    """5 m to the north, which here is the left."""
+    """Fixes shifted by 5 m to the north, which is to the left here."""
     assert frame.gnss is not None
     return evolve(frame, gnss=dataclasses.replace(frame.gnss, lat_deg=frame.gnss.lat_deg + 5.0 / 110_950.0))
 
 
 def wrong_mount(frame: Frame) -> Frame:
-    """The camera is taken to look 4° to the left of where it looks."""
+    """A calibration in which the camera faces 4° too far to the left."""
     assert frame.camera is not None
     turn = math.radians(4.0)
     T = np.eye(4)
@@ -117,8 +117,8 @@ def test_nothing_broken() -> None:
     ],
 )
 def test_less_is_known_and_nobody_else_leads(broken: Break, from_start: bool, factor: float) -> None:
-    """factor: by how much less sure the path 60 m ahead is. Who is missed is missed on a path that is not usable, and
-    nothing jumps."""
+    """factor: by how much the path's sigma 60 m ahead grows. A lead may be missed only while the path is not usable,
+    and nothing jumps."""
     whole, _ = unbroken()
     results, verdicts = driven(broken, from_start)
     assert set(verdicts) <= {"right", "missed", "undecided"}, "never a decoy"
@@ -130,8 +130,8 @@ def test_less_is_known_and_nobody_else_leads(broken: Break, from_start: bool, fa
 
 
 def test_an_own_motion_that_is_lost_goes_on_for_a_while_and_is_said() -> None:
-    """Half a second after the fix, and the own speed that came from it, are gone: the path has hardly moved, the car
-    gets no faster though 130 km/h are set, and later nobody drives any more."""
+    """Half a second after the fix, and the ego speed from it, are lost: the path has hardly moved, the car does not
+    accelerate although 130 km/h are set, and later ACC ends."""
     params = with_changes(PARAMS, {"acc.set_speed_kmh": 130.0, "acc.time_gap_s": 0.8, "motion.source": "can"})
     state, commands, path_sources = State(), [], []
     for moment in drive():
@@ -152,7 +152,7 @@ def test_an_own_motion_that_is_lost_goes_on_for_a_while_and_is_said() -> None:
 
 
 def test_a_wrong_mount_is_said_and_nobody_drives_by_it() -> None:
-    """Cars lie apart in camera and LiDAR."""
+    """Camera and LiDAR disagree about the positions of cars."""
     results, verdicts = driven(wrong_mount, from_start=True)
     assert "decoy" not in verdicts
     assert missed_while_usable(results, verdicts) == 0
@@ -175,8 +175,8 @@ def test_a_jump_is_said_and_moves_nothing() -> None:
 
 @pytest.mark.parametrize("layout", ["straight", "r250", "r500"])
 def test_a_jump_that_stays_misleads_nobody(layout: str) -> None:
-    """Long after the fixes are believed again, without a line on the road, and beyond the end of the bend: the route is
-    followed in how it bends, not in where it lies, and the lead is right in every frame."""
+    """Until long after the fixes are accepted again, without lane lines, and beyond the end of the bend: the route
+    gives the curvature, not the lateral position, and the lead is right in every frame."""
     results, verdicts = driven(lambda frame: no_lines(jumped(frame)), moments=lambda: drive(layout, 11.5))
     assert set(verdicts) == {"right"}
     assert results[-1].path.notes[-1].startswith("GNSS position reset after a jump, uncertain by 4.")
@@ -190,7 +190,7 @@ def test_a_broken_yaw_rate_is_said() -> None:
 
 
 def test_acc_hears_that_nobody_knows_the_way() -> None:
-    """With a straight guess at 99 km/h the car gets no faster, though 130 km/h are set."""
+    """With only a straight path at 99 km/h, the car does not accelerate although 130 km/h are set."""
     params = with_changes(PARAMS, {"acc.set_speed_kmh": 130.0})
     state = State()
     for moment in drive()[:10]:

@@ -20,7 +20,7 @@ def ego(speed_mps: float, yaw_rate_radps: float | None) -> EgoState:
 
 
 def test_the_arc_is_not_twice_as_curved() -> None:
-    """20 m/s and 0.1 rad/s make a 200 m radius: 20 m along it the car is 1.00 m aside, not 2.00 m."""
+    """20 m/s and 0.1 rad/s give a radius of 200 m: 20 m along the arc, the offset is 1.00 m, not 2.00 m."""
     path = corridor(ego(20.0, 0.1), PARAMS)
     assert path.source == "yaw_rate"
     assert path.center[20] == pytest.approx([200 * np.sin(0.1), 200 * (1 - np.cos(0.1))], abs=1e-3)
@@ -44,13 +44,13 @@ def test_source_of_the_path(state: EgoState | None, source: str) -> None:
 
 
 def test_a_guess_is_less_sure_than_a_measurement() -> None:
-    """As far ahead as a yaw rate is good for, two seconds of driving."""
+    """As far ahead as a yaw rate is useful, two seconds of driving."""
     guessed, measured = corridor(None, PARAMS), corridor(ego(20.0, 0.0), PARAMS)
     assert guessed.sigma_m["30"] > 1.5 * measured.sigma_m["30"] > measured.sigma_m["10"] > 0.0
 
 
 def test_what_is_right_ahead_of_a_standing_car_is_in_its_path_whatever_a_vague_route_says() -> None:
-    """A single receiver is off by metres: a truck three metres ahead in a queue was no lead by it."""
+    """A single receiver is wrong by metres: by the route, a truck three metres ahead in a queue was not the lead."""
     route = Route("street", np.linspace(-0.001, 0.002, 200), np.zeros(200), 0.1)
     standing = EgoState(0, 0.0, 0.0)
     state = PathState()
@@ -79,7 +79,7 @@ def test_left_is_left() -> None:
     aside=st.floats(-5.0, 5.0),
 )
 def test_offset_of_a_point_set_beside_the_arc(curvature: float, s: float, aside: float) -> None:
-    """A point put ``aside`` metres from the arc at path length s is found there, within the chords' sagitta."""
+    """A point ``aside`` metres from the arc at path length s is located there, within the chords' sagitta."""
     center, _ = arc(curvature, samples(PARAMS.length_m))
     path = Path("fused", center, center, center, PARAMS.half_width_m, {}, {})
     point, heading = arc(curvature, np.array([s]))

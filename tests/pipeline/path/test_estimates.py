@@ -13,7 +13,8 @@ COVARIANCE = np.diag(np.square([0.05, 5e-3, 3e-4, 5e-6]))
 
 
 def middle(left_m: float, heading: float, width_m: float = 3.4, bend_per_m: float = 0.0) -> PathEstimate:
-    """The estimate in a lane whose left line is ``left_m`` aside and that leads away from the car at ``heading``."""
+    """The estimate in a lane whose left line is at a distance of ``left_m`` and at an angle of ``heading`` to the
+    car."""
 
     def line(side: Side, y_m: float) -> LaneLine:
         return LaneLine(side, np.array([y_m, heading, bend_per_m / 2, 0.0]), COVARIANCE, 4.0, 50.0, 1.0, 0.0)
@@ -28,8 +29,8 @@ def middle(left_m: float, heading: float, width_m: float = 3.4, bend_per_m: floa
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_car_that_is_about_to_cross_a_line_goes_on_as_it_points(side: float) -> None:
-    """Its right side is 0.2 m from the line and points at it with 3°: the path leads straight ahead from the car, not
-    back to the middle that lies 0.6 m to its left."""
+    """Its right side is 0.2 m from the line, and it heads for it at 3°: the path leads straight ahead from the car, not
+    back to the centre of the lane 0.6 m to its left."""
     left_m = 2.3 if side > 0.0 else 1.1
     found = middle(left_m, 0.055 * side)
     assert np.abs(found.center[:30, 1]).max() < 0.35
@@ -53,6 +54,6 @@ def test_a_car_that_stays_is_led_along_the_middle(left_m: float, heading: float)
 
 
 def test_between_the_two_it_is_open() -> None:
-    """Neither certain to cross nor to stay: less sure than either."""
+    """If neither crossing nor staying is certain, the estimate is less certain than in both cases."""
     sure, open_ = middle(1.7, 0.0), middle(2.0, 0.03)
     assert open_.sigma_m[20] > sure.sigma_m[20] + 0.15

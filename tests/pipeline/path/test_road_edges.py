@@ -86,7 +86,7 @@ def test_edges_have_a_say_where_paint_ends_early() -> None:
 
 
 def test_a_standing_car_keeps_the_road_that_it_saw() -> None:
-    """Cross traffic stops on both sides of its lane; the hedges are hidden."""
+    """Cross traffic stops on both sides of the lane and hides the hedges."""
     state, edges = EdgeState(), None
     for _ in range(3):
         state, edges = road_edges.follow(state, between_hedges(), NOW, PARAMS)
@@ -104,7 +104,7 @@ def test_a_standing_car_keeps_the_road_that_it_saw() -> None:
 
 @pytest.mark.parametrize(("label", "is_left"), [("car", 0), (None, 8)])
 def test_a_lead_that_has_stopped_is_no_roadside(label: str | None, is_left: int) -> None:
-    """Once seen driving by the camera too; a hedge only seems to drive while more of it comes into view."""
+    """Provided that the camera saw it drive too; a hedge seems to drive while more of it comes into view."""
     stopped = fused(3, 20.0, 0.0, source="VL" if label else "L", label=label)
     drove = evolve(stopped, surely_moving=True, speed_over_ground_mps=8.0)
     rear = np.column_stack([np.full(8, 20.1), np.linspace(-0.8, 0.8, 8), np.full(8, 0.5), np.zeros(8)]).astype(

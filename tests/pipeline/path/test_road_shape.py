@@ -16,7 +16,7 @@ S = samples(PARAMS.length_m)
 
 
 def beside(curvature: float, seed: int = 0) -> F64:
-    """A hedge 6 m to the left, parked cars to the right with their rears, gaps, and clutter all around."""
+    """A hedge 6 m to the left, parked cars to the right with rears and gaps, and clutter all around."""
     rng = np.random.default_rng(seed)
     line, heading = arc(curvature, S)
     normal = np.column_stack([-np.sin(heading), np.cos(heading)])
@@ -55,7 +55,7 @@ def test_of_a_road_with_nothing_beside_it_little_is_known() -> None:
 
 
 def test_a_shape_that_is_followed_moves_with_the_car() -> None:
-    """After a metre along a bend, the rest of the bend lies ahead, from the car on."""
+    """After one metre along a bend, the rest of the bend lies ahead, starting at the car."""
     ego = EgoState(0, 10.0, 0.2)
     moved = road_shape.moved_on(arc(0.02, S)[0], ego, 0.1, S)
     assert moved[0] == pytest.approx([0.0, 0.0])
@@ -64,8 +64,8 @@ def test_a_shape_that_is_followed_moves_with_the_car() -> None:
 
 @pytest.mark.parametrize("speed_mps", [14.0, 20.0])
 def test_with_little_beside_it_a_road_goes_on_as_it_went(speed_mps: float) -> None:
-    """At speed a bend cannot end at once. With nothing but clutter, the shape is the arc just driven, though at 3 m/s²
-    sideways that is harder than roads mostly are; where the yaw rate is not known, it is straight."""
+    """At speed, a bend cannot end at once. With only clutter, the shape is the arc just driven, although 3 m/s² of
+    lateral acceleration is more than usual; without a yaw rate, it is straight."""
     curvature = 3.0 / speed_mps**2
     clutter = np.random.default_rng(1).uniform((2.0, -14.0), (45.0, 14.0), (30, 2))
     center, sigma = found(clutter, EgoState(0, speed_mps, speed_mps * curvature))

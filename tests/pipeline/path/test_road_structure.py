@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.path import road_structure
 from pipeline.path.road_structure import Cells
-from pipeline.simulation.sensors.lidar import Lidar
+from pipeline.simulation.sensors.lidar.sensor import Lidar
 from pipeline.types import F64, GROUND, EgoState, Ground, Sweep
 
 HEIGHT_M, KERB_M, KERB_HIGH_M = 0.5, 3.0, 0.12

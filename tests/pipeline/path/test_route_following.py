@@ -66,8 +66,8 @@ def north_bound(count: int, **options: float) -> list[GnssFix | None]:
     ids=["Munich", "south", "zone edge", "date"],
 )
 def test_the_route_lies_ahead_in_the_ego_frame(lat: float, lon: float) -> None:
-    """After 3 s at 20 m/s the car is 40 m before the bend. Grid north is up to 3° off true north: a path that takes one
-    for the other is 5 m off at 100 m."""
+    """After 3 s at 20 m/s, the car is 40 m before the bend. Grid north differs from true north by up to 3°: a path that
+    confuses them is wrong by 5 m at 100 m."""
     where = {"lat": lat, "lon": lon}
     _, path, said = drive(north_bound(31, **where), bend(125.0, **where))
     assert not said
@@ -124,8 +124,8 @@ def test_a_jump_lowers_confidence_and_does_not_move_the_path() -> None:
 
 
 def test_a_jump_that_stays_is_doubted_for_long() -> None:
-    """Two seconds of fixes 5 m to the right: the pose was wrong, or the receiver is. The route goes on telling how the
-    road bends; that it lies 5 m to the left is believed no more than that the car keeps its lane."""
+    """Two seconds of fixes 5 m to the right: either the pose was wrong, or the receiver is. The route still gives the
+    curvature; that it lies 5 m to the left is as uncertain as that the car keeps its lane."""
     fixes = [*north_bound(20), *[fix(0.1 * k, 2.0 * k, 5.0) for k in range(20, 45)]]
     state, path, said = drive(fixes, bend(250.0))
     _, straight_on, _ = drive(north_bound(45), bend(250.0))
@@ -226,7 +226,7 @@ def test_zones_and_convergence() -> None:
 
 
 def test_the_simulators_receiver_and_the_route_agree() -> None:
-    """The simulator lays its world on the ellipsoid by itself; UTM brings it back to the centimetre."""
+    """The simulator places its world on the ellipsoid without UTM; converting back by UTM agrees to a centimetre."""
     model = GnssModel(x_axis_deg=30.0)
     rows = [receiver.from_local(np.array([e, 2.0 * e, 0.0]), model.lat_deg, model.lon_deg, 0.0) for e in (0.0, 100.0)]
     (x0, y0, _), (x1, y1, _) = (to_grid(32652, lat, lon) for lat, lon, _ in rows)

@@ -29,14 +29,14 @@ class Driver:
     """A vehicle that goes straight, seen from an ego vehicle that goes straight along x from the origin."""
 
     x: float
-    """Where its middle is when it is first seen, ground frame."""
+    """Its centre when first seen, in the ground frame."""
     y: float
     heading: float = 0.0
     speed_mps: float = SPEED_MPS
     track: int = 1
 
     def at(self, t_s: float, ego_mps: float = SPEED_MPS) -> FusedObject:
-        """As it is seen then."""
+        """The object as seen at this time."""
         x = self.x + (self.speed_mps * cos(self.heading) - ego_mps) * t_s
         y = self.y + self.speed_mps * sin(self.heading) * t_s
         velocity = self.speed_mps * cos(self.heading) - ego_mps, self.speed_mps * sin(self.heading)
@@ -51,7 +51,7 @@ def drive(
     state: TrafficState = NONE,
     params: PathParams = PARAMS,
 ) -> tuple[TrafficState, Traffic | None]:
-    """What is known after so many frames. change: of each object in each frame."""
+    """The estimate after this number of frames. change: applied to each object in each frame."""
     found, ego = None, EgoState(0, ego_mps, 0.0)
     for n in range(frames):
         objects = [change(each.at(n * DT_S, ego_mps), n) for each in drivers]
@@ -65,7 +65,7 @@ def centre(found: Traffic | None) -> np.ndarray:
 
 
 def test_a_car_that_drives_straight_on_ahead_makes_a_straight_path_sure() -> None:
-    """Without it the next bend may begin at any moment: at 8 m/s the place of the path at 25 m is known to 4 m."""
+    """Without it, a bend may begin at any moment: at 8 m/s, the path 25 m ahead is known only to 4 m."""
     ego = EgoState(0, SPEED_MPS, 0.0)
     now = Moment(0, DT_S, ego, ego)
     _, found = drive(Driver(25.0, 0.0))
@@ -122,7 +122,7 @@ def test_what_is_not_known_to_drive(change: Callable[[FusedObject], FusedObject]
 
 
 def by_camera(item: FusedObject, n: int = 0, **changed: object) -> FusedObject:
-    """As the camera alone sees it, with a distance that wavers by 2 m."""
+    """As seen by the camera alone, with a distance that varies by 2 m."""
     assert item.bev is not None
     nearer = 1.0 + 2.0 * (-1) ** n / 45.0
     seen = replace(item, source="V", seen_by="V", cuboid=None, lidar_track=None, vision_track=7, distance_sigma_m=3.0)
@@ -154,7 +154,7 @@ def test_a_car_of_which_the_camera_is_not_sure_shows_no_road(changed: dict[str, 
 
 
 def test_a_camera_track_that_jumps_aside_shows_no_road() -> None:
-    """From one parked car to another, 3 m beside it."""
+    """It jumps from one parked car to another, 3 m beside it."""
 
     def jumps(item: FusedObject, n: int) -> FusedObject:
         aside = 3.0 if n % 2 else 0.0
@@ -166,7 +166,7 @@ def test_a_camera_track_that_jumps_aside_shows_no_road() -> None:
 
 
 def test_a_track_that_jumps_from_one_parked_car_to_the_next_does_not_drive() -> None:
-    """Each car is 6 m farther than the last: on average the track goes along at ego's speed."""
+    """Each car is 6 m farther than the last, so on average the track moves at ego speed."""
 
     def jumps(item: FusedObject, n: int) -> FusedObject:
         parked = Driver(25.0 + 6.0 * (n // 8), -3.0, speed_mps=0.0).at(n * DT_S)
@@ -185,7 +185,7 @@ def test_who_turns_off_takes_back_what_it_said() -> None:
 
 
 def test_where_it_drove_before_shows_the_road_in_between() -> None:
-    """After 3 s behind a car the headings lie along the whole way, and the path is surer for it."""
+    """After 3 s behind a car, its headings lie along the whole way and make the path more certain."""
     _, first = drive(Driver(25.0, 0.0), frames=9)
     _, last = drive(Driver(25.0, 0.0), frames=31)
     assert first is not None

@@ -13,7 +13,7 @@ CAR = box(20.0, 0.5, 4.0, 1.8, 1.5)
 WALL_BEHIND = box(30.0, 0.0, 0.4, 30.0, 2.5)
 TRUCK_BEFORE = box(12.0, 0.3, 3.0, 2.5, 3.0)
 BESIDE = box(20.0, 20.0, 30.0, 0.6, 4.0)
-"""Keeps every ring working."""
+"""Returns that keep every ring working."""
 HEDGE = box(20.0, 6.0, 30.0, 0.6, 1.5)
 
 

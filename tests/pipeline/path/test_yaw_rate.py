@@ -85,7 +85,7 @@ def test_no_arc_without_a_speed_that_means_a_curve(state: EgoState | None) -> No
 
 
 def test_the_look_ahead_is_one_of_time() -> None:
-    """The sigma reaches a metre after about the same time at any speed: twice as far at twice the speed."""
+    """At any speed, the sigma reaches one metre after about the same time, so twice as far at twice the speed."""
     reach_s = []
     for speed in (10.0, 20.0, 40.0):
         path = yaw_rate.ahead(YawRate(0.0, 1e-6), ego(speed), PARAMS)

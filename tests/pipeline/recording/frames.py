@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,17 @@ from pipeline.common.geometry import Cuboid
 from pipeline.params import Params
 from pipeline.recording.session.provenance import About
 from pipeline.recording.session.writer import SessionWriter
-from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, GnssFix, Route, StreamHealth, Sweep
+from pipeline.types import (
+    CameraCalibration,
+    CameraImage,
+    EgoState,
+    Frame,
+    GnssFix,
+    RangeScan,
+    Route,
+    StreamHealth,
+    Sweep,
+)
 from pipeline.types.source import TruthObject
 
 PERIOD_NS = 100_000_000
@@ -48,6 +59,13 @@ def image(index: int = 0, kind: str = ".jpg", t_ns: int | None = None) -> Camera
     return CameraImage(t_ns, np.asarray(decoded, np.uint8), encoded)
 
 
+def scan(index: int, t_ns: int) -> RangeScan:
+    """A random scan of a sensor that this program does not know, the same for the same index."""
+    random = np.random.default_rng(index)
+    points = random.normal(0.0, 50.0, (3, 3)).astype(np.float32)
+    return RangeScan(t_ns - 5, points, {"range_rate_mps": random.normal(0.0, 9.0, 3).astype(np.float32)})
+
+
 def full(index: int) -> Frame:
     t_ns = PERIOD_NS * (1 + index)
     return Frame(
@@ -63,6 +81,7 @@ def full(index: int) -> Frame:
         route=ROUTE,
         streams=(StreamHealth("camera", "stale", 29.97, 12.5, 1.0, 3, "cable?"),),
         timing_ms={"arrival": 12.25},
+        scans={"sonar": scan(index, t_ns)},
     )
 
 
@@ -82,4 +101,6 @@ def same(a: object, b: object) -> bool:
         return equal and a.tobytes() == b.tobytes()
     if is_dataclass(a) and not isinstance(a, type):
         return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
     return type(a) is type(b) and a == b

@@ -24,7 +24,7 @@ CHANGED = with_changes(Params(), {"cluster.z_weight": 0.35})
 
 
 def frame_of(index: int) -> Frame:
-    """The camera gives every other frame an image of its own."""
+    """Every other frame has a new image."""
     return replace(full(index), image=IMAGES[index // 2])
 
 
@@ -56,7 +56,7 @@ def test_a_clip_holds_its_frames_and_what_belongs_to_them(drive: SessionSource, 
 
 
 def test_a_clip_begins_where_it_begins(drive: SessionSource, tmp_path: Path) -> None:
-    """Though its calibration and its first image are from before."""
+    """Although its calibration and its first image are older."""
     save(drive, tmp_path / "clip.mcap", 5, 9)
     assert info(tmp_path / "clip.mcap").duration_s == pytest.approx(0.4, abs=1e-6)
 

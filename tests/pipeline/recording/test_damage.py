@@ -33,7 +33,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 def read_all(path: Path) -> int:
-    """Every frame and everything about them; how many there are."""
+    """Read every frame with all its data; returns the number of frames."""
     session = SessionSource("a", str(path))
     for index in range(len(session)):
         frame = session.frame(index)
@@ -45,7 +45,7 @@ def read_all(path: Path) -> int:
 
 
 def frames_or_refusal(path: Path) -> int | str:
-    """How many frames can be read, or the one sentence that says why none."""
+    """Number of readable frames, or the sentence that says why there are none."""
     try:
         return read_all(path)
     except SourceError as error:
@@ -96,7 +96,7 @@ def test_bytes_changed(where: str, whole: bytes, tmp_path: Path) -> None:
 
 
 def test_one_flipped_bit_costs_one_part_of_the_drive(whole: bytes, tmp_path: Path) -> None:
-    """Each chunk carries a checksum: what is damaged is not shown, and said; the rest is untouched."""
+    """Each chunk has a checksum: damaged data is reported and not shown; the rest is unaffected."""
     path = tmp_path / "a.mcap"
     path.write_bytes(whole)
     chunk = SessionSource("a", str(path)).file.directory.chunks[2]

@@ -44,7 +44,8 @@ WELL_KNOWN = {
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Everything a live recording holds: frames with results, images and samples between them, packets, a mark."""
+    """A session with everything that a live recording contains: frames with results, images and samples between them,
+    packets, a mark."""
     path, state = tmp_path_factory.mktemp("foxglove") / "a.mcap", State()
     recorder = Recorder(path, ABOUT)
     for index in range(FRAMES):
@@ -113,7 +114,7 @@ def test_schemas_are_the_published_ones(rows: list[Row]) -> None:
 
 
 def parsed(rows: list[Row], topic: str) -> list[tuple[Any, Message]]:
-    """Messages of a topic, by the schema that is in the file."""
+    """Messages of a topic, parsed with the schema in the file."""
     found = []
     for schema, channel, message in rows:
         if channel.topic == topic:
@@ -197,7 +198,7 @@ def test_a_recovered_file_is_as_sound(session: Path, rows: list[Row], tmp_path: 
 
 
 def _without_null(value: Any) -> Any:
-    """What is null is unknown; a viewer has nothing to plot there."""
+    """Without nulls, which viewers do not plot."""
     if isinstance(value, dict):
         return {key: _without_null(inner) for key, inner in value.items() if inner is not None}
     return value

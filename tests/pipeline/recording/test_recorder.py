@@ -97,7 +97,8 @@ def test_a_slow_disk_holds_nobody_up_and_what_is_dropped_is_counted_and_noted(
 
 
 def test_what_comes_between_frames_is_recorded_when_it_came(tmp_path: Path) -> None:
-    """Three images a frame, own motion twice, a fix; the frame refers to the image it shows, moved by 4 ms."""
+    """Three images per frame, ego motion twice, one fix; the frame refers to the image that it shows, with a time 4 ms
+    later."""
     recorder = Recorder(tmp_path / "a.mcap", ABOUT)
     began_ns, frames = 10**18, [full(index) for index in range(4)]
     for index, frame in enumerate(frames):
@@ -129,7 +130,7 @@ def test_what_comes_between_frames_is_recorded_when_it_came(tmp_path: Path) -> N
 
 
 def test_a_sweep_that_no_frame_shows_is_recorded_and_one_that_a_frame_shows_only_once(tmp_path: Path) -> None:
-    """The line is too slow for two of three; the last frame is put before its sweep is told."""
+    """The pipeline is too slow for two of three sweeps; the last frame is recorded before its sweep arrives."""
     recorder = Recorder(tmp_path / "a.mcap", ABOUT)
     sweeps = [sweep(index) for index in range(10)]
     frames = {index: replace(full(index), sweep=sweeps[index]) for index in (0, 3, 6, 9)}
@@ -308,7 +309,7 @@ def recording_process(path: Path, limit: int) -> subprocess.Popen[str]:
 
 
 def messages_until_the_cut(path: Path) -> int:
-    """As MCAP's own reader finds them from the start on."""
+    """The messages that MCAP's own reader finds from the start."""
     count = 0
     with path.open("rb") as file, suppress(McapError):
         for _ in NonSeekingReader(file).iter_messages(log_time_order=False):
@@ -317,7 +318,7 @@ def messages_until_the_cut(path: Path) -> int:
 
 
 def test_killed_every_complete_chunk_is_there(tmp_path: Path) -> None:
-    """Once; again and again in tests/soak."""
+    """Killed once; tests/soak does so repeatedly."""
     path, out = tmp_path / "a.mcap", tmp_path / "out.mcap"
     with recording_process(path, 0) as process:
         assert process.stdout is not None
@@ -338,7 +339,7 @@ def test_killed_every_complete_chunk_is_there(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_stops_the_recording_says_so_and_keeps_what_is_there(tmp_path: Path) -> None:
-    """A limit on the size of files does what a full disk does, at any byte of a chunk."""
+    """A limit on the file size acts like a full disk, at any byte of a chunk."""
     path = tmp_path / "a.mcap"
     with recording_process(path, 1_000_000) as process:
         assert process.stdout is not None
@@ -354,7 +355,7 @@ def test_a_full_disk_stops_the_recording_says_so_and_keeps_what_is_there(tmp_pat
 
 
 def test_a_writer_that_is_slow_and_goes_on_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As on a machine whose processors have other work: one frame in each ``_PATIENCE_S``, which is over many times."""
+    """As on a busy machine: one frame per ``_PATIENCE_S``, which expires many times."""
     monkeypatch.setattr(recorder_module, "_PATIENCE_S", 0.0)
     allowed, write = threading.Semaphore(0), Segments.write
 

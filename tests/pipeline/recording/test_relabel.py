@@ -23,7 +23,7 @@ FRAMES = 12
 
 
 def drive(path: Path, labels_at: int | None = None) -> Path:
-    """A session of several chunks; with labels after one of its frames."""
+    """A session of several chunks, with labels after one of its frames."""
     writer = SessionWriter(path, ABOUT)
     for index in range(FRAMES):
         writer.write(full(index), {"frame": index})

@@ -17,7 +17,7 @@ FRAMES = 3
 
 @pytest.fixture(scope="module")
 def columns(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[pa.Array]]:
-    """``entity component`` → its values, a piece for each chunk, as rerun's MCAP loader reads them."""
+    """``entity component`` → its values, one piece per chunk, as read by rerun's MCAP loader."""
     folder = tmp_path_factory.mktemp("rerun")
     session = write(folder / "a.mcap", [full(index) for index in range(FRAMES)])
     recording = rr.RecordingStream("test_session")

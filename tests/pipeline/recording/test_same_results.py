@@ -31,7 +31,7 @@ def imported(source: Source, tmp_path: Path, frames: int) -> Source:
 
 @pytest.mark.parametrize(("kind", "folder", "frames"), [("astyx", "astyx", 8), ("kitti", "kitti_0052", 3)])
 def test_real_recordings(kind: str, folder: str, frames: int, data_dir: Path, tmp_path: Path) -> None:
-    """JPEG of Astyx, PNG of KITTI, each with its own calibration."""
+    """JPEGs of Astyx and PNGs of KITTI, each with its calibration."""
     source = open_source(f"{kind}:{data_dir / folder}")
     session = imported(source, tmp_path, frames)
     detectors = Detectors(open_detector(str(data_dir / "models" / "yolox_nano.onnx"), None))
@@ -42,7 +42,7 @@ def test_real_recordings(kind: str, folder: str, frames: int, data_dir: Path, tm
 
 
 def test_the_simulator(tmp_path: Path) -> None:
-    """Own motion and GNSS too, with the detector that the simulator's images call for."""
+    """With ego motion and GNSS, and the detector for the simulator's images."""
     source = open_source("sim:straight")
     session = imported(source, tmp_path, frames=4)
     detector = detector_for(session)

@@ -15,7 +15,7 @@ MS = 1_000_000
 
 
 class Notebook:
-    """A sender that writes down what it is given and when."""
+    """A sender that records what it is given, and when."""
 
     def __init__(self, takes_s: float = 0.0) -> None:
         self.sent: list[tuple[int, Any]] = []

@@ -37,7 +37,7 @@ def decoded(events: list[WireEvent]) -> list[Sweep]:
 
 
 def test_a_recording_on_the_wire_decodes_to_its_own_sweeps() -> None:
-    """Points come back within the 0.2° step of a VLP-16's firings and its 2 mm."""
+    """Points are reproduced within a VLP-16's azimuth step of 0.2° and its range resolution of 2 mm."""
     source = open_source("sim:straight")
     recorded = [source.frame(index).sweep for index in range(3)]
     messages = [message for message in of_recording(source, 0, 2) if message.sensor == "lidar"]

@@ -28,12 +28,12 @@ def actor(now: World, number: int) -> ActorState:
 
 
 def gap_m(now: World, number: int) -> float:
-    """From the bumper to an actor's nearest corner along x."""
+    """Distance along x from the bumper to an actor's nearest corner."""
     return float(actor(now, number).cuboid.footprint()[:, 0].min())
 
 
 def apart(a: F64, b: F64) -> bool:
-    """Whether a side of one of two rectangles divides them (separating axes)."""
+    """Whether a side of one of two rectangles separates them (separating axis theorem)."""
     for one, other in ((a, b), (b, a)):
         for edge in np.roll(one, -1, axis=0) - one:
             normal = np.array([-edge[1], edge[0]])
@@ -60,7 +60,7 @@ def test_nobody_drives_into_anybody(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_ego_car_can_drive_so(name: str) -> None:
-    """No harder than 8 m/s² along and 5 m/s² across."""
+    """At most 8 m/s² longitudinally and 5 m/s² laterally."""
     speeds = np.array([now.speed_mps for now in drive(name)])
     assert np.abs(np.diff(speeds) * 5).max() < 8.0
     assert max(abs(now.speed_mps * now.yaw_rate_radps) for now in drive(name)) < 5.0
@@ -104,7 +104,7 @@ def test_in_the_left_turn_the_lead_leaves_the_straight_line_and_stays_in_the_lan
 
 
 def test_in_the_bend_another_lane_lies_straight_ahead() -> None:
-    """Somebody who is not in the ego lane crosses the bumper's straight line, nearer than the lead would."""
+    """A vehicle outside the ego lane crosses the straight line from the bumper, nearer than the lead."""
     crossed = {
         state.actor.id
         for now in drive("curve_250")

@@ -25,17 +25,17 @@ TICKS = 25
 
 @pytest.fixture(scope="module")
 def braking() -> Scenario:
-    """Closing in on a standing car: the loop brakes, which the script does not."""
+    """Approaching a standing car: the closed loop brakes, unlike the script."""
     return load("ccrs_100")
 
 
 def believed(result: Result) -> dict[str, Any]:
-    """All but how long it took, and that the replay has an image too."""
+    """The result without timings, and without differences due to the replay's image."""
     return {key: value for key, value in to_json(result).items() if key not in ("timing_ms", "sensors")}
 
 
 class Unwanted:
-    """A detector that nobody may ask."""
+    """A detector that must not be called."""
 
     name, notes = "unwanted", ()
 

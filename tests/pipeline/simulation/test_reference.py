@@ -15,7 +15,7 @@ from pipeline.simulation.scenario import Ego, Scenario
 from pipeline.simulation.sensors.detection_model import BoxNoise, Detections, LineNoise
 from pipeline.simulation.sensors.faults import Faults, Knock
 from pipeline.simulation.sensors.gnss_model import GnssModel, OdometryModel
-from pipeline.simulation.sensors.lidar_model import LidarModel
+from pipeline.simulation.sensors.lidar.model import LidarModel
 from pipeline.simulation.world.actors import Actor, Brake
 from pipeline.simulation.world.intersection_ways import CrossingActor
 from pipeline.simulation.world.roads import Beacon, Crossing, Road, Segment, Strip
@@ -45,7 +45,7 @@ PARTS: dict[str, type[BaseModel]] = {
 
 
 def documented(part: str) -> dict[str, str]:
-    """Default by key, as the table has them."""
+    """Default by key, as in the table."""
     body = TEXT.split(f"\n## {part}\n")[1].split("\n## ")[0]
     rows = re.findall(r"^\| ([a-z0-9_, ]+) \| ([^|]*)\|", body, re.MULTILINE)
     return {key: default.strip() for keys, default in rows for key in keys.split(", ") if key != "key"}

@@ -26,6 +26,7 @@ STRAIGHT = FILES["straight"]
     [
         (("title:", "titel:"), "t.yaml: title: is missing"),
         (("seed: 7", "seed: 7\nweather: rain"), "t.yaml: weather: no such setting"),
+        (("seed: 7", "seed: 7\nfurther_sensors: [sonar]"), "no simulated sensor 'sonar'; available: "),
         (("kind: van", "kind: boat"), "actors.3.kind: Input should be"),
         (("id: 8,", "id: 1,"), "two actors have the same id"),
         (("lanes_forward: 3", "lanes_forward: 2"), "no lane -3"),

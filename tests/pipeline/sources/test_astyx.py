@@ -186,7 +186,8 @@ def test_real_rings_lie_on_the_vlp16s_elevations(data_dir: Path) -> None:
 
 
 def test_real_labels_hold_the_points_of_their_cars(data_dir: Path) -> None:
-    """Labels, quaternion order, ego frame and sweep agree: near cars' cuboids hold points, beside them is air."""
+    """Labels, quaternion order, ego frame and sweep agree: cuboids of near cars contain points, and the space beside
+    them does not."""
     source = opened(data_dir / "astyx")
     inside, beside = [], []
     for index in range(0, len(source), 3):

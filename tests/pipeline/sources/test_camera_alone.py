@@ -13,7 +13,7 @@ import pytest
 from pipeline.params import Params
 from pipeline.sources import SourceError, open_source
 from pipeline.step import State, step
-from tests.pipeline.sources.captures import sentences
+from tests.pipeline.sources.made.captures import sentences
 
 GPX = """<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/1" version="1.1" creator="test"><trk><trkseg>
 {}</trkseg></trk></gpx>"""
@@ -21,7 +21,7 @@ GPX = """<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/1" ver
 
 @pytest.fixture
 def video(tmp_path: Path) -> Path:
-    """Two seconds at 30 Hz, in which the image's brightness counts."""
+    """Two seconds at 30 Hz in which the brightness of the image is the frame number."""
     file = tmp_path / "drive.mp4"
     with av.open(str(file), "w") as container:
         stream = container.add_stream("mpeg4", rate=30)
@@ -98,7 +98,7 @@ def test_a_track_in_a_folder_of_images_is_taken(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("degrees", "corner"), [(0, (0, 0)), (90, (0, -1)), (180, (-1, -1)), (270, (-1, 0))])
 def test_a_video_of_a_telephone_on_its_side_stands_upright(degrees: int, corner: tuple[int, int], video: Path) -> None:
-    """The matrix in the file's track header says how far to turn clockwise."""
+    """The matrix in the file's track header states the clockwise rotation."""
     image = np.zeros((180, 320, 3), np.uint8)
     image[:60, :60] = 255
     with av.open(str(video), "w") as container:

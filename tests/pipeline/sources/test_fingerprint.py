@@ -26,7 +26,7 @@ def _touch_later(path: Path) -> None:
 
 
 def _replace(path: Path) -> None:
-    """By another file of the same size and time."""
+    """Replace a file by another one of the same size and time."""
     times = path.stat()
     other = path.with_name("other.tmp")
     other.write_text("x" * times.st_size)
@@ -82,7 +82,7 @@ def test_a_recording_has_the_same_key_wherever_it_lies_and_whatever_form_it_has(
 
 def test_another_recording_has_another_key() -> None:
     class Darker(Recording):
-        """Another first image."""
+        """A recording with another first image."""
 
         def frame(self, index: int) -> Frame:
             frame = super().frame(index)
@@ -90,7 +90,7 @@ def test_another_recording_has_another_key() -> None:
             return frame if index else replace(frame, image=CameraImage(frame.t_ns, frame.image.bgr // 2))
 
     class Later(Recording):
-        """The same at another time."""
+        """The same recording at another time."""
 
         def t_ns(self, index: int) -> int:
             return super().t_ns(index) + 1
@@ -99,7 +99,7 @@ def test_another_recording_has_another_key() -> None:
 
 
 class Sensed(Recording):
-    """Its LiDAR says how bright things are, as a real one does."""
+    """A recording whose LiDAR measures intensity, as a real one does."""
 
     def frame(self, index: int) -> Frame:
         frame = super().frame(index)
@@ -111,7 +111,7 @@ class Sensed(Recording):
 
 def test_neither_a_mount_nor_a_video_beside_it_makes_it_another(tmp_path: Path) -> None:
     class Mounted(Sensed):
-        """Found to look a little to the left."""
+        """A recording whose camera was found to face slightly to the left."""
 
         def frame(self, index: int) -> Frame:
             frame = super().frame(index)
@@ -124,7 +124,7 @@ def test_neither_a_mount_nor_a_video_beside_it_makes_it_another(tmp_path: Path) 
             return replace(super().frame(index), image=None)
 
     class Elsewhere(Sensed):
-        """Other things are seen there, at the same times."""
+        """A recording of another scene at the same times."""
 
         def frame(self, index: int) -> Frame:
             return super().frame(index + 1)

@@ -10,17 +10,17 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.sources import SourceError, open_source
-from tests.pipeline.sources.bags import Kind, write_bag
-from tests.pipeline.sources.captures import write_capture
-from tests.pipeline.sources.clouds_on_disk import STAMPS_NS, write_clouds
 from tests.pipeline.sources.conftest import write_astyx, write_kitti, write_kitti_raw
 from tests.pipeline.sources.kitti.test_kitti360 import DRIVE, write_kitti360
-from tests.pipeline.sources.nuscenes_on_disk import START_US, write_nuscenes
+from tests.pipeline.sources.made.bags import Kind, write_bag
+from tests.pipeline.sources.made.captures import write_capture
+from tests.pipeline.sources.made.clouds_on_disk import STAMPS_NS, write_clouds
+from tests.pipeline.sources.made.nuscenes_on_disk import START_US, write_nuscenes
 from tests.pipeline.sources.test_radiate import write_radiate
 
 
 def small_bag(folder: Path, kind: Kind = "db3") -> Path:
-    """A folder that is a bag, or, of ROS 1, has one in it."""
+    """A folder that is a ROS 2 bag or contains a ROS 1 bag."""
     if kind == "ros1":
         folder.mkdir()
         write_bag(folder / "drive.bag", kind, sweeps=2, every=50)

@@ -12,9 +12,9 @@ from pipeline.sources import open_source
 from pipeline.types import Frame
 from pipeline.types.source import InParts, Source
 from tests.pipeline.recording.frames import full, write
-from tests.pipeline.sources.bags import write_bag
-from tests.pipeline.sources.captures import write_capture
-from tests.pipeline.sources.clouds_on_disk import write_clouds
+from tests.pipeline.sources.made.bags import write_bag
+from tests.pipeline.sources.made.captures import write_capture
+from tests.pipeline.sources.made.clouds_on_disk import write_clouds
 
 
 @pytest.fixture(params=["session", "astyx", "kitti", "simulated", "rosbag", "pcap", "pcd"])

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.common.geometry import transform
 from pipeline.sources import SourceError, open_source
-from tests.pipeline.sources.nuscenes_on_disk import (
+from tests.pipeline.sources.made.nuscenes_on_disk import (
     BOX_AT,
     BOX_SIZE,
     LIDAR_AT,

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from pipeline.formats.pcd_file import parse_pcd
 from pipeline.sources import SourceError, open_source
 from tests.pipeline.formats.velodyne.streams import ring_wall
-from tests.pipeline.sources.captures import RIG
-from tests.pipeline.sources.clouds_on_disk import DTYPE, STAMPS_NS, lzf, pcd, rows_of, write_clouds
+from tests.pipeline.sources.made.captures import RIG
+from tests.pipeline.sources.made.clouds_on_disk import DTYPE, STAMPS_NS, lzf, pcd, rows_of, write_clouds
 
 ENCODINGS = ("ascii", "binary", "binary_compressed")
 ROWS = rows_of(ring_wall(0))[::37]
@@ -156,7 +156,7 @@ def test_no_clouds(tmp_path: Path) -> None:
 
 
 def test_nebula(data_dir: Path, tmp_path: Path) -> None:
-    """Another program's file: its rings, its times."""
+    """A file of another program, with its rings and times."""
     name = "nebula_1673400472138016708.pcd"
     (tmp_path / "1673400472138016708.pcd").symlink_to(data_dir / "vlp16_packets" / name)
     frame = open_source(f"pcd:{tmp_path}").frame(0)

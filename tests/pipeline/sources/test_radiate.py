@@ -16,11 +16,11 @@ from pipeline.sources.radiate import parse_state
 START_NS = 1_574_859_771_700_975_000
 COUNT = 6
 NORTH_MPS, EAST_MPS, DOWN_RADPS = -7.33568, -10.13310, 0.03532
-"""Of a right bend, as the sample has it: the course grows while this turn rate is positive."""
+"""Turn rate in a right bend, as in the sample: the course increases while it is positive."""
 
 
 def wall() -> str:
-    """A wall 12 m ahead, its left half bright, as 32 rings see it; y looks ahead, x to the right."""
+    """A wall 12 m ahead with a bright left half, as seen by 32 rings; y points ahead, x to the right."""
     rows = [
         f"{-left:.5g},12,{(ring - 23) * 0.2:.5g},{200 if left > 0 else 20},{ring}"
         for ring in range(32)
@@ -91,8 +91,8 @@ def test_points_are_in_the_axes_of_the_car(sequence: Path) -> None:
 
 
 def test_points_fall_into_the_image_where_the_sdk_draws_them(sequence: Path) -> None:
-    """By hand from ``default-calib.yaml``: a point ahead, level with the LiDAR, lies 5 cm above the camera and 26 cm to
-    the right, and the camera looks 1.28° down of it and 0.53° aside."""
+    """Computed by hand from ``default-calib.yaml``: a point ahead at the LiDAR's height is 5 cm above the camera and 26
+    cm to its right, and the camera is turned 1.28° down and 0.53° to the side."""
     camera = open_source(str(sequence)).frame(0).camera
     assert camera is not None
     x, y, z = transform(camera.T_camera_ego, np.array([[20.0, 0.0, 0.0]]))[0]

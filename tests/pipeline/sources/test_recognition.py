@@ -14,13 +14,13 @@ import pytest
 from app.commands.serve import Serve
 from pipeline.sources import SourceError, open_source
 from tests.pipeline.recording.frames import full, write
-from tests.pipeline.sources.bags import write_bag
-from tests.pipeline.sources.captures import write_capture
-from tests.pipeline.sources.clouds_on_disk import write_clouds
 from tests.pipeline.sources.conftest import write_astyx, write_kitti, write_kitti_raw
+from tests.pipeline.sources.made.bags import write_bag
+from tests.pipeline.sources.made.captures import write_capture
+from tests.pipeline.sources.made.clouds_on_disk import write_clouds
 
 Write = Callable[[Path], Path]
-"""Takes a folder that is not there yet, and gives what a person types."""
+"""Functions that create a recording in a new folder and return what a user types."""
 
 
 def capture(folder: Path) -> Path:

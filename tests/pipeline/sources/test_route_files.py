@@ -31,7 +31,7 @@ RMC = (
 
 
 def gga(latitude: str, quality: str) -> str:
-    """A sentence with a right checksum, whatever is in it."""
+    """A sentence with these fields and a valid checksum."""
     body = f"GPGGA,123521,{latitude},N,01131.000,E,{quality},08,0.9,545.4,M,46.9,M,,"
     return f"${body}*{reduce(xor, body.encode()):02X}\n"
 
@@ -51,7 +51,7 @@ def written(folder: Path, name: str, text: str) -> str:
     ],
 )
 def test_places_of_a_utm_zone(tmp_path: Path, text: str, asked: str) -> None:
-    """The same places as in degrees, to a millimetre."""
+    """The same positions as in degrees, to a millimetre."""
     utm = Transformer.from_crs(4326, 32632, always_xy=True)
     places = [*utm.transform(11.2, 48.1), *utm.transform(11.3, 48.2)]
     route = load_route(written(tmp_path, "a.csv", text.format(*places)) + asked)

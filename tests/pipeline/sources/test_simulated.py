@@ -56,7 +56,7 @@ def test_any_order_gives_the_same_bytes(frames: dict[int, Frame]) -> None:
 
 
 def test_truth_image_and_sweep_agree_on_the_lead(frames: dict[int, Frame]) -> None:
-    """The lead's cuboid holds LiDAR points, and its box in the image is mostly its red paint and lights."""
+    """The lead's cuboid contains LiDAR points, and its image box is mostly its red paint and lights."""
     frame = frames[100]
     truth = open_source("sim:straight").truth(100)
     assert truth is not None

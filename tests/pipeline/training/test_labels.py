@@ -43,7 +43,7 @@ def test_the_height_of_a_box_is_the_pinhole_camera_s(ahead_m: float) -> None:
 
 
 def test_the_box_is_where_the_vehicle_is_drawn() -> None:
-    """Two images that differ in the car's paint alone differ inside its box and up to its edges."""
+    """Two images that differ only in the car's paint differ inside its box, up to its edges."""
     images, found = [], None
     for colour in ("#ff0000", "#0000ff"):
         now = world_state.at(_scenario({"ahead_m": 5.0, "lane": -2, "colour": colour}), 0.0)

@@ -26,7 +26,7 @@ def seen(detector: Detector) -> list[SeenPair]:
 
 
 def test_simulated_cars_are_as_far_as_the_networks_own_law_says(detector: Detector, seen: list[SeenPair]) -> None:
-    """Within 6 % to 60 m on average, to either side; by the law for real cars they would be a tenth too far."""
+    """Within 6 % on average up to 60 m; with the law for real cars, they would be 10 % too far."""
     near = [row for row in errors(seen, detector.law)[:5] if row[0]]
     assert sum(count for count, _, _ in near) >= 20
     assert np.average([absolute for _, _, absolute in near], weights=[count for count, _, _ in near]) <= 0.06

@@ -46,7 +46,7 @@ def test_traffic_holds_every_kind_near_and_far_and_nobody_overlaps() -> None:
 
 
 def test_no_image_is_drawn_from_inside_of_a_vehicle() -> None:
-    """Seed 202's image 16 was: a truck with its rear 1.6 m behind our bumper, its label as large as the image."""
+    """Image 16 of seed 202 was: a truck with its rear 1.6 m behind our bumper, and a label as large as the image."""
     now = next(drive("straight", 10.0)).world
     one = now.actors[-1]
 

@@ -23,8 +23,8 @@ def test_it_rounds_as_python_does(values: list[float | None]) -> None:
 
 
 def test_what_multiplying_would_round_wrong() -> None:
-    """As a double, 0.00025 lies above the half of a ten-thousandth and 0.00035 below; multiplied, both are exact
-    halves, which would go to the even neighbour."""
+    """As doubles, 0.00025 is slightly above half of the last decimal and 0.00035 slightly below; multiplied, both
+    become exact halves, which would be rounded to even."""
     assert rounded([0.00025, 0.00035, -0.00025]) == [0.0003, 0.0003, -0.0003]
 
 

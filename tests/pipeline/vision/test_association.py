@@ -32,7 +32,7 @@ def box(u: float, size_px: float = 30.0) -> VisionMeasurement:
     ],
 )
 def test_a_vague_prediction_does_not_outbid_a_sure_one(vague_at: float, partner: int) -> None:
-    """By surprise alone the vague one would win: 2 px of 40 against 8 px of 5."""
+    """By the normalised error alone, the uncertain one would win: 2 px at σ = 40 against 8 px at σ = 5."""
     followed = [expected(1, 610.0, 5.0), expected(2, vague_at, 40.0)]
     assert match(followed, [box(602.0)], VisionTrackingParams()) == {partner: 0}
 

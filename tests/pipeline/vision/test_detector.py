@@ -110,7 +110,7 @@ def test_a_detr_gives_boxes_in_the_images_pixels(tmp_path: Path) -> None:
 
 
 def test_the_rest_of_the_input_is_grey(tmp_path: Path) -> None:
-    """A black image that fills a quarter of the input leaves a mean of three quarters of 114."""
+    """With a black image that fills a quarter of the input, the mean is three quarters of 114."""
     detector = open_detector(str(networks.yolov8(tmp_path / "v8.onnx")), None)
     raw = detector.detect(np.zeros((16, 64, 3), np.uint8))
     assert raw.scores[0] == pytest.approx(0.75 * 114 / 255, abs=1e-5)

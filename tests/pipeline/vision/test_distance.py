@@ -15,11 +15,11 @@ from pipeline.vision.distance import PowerLaw, binned, fit_power_law, measure
 
 FOCAL_PX = 907.0
 CAR_M = 1444.0 / FOCAL_PX
-"""Height of the car that the default law is told by."""
+"""Height of the car assumed by the default law."""
 
 
 def _camera(focal_px: float = FOCAL_PX, mount: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> CameraCalibration:
-    """A level camera that looks along ego x, at ``mount``."""
+    """A level camera at ``mount`` that faces along ego x."""
     axes = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = axes, -axes @ np.array(mount)
@@ -46,7 +46,8 @@ def _one(detection: Detection, camera: CameraCalibration | None, **changes: obje
 
 @given(st.floats(8.0, 100.0), st.floats(-0.5, 0.5), st.floats(600.0, 2000.0), st.tuples(*[st.floats(-1.0, 1.0)] * 2))
 def test_a_car_is_placed_where_it_stands(x: float, slope: float, focal: float, mount: tuple[float, float]) -> None:
-    """Any focal length, any bearing, any mount: the law is a pinhole camera's, and the car is as tall as it says."""
+    """For any focal length, bearing and mount: the law is that of a pinhole camera, and the car has the assumed
+    height."""
     camera = _camera(focal, (*mount, 0.0))
     seen = _one(_seen(camera, x, slope * x), camera, max_m=200.0)
     assert seen.distance_m == pytest.approx(math.hypot(x, slope * x), rel=1e-6)
@@ -125,7 +126,7 @@ def test_a_box_that_tells_no_distance_keeps_its_row(box: tuple[float, float, flo
 
 
 def test_sigma_is_the_laws_slope_and_the_spread_of_sizes() -> None:
-    """At 60 m one pixel more or less moves the estimate by as much as sigma says for one pixel of noise."""
+    """At 60 m, one pixel more or less changes the estimate by the sigma for one pixel of noise."""
     camera = _camera()
     detection = _seen(camera, 60.0, 0.0)
     x1, y1, x2, y2 = detection.bbox

@@ -97,7 +97,7 @@ def raw(boxes: list[list[float]], scores: list[float]) -> RawBoxes:
 
 
 class Answers:
-    """Gives the same boxes for every image, and counts."""
+    """Returns the same boxes for every image, and counts its calls."""
 
     notes: tuple[str, ...] = ()
 

@@ -169,7 +169,7 @@ def _recognise(answer: BoxOutputs) -> Decoder | None:
 
 
 def test_a_head_is_added_by_a_file_and_one_entry(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the two functions above hold is all that a new form of answer takes."""
+    """The two functions above are all that a new form of output needs."""
     table = np.array([[1.0, 2.0, 3.0, 4.0, 0.9, 2.0]], np.float32)
     with pytest.raises(UnknownHead):
         pick_decoder([table], SIZE)

@@ -24,7 +24,7 @@ def sighting(range_m: float, bearing_rad: float = 0.0, share: float = 0.05) -> P
 
 
 def seen(range_m: float, u: float = 600.0, height_px: float | None = None) -> VisionMeasurement:
-    """A car straight ahead through a lens of 721 px: 1.5 m tall, so many pixels tall as its range makes it."""
+    """A car straight ahead, 1.5 m tall, seen with a focal length of 721 px."""
     tall = height_px if height_px is not None else 721.0 * 1.5 / range_m
     box = (u - 0.6 * tall, 180.0 - tall / 2, u + 0.6 * tall, 180.0 + tall / 2)
     side_m = (600.0 - u) / 721.0 * range_m
@@ -32,7 +32,7 @@ def seen(range_m: float, u: float = 600.0, height_px: float | None = None) -> Vi
 
 
 def follow(images: list[list[VisionMeasurement]], ego_mps: float | None = 10.0) -> list[tuple[VisionTrack, ...]]:
-    """Every image's tracks, ten images a second."""
+    """The tracks of every image, at 10 Hz."""
     state, shown = VisionTrackerState(), []
     for k, boxes in enumerate(images):
         state, tracks = track(state, tuple(boxes), 0.1 if k else None, PARAMS, ego_mps)
@@ -63,7 +63,7 @@ def test_a_growing_box_is_a_closing_speed() -> None:
 
 
 def test_the_error_of_a_closing_speed_is_as_large_as_it_says() -> None:
-    """A parked car approached at 10 m/s, its box off by 2 px in every image and too small by a tenth for good."""
+    """A parked car approached at 10 m/s, whose box has a noise of 2 px and is always 10 % too small."""
     rng, off = np.random.default_rng(3), []
     for _ in range(40):
         images = []
@@ -82,7 +82,7 @@ def test_the_error_of_a_closing_speed_is_as_large_as_it_says() -> None:
 
 
 def test_a_small_box_does_not_become_its_neighbour() -> None:
-    """Parked cars 55 m away, 30 px apart: when one is missed for three images, its number does not go to the next."""
+    """Parked cars 55 m away, 30 px apart: if one is missed in three images, its id does not pass to the next."""
     left, right = (lambda k: seen(55.0 - k, 560.0)), (lambda k: seen(55.0 - k, 590.0))
     shown = follow([[left(k)] for k in range(5)] + [[right(k)] for k in range(5, 8)])
     (first,) = shown[4]
@@ -92,7 +92,7 @@ def test_a_small_box_does_not_become_its_neighbour() -> None:
 
 
 def test_one_wrong_height_is_refused_and_the_place_kept() -> None:
-    """For one image the network draws the upper half of the car: twice as far, by its height."""
+    """In one image, the network returns the upper half of the car: by its height, twice as far."""
     shown = follow([[seen(24.0)]] * 8 + [[seen(42.0, height_px=29.0)]] + [[seen(24.0)]], 0.0)
     assert [each.id for each in shown[8]] == [shown[0][0].id], "it keeps its number"
     assert not shown[8][0].measured
@@ -101,7 +101,7 @@ def test_one_wrong_height_is_refused_and_the_place_kept() -> None:
 
 
 def test_a_place_that_is_contradicted_for_long_begins_anew() -> None:
-    """The filter was wrong, not the images: it must be called back, with its speed to be measured again."""
+    """The filter was wrong, not the images: it must restart, and its speed must be measured again."""
     shown = follow([[seen(12.0, height_px=60.0)]] * 8 + [[seen(45.0, height_px=45.0)]] * 4, 0.0)
     assert shown[-1][0].distance_m == pytest.approx(45.0, rel=0.05)
     assert shown[-1][0].ranges < 4
@@ -110,7 +110,7 @@ def test_a_place_that_is_contradicted_for_long_begins_anew() -> None:
 
 
 def test_nothing_is_faster_than_cars_are() -> None:
-    """Boxes that shrink as if the object left at 120 m/s: the place is measured anew rather than believed."""
+    """Boxes shrink as if the object moved away at 120 m/s: the position is reset instead."""
     shown = follow([[seen(20.0 + 12.0 * k, height_px=50.0)] for k in range(10)])
     speeds = [each.velocity_mps[0] for tracks in shown for each in tracks if each.velocity_mps is not None]
     assert all(speed + 10.0 <= 70.0 for speed in speeds)
@@ -128,14 +128,15 @@ def test_the_covariance_stays_positive() -> None:
 
 @pytest.mark.parametrize(("expected_m", "found_m"), [(77.0, 42.7), (42.7, 77.0), (30.0, 12.0)])
 def test_a_precise_sighting_far_from_a_vague_place_is_where_the_place_goes(expected_m: float, found_m: float) -> None:
-    """One linear step in the logarithm overshoots: from 77 m to a sighting at 42.7 m it ends at 32 m."""
+    """A single linear step in the logarithm overshoots: from 77 m, a sighting at 42.7 m would give 32 m."""
     vague = place_filter.start(sighting(expected_m, share=0.6), 0.0, 8.0)
     x, y = place_filter.position(place_filter.update(vague, sighting(found_m, share=0.012))[0])
     assert math.hypot(x, y) == pytest.approx(found_m, rel=0.01)
 
 
 def test_half_a_vehicle_drawn_for_a_moment_does_not_send_it_sideways() -> None:
-    """The right half of the box only, twice: its centre jumps by a quarter of a car, 0.45 m. That is no lane change."""
+    """Only the right half of the box, twice: its centre jumps by a quarter of a car, 0.45 m. That is not a lane
+    change."""
     whole = [seen(40.0, u=600.0) for _ in range(15)]
     x1, y1, x2, y2 = whole[0].detection.bbox
     middle = (x1 + 3 * x2) / 4

@@ -17,7 +17,7 @@ BOTH = pytest.mark.parametrize("params", [QUEUE, KALMAN], ids=["queue", "kalman"
 
 
 def _car(x: float, y: float = 0.0, label: str = "car", score: float = 0.9, sigma: float = 0.05) -> VisionMeasurement:
-    """A car as a 900 px camera sees it, its distance known to a share ``sigma``."""
+    """A car seen with a focal length of 900 px; ``sigma``: of its distance, as a share."""
     u, w, h = CENTRE_PX - FOCAL_PX * y / x, FOCAL_PX * 1.8 / x, FOCAL_PX * 1.5 / x
     box = (u - w / 2, 360 - h / 2, u + w / 2, 360 + h / 2)
     distance = float(np.hypot(x, y))
@@ -41,7 +41,7 @@ def _drive(
 @BOTH
 @pytest.mark.parametrize("dt_s", [0.1, 0.3])
 def test_two_cars_keep_their_numbers(params: VisionTrackingParams, dt_s: float) -> None:
-    """The lead closes in while the neighbour falls back; detections come in falling score, in turns."""
+    """The lead comes closer while its neighbour falls back; detections are in order of score, which alternates."""
     images = []
     for step in range(12):
         lead, beside = _car(32.0 - 2.7 * dt_s * step), _car(20.0 + 3.0 * dt_s * step, 3.5)
@@ -52,7 +52,7 @@ def test_two_cars_keep_their_numbers(params: VisionTrackingParams, dt_s: float) 
 
 @BOTH
 def test_a_row_of_cars_does_not_shift_when_the_first_leaves(params: VisionTrackingParams) -> None:
-    """Making as many pairs as possible would hand every number to the neighbour."""
+    """Maximising the number of pairs would pass every id to the neighbour."""
     row = [_car(30.0, y) for y in (6.0, 3.6, 1.2, -1.2)]
     tracks = _drive([tuple(row)] * 3 + [(*tuple(row[1:]), _car(30.0, -3.6))], params)[-1]
     places = {t.id: t.position for t in tracks if not t.carried}
@@ -63,7 +63,7 @@ def test_a_row_of_cars_does_not_shift_when_the_first_leaves(params: VisionTracki
 
 @BOTH
 def test_one_new_object_takes_one_new_number(params: VisionTrackingParams) -> None:
-    """Slip of the print: it burns a number for every candidate that fails."""
+    """An error in the paper: it uses up an id for every failed candidate."""
     others = tuple(_car(30.0, y) for y in (8.0, 4.0, -4.0))
     tracks = _drive([others, (*others, _car(15.0))], params)[-1]
     assert [t.id for t in tracks] == [1, 2, 3, 4]
@@ -116,7 +116,7 @@ def test_queue_shows_what_was_measured_last() -> None:
 
 
 def test_queue_gate_is_on_the_move_of_centres() -> None:
-    """79 px is the same object, 81 px another; half widths (as printed) would not change at all."""
+    """79 px is the same object, 81 px another one; half widths (as printed) would not change at all."""
     for moved, ids in [(79.0, [1]), (81.0, [1, 2])]:
         box = _car(30.0).detection.bbox
         there = _blind((box[0] + moved, box[1], box[2] + moved, box[3]))
@@ -149,7 +149,7 @@ def test_kalman_follows_a_box_that_crosses_the_image() -> None:
 
 
 def test_one_absurd_distance_hardly_moves_the_track() -> None:
-    """A box of half the car doubles its distance for one image, as it happens on real ones."""
+    """A box of half the car doubles its distance in one image, as happens in real ones."""
     steady = [(_car(24.0),)] * 8
     good = _car(24.0)
     half = VisionMeasurement(good.detection, 44.0, 2.2, (44.0, 0.0))
@@ -175,7 +175,7 @@ def test_an_object_without_distance_is_followed_all_the_same() -> None:
 
 
 def test_a_distance_no_longer_measured_is_forgotten() -> None:
-    """The lead comes so near that its box is cut: the last distance must not live on."""
+    """The lead comes so near that its box is cut off: the last distance must not persist."""
     car = _car(20.0)
     shown = _drive([(car,)] * 5 + [(_blind(car.detection.bbox),)] * 12, KALMAN)
     assert shown[6][0].distance_m == pytest.approx(20.0, abs=0.2)
@@ -221,7 +221,7 @@ def test_every_detection_is_in_one_track_and_tracks_are_bounded(
 
 
 def test_a_standing_car_ahead_of_a_fast_ego_car_is_soon_known_to_stand() -> None:
-    """Twelve images of a car that 28 m/s bring nearer: with the own speed known, its closing speed is right soon."""
+    """Twelve images of a car approached at 28 m/s: with a known ego speed, its closing speed is right soon."""
 
     def closing_mps(ego_speed_mps: float | None) -> float:
         state = VisionTrackerState()
@@ -237,7 +237,7 @@ def test_a_standing_car_ahead_of_a_fast_ego_car_is_soon_known_to_stand() -> None
 
 @pytest.mark.parametrize("images", [1, 3, 20], ids=lambda images: f"{images} double boxes")
 def test_a_vehicle_keeps_its_number_however_long_it_had_two_boxes(images: int) -> None:
-    """The detector then draws only the box that was the second one."""
+    """The detector then returns only the box that was the second one."""
     first, second = _car(40.0), _car(39.0, -0.6)
     shown = _drive([(first,)] * 10 + [(first, second)] * images + [(second,)] * 10, KALMAN)
     assert [len(tracks) for tracks in shown[10:-10]] == [2] * images
@@ -245,7 +245,7 @@ def test_a_vehicle_keeps_its_number_however_long_it_had_two_boxes(images: int) -
 
 
 def test_a_carried_box_on_a_seen_one_is_a_ghost() -> None:
-    """A car jumps in the image by more than the gate and gets a new number: the old one must not stay beside it."""
+    """A car jumps in the image by more than the gate and gets a new id: the old track must not stay beside it."""
     gone = [(_car(20.0, 0.0),)] * 3 + [(_car(20.0, 0.0), _car(20.0, 6.0))] * 2
     shown = _drive([*gone, (_car(21.0, 0.1, label="person"), _car(20.0, 6.0))], KALMAN)
     assert [track.carried for track in shown[-1]] == [True, False, False], "another kind of object is no ghost's heir"

@@ -45,7 +45,7 @@ def seen(law_m: float) -> VisionMeasurement:
 
 @pytest.mark.parametrize("learns", [True, False])
 def test_a_lead_that_leaves_the_lidars_reach_keeps_its_distance(learns: bool) -> None:
-    """It is 20 % taller than a car, so the law says 20 % less; the LiDAR has it for a second, then it draws away."""
+    """It is 20 % taller than a car, so the law gives 20 % less; the LiDAR sees it for a second, then it moves away."""
     params = PARAMS.model_copy(update={"learn_height": learns})
     state = VisionTrackerState()
     closing = []
@@ -68,14 +68,14 @@ FACTORS = {"car": 1.0, "truck": 2.4}
 
 
 def called(label: str, range_m: float) -> VisionMeasurement:
-    """A truck at a range, by whatever name the detector gives it in this image."""
+    """A truck at this range, with the class that the detector returns in this image."""
     one = seen(range_m / FACTORS["truck"] * FACTORS[label])
     box = seen(range_m / FACTORS["truck"]).detection.bbox
     return replace(one, detection=Detection(box, label, 0.8), class_factors=FACTORS)
 
 
 def test_a_truck_that_is_called_a_car_for_a_while_stays_where_it_is() -> None:
-    """By a car's law its box means 25 m, not 60."""
+    """With a car's law, its box means 25 m instead of 60 m."""
     state = VisionTrackerState()
     for k in range(20):
         measured = called("car" if 8 <= k < 13 else "truck", 60.0)
@@ -85,7 +85,7 @@ def test_a_truck_that_is_called_a_car_for_a_while_stays_where_it_is() -> None:
 
 
 def test_what_was_learned_is_kept_when_the_class_turns_out_to_be_another() -> None:
-    """Its metres are known; only what they are a multiple of changes."""
+    """Its height in metres is known; only the class height that it is a multiple of changes."""
     state, labels = VisionTrackerState(), []
     for k in range(30):
         measured = called("car" if k < 8 else "truck", 60.0)
@@ -105,7 +105,7 @@ def test_a_range_of_no_track_changes_nothing() -> None:
 
 
 def test_returns_of_a_far_vehicle_place_it_without_seeming_motion() -> None:
-    """Seen for a second by its box, 15 % too near; then one return says how far it is, every other frame."""
+    """For a second, it is ranged by its box, 15 % too near; then by one return in every other frame."""
     state = VisionTrackerState()
     for k in range(20):
         measured = seen(60.0 / 1.15)
@@ -120,7 +120,8 @@ def test_returns_of_a_far_vehicle_place_it_without_seeming_motion() -> None:
 
 
 def test_a_place_that_rests_on_ranges_stays_when_a_height_is_unlearned() -> None:
-    """The first box held the upper part of the car only, beside a range. The next one is whole: it has not moved."""
+    """The first box, with a range, contained only the upper part of the car. The next one is complete: the car has not
+    moved."""
     state, speeds = VisionTrackerState(), []
     for k in range(8):
         measured = replace(seen(50.0 if k < 2 else 40.0), ranged_m=40.0, ranged_sigma_m=0.5, returns=2)
@@ -160,8 +161,8 @@ def test_a_shape_averages_single_boxes_and_follows_a_turn() -> None:
 
 @pytest.mark.parametrize("uses", [True, False])
 def test_a_van_that_only_the_camera_sees_is_placed_by_the_shape_of_its_box(uses: bool) -> None:
-    """2.0 m tall and 1.9 m wide; a car's law places it a quarter too near. Its speed is that of its box, not of what
-    the shape is found out to be."""
+    """It is 2.0 m tall and 1.9 m wide; a car's law places it 25 % too near. Its speed comes from its box, and the
+    correction by its shape does not count as motion."""
     params, state, true_m = PARAMS.model_copy(update={"use_aspect": uses}), VisionTrackerState(), 60.0
     for k in range(20):
         measured = replace(seen(true_m * 1.55 / 2.0), aspect=math.log(2.0 / 1.9) if k >= 5 else None)
@@ -217,7 +218,7 @@ def test_a_contact_averages_single_boxes() -> None:
 
 
 def test_a_range_overrules_a_contact() -> None:
-    """Even one that is far off and was sure of itself."""
+    """Even a contact that is far off and has a small sigma."""
     height = hinted(BoxShape(), RoadContact().seen(0.4, 0.03, 0.0), SPREAD)
     for _ in range(5):
         height = learn(height, 25.0, NOISE, SPREAD, 25.0, 0.2)
@@ -227,8 +228,7 @@ def test_a_range_overrules_a_contact() -> None:
 
 @pytest.mark.parametrize("from_k", [0, 8])
 def test_a_van_that_only_the_camera_sees_stands_where_it_meets_the_road(from_k: int) -> None:
-    """It keeps its distance ahead; that the road corrects it is no motion. from_k: when its lower edge comes in
-    sight."""
+    """It keeps its distance; the correction by the road is not motion. from_k: when its lower edge becomes visible."""
     state, true_m = VisionTrackerState(), 50.0
     for k in range(25):
         contact_m = true_m if k >= from_k else None
@@ -242,7 +242,7 @@ def test_a_van_that_only_the_camera_sees_stands_where_it_meets_the_road(from_k: 
 
 
 def test_another_class_leaves_a_vehicle_where_it_meets_the_road() -> None:
-    """A truck's law says twice a car's; its boxes are called cars, then trucks."""
+    """A truck's law gives twice a car's distance; its boxes are classified as cars, then as trucks."""
     state, factors = VisionTrackerState(), {"car": 1.0, "truck": 1.5}
     for k in range(30):
         label = "car" if k < 10 else "truck"

@@ -9,8 +9,8 @@ from pydantic import Field
 
 from app.labels.acts.request_fields import Person, PersonOrNobody, Strict
 from app.labels.acts.requests import Act
-from app.labels.service.tasks import TaskKind
 from app.labels.store.values import LONGEST_ITEM
+from app.labels.tasks import TaskKind
 from app.web.routes.labels.shapes import ItemKey, LabelChanges
 from app.web.routes.shapes.common import ApiModel
 

@@ -13,8 +13,8 @@ from app.labels.errors import Stale
 from app.labels.permissions import check_act
 from app.labels.service.answers import changes_json
 from app.labels.service.desk import ActDone, LabelDesk
+from app.web.refusals import refusing
 from app.web.routes.labels.act_shapes import ActBody, ActedJson, StaleJson, TaskBegun, Who
-from app.web.routes.refusals import refusing
 
 if TYPE_CHECKING:
     from app.labels.store.undo_order import Way

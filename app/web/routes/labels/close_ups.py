@@ -10,8 +10,8 @@ from app.labels.acts.request_fields import Id, Index
 from app.labels.errors import NoSuchLabel
 from app.labels.service.desk import LabelDesk
 from app.labels.service.filmstrip import close_up_jpeg, filmstrip
+from app.web.refusals import refusing
 from app.web.routes.labels.shapes import StillJson
-from app.web.routes.refusals import refusing
 from pipeline.labels.model import LabelTrack
 
 

@@ -18,9 +18,9 @@ from app.labels.acts.request_fields import Person
 from app.labels.service.desk import LabelDesk
 from app.labels.store.values import LONGEST_ITEM, LONGEST_NAME
 from app.labels.wording import WORKING
+from app.web.refusals import refusing
 from app.web.routes.labels.act_shapes import TaskBegun
 from app.web.routes.labels.file_shapes import VERSION_NAME, FormatJson, LostJson, NativeFile, NewVersion, VersionJson
-from app.web.routes.refusals import refusing
 from app.web.routes.shapes.common import file_of
 from pipeline.labels.classes import as_written
 from pipeline.labels.formats.registry import FORMATS, FormatName

@@ -12,12 +12,12 @@ from app.labels.service.answers import changes_json, history_json, track_json, w
 from app.labels.service.desk import LabelDesk
 from app.labels.service.next_work import Asked, What, where_next
 from app.labels.store.values import HistoryEntry, ItemKind
+from app.web.refusals import refusing
 from app.web.routes.drive import current
 from app.web.routes.labels.class_shapes import AttributeKindJson, ClassJson, ClassListJson
 from app.web.routes.labels.score_shapes import BadFrameJson, ScoreJson, errors_json
 from app.web.routes.labels.shapes import ChecksJson, ItemKey, LabelsOfPerson, NextJson, ProblemJson
 from app.web.routes.labels.sighting_shapes import WholeTrack, Window
-from app.web.routes.refusals import refusing
 from app.web.routes.shapes.common import MetricJson
 
 LONGEST_WINDOW = 200

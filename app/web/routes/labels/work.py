@@ -10,8 +10,8 @@ from app.core.client_role import account_of
 from app.labels.permissions import check_work
 from app.labels.projects.results import ControlResult, ProjectProgress
 from app.labels.service.desk import LabelDesk
+from app.web.refusals import refusing
 from app.web.routes.labels.work_shapes import EffortJson, WorkChange, WorkJson
-from app.web.routes.refusals import refusing
 
 if TYPE_CHECKING:
     from app.labels.store.database import Database

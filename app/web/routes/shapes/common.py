@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
+from pipeline.types import object_sources
+
+SensorLetters = Annotated[str, Field(json_schema_extra={"enum": list(object_sources())})]
 Point = tuple[float, float]
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from app.web.routes.shapes.common import CuboidJson, Exact, Point
-from pipeline.types import ObjectSource
+from app.web.routes.shapes.common import CuboidJson, Exact, Point, SensorLetters
 
 
 class GateJson(Exact):
@@ -26,7 +25,7 @@ class ObjectJson(Exact):
 
     id: int
     """The same for as long as the object is tracked; never reused within a run."""
-    source: ObjectSource
+    source: SensorLetters
     """Which sensors' tracks it is made of: V camera, L LiDAR, VL both."""
     type: str | None
     """Class by the detector; null for L."""
@@ -44,8 +43,9 @@ class ObjectJson(Exact):
     """Horizontal range from the ego origin to the nearest point; null when unknown."""
     distance_sigma_m: float | None
     """Standard deviation of the distance."""
-    distance_from: Literal["cluster", "returns", "box"] | None
-    """What measured the distance in this frame; null when nothing did."""
+    distance_from: str | None
+    """What measured the distance in this frame: cluster, returns, box or the name of a further ranging sensor; null
+    when nothing did."""
     height_from: Literal["class", "shape", "road", "range"] | None
     """V: what the height that the distance rests on was taken from; null otherwise."""
     velocity_mps: Point | None
@@ -66,7 +66,7 @@ class ObjectJson(Exact):
     """Time to collision; null when the gap does not shrink."""
     carried: bool
     """Not seen in this frame: its position is predicted."""
-    seen_by: ObjectSource | Literal[""]
+    seen_by: SensorLetters | Literal[""]
     """Which sensors saw it in this frame; empty when carried."""
     hits: int
     """Sightings so far."""

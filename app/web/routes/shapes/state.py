@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from app.labels.service.tasks import TaskKind
+from app.labels.tasks import TaskKind
 from app.web.routes.shapes.common import Exact
 
 

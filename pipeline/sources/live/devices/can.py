@@ -11,7 +11,7 @@ from typing import Any
 import can
 import cantools
 
-from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
+from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import CanConfig, SignalConfig
 from pipeline.sources.live.devices.device_reader import POLL_S, DeviceLost, Reader, ReaderStop

@@ -20,7 +20,7 @@ import { knownName, mayReview } from "../state/person.js";
 export const isReviewing = () => get("labeling")?.on === true && get("labeling")?.review === true;
 
 export function toggleReview() {
-  if (!mayReview()) return say("Only for accounts with the role reviewer");
+  if (!mayReview()) return say("Requires the role reviewer");
   setReview(!isReviewing());
   if (isReviewing()) begin();
 }

@@ -62,7 +62,7 @@ function row(project, control) {
     aria: { label: `Progress of ${name}` },
   });
   const progress = isSampled
-    ? `${sampled - asked} of ${sampled} requested frames labelled`
+    ? `${sampled - asked} of ${sampled} queued frames labelled`
     : `lead labelled in ${Math.round(100 * labelled)} % of ${frames} frames`;
   return el(
     "div",

@@ -83,7 +83,7 @@ function facts({ frames, labelled, reviewed, proposals, asked, worth, efforts })
   );
   return [
     `${frames} frames, lead labelled in ${percent(labelled)}, ${percent(reviewed)} of tracks reviewed`,
-    `${proposals} proposals, ${asked} frames to label next, priority ${worth.toFixed(2)}`,
+    `${proposals} proposals, ${asked} queued frames, priority ${worth.toFixed(2)}`,
     ...people,
   ].join(" · ");
 }

@@ -1,5 +1,5 @@
 /**
- * Name of the annotator. Who signed in with a personal token has the account's name; others are asked once, and the
+ * Name of the annotator. A user with a personal token has the account's name; others are asked once, and the
  * name is stored in this browser: click it to change it.
  */
 import { request } from "../../core/api.js";

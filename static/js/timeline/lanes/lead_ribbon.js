@@ -1,6 +1,6 @@
 /** A ribbon of the CIPV per frame, coloured by id and hatched by source. */
 import { ui } from "../../core/colors.js";
-import { isTrackedByTwo } from "../../core/object_sources.js";
+import { isImaged, isTrackedByTwo } from "../../core/object_sources.js";
 import { get } from "../../core/store.js";
 
 /** @typedef {import("../../drive/types.js").Series} Series */
@@ -75,7 +75,7 @@ function drawStretch(ctx, { id, source, carried }, box, look) {
   ctx.globalAlpha = carried ? 0.4 : 1;
   ctx.fillStyle = colorOf(id, look.isLight);
   ctx.fillRect(box.x, box.top, box.width, box.height);
-  if (!isTrackedByTwo({ source })) hatch(ctx, box, source === "V" ? 1 : -1, look.isLight);
+  if (!isTrackedByTwo({ source })) hatch(ctx, box, isImaged({ source }) ? 1 : -1, look.isLight);
   ctx.globalAlpha = 1;
   if (id === look.chosen) {
     ctx.strokeStyle = look.ring;

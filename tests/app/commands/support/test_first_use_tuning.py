@@ -18,7 +18,7 @@ from tests.pipeline.vision import networks
 
 @pytest.fixture
 def network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Detector:
-    """A small network, and a store of its own."""
+    """A small network in its own store."""
     monkeypatch.setenv("CIPV_HOME", str(tmp_path / "home"))
     return open_detector(str(networks.yolox(tmp_path / "tiny.onnx")), None)
 

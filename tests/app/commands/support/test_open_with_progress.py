@@ -17,7 +17,7 @@ from tests.app.engine.recording_helpers import Recording
 
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
-    """What a terminal gets."""
+    """The output to a terminal."""
     text = io.StringIO()
 
     def console(**_: Any) -> Console:

@@ -16,7 +16,7 @@ from pipeline.sources import open_source
 from pipeline.types import Frame, Result
 
 SCENARIO, FIRST, LAST, MARKED = "sim:cut_in", 40, 109, 90
-"""The frames that are recorded, and the one that is marked."""
+"""The frames that are recorded, and the marked one."""
 
 
 @cache
@@ -29,7 +29,7 @@ def driven() -> tuple[tuple[Frame, Result], ...]:
 
 
 def record(file: Path) -> tuple[Path, tuple[tuple[Frame, Result], ...]]:
-    """A session of it, and what was recorded."""
+    """A session of the drive, and the recorded results."""
     recorder = Recorder(file, about(open_source(SCENARIO)), queued=1000)
     for frame, result in driven():
         recorder.put(frame, result, Params())

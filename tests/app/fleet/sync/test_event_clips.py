@@ -22,7 +22,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> SessionSource:
 
 
 def test_the_events_are_those_of_the_run_that_was_recorded(tmp_path: Path):
-    """All but the disagreement of camera and LiDAR, which results do not hold."""
+    """All except disagreements of camera and LiDAR, which results do not contain."""
     file, ran = record(tmp_path / "b.mcap")
     rows, objects = [row_of(frame, result) for frame, result in ran], [objects_of(result) for _, result in ran]
     expected = [each for each in find_events(rows, objects, Params()) if each.kind != "vl_disagreement"]

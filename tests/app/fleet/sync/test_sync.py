@@ -18,8 +18,8 @@ from app.fleet.sync.pace import Pace
 from app.fleet.sync.s3_parts import PART_BYTES
 from app.fleet.sync.sending import BLOCK_BYTES, sender
 from app.fleet.sync.sync import Sync, SyncOptions, SyncTally
-from pipeline.common import remote_files
 from pipeline.common.errors import BadInput
+from pipeline.common.files import remote_files
 from pipeline.common.progress import silent
 from pipeline.recording.session.source import SessionSource
 from tests.app.fleet.s3 import BUCKET, Unsteady, s3_server
@@ -43,7 +43,7 @@ def car(tmp_path: Path) -> Path:
 
 
 def synced(car: Path, address: str, **options: Any) -> tuple[Sync, Begun]:
-    """A run, and what it sent, in order."""
+    """A run, and the files it sent, in order."""
     begun: Begun = []
 
     def begin(what: str, size: int) -> Any:
@@ -67,7 +67,7 @@ def in_memory() -> Iterator[str]:
 
 
 def check(car: Path, address: str) -> None:
-    """All that is finished, and nothing else, is there as it is here."""
+    """Check that exactly the finished files are in the store, unchanged."""
     sync, begun = synced(car, address, clips=False)
     assert [what for what, _ in begun] == ["may/b", "a"], "the oldest first"
     assert (sync.tally.sessions, sync.tally.before, sync.tally.unfinished) == (2, 0, ["now"])
@@ -131,7 +131,7 @@ def test_clips_come_first_and_say_what_happened(car: Path, tmp_path: Path):
 
 
 def test_a_session_that_ends_meanwhile_sends_its_clips_before_older_sessions(car: Path, tmp_path: Path):
-    """It is finished while the first session is being sent."""
+    """The recording ends while the first session is being sent."""
     sent: list[str] = []
 
     def begin(what: str, _: int) -> Any:
@@ -185,7 +185,7 @@ def stopping_after(calls: int) -> Any:
 
 
 class Spoils:
-    """A WSGI program in front of another one: it counts uploaded parts, and changes a byte of some on their way."""
+    """A WSGI program in front of another one: it counts uploaded parts and corrupts a byte in some of them."""
 
     def __init__(self, program: Any, spoiled: Iterable[int]) -> None:
         self._program, self._spoiled, self.parts = program, set(spoiled), 0

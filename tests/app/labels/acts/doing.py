@@ -18,7 +18,7 @@ BOX = {"center": [20.0, 0.0, 0.7], "size": [4.0, 1.8, 1.5], "yaw_rad": 0.0}
 
 
 def act(labels: DriveLabels, person: str = "Ada", **body: Any) -> Acted:
-    """``track`` alone is given its revision as it stands, and so are items."""
+    """A bare ``track`` or item gets its current revision."""
     if "track" in body:
         body.setdefault("revision", labels.track(body["track"]).revision)
     if "items" in body:

@@ -36,7 +36,7 @@ def labels(sqlite_database: Database) -> DriveLabels:
 
 
 def of(labels: DriveLabels, *tracks: LabelTrack, leads: tuple[LeadRange, ...] = ()) -> LabelSet:
-    """As a file of the same recording brings it."""
+    """As imported from a file of the same recording."""
     return LabelSet(labels.info.uri, labels.info.names(), labels.info.t_ns, tracks, leads)
 
 
@@ -116,7 +116,7 @@ def test_a_proposal_nobody_looked_at_is_what_the_file_says_of_it(
 def test_what_names_a_track_that_is_not_there_is_not_taken(
     labels: DriveLabels, what: str, tracks: tuple[LabelTrack, ...]
 ) -> None:
-    """An unrelated #1 here is not the #1 of a file."""
+    """The #1 in the database is not the #1 of the file."""
     put(labels, car(1 if tracks else 5, "corrected", ADA, x=50.0))
     file = of(labels, *tracks)
     if what == "lead":
@@ -130,7 +130,7 @@ def test_what_names_a_track_that_is_not_there_is_not_taken(
 
 
 def test_leads_without_tracks_are_of_those_that_are_here(labels: DriveLabels) -> None:
-    """As a table of the lead has them."""
+    """As in a table of leads."""
     put(labels, car(1, "corrected", ADA))
     importing(labels, of(labels, leads=(lead(1, FILE),)), "Ada", ())
     assert [each.lead for each in labels.label_set().leads] == [1]
@@ -148,7 +148,7 @@ def test_what_is_cancelled_while_it_is_written_is_not_written(labels: DriveLabel
 
 
 def test_a_number_that_a_removed_track_had_is_not_given_to_what_comes_from_elsewhere(labels: DriveLabels) -> None:
-    """Its history is another vehicle's."""
+    """That id's history belongs to another vehicle."""
     put(labels, car(7, "accepted", FILE))
     labels.log.act("remove", "Ada", lambda draft: draft.put("track", 7, None) or "removed")
     put(labels, car(7, "accepted", FILE, x=30.0))

@@ -33,7 +33,7 @@ def test_a_tag_is_there_once_or_not(labels: DriveLabels) -> None:
 
 
 def test_frames_are_tagged_and_untagged_with_one_act(labels: DriveLabels) -> None:
-    """What another person said stays theirs; what one says beside their own is one range with it."""
+    """Another person's tags stay theirs; a person's adjacent tags become one range."""
     act(labels, "Bob", kind="tag", first=4, last=5, tag="night")
     done = act(labels, kind="tag", first=2, last=9, tag="night")
     assert done.what == "tagged frames 3–10 night"

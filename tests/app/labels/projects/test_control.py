@@ -41,7 +41,7 @@ def results(database: Database, labels: DriveLabels) -> dict[str, ControlResult]
 
 @pytest.fixture
 def labels(database: Database) -> DriveLabels:
-    """A recording of a project of its own, with control frames 2 to 5."""
+    """A recording in its own project, with control frames 2 to 5."""
     labels = DriveLabels(database, fresh(), station="here")
     key, span = labels.info.key, (2, 5)
     entries = ProjectEntries(name=key, drives=[key])

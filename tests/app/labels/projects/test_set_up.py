@@ -29,7 +29,7 @@ CLASSES = "classes: {car: {}, tank: {of: car}}\n"
 
 @pytest.fixture(scope="module")
 def there(tmp_path_factory: pytest.TempPathFactory) -> DriveLabels:
-    """The recording, in a database of its own."""
+    """The recording, in its own database."""
     source = open_source(DRIVE)
     count = len(source)
     database = Database.in_file(tmp_path_factory.mktemp("projects") / "labels.db")
@@ -84,7 +84,7 @@ def test_a_project_has_its_own_classes_and_its_control_frames_look_like_others(
 
 
 def tags_of(there: DriveLabels) -> dict[int, Origin]:
-    """Who asked for each frame."""
+    """Who queued each frame."""
     tags = [cast("FrameTag", item.value) for item in there.items("tag").values()]
     return {n: each.origin for each in tags for n in range(each.first, each.last + 1)}
 

@@ -27,7 +27,7 @@ def test_a_cuboid_in_or_over_the_road_is_said(client: httpx.Client, z: float, sa
 
 
 def test_the_road_is_where_its_points_are_when_a_plane_misses_it(data_dir: Path) -> None:
-    """KITTI 0009: the street bends upwards, and the plane beside it is more than a metre too high."""
+    """KITTI 0009: the street curves upwards, and the plane beside it is more than a metre too high."""
     folder = data_dir / "kitti_0009" / "2011_09_26" / "2011_09_26_drive_0009_sync"
     if not folder.is_dir():
         pytest.skip(f"no KITTI drive at {folder}")

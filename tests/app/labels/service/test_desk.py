@@ -30,7 +30,7 @@ def control() -> Control:
 
 @pytest.fixture
 def desk(control: Control) -> Iterator[LabelDesk]:
-    """Of something without frames: parameters alone are changed."""
+    """A desk without frames: only parameters are changed."""
     desk = LabelDesk()
     desk.start(control)
     desk.open("live:a car", None)
@@ -90,7 +90,7 @@ def test_nobody_changes_parameters_between_an_undo_and_what_it_restores(
 
 
 class Rounds(threading.Event):
-    """Lets the desk's thread look around all the time, and tells when it has."""
+    """Lets the desk's thread poll continuously, and reports when it has."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -140,7 +140,7 @@ def test_one_that_cannot_be_opened_is_said_and_keeps_nobody_from_driving(control
 
 @pytest.fixture
 def shared(control: Control, file: Path) -> Iterator[LabelDesk]:
-    """A desk on a file that others write too, and that is open there already."""
+    """A desk on a file that another process has open and writes to."""
     desk = LabelDesk(Database.in_file(file))
     desk.start(control)
     desk.open("live:a car", None)
@@ -151,7 +151,7 @@ def shared(control: Control, file: Path) -> Iterator[LabelDesk]:
 
 @contextmanager
 def held(file: Path) -> Iterator[None]:
-    """By another connection, for writing."""
+    """The database, locked for writing by another connection."""
     other = sqlite3.connect(file, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
     yield
@@ -160,7 +160,7 @@ def held(file: Path) -> Iterator[None]:
 
 
 def until(desk: LabelDesk, holds: Any) -> None:
-    """The desk wakes nobody who waits for its state: its own queue is asked."""
+    """Poll through the desk's own queue, since it notifies nobody of its state."""
     ended = threading.Event()
     for _ in range(int(WAIT_S / 0.02)):
         if holds():

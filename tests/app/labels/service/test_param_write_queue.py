@@ -12,7 +12,7 @@ from pipeline.params import Params, ParamsError
 
 
 class Steps:
-    """Hears of them as the log does."""
+    """Receives the steps as the log does."""
 
     def __init__(self) -> None:
         self.heard: list[tuple[dict[str, Any], str, bool]] = []

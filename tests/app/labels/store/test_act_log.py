@@ -109,7 +109,7 @@ def test_of_two_edits_of_one_label_at_once_one_wins_and_one_is_told(labels: Driv
 
 
 def test_many_acts_at_once_are_all_there(labels: DriveLabels, database: Database) -> None:
-    """On two servers: each has a number of its own, and none is lost."""
+    """On two servers: each act has its own number, and none is lost."""
     other = DriveLabels(database, labels.info, station="there")
     together(
         *(lambda on=on, who=who: [add_only(on, who) for _ in range(5)] for on, who in ((labels, "A"), (other, "B")))
@@ -169,7 +169,7 @@ def test_labels_of_one_drive_are_not_anothers(labels: DriveLabels, database: Dat
 
 
 def test_a_flood_of_acts_of_many_people_is_done_one_after_the_other(labels: DriveLabels) -> None:
-    """Thirty people, three acts each, all at once: more than the database is connected to at a time."""
+    """Thirty people with three acts each at once: more than the number of database connections."""
     wrong: list[BaseException] = []
 
     def work(person: str) -> None:

@@ -35,7 +35,7 @@ def test_the_newest_migration_is_the_one_that_is_worked_with() -> None:
 
 
 def test_what_is_committed_is_on_disk(sqlite_database: Database) -> None:
-    """A log that is written through to the disk before a commit ends."""
+    """The log is flushed to disk before a commit returns."""
     with sqlite_database.reading() as connection:
         assert connection.scalar(text("PRAGMA journal_mode")) == "wal"
         assert connection.scalar(text("PRAGMA synchronous")) == 2
@@ -129,7 +129,7 @@ def test_the_environment_names_the_database_of_a_team(file: Path, monkeypatch: p
 
 
 def test_a_database_at_the_newest_schema_is_opened_as_it_is(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What changes schemas takes half a second to import: only who needs it pays."""
+    """The migration library takes half a second to import, so it is imported only when needed."""
     Database.in_file(file).close()
 
     def migrate(*_: object) -> None:
@@ -150,7 +150,7 @@ def test_a_reader_has_one_view_whatever_others_write(database: Database) -> None
 
 
 def test_a_database_of_an_older_program_goes_on(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Parameters that were changed on the machine are those of its usual server."""
+    """Parameters changed on the machine are those of its usual server."""
     monkeypatch.setattr("app.labels.store.database.HEAD", "0001")
     old = Database.in_file(file)
     key = info("drive").key
@@ -184,7 +184,7 @@ def nowhere(request: pytest.FixtureRequest, file: Path) -> str:
 
 
 def test_tags_of_single_frames_become_ranges(nowhere: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What stands, and what can be taken back: the second was removed."""
+    """Both current tags and undo steps; the second tag was removed."""
     monkeypatch.setattr("app.labels.store.database.HEAD", "0002")
     old = Database(nowhere)
     origin = {"maker": "person", "name": "Ada", "t_unix_ms": 5, "params": None, "calibration": None, "how": ""}

@@ -11,7 +11,7 @@ from app.labels.errors import ActRefused
 from app.labels.store.drive_labels import DriveLabels
 from app.labels.store.tables import VersionRow
 from app.labels.store.version_chain import _sha256
-from pipeline.common.signing import PUBLIC_VARIABLE, SIGNING_VARIABLE, new_keys
+from pipeline.common.files.signing import PUBLIC_VARIABLE, SIGNING_VARIABLE, new_keys
 from tests.app.labels.doing import add
 
 

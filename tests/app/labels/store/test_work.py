@@ -22,7 +22,7 @@ PIPELINE = Origin("pipeline", "run 1", 1, "params", "camera")
 
 
 def proposed(database: Database, key: str, confidence: float) -> DriveLabels:
-    """A recording of 100 frames with one proposal in 50 of them; in ten it is unclear who leads."""
+    """A recording of 100 frames, 50 of them with one proposal; in ten, the lead is unclear."""
     labels = DriveLabels(database, info(key), station="here")
 
     def proposals(draft: Any) -> str:

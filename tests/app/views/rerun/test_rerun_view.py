@@ -29,7 +29,7 @@ def write(path: Path, ticks: Ticks) -> Path:
 
 
 def rows(path: Path, entity: str, component: str) -> list[tuple[int, Any]]:
-    """(frame, value) of every row of a component, in order of time; nulls left by clearing are absent."""
+    """(frame, value) of every row of a component, in order of time; without nulls left by clearing."""
     found: list[tuple[int, Any]] = []
     for chunk in RrdReader(path).stream().to_chunks():
         table = chunk.to_record_batch().to_pydict()
@@ -43,7 +43,7 @@ def entities(path: Path) -> set[str]:
 
 
 def packed(color: tuple[int, int, int]) -> int:
-    """0xRRGGBBAA, as the file holds it."""
+    """0xRRGGBBAA, as in the file."""
     return int.from_bytes(bytes((*color, 255)), "big")
 
 

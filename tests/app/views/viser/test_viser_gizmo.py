@@ -30,7 +30,7 @@ def drags() -> Drags:
 
 
 class Scene:
-    """A 3D view that shows one cuboid to every page."""
+    """A 3D view that shows the same cuboid to every page."""
 
     def __init__(self, drags: Drags) -> None:
         self._wanted = PageView()
@@ -60,7 +60,7 @@ def turned(yaw_rad: float) -> np.ndarray:
 
 
 def outward(cuboid: Cuboid, face: str) -> np.ndarray:
-    """(3,) out of a face, from the corners: the mean of the face's less the mean of all."""
+    """(3,) direction out of a face: mean of its corners minus mean of all corners."""
     axis, side = FACES[face]
     corners = cuboid.corners() - cuboid.center
     own = corners @ np.array(
@@ -105,7 +105,7 @@ def drag(client: Any, name: str, position: tuple[float, ...]) -> None:
 
 
 def owner(client: Any) -> str:
-    """A handle is in the scene of one browser, and says so."""
+    """The browser that owns a handle, from the handle's name."""
     return next(str(each["owner"]) for each in client.messages if each.get("name", "").startswith(NODE))
 
 

@@ -46,7 +46,7 @@ def client(engine: Engine) -> Iterator[httpx.Client]:
 
 @pytest.fixture(autouse=True)
 def _at_the_start(engine: Engine) -> None:
-    """Each test begins paused at the first frame of a freshly opened recording, its drive computed."""
+    """Each test begins paused at the first frame of a newly opened recording whose drive is computed."""
     engine.control.set_params(Params(), "default")
     before = engine.drives.recording
     engine.control.change(uri="test:car", playing=False, target=None, steps=0)
@@ -57,7 +57,7 @@ def _at_the_start(engine: Engine) -> None:
 
 
 def computed(engine: Engine) -> int:
-    """Wait until the drive of the present parameters is computed; the run's number."""
+    """Wait until the drive is computed with the current parameters; returns the run's number."""
     wanted = engine.control.peek().params
     shown = engine.wait_for(
         lambda s: s.params == wanted and s.drive.run is not None and s.drive.phase == "done" and s.drive.done == 30,
@@ -310,7 +310,7 @@ def test_every_route_of_the_timeline_is_described(client: httpx.Client):
 
 
 def test_the_alignment_is_scored(client: httpx.Client):
-    """Each image of the small recording has one car's sides, and its points' borders lie elsewhere."""
+    """Each image of the small recording shows the sides of one car, and the edges of its points lie elsewhere."""
     found = client.get("/api/alignment/score").json()
     whole = {"score", "sigmas", "borders", "better", "brief", "text"}
     assert set(found) == whole | {"columns", "rows", "regions", "ranges"}

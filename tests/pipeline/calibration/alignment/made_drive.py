@@ -30,7 +30,7 @@ def drive(
     seed: int = 0,
     camera: CameraCalibration | None = CAMERA,
 ) -> list[FitScene]:
-    """Every frame is a second of its own. walls: clusters that no box belongs to; as many boxes have no cluster."""
+    """Frames one second apart. walls: number of clusters without a box, and of boxes without a cluster."""
     rng = np.random.default_rng(seed)
     scenes = []
     for k in range(frames):
@@ -51,7 +51,7 @@ def drive(
 def _seen(
     rng: np.random.Generator, ranges_m: tuple[float, float], bearing_deg: float, width_m: float, height_m: float
 ) -> tuple[F64, F64, F64]:
-    """Outline, roof and foot of a flat rear that rings 2° apart meet."""
+    """Outline, top and bottom of a flat rear as hit by rings 2° apart."""
     range_m, bearing = rng.uniform(*ranges_m), np.radians(rng.uniform(-bearing_deg, bearing_deg))
     middle = np.array([range_m * np.cos(bearing), range_m * np.sin(bearing)])
     side = np.array([-np.sin(bearing), np.cos(bearing)]) * width_m / 2
@@ -68,7 +68,7 @@ def _seen(
 
 
 def _box(true: Alignment, outline: F64, roof: F64, foot: F64) -> F64:
-    """Where the camera sees it; the roof anywhere between the rings, here a third of the way."""
+    """The box that the camera sees; the roof is between two rings, here at a third of the gap."""
     sides = true.project(outline)[:, 0]
     top = true.project((outline[2] * 2 / 3 + roof / 3)[None])[0, 1]
     return np.array([sides.min(), top, sides.max(), true.project(foot)[:, 1].max()])

@@ -21,7 +21,7 @@ EVERY_NS = 500_000_000
 
 
 def view(true: Alignment, number: int, edges: int = 120) -> EdgeView:
-    """A frame with posts, walls and vehicles to all sides, whose edges the image shows where the camera sees them."""
+    """A frame with posts, walls and vehicles all around, and their edges in the image."""
     rng = np.random.default_rng(number)
     range_m, bearing = rng.uniform(6.0, 40.0, edges), np.radians(rng.uniform(-35.0, 35.0, edges))
     points = np.column_stack([range_m * np.cos(bearing), range_m * np.sin(bearing), rng.uniform(-1.5, 3.0, edges)])

@@ -14,7 +14,8 @@ ROAD_M = -1.5
 
 
 def frame(width_m: float = 1.8, height_m: float = 1.5, ahead_m: float = 15.0) -> Frame:
-    """Rings 2° apart on a flat road, a wall on it, seen 0.2° by 0.2°, and on the left a house that all rings hit."""
+    """A flat road with a wall, scanned by rings 2° apart in steps of 0.2°, and on the left a house that all rings
+    hit."""
     azimuth = np.radians(np.arange(-40.0, 40.0, 0.2))
     points, rings = [], []
     for ring, elevation in enumerate(np.radians(np.arange(-15.0, 16.0, 2.0))):

@@ -17,7 +17,7 @@ YAW, AHEAD, LEFT, SCALE = np.radians(1.4), 2.3, 0.4, 0.98
 
 
 def record(bends: float = 0.2, pieces: int = 80, roads: int = 80, noise_m: float = 0.02) -> MountRecord:
-    """bends: standard deviation of what the car turns in a piece, rad."""
+    """bends: standard deviation of the car's rotation per segment, rad."""
     rng = np.random.default_rng(3)
     way = []
     for k in range(pieces):

@@ -27,7 +27,7 @@ def drive() -> list[Frame]:
 
 
 def seen(frame: Frame, turn: F64) -> Frame:
-    """As a LiDAR that is turned so sees it, whose mount nobody told."""
+    """As seen by a LiDAR with this unknown rotation."""
     assert frame.sweep is not None
     points = frame.sweep.points.copy()
     points[:, :3] = points[:, :3] @ turn.astype(np.float32)

@@ -32,7 +32,7 @@ def test_the_last_measurements_say_nothing_of_later_moments_nor_one_of_earlier_o
 
 
 def test_errors_lie_within_what_it_says_of_itself():
-    """Vehicles that brake and accelerate at random: the errors in its own variances are about one."""
+    """With vehicles that brake and accelerate at random, errors in units of the stated variance are about one."""
     random = np.random.default_rng(0)
     squares = []
     for _ in range(300):

@@ -30,7 +30,7 @@ def test_an_empty_drive_has_no_score():
 
 
 def approach(error: float):
-    """The camera alone to 3 s, too far by a share; then both sensors."""
+    """The camera alone until 3 s, with distances too far by a share; then both sensors."""
     frames = []
     for n in range(60):
         true = 50.0 - 0.5 * n
@@ -59,7 +59,7 @@ def test_the_cameras_closing_speed_is_judged():
 
 
 def test_a_lead_found_late_is_seen_in_hindsight():
-    """It was in the path, and nearer than anything, for a second before it was chosen."""
+    """For a second before it was chosen, it was the nearest object in the path."""
     drive = history([(1 if n >= 20 else None, [thing(1, 30.0, in_path=n >= 10)]) for n in range(60)])
     assert value(drive, "late_leads") == pytest.approx(100.0 * 10 / 60)
     assert value(drive, "lead_doubted") == pytest.approx(100.0 * 10 / 60)
@@ -71,7 +71,7 @@ def test_a_lead_that_cut_in_is_not_late():
 
 
 def test_one_behind_the_lead_is_not_late():
-    """The nearer one leaves; the farther one was there all the time."""
+    """The nearer one leaves; the farther one was visible all the time."""
     frames = [(1 if n < 30 else 2, [thing(1, 20.0, in_path=n < 30), thing(2, 40.0)]) for n in range(60)]
     assert value(history(frames), "late_leads") == 0.0
 
@@ -83,7 +83,7 @@ def test_jitter_is_how_far_distances_leave_their_neighbours():
 
 
 def test_nothing_is_judged_across_a_gap():
-    """Two clips of a recording: the lead of the first proves nothing of the second."""
+    """Two clips of a recording: the lead of the first says nothing about the second."""
     whole = history([(1, [thing(1, 30.0)]) for _ in range(40)])
     torn = History(
         _t_ns=[t + (5_000_000_000 if n >= 20 else 0) for n, t in enumerate(whole._t_ns)],

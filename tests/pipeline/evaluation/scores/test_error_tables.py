@@ -15,7 +15,7 @@ from tests.pipeline.evaluation.scores.drives import believed, truth
 
 
 def drive(errors_m: list[float], at_m: float, source: ObjectSource = "VL", sigma_m: float | None = 0.1) -> DriveScore:
-    """One vehicle, a frame for each error of its distance."""
+    """One vehicle, with one frame per distance error."""
     known = truth(*({1: (at_m, 0.0)} for _ in errors_m))
     results = [
         believed(n, [replace(fused(7, at_m + off, source=source), distance_sigma_m=sigma_m)], 7)

@@ -15,7 +15,7 @@ from tests.pipeline.evaluation.scores.drives import believed, truth
 
 
 def drive(offsets: list[float | None], uri: str = "made:1") -> DriveScore:
-    """A lead 40 m ahead that comes nearer by 1 m a frame; how far off the CIPV is in each, null: none."""
+    """A lead 40 m ahead that approaches by 1 m per frame, and the CIPV's distance error in each; None: no CIPV."""
     known = truth(*({1: (40.0 - n, 0.0)} for n in range(len(offsets))), uri=uri)
     results = [
         believed(n, [fused(7, 40.0 - n + off)] if off is not None else [], 7 if off is not None else None)
@@ -63,7 +63,7 @@ def test_one_drive_has_no_interval_and_equal_ones_have_a_point() -> None:
 
 
 def test_the_interval_of_two_drives_reaches_from_one_to_the_other() -> None:
-    """A quarter of the draws takes each twice."""
+    """A quarter of the draws contains the same drive twice."""
     assert bootstrap([(0.0, 1.0), (10.0, 1.0)], ratio) == Interval(0.0, 10.0)
 
 
@@ -84,7 +84,7 @@ def test_more_drives_are_surer() -> None:
 
 
 def test_two_runs_are_compared_drive_by_drive() -> None:
-    """Drives differ far more than runs do: only pairs show that the run is better in each."""
+    """Drives differ far more than runs: only pairing shows that the run is better in every drive."""
     base = [drive([2.0, 2.0]), drive([0.5, 0.5])]
     run = [drive([1.8, 1.8]), drive([0.3, 0.3])]
     by_name = {each.figure.name: each for each in compare(base, run)}

@@ -14,7 +14,7 @@ from tests.pipeline.evaluation.scores.drives import TICK_NS, believed, labelled,
 
 
 def judged(chosen: list[int | None], known: DriveTruth) -> DriveScore:
-    """The CIPV is on the true lead wherever one is chosen. Numbers are those of objects."""
+    """The CIPV matches the true lead whenever one is chosen. Numbers are object ids."""
     results: list[Result] = []
     for n, number in enumerate(chosen):
         lead = known.frames[n * TICK_NS].lead

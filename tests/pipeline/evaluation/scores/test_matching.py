@@ -11,7 +11,7 @@ from tests.pipeline.evaluation.scores.drives import TICK_NS, believed, truth
 
 
 def found(*objects: FusedObject) -> tuple[Error, ...]:
-    """Against a car that stands 20 m ahead, closing at 10 m/s, and another 30 m ahead in the next lane."""
+    """Matches with a standing car 20 m ahead, closing at 10 m/s, and another car 30 m ahead in the next lane."""
     known = truth({1: (21.0, 0.0), 2: (31.0, 3.5)}, {1: (20.0, 0.0), 2: (30.0, 3.5)}, {1: (19.0, 0.0), 2: (29.0, 3.5)})
     return errors(believed(1, objects, None), known.frames[TICK_NS])
 
@@ -54,7 +54,7 @@ def test_what_is_not_seen_in_this_frame_is_not_measured() -> None:
 
 
 def test_the_pairs_are_nearest_together() -> None:
-    """The V object at 24 m is nearer to the car at 20 m, for which the other one is too, and reaches both."""
+    """The V object at 24 m could match both cars; it is nearer to the car at 20 m, but so is the other object."""
     known = truth({1: (20.0, 0.0), 2: (30.0, 1.0)})
     seen = [fused(7, 21.0, 0.0, source="V"), fused(8, 24.0, 0.5, source="V")]
     by_range = {round(error.range_m): error.distance_m for error in errors(believed(0, seen, None), known.frames[0])}

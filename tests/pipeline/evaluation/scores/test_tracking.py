@@ -54,7 +54,7 @@ def test_counts(found: list[NamedPositions], precision: float, recall: float, mo
 
 
 def test_hota_of_a_track_that_breaks_in_half() -> None:
-    """DetA 1; each of the four matches has 2 of its own association and 2 that it lacks: AssA = 2/4."""
+    """DetA 1; each of the four matches shares its association with 2 and misses 2: AssA = 2/4."""
     counts = counted([[(1, A)]] * 4, [[(5, A)]] * 2 + [[(6, A)]] * 2)
     assert hota_of([counts]) == pytest.approx(sqrt(1.0 * 0.5))
 
@@ -74,7 +74,7 @@ def test_drives_are_summed_not_averaged() -> None:
 
 
 def test_what_claims_to_be_a_vehicle() -> None:
-    """Named and confirmed objects do; a nameless one only where a labelled vehicle has no named one."""
+    """Classified and confirmed objects do; an unclassified one only if a labelled vehicle has no classified one."""
     wanted = vehicles([labelled(1, *A), labelled(2, *B), labelled(3, 10.0, 2.0, "person"), labelled(4, 80.0)])
     assert [item.id for item in wanted] == [1, 2]
     objects = [
@@ -90,7 +90,7 @@ def test_what_claims_to_be_a_vehicle() -> None:
 
 
 def test_a_vehicle_of_which_only_the_image_is_labelled_is_not_claimed_falsely() -> None:
-    """Nobody knows how far off it is. One whose place is labelled counts, whatever boxes overlap."""
+    """Its distance is unknown. A vehicle with a labelled position counts, whatever boxes overlap."""
     wanted = vehicles([labelled(1, *A)])
     seen, elsewhere = (0.0, 0.0, 10.0, 10.0), (50.0, 0.0, 60.0, 10.0)
     objects = [

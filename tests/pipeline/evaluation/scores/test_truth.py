@@ -63,7 +63,7 @@ def led(first: int, last: int, lead: Lead, state: State = "accepted", by: Origin
 
 
 def leads(known: DriveTruth) -> list[int | str | None]:
-    """Of each labelled frame: the lead's id, null where none leads, a question mark where nobody knows."""
+    """The lead's id in each labelled frame; None without a lead, a question mark if it is unclear."""
     return [
         (frame.lead.id if frame.lead is not None else None) if frame.lead_known else "?"
         for frame in known.frames.values()
@@ -149,7 +149,7 @@ def test_frames_in_which_every_vehicle_is_labelled(known: LabelSet, whole: int) 
 
 
 def test_a_vehicle_that_nobody_looked_at_is_not_claimed_falsely() -> None:
-    """The line sees both cars. Of one nobody has said anything yet; then that it is none; then that it is one."""
+    """The pipeline sees both cars. One is first unlabelled, then labelled as no vehicle, then as a vehicle."""
     pytest.importorskip("trackeval", reason="the extra `scores` is not installed")
     results = [believed(n, [fused(7, 30.0 - n), fused(8, 20.0 - n, 3.5)], 7) for n in range(3)]
 
@@ -218,7 +218,7 @@ def test_labels_without_identity_are_linked_to_the_nearest_of_their_class() -> N
 
 
 def test_tracks_of_one_frame_each_are_linked_too() -> None:
-    """As a file of KITTI's object labels gives them."""
+    """As in a file of KITTI's object labels."""
     alone = [LabelTrack(n + 1, "car", (Sighting(n, cuboid(30.0 - n, 0.0)),), "accepted", IMPORT) for n in range(3)]
     known = of_labels(labels(*alone), RULE)
     assert leads(known) == [1, 1, 1]
@@ -252,7 +252,7 @@ def test_the_simulators_own_truth() -> None:
 
 
 def test_what_a_person_should_know_is_said() -> None:
-    """A place that no vehicle can have come to, places that are the pipeline's own, and what is left to do."""
+    """A position that no vehicle can have reached, positions taken from the pipeline, and unfinished work."""
     jumping = replace(track(4, 30.0, by=PIPELINE), sightings=tuple(Sighting(n, cuboid(x, 0.0)) for n, x in AWAY))
     known = of_labels(labels(jumping, track(5, 20.0, state="proposed")), RULE)
     assert [frame.velocity_mps for frame in known.frames.values()] == [{}, {}, {}]

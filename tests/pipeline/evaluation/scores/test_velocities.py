@@ -12,12 +12,12 @@ TENTH_NS = 100_000_000
 
 
 def of(x: F64 | list[float], step_ns: int = TENTH_NS, absent: tuple[int, ...] = ()) -> Velocities:
-    """One vehicle, straight ahead at x in each frame; not there in some."""
+    """One vehicle straight ahead, at x in each frame, missing in some."""
     return velocities((n * step_ns, {} if n in absent else {4: (float(at), 1.0)}) for n, at in enumerate(x))
 
 
 def speeds(found: Velocities, step_ns: int = TENTH_NS) -> dict[int, float]:
-    """By frame, along x."""
+    """Speed along x, by frame."""
     return {tick // step_ns: each[4][0] for tick, each in found.mps.items()}
 
 
@@ -48,7 +48,7 @@ def test_a_track_that_jumps_has_no_speed_there() -> None:
 
 
 def test_three_places_that_no_vehicle_goes_through_have_no_speed() -> None:
-    """As of a track of Astyx, accepted as the pipeline saw it: two vehicles under one number."""
+    """As in a track of Astyx, accepted as proposed by the pipeline: two vehicles with one id."""
     found = of([5.0, 14.9, 10.7], 300_000_000)
     assert 300_000_000 not in found.mps
     assert found.jumps == {(300_000_000, 4)}

@@ -73,7 +73,8 @@ def outcomes() -> dict[CurveCase, CurveOutcome]:
 
 
 def test_in_a_bend_of_125_m_the_lead_is_the_cipv(outcomes: dict[CurveCase, CurveOutcome]) -> None:
-    """Fused: in 99 % of the frames to 60 m, never 0.3 s on a decoy; a straight guess shows what is at stake."""
+    """With all sources fused: in 99 % of the frames up to 60 m, never 0.3 s on a decoy; a straight path shows the
+    difference."""
     (outcome,) = (outcome for case, outcome in outcomes.items() if case.kind == "follow")
     share, frames = share_right([outcome["fused"]], 60.0)
     assert frames > 90

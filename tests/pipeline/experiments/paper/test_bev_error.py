@@ -54,7 +54,7 @@ def test_the_lidar_alone_is_driven_and_the_network_too() -> None:
     [(0.1, 0.3, ("better", "better")), (0.3, 0.3, ("better", "no better")), (None, 0.3, ("no better", None))],
 )
 def test_the_verdict_is_what_was_measured(fused_m: float | None, lidar_m: float, says: tuple[str, str | None]) -> None:
-    """20 m are placed by both, or by the LiDAR alone; 50 m by fused alone, or by nobody."""
+    """At 20 m, both place the object, or the LiDAR alone; at 50 m, only fused, or none."""
     near = PositionError("VL", fused_m, 0.0, 0.0) if fused_m is not None else None
     far = PositionError("V", 2.0, 0.0, 0.0) if fused_m is not None else None
     fused = [
@@ -74,7 +74,8 @@ def test_the_verdict_is_what_was_measured(fused_m: float | None, lidar_m: float,
 
 
 def test_however_far_off_it_counts() -> None:
-    """What is placed 20 m off and 6 m aside is an error of 20 m and 6 m, not an object of something else."""
+    """An object placed 20 m too far and 6 m to the side has errors of 20 m and 6 m; it does not count as another
+    object."""
     seen = [PositionSample(50.0, PositionError("V", 20.0, 6.0, 19.0)), PositionSample(40.0, None)]
     row = report([BevCase("a", 0)], [seen]).tables[0].rows[3]
     assert row[3:5] == (1, 1)

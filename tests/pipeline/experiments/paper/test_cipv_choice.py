@@ -32,7 +32,7 @@ def test_one_wrong_frame_of_the_fused_fails_the_suite(verdict: ChoiceVerdict, fa
 
 
 def test_every_decidable_frame_is_right(see_again: SeeAgain) -> None:
-    """One drive of the suite's twenty: the one in which a false alarm beside the lead once took its box."""
+    """One of the suite's twenty drives, in which a false alarm beside the lead once took its box."""
     case = ChoiceCase("straight", "both", 8)
     frames = run(case)
     judged = [frame.verdict for frame in frames if frame.verdict not in UNDECIDABLE]

@@ -33,7 +33,7 @@ SHORT_S = 8.0
 
 @pytest.fixture
 def short_drives(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A hundred metres or two instead of a kilometre."""
+    """Drives of 100 or 200 m instead of a kilometre."""
     whole = traffic.scenario
 
     def short(seed: int, number: int) -> Scenario:
@@ -98,7 +98,7 @@ def test_cases_are_numbered_kilometres_and_every_variant_is_a_parameter() -> Non
 
 @pytest.mark.parametrize("number", range(12))
 def test_any_number_is_a_drive_in_which_nobody_is_hit(number: int) -> None:
-    """The ego vehicle's script keeps away from every true vehicle."""
+    """The scripted ego vehicle keeps its distance from every vehicle."""
     from pipeline.simulation.world import world_state
 
     scene = traffic.scenario(5, number)

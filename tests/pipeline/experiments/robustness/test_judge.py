@@ -22,13 +22,13 @@ from pipeline.step import State, step
 from pipeline.types import Box, CameraCalibration, FusedObject, Point2, Result
 
 FRAMES = 12
-"""Longer than a lead may be missed."""
+"""Longer than the time for which a lead may be missed."""
 Choice = Callable[[FusedObject, ActorState, Box], FusedObject | None]
 
 
 @cache
 def drive() -> tuple[Scenario, tuple[tuple[World, CameraCalibration, Result], ...]]:
-    """The first drive whose true lead is in sight and chosen for a while, from then on."""
+    """The first drive whose true lead is visible and chosen for a while, from that moment on."""
     for number in range(20):
         scene, state, found = traffic.scenario(5, number), State(), []
         way = ScriptedWay.of(scene)

@@ -98,7 +98,7 @@ FOUR = replace(STRAIGHT, distortion=BENT.distortion[:4])
 
 
 def chain(folder: Path, **values: object) -> Path:
-    """A Kalibr folder with something changed in the camera's part."""
+    """A Kalibr folder with a change in the camera's section."""
     file = written("kalibr", FOUR, folder) / kalibr.CHAIN
     loaded = yaml.safe_load(file.read_text())
     loaded["cam0"].update(values)
@@ -162,7 +162,7 @@ def test_a_damaged_file_of_opencv_is_said_in_a_sentence(text: str, said: str, tm
 
 
 def test_no_file_is_given_to_opencvs_own_parser(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """It writes beyond its memory: 300 damaged calibrations were enough to end the process."""
+    """It writes out of bounds: 300 damaged calibrations were enough to crash the process."""
     path, made = written("opencv", BENT, tmp_path), cv2.FileStorage
 
     def only_written(name: str, flags: int) -> cv2.FileStorage:

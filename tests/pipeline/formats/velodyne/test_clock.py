@@ -13,7 +13,7 @@ UTC_NS = 1_453_364_282_342_001_000
 
 
 def test_host_time_begins_where_the_shortest_way_says() -> None:
-    """Waiting in queues makes packets later, never earlier."""
+    """Queues delay packets, and never make them earlier."""
     clock, rng = SensorClock(), np.random.default_rng(0)
     for us in range(0, 5_000_000, 1_327):
         clock.observe(us, UTC_NS + us * 1000 + int(rng.exponential(2e6)))

@@ -56,7 +56,8 @@ def test_each_point_has_its_time() -> None:
 
 
 def test_cut_behind_the_mount_ahead() -> None:
-    """The sensor is turned by 90°: what is ahead of the car is whole, and its tick is when the head looks there."""
+    """The sensor is rotated by 90°: the view ahead of the car is in one sweep, and its tick is when the head points
+    there."""
     T = np.eye(4)
     T[:3, :3] = rotation(0.0, 0.0, np.pi / 2)
     T[:3, 3] = (0.5, 0.0, 1.0)
@@ -128,7 +129,7 @@ def test_lost_packets_are_counted() -> None:
 
 
 def test_lost_rotation_joins_no_two_sweeps() -> None:
-    """From the middle of a rotation to the middle of the next but one: azimuth alone would not show it."""
+    """From the middle of one rotation to the middle of the next but one, which the azimuth alone would not reveal."""
     sweeps = decoded(VelodyneDecoder(), [*STREAM[:40], *STREAM[40 + 75 :]])
     assert [round(ranges(sweep), 2) for sweep in sweeps] == [9.8, 9.7]
 
@@ -142,7 +143,7 @@ def test_begins_and_ends_anywhere() -> None:
 
 @pytest.mark.parametrize("with_host", [True, False])
 def test_a_sensor_set_to_send_the_front_half_only(with_host: bool) -> None:
-    """The first rotation could be one seen in part; from the second on it is known to be all there is."""
+    """The first rotation could be incomplete; from the second on, it is known that the sensor sends no more."""
     front = [(packet, t if with_host else None) for i, (packet, t) in enumerate(STREAM) if 19 <= i % 75 < 56]
     decoder = VelodyneDecoder()
     sweeps = decoded(decoder, front)
@@ -155,7 +156,7 @@ def test_a_sensor_set_to_send_the_front_half_only(with_host: bool) -> None:
 
 @pytest.mark.parametrize("with_host", [True, False])
 def test_silence(with_host: bool) -> None:
-    """Plugged out for ten seconds in the middle of a sweep: no sweep is made of both sides of the silence."""
+    """Unplugged for ten seconds in the middle of a sweep: no sweep joins the data before and after."""
     later = drive(2)
     stream = [(packet, t) for packet, t in STREAM[:190]]
     stream += [(stamped(packet, time_us(packet) + 10_000_000), t + 10_000_000_000) for packet, t in later]
@@ -165,7 +166,7 @@ def test_silence(with_host: bool) -> None:
 
 
 def test_sensor_that_starts_anew_keeps_the_hosts_time() -> None:
-    """Switched off and on, it counts from zero: from its second packet on all is well."""
+    """After switching off and on, the sensor counts from zero: times are right from its second packet on."""
     start = time_us(STREAM[0][0])
     again = [(stamped(packet, time_us(packet) - start), t + 2_000_000_000) for packet, t in STREAM]
     decoder = VelodyneDecoder()
@@ -211,8 +212,8 @@ def test_counts_in_words() -> None:
 
 
 def test_dual_return_gives_both_returns_once() -> None:
-    """Two blocks in a row hold the two returns of the same firings: of a wall behind a fence both are kept, of a wall
-    alone, where the two are the same, one."""
+    """Two consecutive blocks contain the two returns of the same firings: both are kept for a wall behind a fence, one
+    for a wall alone, where they are equal."""
     packets = [packet for index in range(3) for packet in dual_packets(index)]
     decoder = VelodyneDecoder()
     sweeps = decoded(decoder, [(packet, None) for packet in packets])
@@ -246,7 +247,7 @@ def dual_packets(index: int) -> list[bytes]:
 
 
 def test_nothing_returned() -> None:
-    """A sensor in an empty field, or covered: no sweep without a point."""
+    """A covered sensor, or one in an empty field: sweeps without points are not delivered."""
     blank = Sweep(0, np.zeros((0, 4), np.float32), np.zeros(0, np.uint8), 16)
     assert (
         decoded(VelodyneDecoder(), [(packet, None) for i in range(2) for packet in packets_of(blank, None, i * 10**5)])

@@ -21,20 +21,20 @@ from pipeline.formats.velodyne.models import HDL32E, MODELS, PUCK_HI_RES, VLP32C
 from pipeline.sources import open_source
 from pipeline.types import Sweep
 from tests.pipeline.formats.velodyne.streams import START_NS, decoded, drive
-from tests.pipeline.sources.bags import HEADER_NS, BagWriter
-from tests.pipeline.sources.captures import pcap
+from tests.pipeline.sources.made.bags import HEADER_NS, BagWriter
+from tests.pipeline.sources.made.captures import pcap
 
 OTHERS = [PUCK_HI_RES, HDL32E, VLP32C]
 RANGE_STEP_M = {"VLP-32C": 0.004}
 ELEVATION_DEG = {"Puck Hi-Res": (-10.0, 10.0), "HDL-32E": (-30.67, 10.67), "VLP-32C": (-25.0, 15.0)}
 BLOCK_US = {"VLP-16": 110.592, "Puck Hi-Res": 110.592, "HDL-32E": 46.08, "VLP-32C": 55.296}
-"""Of the manuals."""
+"""From the manuals."""
 TURNS_A_SECOND = 10.0
 
 
 def stream(model: VelodyneModel, sweeps: int = 3, wall_m: float = 10.0) -> list[tuple[bytes, int]]:
-    """Single returns of a round wall, ten turns a second from straight behind, and when each packet was received. Twice
-    as far and bright on the left."""
+    """Single returns of a round wall at 10 Hz, beginning straight behind, and the time of arrival of each packet. On
+    the left, the wall is twice as far and as bright."""
     block_us, unit_m, begin_us = BLOCK_US[model.name], RANGE_STEP_M.get(model.name, 0.002), START_NS // 1000
     packets = round(sweeps / TURNS_A_SECOND * 1e6 / block_us / 12)
     found = []

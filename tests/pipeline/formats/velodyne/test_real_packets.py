@@ -24,7 +24,7 @@ Cloud = npt.NDArray[np.float64]
 
 
 def test_einride(data_dir: Path) -> None:
-    """1000 raw payloads without any time of reception: 13 rotations, two more in part."""
+    """1000 raw payloads without receive times: 13 rotations, and two incomplete ones."""
     decoder = VelodyneDecoder()
     sweeps = decoded(decoder, [(packet, None) for packet in einride(data_dir)])
     assert (decoder.counts.sweeps, decoder.counts.partial, decoder.counts.lost) == (13, 2, 0)
@@ -35,7 +35,8 @@ def test_einride(data_dir: Path) -> None:
 
 
 def test_mrpt_follows_gps(data_dir: Path) -> None:
-    """The pcap's host clock is 0.37 s ahead; position packets say that the sensor follows GPS: its time is UTC."""
+    """The pcap's host clock is 0.37 s fast; position packets say that the sensor is synchronised with GPS, so its time
+    is UTC."""
     decoder = VelodyneDecoder()
     sweeps = []
     for payload, t_host_ns, port in mrpt(data_dir):
@@ -72,11 +73,9 @@ def _nebula_cloud(folder: Path) -> npt.NDArray[np.void]:
 
 
 def _decoded(packets: list[bytes]) -> Cloud:
-    """(N, 3) range in metres, azimuth in degrees and ring of what our decoder makes of the last rotation.
-
-    nebula cuts ahead: so does a decoder whose mount looks backwards. The packet in which it cuts belongs to the
-    rotation before, so that one's last milliseconds are here too.
-    """
+    """(N, 3) range in metres, azimuth in degrees and ring of the last rotation from our decoder. nebula cuts sweeps
+    ahead, as our decoder does with a mount that faces backwards. The packet at the cut belongs to the previous
+    rotation, so its last milliseconds are included."""
     T = np.diag([-1.0, -1.0, 1.0, 1.0])
     before, last = decoded(VelodyneDecoder(T, SensorClock()), [(packet, None) for packet in packets])[-2:]
     assert before.time_s is not None
@@ -91,7 +90,7 @@ def _polar(xyz: Cloud) -> Cloud:
 
 
 def _matched(wanted: Cloud, given: Cloud, range_m: float, angle_deg: float) -> npt.NDArray[np.bool_]:
-    """(N,) of the wanted points: whether there is a given one of the same ring, so near in range and azimuth."""
+    """(N,) for each wanted point, whether a given point of the same ring is this near in range and azimuth."""
     scale = np.array([1.0 / range_m, 1.0 / angle_deg, 1e3])
     away, _ = cKDTree(given * scale).query(wanted * scale, p=np.inf)
     return np.asarray(away <= 1.0)
@@ -122,8 +121,8 @@ def test_nebula(data_dir: Path) -> None:
 
 
 def test_azimuth_of_every_firing(data_dir: Path) -> None:
-    """Ours against the packets themselves, read in plain Python: between two blocks the head turns evenly, also over
-    the end of a packet, whose next block is the next packet's first."""
+    """Our azimuths against the packets, read in plain Python: the head turns evenly between two blocks, including the
+    last block of a packet and the first of the next."""
     packets = _nebula_packets(data_dir)
     by_hand = np.array(_by_hand(packets))
     assert _matched(_decoded(packets), by_hand, 0.003, 0.03).all()

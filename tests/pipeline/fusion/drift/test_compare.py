@@ -32,7 +32,7 @@ def test_every_vehicle_shows_the_angle_of_a_turned_camera():
 
 
 def test_a_box_of_a_neighbour_is_not_taken_when_the_others_disagree():
-    """Two cars 3° apart, the camera turned by 3°: the box of one lies on the other."""
+    """Two cars are 3° apart and the camera is turned by 3°: the box of one lies on the other."""
     places = ((32.0, 0.0), (32.0, 1.7), (20.0, -5.0), (15.0, 5.0))
     boxes = [box(*place, AlignmentParams(yaw_deg=3.0)) for place in places]
     found = told([track(k, *place) for k, place in enumerate(places)], boxes)

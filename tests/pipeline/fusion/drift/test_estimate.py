@@ -10,7 +10,7 @@ from pipeline.types import F64
 
 
 def sightings(vehicles: int, pieces: int, rates: F64 | None = None) -> PairedBoxes:
-    """Every vehicle in every piece of time."""
+    """Every vehicle in every time interval."""
     piece, vehicle = (each.ravel() for each in np.meshgrid(np.arange(pieces), np.arange(vehicles), indexing="ij"))
     rate = np.zeros(len(piece)) if rates is None else rates[vehicle]
     return PairedBoxes(piece, vehicle, np.full(len(piece), 5.0), np.full(len(piece), 3.0), rate)

@@ -18,7 +18,7 @@ RIGHT = AlignmentParams()
 
 
 def told(frames: Iterable[Seen], alignment: Callable[[int], AlignmentParams] = lambda k: RIGHT) -> list[Drift | None]:
-    """What is reported in each frame. alignment: in use in a frame."""
+    """The reports of each frame. alignment: the one in use in a frame."""
     state, found = DriftState(), []
     for k, frame in enumerate(frames):
         params = alignment(k)
@@ -76,7 +76,7 @@ def test_it_is_dropped_when_vehicles_show_otherwise():
 
 
 def test_a_late_image_is_no_turn():
-    """100 ms, with vehicles whose bearings change both ways."""
+    """A delay of 100 ms, with vehicles whose bearings change in both directions."""
     speeds = ((0.0, 0.6), (0.0, -1.2), (0.0, 1.4), (0.0, -1.6), (0.0, 2.0), (0.0, -1.5))
     assert not any(told(seen(k, RIGHT, PLACES, 0.1, speeds) for k in range(100)))
 
@@ -91,7 +91,7 @@ def test_without_an_alignment_or_an_image_nothing_is_compared():
 
 
 def test_vehicles_that_change_their_size_are_other_vehicles():
-    """A track that takes the box of its neighbour has not turned the camera."""
+    """A track that takes over its neighbour's box does not mean that the camera has turned."""
     aligned = resolve(RIGHT, CAMERA)
     state, _ = follow(DriftState(), seen(0, RIGHT, PLACES[1:2]), aligned, RIGHT, PARAMS)
     ((_, before),) = state.vehicles

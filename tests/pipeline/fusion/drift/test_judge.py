@@ -12,7 +12,7 @@ SIGMAS = 4.0
 
 
 def turn(angles_deg: list[list[float]], frames: int = 5) -> MountTurn | None:
-    """angles_deg: of each vehicle in each piece of time."""
+    """angles_deg: of each vehicle in each time interval."""
     values = np.array(angles_deg).T
     pieces, vehicles = values.shape
     piece, vehicle = (each.ravel() for each in np.meshgrid(np.arange(pieces), np.arange(vehicles), indexing="ij"))

@@ -17,7 +17,7 @@ from tests.pipeline.calibration.alignment.made_drive import CAMERA, ROAD_M, SIZE
 PLACES = ((12.0, -3.0), (18.0, 0.5), (22.0, 4.0), (30.0, -5.0), (35.0, 3.0), (26.0, -8.0))
 FRAME_NS = 100_000_000
 WIDTH_M, HEIGHT_M, BEAM_M = 1.75, 1.5, 0.0035
-"""Of each car; a cluster ends half a step of the beams inside it, in metres for each metre of range."""
+"""Size of each car; a cluster ends half a beam step inside it, in metres per metre of range."""
 
 
 def track(number: int, x: float, y: float, velocity: tuple[float, float] = (0.0, 0.0)) -> LidarTrack:
@@ -32,7 +32,7 @@ def track(number: int, x: float, y: float, velocity: tuple[float, float] = (0.0,
 def box(
     x: float, y: float, turned: AlignmentParams, off: Sequence[float] = (0.0, 0.0, 0.0, 0.0), length_m: float = 0.2
 ) -> VisionMeasurement:
-    """Its box. off: of the four edges, as a share of its height."""
+    """Its box. off: error of each edge, as a share of its height."""
     aligned = resolve(turned, CAMERA)
     assert aligned is not None
     cuboid = Cuboid((x + length_m / 2, y, ROAD_M + HEIGHT_M / 2), (length_m, WIDTH_M, HEIGHT_M), 0.0)
@@ -49,7 +49,7 @@ def seen(
     late_s: float = 0.0,
     speeds: Sequence[tuple[float, float]] | None = None,
 ) -> Seen:
-    """A frame of these cars, with the errors of a detector that last and those that are new. late_s: of the image."""
+    """A frame of these cars, with the lasting and the new errors of a detector. late_s: delay of the image."""
     speeds = speeds or [(0.0, 0.0)] * len(places)
     rng = np.random.default_rng(frame)
     tracks, boxes = [], []

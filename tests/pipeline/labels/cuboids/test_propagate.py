@@ -67,7 +67,7 @@ def test_it_stops_at_another_vehicle_and_at_another_clip() -> None:
 
 
 def test_what_a_hand_saw_beside_the_points_stays() -> None:
-    """Drawn 0.3 m farther than its points, it stays so far off them."""
+    """A cuboid drawn 0.3 m beyond its points keeps this offset."""
     cars = {at: standing(30.0 - at, 4.0) for at in range(12)}
     drawn = standing(30.3, 4.0)
     found = propagated([Sighting(0, drawn)], T_NS, seen(cars), driving(1.0, 30), forward=True)
@@ -76,7 +76,7 @@ def test_what_a_hand_saw_beside_the_points_stays() -> None:
 
 
 def test_a_street_is_labelled_from_one_frame_a_car(data_dir: Path) -> None:
-    """KITTI 0009: each car from the frame in which it is some 18 m away."""
+    """KITTI 0009: each car from the frame in which it is about 18 m away."""
     folder = data_dir / "kitti_0009"
     if not folder.is_dir():
         pytest.skip(f"no KITTI drive at {folder}")

@@ -54,7 +54,7 @@ def driving(step_m: float, count: int) -> dict[int, Pose]:
 
 
 def test_a_parked_cars_rear_and_side_are_one_outline_over_own_motion() -> None:
-    """First its rear is seen, later its right side: only together do they show how long and wide it is."""
+    """Its rear is seen first, its right side later: only both together show its length and width."""
     cars = {at: standing(20.0 - 1.0 * at, 4.0) for at in range(8)}
     seen = {at: clustered(sweep_of(car, faces="rear" if at < 4 else "both")) for at, car in cars.items()}
     boxes = {at: replace_size(car, (3.9, 1.5, 1.5), 0.3 * (-1) ** at) for at, car in cars.items()}
@@ -73,7 +73,8 @@ def test_a_parked_cars_rear_and_side_are_one_outline_over_own_motion() -> None:
 
 
 def test_a_driving_car_is_laid_over_itself_along_its_track() -> None:
-    """It keeps its distance while we drive: over own motion its points would be smeared over 14 m."""
+    """It keeps its distance while the ego vehicle drives: aligned by ego motion, its points would be smeared over 14
+    m."""
     car = standing(15.0, 4.0)
     seen = dict.fromkeys(range(8), clustered(sweep_of(car)))
     boxes = {at: standing(15.0 + 0.2 * (-1) ** at, 4.1) for at in range(8)}
@@ -92,7 +93,7 @@ def test_nothing_is_laid_where_nothing_is_seen() -> None:
 
 
 def test_what_is_nearly_along_the_road_is_turned_along_it() -> None:
-    """The road bends by 0.2 rad until where the parked car stands; across the road stands another."""
+    """The road turns by 0.2 rad on the way to the parked car; another car stands across the road."""
     poses = {at: Pose(1, 5.0 * at, 0.0, 0.02 * at, 5.0 * at, 0.5 * at) for at in range(11)}
     along = track_of({0: standing(50.0, 3.0, 0.2 + 0.1), 1: standing(45.0, 3.0, 0.18 - 0.1)})
     across = track_of({0: standing(20.0, 8.0, math.radians(80))})
@@ -138,7 +139,7 @@ def replace_size(cuboid: Cuboid, size: tuple[float, float, float], along_m: floa
 
 
 def hand_drawn(sightings: tuple[Sighting, ...], rng: np.random.Generator) -> list[Sighting]:
-    """As a person draws: one error along the whole track, a smaller one in each frame."""
+    """Like a person's drawing: a constant error over the whole track, and a smaller one in each frame."""
     common, long, wide = rng.normal(0, 1, 3), *rng.normal(0, [0.2, 0.1])
     out = []
     for each in sightings:
@@ -152,7 +153,8 @@ def hand_drawn(sightings: tuple[Sighting, ...], rng: np.random.Generator) -> lis
 
 
 def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
-    """To 15 m: of the side that faces us. A mesh's bumper is not flat, so its face is some centimetres inside."""
+    """Up to 15 m, for the side that faces the sensor. A mesh's bumper is not flat, so its face lies some centimetres
+    inside."""
     source = open_source("sim:straight")
     names = tuple(str(index) for index in range(len(source)))
     labels, _ = truth_labels(source, names, ORIGIN)
@@ -186,7 +188,7 @@ def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
 
 
 def test_a_snap_seldom_makes_a_real_box_worse(data_dir: Path) -> None:
-    """Astyx to 50 m. Before there was a choice to leave a box, half of them got worse, a third by more than 0.1."""
+    """Astyx up to 50 m. When every box was changed, half of them got worse, a third by more than 0.1."""
     source = open_source(f"astyx:{data_dir / 'astyx'}")
     labels, _ = truth_labels(source, tuple(str(index) for index in range(len(source))), ORIGIN)
     sweeps, rng = sweeps_in(source), np.random.default_rng(0)

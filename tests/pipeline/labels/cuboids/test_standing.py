@@ -17,7 +17,7 @@ POSES = {at: Pose(1, float(at), 0.0, TURN_RAD * at, float(at), 0.1 * at) for at 
 
 
 def parked(at: int, off_m: float = 0.0, moved_m: float = 0.0) -> Cuboid:
-    """At (30, 3) over ground, in the ego frame of a moment."""
+    """A car parked at (30, 3) on the ground, in the ego frame of a moment."""
     dx, dy = 30.0 + moved_m - at, 3.0
     c, s = math.cos(TURN_RAD * at), math.sin(TURN_RAD * at)
     return Cuboid((c * dx + s * dy + off_m, c * dy - s * dx, 0.5), SIZE, -TURN_RAD * at)
@@ -28,7 +28,7 @@ def apart(a: Cuboid, b: Cuboid) -> float:
 
 
 def test_what_is_seen_from_near_by_places_a_parked_car_in_every_frame() -> None:
-    """From far away it is half a metre off; in frames 3 and 4 it was only predicted."""
+    """From far away, it is wrong by half a metre; in frames 3 and 4 it was only predicted."""
     seen = {at: parked(at, 0.5 if at < 10 else 0.0) for at in range(20)} | {3: parked(3, 1.5), 4: parked(4, 1.5)}
     points = {at: 10 if at < 10 else 200 for at in range(20) if at not in (3, 4)}
     found = held_still(seen, points, POSES)

@@ -34,7 +34,7 @@ CAMERA_AXES = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
 def camera(distortion: tuple[float, ...] = (), pitch_rad: float = 0.03) -> CameraCalibration:
-    """Looks ahead, a little down and to the left, from 1.2 m over the ego origin."""
+    """A camera 1.2 m above the ego origin that faces ahead, slightly down and to the left."""
     T_ego_camera = np.eye(4)
     T_ego_camera[:3, :3] = rotation(0.01, pitch_rad, 0.02) @ CAMERA_AXES
     T_ego_camera[:3, 3] = (-1.0, 0.1, 1.2)
@@ -84,7 +84,7 @@ def several(each: st.SearchStrategy[T]) -> st.SearchStrategy[tuple[T, ...]]:
 
 @st.composite
 def label_sets(draw: st.DrawFn) -> LabelSet:
-    """Everything that a label set can be."""
+    """Label sets with everything that they can contain."""
     ids = draw(st.lists(st.integers(0, 2**62), unique=True, max_size=4))
     tracks = []
     for number in ids:
@@ -132,7 +132,7 @@ def label_sets(draw: st.DrawFn) -> LabelSet:
 
 @st.composite
 def leads(draw: st.DrawFn, ids: list[int]) -> tuple[LeadRange, ...]:
-    """Ranges that do not overlap, by their frames."""
+    """Ranges that do not overlap, in order of frames."""
     cuts = sorted(draw(st.sets(st.integers(0, COUNT), max_size=4)))
     found = []
     for first, end in pairwise(cuts):
@@ -143,7 +143,7 @@ def leads(draw: st.DrawFn, ids: list[int]) -> tuple[LeadRange, ...]:
 
 
 def plain(labels: LabelSet, *, cuboids: bool = True, boxes: bool = True) -> LabelSet:
-    """Tracks alone, as a format without states and origins gives them back."""
+    """Only the tracks, as returned by a format without states and origins."""
     tracks = []
     for track in labels.tracks:
         seen = (
@@ -158,7 +158,7 @@ def plain(labels: LabelSet, *, cuboids: bool = True, boxes: bool = True) -> Labe
 
 
 def assert_same_alone(found: LabelSet, wanted: LabelSet, tolerance: float = 1e-6) -> None:
-    """Equal as ``assert_same`` has it, but for who is who over time: each sighting is a track of its own."""
+    """Like ``assert_same``, but without identities over time: each sighting is its own track."""
     left = _alone(found)
     for label, seen in _alone(wanted):
         near = (n for n, (other, each) in enumerate(left) if other == label and _are_near(each, seen, tolerance))
@@ -180,7 +180,7 @@ def _are_near(one: Sighting, other: Sighting, tolerance: float) -> bool:
 
 
 def assert_same(found: LabelSet, wanted: LabelSet, tolerance: float = 1e-6) -> None:
-    """Equal, numbers of shapes up to a tolerance and angles up to full turns."""
+    """Check that both are equal, with a tolerance for shapes and modulo full turns for angles."""
     assert replace(found, tracks=(), paths=()) == replace(wanted, tracks=(), paths=())
     assert [replace(t, sightings=()) for t in found.tracks] == [replace(t, sightings=()) for t in wanted.tracks]
     assert found.paths == wanted.paths

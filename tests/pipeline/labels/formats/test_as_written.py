@@ -55,7 +55,7 @@ def test_openlabel(tmp_path: Path) -> None:
 
 
 def test_openlabel_of_others(tmp_path: Path) -> None:
-    """Nine numbers with Euler angles, a coordinate system of its own, UUIDs, and a lead by relation alone."""
+    """Nine numbers with Euler angles, its own coordinate system, UUIDs, and a lead given only by a relation."""
     uid = "c44c1fc2-ee48-4b17-a20e-829de9be1141"
     cuboid = {"name": "shape", "val": [10, 1, 0, 0, 0, 0.5, 4, 2, 1.5], "coordinate_system": "lidar"}
     pose = [0, -1, 0, 2, 1, 0, 0, 3, 0, 0, 1, 4, 0, 0, 0, 1]  # turned by a quarter to the left

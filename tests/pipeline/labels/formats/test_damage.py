@@ -117,7 +117,7 @@ def test_labels_that_cannot_be_are_not_written(what: str, tmp_path: Path) -> Non
 
 
 def seen_set(here: LabeledDrive) -> LabelSet:
-    """Four cars with the boxes that they have in the image."""
+    """Four cars with their boxes in the image."""
     eye = here.shots[0].camera
     assert eye is not None
     tracks = []
@@ -130,7 +130,7 @@ def seen_set(here: LabeledDrive) -> LabelSet:
 
 
 def turned_round(here: LabeledDrive) -> LabeledDrive:
-    """The same drive with its extrinsic given the wrong way round."""
+    """The same drive with an inverted extrinsic."""
     eye = here.shots[0].camera
     assert eye is not None
     wrong = replace(eye, T_camera_ego=inverse(eye.T_camera_ego))
@@ -146,7 +146,7 @@ def test_an_inverted_extrinsic_of_the_recording_is_detected(name: FormatName, tm
 
 @pytest.mark.parametrize("name", ["native", "openlabel", "kitti-tracking", "kitti"])
 def test_labels_that_do_not_fall_where_their_boxes_are_are_refused(name: FormatName, tmp_path: Path) -> None:
-    """As when the extrinsic was taken the wrong way round by whoever wrote them."""
+    """As when the program that wrote them used the inverse of the extrinsic."""
     here = drive()
     labels = seen_set(here)
     export_labels(labels, here, name, tmp_path / "good")

@@ -14,7 +14,7 @@ from tests.pipeline.labels.formats.sets import IMPORT
 
 
 def in_turn(points: F32, cuboid: Cuboid) -> int:
-    """The same, point by point in the cuboid's own frame."""
+    """The same count, point by point in the cuboid's frame."""
     c, s = np.cos(cuboid.yaw_rad), np.sin(cuboid.yaw_rad)
     offset = points[:, :3].astype(np.float64) - cuboid.center
     along, across = offset[:, 0] * c + offset[:, 1] * s, offset[:, 1] * c - offset[:, 0] * s
@@ -47,7 +47,7 @@ def test_no_cuboid_and_no_point() -> None:
 
 
 def test_every_frame_is_counted_with_its_own_points() -> None:
-    """More frames than one reader takes at once; every third one has no LiDAR, every fifth no cuboid."""
+    """More frames than one reader takes at once; every third one is without LiDAR, every fifth without a cuboid."""
     count = 50
     cuboid = Cuboid((10.0, 0.0, 0.0), (4.0, 2.0, 1.5), 0.0)
 

@@ -40,7 +40,7 @@ def astyx(data_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[str
 
 
 def test_kitti_lines_are_what_they_were(kitti: tuple[Path, LabeledDrive], tmp_path: Path) -> None:
-    """All but what labels do not keep: that a van is one."""
+    """Everything except what labels do not store, such as the class van."""
     folder, drive = kitti
     found = import_labels(folder / "label_2", drive, "kitti", IMPORT)
     sightings = [each for track in found.labels.tracks for each in track.sightings]
@@ -68,7 +68,7 @@ def test_kitti_lines_are_what_they_were(kitti: tuple[Path, LabeledDrive], tmp_pa
 def test_the_truth_of_a_kitti_recording_is_what_its_label_files_say(
     kitti: tuple[Path, LabeledDrive], tmp_path: Path
 ) -> None:
-    """Boxes in the image, who is who, and what is taken for another class: also of a session made of it."""
+    """Image boxes, identities and original classes, also after conversion to a session."""
     folder, drive = kitti
     found = import_labels(folder / "label_2", drive, "kitti", IMPORT)
     source = open_source(f"kitti:{folder}")
@@ -111,7 +111,7 @@ def test_astyx_truth_comes_back(astyx: tuple[str, LabeledDrive], name: str, tmp_
 
 
 def test_the_tracking_benchmarks_own_file_is_read(data_dir: Path) -> None:
-    """Its regions have their missing numbers in another order than those of the object benchmark."""
+    """In its regions, missing numbers are in another order than in the object benchmark."""
     folder = data_dir / "kitti_0009"
     if not folder.is_dir():
         pytest.skip(f"no KITTI drive at {folder}")

@@ -35,7 +35,7 @@ def there_and_back(labels: LabelSet, here: LabeledDrive, name: FormatName, folde
 
 
 def wanted(labels: LabelSet, name: FormatName) -> LabelSet:
-    """What a format can hold of the labels, by its registration."""
+    """The part of the labels that a format can hold, according to its registration."""
     holds = FORMATS[name].holds
     if "boxes" in holds and not FORMATS[name].as_stored:
         labels = following(labels, drive())
@@ -50,12 +50,12 @@ def wanted(labels: LabelSet, name: FormatName) -> LabelSet:
 
 
 def is_anonymous(name: FormatName) -> bool:
-    """It does not say which sightings are of one track."""
+    """Whether the format does not say which sightings are of one track."""
     return "identities" not in FORMATS[name].holds and "leads" not in FORMATS[name].holds
 
 
 def regions_named(labels: LabelSet, by_frame: bool) -> LabelSet:
-    """What has no cuboid anywhere, or none in a frame, is a region of which KITTI says nothing."""
+    """Objects without a cuboid, in all frames or in one, become KITTI's ``DontCare`` regions."""
     tracks = []
     for track in labels.tracks:
         flat = [each for each in track.sightings if each.cuboid is None]
@@ -90,7 +90,7 @@ def test_what_can_be_held_comes_back(name: FormatName, monkeypatch: pytest.Monke
 
 
 def _apart(leads: tuple[LeadRange, ...]) -> tuple[LeadRange, ...]:
-    """Neighbours differ: a table cannot tell one long range from two."""
+    """Neighbouring ranges differ, since a table cannot distinguish one long range from two."""
     return tuple(replace(r, origin=replace(r.origin, name=f"by{i}")) for i, r in enumerate(leads))
 
 
@@ -191,7 +191,7 @@ def test_a_file_of_version_1_has_tags_of_single_frames() -> None:
 
 
 def test_nuscenes_places_are_where_the_car_has_gone(tmp_path: Path) -> None:
-    """A parked car ahead, seen from a car that drives straight at 12 m/s, stays where it is in the global frame."""
+    """A parked car ahead, seen from a car driving straight at 12 m/s, stays at its position in the global frame."""
     here = drive(yaw_rate_radps=0.0)
     seen = tuple(Sighting(i, Cuboid((30.0 - 1.2 * i, 2.0, 0.0), (4.0, 2.0, 1.5), 0.3)) for i in range(len(here.shots)))
     labels = replace(here.empty(), tracks=(LabelTrack(9, "car", seen, "accepted", IMPORT),))

@@ -21,7 +21,7 @@ from tests.pipeline.recording.frames import ABOUT, full, image, sweep, write
 
 
 def test_a_full_frame_is_one_chunk(tmp_path: Path) -> None:
-    """A seek then reads nothing that is not its frame's."""
+    """A seek then reads only data of its frame."""
     jpeg = b"\xff\xd8" + bytes(np.random.default_rng(0).integers(0, 255, 400_000, dtype=np.uint8))
     frames = [
         replace(full(index), sweep=sweep(index, points=28_000), image=replace(image(index), encoded=jpeg[:-index]))
@@ -36,7 +36,7 @@ def test_a_full_frame_is_one_chunk(tmp_path: Path) -> None:
 def test_frames_said_to_be_kept_are_in_the_file(
     chunk_bytes: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Wherever a chunk begins, between the messages of a frame too."""
+    """Wherever a chunk begins, including between the messages of a frame."""
     monkeypatch.setattr(mcap_output, "CHUNK_BYTES", chunk_bytes)
     writer = SessionWriter(tmp_path / "a.mcap", ABOUT)
     for index in range(12):
@@ -51,7 +51,7 @@ def test_frames_said_to_be_kept_are_in_the_file(
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
 def test_a_chunk_never_unpacks_to_more_than_it_says(compression: str) -> None:
-    """80 MB of nothing, of which the chunk says that they are a kilobyte."""
+    """80 MB of zeros in a chunk that claims to contain one kilobyte."""
     zeros = bytes(80_000_000)
     packed = zstandard.compress(zeros) if compression == "zstd" else lz4.frame.compress(zeros)
     head = (

@@ -9,7 +9,7 @@ import pytest
 
 from app.cli import main
 from pipeline.common.errors import BadInput
-from pipeline.common.signing import SIGNING_VARIABLE, new_keys
+from pipeline.common.files.signing import SIGNING_VARIABLE, new_keys
 from pipeline.recording.mcap.chain import NAME, ChainWriter, verify
 from pipeline.recording.mcap.index import MAGIC, summary_start
 from pipeline.recording.mcap.reader import McapFile
@@ -19,7 +19,7 @@ from tests.pipeline.recording.frames import full, write
 
 @pytest.fixture
 def key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The public key of who signs from here on."""
+    """The public key of the key pair that signs from now on."""
     _, digits = new_keys(tmp_path / "key")
     monkeypatch.setenv(SIGNING_VARIABLE, str(tmp_path / "key"))
     return digits

@@ -25,6 +25,7 @@ from pipeline.types import (
     EgoState,
     Frame,
     GnssFix,
+    RangeScan,
     RawBoxes,
     RawLanes,
     Route,
@@ -39,7 +40,7 @@ def with_camera(distortion: int) -> Frame:
 
 
 def loose_rotation() -> CameraCalibration:
-    """What a file with four decimals gives: no quaternion stands for it exactly."""
+    """A rotation read from a file with four decimals, which no quaternion represents exactly."""
     T_camera_ego = CAMERA.T_camera_ego.copy()
     T_camera_ego[0, 0] = 3.3e-4
     return replace(CAMERA, T_camera_ego=T_camera_ego)
@@ -89,14 +90,15 @@ def test_a_frame_comes_back_to_the_last_bit(frame: Frame, tmp_path: Path) -> Non
 
 
 def test_every_field_is_written() -> None:
-    """A field that someone adds must be written too; then this list grows."""
+    """A new field must be written too, and added to this list."""
     known = {
         Frame: "index name t_ns sweep image camera ego raw_boxes notes gnss raw_lanes route streams timing_ms "
-        "detections_given",
+        "detections_given scans",
         Sweep: "t_ns points ring channels time_s origin",
         CameraImage: "t_ns bgr encoded",
         CameraCalibration: "K distortion T_camera_ego width height road_z_m",
         Route: "name lat_deg lon_deg sigma_m",
+        RangeScan: "t_ns points values",
     }
     for kind, names in known.items():
         assert {field.name for field in fields(kind)} == set(names.split()), kind

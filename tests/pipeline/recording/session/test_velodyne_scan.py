@@ -31,7 +31,7 @@ def mounted() -> RawLidar:
 
 
 def record(recorder: Segments, lidar: RawLidar, behind: int = 0) -> list[Frame]:
-    """Packets as they come, and a frame for each sweep that they complete, when so many more sweeps have come."""
+    """Record packets as they arrive, and a frame for each completed sweep, delayed by this number of sweeps."""
     decoder, batch, frames = VelodyneDecoder(lidar.T_ego_lidar), [], []
     for packet, t_ns in drive(SWEEPS):
         sweep = decoder.push(packet, t_ns)

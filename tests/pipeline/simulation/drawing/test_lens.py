@@ -51,7 +51,8 @@ def test_nothing_far_outside_folds_back_into_the_image() -> None:
 
 @pytest.mark.parametrize(("k1", "k2"), LENSES)
 def test_long_straight_edges_are_drawn_bent(k1: float, k2: float) -> None:
-    """A bar across the upper part of the image, of one polygon with four corners: its middle line against OpenCV."""
+    """A bar across the upper part of the image, drawn as one polygon with four corners: its centre line, compared with
+    OpenCV."""
     model = calibration(CameraModel(**{**PERFECT, "k1": k1, "k2": k2}))
     image = np.zeros((720, 1280, 3), dtype=np.uint8)
     canvas = Canvas(image, model)

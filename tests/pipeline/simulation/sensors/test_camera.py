@@ -98,7 +98,7 @@ def test_brake_lights_light_up() -> None:
 @pytest.mark.parametrize("kind", ["car", "van", "truck", "bus", "motorcycle"])
 @pytest.mark.parametrize(("ahead_m", "t_s"), [(-0.5, 1.0), (6.0, 0.0), (300.0, 0.0)], ids=["beside", "ahead", "far"])
 def test_any_kind_beside_and_ahead_is_drawn(kind: str, ahead_m: float, t_s: float) -> None:
-    """Beside the camera a vehicle crosses the near plane; nothing of it may smear over the sky."""
+    """Beside the camera, a vehicle crosses the near plane; no part of it may be smeared over the sky."""
     scene = with_actors(
         f"{{id: 1, kind: {kind}, lane: -1, colour: '#ff00ff', ahead_m: {ahead_m}, speed_mps: {{0: 24}}}}"
     )
@@ -129,7 +129,7 @@ TOWN = "{length_m: 2000}], lanes_forward: 1, lanes_oncoming: 1, median_m: 0, cro
 
 
 def test_a_crossing_road_is_painted_with_its_lines() -> None:
-    """25 m ahead: asphalt where grass was, our lines open, its own lines across."""
+    """25 m ahead, there is asphalt instead of grass, gaps in our lines, and the crossing road's own lines."""
     crossed, now = draw(with_actors(segments=TOWN, lane=-1))
     plain, _ = draw(with_actors(segments=TOWN.replace("{s_m: 125, lanes_each_way: 1}", ""), lane=-1))
 

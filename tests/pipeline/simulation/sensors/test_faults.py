@@ -37,7 +37,7 @@ def test_clouds_come_on_top_and_are_small(sweep: Sweep) -> None:
 
 
 def test_a_nod_lifts_what_is_ahead_in_both_sensors_alike(sweep: Sweep) -> None:
-    """The nose 1° down: at 30 m everything stands 0.52 m higher, and no higher in the image than that."""
+    """With the nose 1° down, everything at 30 m appears 0.52 m higher, and by the same amount in the image."""
     nod = float(np.radians(1.0))
     tilted = disturb_sweep(sweep, Faults(nods_deg=1.0), 1, 0, nod)
     assert tilted is not None

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.sensors import lidar_rays
-from pipeline.simulation.sensors.lidar import Lidar
-from pipeline.simulation.sensors.lidar_model import LidarModel
-from pipeline.simulation.sensors.lidar_scene import PAINT, WALL
+from pipeline.simulation.sensors.lidar import rays as lidar_rays
+from pipeline.simulation.sensors.lidar.model import LidarModel
+from pipeline.simulation.sensors.lidar.scene import PAINT, WALL
+from pipeline.simulation.sensors.lidar.sensor import Lidar
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.types import F64, Sweep
@@ -52,7 +52,7 @@ def test_an_empty_road_is_rings_on_the_ground() -> None:
 
 @pytest.mark.parametrize("radius_m", [-600.0, 600.0, 2000.0])
 def test_over_crests_and_in_sags_rings_lie_on_the_curved_road(radius_m: float) -> None:
-    """radius_m: positive on a crest, over which the flattest ring passes without meeting the road."""
+    """radius_m: positive on a crest, beyond which the flattest ring does not meet the road."""
     now = replace(world_state.at(with_actors(""), 0.0), hump_per_m=1.0 / radius_m)
     sweep = Lidar(LidarModel(range_sigma_m=0.0)).sweep(now, NOTHING, 1, 0, 0)
     x, y, z = sweep.points[:, :3].T
@@ -69,7 +69,7 @@ boxes = st.tuples(
 @settings(max_examples=40, deadline=None)
 @given(st.lists(boxes, min_size=1, max_size=5))
 def test_every_ray_ends_at_the_nearest_box(given_boxes: list[tuple[float, ...]]) -> None:
-    """Against a reference that tries every ray with every box."""
+    """Compared with a reference that tests every ray against every box."""
     rows = np.array([[*box[:6], np.cos(box[6]), np.sin(box[6]), WALL, 0, 0, 0, 1] for box in given_boxes])
     rays = lidar_rays.directions()
     ground = np.array([-world_state.LIDAR_HEIGHT_M, 0.0, 0.0, 0.0])
@@ -136,15 +136,15 @@ def cloud_of(scene: Scenario, t_s: float = 0.0, **model: object) -> F64:
 
 
 def rear_x(points: F64, y_m: float) -> float:
-    """Where the rear of what stands around y is."""
+    """x of the rear of the object at about y."""
     near = points[(np.abs(points[:, 1] - y_m) < 0.8) & (points[:, 2] > -0.2) & (points[:, 0] > 3.0)]
     return float(np.percentile(near[:, 0], 5))
 
 
 @pytest.mark.parametrize(("lane", "side"), [(-1, 1.0), (-2, 0.0), (-3, -1.0)])
 def test_what_stands_is_met_earlier_on_the_left_and_later_on_the_right(lane: int, side: float) -> None:
-    """30 m/s past a standing car 12 m ahead: left of the axis it is measured before the tick, farther away; right of
-    it after the tick, nearer. 3.6 m aside at 12 m is 16.7°, a 4.6 ms turn of the head."""
+    """Passing a standing car 12 m ahead at 30 m/s: left of the axis, it is measured before the tick and farther away;
+    right of it, after the tick and nearer. 3.6 m to the side at 12 m is 16.7°, or 4.6 ms of the head's rotation."""
     parked = with_actors(f"{{id: 1, kind: van, lane: {lane}, ahead_m: 12, speed_mps: {{0: 0}}}}", speed=30.0)
     moved = rear_x(cloud_of(parked), 3.6 * side) - rear_x(cloud_of(parked, motion=False), 3.6 * side)
     assert moved == pytest.approx(side * 30.0 * np.degrees(np.arctan2(3.6, 12.0)) / 3600.0, abs=0.04)
@@ -156,7 +156,7 @@ def test_what_drives_along_is_not_distorted() -> None:
 
 
 def test_moving_boxes_are_met_where_they_are_at_each_rays_time() -> None:
-    """Against the same cast with every box put by hand to where it is when that column fires."""
+    """Compared with casting the same rays after every box was placed at its position when that column fires."""
     rays, times = lidar_rays.directions(), lidar_rays.firing_times_s().mean(axis=1)
     ground = np.array([-0.5, 0.0, 0.0, 0.0])
     box = np.array([18.0, 3.0, 0.5, 2.0, 1.0, 0.9, np.cos(0.4), np.sin(0.4), WALL, -25.0, 6.0, 0.5, 1.0])
@@ -191,7 +191,7 @@ def test_drop_outs_are_as_many_as_said() -> None:
 
 
 def test_a_side_met_at_a_grazing_angle_returns_less_than_a_rear() -> None:
-    """Of the rays that end on a wall along the way and on one across it, at the same range."""
+    """Share of returns of rays that end on a wall along the road and on one across it, at the same range."""
     rows = np.array([[24.0, 0.0, 0.4, 0.1, 30.0, 0.9, 1.0, 0.0, PAINT, 0, 0, 0, 1.0]])  # a wall across
     flat = np.array([[24.0, 3.0, 0.4, 30.0, 0.1, 0.9, 1.0, 0.0, PAINT, 0, 0, 0, 1.0]])  # a wall along
 
@@ -209,7 +209,7 @@ def test_a_side_met_at_a_grazing_angle_returns_less_than_a_rear() -> None:
 
 
 def test_a_tilted_sensor_sees_the_same_world() -> None:
-    """The points of a pitched and rolled sensor lie on the same road and the same rear as those of a level one."""
+    """The points of a pitched and rolled sensor lie on the same road and rear as those of a level one."""
     scene = with_actors("{id: 1, kind: truck, lane: -2, ahead_m: 14, speed_mps: {0: 20}}")
     tilted = cloud_of(scene, up_m=0.4, pitch_deg=3.0, roll_deg=-2.0, yaw_deg=4.0)
     low = tilted[tilted[:, 2] < -0.4]

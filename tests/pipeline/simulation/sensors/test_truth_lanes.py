@@ -11,16 +11,16 @@ from pipeline.simulation import scenario
 from pipeline.simulation.sensors import gnss
 from pipeline.simulation.sensors.camera import calibration
 from pipeline.simulation.sensors.detection_model import LineNoise
+from pipeline.simulation.sensors.planned_route import planned_route
 from pipeline.simulation.sensors.truth_lanes import lane_points
 from pipeline.simulation.world import world_state
-from pipeline.simulation.world.planned_route import planned_route
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M
 from tests.pipeline.simulation.worlds import with_actors
 
 
 @pytest.mark.parametrize("segments", ["{length_m: 2000}", "{length_m: 2000, radius_m: 125}"], ids=["straight", "bend"])
 def test_the_points_lie_on_the_roads_lines(segments: str) -> None:
-    """Brought back to the road, near points are on a line; there are four lines on three lanes."""
+    """Projected onto the road, near points are on a line; three lanes have four lines."""
     scene = with_actors(segments=segments)
     camera, now = calibration(scene.camera), world_state.at(scene, 1.0)
     raw = lane_points(now, scene.road, camera, LineNoise(), 1, 10)
@@ -46,7 +46,7 @@ def test_the_same_moment_gives_the_same_points_and_another_others() -> None:
 
 @pytest.mark.parametrize("name", ["left_turn", "cut_in", "curve_500"])
 def test_the_planned_route_is_the_way_driven(name: str) -> None:
-    """Every fix of the drive lies on it, to the receiver's noise."""
+    """Every fix of the drive lies on it, within the receiver's noise."""
     scene = scenario.load(name)
     route = planned_route(scene)
     line = lay_out(route)

@@ -47,7 +47,7 @@ def test_a_left_curve_turns_left(curvature: float, sign: float) -> None:
 
 
 def test_the_yaw_rate_is_what_the_heading_does() -> None:
-    """In a lane change the heading's own derivative is the yaw rate that the frame tells."""
+    """In a lane change, the derivative of the heading is the yaw rate in the frame."""
     scene = with_actors()
     change = {"start_s": 1.0, "duration_s": 4.0, "lane": -1}
     ego = scene.ego.model_validate({**scene.ego.model_dump(), "lane_changes": [change]})
@@ -90,7 +90,7 @@ def test_braking_at_a_gap_starts_when_the_gap_is_that() -> None:
 
 @pytest.mark.parametrize("lane", [-1, -3])
 def test_ground_covered_is_the_speed_in_a_bend_too(lane: int) -> None:
-    """On the inner lane of a bend a car that drives 20 m/s covers 20 m of its own lane a second."""
+    """On the inner lane of a bend, a car at 20 m/s covers 20 m of its lane per second."""
     scene = with_actors(segments="{length_m: 900, radius_m: 60}", lane=lane)
     here, there = world_state.at(scene, 3.0), world_state.at(scene, 3.01)
     assert np.hypot(there.pose[0] - here.pose[0], there.pose[1] - here.pose[1]) == pytest.approx(0.2, rel=1e-4)

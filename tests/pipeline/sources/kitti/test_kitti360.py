@@ -35,7 +35,7 @@ def T_rect_ego() -> np.ndarray:
 
 
 def write_kitti360(root: Path, drive: str = DRIVE) -> Path:
-    """Frames at 10 Hz of a car on an arc, which has no poses while it stands."""
+    """Frames at 10 Hz of a car on an arc, without poses while it stands."""
     velodyne, camera = root / "data_3d_raw" / drive / "velodyne_points", root / "data_2d_raw" / drive / "image_00"
     for folder in (velodyne / "data", camera / "data_rect", root / "data_poses" / drive):
         folder.mkdir(parents=True)

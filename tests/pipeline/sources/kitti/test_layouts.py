@@ -16,7 +16,8 @@ COUNT = 6
 
 @pytest.fixture
 def sequence(data_dir: Path, tmp_path: Path) -> Path:
-    """``sequences/04`` and ``poses/04.txt`` in the published form, of a car that drives 10.6 m/s in a left bend."""
+    """``sequences/04`` and ``poses/04.txt`` in the published format, of a car that drives at 10.6 m/s in a left
+    bend."""
     raw = data_dir / "kitti_0009/2011_09_26"
     folder = tmp_path / "sequences" / "04"
     for ours, theirs, suffix in (("velodyne", "velodyne_points", ".bin"), ("image_2", "image_02", None)):

@@ -221,8 +221,8 @@ def test_real_drive_has_ten_rings(data_dir: Path) -> None:
 
 
 def test_a_drive_whose_sweeps_end_out_of_order_has_its_lidar(data_dir: Path) -> None:
-    """Its sweeps end with a point at the sensor, which counts as the begin of a 65th ring. The truth for the rings by
-    elevation is the order of the file."""
+    """Its sweeps end with a point at the sensor, which counts as the start of a 65th ring. The rings found by elevation
+    are compared with the order of the file."""
     source = open_source(f"kitti:{data_dir / 'kitti_order'}", rings=64)
     assert len(source) == 3
     for index in range(len(source)):
@@ -236,7 +236,7 @@ def test_a_drive_whose_sweeps_end_out_of_order_has_its_lidar(data_dir: Path) -> 
 
 
 def test_real_labels_land_on_their_2d_boxes(data_dir: Path) -> None:
-    """Independent of our own chain: each label line also holds the box that a person drew in the image."""
+    """Independent of our own transforms: each label line also contains the box that a person drew in the image."""
     folder = data_dir / "kitti_0052"
     source = open_source(f"kitti:{folder}")
     overlaps = []

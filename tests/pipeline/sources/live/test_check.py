@@ -15,7 +15,7 @@ State = Literal["ok", "stale", "silent", "absent"]
 
 
 class Sensor:
-    """A LiDAR that is found in one state after the other, and in the last one for good."""
+    """A LiDAR that goes through these states and stays in the last one."""
 
     def __init__(self, *states: State) -> None:
         self._states = chain(states, repeat(states[-1]))
@@ -53,7 +53,7 @@ def test_a_late_sensor_is_waited_for_and_a_silent_one_is_not(states: tuple[State
 
 
 class Ego(Sensor):
-    """Own motion from a receiver, at a rate."""
+    """Ego motion from a receiver, at this rate."""
 
     def __init__(self, rate_hz: float | None) -> None:
         super().__init__("ok")

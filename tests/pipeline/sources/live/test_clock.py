@@ -13,7 +13,7 @@ from tests.pipeline.formats.velodyne.test_position import position
 from tests.pipeline.sources.live.bench import MS, SECOND, START, Bench, Taken, sent
 
 HOST_AHEAD_NS = 1_234 * MS
-"""The host's clock is wrong by so much; a car has no network to set it by."""
+"""Error of the host's clock; a car has no network to set it."""
 RECEIVER_TAKES_NS = 80 * MS
 
 
@@ -50,8 +50,8 @@ def test_a_message_held_up_once_moves_nothing() -> None:
 
 @pytest.mark.parametrize(("pps", "off_ms"), [(2, 0.0), (0, 80.0)], ids=["PPS locked", "no PPS"])
 def test_a_fix_is_placed_by_the_lidars_gps_time_where_it_has_one(pps: int, off_ms: float) -> None:
-    """A receiver says where it was 80 ms after it was there. Alone nobody can know that. A LiDAR on the same
-    receiver's pulse has GPS time without the delay, and tells what the host's clock is at a moment of it."""
+    """A receiver reports its position 80 ms late, which cannot be known from it alone. A LiDAR on the same receiver's
+    pulse has GPS time without this delay, and relates it to the host's clock."""
     bench = Bench()
     lidar = bench.source.inputs["lidar"]
     assert isinstance(lidar, LidarInput)
@@ -64,7 +64,7 @@ def test_a_fix_is_placed_by_the_lidars_gps_time_where_it_has_one(pps: int, off_m
 
 
 def _delayed(events):  # type: ignore[no-untyped-def]
-    """The sensors' clocks are GPS time, the host's is ahead of it, and the receiver is slow to say its fix."""
+    """The sensors' clocks are GPS time, the host's clock is ahead of it, and the receiver's fixes arrive late."""
     moved: list[WireEvent] = []
     for event in events:
         late_ns = RECEIVER_TAKES_NS if event.sensor == "gnss" else 0
@@ -74,7 +74,8 @@ def _delayed(events):  # type: ignore[no-untyped-def]
 
 
 def assert_fixes_off_by(taken: list[Taken], off_ms: float) -> None:
-    """Receivers of the bench measure at 20, 120, … ms after each sweep's beginning of the schedule."""
+    """Check that fixes are wrong by this much: the bench's receivers measure 20, 120, … ms after the start of the
+    schedule."""
     fixes = [each.frame.gnss for each in taken if each.at_s > 1.5 and each.frame.gnss is not None]
     sweeps = [each.frame.t_ns for each in taken if each.at_s > 1.5 and each.frame.sweep is not None]
     assert len(fixes) > 10

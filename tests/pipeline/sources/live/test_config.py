@@ -118,8 +118,8 @@ def test_files_are_found_beside_the_config(tmp_path: Path) -> None:
     ],
 )
 def test_a_camera_sits_where_its_mount_says(mount: dict[str, Any], seen_at: tuple[float, float]) -> None:
-    """A point 20 m ahead at the LiDAR's height: below the middle of a camera that sits higher, right of one that sits
-    or looks to the left, above that of one that looks down."""
+    """A point 20 m ahead at the LiDAR's height appears below the image centre of a higher camera, right of it for a
+    camera mounted or turned to the left, and above it for one turned down."""
     calibration = CalibrationConfig.model_validate(
         {"fx_px": 900, "fy_px": 900, "cx_px": 640, "cy_px": 360, "width_px": 1280, "height_px": 720, "mount": mount}
     ).calibration()

@@ -36,7 +36,7 @@ def driven(*faults: Fault, camera_hz: float = 30.0, params: SyncParams | None = 
 
 
 def during(taken: list[Taken]) -> list[Taken]:
-    """While it lasts, the time to notice it apart."""
+    """The frames during the fault, without the time needed to notice it."""
     return [each for each in taken if FROM_S + 0.5 < each.at_s < TO_S]
 
 
@@ -45,7 +45,7 @@ def after(taken: list[Taken]) -> list[Taken]:
 
 
 def assert_well(taken: list[Taken]) -> None:
-    """Sweep with image and own motion, ten times a second."""
+    """Check that there are ten frames per second with sweep, image and ego motion."""
     assert len(taken) >= 4
     assert all(each.frame.sweep is not None and each.frame.image is not None for each in taken)
     assert all(each.frame.ego is not None and each.frame.gnss is not None for each in taken)
@@ -118,7 +118,7 @@ def test_garbage_between_costs_nothing(sensor: str) -> None:
 
 @pytest.mark.parametrize("kind", ["duplicate", "out_of_order"])
 def test_packets_doubled_or_overtaken_cost_no_sweep(kind: str) -> None:
-    """A packet that is overtaken by the first of the next rotation is the one that cannot be put where it belongs."""
+    """Only a packet overtaken by the first one of the next rotation cannot be restored to its place."""
     taken, bench = driven(*(fault(sensor, kind) for sensor in ("lidar", "camera", "gnss")))
     whole = [each for each in taken if each.frame.sweep is not None]
     assert len(whole) >= 38
@@ -238,7 +238,7 @@ def test_a_receiver_that_talks_but_lost_its_position_says_so() -> None:
 
 
 def packets_of(bench: Bench, seconds: float, other: bool = False) -> Iterator[tuple[int, bytes]]:
-    """When each is sent and what, of a LiDAR that sees a wall 20 m away, or of another one."""
+    """(send time, packet) of a LiDAR that sees a wall 20 m away, or of another one."""
     for event in sent([], seconds=seconds):
         if event.sensor == "lidar":
             stamp_ns = event.stamp_ns + (1_500 * MS + 700_000 if other else 0)
@@ -264,7 +264,7 @@ def test_a_clock_that_jumps_is_said_and_spoils_no_sweep(jump_s: float) -> None:
 
 
 def test_a_second_lidar_with_the_same_address_is_said_and_spoils_no_sweep() -> None:
-    """As both are bought: at 192.168.1.201. Nothing but their times and azimuths tells their packets apart."""
+    """Both have the factory address 192.168.1.201. Only times and azimuths distinguish their packets."""
     bench = Bench()
     lidar = cast("LidarInput", bench.source.inputs["lidar"])
     sizes = []

@@ -62,7 +62,7 @@ def test_after_the_window_the_rate_is_unknown_again() -> None:
 
 
 def test_health_may_be_asked_for_while_messages_arrive() -> None:
-    """A reader's thread counts while another asks; a thousand times over each other."""
+    """A reader's thread counts while another thread queries, a thousand times concurrently."""
     stats, stop = StreamStats("camera"), threading.Event()
 
     def count() -> None:

@@ -35,8 +35,8 @@ def leads(frames: list[Frame], params: Params, detectors: Detectors) -> list[Res
 
 
 def test_a_drive_over_the_network_has_the_lead_of_the_recording(sensors: list[LiveSensors]) -> None:
-    """Same drive, same line. The lead drives 23 m ahead at nearly our speed, so that a frame more or less is no matter;
-    what remains is a VLP-16's steps of 0.2° and 2 mm, and the JPEG."""
+    """The same drive and pipeline. The lead drives 23 m ahead at nearly ego speed, so one frame more or less does not
+    matter; what remains are a VLP-16's steps of 0.2° and 2 mm, and JPEG compression."""
     recording = open_source("sim:straight")
     recorded = [recording.frame(index) for index in range(86, 100)]
     camera = recorded[0].camera
@@ -134,7 +134,7 @@ def test_closing_twice_is_safe_and_gives_the_port_back(sensors: list[LiveSensors
 
 
 def test_a_real_capture_sent_back_is_decoded_as_its_file_is(sensors: list[LiveSensors], data_dir: Path) -> None:
-    """MRPT's capture of a VLP-16 indoors, its own packets at their own times."""
+    """MRPT's capture of a VLP-16 indoors: the original packets at their original times."""
     recording = open_source(f"pcap:{data_dir / 'vlp16_packets' / 'mrpt_sample_velodyne_vlp16_gps.pcap'}")
     assert isinstance(recording, PcapSource)
     direct = [recording.frame(index).sweep for index in range(len(recording))]

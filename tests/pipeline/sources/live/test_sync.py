@@ -23,7 +23,7 @@ def sweep(t_ms: float) -> Sweep:
 
 @dataclass
 class Bench:
-    """Times in milliseconds after the start."""
+    """A bench with times in milliseconds after the start."""
 
     sync: Synchroniser[str] = field(default_factory=Synchroniser)
     params: SyncParams = field(default_factory=SyncParams)
@@ -219,7 +219,7 @@ def test_own_motion_is_the_nearest_and_not_an_old_one() -> None:
 
 @pytest.mark.parametrize("rate_hz", [1, 2, 5, 10])
 def test_own_motion_holds_until_its_receiver_speaks_again(rate_hz: int) -> None:
-    """Fixes come 120 ms after their moment; then the receiver falls silent, and its last word holds no longer."""
+    """Fixes arrive 120 ms late; then the receiver falls silent, and its last value does not hold any longer."""
     bench, period_ms = Bench(), 1000 // rate_hz
     fixes = list(range(0, 6000, period_ms))
     for t in range(200, fixes[-1] + 3000, 100):

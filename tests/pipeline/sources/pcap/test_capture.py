@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.sources import SourceError
 from pipeline.sources.pcap.capture import Capture
-from tests.pipeline.sources.captures import ethernet, pcap, pcapng
+from tests.pipeline.sources.made.captures import ethernet, pcap, pcapng
 
 SENT = [(1_700_000_000_123_456_000 + i * 1_000_000, 2368 + i, bytes([i]) * (10 + i)) for i in range(5)]
 KINDS: dict[str, Callable[[], bytes]] = {

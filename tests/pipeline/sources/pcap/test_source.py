@@ -14,7 +14,7 @@ from pipeline.params import Params
 from pipeline.run import run
 from pipeline.sources import Source, SourceError, open_source
 from tests.pipeline.formats.velodyne.streams import PRODUCT, START_NS, STEP_NS, mrpt, with_byte
-from tests.pipeline.sources.captures import RIG, lidar, pcap, pcapng, sentences, write_capture, write_video
+from tests.pipeline.sources.made.captures import RIG, lidar, pcap, pcapng, sentences, write_capture, write_video
 
 
 def opened(folder: Path, data: bytes, options: str = "") -> Source:
@@ -171,7 +171,7 @@ def test_a_file_that_goes_away_degrades(tmp_path: Path) -> None:
 
 
 def test_memory_does_not_grow_with_the_file_and_opening_says_how_far_it_is(tmp_path: Path) -> None:
-    """75 packets of 1.2 kB a sweep lie in the file; a few dozen bytes a sweep stay in memory."""
+    """The file contains 75 packets of 1.2 kB per sweep, of which a few dozen bytes per sweep stay in memory."""
     path = tmp_path / "drive.pcap"
     head, body = pcap([]), pcap(lidar(2))[24:]
     with path.open("wb") as file:
@@ -198,7 +198,7 @@ def test_memory_does_not_grow_with_the_file_and_opening_says_how_far_it_is(tmp_p
 
 
 def later(body: bytes, by_ns: int) -> bytes:
-    """Records of a capture, and the packets in them, later by that much."""
+    """Records of a capture and their packets, later by this much."""
     rows = np.frombuffer(body, np.uint8).reshape(-1, 1264).copy()
     seconds, micros = (rows[:, at : at + 4].view("<u4")[:, 0].astype(np.int64) for at in (0, 4))
     t_us = seconds * 1_000_000 + micros + by_ns // 1000

@@ -15,7 +15,7 @@ from pipeline.params import Params
 from pipeline.run import run
 from pipeline.sources import SourceError, open_source
 from tests.pipeline.formats.velodyne.streams import PRODUCT, START_NS, ring_wall, with_byte
-from tests.pipeline.sources.bags import (
+from tests.pipeline.sources.made.bags import (
     HEADER_NS,
     HEIGHT,
     POINT,
@@ -37,7 +37,7 @@ def path_of(folder: Path, kind: Kind) -> Path:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_sensor_of_a_bag(kind: Kind, tmp_path: Path) -> None:
-    """Turned by the car's own axes: what the LiDAR, which sits turned to the left, sees at its right is ahead."""
+    """The LiDAR is mounted turned to the left: an object on its right is ahead of the car."""
     told: list[tuple[int, int]] = []
     uri = f"rosbag:{write_bag(path_of(tmp_path, kind), kind)}"
     source = open_source(uri, progress=lambda done, total: told.append((done, total)))
@@ -185,7 +185,7 @@ def test_a_camera_without_transform_is_not_fused(tmp_path: Path) -> None:
 
 
 def test_a_transform_to_the_cameras_body_will_do(tmp_path: Path) -> None:
-    """Many bags call the body's frame, x forward, the camera's."""
+    """In many bags, the camera's frame is that of its body, with x forward."""
     with BagWriter(tmp_path / "drive", "db3") as bag:
         bag.write("/tf_static", bag.transforms(("velodyne", "camera_optical", (0, 0, 0.2), (0, 0, 0, 1.0))), HEADER_NS)
         bag.write("/points", bag.cloud(ring_wall(0), HEADER_NS), HEADER_NS)
@@ -309,7 +309,7 @@ def test_a_bad_cloud_degrades_its_frame(what: str, tmp_path: Path) -> None:
 
 
 def test_nebula(data_dir: Path) -> None:
-    """A bag without definitions, of a driver that cuts straight ahead."""
+    """A bag without message definitions, from a driver that cuts sweeps straight ahead."""
     name = "nebula_1673400471837873222_1673400471837873222_0.db3"
     source = open_source(f"rosbag:{data_dir / 'vlp16_packets' / name}")
     assert len(source) == 3

@@ -15,7 +15,7 @@ from rosbags.rosbag2 import reader as rosbag2
 from pipeline.sources import SourceError, open_source
 from pipeline.sources.rosbag import unpack_budget
 from pipeline.sources.rosbag.unpack_budget import TooLarge, bounded
-from tests.pipeline.sources.bags import write_bag
+from tests.pipeline.sources.made.bags import write_bag
 
 unpack_budget.install()
 MANY = bytes(64 << 20)

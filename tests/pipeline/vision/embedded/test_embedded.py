@@ -29,7 +29,7 @@ def random_traffic(detector: Detector) -> list[Bin]:
 
 @pytest.fixture(scope="module")
 def built_in(detector: Detector) -> list[Bin]:
-    """Moments of built-in scenarios: following and cut in, a bend, a crossing."""
+    """Moments of built-in scenarios: following, a cut-in, a bend, a crossing."""
     drives = (islice(drive(name, 2.0), 7) for name in ("straight", "curve_250", "turn_across_left"))
     return evaluate(detector, chain.from_iterable(drives))
 
@@ -48,7 +48,7 @@ def test_the_lead_is_found(random_traffic: list[Bin], built_in: list[Bin]) -> No
 
 
 def test_a_motorcycle_before_a_larger_vehicle_is_found(detector: Detector) -> None:
-    """Measured 23 of 28; with the score that the other classes have it is 21."""
+    """Measured: 23 of 28; with the score threshold of the other classes, 21."""
     rides = chain.from_iterable(moments(seed, 40, _follows_a_motorcycle) for seed in JUDGE_SEEDS)
     near = within(evaluate(detector, rides), LEAD_M)
     assert near.leads >= 25
@@ -56,7 +56,7 @@ def test_a_motorcycle_before_a_larger_vehicle_is_found(detector: Detector) -> No
 
 
 def _follows_a_motorcycle(now: World) -> bool:
-    """Whether the nearest vehicle straight ahead is one, at less than ``LEAD_M``."""
+    """Whether the nearest vehicle straight ahead is a motorcycle within ``LEAD_M``."""
     ahead = [s for s in now.actors if 0.0 < s.cuboid.center[0] < LEAD_M and abs(s.cuboid.center[1]) < 1.5]
     return bool(ahead) and ahead[-1].actor.kind == "motorcycle"
 

@@ -12,31 +12,31 @@ import pytest
 from fastapi import FastAPI
 
 from app.labels.service.desk import LabelDesk
-from app.web.limits import BodyLimit
+from app.web.guards.limits import BodyLimit
 from app.web.routes.labels.files import IMPORT, label_files_router
 from tests.app.waiting import loop_apart
 
 MOST = 10
-"""Bytes of a file."""
+"""Maximum size of a file in bytes."""
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where uploads lie."""
+    """The folder of uploads."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     return tmp_path
 
 
 @pytest.fixture
 def desk() -> Iterator[LabelDesk]:
-    """Nothing is open."""
+    """A desk without an open recording."""
     desk = LabelDesk()
     yield desk
     desk.stop()
 
 
 def upload(desk: LabelDesk, *messages: dict[str, Any]) -> int:
-    """The status of the answer to a body that comes in these pieces."""
+    """Status code of the response to a body that arrives in these pieces."""
     app = FastAPI()
     app.include_router(label_files_router(desk))
     coming, sent = iter(messages), []

@@ -18,7 +18,7 @@ MULTIPART = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace;boundar
 
 @contextmanager
 def answering(answer: bytes) -> Iterator[str]:
-    """A server that says ``answer`` to whoever asks, and closes."""
+    """A server that sends ``answer`` to every client, and closes."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
 
         def serve() -> None:
@@ -35,7 +35,7 @@ def answering(answer: bytes) -> Iterator[str]:
 
 
 class StopAtLook(ReaderStop):
-    """Set when it is looked at for the n-th time."""
+    """An event that is set when it is read for the n-th time."""
 
     def __init__(self, number: int) -> None:
         super().__init__()

@@ -28,7 +28,7 @@ PYTHON = shutil.which("python3", path=os.defpath)
 
 @contextmanager
 def camera(codec: str, port: int) -> Iterator[None]:
-    """A camera that is plugged in; pulled out at the end."""
+    """A camera that is plugged in, and unplugged at the end."""
     assert PYTHON is not None
     command = [PYTHON, str(CAMERA), codec, str(port)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -44,7 +44,7 @@ def camera(codec: str, port: int) -> Iterator[None]:
 @pytest.mark.skipif(PYTHON is None, reason="no Python of the system")
 @pytest.mark.parametrize("codec", ["h264", "mjpeg"])
 def test_a_camera_that_speaks_rtsp(codec: str) -> None:
-    """Plugged in late, pulled out, and plugged in again."""
+    """Plugged in late, unplugged, and plugged in again."""
     port = free_port(socket.SOCK_STREAM)
     camera_at = {"url": f"rtsp://127.0.0.1:{port}/front"}
     source = LiveSensors("live:rtsp", loopback_config(lidar=None, gnss=None, ego=None, camera=camera_at))
@@ -75,7 +75,7 @@ FLOODS = {
 
 @pytest.mark.parametrize("flood", FLOODS)
 def test_a_camera_that_floods_instead_of_answering_is_given_up_and_takes_no_memory(flood: str) -> None:
-    """As fast as the loopback goes. Given up in a bounded time, however long it goes on."""
+    """At the speed of the loopback. The connection is abandoned within a bounded time, however long the flood lasts."""
     first, rest = FLOODS[flood]
     ended = threading.Event()
 

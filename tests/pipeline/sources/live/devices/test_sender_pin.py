@@ -72,8 +72,8 @@ def test_the_second_port_follows_the_first() -> None:
 
 
 def test_a_flood_of_another_sender_costs_the_first_no_datagram_and_no_memory() -> None:
-    """As fast as a thread can send, twenty thousand datagrams into a buffer that holds three thousand; the sensor sends
-    two thousand in between and each arrives."""
+    """Twenty thousand datagrams, as fast as a thread can send, into a buffer for three thousand; the sensor's two
+    thousand in between all arrive."""
     refused: Counter[str] = Counter()
     chosen = SenderPin("LiDAR", None, lambda data: data[:1] == b"s", refused, by_port=True, silent_s=60.0)
     port, stop, came, first = free_port(socket.SOCK_DGRAM), ReaderStop(), [], threading.Event()

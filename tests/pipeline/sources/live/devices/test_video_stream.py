@@ -110,7 +110,7 @@ def test_a_camera_that_is_not_plugged_in_is_said(sensors: list[LiveSensors]) -> 
 
 
 def film(path: Path, count: int) -> None:
-    """A video of grey images, each brighter than the one before."""
+    """A video of grey images, each brighter than the last."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("mpeg4", rate=25)
         stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"

@@ -117,7 +117,7 @@ def test_a_dbc_file_without_the_signals_is_said_at_once(
 
 
 def test_a_receiver_on_a_serial_line_comes_goes_and_comes(sensors: list[LiveSensors]) -> None:
-    """A pair of pseudo-terminals is a serial line; closing its other end pulls the plug."""
+    """A pair of pseudo-terminals acts as a serial line; closing the other end unplugs it."""
     ours, theirs = os.openpty()
     tty.setraw(theirs)
     config = LiveConfig.model_validate({"lidar": {"data_port": free_port(socket.SOCK_DGRAM), "position_port": None},

@@ -1,0 +1,1 @@
+"""The simulated LiDAR: its model, its rays and what they hit."""
