@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from app.bench import clients as clients_bench
 from app.bench.calibration import speed_warning
@@ -23,6 +23,8 @@ from app.fleet.extra import need_extra
 from pipeline.common.errors import BadInput
 
 CLIENTS_EACH_S, PAGE_S = 6.0, 12.0
+_PEER_WIDTH, _FILE_WIDTH = 18, 120
+"""Columns of the narrowest legible table, and of one that is written to a file."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,10 @@ class Bench:
         if self.json:
             print(json.dumps(figures, indent=1))
         else:
-            Console().print(_table(figures))
+            terminal = Console()
+            Console(width=None if terminal.is_terminal else _FILE_WIDTH).print(_table(figures))
+            for sentence in _absent(figures):
+                print(sentence)
         _warn(warning)
         _warn(speed_warning(figures[CALIBRATION]))
         return _judge(broken(figures))
@@ -92,7 +97,9 @@ def _judge(failures: Iterable[str]) -> int:
 
 
 def _table(figures: dict[str, dict[str, Any]]) -> Table:
-    table = Table("stage", "median ms", "p99 ms", "samples", "peer", "median ms", "times faster", title="cipv bench")
+    stage_column, peer_column = Column("stage", no_wrap=True), Column("peer", min_width=_PEER_WIDTH)
+    columns = (stage_column, "median ms", "p99 ms", "samples", peer_column, "median ms", "times faster")
+    table = Table(*columns, title="cipv bench")
     for stage, row in figures.items():
         peers = [_peer_cells(name, peer) for name, peer in row["peers"].items()] or [_remark(row)]
         for n, cells in enumerate(peers):
@@ -101,6 +108,17 @@ def _table(figures: dict[str, dict[str, Any]]) -> Table:
             )
             table.add_row(*own, *cells)
     return table
+
+
+def _absent(figures: dict[str, dict[str, Any]]) -> Iterator[str]:
+    """A sentence for each reason why peers could not be measured, with their names."""
+    names: dict[str, list[str]] = {}
+    for row in figures.values():
+        for name, peer in row["peers"].items():
+            if peer["ratio"] is None and name not in names.setdefault(peer["absent"], []):
+                names[peer["absent"]].append(name)
+    for reason, peers in names.items():
+        yield f"Absent: {'; '.join(peers)}: {reason}"
 
 
 def _remark(row: dict[str, Any]) -> tuple[str, str, str]:
@@ -113,7 +131,7 @@ def _remark(row: dict[str, Any]) -> tuple[str, str, str]:
 
 
 def _peer_cells(name: str, peer: dict[str, Any]) -> tuple[str, str, str]:
-    """The cells of a peer; if it could not be measured, they say why."""
+    """The cells of a peer; ``_absent`` says why one could not be measured."""
     if peer["ratio"] is None:
-        return name, "absent", peer["absent"]
+        return name, "absent", ""
     return name, f"{peer['median_ms']:.2f}", f"{peer['ratio']:.1f} ×"

@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 
 from app.bench import whole_pipeline
-from app.commands.bench import _table
+from app.commands.bench import _absent, _table
 from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.sources import open_source
@@ -61,6 +61,16 @@ def test_the_step_is_measured_alone_and_beside_the_network(tmp_path: Path, monke
     Console(width=160, file=printed).print(_table(figures))
     assert f"p99 is {beside['p99_to_idle_median']:.1f} × the idle step's median" in printed.getvalue()
     assert all(f" {row['samples']} " in printed.getvalue() for row in figures.values())
+
+
+def test_why_peers_are_absent_is_said_once_below_the_table() -> None:
+    peer = {"median_ms": None, "ratio": None, "absent": "no library: nowhere"}
+    row = {"median_ms": 1.0, "p99_ms": 2.0, "samples": 3, "peers": {"open3d": peer, "voxels": peer}}
+    assert list(_absent({"one": row, "two": row})) == ["Absent: open3d; voxels: no library: nowhere"]
+    printed = StringIO()
+    Console(width=80, file=printed).print(_table({"one": row}))
+    assert "absent" in printed.getvalue()
+    assert "nowhere" not in printed.getvalue()
 
 
 def test_each_round_goes_on_where_the_last_one_ended() -> None:
