@@ -16,6 +16,7 @@ from pipeline.types.source import SourceError, TruthObject
 WIDTH, HEIGHT = 320, 180
 FOCAL_PX = 250.0
 GROUND_M = -0.6
+NEAREST_M = 2.0
 PERIOD_NS = 100_000_000
 HANGS_S = 600.0
 """A hung disk hangs for longer than any test waits, even on a busy machine."""
@@ -105,7 +106,7 @@ class Recording:
         assert self.gate.wait(HANGS_S)
         if index in self._broken:
             raise OSError(f"frame {index} is not there")
-        distance_m = 30.0 - 0.4 * index
+        distance_m = max(30.0 - 0.4 * index, NEAREST_M)  # it comes nearer, then stands still before the car
         t_ns = self.t_ns(index)
         points, ring = _points(distance_m)
         return Frame(
