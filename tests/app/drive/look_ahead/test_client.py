@@ -45,11 +45,6 @@ def process(detectors: Detectors) -> Iterator[NetworkProcess]:
     process.close()
 
 
-@pytest.fixture(autouse=True)
-def _at_usual_priority(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client, "_COMMAND", COMMAND)
-
-
 def test_detections_are_the_same_to_the_last_bit(process: NetworkProcess, detectors: Detectors) -> None:
     there = process.detectors
     assert there.names == detectors.names

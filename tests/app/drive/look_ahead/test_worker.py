@@ -50,11 +50,6 @@ def drives() -> Iterator[BackgroundRuns]:
     drives.stop()
 
 
-@pytest.fixture(autouse=True)
-def _at_usual_priority(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client, "_COMMAND", COMMAND)
-
-
 def computed(drives: BackgroundRuns, detectors: Detectors) -> DriveRun:
     """The run that the drives make."""
     drives.start()
