@@ -103,6 +103,8 @@ class Evaluate:
             raise BadInput(f"--dashboard {self.dashboard}: not a valid address; expected e.g. {DASHBOARD}")
         if not 0.0 < self.max_range_m < 1000.0:
             raise BadInput(f"--max-range-m {self.max_range_m:g}: expected metres, more than 0 and less than 1000")
+        if self.classes is not None:
+            read_classes(given_path(self.classes))  # report a bad file before the work, also if no label needs it
 
     def _base_preset(self) -> str | None:
         """The preset named by --against; None if it names a file of results."""

@@ -92,6 +92,8 @@ def test_labels_of_a_sub_class_are_scored_as_its_parent(
     assert recall() is None, "nobody said what a taxi is"
     assert recall("--classes", str(classes)) is not None
     assert evaluate(SOURCE, "--truth", str(truth), "--classes", str(tmp_path / "none.yaml")) == 2
+    classes.write_text("classes: [1, 2]", encoding="utf-8")
+    assert evaluate(SOURCE, "--classes", str(classes)) == 2
     assert "none.yaml" in capsys.readouterr().err
 
 
