@@ -55,7 +55,13 @@ export function setUp() {
     edgesButton(),
     regionsButton,
   );
-  bar.after(rangesRow, el("div", { class: "fit-place" }, alignmentFit.panel, timeFit.panel, versionsPanel));
+  bar.after(rangesRow, el(
+      "div",
+      { class: "fit-place" },
+      el("div", { class: "fits" }, alignmentFit.panel, timeFit.panel),
+      versionsPanel,
+    ),
+  );
   followHand($("#camera", HTMLCanvasElement), isOn);
   addLayer((ctx, frame, place) => isOn() && get("align")?.edges && drawEdges(ctx, frame, place));
   addLayer((ctx, frame, place) => isOn() && get("align")?.regions && drawRegions(ctx, frame, place), "over");
