@@ -100,8 +100,8 @@ export function fitJob(kind) {
     bar.value = fit.progress;
     if (isRunning) timer = setTimeout(poll, POLL_MS);
     if (fit.state === "failed") return fail(new Error(fit.note));
-    panel.hidden = !fit.result;
-    if (!fit.result) return;
+    if (!fit.result) return void (panel.hidden = true);
+    reveal();
     const { changes, sigmas } = fit.result;
     text(heading, kind.heading(fit.result));
     values.replaceChildren(
@@ -135,6 +135,12 @@ export function fitJob(kind) {
     showWarnings([]);
     apply.hidden = true;
     if (kind.more) kind.more.hidden = true;
+    reveal();
+  }
+
+  /** Shown above the results of other fits. */
+  function reveal() {
+    if (panel.hidden) panel.parentElement?.prepend(panel);
     panel.hidden = false;
   }
 
