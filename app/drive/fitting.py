@@ -12,7 +12,7 @@ from app.drive.open_recording import OpenRecording
 from pipeline.calibration.alignment.drive import fit_drive
 from pipeline.calibration.alignment.fit import AlignmentFit
 from pipeline.calibration.alignment.models import ModelName
-from pipeline.calibration.times import Times, fit_times
+from pipeline.calibration.times import TimeOffsets, fit_times
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress
 from pipeline.params import Params
@@ -77,10 +77,10 @@ class AlignmentFitting(_Fitting[AlignmentFit]):
         )
 
 
-class TimeFitting(_Fitting[Times]):
+class TimeFitting(_Fitting[TimeOffsets]):
     """The time offsets of the camera and of ego speed."""
 
-    def begin(self, recording: OpenRecording, params: Params) -> BackgroundJob[Times]:
+    def begin(self, recording: OpenRecording, params: Params) -> BackgroundJob[TimeOffsets]:
         """FitRefused if another fit is running."""
         source = recording.setup.source
         return self._start(recording, "time fit", lambda told: fit_times(source, params, told))

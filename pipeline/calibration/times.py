@@ -17,7 +17,7 @@ class NoTimes(NoOffset):
 
 
 @dataclass(frozen=True)
-class Times:
+class TimeOffsets:
     """The time offsets of a drive."""
 
     camera: TimeOffset | None
@@ -61,7 +61,7 @@ class Times:
         return (*(self.camera.warnings if self.camera is not None else ()), *self.untold)
 
 
-def fit_times(source: Source, params: Params, progress: Progress = silent) -> Times:
+def fit_times(source: Source, params: Params, progress: Progress = silent) -> TimeOffsets:
     """The time offsets of a recording. Raises NoTimes if it determines neither. An exception of ``progress`` ends
     it."""
     scenes, speeds = watch(source.frame, len(source), params, progress)
@@ -69,8 +69,8 @@ def fit_times(source: Source, params: Params, progress: Progress = silent) -> Ti
     return times_of(scenes, speeds, recorded.sync.camera_offset_ms if recorded is not None else 0.0)
 
 
-def times_of(scenes: Sequence[MovingScene], speeds: Sequence[SpeedPair], recorded_ms: float = 0.0) -> Times:
-    """The offsets of the camera and of ego speed. recorded_ms: see ``Times``. Raises NoTimes if neither is
+def times_of(scenes: Sequence[MovingScene], speeds: Sequence[SpeedPair], recorded_ms: float = 0.0) -> TimeOffsets:
+    """The offsets of the camera and of ego speed. recorded_ms: see ``TimeOffsets``. Raises NoTimes if neither is
     determined."""
     camera: TimeOffset | None = None
     ego: SpeedDelay | None = None
@@ -85,4 +85,4 @@ def times_of(scenes: Sequence[MovingScene], speeds: Sequence[SpeedPair], recorde
         untold.append(str(error))
     if camera is None and ego is None:
         raise NoTimes("; ".join(untold))
-    return Times(camera, ego, tuple(untold), len(scenes), len(speeds), recorded_ms)
+    return TimeOffsets(camera, ego, tuple(untold), len(scenes), len(speeds), recorded_ms)

@@ -11,7 +11,7 @@ from app.engine.engine import Engine
 from app.web.refusals import open_recording, refusing
 from app.web.routes.alignment.progress import FitProgress, progress_of
 from app.web.routes.shapes.common import ApiModel, StatusJson
-from pipeline.calibration.times import Times
+from pipeline.calibration.times import TimeOffsets
 
 
 class TimeFitResult(ApiModel):
@@ -63,12 +63,12 @@ def time_fit_router(engine: Engine, fitting: TimeFitting) -> APIRouter:
     return router
 
 
-def _json(job: BackgroundJob[Times] | None) -> TimeFitJson:
+def _json(job: BackgroundJob[TimeOffsets] | None) -> TimeFitJson:
     found = job.result if job is not None else None
     return TimeFitJson(**vars(progress_of(job)), result=_result(found) if found is not None else None)
 
 
-def _result(found: Times) -> TimeFitResult:
+def _result(found: TimeOffsets) -> TimeFitResult:
     return TimeFitResult(
         changes=found.changes,
         sigmas=found.sigmas,
