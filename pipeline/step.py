@@ -19,7 +19,7 @@ from pipeline.alignment import projection
 from pipeline.common.stopwatch import Stopwatch
 from pipeline.decision import acc, aeb, braking_evidence, cipv, object_motion
 from pipeline.ego_motion import own_motion
-from pipeline.fusion import agreement, existence, ground_contact, returns
+from pipeline.fusion import agreement, existence, ground_contact, merged_clusters, returns
 from pipeline.fusion import fuse as fusion
 from pipeline.fusion.drift import follow as drift
 from pipeline.lanes import road_lines as lanes
@@ -101,6 +101,7 @@ def step(
 
     # Camera: the detector's boxes, each with a distance from its height, tracked from image to image
     boxes = _measure_boxes(frame, aligned, params)
+    boxes = merged_clusters.range_boxes(boxes, sweep, aligned, params.fusion)
     boxes = returns.range_boxes(boxes, sweep, aligned, params.fusion)
     road = ground_contact.road_ahead(sweep.points, sweep.ground, boxes, aligned, now.speed_mps)
     boxes = ground_contact.measure_contacts(boxes, road, aligned, params.fusion)

@@ -187,6 +187,10 @@ class FusionParams(Section):
         "σ",
         "Largest difference between the two distances; 1.5 σ of a box's distance is 30 % of it",
     )
+    merged_clusters: bool = choice(
+        True,
+        "Range a box by the points inside it where their cluster is longer than any vehicle, such as car and hedge",
+    )
     single_returns: bool = choice(
         True, "Range far vehicles by single LiDAR returns inside their boxes, too few for a cluster"
     )

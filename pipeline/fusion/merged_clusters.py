@@ -1,0 +1,118 @@
+"""Ranges a near vehicle whose LiDAR cluster has merged with the roadside.
+
+A car in front of a hedge, or parked along it, often forms one cluster with it. That cluster is longer than any vehicle,
+so it is no object that a box could be joined with, and the car is left with the camera's distance, or, if the image's
+edge cuts its box, with none. But its points are inside its box: the nearest group of them is its nearest face. Of 284
+labelled vehicles within 30 m on Astyx and KITTI, 7 are in such a cluster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from pipeline.alignment.projection import Alignment
+from pipeline.common.fast_replace import evolve
+from pipeline.common.geometry import F64
+from pipeline.fusion.returns import SweepReturns
+from pipeline.fusion.vehicle_sizes import largest_size_m
+from pipeline.params import FusionParams
+from pipeline.types import VEHICLES, Obstacle, VisionMeasurement
+
+FARTHEST_M = 30.0
+"""Beyond this, points are few, and ``returns`` ranges boxes by single ones."""
+SIGMA_M = 0.3
+"""Standard deviation of the nearest face's distance: points at the edge of a box may belong to what is behind it."""
+_EDGE_SHARE = 0.1
+"""Margin inside the box at either side and at the top, as a share of its size: boxes drawn too wide, and calibration
+errors. Below it is the road, whose points do not count anyway."""
+_GAP_M, _FEWEST = 0.5, 20
+"""A group of points ends at a larger gap in range than the first, and counts with at least the second number: a car at
+30 m returns 30 points."""
+_LOW_M, _HIGH_M = 0.25, 3.5
+"""Heights above the road between which a vehicle returns rays."""
+_SIGMAS = 3.0
+"""If the camera knows a distance, the range must agree with it within this many standard deviations."""
+
+
+class SweepWithClusters(SweepReturns, Protocol):
+    """A segmented sweep with its clusters."""
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...] | None:
+        """One per cluster."""
+        ...
+
+
+def range_boxes(
+    boxes: tuple[VisionMeasurement, ...] | None,
+    sweep: SweepWithClusters,
+    alignment: Alignment | None,
+    params: FusionParams,
+) -> tuple[VisionMeasurement, ...] | None:
+    """The boxes; those of near vehicles with points in a cluster that is longer than any vehicle of their class get
+    ``ranged_m`` and ``returns``, and a place if the camera gives none."""
+    if not params.merged_clusters or not boxes or alignment is None or sweep.ground is None or not sweep.obstacles:
+        return boxes
+    asked = [each.detection.label in VEHICLES and (each.distance_m or 0.0) < FARTHEST_M for each in boxes]
+    longest = max(max(each.cuboid.size[:2]) for each in sweep.obstacles)
+    if not any(asked) or longest <= largest_size_m("car")[0]:
+        return boxes
+    return tuple(
+        _ranged(each, sweep, sweep.obstacles, alignment) if ask else each
+        for each, ask in zip(boxes, asked, strict=True)
+    )
+
+
+def _ranged(
+    seen: VisionMeasurement, sweep: SweepWithClusters, obstacles: Sequence[Obstacle], alignment: Alignment
+) -> VisionMeasurement:
+    longest_m = largest_size_m(seen.detection.label)[0]
+    merged = [each.cluster for each in obstacles if max(each.cuboid.size[:2]) > longest_m]
+    points = sweep.points[np.isin(sweep.kind, merged), :3].astype(np.float64)
+    inside = points[_is_inside(alignment.project(points), seen.detection.bbox)]
+    assert sweep.ground is not None
+    height_m = sweep.ground.above(inside)
+    inside = inside[(height_m > _LOW_M) & (height_m < _HIGH_M)]
+    range_m = np.hypot(inside[:, 0], inside[:, 1])
+    order = np.argsort(range_m, kind="stable")
+    group = _nearest_group(range_m[order])
+    if group is None:
+        return seen
+    rows = order[group]
+    nearest_m = float(range_m[rows[0]])
+    if seen.distance_m is not None and seen.sigma_m is not None:
+        if abs(nearest_m - seen.distance_m) > _SIGMAS * seen.sigma_m:
+            return seen
+        return evolve(seen, ranged_m=nearest_m, ranged_sigma_m=SIGMA_M, returns=len(rows))
+    bearing = np.arctan2(np.median(inside[rows, 1]), np.median(inside[rows, 0]))
+    place = (float(nearest_m * np.cos(bearing)), float(nearest_m * np.sin(bearing)))
+    return evolve(
+        seen,
+        distance_m=nearest_m,
+        sigma_m=SIGMA_M,
+        position=place,
+        ranged_m=nearest_m,
+        ranged_sigma_m=SIGMA_M,
+        returns=len(rows),
+    )
+
+
+def _is_inside(uv: F64, bbox: tuple[float, float, float, float]) -> np.ndarray:
+    """(N,) whether pixels, NaN behind the camera, lie well inside a box."""
+    x1, y1, x2, y2 = bbox
+    across, down = _EDGE_SHARE * (x2 - x1), _EDGE_SHARE * (y2 - y1)
+    with np.errstate(invalid="ignore"):
+        u, v = uv[:, 0], uv[:, 1]
+        return np.asarray((u > x1 + across) & (u < x2 - across) & (v > y1 + down) & (v < y2))
+
+
+def _nearest_group(range_m: F64) -> slice | None:
+    """The nearest group with enough points, of (N,) sorted ranges; None without one."""
+    cuts = np.concatenate([[0], np.flatnonzero(np.diff(range_m) > _GAP_M) + 1, [len(range_m)]])
+    for start, end in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
+        if end - start >= _FEWEST:
+            return slice(start, end)
+    return None
