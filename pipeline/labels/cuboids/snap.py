@@ -3,12 +3,12 @@
 The non-ground points in and near it are clustered; the cluster with most points in it (or else near it) is the vehicle.
 Points outside the cuboid contradict it; a gap between its side and the points does not, because that part of the
 vehicle may be hidden. So a cuboid that contains its points is left unchanged, unless they span its whole length and
-width. Otherwise, several placements are tried:
-the visible sides fitted to the points, with the yaw kept or taken from the points. The best one is used only if its
-sides explain the points, if it fits those of this sweep and of the sweeps around it clearly better than the original,
-and if both place it alike. Otherwise, too, the cuboid is left unchanged: a dozen points beyond 35 m are no better than
-a person's judgement of the image. A vehicle is never seen completely, so the size only grows to contain its points; where
-both of its ends were seen, in one sweep or over several, the measured size is used. The cuboid stands on the ground.
+width. Otherwise, several placements are tried: the visible sides fitted to the points, with the yaw kept or taken from
+the points. The best one is used only if its sides explain the points, if it fits those of this sweep and of the sweeps
+around it clearly better than the original, and if both place it alike. Otherwise, too, the cuboid is left unchanged: a
+dozen points beyond 35 m are no better than a person's judgement of the image. A vehicle is never seen completely, so
+the size only grows to contain its points; where both of its ends were seen, in one sweep or over several, the measured
+size is used. The cuboid stands on the ground.
 
 The yaw comes from the closeness fit of the pipeline (``pipeline.lidar.boxes``). Open3D's minimal oriented box, which
 fits all three axes or, on flattened points, the smallest area, is less accurate on every real recording available: the
@@ -49,7 +49,8 @@ _CONTAINS_M = 0.02
 """A cuboid contains its points if they are outside by less than this on average: the noise of a VLP-16 (3 cm, standard
 deviation) on the points of one side. Without the rules on contained, explained, widened and turned cuboids, those drawn
 on labelled vehicles got worse (by more than 0.02 IoU) in 4 % (Astyx), 12 % (its further frames), 6 % (KITTI 0009) and
-4 % (0052) of the cases; with this rule alone in 0, 4, 1 and 4 %, with all of them in 0.5, 1.4, 0.8 and 3 % (2 of 63)."""
+4 % (0052) of the cases; with this rule alone in 0, 4, 1 and 4 %, with all of them in 0.5, 1.4, 0.8 and 3 % (2 of
+63)."""
 _WHOLE = 0.8
 """Share of length and width that the points must span to show the whole vehicle: its corners are round."""
 _EXPLAINED_M = 0.15

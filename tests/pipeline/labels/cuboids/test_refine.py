@@ -153,8 +153,8 @@ def hand_drawn(sightings: tuple[Sighting, ...], rng: np.random.Generator) -> lis
 
 
 def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
-    """Up to 15 m, for the side that faces the sensor, where it changes anything. A mesh's bumper is not flat, so its face lies some centimetres
-    inside."""
+    """Up to 15 m, for the side that faces the sensor, where it changes anything. A mesh's bumper is not flat, so its
+    face lies some centimetres inside."""
     source = open_source("sim:straight")
     names = tuple(str(index) for index in range(len(source)))
     labels, _ = truth_labels(source, names, ORIGIN)
