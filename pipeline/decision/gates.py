@@ -226,7 +226,8 @@ def _probable(who: Candidate) -> Answer:
 
     For a new lead, the required probability of existence is higher than that of being in the path: braking for a false
     object is worse than braking for a car beside the path, and far away no position is certain. Standing vehicles must
-    be in the path with a higher probability: of 43 standing vehicles within 40 m on two KITTI drives, 2 were. Oncoming
+    be in the path with a higher probability: of 43 standing vehicles within 40 m on two KITTI drives, 2 were. So must
+    what only the LiDAR sees: a wall or a hedge that comes into view bit by bit seems to move. Oncoming
     traffic must be in it almost certainly: its drivers keep clear of us, and before a bend is known, oncoming cars seem
     to come straight at us.
     """
@@ -255,7 +256,8 @@ def _needed_probability(who: Candidate) -> float:
     usual, params = who.params.become_probability, who.params
     if who.item.oncoming:
         return max(usual, params.become_oncoming)
-    return max(usual, params.become_standing) if who.item.surely_moving is False else usual
+    may_stand = who.item.surely_moving is False or not who.item.imaged
+    return max(usual, params.become_standing) if may_stand else usual
 
 
 def _in_path_probability(who: Candidate) -> float:

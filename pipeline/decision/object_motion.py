@@ -19,6 +19,8 @@ SMALLEST_CLOSING_MPS = 0.1
 """If a gap shrinks more slowly than this, it is not measurable, and there is no TTC."""
 _SMALLEST_GAP_M = 0.1
 _SURE_SIGMAS = 2.0
+_STEADY = 5
+"""Steady sightings by a ranging sensor after which its speed is known: to 0.6 m/s with 0.2 m per sighting at 10 Hz."""
 _ONCOMING_MPS = 3.0
 """A slower object may only seem to be oncoming due to its speed error."""
 
@@ -65,6 +67,11 @@ def _described(item: FusedObject, ego: EgoState | None, params: MotionParams) ->
         ttc_s=ttc,
         speed_over_ground_mps=speed,
         moving=speed > params.moving_mps,
-        surely_moving=speed - _SURE_SIGMAS * (item.camera_speed_sigma_mps or 0.0) > params.moving_mps,
+        surely_moving=_has_sure_speed(item)
+        and speed - _SURE_SIGMAS * (item.camera_speed_sigma_mps or 0.0) > params.moving_mps,
         oncoming=-vx > max(_ONCOMING_MPS, abs(vy)),
     )
+
+
+def _has_sure_speed(item: FusedObject) -> bool:
+    return not item.ranged or item.ranged_steady >= _STEADY

@@ -16,6 +16,7 @@ import numba
 import numpy as np
 
 from pipeline.common.near_face import outlines, without_flank
+from pipeline.fusion.vehicle_sizes import LONGEST_M
 from pipeline.params import CipvParams
 from pipeline.path.corridor import nearest
 from pipeline.path.estimates import STEP_M
@@ -33,8 +34,10 @@ CAMERA_SIDEWAYS_PER_S = 0.02
 lateral position varies with the estimated distance."""
 _SLANTED = 0.64
 """Rotated by more than 20° from along or across the path, as |sin 2φ|."""
-_WIDEST_M, _LONGEST_M = 3.2, 6.0
-"""Maximum extent across the path of a vehicle that drives along it, and the length of its flank that may be visible."""
+_WIDEST_M = 3.2
+"""Maximum extent across the path of a vehicle that drives along it, without its flank."""
+_LONGEST_M = 6.0
+"""Length of a car's flank that may be visible. Trucks and buses: ``LARGEST_SIZE_M``."""
 _CAR_LENGTH_M, _SLOWEST_MPS, _MOST_TURNED = 4.5, 5.0, 0.2
 """A car that changes lanes and is faster than the second is rotated by lateral speed over forward speed, at most by the
 third; its nose is ahead by the first."""
@@ -147,6 +150,7 @@ def place(
         path.right if has_edges else path.center,
         0.0 if has_edges else path.half_width_m,
         path.profile_m if len(path.profile_m) else np.zeros(len(path.center)),
+        path.corner_m if len(path.corner_m) else np.zeros(len(path.center)),
         STEP_M,
         params.min_overlap_m,
         params.use_flank,
@@ -168,13 +172,15 @@ def place(
 def warm_up() -> None:
     """Compile the kernel before the first frame."""
     center = np.column_stack([np.arange(3.0), np.zeros(3)])
-    _against(np.zeros((1, 19)), center, center, center, 1.5, np.zeros(3), STEP_M, 0.9, True, True, 0.0, 0.0)
+    _against(
+        np.zeros((1, 21)), center, center, center, 1.5, np.zeros(3), np.zeros(3), STEP_M, 0.9, True, True, 0.0, 0.0
+    )
 
 
 def _numbers(item: FusedObject) -> tuple[float, ...]:
     """One row for ``_against``: the four corners x y, yaw, velocity x y, sigma of the distance, whether only the camera
-    sees it, whether it is carried, ``box_sides``, share of its lateral speed that is motion of the whole object. NaN if
-    unknown."""
+    sees it, whether it is carried, ``box_sides``, share of its lateral speed that is motion of the whole object, length
+    of the flank that may be visible, whether it drives where the road goes. NaN if unknown."""
     a, b, c, d = item.bev  # type: ignore[misc]
     e, f = item.box_sides if item.box_sides is not None else _NO_SIDES
     yaw_rad = item.cuboid.yaw_rad if item.cuboid is not None else nan
@@ -192,12 +198,21 @@ def _numbers(item: FusedObject) -> tuple[float, ...]:
         *e,
         *f,
         _rigid_share(item),
+        _flank_m(item),
+        item.imaged and bool(item.surely_moving) and not item.oncoming,
     )
 
 
+def _flank_m(item: FusedObject) -> float:
+    """Longest flank that an object may show if it drives along the path."""
+    return LONGEST_M[item.label] if item.label in ("truck", "bus") else _LONGEST_M
+
+
 @numba.njit(cache=True, nogil=True)
-def _against(rows, center, left, right, half_width, profile, step, overlap, use_flank, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]
-    """(N, 12) from (N, 19) rows of ``_numbers``: distances from the centre to the left and to the right edge at the
+def _against(
+    rows, center, left, right, half_width, profile, corner, step, overlap, use_flank, ego_known, speed, yaw_rate
+):  # type: ignore[no-untyped-def]
+    """(N, 12) from (N, 21) rows of ``_numbers``: distances from the centre to the left and to the right edge at the
     object, speed to the left of the path and along it, then the fields of ``Place`` up to ``sigma_m``. half_width: for
     a path without edges, else 0."""
     middles = np.empty((len(rows), 2))
@@ -226,7 +241,7 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, use_
         heading = headings[n]
         cos, sin = np.cos(heading), np.sin(heading)
         has_sides = np.isfinite(rows[n, 14:18]).all()
-        flank = _LONGEST_M * abs(near_y * cos - near_x * sin) / max(np.hypot(near_x, near_y), 0.1)
+        flank = rows[n, 19] * abs(near_y * cos - near_x * sin) / max(np.hypot(near_x, near_y), 0.1)
         low, high = _reach(offsets, has_sides, beside[2 * n], beside[2 * n + 1], flank, rows[n, 8] - heading)
         vx, vy = rows[n, 9], rows[n, 10]
         # the path is fixed to the ground, so an object that follows its bend does not move sideways relative to it;
@@ -246,7 +261,8 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, use_
         out[n, 8] = 0.5 * (low + high)
         out[n, 9], out[n, 10] = half_left + spare, half_right + spare
         own = _sigma_m(near_x, near_y, cos, sin, rows[n, 11], rows[n, 12], rows[n, 13])
-        out[n, 11] = np.sqrt(profile[k] ** 2 + own**2 + flanks[n] ** 2)
+        turns_off = 0.0 if rows[n, 20] else corner[k]  # a vehicle that drives ahead is where the road goes
+        out[n, 11] = np.sqrt(profile[k] ** 2 + turns_off**2 + own**2 + flanks[n] ** 2)
     return out
 
 

@@ -2,7 +2,8 @@
 
 For: a camera box counts according to how often boxes with its score were correct; a LiDAR cluster counts a lot.
 Against: LiDAR rays that passed through the position at the height of a car's body (``free_road``). If a working LiDAR
-looks through a position, nothing stands there, however certain a box is.
+looks through a position, nothing stands there, however certain a box is. Images in which a working camera must have
+seen what a cluster is, without a box on it (``unseen``): it is there, but it is not a vehicle.
 
 A sensor that could not observe the object gives no evidence: no ray passed at that height, or something nearer stopped
 it. Evidence is not accumulated without limit either: ten consecutive boxes of one network on one wall count hardly more
@@ -17,11 +18,9 @@ import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import numpy as np
-
 from pipeline.common.fast_replace import evolve
-from pipeline.common.geometry import covered_share
 from pipeline.fusion.free_road import CLEAR_SHARE, MIN_RAYS, NEAR_M, Rays, SweepRays, rays_to
+from pipeline.fusion.unseen import missing_boxes, never_boxed
 from pipeline.params import ExistenceParams
 from pipeline.types import Frame, FusedObject, Gate, Moment
 from pipeline.types.sensors import further_sensors
@@ -42,8 +41,12 @@ _ALONG, _ALONG_AFTER_M, _ALONG_SHARE = 2.0, 25.0, 0.5
 the share of it by which the object's distance has then shrunk at most. False boxes lie on static structures, which come
 nearer by every metre that the car drives. At 50 m the distance from a box varies by 7 % from image to image, so half of
 25 m is more than two standard deviations of a difference."""
-_HIDDEN_SHARE = 0.3
-"""If more of a box is hidden by other boxes, a network may miss the vehicle, so a missing box is no evidence."""
+_UNBOXED, _LOOKS = -1.3, 3
+"""Log-odds added for each image in which the camera must have seen what the LiDAR tracks and no box was on it, up to
+this number of images; void with the first box. Of confirmed clusters as large as a vehicle, on Astyx and KITTI, 48 of
+48 on labelled vehicles had been boxed after three sightings, and 8 of 109 others. Of those sighted once or twice 12 of
+113 and 337 of 363 had no box, a log-likelihood ratio of -2.2. Without the LiDAR's evidence for it, such a cluster is a
+wall, a tree or a hedge; with it, it counts as a half."""
 _EMPTY_S = 1.0
 """Time constant for forgetting that rays passed through the object's position: ten images at 10 Hz, in which the camera
 measures the position again."""
@@ -81,6 +84,8 @@ class Existence(NamedTuple):
     """Decrease of its distance meanwhile."""
     cluster_s: float = 0.0
     """Total time that the LiDAR has seen it."""
+    unboxed: int = 0
+    """Number of images in which the camera must have seen it, while no box was ever on it; at most ``_LOOKS``."""
 
     @property
     def goes_along(self) -> bool:
@@ -119,17 +124,19 @@ def weigh(
     looks_far = state.looks_far or (seen is not None and seen.far is not None)
     # in frames without a far view, far objects may be missing for that reason
     looked = seen is not None and (seen.far is not None or not looks_far)
-    missed = _missed(objects, frame.image_size) if looked else frozenset()
+    missed = missing_boxes(objects, frame) if looked else frozenset()
+    unboxed = never_boxed(objects, frame) if looked and params.use_missing_boxes else frozenset()
     known: dict[int, Existence] = {}
     judged = []
     for item in objects:
         before = _before(state, item)
         found = _updated(before, item, rays.get(item.id), item.id in missed, now)
+        if item.id in unboxed:
+            found = found._replace(unboxed=min(found.unboxed + 1, _LOOKS))
         known[item.id] = found
-        camera = (found.score - _EVEN_SCORE) * _SCORE_SLOPE if found.score is not None else 0.0
-        camera += _ALONG if found.goes_along else 0.0
+        camera = _said_by_camera(found)
         odds = _bounded(_bounded(camera) + found.lidar)
-        judged.append(_told(item, 1.0 / (1.0 + math.exp(-odds)), rays.get(item.id)))
+        judged.append(_told(item, 1.0 / (1.0 + math.exp(-odds)), rays.get(item.id), found.unboxed))
     by_vision = {item.vision_track: item.id for item in objects if item.vision_track is not None}
     return ExistenceState(known, by_vision, looks_far), tuple(judged)
 
@@ -142,20 +149,6 @@ def _before(state: ExistenceState, item: FusedObject) -> Existence:
         before = state.known[state.by_vision[item.vision_track]]
         known = before._replace(lidar=min(before.lidar, 0.0))
     return known if known is not None else Existence(None, 0.0)
-
-
-def _missed(objects: tuple[FusedObject, ...], size: tuple[int, int] | None) -> frozenset[int]:
-    """Ids of the objects that only the camera tracks and that it should have seen: their box lies in the image (size:
-    width and height), and no seen box, which may hide the object or belong to it, covers much of it."""
-    asked = [each for each in objects if not each.ranged and not each.seen_by_camera and each.bbox is not None]
-    if not asked or size is None:
-        return frozenset()
-    boxes = np.array([each.bbox for each in asked])
-    inside = (boxes[:, 0] >= 0) & (boxes[:, 1] >= 0) & (boxes[:, 2] <= size[0]) & (boxes[:, 3] <= size[1])
-    seen = [each.bbox for each in objects if each.seen_by_camera and each.bbox is not None]
-    if seen:
-        inside &= covered_share(boxes, np.array(seen)).max(axis=1) < _HIDDEN_SHARE
-    return frozenset(asked[index].id for index in np.flatnonzero(inside).tolist())
 
 
 def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bool, now: Moment) -> Existence:
@@ -179,7 +172,15 @@ def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bo
             judged_m, shrunk_m = travelled_m, from_m - item.distance_m
     cluster_s = before.cluster_s + (dt_s if item.seen_by_lidar else 0.0)
     lidar = _bounded(lidar + _said_by_lidar(item, rays, cluster_s >= _FOLLOWED_S) + _said_by_others(item))
-    return Existence(score, lidar, item.camera_ranges, age_s, from_m, travelled_m, judged_m, shrunk_m, cluster_s)
+    return Existence(
+        score, lidar, item.camera_ranges, age_s, from_m, travelled_m, judged_m, shrunk_m, cluster_s, before.unboxed
+    )
+
+
+def _said_by_camera(found: Existence) -> float:
+    """Log-odds of the camera, from all images so far."""
+    boxes = (found.score - _EVEN_SCORE) * _SCORE_SLOPE if found.score is not None else _UNBOXED * found.unboxed
+    return boxes + (_ALONG if found.goes_along else 0.0)
 
 
 def _weight(dt_s: float, mean_s: float) -> float:
@@ -209,13 +210,15 @@ def _said_by_others(item: FusedObject) -> float:
     return sum([kind.sighting_odds for kind in further_sensors() if kind.letter in item.seen_by])
 
 
-def _told(item: FusedObject, probability: float, rays: Rays | None) -> FusedObject:
-    """The object with its probability and the gates for the evidence from rays."""
+def _told(item: FusedObject, probability: float, rays: Rays | None, unboxed: int) -> FusedObject:
+    """The object with its probability and the gates for the evidence from rays and from missing boxes."""
     found: list[Gate] = []
     if rays is not None and (share := rays.free_share) is not None:
         found.append(Gate("free_road", share, CLEAR_SHARE, not (rays.is_free or rays.is_silent)))
     if rays is not None and rays.taken >= MIN_RAYS and (item.distance_m or 0.0) < NEAR_M:
         found.append(Gate("own_returns", rays.stopped, MIN_RAYS, rays.is_stopped))
+    if unboxed and not item.imaged:
+        found.append(Gate("images_without_box", unboxed, _LOOKS - 1, unboxed < _LOOKS))
     return evolve(item, existence=probability, gates=(*item.gates, *found))
 
 

@@ -138,6 +138,9 @@ class ExistenceParams(Section):
     """Whether an object exists: evidence from both sensors for and against it."""
 
     enabled: bool = choice(True, "Weigh the evidence for and against each object; off: every object exists")
+    use_missing_boxes: bool = choice(
+        True, "Count against an object of the LiDAR alone that the camera looks at it and sees no vehicle"
+    )
     min_braking: float = slider(
         0.8,
         0.0,

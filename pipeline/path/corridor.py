@@ -20,12 +20,13 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64
 from pipeline.params import PathParams
 from pipeline.path import blend_estimates, yaw_rate
 from pipeline.path import route_following as gnss
 from pipeline.path.blend_estimates import FusedPath
-from pipeline.path.estimates import SOURCES, STEP_M, PathEstimate, between_lines, straight
+from pipeline.path.estimates import SOURCES, STEP_M, PathEstimate, between_lines, corner_m, straight
 from pipeline.path.route_following import GnssState
 from pipeline.path.yaw_rate import YawRate
 from pipeline.types import EgoState, GnssFix, Moment, Path, PathSource, Route
@@ -104,7 +105,10 @@ def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParam
         keep = exp(-dt_s / params.smoothing_s) if params.smoothing_s > 0.0 else 0.0
         path = blend_estimates.blend(fresh, expected, keep, _FASTEST_SHIFT_MPS * dt_s)
     notes = (*_about_own_motion(ego), *wrong_fix, *wrong_route, *left_out)
-    return PathState(yaw, placed, path if ego is not None else None, is_shown), _as_path(path, ego, notes, params)
+    shown = _as_path(path, ego, notes, params)
+    if not is_shown:
+        shown = evolve(shown, corner_m=corner_m(ego, params))
+    return PathState(yaw, placed, path if ego is not None else None, is_shown), shown
 
 
 def corridor(ego: EgoState | None, params: PathParams) -> Path:

@@ -69,6 +69,28 @@ SHARPEST_BEGIN_PER_M2 = 0.0044
 lateral jerk limits it further; a creeping car could turn its wheels on the spot, but the road ahead does not."""
 
 
+_SHAPE_CURVATURE_PER_M = 0.04
+"""Largest change of curvature over 20 m that ``road_shape`` can follow: 8 m aside."""
+_CORNER_CURVATURE_PER_M = 0.1
+"""Largest curvature of a street corner: 10 m."""
+_CORNER_SHARE = 0.6
+"""Standard deviation of the car's way, as a share of how far aside the tightest corner leads that it could take: it may
+take it or not. In 2,240 frames of simulated streets with corners of 12 and 20 m radius, the errors of the path up to
+20 m then lie within one sigma in 50 to 95 %, and within two in 85 to 99 %."""
+
+
+def corner_m(ego: EgoState | None, params: PathParams) -> F64:
+    """(K,) standard deviation of the path due to street corners that no lane line or route shows. What is beside the
+    road does not tell whether the car turns at a corner, but its speed tells whether it can."""
+    s = samples(params.length_m)
+    if ego is None:
+        return np.zeros_like(s)
+    speed2 = max(ego.speed_mps, params.min_speed_mps, 0.1) ** 2
+    tightest = min(params.lateral_accel_mps2 / speed2, _CORNER_CURVATURE_PER_M)
+    beyond = max(tightest - _SHAPE_CURVATURE_PER_M, 0.0)
+    return np.minimum(_CORNER_SHARE * 0.5 * beyond * s * s, SHARPEST_BEGIN_PER_M2 / 6.0 * s**3)
+
+
 def arc(curvature: float, s: F64) -> tuple[F64, F64]:
     """(K, 2) points and (K,) headings at path lengths ``s`` of an arc from the origin along +x; curvature is positive
     to the left. At path length s the heading has turned by θ = s/r and the lateral offset is r(1 − cos θ). The arc

@@ -37,6 +37,9 @@ class Path:
     """Weight of each source, averaged over the whole length."""
     profile_m: F64 = field(default_factory=lambda: np.zeros(0))
     """(K,) float64, ``sigma_m`` at every point; empty where it was not computed."""
+    corner_m: F64 = field(default_factory=lambda: np.zeros(0))
+    """(K,) float64, the additional standard deviation at every point because the car may turn at a corner that nothing
+    shows. It applies to what stands: a vehicle that drives ahead follows the road. Empty where it was not computed."""
     carried_by: dict[str, dict[str, float]] = field(default_factory=dict)
     """Weight of each source at 10, 30 and 60 m."""
     reach_m: float = 0.0

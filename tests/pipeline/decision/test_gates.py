@@ -14,7 +14,7 @@ from pipeline.decision.cipv import Choice, CipvState, choose
 from pipeline.decision.object_motion import describe
 from pipeline.params import AccParams, AebParams, CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
-from pipeline.types import AccCommand, Conditions, EgoState, FusedObject, Gate, Situation
+from pipeline.types import AccCommand, Conditions, EgoState, FusedObject, Gate, ObjectSource, Situation
 from tests.pipeline.build import fused, moment
 
 EGO = EgoState(0, 15.0, 0.0)
@@ -117,6 +117,14 @@ def test_at_the_edge_only_what_goes_along_leads(speed_mps: float | None, leads: 
     centred = dataclasses.replace(known, **fused_place(30.0, 0.0))
     sure = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 0.3))
     assert choose(CipvState(), (centred,), sure, moment(EGO, 0.1), CipvParams())[1].lead is not None
+
+
+@pytest.mark.parametrize(("source", "leads"), [("VL", True), ("L", False)])
+def test_what_has_no_class_must_surely_be_in_the_path(source: ObjectSource, leads: bool) -> None:
+    """In the path with 60 %, ego motion unknown: a car may lead, a wall that the camera cannot see may not."""
+    path = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 1.5))
+    item = dataclasses.replace(fused(1, 30.0, 0.9, source=source), existence=0.98)
+    assert (choose(CipvState(), (item,), path, moment(), CipvParams())[1].lead is not None) == leads
 
 
 def fused_place(x: float, y: float) -> dict[str, object]:

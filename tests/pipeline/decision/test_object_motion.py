@@ -92,3 +92,9 @@ def test_an_uncertain_speed_proves_no_motion(speed: float, sigma: float | None, 
     assert item.moving is (speed > PARAMS.moving_mps), "the result's meaning of it stays"
     (unknown,) = describe([seen], None, PARAMS)
     assert unknown.surely_moving is None
+
+
+@pytest.mark.parametrize(("sightings", "surely"), [(4, False), (5, True)])
+def test_a_speed_from_a_few_clusters_proves_no_motion(sightings: int, surely: bool) -> None:
+    (item,) = describe([fused(1, 30.0, hits=sightings)], EgoState(0, 10.0, 0.0), PARAMS)
+    assert (item.moving, item.surely_moving) == (True, surely)

@@ -14,7 +14,7 @@ from pipeline.decision.object_motion import describe
 from pipeline.decision.path_position import Place, place
 from pipeline.params import CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
-from pipeline.path.estimates import arc, samples
+from pipeline.path.estimates import arc, corner_m, samples
 from pipeline.types import EgoState, FusedObject, Path
 from tests.pipeline.build import fused
 
@@ -174,6 +174,34 @@ def test_the_flank_of_a_car_in_the_next_lane_does_not_widen_it() -> None:
     item = fused(1, 15.0, 3.5, length=4.5)
     beside = dataclasses.replace(item, box_sides=((15.0, 4.4), (15.0, 2.0)))
     assert placed(beside)[0].middle_m == pytest.approx(3.5, abs=0.02)
+
+
+@pytest.mark.parametrize(("label", "reaches"), [("truck", False), ("bus", False), ("car", True)])
+def test_the_flank_of_an_oncoming_truck_does_not_widen_it(label: str, reaches: bool) -> None:
+    """Seen from a bend, its box covers 7 m at the distance of its front: its flank is 12 m long. A car's is not."""
+    item = fused(1, 37.0, 8.0, length=4.5, width=2.5, label=label)
+    found, _ = placed(dataclasses.replace(item, box_sides=((37.0, 9.3), (37.0, 2.3))))
+    assert (found.low_m < 3.0) == reaches
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "label", "doubtful"),
+    [
+        pytest.param(0.0, "car", True, id="a parked car: we may turn off before it"),
+        pytest.param(4.0, "car", False, id="one that drives ahead is where the road goes"),
+        pytest.param(-6.0, "car", True, id="an oncoming one may come around the corner"),
+        pytest.param(4.0, None, True, id="a hedge that seems to move"),
+    ],
+)
+def test_at_a_creep_what_stands_ahead_may_be_beyond_a_corner(
+    speed_mps: float, label: str | None, doubtful: bool
+) -> None:
+    slow = EgoState(0, 4.2, 0.0)
+    path = dataclasses.replace(STRAIGHT, corner_m=corner_m(slow, PathParams()))
+    item = fused(1, 18.0, source="VL" if label else "L", velocity=(speed_mps - 4.2, 0.0), label=label)
+    aware, unaware = placed(item, path, slow)[0], placed(item, STRAIGHT, slow)[0]
+    assert (aware.sigma_m > 2.0) == doubtful
+    assert (aware.sigma_m == unaware.sigma_m) != doubtful
 
 
 @pytest.mark.parametrize("way", [-1.0, 1.0])

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pipeline.params import PathParams
-from pipeline.path.estimates import PathEstimate, between_lines
+from pipeline.path.estimates import PathEstimate, between_lines, corner_m
+from pipeline.types import EgoState
 from pipeline.types.lane import EgoLane, LaneLine, Side
 
 COVARIANCE = np.diag(np.square([0.05, 5e-3, 3e-4, 5e-6]))
@@ -57,3 +58,18 @@ def test_between_the_two_it_is_open() -> None:
     """If neither crossing nor staying is certain, the estimate is less certain than in both cases."""
     sure, open_ = middle(1.7, 0.0), middle(2.0, 0.03)
     assert open_.sigma_m[20] > sure.sigma_m[20] + 0.15
+
+
+@pytest.mark.parametrize(
+    ("speed_kmh", "at_15_m"),
+    [
+        pytest.param(15.0, (1.0, 3.0), id="slow enough for a street corner"),
+        pytest.param(19.0, (0.5, 1.5), id="for a wide one"),
+        pytest.param(24.0, (0.0, 0.0), id="too fast for any corner"),
+        pytest.param(None, (0.0, 0.0), id="speed not known"),
+    ],
+)
+def test_a_slow_car_may_turn_at_a_corner(speed_kmh: float | None, at_15_m: tuple[float, float]) -> None:
+    found = corner_m(EgoState(0, speed_kmh / 3.6, 0.0) if speed_kmh else None, PathParams())
+    assert at_15_m[0] <= found[15] <= at_15_m[1]
+    assert found[3] < 0.05, "the next metres are certain at any speed"
