@@ -8,7 +8,7 @@ has a negative closing speed and no TTC.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import hypot, inf
+from math import hypot, inf, sqrt
 
 from pipeline.common.fast_replace import evolve
 from pipeline.params import AebParams, MotionParams
@@ -20,7 +20,10 @@ SMALLEST_CLOSING_MPS = 0.1
 _SMALLEST_GAP_M = 0.1
 _SURE_SIGMAS = 2.0
 _STEADY = 5
-"""Steady sightings by a ranging sensor after which its speed is known: to 0.6 m/s with 0.2 m per sighting at 10 Hz."""
+"""Steady sightings by a ranging sensor from which its speed is used: before, a new side that comes into view moves an
+object by metres."""
+_SIGHTING_SIGMA_M, _SIGHTING_S = 0.2, 0.1
+"""Error of one sighting along its motion, and the time between two: a LiDAR at 10 Hz."""
 _ONCOMING_MPS = 3.0
 """A slower object may only seem to be oncoming due to its speed error."""
 
@@ -67,11 +70,16 @@ def _described(item: FusedObject, ego: EgoState | None, params: MotionParams) ->
         ttc_s=ttc,
         speed_over_ground_mps=speed,
         moving=speed > params.moving_mps,
-        surely_moving=_has_sure_speed(item)
-        and speed - _SURE_SIGMAS * (item.camera_speed_sigma_mps or 0.0) > params.moving_mps,
+        surely_moving=speed - _SURE_SIGMAS * _speed_sigma_mps(item) > params.moving_mps,
         oncoming=-vx > max(_ONCOMING_MPS, abs(vy)),
     )
 
 
-def _has_sure_speed(item: FusedObject) -> bool:
-    return not item.ranged or item.ranged_steady >= _STEADY
+def _speed_sigma_mps(item: FusedObject) -> float:
+    """Standard deviation of its speed: that of the camera, or that of a line through the sightings of a ranging
+    sensor."""
+    if item.camera_speed_sigma_mps is not None or not item.ranged:
+        return item.camera_speed_sigma_mps or 0.0
+    if item.ranged_steady < _STEADY:
+        return inf
+    return _SIGHTING_SIGMA_M * sqrt(12.0 / item.ranged_steady**3) / _SIGHTING_S

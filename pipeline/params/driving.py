@@ -39,6 +39,9 @@ class PathParams(Section):
         "Align the corridor with the edges of the road (kerbs, hedges, walls, rails, parked cars) where no lane lines "
         "or route show the road",
     )
+    use_corners: bool = choice(
+        True, "Where no lane lines or route show the road, a slow car may turn before what stands ahead of it"
+    )
     use_traffic: bool = choice(
         True,
         "Align the corridor with the headings of other vehicles where no lane lines or route show the road",

@@ -106,7 +106,7 @@ def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParam
         path = blend_estimates.blend(fresh, expected, keep, _FASTEST_SHIFT_MPS * dt_s)
     notes = (*_about_own_motion(ego), *wrong_fix, *wrong_route, *left_out)
     shown = _as_path(path, ego, notes, params)
-    if not is_shown:
+    if params.use_corners and not is_shown:
         shown = evolve(shown, corner_m=corner_m(ego, params))
     return PathState(yaw, placed, path if ego is not None else None, is_shown), shown
 

@@ -26,6 +26,7 @@ AS_IS = "unchanged"
 VARIANTS: Mapping[str, Mapping[str, Any]] = {
     AS_IS: {},
     "no existence estimate": {"existence.enabled": False},
+    "missing boxes ignored": {"existence.use_missing_boxes": False},
     "braking at any existence": {"existence.min_braking": 0.0},
     "braking on first camera range": {"existence.camera_ranges": 1},
     "no minimum lead probability": {
@@ -46,6 +47,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "no innovation gate": {"vision_tracking.max_nis": 1000.0},
     "wide camera gate": {"vision_tracking.gate_sigmas": 10.0},
     "no road edges": {"path.use_edges": False},
+    "no corners": {"path.use_corners": False},
     "flanks taken for rears": {"cipv.use_flank": False},
     "tall boxes treated like others": {"vision_tracking.use_aspect": False},
     "boxes placed by height alone": {"fusion.use_ground_contact": False},

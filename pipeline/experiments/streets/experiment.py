@@ -1,7 +1,8 @@
 """Experiment: is the CIPV right in streets without paint and route, and what do the road's edges and other vehicles
 contribute?
 
-Bends of 30–150 m radius between parked rows, hedges and kerbs; a car drives ahead, or nothing does. Every frame goes
+Bends of 30–150 m radius between parked rows, hedges and kerbs; a car drives ahead, or nothing does. At corners, nothing
+does. Every frame goes
 through the pipeline as it is by default, without the road's edges, and without other vehicles either. Detections are
 given, and the truth is that of ``curves``.
 """
@@ -18,7 +19,7 @@ from pipeline.experiments.curves.drives import BOXES, SourceFrames, driven
 from pipeline.experiments.curves.experiment import longest_wrong_s, share_right
 from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.streets import scenarios
-from pipeline.experiments.streets.scenarios import BESIDE, REACH_M, SPEEDS_KMH, Street
+from pipeline.experiments.streets.scenarios import BESIDE, CORNER_M, REACH_M, SPEEDS_KMH, Street
 from pipeline.params import Params, with_changes
 from pipeline.simulation.sensors.detection_model import Detections
 
@@ -47,8 +48,10 @@ def cases(short: bool) -> list[StreetCase]:
     """Every street; every second one bends to the left first."""
     if short:
         return [StreetCase(Street(50.0, "hedges", "lead"), 0)]
-    streets = [Street(r, beside, ahead) for r in SPEEDS_KMH for beside in BESIDE for ahead in ("lead", "nothing")]
-    return [StreetCase(street, n % 2) for n, street in enumerate(streets)]
+    bends = [r for r in SPEEDS_KMH if r != CORNER_M]
+    streets = [Street(r, beside, ahead) for r in bends for beside in BESIDE for ahead in ("lead", "nothing")]
+    corners = [StreetCase(Street(CORNER_M, beside, "nothing"), seed) for beside in BESIDE for seed in (0, 1)]
+    return [*(StreetCase(street, n % 2) for n, street in enumerate(streets)), *corners]
 
 
 def run(case: StreetCase) -> StreetOutcome:
@@ -79,7 +82,8 @@ def report(cases: Sequence[StreetCase], outcomes: Sequence[StreetOutcome]) -> Re
         "Streets without lane markings and without a route",
         (
             "Detections are given and the VLP-16 is simulated as in the curves. Speed and yaw rate come from the car's "
-            f"bus; leads count up to {REACH_M:.0f} m. With nothing ahead, a frame is right if no lead is chosen.",
+            f"bus; leads count up to {REACH_M:.0f} m. With nothing ahead, a frame is right if no lead is chosen. "
+            f"Corners have a radius of {CORNER_M:.0f} m and are taken at {SPEEDS_KMH[CORNER_M]:.0f} km/h.",
         ),
         (
             Table(
@@ -93,16 +97,20 @@ def report(cases: Sequence[StreetCase], outcomes: Sequence[StreetOutcome]) -> Re
 
 
 def _rows(cases: Sequence[StreetCase], outcomes: Sequence[StreetOutcome]) -> Iterator[tuple[Cell, ...]]:
-    groups = sorted({(case.street.beside, case.street.ahead) for case in cases})
+    groups = sorted({_group(case) for case in cases})
     for name in (NEITHER, WITHOUT, WITH):
         for beside, ahead in groups:
             chosen = [
-                outcome[name]
-                for case, outcome in zip(cases, outcomes, strict=True)
-                if (case.street.beside, case.street.ahead) == (beside, ahead)
+                outcome[name] for case, outcome in zip(cases, outcomes, strict=True) if _group(case) == (beside, ahead)
             ]
             yield (beside, ahead, name, *_figures(chosen))
         yield ("all", "all", name, *_figures([outcome[name] for outcome in outcomes]))
+
+
+def _group(case: StreetCase) -> tuple[str, str]:
+    """What is beside the street, and what is ahead."""
+    street = case.street
+    return street.beside, street.ahead if street.radius_m != CORNER_M else "nothing, at a corner"
 
 
 def _figures(drives: Sequence[SourceFrames]) -> tuple[Cell, ...]:

@@ -1,5 +1,6 @@
 """The streets of the experiment ``streets``: no paint, no route, bends of 30–150 m radius between parked rows, hedges
-and kerbs; with a lead that draws away or slows down, or with nothing ahead at all."""
+and kerbs; with a lead that draws away or slows down, or with nothing ahead at all. And street corners, with nothing
+ahead."""
 
 from __future__ import annotations
 
@@ -23,7 +24,9 @@ _COLOURS = ("#e8e8e6", "#20252c", "#a3202a", "#2f5f8f", "#8090a0", "#5b6f86", "#
 
 StreetBorder = Literal["parked", "hedges", "kerbs", "mixed"]
 Ahead = Literal["lead", "nothing"]
-SPEEDS_KMH = {30.0: 24.0, 50.0: 31.0, 80.0: 39.0, 150.0: 48.0}
+CORNER_M = 12.0
+"""Radius of the way around a street corner."""
+SPEEDS_KMH = {CORNER_M: 15.0, 30.0: 24.0, 50.0: 31.0, 80.0: 39.0, 150.0: 48.0}
 """Speed by radius: a lateral acceleration of 1.5 m/s², as usual in streets, and at most 50 km/h."""
 BESIDE: tuple[StreetBorder, ...] = ("parked", "hedges", "kerbs", "mixed")
 

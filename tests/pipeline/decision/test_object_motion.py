@@ -94,7 +94,16 @@ def test_an_uncertain_speed_proves_no_motion(speed: float, sigma: float | None, 
     assert unknown.surely_moving is None
 
 
-@pytest.mark.parametrize(("sightings", "surely"), [(4, False), (5, True)])
-def test_a_speed_from_a_few_clusters_proves_no_motion(sightings: int, surely: bool) -> None:
-    (item,) = describe([fused(1, 30.0, hits=sightings)], EgoState(0, 10.0, 0.0), PARAMS)
+@pytest.mark.parametrize(
+    ("speed", "sightings", "surely"),
+    [
+        pytest.param(10.0, 4, False, id="a new side that came into view"),
+        pytest.param(10.0, 5, True, id="traffic"),
+        pytest.param(2.5, 5, False, id="slow, and just seen"),
+        pytest.param(2.5, 10, True, id="slow, and followed"),
+    ],
+)
+def test_a_speed_from_a_few_clusters_proves_no_motion(speed: float, sightings: int, surely: bool) -> None:
+    seen = fused(1, 30.0, velocity=(speed - 10.0, 0.0), hits=sightings)
+    (item,) = describe([seen], EgoState(0, 10.0, 0.0), PARAMS)
     assert (item.moving, item.surely_moving) == (True, surely)
