@@ -209,9 +209,9 @@ def _flank_m(item: FusedObject) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _against(
+def _against(  # type: ignore[no-untyped-def]
     rows, center, left, right, half_width, profile, corner, step, overlap, use_flank, ego_known, speed, yaw_rate
-):  # type: ignore[no-untyped-def]
+):
     """(N, 12) from (N, 21) rows of ``_numbers``: distances from the centre to the left and to the right edge at the
     object, speed to the left of the path and along it, then the fields of ``Place`` up to ``sigma_m``. half_width: for
     a path without edges, else 0."""
