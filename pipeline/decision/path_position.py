@@ -149,8 +149,7 @@ def place(
         path.left if has_edges else path.center,
         path.right if has_edges else path.center,
         0.0 if has_edges else path.half_width_m,
-        path.profile_m if len(path.profile_m) else np.zeros(len(path.center)),
-        path.corner_m if len(path.corner_m) else np.zeros(len(path.center)),
+        np.array([each if len(each) else np.zeros(len(path.center)) for each in (path.profile_m, path.corner_m)]),
         STEP_M,
         params.min_overlap_m,
         params.use_flank,
@@ -172,9 +171,7 @@ def place(
 def warm_up() -> None:
     """Compile the kernel before the first frame."""
     center = np.column_stack([np.arange(3.0), np.zeros(3)])
-    _against(
-        np.zeros((1, 21)), center, center, center, 1.5, np.zeros(3), np.zeros(3), STEP_M, 0.9, True, True, 0.0, 0.0
-    )
+    _against(np.zeros((1, 21)), center, center, center, 1.5, np.zeros((2, 3)), STEP_M, 0.9, True, True, 0.0, 0.0)
 
 
 def _numbers(item: FusedObject) -> tuple[float, ...]:
@@ -209,12 +206,10 @@ def _flank_m(item: FusedObject) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _against(  # type: ignore[no-untyped-def]
-    rows, center, left, right, half_width, profile, corner, step, overlap, use_flank, ego_known, speed, yaw_rate
-):
+def _against(rows, center, left, right, half_width, sigmas, step, overlap, use_flank, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]
     """(N, 12) from (N, 21) rows of ``_numbers``: distances from the centre to the left and to the right edge at the
     object, speed to the left of the path and along it, then the fields of ``Place`` up to ``sigma_m``. half_width: for
-    a path without edges, else 0."""
+    a path without edges, else 0. sigmas: (2, K) ``profile_m`` and ``corner_m`` of the path."""
     middles = np.empty((len(rows), 2))
     for n in range(len(rows)):
         for k in range(2):
@@ -261,8 +256,8 @@ def _against(  # type: ignore[no-untyped-def]
         out[n, 8] = 0.5 * (low + high)
         out[n, 9], out[n, 10] = half_left + spare, half_right + spare
         own = _sigma_m(near_x, near_y, cos, sin, rows[n, 11], rows[n, 12], rows[n, 13])
-        turns_off = 0.0 if rows[n, 20] else corner[k]  # a vehicle that drives ahead is where the road goes
-        out[n, 11] = np.sqrt(profile[k] ** 2 + turns_off**2 + own**2 + flanks[n] ** 2)
+        turns_off = 0.0 if rows[n, 20] else sigmas[1, k]  # a vehicle that drives ahead is where the road goes
+        out[n, 11] = np.sqrt(sigmas[0, k] ** 2 + turns_off**2 + own**2 + flanks[n] ** 2)
     return out
 
 
