@@ -6,19 +6,20 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
+from pipeline import lidar_branch
 from pipeline.common.files.user_files import Overloaded
 from pipeline.detection import Detectors, LiveDetectors, Look, detect, look
 from pipeline.params import Params
-from pipeline.step import State, measure_own_motion, step
+from pipeline.step import State, step
 from pipeline.types import Frame, Result
 from pipeline.types.source import LiveSource, Source
 from pipeline.warm_up import warm_up
 
 _SILENCE_S = 0.5
-_BESIDE = ThreadPoolExecutor(thread_name_prefix="own-motion")
-"""Measures own motion while detectors process the image."""
+_BESIDE = ThreadPoolExecutor(thread_name_prefix="lidar")
+"""Processes the sweep while detectors process the image."""
 _TRIES = 10
 
 Sensors = Literal["lidar", "camera", "both"]
@@ -40,10 +41,23 @@ def sensed(frame: Frame, detectors: Detectors, sensors: Sensors = "both", ask: L
     return only(frame if sensors == "lidar" else detect(frame, detectors, ask), sensors)
 
 
+class Advanced(NamedTuple):
+    """One frame of a source after the pipeline."""
+
+    frame: Frame
+    """The frame as passed to ``step``, detections included."""
+    state: State
+    """The state after it."""
+    result: Result
+    """Its result."""
+    lidar: lidar_branch.LidarBranch
+    """What was computed without the detections; helps to run the frame again with other parameters."""
+
+
 def advance(
     state: State, frame: Frame, params: Params, detectors: Detectors, sensors: Sensors = "both", ask: Look = look
-) -> tuple[Frame, State, Result]:
-    """Run one frame of a source.
+) -> Advanced:
+    """Run one frame of a source: its sweep beside the detectors, then the rest of the step.
 
     Args:
         state: state after the previous frame; ``State()`` at the start.
@@ -52,14 +66,12 @@ def advance(
         detectors: detectors that process its image.
         sensors: which sensors the car has.
         ask: how a detector is called: directly, or through a cache.
-
-    Returns:
-        The frame as passed to ``step``, the state after it, and the result.
     """
-    beside = _BESIDE.submit(measure_own_motion, state, only(frame, sensors), params)
+    beside = _BESIDE.submit(lidar_branch.follow, state, only(frame, sensors), params)
     frame = sensed(frame, detectors, sensors, ask)
-    state, result = step(state, frame, params, beside.result())
-    return frame, state, result
+    lidar = beside.result()
+    state, result = step(state, frame, params, lidar)
+    return Advanced(frame, state, result, lidar)
 
 
 def run(
@@ -110,7 +122,7 @@ def _through(
     state = State()
     for frame in frames:
         asked = used(detectors_of(frame), params)
-        seen, state, result = advance(state, frame, params, asked, sensors, ask)
+        seen, state, result, _ = advance(state, frame, params, asked, sensors, ask)
         yield seen, result
 
 

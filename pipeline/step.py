@@ -1,6 +1,6 @@
 """The pipeline: one frame in, one result out; state in and state out.
 
-    LiDAR:  deskew → down-sample → ground → cluster → boxes → tracks ─┐
+    LiDAR:  deskew → down-sample → ground → cluster → boxes → tracks ─┐   (``lidar_branch``, beside the networks)
     camera: (raw boxes) → select → distance → tracks ─────────────────┼→ fuse → motion → path → CIPV → ACC, AEB
     further ranging sensors: (scans) → tracks ────────────────────────┤
     ego ──────────────────────────────────────────────────────────────┘
@@ -14,16 +14,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipeline import lidar_branch
 from pipeline.alignment import projection
-from pipeline.common.clips import begins_clip
 from pipeline.common.stopwatch import Stopwatch
 from pipeline.decision import acc, aeb, braking_evidence, cipv, object_motion
-from pipeline.ego_motion import coasting, own_motion
+from pipeline.ego_motion import own_motion
 from pipeline.fusion import agreement, existence, ground_contact, returns
 from pipeline.fusion import fuse as fusion
 from pipeline.fusion.drift import follow as drift
 from pipeline.lanes import road_lines as lanes
-from pipeline.lidar import segmentation
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.params import Params
 from pipeline.path import corridor, road_edges, traffic, yaw_rate
@@ -35,7 +34,6 @@ from pipeline.types import (
     Frame,
     Ground,
     Layers,
-    Moment,
     Result,
     SensorHealth,
     Situation,
@@ -43,9 +41,6 @@ from pipeline.types import (
 )
 from pipeline.vision import distance, nms
 from pipeline.vision import tracking as vision_tracking
-
-_LATE_MS = 50.0
-"""Half of the time between two sweeps."""
 
 
 @dataclass(frozen=True)
@@ -90,20 +85,19 @@ class State:
     """The active stage of emergency braking, and its cause."""
 
 
-def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured | None = None) -> tuple[State, Result]:
+def step(
+    state: State, frame: Frame, params: Params, lidar: lidar_branch.LidarBranch | None = None
+) -> tuple[State, Result]:
     """Run every stage on one frame. The networks have already run: their outputs are ``frame.raw_boxes`` and
-    ``frame.raw_lanes`` (``pipeline.detection.detect``). motion: result of ``measure_own_motion`` if it ran in parallel
-    with them."""
+    ``frame.raw_lanes`` (``pipeline.detection.detect``). lidar: result of ``lidar_branch.follow`` for these arguments,
+    if it ran beside them."""
     clock = Stopwatch()
-    motion = motion if motion is not None else measure_own_motion(state, frame, params)
-    clock.lap("own_motion")
-    state, now = _begin(state, frame, motion.ego, params)
+    # Own motion, and the LiDAR: objects on the ground in this sweep, tracked from sweep to sweep
+    lidar = lidar if lidar is not None else lidar_branch.follow(state, frame, params)
+    motion, now, sweep, lidar_tracks = lidar.motion, lidar.now, lidar.sweep, lidar.tracks
+    clock.skip()
+    state = state if now.dt_s is not None else _restarted(state)
     aligned = projection.resolve(params.alignment, frame.camera)
-
-    # LiDAR: objects on the ground in this sweep, tracked from sweep to sweep
-    sweep = segmentation.segment(frame.sweep, now.ego, params, clock, state.lidar, now.dt_s)
-    lidar_state, lidar_tracks = lidar_tracking.track(state.lidar, sweep.obstacles, now.dt_s, params.lidar_tracking)
-    clock.lap("lidar_tracking")
 
     # Camera: the detector's boxes, each with a distance from its height, tracked from image to image
     boxes = _measure_boxes(frame, aligned, params)
@@ -194,12 +188,12 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         acc=command,
         notes=(*frame.notes, *yaw_rate.doubts(frame.ego), *motion.notes, *path.notes, *_note_of(turned)),
         streams=frame.streams,
-        timing_ms={**frame.timing_ms, **clock.timing_ms()},
+        timing_ms={**frame.timing_ms, **lidar.timing_ms, **clock.timing_ms()},
         layers=layers,
     )
     following = State(
         t_ns=frame.t_ns,
-        lidar=lidar_state,
+        lidar=lidar.tracker,
         vision=vision_state,
         ranging=ranging_state,
         fusion=fusion_state,
@@ -224,35 +218,10 @@ def _note_of(turned: drift.Drift | None) -> tuple[str, ...]:
     return (turned.note,) if turned is not None else ()
 
 
-def measure_own_motion(state: State, frame: Frame, params: Params) -> own_motion.Measured:
-    """Own motion in a frame, from all available sources. It does not depend on the networks, so it may run in
-    parallel."""
-    dt_s = _since(state, frame, params)
-    seen = own_motion.OdometryContext(state.ground, state.lidar.tracks, coasting.recent(state.own, params.motion))
-    before = state.measured if dt_s is not None else own_motion.OwnMotionState()
-    clock = Stopwatch()
-    found = own_motion.measure(before, frame, yaw_rate.believable(frame.ego), seen, dt_s, params.motion)
-    late_ms = clock.timing_ms()["total"]
-    if frame.streams and late_ms > _LATE_MS:  # live sensors only: a recording's results must not depend on the clock
-        return found._replace(notes=(*found.notes, f"LiDAR odometry took {late_ms:.0f} ms"))
-    return found
-
-
-def _since(state: State, frame: Frame, params: Params) -> float | None:
-    """Seconds since the previous frame; None at the start, after a gap and after a jump back in time."""
-    if state.t_ns is None or begins_clip(state.t_ns, frame.t_ns, params.time.reset_gap_s):
-        return None
-    return (frame.t_ns - state.t_ns) / 1e9
-
-
-def _begin(state: State, frame: Frame, measured: EgoState | None, params: Params) -> tuple[State, Moment]:
-    """The state to continue from, and the moment. After a gap or a jump back in time the state is reset, because tracks
-    carried over it would be guesses; only object ids continue, so that none is used twice."""
-    dt_s = _since(state, frame, params)
-    if dt_s is None:
-        state = State(fusion=fusion.FusionState(next_id=state.fusion.next_id))
-    motion = coasting.follow(state.own, measured, dt_s, params.motion)
-    return state, Moment(frame.t_ns, dt_s, motion, coasting.recent(motion, params.motion))
+def _restarted(state: State) -> State:
+    """After a gap or a jump back in time: tracks carried over it would be guesses. Only object ids continue, so that
+    none is used twice."""
+    return State(fusion=fusion.FusionState(next_id=state.fusion.next_id))
 
 
 def _measure_boxes(

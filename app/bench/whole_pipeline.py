@@ -1,5 +1,6 @@
-"""Benchmarks the step without networks, the step next to a busy network, and the whole pipeline as the command line
-runs it: reading, decoding, both networks, step."""
+"""Benchmarks the two parts of a step without networks (what runs beside them, and what is left when their outputs are
+there), both next to a busy network, and the whole pipeline as the command line runs it: reading, decoding, both
+networks, step."""
 
 from __future__ import annotations
 
@@ -12,8 +13,10 @@ from typing import Any
 import numpy as np
 
 from app.bench.timing import figures
+from pipeline import lidar_branch
 from pipeline.detection import Detectors, Detects, detect
 from pipeline.params import Params
+from pipeline.run import advance
 from pipeline.step import State, step
 from pipeline.types import Frame, RawBoxes
 from pipeline.types.source import Source
@@ -28,14 +31,12 @@ _SETTLE_S = 0.2
 network never stops."""
 
 
-_NOBODY = Detectors()
-
-
 def stages(
     source: Source, count: int, params: Params, detectors: Detectors, budget_s: float
 ) -> dict[str, dict[str, Any]]:
-    """Figures for ``step`` and, with a vehicle detector, for ``step_beside_network`` and ``line`` (the whole pipeline,
-    from the recording to the result).
+    """Figures for ``lidar_branch`` (own motion and LiDAR objects, which the product computes beside the networks) and
+    ``step`` (from their outputs to the result); with a vehicle detector, also for ``step_beside_network`` and ``line``
+    (the whole pipeline, from the recording to the result).
 
     The network next to it processes one image after another, with as many threads as in the product. The first
     ``count`` frames are repeated. budget_s: total wall time, seconds.
@@ -43,24 +44,25 @@ def stages(
     warm_up()
     detector = detectors.boxes
     seen = [detect(source.frame(index), Detectors(detector)) for index in range(count)]
-    idle = _Laps(cycle(seen), params)
+    idle = _Steps(cycle(seen), params)
     if detector is None:
         idle.go_on(budget_s)
-        return {"step": idle.row()}
-    beside, whole = _Laps(cycle(seen), params), _Laps(_read(source, count), params, detectors)
+        return {"lidar_branch": idle.branch.row(), "step": idle.rest.row()}
+    beside, whole = _Steps(cycle(seen), params), _Whole(_read(source, count), params, detectors)
     for _ in range(_ROUNDS):
         idle.go_on(budget_s * _IDLE / _ROUNDS)
         with _Busy(detector, seen):
-            _Laps(cycle(seen), params).go_on(_SETTLE_S)
+            _Steps(cycle(seen), params).go_on(_SETTLE_S)
             beside.go_on(budget_s * _BESIDE / _ROUNDS - _SETTLE_S)
     whole.go_on(budget_s * (1.0 - _IDLE - _BESIDE))
-    alone, row, line = idle.row(), beside.row(), whole.row()
+    alone, row, line = idle.rest.row(), beside.rest.row(), whole.laps.row()
     del line["cpu_ms"]  # networks compute in other threads
     named = {"detector": _name(detector), "lanes": _name(detectors.lanes), "lanes_every": detectors.lanes_every}
     return {
+        "lidar_branch": idle.branch.row(),
         "step": alone,
         "step_beside_network": {**row, "p99_to_idle_median": round(row["p99_ms"] / alone["median_ms"], 2)},
-        "line": {**line, "rate_hz": round(1.0 / float(np.mean(whole.times_s)), 1), **named},
+        "line": {**line, "rate_hz": round(1.0 / float(np.mean(whole.laps.times_s)), 1), **named},
     }
 
 
@@ -75,29 +77,59 @@ def _name(network: object) -> str | None:
 
 
 class _Laps:
-    """Runs through the frames and times each, from the request to the result. Without detectors, only the step is
-    timed, on frames held in memory. times_s: times of all frames so far."""
+    """Times of one part of every frame."""
 
-    def __init__(self, frames: Iterator[Frame], params: Params, detectors: Detectors = _NOBODY) -> None:
+    def __init__(self) -> None:
         self.times_s: list[float] = []
         self._cpu_s: list[float] = []
-        self._turn, self._state = frames, State()
-        self._params, self._detectors = params, detectors
+        self._start = (0.0, 0.0)
 
-    def go_on(self, budget_s: float) -> None:
-        """Continue after the previous call's last frame until the time is over, for at least one frame."""
-        start = perf_counter()
-        end = start + budget_s
-        while start < end or not self.times_s:
-            start, start_cpu = perf_counter(), thread_time()
-            frame = next(self._turn)
-            self._state, _ = step(self._state, detect(frame, self._detectors), self._params)
-            self.times_s.append(perf_counter() - start)
-            self._cpu_s.append(thread_time() - start_cpu)
+    def __enter__(self) -> None:
+        self._start = (perf_counter(), thread_time())
+
+    def __exit__(self, *_: object) -> None:
+        start, start_cpu = self._start
+        self.times_s.append(perf_counter() - start)
+        self._cpu_s.append(thread_time() - start_cpu)
 
     def row(self) -> dict[str, Any]:
         """With ``cpu_ms``, the median processor time of this thread, which other load hardly changes."""
         return {**figures(self.times_s), "cpu_ms": round(float(np.median(self._cpu_s)) * 1e3, 4), "peers": {}}
+
+
+class _Steps:
+    """Runs through frames held in memory with their detections, and times both parts of each step. branch, rest: the
+    times so far."""
+
+    def __init__(self, frames: Iterator[Frame], params: Params) -> None:
+        self.branch, self.rest = _Laps(), _Laps()
+        self._turn, self._state, self._params = frames, State(), params
+
+    def go_on(self, budget_s: float) -> None:
+        """Continue after the previous call's last frame until the time is over, for at least one frame."""
+        end = perf_counter() + budget_s
+        while not self.rest.times_s or perf_counter() < end:
+            frame = next(self._turn)
+            with self.branch:
+                lidar = lidar_branch.follow(self._state, frame, self._params)
+            with self.rest:
+                self._state, _ = step(self._state, frame, self._params, lidar)
+
+
+class _Whole:
+    """Runs through the frames of a recording, networks included, and times each from reading it to its result."""
+
+    def __init__(self, frames: Iterator[Frame], params: Params, detectors: Detectors) -> None:
+        self.laps = _Laps()
+        self._turn, self._state = frames, State()
+        self._params, self._detectors = params, detectors
+
+    def go_on(self, budget_s: float) -> None:
+        """As for ``_Steps``."""
+        end = perf_counter() + budget_s
+        while not self.laps.times_s or perf_counter() < end:
+            with self.laps:
+                self._state = advance(self._state, next(self._turn), self._params, self._detectors).state
 
 
 class _Busy:

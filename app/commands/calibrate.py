@@ -24,8 +24,7 @@ from pipeline.calibration.alignment.fit import overlap_sentence
 from pipeline.calibration.distance import LawFit, as_law, as_overrides, collect_pairs, fit_laws
 from pipeline.calibration.mount.drive import fit_mount_drive
 from pipeline.calibration.mount.fit import mount_sentence, turned
-from pipeline.calibration.time_offset import watch
-from pipeline.calibration.times import times_of
+from pipeline.calibration.times import fit_times
 from pipeline.common.errors import BadInput
 from pipeline.detection import Detectors, detect, detector_for
 from pipeline.formats.calibration_files.rig import write_rig
@@ -133,24 +132,20 @@ class Calibrate:
 
     def _fit_time(self, params: Params, source: Source) -> int:
         with frames_progress() as bar:
-            scenes, speeds = watch(source.frame, len(source), params, task_progress(bar, "driving"))
-        camera, ego, untold = times_of(scenes, speeds)
-        found = {"camera": camera, "ego": ego}
+            times = fit_times(source, params, task_progress(bar, "driving"))
         if self.json:
+            found = {"camera": times.camera, "ego": times.ego}
             told = {name: asdict(each) if each is not None else None for name, each in found.items()}
-            print(json.dumps(told, indent=1))
+            print(json.dumps({**told, "changes": times.changes}, indent=1))
         else:
-            table = Table("sync", "add to its times", "± 1 σ", title=f"{len(scenes)} images, {len(speeds)} speeds")
-            if camera is not None:
-                table.add_row("camera_offset_ms", f"{camera.camera_offset_ms:+.1f} ms", f"{camera.sigma_ms:.1f}")
-            if ego is not None:
-                table.add_row("ego_offset_ms", f"{ego.ego_offset_ms:+.1f} ms", f"{ego.sigma_ms:.1f}")
+            table = Table("parameter", "value", "± 1 σ", title=f"{times.images} images, {times.speeds} speeds")
+            for name, value in times.changes.items():
+                table.add_row(name, f"{value:+.1f} ms", f"{times.sigmas[name]:.1f}")
             Console().print(table)
-        for warning in (*(camera.warnings if camera is not None else ()), *untold):
+        for warning in times.warnings:
             print(f"cipv: {warning}", file=sys.stderr)
         if self.out is not None:
-            values = {"camera_offset_ms": camera.camera_offset_ms} if camera is not None else {}
-            values |= {"ego_offset_ms": ego.ego_offset_ms} if ego is not None else {}
+            values = {name.removeprefix("sync."): value for name, value in times.changes.items()}
             self.out.write_text(yaml.safe_dump({"sync": values}, sort_keys=False), encoding="utf-8")
         return 0
 

@@ -58,8 +58,10 @@ class LivePipeline:
         before = self.newest.after if self.newest is not None else State()
         ask = _TimedLook()
         with at_work("the pipeline"):
-            frame, after, result = advance(before, frame, params, self._detectors.of(frame), self._sensors, ask)
-        self.newest = ProcessedFrame(before, frame, after, result, params, ask.spent_ms, exact=True)
+            ran = advance(before, frame, params, self._detectors.of(frame), self._sensors, ask)
+        self.newest = ProcessedFrame(
+            before, ran.frame, ran.state, ran.result, ran.lidar, params, ask.spent_ms, exact=True
+        )
         return self.newest
 
     def with_silence(self, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:

@@ -17,7 +17,7 @@ from app.engine.processed_frame import ProcessedFrame
 from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.run import Sensors, advance, sensed
-from pipeline.step import State, step
+from pipeline.step import State
 from pipeline.types import Frame
 from pipeline.types.source import Source
 
@@ -112,9 +112,7 @@ class SeekablePipeline:
         if self.shown is None:
             return None
         known = self._known(self.shown.frame.index, params) if self.shown.whole else None
-        before, exact = (self.shown.before, False) if known is None else (known, True)
-        after, result = step(before, self.shown.frame, params)
-        self.shown = replace(self.shown, before=before, after=after, result=result, params=params, exact=exact)
+        self.shown = replace(self.shown.rerun(params, known), exact=known is not None)
         return self.shown
 
     def prepare(self, index: int) -> None:
@@ -142,10 +140,10 @@ class SeekablePipeline:
         spent_ms = self._ask.spent_ms
         frame = self._read(index)
         with at_work("the pipeline"):
-            frame, after, result = advance(state, frame, params, detectors, self._sensors, self._ask)
+            ran = advance(state, frame, params, detectors, self._sensors, self._ask)
         ahead, ahead_ms = self._ahead_ms
         detect_ms = self._ask.spent_ms - spent_ms + (ahead_ms if ahead == index else 0.0)
-        return ProcessedFrame(state, frame, after, result, params, detect_ms, exact)
+        return ProcessedFrame(state, ran.frame, ran.state, ran.result, ran.lidar, params, detect_ms, exact)
 
     def _asked_at_once(self, index: int, *, is_wanted: bool = False) -> Detectors:
         """The detectors to run on a frame for immediate display, or in its warm-up: those whose outputs are cached."""

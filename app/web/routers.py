@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from fastapi import APIRouter
 
 from app.clips.export_queue import ExportQueue
-from app.drive.alignment_fit import AlignmentFitting
 from app.drive.alignment_scenes import AlignmentScenes
 from app.drive.alignment_versions import AlignmentVersions
+from app.drive.fitting import AlignmentFitting, TimeFitting
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.fleet.desk import FleetDesk
@@ -21,9 +21,10 @@ from app.streaming.stream import Stream
 from app.views.rerun.web import ViewerFiles
 from app.web.metrics import Metrics
 from app.web.routes.account import account_router
-from app.web.routes.alignment import alignment_router
-from app.web.routes.alignment_fit import alignment_fit_router
-from app.web.routes.alignment_versions import alignment_versions_router
+from app.web.routes.alignment.fit import alignment_fit_router
+from app.web.routes.alignment.score import alignment_router
+from app.web.routes.alignment.time import time_fit_router
+from app.web.routes.alignment.versions import alignment_versions_router
 from app.web.routes.clips import clips_router
 from app.web.routes.drive import drive_router
 from app.web.routes.fleet import fleet_router
@@ -64,6 +65,8 @@ class Services:
     """The frames used to score an alignment."""
     fitting: AlignmentFitting
     """The running alignment fit."""
+    time_fitting: TimeFitting
+    """The running fit of the time offsets."""
     fleet: FleetDesk | None
     """The tables of a fleet; None without one."""
 
@@ -84,6 +87,7 @@ ROUTERS: list[Callable[[Services], APIRouter]] = [
     lambda on: clips_router(on.engine, on.exports),
     lambda on: alignment_router(on.engine, on.scenes),
     lambda on: alignment_fit_router(on.engine, on.fitting),
+    lambda on: time_fit_router(on.engine, on.time_fitting),
     lambda on: alignment_versions_router(on.engine, on.alignments, on.scenes, on.fitting),
     lambda on: project_router(on.engine),
     lambda on: fleet_router(on.fleet),

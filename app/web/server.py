@@ -22,9 +22,9 @@ from starlette.types import Scope
 
 from app.clips.export_queue import ExportQueue
 from app.core.shared_view_state import SharedViewState
-from app.drive.alignment_fit import AlignmentFitting
 from app.drive.alignment_scenes import AlignmentScenes
 from app.drive.alignment_versions import AlignmentVersions
+from app.drive.fitting import AlignmentFitting, TimeFitting
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.fleet.desk import FleetDesk
@@ -82,6 +82,7 @@ def create_app(
         alignments or AlignmentVersions(),
         AlignmentScenes(),
         AlignmentFitting(engine.drives),
+        TimeFitting(engine.drives),
         fleet,
     )
 

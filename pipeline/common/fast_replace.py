@@ -13,10 +13,12 @@ def evolve(record: Record, **values: Any) -> Record:
 
     Only for frozen dataclasses without ``__slots__`` and ``__post_init__``. TypeError for an unknown field.
     """
-    before = record.__dict__
-    fields = before | values
-    if len(fields) != len(before):
-        raise TypeError(f"{type(record).__name__} has no field {', '.join(sorted(values.keys() - before.keys()))}")
+    fields = record.__dict__.copy()
+    known = len(fields)
+    fields.update(values)
+    if len(fields) != known:
+        unknown = sorted(values.keys() - record.__dict__.keys())
+        raise TypeError(f"{type(record).__name__} has no field {', '.join(unknown)}")
     changed = object.__new__(type(record))
     object.__setattr__(changed, "__dict__", fields)  # plain assignment raises in frozen records
     return changed

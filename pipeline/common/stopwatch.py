@@ -18,6 +18,10 @@ class Stopwatch:
         self._laps[stage] = (now - self._last) / 1e6
         self._last = now
 
+    def skip(self) -> None:
+        """Attribute the time since the previous lap to no stage; it still counts in ``total``."""
+        self._last = perf_counter_ns()
+
     def timing_ms(self) -> dict[str, float]:
         """Milliseconds by stage, and ``total`` since the start."""
         return {**self._laps, "total": (perf_counter_ns() - self._start) / 1e6}

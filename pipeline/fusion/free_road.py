@@ -237,6 +237,22 @@ def _by_direction(places):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 @numba.njit(cache=True, nogil=True)
+def _slices(places):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """The slices of the places (K, 7), as in ``_count``: (K,) their number, and (K, most) for each the distance of its
+    middle and the height of the road there above that at the near end."""
+    counts = np.empty(len(places), np.int64)
+    middles, roads = np.empty((len(places), _MOST_SLICES)), np.empty((len(places), _MOST_SLICES))
+    for k in range(len(places)):
+        near, deep = places[k, 2], places[k, 3] - places[k, 2]
+        counts[k] = min(max(int(np.ceil(deep / _SLICE_M)), 1), _MOST_SLICES)
+        half = 0.5 * deep / counts[k]
+        for b in range(counts[k]):
+            middles[k, b] = near + (2 * b + 1) * half
+            roads[k, b] = (places[k, 6] - places[k, 5]) * (middles[k, b] - near) / deep
+    return counts, middles, roads
+
+
+@numba.njit(cache=True, nogil=True)
 def _count(points, ring, kind, origin, places, slope, step_rad, silent_m):  # type: ignore[no-untyped-def]  # pragma: no cover
     """(K, 6) fields of ``Rays`` for (K, 7) places: unit x, y, near, far, tangent of half the angle, and the road's
     height at near and far, all relative to ``origin``. slope, step_rad: the beams."""
@@ -245,6 +261,7 @@ def _count(points, ring, kind, origin, places, slope, step_rad, silent_m):  # ty
     taken = np.zeros((len(places), _MOST_SLICES))
     seen, hidden = np.zeros((len(places), len(slope))), np.zeros(len(places))
     first, which = _by_direction(places)
+    counts, middles, roads = _slices(places)
     for i in range(len(points)):
         x, y, z = points[i, 0] - origin[0], points[i, 1] - origin[1], points[i, 2] - origin[2]
         towards = _diamond(x, y)
@@ -256,26 +273,24 @@ def _count(points, ring, kind, origin, places, slope, step_rad, silent_m):  # ty
             near, deep = places[k, 2], places[k, 3] - places[k, 2]
             over_road = z - places[k, 5] - (places[k, 6] - places[k, 5]) * (along - near) / deep
             hidden[k] += over_road > _BODY_LOW_M and (along < near or 0.0 < along - places[k, 3] < _FLANK_M)
-            slices = min(max(int(np.ceil(deep / _SLICE_M)), 1), _MOST_SLICES)
-            half = 0.5 * deep / slices
-            for b in range(slices):
-                at = near + (2 * b + 1) * half
-                height = z * at / along - places[k, 5] - (places[k, 6] - places[k, 5]) * (at - near) / deep
+            half = 0.5 * deep / counts[k]
+            for b in range(counts[k]):
+                at = middles[k, b]
+                if at - half > along:  # it ended before this slice and all behind it
+                    break
+                height = z * at / along - places[k, 5] - roads[k, b]
                 if _BODY_LOW_M <= height <= _BODY_HIGH_M:
                     through[k, b] += along > at + half
                     stopped[k, b] += kind[i] < 0 and at - half <= along <= at + half
                     taken[k, b] += kind[i] >= 0 and at - half <= along <= at + half
     for k in range(len(places)):
-        near, deep = places[k, 2], places[k, 3] - places[k, 2]
-        slices = min(max(int(np.ceil(deep / _SLICE_M)), 1), _MOST_SLICES)
-        half = 0.5 * deep / slices
         rays, live = 2.0 * places[k, 4] / step_rad, seen[k].sum() >= MIN_RAYS and hidden[k] < MIN_RAYS
         out[k, 0] = out[k, 3] = out[k, 4] = out[k, 5] = np.inf
-        for b in range(slices):
-            at = near + (2 * b + 1) * half
+        for b in range(counts[k]):
+            at = middles[k, b]
             silent = 0.0
             for c in range(len(slope)):
-                height = slope[c] * at - places[k, 5] - (places[k, 6] - places[k, 5]) * (at - near) / deep
+                height = slope[c] * at - places[k, 5] - roads[k, b]
                 if live and at <= silent_m and _BODY_LOW_M <= height <= _BODY_HIGH_M:
                     silent += max(rays - seen[k, c], 0.0)
             passed, ended = through[k, b] + silent, stopped[k, b] + taken[k, b]

@@ -24,6 +24,8 @@ IN_DISPUTE = 1.5
 """Factor on the sigma while a source is ignored: the others may be the ones that are wrong."""
 EDGE_SIGMA_M = 0.5
 """Sigma of the lane lines at which the edges lie half way between them and the usual half width."""
+_SUREST_M = 1e-3
+"""No source is surer than this: an uncertainty that a parameter sets to 0 would outweigh all others without limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,7 @@ def fuse(
     """One path from one or more estimates, and a sentence for each ignored source. expected: the previous frame's path,
     predicted to now; it takes part in the comparison of sources, not in the mean."""
     centers = np.stack([each.center for each in estimates])
-    sigmas = np.stack([each.sigma_m for each in estimates])
+    sigmas = np.maximum(np.stack([each.sigma_m for each in estimates]), _SUREST_M)
     compared = int(COMPARED_M / STEP_M)
     ref = int(np.argmin(np.log(sigmas[:, :compared]).mean(axis=1)))
     known = expected is not None

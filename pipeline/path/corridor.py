@@ -132,7 +132,10 @@ def warm_up() -> None:
 def _shows_the_road(each: PathEstimate | None, params: PathParams) -> bool:
     """Whether lane lines or a route show the road well. Then road edges and other vehicles add nothing and must not
     outvote them: a car keeps to its lane where the kerb diverges or other vehicles turn off."""
-    return each is not None and float(each.sigma_m[int(_LOOK_AHEAD_M[1] / STEP_M)]) <= params.good_sigma_m
+    if each is None:
+        return False
+    ahead = min(int(_LOOK_AHEAD_M[1] / STEP_M), len(each.sigma_m) - 1)  # a path may be shorter
+    return float(each.sigma_m[ahead]) <= params.good_sigma_m
 
 
 def _expected(

@@ -193,7 +193,7 @@ def _doubted(aside_m: float, turned: F64, doubt_m: float, params: PathParams) ->
     lateral error.
     """
     keeping_var = params.lane_keeping_sigma_m**2
-    believed = keeping_var / (keeping_var + doubt_m**2)
+    believed = keeping_var / (keeping_var + doubt_m**2) if doubt_m > 0.0 else 1.0
     return (1.0 - believed) * aside_m, believed * doubt_m**2 + (doubt_m * np.sin(turned)) ** 2
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol, TypeGuard, runtime_checkable
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
 from pipeline.common.progress import Progress, silent
-from pipeline.params import SyncParams
+from pipeline.params import Params, SyncParams
 from pipeline.source_kinds import is_live
 from pipeline.types import F64, Box, CameraCalibration, EgoState, Frame, GnssFix, StreamHealth, Sweep
 from pipeline.types.camera_shot import Shot
@@ -141,6 +141,15 @@ class Recorded(Protocol):
 
     origin: str
     """URI of the original source."""
+
+
+@runtime_checkable
+class Parametrised(Protocol):
+    """A source that stores the parameters it was recorded with."""
+
+    def params(self, index: int) -> Params | None:
+        """Parameters of a frame when it was recorded; None if they are not known."""
+        ...
 
 
 class Mark(NamedTuple):

@@ -52,7 +52,7 @@ def errors(
     for index in frames:
         now = world_state.at(played, index / played.rate_hz)
         frame = sensors.frame(now, index, round(index / played.rate_hz * 1e9))
-        _, state, result = advance(state, frame, params or Params(), detectors)
+        _, state, result, _ = advance(state, frame, params or Params(), detectors)
         yield from _compared(index, result.layers.lanes, true_lines(played, now))
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -12,7 +14,8 @@ from playwright.sync_api import Page, expect
 from app.engine.engine import Engine
 from pipeline.params import Params, with_changes
 from pipeline.sources import open_source
-from tests.browser.conftest import WAIT_MS, CountedDetector, OpenPage, Site, opening
+from pipeline.types import Frame
+from tests.browser.conftest import WAIT_MS, CountedDetector, OpenPage, Pages, Site, opening
 from tests.browser.looks import pixels, repainted
 
 WAIT_S = WAIT_MS / 1e3
@@ -107,6 +110,57 @@ def test_a_fit_is_cancelled_and_changes_nothing(page: Page, knocked: Site):
     expect(page.get_by_label("Fitted alignment")).to_be_hidden()
     assert page.request.get(f"{knocked.address}/api/alignment/fit").json()["state"] == "none"
     assert alignment(knocked) == Params()
+
+
+LATE_MS = 100.0
+
+
+class LateCamera:
+    """Six seconds of a bend whose images are those of the next frame."""
+
+    def __init__(self) -> None:
+        self._bend = open_source("sim:curve_125")
+        self.uri, self.title, self.rate_hz = "sim:late", "a late camera", self._bend.rate_hz
+        self.calibrated_focal_px, self.notes, self.images_given = None, (), True
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._bend, name)
+
+    def __len__(self) -> int:
+        return 60
+
+    def frame(self, index: int) -> Frame:
+        own, image = self._bend.frame(index), self._bend.frame(index + 1).image
+        assert own.image is not None
+        assert image is not None
+        return replace(own, image=replace(image, t_ns=own.image.t_ns))
+
+
+def test_the_time_offset_is_shown_applied_on_consent_and_undone(pages: Pages):
+    engine = Engine(lambda uri, progress: LateCamera(), CountedDetector, Params(), uri="sim:late", whole_drives=True)
+    engine.start()
+    engine.wait_for(lambda s: s.processed is not None, WAIT_S)
+    site = Site(engine, 0)
+    site.start()
+    try:
+        with opening(pages, site) as begin:
+            page = begin()
+            page.keyboard.press("a")
+            page.get_by_role("button", name="Time", exact=True).click()
+            result = page.get_by_label("Time offsets", exact=True)
+            expect(result).to_contain_text(re.compile(r"Camera\d+\.\d ms ± \d"))
+            expect(result).to_contain_text("ego speed changes too little")
+            assert alignment(site) == Params(), "nothing changes before Apply"
+            result.get_by_role("button", name="Apply").click()
+            found = engine.wait_for(lambda s: s.params != Params(), WAIT_S).params
+            assert found.sync.camera_offset_ms == pytest.approx(LATE_MS, abs=5.0)
+            expect(result).to_be_hidden()
+            page.locator("#camera").click(position={"x": 5, "y": 5})
+            page.keyboard.press("Control+z")
+            engine.wait_for(lambda s: s.params == Params(), WAIT_S)
+    finally:
+        site.stop()
+        engine.stop()
 
 
 MOST_MOVES, MOST_S = 8, 120.0

@@ -131,7 +131,7 @@ class _Ticks:
 
 def test_a_car_with_lidar_alone_asks_no_detector() -> None:
     boxes, lanes = _Seen(_NO_BOXES), _Seen(_NO_LANES)
-    frame, _, result = advance(State(), _frames(1)[0], Params(), Detectors(boxes, lanes), "lidar")
+    frame, _, result, _ = advance(State(), _frames(1)[0], Params(), Detectors(boxes, lanes), "lidar")
     assert (boxes.calls, lanes.calls) == (0, 0)
     assert frame.raw_boxes is None
     assert frame.raw_lanes is None
@@ -150,7 +150,7 @@ def test_the_line_believes_the_simulators_lane_by_the_classical_detector() -> No
     lanes = lanes_for(source)
     assert lanes is not None
     assert lanes.name.startswith("classical")
-    _, _, result = advance(State(), source.frame(0), Params(), Detectors(None, lanes))
+    _, _, result, _ = advance(State(), source.frame(0), Params(), Detectors(None, lanes))
     lane = result.layers.lanes
     assert lane is not None
     assert lane.width_m == pytest.approx(3.6, abs=0.2)

@@ -43,6 +43,9 @@ class PairedBoxes(NamedTuple):
     """(M,) number of the piece of time; ascending."""
     vehicle: I64
     """(M,) which vehicle, from 0 without gaps."""
+    track: I64
+    """(M,) which track, from 0 without gaps. A track whose size jumps counts as several vehicles, each with an error of
+    its own, but not as several witnesses."""
     frames: F64
     """(M,) number of frames."""
     height_deg: F64

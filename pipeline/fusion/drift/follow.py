@@ -36,7 +36,7 @@ HELD = 2
 CONTRADICTED_SIGMAS = 3.0
 """A reported turn is dropped once vehicles show less than half of it, this clearly."""
 _PIECE_NS = round(PIECE_S * 1e9)
-_PIECE, _VEHICLE, _FRAMES, _YAW, _PITCH, _RATE, _HEIGHT = range(7)
+_PIECE, _VEHICLE, _FRAMES, _YAW, _PITCH, _RATE, _HEIGHT, _TRACK = range(8)
 _AXES = (_YAW, _PITCH)
 
 
@@ -73,6 +73,8 @@ class _Vehicle(NamedTuple):
 
     number: int
     """Never given twice."""
+    track: int
+    """Number of the first vehicle of the same track: what is now taken for another one may be the same."""
     t_ns: int
     """When it was last compared."""
     frames: int
@@ -105,8 +107,8 @@ class DriftState(NamedTuple):
     """The piece of time under way."""
     fresh: tuple[tuple[float, ...], ...] = ()
     """Rows of the piece under way, one for each vehicle and frame."""
-    rows: F64 = np.zeros((0, 7))
-    """(M, 7) means over earlier pieces: piece, vehicle, frames, yaw, pitch, rate, height."""
+    rows: F64 = np.zeros((0, 8))
+    """(M, 8) means over earlier pieces: piece, vehicle, frames, yaw, pitch, rate, height, track."""
     names: tuple[tuple[int, str], ...] = ()
     """Name of the first frame of each piece."""
     found: _Found = _Found()
@@ -158,15 +160,16 @@ def _noted(state: DriftState, pairs: Sequence[Offset], t_ns: int) -> DriftState:
     for pair in pairs:
         sizes = np.log(np.maximum(pair.sizes_m, 0.1)).tolist()
         before = known.get(pair.track)
-        if before is None or t_ns - before.t_ns > FORGOTTEN_S * 1e9 or _differ(before.sizes, sizes):
-            now = _Vehicle(number, t_ns, 1, tuple(sizes))
+        is_new = before is None or t_ns - before.t_ns > FORGOTTEN_S * 1e9
+        if before is None or is_new or _differ(before.sizes, sizes):
+            now = _Vehicle(number, number if before is None or is_new else before.track, t_ns, 1, tuple(sizes))
             number += 1
         else:
             frames = min(before.frames + 1, SIZES_OVER)
             means = tuple(old + (new - old) / frames for old, new in zip(before.sizes, sizes, strict=True))
-            now = _Vehicle(before.number, t_ns, frames, means)
+            now = _Vehicle(before.number, before.track, t_ns, frames, means)
         known[pair.track] = now
-        rows.append((now.number, pair.yaw_deg, pair.pitch_deg, pair.rate_degps, pair.height_deg))
+        rows.append((now.number, pair.yaw_deg, pair.pitch_deg, pair.rate_degps, pair.height_deg, now.track))
     kept = tuple((track, each) for track, each in known.items() if t_ns - each.t_ns <= FORGOTTEN_S * 1e9)
     return state._replace(vehicles=kept, next_number=number, fresh=(*state.fresh, *rows))
 
@@ -182,7 +185,7 @@ def _closed(state: DriftState, piece: int, params: FusionParams) -> DriftState:
         fresh = np.array(state.fresh)
         numbers, at = np.unique(fresh[:, 0], return_inverse=True)
         frames = np.bincount(at)
-        means = [np.bincount(at, fresh[:, k]) / frames for k in range(1, 5)]
+        means = [np.bincount(at, fresh[:, k]) / frames for k in range(1, 6)]
         rows = np.vstack([rows, np.column_stack([np.full(len(numbers), state.piece), numbers, frames, *means])])
     oldest = piece - params.drift_s / PIECE_S
     names = tuple(each for each in state.names if each[0] > oldest)
@@ -199,7 +202,8 @@ def _judged(state: DriftState, params: FusionParams) -> DriftState:
     axis = state.piece % 2
     rate = rows[:, _RATE] if axis == 0 else np.zeros(len(rows))
     vehicle = np.unique(rows[:, _VEHICLE], return_inverse=True)[1]
-    seen = PairedBoxes(rows[:, _PIECE].astype(np.int64), vehicle, rows[:, _FRAMES], rows[:, _HEIGHT], rate)
+    track = np.unique(rows[:, _TRACK], return_inverse=True)[1]
+    seen = PairedBoxes(rows[:, _PIECE].astype(np.int64), vehicle, track, rows[:, _FRAMES], rows[:, _HEIGHT], rate)
     verdict = judge(seen, rows[:, _AXES[axis]])
     found = _updated(state.found, axis, verdict, params)
     return state._replace(found=found, told=_told(state, found, axis, verdict))

@@ -78,9 +78,10 @@ def judge(seen: PairedBoxes, values: F64) -> TurnEstimates:
     found = changes(seen, values, moments)
     of_vehicle = np.equal.outer(seen.vehicle, np.arange(int(seen.vehicle.max()) + 1)).astype(np.float64)
     is_after = (seen.piece[None] >= moments[:, None]).astype(np.float64)
-    frames = (is_after * seen.frames) @ of_vehicle
+    of_track = np.equal.outer(seen.track, np.arange(int(seen.track.max()) + 1)).astype(np.float64)
+    frames = (is_after * seen.frames) @ of_track
     timed = values - found.time_s[:, None] * seen.rate_degps
-    shown = ((is_after * seen.frames * timed) @ of_vehicle) / np.maximum(frames, 1.0)
+    shown = ((is_after * seen.frames * timed) @ of_track) / np.maximum(frames, 1.0)
     counts = frames >= FEWEST_FRAMES
     near = np.maximum(AGREE_DEG, AGREE_SHARE * np.abs(found.after))
     agreeing = np.sum(counts & (np.abs(shown - found.after[:, None]) < near[:, None]), axis=1)

@@ -6,7 +6,7 @@ import { newestOnly, request } from "../core/api.js";
 import { $, el, press, text } from "../core/dom.js";
 import { get, on, set } from "../core/store.js";
 import { change, reveal } from "../panels/params.js";
-import { fitControl, resultPanel } from "./fit.js";
+import { alignmentFit, timeFit } from "./fit.js";
 import { drawRegions, rangesRow, regionsButton, showRegions } from "./regions.js";
 import { versionsButton, versionsPanel } from "./versions.js";
 import { followHand } from "./pointer.js";
@@ -46,7 +46,8 @@ export function setUp() {
     model("pinhole"),
     el("span", { class: "facts match", textContent: "Match" }),
     score,
-    fitControl,
+    alignmentFit.control,
+    timeFit.control,
     versionsButton,
     el("span", { class: "spacer" }),
     how,
@@ -54,7 +55,13 @@ export function setUp() {
     edgesButton(),
     regionsButton,
   );
-  bar.after(rangesRow, el("div", { class: "fit-place" }, resultPanel, versionsPanel));
+  bar.after(rangesRow, el(
+      "div",
+      { class: "fit-place" },
+      el("div", { class: "fits" }, alignmentFit.panel, timeFit.panel),
+      versionsPanel,
+    ),
+  );
   followHand($("#camera", HTMLCanvasElement), isOn);
   addLayer((ctx, frame, place) => isOn() && get("align")?.edges && drawEdges(ctx, frame, place));
   addLayer((ctx, frame, place) => isOn() && get("align")?.regions && drawRegions(ctx, frame, place), "over");

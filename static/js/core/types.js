@@ -247,11 +247,10 @@
  * @property {number} from_m
  * @property {number|null} to_m
  *
- * @typedef {object} AlignmentFit
+ * @typedef {object} FitProgress
  * @property {"none"|"waiting"|"running"|"done"|"failed"|"cancelled"} state
  * @property {number} progress
  * @property {string} note
- * @property {AlignmentFitResult|null} result
  *
  * @typedef {object} AlignmentFitResult
  * @property {Record<string, number|string>} changes
@@ -261,6 +260,13 @@
  * @property {number|null} iou_before
  * @property {number} iou_after
  * @property {string} text
+ * @property {string[]} warnings
+ *
+ * @typedef {object} TimeFitResult
+ * @property {Record<string, number>} changes
+ * @property {Record<string, number>} sigmas
+ * @property {number} images
+ * @property {number} speeds
  * @property {string[]} warnings
  *
  * @typedef {object} AlignmentVersion

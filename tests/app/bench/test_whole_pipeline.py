@@ -46,7 +46,7 @@ def test_the_step_is_measured_alone_and_beside_the_network(tmp_path: Path, monke
     monkeypatch.setattr(Detector, "detect", noting)
     lanes = Paint()
     figures = whole_pipeline.stages(source, 3, Params(), Detectors(detector, lanes, 2), 0.4)
-    assert list(figures) == ["step", "step_beside_network", "line"]
+    assert list(figures) == ["lidar_branch", "step", "step_beside_network", "line"]
     assert asked == {"here", "beside"}
     assert lanes.asked > 0
     assert (figures["line"]["lanes"], figures["line"]["lanes_every"]) == ("paint", 2)
@@ -54,6 +54,7 @@ def test_the_step_is_measured_alone_and_beside_the_network(tmp_path: Path, monke
         assert 0.0 < row["median_ms"] <= row["p99_ms"]
         assert row["samples"] >= 1
     assert figures["step"]["cpu_ms"] > 0.0
+    assert figures["lidar_branch"]["cpu_ms"] > 0.0
     beside = figures["step_beside_network"]
     ratio = beside["p99_ms"] / figures["step"]["median_ms"]
     assert beside["p99_to_idle_median"] == pytest.approx(ratio, abs=0.01)
@@ -75,11 +76,11 @@ def test_why_peers_are_absent_is_said_once_below_the_table() -> None:
 
 def test_each_round_goes_on_where_the_last_one_ended() -> None:
     source = open_source("sim:straight")
-    laps = whole_pipeline._Laps(iter([source.frame(0), source.frame(1)] * 1000), Params())
+    steps = whole_pipeline._Steps(iter([source.frame(0), source.frame(1)] * 1000), Params())
     for _ in range(2):
-        laps.go_on(0.0)
-    assert len(laps.times_s) == 1, "one frame at least, however short the time"
-    laps.go_on(0.05)
-    row = laps.row()
-    assert row["samples"] == len(laps.times_s) > 1
-    assert row["median_ms"] == pytest.approx(float(np.median(laps.times_s)) * 1e3)
+        steps.go_on(0.0)
+    assert len(steps.rest.times_s) == 1, "one frame at least, however short the time"
+    steps.go_on(0.05)
+    row = steps.rest.row()
+    assert row["samples"] == len(steps.rest.times_s) == len(steps.branch.times_s) > 1
+    assert row["median_ms"] == pytest.approx(float(np.median(steps.rest.times_s)) * 1e3)

@@ -16,7 +16,9 @@ from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
-from app.web.routes.alignment_fit import FitResult
+from app.web.routes.alignment.fit import FitResult
+from app.web.routes.alignment.progress import FitProgress
+from app.web.routes.alignment.time import TimeFitResult
 from app.web.server import create_app
 from tests.app.engine.recording_helpers import Recording
 from tests.app.web.serving import WAIT_S, running, serving
@@ -102,9 +104,10 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "AlignmentScore": (alignment := get("/api/alignment/score")),
         "MatchRegion": alignment["regions"][0],
         "MatchRange": alignment["ranges"][0],
-        "AlignmentFit": get("/api/alignment/fit"),
+        "FitProgress": dict.fromkeys(FitProgress.model_fields),
         "AlignmentVersion": client.post("/api/alignment/versions", json={"note": ""}).json(),
         "AlignmentFitResult": dict.fromkeys(FitResult.model_fields),
+        "TimeFitResult": dict.fromkeys(TimeFitResult.model_fields),
         **labelled(engine, client),
     }
 

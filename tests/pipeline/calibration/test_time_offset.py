@@ -50,9 +50,12 @@ def test_a_camera_whose_images_are_later_than_they_say_is_found(late: list[Frame
     assert abs(found.camera_offset_ms - LATER_MS) < 4.0 * found.sigma_ms
     assert found.frames >= 50
     assert len(speeds) > 40
-    camera, _, untold = times_of(scenes, speeds)
-    assert camera == found
-    assert any("ego speed" in each for each in untold), "six seconds at one speed"
+    times = times_of(scenes, speeds)
+    assert times.camera == found
+    assert times.changes == {"sync.camera_offset_ms": found.camera_offset_ms}
+    assert any("ego speed" in each for each in times.warnings), "six seconds at one speed"
+    again = times_of(scenes, speeds, recorded_ms=20.0)
+    assert again.changes == {"sync.camera_offset_ms": round(found.camera_offset_ms + 20.0, 1)}, "its images say so"
 
 
 def test_times_that_say_so_leave_nothing_to_correct(late: list[Frame]):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.alignment.projection import resolve
-from pipeline.calibration.alignment.fit import NothingToFit, fit_alignment, overlap_sentence
+from pipeline.calibration.alignment.fit import SHARED_DEG, NothingToFit, fit_alignment, overlap_sentence
 from pipeline.calibration.alignment.scenes import FitScene, fit_scene
 from pipeline.common.geometry import inverse, rotation
 from pipeline.params import AlignmentParams, Params, with_changes
@@ -34,6 +34,7 @@ def test_a_turned_mount_is_found_without_a_start(true: dict[str, float]):
     for name, value in true.items():
         assert fit.values[name] == pytest.approx(value, abs=0.15 if name != "roll_deg" else 0.4)
         assert abs(fit.values[name] - value) < 4.0 * fit.sigmas[name] + 0.02
+        assert fit.sigmas[name] >= SHARED_DEG.get(name, 0.0), "what all frames share does not average out"
     assert fit.before is not None
     assert fit.after.mean_iou > max(0.8, fit.before.mean_iou + 0.3)
     assert fit.held_out

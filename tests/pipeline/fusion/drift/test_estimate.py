@@ -13,7 +13,7 @@ def sightings(vehicles: int, pieces: int, rates: F64 | None = None) -> PairedBox
     """Every vehicle in every time interval."""
     piece, vehicle = (each.ravel() for each in np.meshgrid(np.arange(pieces), np.arange(vehicles), indexing="ij"))
     rate = np.zeros(len(piece)) if rates is None else rates[vehicle]
-    return PairedBoxes(piece, vehicle, np.full(len(piece), 5.0), np.full(len(piece), 3.0), rate)
+    return PairedBoxes(piece, vehicle, vehicle, np.full(len(piece), 5.0), np.full(len(piece), 3.0), rate)
 
 
 def shown(seen: PairedBoxes, before: float, after: float, at: int, time_s: float = 0.0, seed: int = 0) -> F64:

@@ -11,13 +11,13 @@ from pipeline.fusion.drift.judge import MountTurn, judge
 SIGMAS = 4.0
 
 
-def turn(angles_deg: list[list[float]], frames: int = 5) -> MountTurn | None:
-    """angles_deg: of each vehicle in each time interval."""
+def turn(angles_deg: list[list[float]], frames: int = 5, tracks: tuple[int, ...] | None = None) -> MountTurn | None:
+    """angles_deg: of each vehicle in each time interval. tracks: of each vehicle; without it each has its own."""
     values = np.array(angles_deg).T
     pieces, vehicles = values.shape
     piece, vehicle = (each.ravel() for each in np.meshgrid(np.arange(pieces), np.arange(vehicles), indexing="ij"))
-    count = len(piece)
-    seen = PairedBoxes(piece, vehicle, np.full(count, float(frames)), np.full(count, 3.0), np.zeros(count))
+    count, track = len(piece), vehicle if tracks is None else np.array(tracks)[vehicle]
+    seen = PairedBoxes(piece, vehicle, track, np.full(count, float(frames)), np.full(count, 3.0), np.zeros(count))
     return judge(seen, values.ravel()).turn(SIGMAS)
 
 
@@ -35,6 +35,12 @@ def turn(angles_deg: list[list[float]], frames: int = 5) -> MountTurn | None:
 )
 def test_vehicles_must_agree(each_deg: tuple[float, ...], is_told: bool):
     assert (turn([[angle] * 16 for angle in each_deg]) is not None) is is_told
+
+
+def test_a_track_whose_size_jumps_is_still_one_witness():
+    both = [[1.5] * 16, [1.4] * 16]
+    assert turn(both) is not None
+    assert turn(both, tracks=(0, 0)) is None
 
 
 def test_the_moment_is_found():

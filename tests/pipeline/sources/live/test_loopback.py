@@ -29,7 +29,7 @@ def is_whole(frame: Frame) -> bool:
 def leads(frames: list[Frame], params: Params, detectors: Detectors) -> list[Result]:
     state, results = State(), []
     for frame in frames:
-        _, state, result = advance(state, frame, params, detectors)
+        _, state, result, _ = advance(state, frame, params, detectors)
         results.append(result)
     return results
 

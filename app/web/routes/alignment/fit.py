@@ -3,16 +3,17 @@ result."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import yaml
 from fastapi import APIRouter, HTTPException, Response
 from pydantic import ConfigDict, Field
 
-from app.core.jobs import JobState
-from app.drive.alignment_fit import AlignmentFitting, FitJob
+from app.core.jobs import BackgroundJob
+from app.drive.fitting import AlignmentFitting
 from app.engine.engine import Engine
 from app.web.refusals import open_recording, refusing
+from app.web.routes.alignment.progress import FitProgress, progress_of
 from app.web.routes.shapes.common import ApiModel, StatusJson, file_of
 from pipeline.calibration.alignment.fit import AlignmentFit, overlap_sentence
 from pipeline.calibration.alignment.models import ModelName
@@ -48,15 +49,9 @@ class FitResult(ApiModel):
     """What the drive cannot tell."""
 
 
-class FitJson(ApiModel):
+class FitJson(FitProgress):
     """The newest fit."""
 
-    state: JobState | Literal["none"]
-    """``none``: no fit was begun for this recording."""
-    progress: float
-    """0–1."""
-    note: str
-    """Why it failed; empty otherwise."""
     result: FitResult | None
     """Null until it is done."""
 
@@ -98,12 +93,9 @@ def alignment_fit_router(engine: Engine, fitting: AlignmentFitting) -> APIRouter
     return router
 
 
-def _json(job: FitJob | None) -> FitJson:
-    if job is None:
-        return FitJson(state="none", progress=0.0, note="", result=None)
-    now = job.status
-    result = _result(job.result) if job.result is not None else None
-    return FitJson(state=now.state, progress=now.fraction, note=now.error or "", result=result)
+def _json(job: BackgroundJob[AlignmentFit] | None) -> FitJson:
+    found = job.result if job is not None else None
+    return FitJson(**vars(progress_of(job)), result=_result(found) if found is not None else None)
 
 
 def _result(fit: AlignmentFit) -> FitResult:

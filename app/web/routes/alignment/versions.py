@@ -9,12 +9,12 @@ from typing import Any
 from fastapi import APIRouter, HTTPException
 from pydantic import ConfigDict, Field
 
-from app.drive.alignment_fit import AlignmentFitting
 from app.drive.alignment_scenes import AlignmentScenes
 from app.drive.alignment_versions import LONGEST_NOTE, AlignmentVersion, AlignmentVersions
+from app.drive.fitting import AlignmentFitting
 from app.engine.engine import Engine
 from app.web.refusals import refusing
-from app.web.routes.alignment import seen_now
+from app.web.routes.alignment.score import seen_now
 from app.web.routes.shapes.common import ApiModel, StatusJson
 from pipeline.calibration.edge_match import edge_score
 from pipeline.params import with_changes

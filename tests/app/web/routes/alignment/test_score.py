@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.web.routes.alignment import _json
+from app.web.routes.alignment.score import _json
 from pipeline.calibration.edge_match import EdgeScore
 from pipeline.calibration.local_match import NO_MATCH
 
