@@ -14,9 +14,14 @@ from app.core.client_role import Account, AccountRole, includes
 from app.labels.errors import NotAllowed
 from app.labels.work_states import State
 
-ACT_ROLES: Mapping[str, AccountRole] = {"review_ok": "reviewer", "send_back": "reviewer", "import": "reviewer"}
+ACT_ROLES: Mapping[str, AccountRole] = {
+    "review_ok": "reviewer",
+    "send_back": "reviewer",
+    "import": "reviewer",
+    "clear_all": "reviewer",
+}
 """The role that an act needs; without an entry, every account may do it. Import: a labeler would import the truth of
-control frames."""
+control frames. Clear: who may freeze versions, which it follows."""
 
 
 def check_name(account: Account | None, person: str) -> None:

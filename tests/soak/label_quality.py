@@ -45,6 +45,7 @@ DRIVES = {
     "astyx": "astyx:astyx",
     "0009": "kitti:kitti_0009/2011_09_26/2011_09_26_drive_0009_sync",
     "0052": "kitti:kitti_0052",
+    "more": "astyx:astyx_more",
 }
 ORIGIN = Origin("pipeline", "measured", 0)
 FARTHEST_M = 50.0

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from app.labels.acts import attributes, frames, leads, review, shape, tags, tracks
+from app.labels.acts import attributes, bulk_removal, frames, leads, review, shape, tags, tracks
 from app.labels.acts.found import AddMeasured, AddSightings
 from app.labels.acts.requests import (
     Accept,
     AddEvent,
     AddTrack,
+    ClearAll,
     ClearLead,
     DropKeyframe,
     DropSightings,
@@ -40,6 +41,7 @@ _ACTS: dict[type, Callable[[Draft, Scope, Any], str]] = {
     SendBack: review.send_back,
     ReviewOk: review.review_ok,
     Remove: review.remove,
+    ClearAll: bulk_removal.clear_all,
     SetSighting: shape.set_sighting,
     DropKeyframe: shape.drop_keyframe,
     DropSightings: shape.drop_sightings,

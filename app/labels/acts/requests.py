@@ -57,6 +57,15 @@ class Remove(OfItems):
     kind: Literal["remove"]
 
 
+class ClearAll(Strict):
+    """Remove all labels, so that a second person can label the recording independently. Frames that are queued for
+    labeling stay queued."""
+
+    kind: Literal["clear_all"]
+    revision: Id
+    """Number of the last act that its author has seen; after a later one, it is refused."""
+
+
 class SetSighting(OfTrack, Placed):
     """Set a keyframe; with ``interpolate`` the frames around it follow."""
 
@@ -285,8 +294,8 @@ class Import(Strict):
 
 
 Act = Annotated[
-    Accept | Reject | SendBack | ReviewOk | Remove | SetSighting | DropKeyframe | DropSightings | SizeAlong | Flip
-    | Refit | Propagate | AddTrack | Lift | Relabel | SetAttribute | Split | Merge | SetLead | ClearLead | TrimLead
-    | SetPath | RemovePath | AddEvent | Tag | Propose | Import,
+    Accept | Reject | SendBack | ReviewOk | Remove | ClearAll | SetSighting | DropKeyframe | DropSightings | SizeAlong
+    | Flip | Refit | Propagate | AddTrack | Lift | Relabel | SetAttribute | Split | Merge | SetLead | ClearLead
+    | TrimLead | SetPath | RemovePath | AddEvent | Tag | Propose | Import,
     Field(discriminator="kind"),
 ]  # fmt: skip

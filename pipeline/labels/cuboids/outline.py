@@ -102,11 +102,9 @@ def placed(
 
 def misfit_m(points: F32, eyes: F64, cuboid: Cuboid) -> float:
     """Mean distance of the points from the nearest side of the cuboid that faced the sensor, and outside of it."""
-    c, s = math.cos(cuboid.yaw_rad), math.sin(cuboid.yaw_rad)
-    axes = np.array([[c, s], [-s, c]])
+    axes, half = _axes(cuboid), np.array(cuboid.size[:2]) / 2
     flat = (points[:, :2].astype(np.float64) - cuboid.center[:2]) @ axes.T
     from_where = (eyes - cuboid.center[:2]) @ axes.T
-    half = np.array(cuboid.size[:2]) / 2
     outside = np.maximum(np.abs(flat) - half, 0.0).max(axis=1)
     away = [
         np.abs(flat[:, axis] - sign * half[axis])
@@ -116,6 +114,19 @@ def misfit_m(points: F32, eyes: F64, cuboid: Cuboid) -> float:
     ]
     beside = np.min(away, axis=0) if away else outside
     return float(np.minimum(beside, _CAP_M).mean() + np.minimum(outside, _CAP_M).mean())
+
+
+def outside_m(points: F32, cuboid: Cuboid) -> float:
+    """Mean distance of the points outside of the cuboid, seen from above; those inside count as 0."""
+    flat = (points[:, :2].astype(np.float64) - cuboid.center[:2]) @ _axes(cuboid).T
+    outside = np.maximum(np.abs(flat) - np.array(cuboid.size[:2]) / 2, 0.0).max(axis=1)
+    return float(np.minimum(outside, _CAP_M).mean())
+
+
+def _axes(cuboid: Cuboid) -> F64:
+    """(2, 2) unit vectors of length and width, as rows."""
+    c, s = math.cos(cuboid.yaw_rad), math.sin(cuboid.yaw_rad)
+    return np.array([[c, s], [-s, c]])
 
 
 def _side(low: bool | np.bool_, high: bool | np.bool_) -> EndsSeen:

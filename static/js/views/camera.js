@@ -80,7 +80,7 @@ export function setUp() {
     () => (get("labeling")?.tool ? "crosshair" : ""),
   );
   followTape();
-  setUpZoom(canvas, place, invalidate);
+  setUpZoom(canvas, () => surface, invalidate);
   on(["taping"], () => (canvas.style.cursor = get("taping") ? "crosshair" : ""));
 }
 

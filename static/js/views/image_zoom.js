@@ -2,6 +2,7 @@
 import { get } from "../core/store.js";
 
 /** @typedef {{x: number, y: number, scale: number}} Place */
+/** @typedef {{width: number, height: number}} Size */
 
 /** Maximum number of canvas pixels per camera pixel. */
 const LARGEST = 40;
@@ -13,6 +14,8 @@ const WHOLE = { factor: 1, u: 0.5, v: 0.5 };
 let view = { ...WHOLE };
 /** @type {() => void} */
 let changed = () => {};
+/** Size of the pane. @type {() => {width: number, height: number}} */
+let pane = () => ({ width: 0, height: 0 });
 
 export const isZoomed = () => view.factor > 1;
 
@@ -30,6 +33,9 @@ export function placed(pane, image) {
   return { x, y, scale };
 }
 
+/** Where the image is now; several events may come before it is painted there. @param {Size} image */
+const now = (image) => placed(pane(), image);
+
 /**
  * An image larger than its pane covers it completely.
  * @param {number} pane
@@ -41,17 +47,18 @@ const start = (pane, image, share) =>
 
 /**
  * @param {HTMLCanvasElement} canvas
- * @param {() => Place} place
+ * @param {() => Size} size of the pane
  * @param {() => void} redraw
  */
-export function setUp(canvas, place, redraw) {
+export function setUp(canvas, size, redraw) {
   changed = redraw;
+  pane = size;
   canvas.addEventListener(
     "wheel",
     (event) => {
       if (get("align")?.on || !imageSize()) return;
       event.preventDefault();
-      zoomAt(canvas, place(), event.offsetX, event.offsetY, Math.exp(-event.deltaY * (event.ctrlKey ? PINCH : WHEEL)));
+      zoomAt(event.offsetX, event.offsetY, Math.exp(-event.deltaY * (event.ctrlKey ? PINCH : WHEEL)));
     },
     { passive: false },
   );
@@ -62,19 +69,18 @@ export function setUp(canvas, place, redraw) {
   });
   canvas.addEventListener("pointermove", (event) => {
     if (!held) return;
-    pan(place(), event.offsetX - held.x, event.offsetY - held.y);
+    pan(event.offsetX - held.x, event.offsetY - held.y);
     held = { x: event.offsetX, y: event.offsetY };
   });
   for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => (held = null));
-  pinch(canvas, place);
+  pinch(canvas);
 }
 
 /**
  * Two fingers zoom at their position and move the image.
  * @param {HTMLCanvasElement} canvas
- * @param {() => Place} place
  */
-function pinch(canvas, place) {
+function pinch(canvas) {
   /** @type {Map<number, {x: number, y: number}>} */
   const fingers = new Map();
   const grip = () => {
@@ -89,9 +95,9 @@ function pinch(canvas, place) {
     const before = fingers.size === 2 ? grip() : null;
     put(event);
     if (!before || get("align")?.on || !imageSize()) return;
-    const now = grip();
-    pan(place(), now.x - before.x, now.y - before.y);
-    zoomAt(canvas, place(), now.x, now.y, now.apart / before.apart);
+    const after = grip();
+    pan(after.x - before.x, after.y - before.y);
+    zoomAt(after.x, after.y, after.apart / before.apart);
   });
   for (const name of /** @type {const} */ (["pointerup", "pointercancel"]))
     canvas.addEventListener(name, ({ pointerId }) => fingers.delete(pointerId));
@@ -99,40 +105,43 @@ function pinch(canvas, place) {
 
 /**
  * Zoom, keeping the point under a canvas pixel in place.
- * @param {HTMLCanvasElement} canvas
- * @param {Place} at
  * @param {number} x
  * @param {number} y
  * @param {number} by
  */
-function zoomAt(canvas, at, x, y, by) {
+function zoomAt(x, y, by) {
   const size = imageSize();
   if (!size) return;
-  const factor = bounded(view.factor * by, at.scale / view.factor),
-    scale = (at.scale / view.factor) * factor;
-  const u = (x - at.x) / at.scale + (canvas.clientWidth / 2 - x) / scale,
-    v = (y - at.y) / at.scale + (canvas.clientHeight / 2 - y) / scale;
+  const at = now(size),
+    whole = at.scale / view.factor,
+    factor = bounded(view.factor * by, whole),
+    scale = whole * factor;
+  const u = (x - at.x) / at.scale + (pane().width / 2 - x) / scale,
+    v = (y - at.y) / at.scale + (pane().height / 2 - y) / scale;
   show(factor, u / size.width, v / size.height);
 }
 
-/** Move the image with the pointer. @param {Place} at @param {number} dx @param {number} dy pixels of the canvas */
-export function pan(at, dx, dy) {
+/** Move the image with the pointer. @param {number} dx @param {number} dy pixels of the canvas */
+export function pan(dx, dy) {
   const size = imageSize();
-  if (size) show(view.factor, view.u - dx / at.scale / size.width, view.v - dy / at.scale / size.height);
+  if (!size) return;
+  const at = now(size),
+    u = (pane().width / 2 - at.x - dx) / at.scale,
+    v = (pane().height / 2 - at.y - dy) / at.scale;
+  show(view.factor, u / size.width, v / size.height);
 }
 
 /**
  * Zoom by keys at a point of the image.
  * @param {number} by
  * @param {{u: number, v: number}|null} to pixels of the full camera image; null keeps the middle
- * @param {Place} at
  */
-export function zoom(by, to, at) {
+export function zoom(by, to) {
   const size = imageSize();
   if (!size) return;
   const u = to ? (to.u * size.scale) / size.width : view.u,
     v = to ? (to.v * size.scale) / size.height : view.v;
-  show(bounded(view.factor * by, at.scale / view.factor), u, v);
+  show(bounded(view.factor * by, now(size).scale / view.factor), u, v);
 }
 
 /** @param {number} factor @param {number} whole canvas pixels a sent pixel at factor 1 */

@@ -176,6 +176,18 @@ def test_a_version_is_frozen_and_given_out(engine: Engine, client: httpx.Client)
     assert client.get("/api/labels/versions/nobody").status_code == 404
 
 
+def test_two_versions_are_compared(client: httpx.Client) -> None:
+    act(client, kind="set_lead", first=3, last=6, lead="none")
+    assert client.post("/api/labels/versions", json={"name": "one", "person": "Ada"}).status_code == 201
+    act(client, kind="set_lead", first=5, last=6, lead="unknown")
+    found = client.get("/api/labels/agreement", params={"first": "one"}).json()
+    assert (found["lead_share"], found["lead_disagreements"]) == (0.5, [5, 6])
+    same = client.get("/api/labels/agreement", params={"first": "one", "second": "one"}).json()
+    assert (same["lead_share"], same["lead_disagreements"]) == (1.0, [])
+    assert client.get("/api/labels/agreement", params={"first": "nobody"}).status_code == 404
+    act(client, kind="clear_lead", first=3, last=6)
+
+
 def test_a_file_beyond_all_measure_is_not_read(client: httpx.Client) -> None:
     connection = HTTPConnection(client.base_url.host, client.base_url.port or 0, timeout=WAIT_S)
     connection.putrequest("POST", "/api/labels/import?format=native&person=Ada&drive=x")

@@ -49,21 +49,40 @@ def standing(x: float, y: float, yaw_rad: float = 0.0, size: tuple[float, float,
     return Cuboid((x, y, GROUND_M + size[2] / 2), size, yaw_rad)
 
 
-@pytest.mark.parametrize(("dx", "dy", "dyaw"), [(0.4, -0.3, 0.1), (-0.5, 0.4, -0.2), (0.5, 0.0, 0.0)])
+@pytest.mark.parametrize(("dx", "dy", "dyaw"), [(0.4, -0.3, 0.1), (-0.5, 0.4, -0.15), (0.5, 0.0, 0.0)])
 def test_a_cuboid_near_a_car_is_laid_on_it(dx: float, dy: float, dyaw: float) -> None:
-    car = standing(15.0, 4.0, 0.3)
-    found = refit(sweep_of(car), standing(15.0 + dx, 4.0 + dy, 0.3 + dyaw))
+    car = standing(15.0, 4.0, 0.1)
+    found = refit(sweep_of(car), standing(15.0 + dx, 4.0 + dy, 0.1 + dyaw))
     assert (found.is_better, found.turned) == (True, dyaw != 0.0)
     assert found.points > 200
     assert found.cuboid.center == pytest.approx(car.center, abs=0.12)
     assert found.cuboid.size == pytest.approx(car.size, abs=0.12)
-    assert found.cuboid.yaw_rad == pytest.approx(0.3, abs=math.radians(2.0))
+    assert found.cuboid.yaw_rad == pytest.approx(0.1, abs=math.radians(2.0))
 
 
 def test_a_cuboid_that_fits_is_left_as_it_is() -> None:
-    car = standing(15.0, 4.0, 0.3)
+    car = standing(15.0, 4.0, 0.1)
     found = refit(sweep_of(car), car)
     assert (found.is_better, found.cuboid) == (False, car)
+
+
+def test_a_cuboid_that_contains_its_points_is_left_although_they_are_away_from_its_sides() -> None:
+    """What is missing between the points and a side may be hidden."""
+    car, drawn = standing(15.0, 4.0, 0.1), standing(15.0, 4.0, 0.1, (5.6, 2.4, 1.5))
+    found = refit(sweep_of(car), drawn)
+    assert (found.is_better, found.cuboid) == (False, drawn)
+
+
+def test_a_heading_that_is_far_off_is_left_to_the_person() -> None:
+    car = standing(15.0, 4.0, 0.1)
+    found = refit(sweep_of(car), standing(15.3, 4.2, 0.1 - math.radians(18)))
+    assert (found.is_better, found.turned) == (False, False)
+
+
+def test_points_of_a_wider_body_do_not_widen_a_car() -> None:
+    """Two cars side by side, whose points have grown together."""
+    found = refit(sweep_of(standing(15.0, 4.0, 0.1, (4.4, 2.6, 1.5))), standing(15.0, 4.3, 0.1))
+    assert found.cuboid.size[1] == pytest.approx(1.8)
 
 
 def test_of_a_car_seen_from_behind_length_and_turn_are_a_hands() -> None:
@@ -76,8 +95,8 @@ def test_of_a_car_seen_from_behind_length_and_turn_are_a_hands() -> None:
 
 
 def test_a_cuboid_that_is_too_small_grows() -> None:
-    car = standing(15.0, 4.0, 0.3)
-    found = refit(sweep_of(car), standing(14.5, 3.9, 0.3, (3.5, 1.5, 1.2)))
+    car = standing(15.0, 4.0, 0.1)
+    found = refit(sweep_of(car), standing(14.5, 3.9, 0.1, (3.6, 1.6, 1.2)))
     assert found.cuboid.size == pytest.approx(car.size, abs=0.12)
 
 

@@ -31,6 +31,29 @@ class VersionJson(ApiModel):
     """Public key that it is signed with, hexadecimal; empty where it is not signed"""
 
 
+class AgreementJson(ApiModel):
+    """How two label sets of the recording agree. Shares are null where there is nothing to compare."""
+
+    frames: int
+    """Frames in which both have a lead label."""
+    lead_share: float | None
+    """Share of these with the same lead."""
+    lead_disagreements: list[int]
+    """Indices of the frames in which the leads differ."""
+    vehicles: int
+    """Cuboids that both have, frame by frame."""
+    only_first: int
+    """Cuboids that only the first set has, in frames in which both have some."""
+    only_second: int
+    """Cuboids that only the second set has, in the same frames."""
+    iou: float | None
+    """Median overlap of the cuboids that both have, seen from above."""
+    class_share: float | None
+    """Share of these with the same class."""
+    reversed_share: float | None
+    """Share of these with opposite headings."""
+
+
 class NewVersion(Strict):
     """Freeze the labels as they are now."""
 

@@ -20,7 +20,15 @@ from app.labels.store.values import LONGEST_ITEM, LONGEST_NAME
 from app.labels.wording import WORKING
 from app.web.refusals import refusing
 from app.web.routes.labels.act_shapes import TaskBegun
-from app.web.routes.labels.file_shapes import VERSION_NAME, FormatJson, LostJson, NativeFile, NewVersion, VersionJson
+from app.web.routes.labels.file_shapes import (
+    VERSION_NAME,
+    AgreementJson,
+    FormatJson,
+    LostJson,
+    NativeFile,
+    NewVersion,
+    VersionJson,
+)
 from app.web.routes.shapes.common import file_of
 from pipeline.labels.classes import as_written
 from pipeline.labels.formats.registry import FORMATS, FormatName
@@ -109,6 +117,19 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         """Freeze all labels as they are now under a name. 409 when the name is taken."""
         with refusing():
             return VersionJson(**vars(desk.labels.freeze(body.name, body.person)))
+
+    @router.get("/agreement")
+    def agreement_of(
+        first: Annotated[str, Query(max_length=LONGEST_NAME)],
+        second: Annotated[str, Query(max_length=LONGEST_NAME)] = WORKING,
+    ) -> AgreementJson:
+        """Compare two versions of the recording's labels, or one with the labels as they are now."""
+        from pipeline.labels.agreement import agreement
+
+        with refusing():
+            one, other = (desk.labels.label_set(each) for each in (first, second))
+            found = agreement(one, other)
+        return AgreementJson(**(vars(found) | {"lead_disagreements": list(found.lead_disagreements)}))
 
     @router.get("/versions/{name}", responses={200: {"model": NativeFile}})
     def version(name: str) -> Response:

@@ -143,7 +143,6 @@ export function setUp() {
       { class: "label-row" },
       el("b", { textContent: "Lead" }),
       leads,
-      where,
       el("b", { textContent: "Next" }),
       el(
         "span",
@@ -163,8 +162,11 @@ export function setUp() {
       forth,
       name,
     ),
-    el("div", { class: "label-row label-line" }, reviewed, said, offer.setUp(), task, saved, again, discarded),
+    el("div", { class: "label-row label-line" }, where, reviewed, said, offer.setUp(), task, saved, again, discarded),
   );
+  leads.addEventListener("scroll", markMore);
+  leads.addEventListener("wheel", scrollLeads, { passive: false });
+  new ResizeObserver(markMore).observe(leads);
   showKeys();
   on(["keys", "person"], showKeys);
   paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft"], reflect);
@@ -219,6 +221,7 @@ function reflect() {
   const pressed = leads.querySelector("[aria-pressed=true]");
   if (pressed !== inSight) pressed?.scrollIntoView({ block: "nearest", inline: "nearest" });
   inSight = pressed;
+  markMore();
   const { first, last } = span.span();
   text(
     where,
@@ -234,6 +237,19 @@ function reflect() {
   text(under, review.target()?.name ?? "nothing");
   press(fresh, get("labeling")?.tool === "new");
   text(name, shownName() || "your name");
+}
+
+/** A wheel without a sideways axis moves them, too. @param {WheelEvent} event */
+function scrollLeads(event) {
+  event.preventDefault();
+  leads.scrollLeft += event.deltaX || event.deltaY;
+}
+
+/** Fade the ends of the lead buttons where more of them are out of sight. */
+function markMore() {
+  const { scrollLeft, scrollWidth, clientWidth } = leads;
+  leads.classList.toggle("has-before", scrollLeft > 1);
+  leads.classList.toggle("has-after", scrollLeft + clientWidth < scrollWidth - 1);
 }
 
 /** @param {import("../state/types.js").LeadRange} range */

@@ -8,6 +8,7 @@ import { attachMenu, refill } from "../../workspace/menu.js";
 import { act } from "../acts/queue.js";
 import { propose, say } from "../acts/commands.js";
 import { personName } from "../state/person.js";
+import * as second from "./second_labeler.js";
 import * as queue from "../queue/queue_list.js";
 
 /** @typedef {import("../state/types.js").Version} Version */
@@ -131,6 +132,8 @@ export function setUp(parent) {
     versions,
     el("form", { class: "menu-row", onsubmit: freeze }, freezeName, el("button", { textContent: "Freeze" })),
   );
+  second.setUp(parent);
+  second.onFrozen(look);
   queue.setUp(parent);
 }
 
@@ -140,6 +143,7 @@ export async function look() {
   if (!formats.length) listFormats();
   /** @type {Version[]} */
   const found = await request("api/labels/versions").catch(() => []);
+  second.show(found);
   versions.replaceChildren(
     ...found.map(({ name, person, t_unix_ms, tracks, frames }) => {
       const link = el("a", { href: `api/labels/versions/${encodeURIComponent(name)}`, textContent: name });

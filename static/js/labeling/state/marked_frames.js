@@ -112,5 +112,14 @@ export function enter() {
 /** Accept or reject the lead range at this frame. @param {"accept"|"reject"} kind */
 export function judge(kind) {
   const range = leadAt(shown());
-  return range ? act({ kind, items: [{ kind: "lead", id: range.id, revision: range.revision }] }) : null;
+  if (!range) return null;
+  const done = act({ kind, items: [{ kind: "lead", id: range.id, revision: range.revision }] });
+  if (kind === "accept") done.then((answer) => answer && selectProposed(range.lead));
+  return done;
+}
+
+/** An accepted lead whose track is only proposed is selected: the next A accepts that too. @param {Lead} lead */
+function selectProposed(lead) {
+  const track = typeof lead === "number" ? trackOf(lead) : null;
+  if (track?.state === "proposed" && (get("track") ?? null) === null) set("track", track.id);
 }

@@ -38,7 +38,7 @@ export function setUp() {
   });
   canvas.addEventListener("pointermove", (event) => {
     if (!down || !event.isPrimary) return;
-    if (!down.drag && down.hasMoved && isZoomed()) pan(place(), event.movementX, event.movementY);
+    if (!down.drag && down.hasMoved && isZoomed()) pan(event.movementX, event.movementY);
     down.hasMoved ||= Math.hypot(event.offsetX - down.x, event.offsetY - down.y) >= CLICK_PX;
     if (down.hasMoved) down.drag?.moved(pixelAt(event));
   });
@@ -58,7 +58,7 @@ export function setUp() {
 /** Zoom at the selected label, else at the middle. @param {number} by */
 export function zoomBy(by) {
   const box = boxOf(get("track") ?? -1);
-  zoom(by, box && { u: (box[0] + box[2]) / 2, v: (box[1] + box[3]) / 2 }, place());
+  zoom(by, box && { u: (box[0] + box[2]) / 2, v: (box[1] + box[3]) / 2 });
 }
 
 /** Camera pixels per canvas pixel. */

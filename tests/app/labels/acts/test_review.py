@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from app.labels.errors import ActRefused
 from app.labels.store.drive_labels import DriveLabels
-from app.labels.store.values import value_from_json
-from pipeline.labels.model import LeadRange, Origin
+from app.labels.store.values import KINDS, value_from_json
+from pipeline.labels.model import NEXT_TAG, FrameTag, LeadRange, Origin
 from tests.app.labels.acts.conftest import PIPELINE
 from tests.app.labels.acts.doing import act, leads, track
 
@@ -117,3 +117,24 @@ def test_labels_that_were_kept_before_there_were_reviews_are_read() -> None:
     origin = {"maker": "person", "name": "Ada", "t_unix_ms": 5, "params": None, "calibration": None}
     kept = {"first": 1, "last": 2, "lead": 3, "state": "accepted", "origin": origin}
     assert value_from_json("lead", kept) == LeadRange(1, 2, 3, "accepted", Origin("person", "Ada", 5), "", "")
+
+
+def test_everything_is_removed_for_a_second_labeler_but_queued_frames(labels: DriveLabels) -> None:
+    act(labels, kind="tag", first=0, last=3, tag="night")
+    act(labels, kind="tag", first=5, last=7, tag=NEXT_TAG)
+    act(labels, kind="add_event", frame=4, event="cut_in")
+    assert labels.items("track")
+    before = labels.unnamed_set()
+    act(labels, kind="clear_all", revision=labels.revision)
+    assert [kind for kind in KINDS if labels.items(kind)] == ["tag"]
+    assert [cast("FrameTag", each.value).tag for each in labels.items("tag").values()] == [NEXT_TAG]
+    labels.log.move("undo", "Ada", lambda params: params)
+    assert labels.unnamed_set() == before, "one undo brings it back"
+
+
+def test_labels_that_changed_after_they_were_frozen_are_not_removed(labels: DriveLabels) -> None:
+    seen = labels.revision
+    act(labels, "Bob", kind="tag", first=0, last=3, tag="night")
+    with pytest.raises(ActRefused, match="somebody has changed labels since"):
+        act(labels, kind="clear_all", revision=seen)
+    assert labels.items("track")

@@ -46,7 +46,8 @@ GET /api/labels/tracks/{number}/close_up · GET /api/labels/checks · GET /api/l
 GET /api/labels/next · GET /api/labels/queue · GET /api/labels/projects · GET /api/account ·
 GET /api/labels/score · GET /api/labels/history ·
 GET /api/labels/formats · GET /api/labels/export · GET /api/labels/export/notes · GET /api/labels/versions ·
-GET /api/labels/versions/{name} · GET /api/jobs · GET /api/jobs/{number} · GET /api/jobs/{number}/file ·
+GET /api/labels/versions/{name} · GET /api/labels/agreement ·
+GET /api/jobs · GET /api/jobs/{number} · GET /api/jobs/{number}/file ·
 GET /api/alignment/score · GET /api/alignment/fit · GET /api/alignment/fit.yaml · GET /api/alignment/versions ·
 GET /api/alignment/time ·
 GET /api/rerun/open · GET /api/rerun.rrd · GET /openapi.json · HEAD /openapi.json ·
@@ -146,7 +147,12 @@ def test_the_guard_lets_in_whom_the_rules_do_and_nobody_else(role: str, tokens: 
     assert wrong == []
 
 
-ACTS: dict[str, AccountRole] = {"review_ok": "reviewer", "send_back": "reviewer", "import": "reviewer"}
+ACTS: dict[str, AccountRole] = {
+    "review_ok": "reviewer",
+    "send_back": "reviewer",
+    "import": "reviewer",
+    "clear_all": "reviewer",
+}
 """Every account may do all other acts."""
 
 

@@ -153,8 +153,8 @@ def hand_drawn(sightings: tuple[Sighting, ...], rng: np.random.Generator) -> lis
 
 
 def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
-    """Up to 15 m, for the side that faces the sensor. A mesh's bumper is not flat, so its face lies some centimetres
-    inside."""
+    """Up to 15 m, for the side that faces the sensor, where it changes anything. A mesh's bumper is not flat, so its
+    face lies some centimetres inside."""
     source = open_source("sim:straight")
     names = tuple(str(index) for index in range(len(source)))
     labels, _ = truth_labels(source, names, ORIGIN)
@@ -174,10 +174,12 @@ def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
             sweep = sweeps(true.frame)
             assert sweep is not None
             try:
-                found = refit(sweep, drawn.cuboid, aggregated(hand, true.frame, sweeps, poses)).cuboid
+                snapped = refit(sweep, drawn.cuboid, aggregated(hand, true.frame, sweeps, poses))
             except TooFewPoints:  # hidden by another one
                 continue
-            (x, y, _), (length, _, _), yaw_rad = true.cuboid
+            if not snapped.is_better:
+                continue
+            found, ((x, y, _), (length, _, _), yaw_rad) = snapped.cuboid, true.cuboid
             rear = found.center[0] - found.size[0] / 2 - (x - length / 2)
             off.append((abs(rear), abs(found.center[1] - y), abs(math.remainder(found.yaw_rad - yaw_rad, math.tau))))
     assert len(off) >= 10
@@ -187,27 +189,30 @@ def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
     assert yaw_rad < math.radians(1.0)
 
 
-def test_a_snap_seldom_makes_a_real_box_worse(data_dir: Path) -> None:
-    """Astyx up to 50 m. When every box was changed, half of them got worse, a third by more than 0.1."""
-    source = open_source(f"astyx:{data_dir / 'astyx'}")
+@pytest.mark.parametrize("drive", ["astyx", "astyx_more"])
+def test_a_snap_hardly_ever_makes_a_real_box_worse(drive: str, data_dir: Path) -> None:
+    """Up to 50 m. When every box was changed, half of them got worse, a third by more than 0.1."""
+    source = open_source(f"astyx:{data_dir / drive}")
     labels, _ = truth_labels(source, tuple(str(index) for index in range(len(source))), ORIGIN)
-    sweeps, rng = sweeps_in(source), np.random.default_rng(0)
-    change = []
-    for track in (each for each in labels.tracks if each.label == "car"):
-        hand = hand_drawn(track.sightings, rng)
-        for true, drawn in zip(track.sightings, hand, strict=True):
-            assert true.cuboid is not None
-            assert drawn.cuboid is not None
-            sweep = sweeps(true.frame)
-            if sweep is None or not 0.0 < math.hypot(*true.cuboid.center[:2]) < 50.0:
-                continue
-            try:
-                found = refit(sweep, drawn.cuboid, aggregated(hand, true.frame, sweeps)).cuboid
-            except TooFewPoints:
-                continue
-            change.append(iou(found, true.cuboid) - iou(drawn.cuboid, true.cuboid))
+    sweeps, change = sweeps_in(source), []
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        for track in (each for each in labels.tracks if each.label == "car"):
+            hand = hand_drawn(track.sightings, rng)
+            for true, drawn in zip(track.sightings, hand, strict=True):
+                assert true.cuboid is not None
+                assert drawn.cuboid is not None
+                sweep = sweeps(true.frame)
+                if sweep is None or not 0.0 < math.hypot(*true.cuboid.center[:2]) < 50.0:
+                    continue
+                try:
+                    found = refit(sweep, drawn.cuboid, aggregated(hand, true.frame, sweeps))
+                except TooFewPoints:
+                    continue
+                assert found.is_better or found.cuboid == drawn.cuboid
+                change.append(iou(found.cuboid, true.cuboid) - iou(drawn.cuboid, true.cuboid))
     gains = np.array(change)
     assert len(gains) >= 50
-    assert float((gains > 0.02).mean()) > 0.2
-    assert float((gains < -0.02).mean()) < 0.09
-    assert float((gains < -0.1).mean()) < 0.02
+    assert float((gains > 0.02).mean()) > 0.08
+    assert float((gains < -0.02).mean()) < 0.025
+    assert float((gains < -0.1).mean()) < 0.005
