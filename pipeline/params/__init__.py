@@ -150,10 +150,11 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "size_gate": False,
             "keep_partners": False,
             "single_returns": False,
+            "merged_clusters": False,
             "use_ground_contact": False,
         },
         "existence": {"enabled": False},
-        "path": {"use_edges": False},
+        "path": {"use_edges": False, "use_corners": False},
         "cipv": {
             "use_crossing": False,
             "confirm_hits": 1,

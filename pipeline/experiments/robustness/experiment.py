@@ -51,6 +51,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "flanks taken for rears": {"cipv.use_flank": False},
     "tall boxes treated like others": {"vision_tracking.use_aspect": False},
     "boxes placed by height alone": {"fusion.use_ground_contact": False},
+    "merged clusters left whole": {"fusion.merged_clusters": False},
     "no range gate": {"fusion.range_gate": False},
     "no size gate": {"fusion.size_gate": False},
     "boxes change clusters freely": {"fusion.keep_partners": False},
