@@ -62,7 +62,7 @@ export function show(versions) {
 }
 
 /** @type {() => unknown} */
-let again = () => {};
+let again = () => undefined;
 
 /** @param {() => unknown} listAgain after a version was frozen */
 export const onFrozen = (listAgain) => (again = listAgain);
