@@ -126,7 +126,7 @@ def step(
     # Existence: evidence from each sensor for and against every object being at its reported position
     existence_state, objects = existence.weigh(state.existence, fused.objects, sweep, frame, now, params.existence)
     clock.lap("existence")
-    objects = object_motion.describe(objects, now.measured, params.motion)
+    objects = object_motion.describe(objects, now.measured, params.motion, now.dt_s)
 
     # Path: lane lines, the route, the yaw rate, the road's edges and other vehicles, each weighted by its certainty
     road_z_m = frame.camera.road_z_m if frame.camera is not None else None

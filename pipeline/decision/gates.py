@@ -256,7 +256,8 @@ def _needed_probability(who: Candidate) -> float:
     usual, params = who.params.become_probability, who.params
     if who.item.oncoming:
         return max(usual, params.become_oncoming)
-    may_stand = who.item.surely_moving is False or not who.item.imaged
+    moves = who.item.surely_moving and who.item.imaged
+    may_stand = who.item.surely_moving is not None and not moves
     return max(usual, params.become_standing) if may_stand else usual
 
 

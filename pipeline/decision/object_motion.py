@@ -19,11 +19,12 @@ SMALLEST_CLOSING_MPS = 0.1
 """If a gap shrinks more slowly than this, it is not measurable, and there is no TTC."""
 _SMALLEST_GAP_M = 0.1
 _SURE_SIGMAS = 2.0
-_STEADY = 5
-"""Steady sightings by a ranging sensor from which its speed is used: before, a new side that comes into view moves an
-object by metres."""
-_SIGHTING_SIGMA_M, _SIGHTING_S = 0.2, 0.1
-"""Error of one sighting along its motion, and the time between two: a LiDAR at 10 Hz."""
+_STEADY_S = 0.5
+"""Time for which a ranging sensor must have seen an object steadily before its speed is sure: a new side that comes
+into view moves it by metres."""
+_SIGHTING_SIGMA_M, _USUAL_S = 0.2, 0.1
+"""Error of one sighting along its motion; time between two if it is not known: a LiDAR at 10 Hz."""
+_SAME_TIME_S = 0.02
 _ONCOMING_MPS = 3.0
 """A slower object may only seem to be oncoming due to its speed error."""
 
@@ -46,15 +47,18 @@ def required_decel_mps2(distance_m: float, closing_mps: float, params: AebParams
     return closing_mps**2 / (2.0 * left_m) if left_m > _SMALLEST_GAP_M else inf
 
 
-def describe(objects: Iterable[FusedObject], ego: EgoState | None, params: MotionParams) -> tuple[FusedObject, ...]:
-    """Each object with its TTC, and, if ego speed is known, its speed over ground and whether it moves.
+def describe(
+    objects: Iterable[FusedObject], ego: EgoState | None, params: MotionParams, dt_s: float | None = None
+) -> tuple[FusedObject, ...]:
+    """Each object with its TTC, and, if ego speed is known, its speed over ground and whether it moves. dt_s: since the
+    previous frame.
 
     The relative velocity is measured in the rotating ego frame, so the speed over ground adds the ego speed and ω × r.
     """
-    return tuple(_described(item, ego, params) for item in objects)
+    return tuple(_described(item, ego, params, dt_s or _USUAL_S) for item in objects)
 
 
-def _described(item: FusedObject, ego: EgoState | None, params: MotionParams) -> FusedObject:
+def _described(item: FusedObject, ego: EgoState | None, params: MotionParams, dt_s: float) -> FusedObject:
     closing = closing_speed_mps(item)
     shrinks = closing is not None and closing >= SMALLEST_CLOSING_MPS and item.distance_m is not None
     ttc = item.distance_m / closing if shrinks else None  # type: ignore[operator]
@@ -70,16 +74,17 @@ def _described(item: FusedObject, ego: EgoState | None, params: MotionParams) ->
         ttc_s=ttc,
         speed_over_ground_mps=speed,
         moving=speed > params.moving_mps,
-        surely_moving=speed - _SURE_SIGMAS * _speed_sigma_mps(item) > params.moving_mps,
+        surely_moving=speed - _SURE_SIGMAS * _speed_sigma_mps(item, dt_s) > params.moving_mps,
         oncoming=-vx > max(_ONCOMING_MPS, abs(vy)),
     )
 
 
-def _speed_sigma_mps(item: FusedObject) -> float:
-    """Standard deviation of its speed: that of the camera, or that of a line through the sightings of a ranging
-    sensor."""
+def _speed_sigma_mps(item: FusedObject, dt_s: float) -> float:
+    """Standard deviation of its speed: that of the camera, or that of a line through the sightings of a ranging sensor,
+    one every ``dt_s``."""
     if item.camera_speed_sigma_mps is not None or not item.ranged:
         return item.camera_speed_sigma_mps or 0.0
-    if item.ranged_steady < _STEADY:
+    steady = item.ranged_steady
+    if steady * dt_s < _STEADY_S - _SAME_TIME_S:
         return inf
-    return _SIGHTING_SIGMA_M * sqrt(12.0 / item.ranged_steady**3) / _SIGHTING_S
+    return _SIGHTING_SIGMA_M * sqrt(12.0 / steady**3) / dt_s

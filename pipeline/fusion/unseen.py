@@ -2,7 +2,7 @@
 
 An object is not asked about when the camera cannot know: no detector ran, the object is outside the image or cut by its
 edge, another box covers it (which may hide it or belong to it), or, for an object that only the LiDAR sees, it is too
-far, too small in the image, or the image is too dark.
+far or too small in the image, or nothing at all was boxed in it.
 """
 
 from __future__ import annotations
@@ -21,9 +21,6 @@ _SURE_M, _SURE_PX = 40.0, 25.0
 vehicles with a cluster on Astyx and KITTI were boxed at once, but 8 of 13 at 40 to 50 m. A car at 40 m is 27 pixels
 high in KITTI's images."""
 _CAR_HEIGHT_M = 1.5
-_DARK, _EVERY = 40.0, 16
-"""Mean of an image from 0 to 255 below which the camera is short of light: automatic exposure aims at mid-grey, 118, so
-it has reached its limit. Every 16th pixel of every 16th row tells."""
 
 
 def missing_boxes(objects: Sequence[FusedObject], frame: Frame) -> frozenset[int]:
@@ -32,8 +29,9 @@ def missing_boxes(objects: Sequence[FusedObject], frame: Frame) -> frozenset[int
 
 
 def never_boxed(objects: Sequence[FusedObject], frame: Frame) -> frozenset[int]:
-    """Ids of the objects without a class that the LiDAR sees, although the camera must have seen what they are."""
-    if frame.camera is None:
+    """Ids of the objects without a class that the LiDAR sees, although the camera must have seen what they are. None in
+    an image without any box: it may be dark, or the lens covered."""
+    if frame.camera is None or not any(each.seen_by_camera for each in objects):
         return frozenset()
     reach_m = min(_SURE_M, float(frame.camera.K[1, 1]) * _CAR_HEIGHT_M / _SURE_PX)
     asked = [
@@ -41,11 +39,7 @@ def never_boxed(objects: Sequence[FusedObject], frame: Frame) -> frozenset[int]:
         for each in objects
         if each.seen_by_lidar and not each.imaged and each.distance_m is not None and each.distance_m <= reach_m
     ]
-    return frozenset() if not asked or _is_dark(frame) else _uncovered(asked, objects, frame, margin_px=1.0)
-
-
-def _is_dark(frame: Frame) -> bool:
-    return frame.image is not None and float(frame.image.bgr[::_EVERY, ::_EVERY].mean()) < _DARK
+    return _uncovered(asked, objects, frame, margin_px=1.0)
 
 
 def _uncovered(

@@ -21,7 +21,12 @@ const KINDS = {
   class_size: { label: "Length for class", test: "most", unit: "m", param: "fusion.size_gate" },
   free_road: { label: "LiDAR sees through it", test: "most", param: "existence.enabled" },
   own_returns: { label: "LiDAR returns of its own", test: "least", param: "existence.enabled" },
-  images_without_box: { label: "Images without a box on it", test: "most", unit: "images", param: "existence.use_missing_boxes" },
+  images_without_box: {
+    label: "Images without a box on it",
+    test: "most",
+    unit: "images",
+    param: "existence.use_missing_boxes",
+  },
   vehicle_class: { label: "Vehicle class", test: "flag" },
   distance_known: { label: "Distance known", test: "flag", unit: "m" },
   hits: { label: "Detections", test: "least", param: "cipv.confirm_hits" },

@@ -198,11 +198,11 @@ def test_a_drive_is_reviewed_frozen_and_taken_back_in(hand: Hand, labels: Labels
 
     page.get_by_role("tab", name="Files").click()
     page.get_by_label("Version name").fill("reviewed")
-    page.get_by_role("button", name="Freeze").click()
+    page.get_by_role("button", name="Freeze", exact=True).click()
     version = page.locator(".label-files a", has_text="reviewed")
     expect(version).to_be_visible()
     page.get_by_label("Version name").fill("reviewed")
-    page.get_by_role("button", name="Freeze").click()
+    page.get_by_role("button", name="Freeze", exact=True).click()
     expect(page.locator("#label-files [role=alert]").first).not_to_be_empty()
     expect(page.get_by_label("Version name")).to_have_value("reviewed")
     with page.expect_download() as download:

@@ -119,12 +119,23 @@ def test_at_the_edge_only_what_goes_along_leads(speed_mps: float | None, leads: 
     assert choose(CipvState(), (centred,), sure, moment(EGO, 0.1), CipvParams())[1].lead is not None
 
 
-@pytest.mark.parametrize(("source", "leads"), [("VL", True), ("L", False)])
-def test_what_has_no_class_must_surely_be_in_the_path(source: ObjectSource, leads: bool) -> None:
-    """In the path with 60 %, ego motion unknown: a car may lead, a wall that the camera cannot see may not."""
+@pytest.mark.parametrize(
+    ("source", "ego", "leads"),
+    [
+        pytest.param("VL", EGO, True, id="a car that drives ahead"),
+        pytest.param("L", EGO, False, id="a wall that comes into view bit by bit"),
+        pytest.param("L", None, True, id="ego motion is not known"),
+    ],
+)
+def test_what_seems_to_move_and_has_no_class_must_surely_be_in_the_path(
+    source: ObjectSource, ego: EgoState | None, leads: bool
+) -> None:
+    """In the path with a probability of 65 %."""
     path = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 1.5))
-    item = dataclasses.replace(fused(1, 30.0, 0.9, source=source), existence=0.98)
-    assert (choose(CipvState(), (item,), path, moment(), CipvParams())[1].lead is not None) == leads
+    item = dataclasses.replace(fused(1, 30.0, 0.6, source=source, velocity=(-5.0, 0.0)), existence=0.98)
+    (seen,) = describe([item], ego, MotionParams())
+    choice = choose(CipvState(), (seen,), path, moment(ego), CipvParams())[1]
+    assert (choice.lead is not None) == leads
 
 
 def fused_place(x: float, y: float) -> dict[str, object]:

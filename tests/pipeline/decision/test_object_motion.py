@@ -107,3 +107,9 @@ def test_a_speed_from_a_few_clusters_proves_no_motion(speed: float, sightings: i
     seen = fused(1, 30.0, velocity=(speed - 10.0, 0.0), hits=sightings)
     (item,) = describe([seen], EgoState(0, 10.0, 0.0), PARAMS)
     assert (item.moving, item.surely_moving) == (True, surely)
+
+
+@pytest.mark.parametrize(("dt_s", "surely"), [(0.1, False), (0.3, True)])
+def test_at_a_lower_rate_fewer_sightings_prove_motion(dt_s: float, surely: bool) -> None:
+    (item,) = describe([fused(1, 30.0, hits=3)], EgoState(0, 10.0, 0.0), PARAMS, dt_s)
+    assert item.surely_moving is surely

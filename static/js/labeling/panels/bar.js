@@ -14,6 +14,7 @@ import { setTool, toggleFollows } from "../state/mode.js";
 import { newLabel, setNewLabel } from "../state/new_class.js";
 import { askName, hasAccount, shownName } from "../state/person.js";
 import * as offer from "./offer.js";
+import { markMore, scrolls } from "../../core/scrolled_row.js";
 import * as review from "../acts/review.js";
 import * as span from "../state/marked_frames.js";
 
@@ -164,9 +165,7 @@ export function setUp() {
     ),
     el("div", { class: "label-row label-line" }, where, reviewed, said, offer.setUp(), task, saved, again, discarded),
   );
-  leads.addEventListener("scroll", markMore);
-  leads.addEventListener("wheel", scrollLeads, { passive: false });
-  new ResizeObserver(markMore).observe(leads);
+  scrolls(leads);
   showKeys();
   on(["keys", "person"], showKeys);
   paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft"], reflect);
@@ -221,7 +220,7 @@ function reflect() {
   const pressed = leads.querySelector("[aria-pressed=true]");
   if (pressed !== inSight) pressed?.scrollIntoView({ block: "nearest", inline: "nearest" });
   inSight = pressed;
-  markMore();
+  markMore(leads);
   const { first, last } = span.span();
   text(
     where,
@@ -237,19 +236,6 @@ function reflect() {
   text(under, review.target()?.name ?? "nothing");
   press(fresh, get("labeling")?.tool === "new");
   text(name, shownName() || "your name");
-}
-
-/** A wheel without a sideways axis moves them, too. @param {WheelEvent} event */
-function scrollLeads(event) {
-  event.preventDefault();
-  leads.scrollLeft += event.deltaX || event.deltaY;
-}
-
-/** Fade the ends of the lead buttons where more of them are out of sight. */
-function markMore() {
-  const { scrollLeft, scrollWidth, clientWidth } = leads;
-  leads.classList.toggle("has-before", scrollLeft > 1);
-  leads.classList.toggle("has-after", scrollLeft + clientWidth < scrollWidth - 1);
 }
 
 /** @param {import("../state/types.js").LeadRange} range */
@@ -276,8 +262,7 @@ function reflectSaving() {
             : "",
   );
   again.hidden = discarded.hidden = saving?.state !== "failed";
-  text(said, get("said") ?? "");
-  said.title = get("said") ?? "";
+  text(said, (said.title = get("said") ?? ""));
 }
 
 function reflectTask() {

@@ -114,7 +114,8 @@ function rows({ frames, lead_share, lead_disagreements, vehicles, only_first, on
   const cuboids =
     of.iou === null
       ? "No cuboid is in both."
-      : `Cuboids: ${vehicles} in both, median IoU ${of.iou.toFixed(2)}, same class in ${percent(of.class_share ?? 0)}, ` +
+      : `Cuboids: ${vehicles} in both, median IoU ${of.iou.toFixed(2)}, ` +
+        `same class in ${percent(of.class_share ?? 0)}, ` +
         `reversed ${percent(of.reversed_share ?? 0)}`;
   const alone = `${only_first} only in ${first.value}, ${only_second} only in ${second.selectedOptions[0].text}`;
   return [`${cuboids}${of.iou === null ? "" : `; ${alone}`}`, lead];
