@@ -25,6 +25,7 @@ into view moves it by metres."""
 _SIGHTING_SIGMA_M, _USUAL_S = 0.2, 0.1
 """Error of one sighting along its motion; time between two if it is not known: a LiDAR at 10 Hz."""
 _SAME_TIME_S = 0.02
+"""Sightings of a LiDAR that turns a little faster than 10 Hz count as tenths of a second."""
 _ONCOMING_MPS = 3.0
 """A slower object may only seem to be oncoming due to its speed error."""
 

@@ -16,7 +16,7 @@ import numpy as np
 from pipeline.alignment.projection import Alignment
 from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64
-from pipeline.fusion.returns import SweepReturns
+from pipeline.fusion.returns import HIGH_M, LOW_M, SweepReturns
 from pipeline.fusion.vehicle_sizes import largest_size_m
 from pipeline.params import FusionParams
 from pipeline.types import VEHICLES, Obstacle, VisionMeasurement
@@ -31,8 +31,6 @@ errors. Below it is the road, whose points do not count anyway."""
 _GAP_M, _FEWEST = 0.5, 20
 """A group of points ends at a larger gap in range than the first, and counts with at least the second number: a car at
 30 m returns 30 points."""
-_LOW_M, _HIGH_M = 0.25, 3.5
-"""Heights above the road between which a vehicle returns rays."""
 _SIGMAS = 3.0
 """If the camera knows a distance, the range must agree with it within this many standard deviations."""
 
@@ -75,7 +73,7 @@ def _ranged(
     inside = points[_is_inside(alignment.project(points), seen.detection.bbox)]
     assert sweep.ground is not None
     height_m = sweep.ground.above(inside)
-    inside = inside[(height_m > _LOW_M) & (height_m < _HIGH_M)]
+    inside = inside[(height_m > LOW_M) & (height_m < HIGH_M)]
     range_m = np.hypot(inside[:, 0], inside[:, 1])
     order = np.argsort(range_m, kind="stable")
     group = _nearest_group(range_m[order])

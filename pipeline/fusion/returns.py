@@ -40,7 +40,7 @@ _EDGE_SHARE = 0.08
 """Margin at either side as a share of the box's width: boxes drawn too wide, and calibration errors of a pixel or
 two."""
 _BOTTOM_SHARE = 0.06
-_LOW_M, _HIGH_M = 0.25, 3.5
+LOW_M, HIGH_M = 0.25, 3.5
 """Heights above the road between which a vehicle returns rays."""
 _SIGMAS = 3.0
 """The range must agree with the camera's within this many standard deviations."""
@@ -98,7 +98,7 @@ def range_boxes(
 
 
 def _above_the_road(sweep: SweepReturns, ground: Ground, alignment: Alignment) -> _Points:
-    rows, range_m = _far_and_high(sweep.points, sweep.kind, ground.planes, ground.edges, NEAREST_M / 2, _LOW_M, _HIGH_M)
+    rows, range_m = _far_and_high(sweep.points, sweep.kind, ground.planes, ground.edges, NEAREST_M / 2, LOW_M, HIGH_M)
     xyz = sweep.points[rows, :3].astype(np.float64)
     seen = xyz - np.array(sweep.origin)
     elevation_deg = np.degrees(np.arctan2(seen[:, 2], np.hypot(seen[:, 0], seen[:, 1])))

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import httpx
 import pytest
 
 from app.engine.engine import Engine
-from app.web.server import create_app
 from pipeline.params import Params, from_yaml
 from tests.app.engine.recording_helpers import Recording
-from tests.app.web.serving import WAIT_S, running, serving
+from tests.app.web.serving import running
 
+Ended = Callable[[str], dict[str, Any]]
 FIT = "/api/alignment/fit"
 
 
@@ -29,26 +28,13 @@ def engine(recording: Recording) -> Iterator[Engine]:
         yield engine
 
 
-@pytest.fixture
-def client(engine: Engine) -> Iterator[httpx.Client]:
-    with serving(create_app(engine)) as address, httpx.Client(base_url=address, timeout=WAIT_S) as client:
-        yield client
-
-
-def ended(client: httpx.Client) -> dict[str, Any]:
-    until_s = time.monotonic() + WAIT_S
-    while time.monotonic() < until_s:
-        now: dict[str, Any] = client.get(FIT).json()
-        if now["state"] not in ("waiting", "running"):
-            return now
-    raise AssertionError(now)
-
-
-def test_a_fit_is_applied_on_consent_and_undone_in_one_step(client: httpx.Client, engine: Engine, tmp_path: Any):
+def test_a_fit_is_applied_on_consent_and_undone_in_one_step(
+    client: httpx.Client, engine: Engine, tmp_path: Any, ended: Ended
+):
     assert client.get(FIT).json() == {"state": "none", "progress": 0.0, "note": "", "result": None}
     assert client.get(f"{FIT}.yaml").status_code == 404
     assert client.post(FIT, json={"model": "angular"}).status_code == 202
-    fitted = ended(client)
+    fitted = ended(FIT)
     assert (fitted["state"], fitted["progress"]) == ("done", 1.0)
     result = fitted["result"]
     assert result["pairs"] >= 12
@@ -64,7 +50,7 @@ def test_a_fit_is_applied_on_consent_and_undone_in_one_step(client: httpx.Client
     assert engine.control.peek().params == Params()
 
 
-def test_a_fit_is_cancelled_and_another_can_begin(client: httpx.Client, recording: Recording):
+def test_a_fit_is_cancelled_and_another_can_begin(client: httpx.Client, recording: Recording, ended: Ended):
     recording.gate.clear()
     try:
         assert client.post(FIT, json={}).status_code == 202
@@ -75,7 +61,7 @@ def test_a_fit_is_cancelled_and_another_can_begin(client: httpx.Client, recordin
         assert client.post(FIT, json={}).status_code == 202
     finally:
         recording.gate.set()
-    assert ended(client)["state"] == "done"
+    assert ended(FIT)["state"] == "done"
 
 
 def test_unknown_models_are_refused(client: httpx.Client):

@@ -3,19 +3,18 @@ nothing."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import httpx
 import pytest
 
 from app.engine.engine import Engine
-from app.web.server import create_app
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import Recording
-from tests.app.web.serving import WAIT_S, running, serving
+from tests.app.web.serving import running
 
+Ended = Callable[[str], dict[str, Any]]
 TIME = "/api/alignment/time"
 
 
@@ -30,32 +29,17 @@ def engine(recording: Recording) -> Iterator[Engine]:
         yield engine
 
 
-@pytest.fixture
-def client(engine: Engine) -> Iterator[httpx.Client]:
-    with serving(create_app(engine)) as address, httpx.Client(base_url=address, timeout=WAIT_S) as client:
-        yield client
-
-
-def ended(client: httpx.Client) -> dict[str, Any]:
-    until_s = time.monotonic() + WAIT_S
-    while time.monotonic() < until_s:
-        now: dict[str, Any] = client.get(TIME).json()
-        if now["state"] not in ("waiting", "running"):
-            return now
-    raise AssertionError(now)
-
-
-def test_a_drive_that_cannot_tell_says_why(client: httpx.Client, engine: Engine):
+def test_a_drive_that_cannot_tell_says_why(client: httpx.Client, engine: Engine, ended: Ended):
     assert client.get(TIME).json() == {"state": "none", "progress": 0.0, "note": "", "result": None}
     assert client.post(TIME).status_code == 202
-    told = ended(client)
+    told = ended(TIME)
     assert (told["state"], told["result"]) == ("failed", None)
     assert "no lag between camera and LiDAR stands out" in told["note"]
     assert "ego speed" in told["note"]
     assert engine.control.peek().params == Params()
 
 
-def test_it_is_cancelled_and_another_can_begin(client: httpx.Client, recording: Recording):
+def test_it_is_cancelled_and_another_can_begin(client: httpx.Client, recording: Recording, ended: Ended):
     recording.gate.clear()
     try:
         assert client.post(TIME).status_code == 202
@@ -67,4 +51,4 @@ def test_it_is_cancelled_and_another_can_begin(client: httpx.Client, recording: 
         assert client.post(TIME).status_code == 202
     finally:
         recording.gate.set()
-    assert ended(client)["state"] == "failed"
+    assert ended(TIME)["state"] == "failed"
