@@ -111,7 +111,9 @@ def test_check_says_rates_clock_offsets_and_skew() -> None:
 
 
 def test_two_programs_on_one_port_are_told_so(sensors: list[LiveSensors]) -> None:
-    config = loopback_config(camera=None, gnss=None, ego=None)
+    """One port: of the LiDAR's two, each program could come first at one."""
+    lidar = {"data_port": free_port(socket.SOCK_DGRAM), "position_port": None, "interface": "127.0.0.1"}
+    config = loopback_config(lidar=lidar, camera=None, gnss=None, ego=None)
     both = [opened(config, sensors) for _ in range(2)]
     told: list[LiveSensors] = []
     for _ in range(600):
