@@ -168,6 +168,9 @@ class CipvParams(Section):
     stay_probability: float = slider(
         0.4, 0.0, 0.95, 0.05, "", "The lead is kept while both probabilities are at least this"
     )
+    stay_standing: float = slider(
+        0.6, 0.0, 0.95, 0.05, "", "The same for a lead that may be standing and was never seen to drive"
+    )
 
 
 class AccParams(Section):
