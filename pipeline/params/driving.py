@@ -213,6 +213,15 @@ class AccParams(Section):
         "m/s²",
         "Slow down for a lead beyond the desired gap once this deceleration is needed; 0: only at the gap (paper)",
     )
+    gap_sigmas: float = slider(
+        1.0,
+        0.0,
+        3.0,
+        0.1,
+        "σ",
+        "Slow down only for a lead that is too near by this many standard deviations of its distance, and do not speed "
+        "up behind one that may be; 0: as if distances had no error (paper)",
+    )
     brake_limit_mps2: float = slider(
         8.0,
         0.0,
