@@ -219,8 +219,8 @@ class AccParams(Section):
         3.0,
         0.1,
         "σ",
-        "Slow down only for a lead that is too near or closing in too fast by this many standard deviations, and do not "
-        "speed up behind one that may be too near; 0: as if nothing had an error (paper)",
+        "Slow down for a short gap only beyond this many standard deviations of the distance, and do not speed up behind "
+        "a lead that may be too near; 0: as if distances had no error (paper)",
     )
     brake_limit_mps2: float = slider(
         8.0,
