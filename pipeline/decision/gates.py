@@ -237,8 +237,8 @@ def _probable(who: Candidate) -> Answer:
 
     What only the camera sees at the edge of the path must be in it more surely. On 33 random roads
     (``pipeline.experiments.robustness``), such objects led with less than 70 % in 87 frames, and 79 of them were
-    phantoms (59 of 60 on the 18 roads first looked at, 20 of 27 on the others), most of them a track that hopped along a
-    row of parked cars in a bend, as if it drove ahead. A lead may stay with less: in a bend of 125 m without a route,
+    phantoms (59 of 60 on the 18 roads first looked at, 20 of 27 on the others), most of them a track that hopped along
+    a row of parked cars in a bend, as if it drove ahead. A lead may stay with less: in a bend of 125 m without a route,
     true leads fall below 60 %. Clearly inside, a low probability only says that the road is not known.
     """
     there, in_path = _existence(who), _in_path_probability(who) if who.odds > 0.0 else 1.0
