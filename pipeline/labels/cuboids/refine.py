@@ -23,7 +23,7 @@ from pipeline.fusion.vehicle_sizes import largest_size_m, usual_size_m
 from pipeline.labels.cuboids.aggregate import Aggregate, Planar, Sweeps, aggregated
 from pipeline.labels.cuboids.outline import Outline, outline, placed
 from pipeline.labels.cuboids.road_headings import along_road
-from pipeline.labels.cuboids.standing import held_still, strays
+from pipeline.labels.cuboids.standing import held_still, strays, weighted_median
 from pipeline.labels.headings import Pose
 from pipeline.labels.interpolate import resized
 from pipeline.labels.model import LabelTrack, Sighting
@@ -135,14 +135,7 @@ def _side(parts: Sequence[_Part], axis: int, usual_m: float) -> float:
 
 def _by_points(values: Sequence[tuple[_Part, float]]) -> float:
     """Their median, weighted by the points of the parts."""
-    return _median([value for _, value in values], [len(part.aggregate.points) for part, _ in values])
-
-
-def _median(values: Sequence[float], weights: Sequence[float]) -> float:
-    """Weighted."""
-    order = np.argsort(values)
-    total = np.cumsum(np.array(weights, dtype=float)[order])
-    return float(values[order[int(np.searchsorted(total, total[-1] / 2))]])
+    return weighted_median([value for _, value in values], [len(part.aggregate.points) for part, _ in values])
 
 
 def _with(cuboid: Cuboid, at: tuple[float, float], size: tuple[float, float]) -> Cuboid:
