@@ -45,6 +45,34 @@ def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, hei
         assert box["y"] + box["height"] <= height, part
 
 
+def test_name_tags_cover_no_vehicle_and_those_without_room_are_left_out(open_page: OpenPage):
+    """As bounds [left, top, right, bottom] of what is painted."""
+    page = open_page()
+    painted = page.evaluate(
+        """async () => {
+          const { Labels } = await import("/js/views/drawing/text_labels.js");
+          const canvas = new OffscreenCanvas(300, 200), ctx = canvas.getContext("2d", { willReadFrequently: true });
+          const painted = (weight, vehicles, end) => {
+            ctx.clearRect(0, 0, 300, 200);
+            const tags = new Labels(ctx, 300);
+            for (const each of vehicles) tags.keepFree(...each);
+            tags.put("#7", 120, 100, "#fff", weight, end);
+            const { data } = ctx.getImageData(0, 0, 300, 200), xs = [], ys = [];
+            for (let i = 0; i < 300 * 200; i++) if (data[4 * i + 3]) { xs.push(i % 300); ys.push(Math.floor(i / 300)); }
+            return xs.length ? [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)] : null;
+          };
+          const right = [110, 0, 190, 200], left = [0, 0, 100, 200];
+          return [painted("weak", [], 90), painted("weak", [right], 90), painted("weak", [left, right], 90),
+            painted("must", [left, right], 90)];
+        }"""
+    )
+    free, moved, left_out, always = painted
+    assert free[0] >= 120
+    assert moved[2] <= 90, "to the other side"
+    assert left_out is None
+    assert always is not None
+
+
 def nameless(page: Page) -> list[str]:
     """Controls without a name for screen readers."""
     return page.evaluate(
