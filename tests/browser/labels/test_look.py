@@ -45,6 +45,19 @@ def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, hei
         assert box["y"] + box["height"] <= height, part
 
 
+def test_the_labels_panel_stays_when_the_window_becomes_small(open_page: OpenPage, site: Site):
+    page = open_page(1440, 900)
+    Labels(page, site.address).clear(COUNT)
+    begin(page)
+    page.set_viewport_size({"width": 1024, "height": 768})
+    expect(page.locator("#label-pane")).to_be_in_viewport()
+    box = box_of(page.locator("#label-pane"))
+    assert box["x"] + box["width"] <= 1024
+    page.keyboard.press("Shift+L")
+    expect(page.locator("#label-pane")).to_be_hidden()
+    expect(page.locator(".side-column")).to_be_hidden()  # it would cover the views
+
+
 def test_name_tags_cover_no_vehicle_and_those_without_room_are_left_out(open_page: OpenPage):
     """As bounds [left, top, right, bottom] of what is painted."""
     page = open_page()
