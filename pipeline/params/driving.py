@@ -149,6 +149,14 @@ class CipvParams(Section):
         "",
         "To become the lead, an object must exist and be in the path with at least this probability",
     )
+    become_camera: float = slider(
+        0.7,
+        0.0,
+        0.95,
+        0.01,
+        "",
+        "The same for an object that only the camera sees: one that hops along a row of parked cars seems to drive ahead",
+    )
     become_standing: float = slider(
         0.8,
         0.0,
@@ -168,6 +176,7 @@ class CipvParams(Section):
     stay_probability: float = slider(
         0.4, 0.0, 0.95, 0.05, "", "The lead is kept while both probabilities are at least this"
     )
+    stay_camera: float = slider(0.6, 0.0, 0.95, 0.05, "", "The same for a lead that only the camera sees")
     stay_standing: float = slider(
         0.6, 0.0, 0.95, 0.05, "", "The same for a lead that may be standing and was never seen to drive"
     )
