@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.labels.store.values import LONGEST_NAME
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.judges import LOW_CONTRAST
 from tests.browser.labels.hands import Labels, begin, draw
@@ -56,6 +57,18 @@ def test_the_labels_panel_stays_when_the_window_becomes_small(open_page: OpenPag
     page.keyboard.press("Shift+L")
     expect(page.locator("#label-pane")).to_be_hidden()
     expect(page.locator(".side-column")).to_be_hidden()  # it would cover the views
+
+
+def test_a_name_is_no_longer_than_the_server_takes_and_leaves_the_bar_its_room(open_page: OpenPage):
+    page = open_page(1280, 720, locale="en")  # a locale: a page of its own, whose person is not known
+    page.evaluate("localStorage.removeItem('cipv.person')")
+    expect(page.locator("#label-button")).to_be_enabled()
+    page.keyboard.press("Shift+L")
+    page.get_by_role("textbox", name="Name", exact=True).press_sequentially("A" * (LONGEST_NAME + 9))
+    page.keyboard.press("Enter")
+    expect(page.locator(".annotator")).to_have_text("A" * LONGEST_NAME)
+    assert box_of(page.locator(".annotator"))["width"] <= 150
+    page.evaluate("localStorage.removeItem('cipv.person')")
 
 
 def test_name_tags_cover_no_vehicle_and_those_without_room_are_left_out(open_page: OpenPage):
