@@ -98,7 +98,7 @@ def _roads(
         if each.cuboid is not None and (here := poses.get(each.frame)) is not None:
             same, there = stretches[here.stretch], over_ground(each.cuboid, here)
             away_m, nearest = min(
-                ((math.dist((pose.x, pose.y), there), pose) for pose in same), key=lambda found: found[0]
+                ((math.dist((pose.x, pose.y), there), pose) for pose in same), key=lambda each: each[0]
             )
             road_rad = math.hypot(_LANE_RAD, _curvature(nearest, same) * away_m)
             own_share = road_rad**2 / (road_rad**2 + _BOX_RAD**2)
