@@ -173,7 +173,8 @@ def _values(name: Any, values: Any) -> tuple[str, ...]:
 
 def _name(name: Any) -> str:
     is_one = isinstance(name, str) and name.strip() == name and 0 < len(name) <= _LONGEST_NAME and name.isprintable()
-    _require(is_one, f"{str(name)[:_LONGEST_NAME]!r} is not a valid name")
+    what = f"a name has 1 to {_LONGEST_NAME} printable characters and no space around it"
+    _require(is_one, f"{str(name)[:_LONGEST_NAME]!r} is not a valid name: {what}")
     return str(name)
 
 

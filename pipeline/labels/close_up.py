@@ -56,11 +56,14 @@ def fit_of(points: F32, cuboid: Cuboid) -> Fit:
 
 
 def close_up(frame: Frame, sighting: Sighting, alignment: Alignment | None) -> U8:
-    """(2·HEIGHT_PX, 2·WIDTH_PX, 3) BGR: image, top and, below, side and rear view. Views without data stay empty.
-    alignment: projection of points into the image; None if unknown."""
+    """(2·HEIGHT_PX, 2·WIDTH_PX, 3) BGR: image, top and, below, side and rear view. Views without data stay empty. Of a
+    label without a cuboid, only the image: (HEIGHT_PX, WIDTH_PX, 3). alignment: projection of points into the image;
+    None if unknown."""
     views = [_in_image(frame, sighting, alignment)]
-    for name, across, up in _VIEWS:
-        views.append(_projected(name, frame.sweep.points if frame.sweep is not None else None, sighting, across, up))
+    if sighting.cuboid is None:
+        return views[0]
+    points = frame.sweep.points if frame.sweep is not None else None
+    views += [_projected(name, points, sighting.cuboid, across, up) for name, across, up in _VIEWS]
     return np.vstack([np.hstack(views[:2]), np.hstack(views[2:])])
 
 
@@ -71,16 +74,14 @@ def _in_own_frame(points: F32, cuboid: Cuboid) -> F64:
     return np.column_stack([c * away[:, 0] + s * away[:, 1], c * away[:, 1] - s * away[:, 0], away[:, 2]])
 
 
-def _projected(name: str, points: F32 | None, sighting: Sighting, across: int, up: int) -> U8:
+def _projected(name: str, points: F32 | None, cuboid: Cuboid, across: int, up: int) -> U8:
     """The points around a cuboid in a plane of two of its axes: length to the right and width or height up; in the rear
     view, the left side is on the left."""
     view = _empty(name)
-    if sighting.cuboid is None:
-        return view
-    half = np.array(sighting.cuboid.size) / 2
+    half = np.array(cuboid.size) / 2
     scale = min(WIDTH_PX / 2 / (half[across] + _SHOWN_M), HEIGHT_PX / 2 / (half[up] + _SHOWN_M))
     turn = -1.0 if across == 1 else 1.0
-    own = _in_own_frame(points, sighting.cuboid) if points is not None else np.empty((0, 3))
+    own = _in_own_frame(points, cuboid) if points is not None else np.empty((0, 3))
     own = own[np.all(np.abs(own) <= half + _SHOWN_M, axis=1)]
     is_inside = np.all(np.abs(own) <= half + 0.02, axis=1)
     u = np.rint(WIDTH_PX / 2 + turn * own[:, across] * scale).astype(int)

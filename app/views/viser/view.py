@@ -91,7 +91,8 @@ class ViserView:
         self._server.gui.configure_theme(
             dark_mode=True, show_logo=False, show_share_button=False, control_width="small"
         )
-        self._server.gui.main_panel.minimize()  # give space to the scene: a pane of the dashboard is small
+        self._server.gui.main_panel.dock_right()  # beside the scene: a floating panel covers it, folded up too
+        self._server.gui.main_panel.minimize()
         camera = self._server.initial_camera
         camera.position, camera.look_at, camera.up = POSES["Follow"]
         camera.fov = math.radians(CAMERA_FOV_DEG)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +17,12 @@ _DRIFT_SHARE, _DRIFT_MPS = 0.05, 0.2
 """A standing vehicle seems to move at the error of the own speed: up to 5 % of it (wheels and tyres; UN R39 permits
 10 % on the display), and 0.2 m/s. What moves faster than that drives."""
 _LOOSE_M = 0.8
-"""If positions deviate more than this (median) from a standing vehicle's, it does not stand, or is more than one."""
-_FAR_OFF_M = 0.15
-"""Positions farther off count less: the accuracy of a side with points on it."""
+"""If positions deviate more than this (median) from a standing vehicle's, its track is on more than one vehicle."""
+_ON_SIDE_M = 0.15
+"""Accuracy of a side with points on it. Positions farther off count less. If the positions (median, weighted by points)
+deviate more from a standing vehicle's, it does not stand, or own motion is wrong: at a street corner of Astyx's further
+frames, with sweeps half a second apart, it was half a metre off, and fitting made 37 % of the boxes worse. With this
+limit, the median IoU there is 0.71 instead of 0.62; limits up to 0.8 m make no difference on the other drives."""
 _STEPS = 10
 
 
@@ -85,9 +88,10 @@ def _standing(
     times = np.array([pose.t_s for pose in here])
     middle_s = float(times.mean())
     where = np.array([over_ground(cuboids[frame], pose) for frame, pose in zip(frames, here, strict=True)])
-    line, off_m = _line(times - middle_s, where, np.array([weights[frame] for frame in frames], dtype=float))
+    points = np.array([weights[frame] for frame in frames], dtype=float)
+    line, off_m = _line(times - middle_s, where, points)
     own_mps = abs(here[-1].way_m - here[0].way_m) / max(float(np.ptp(times)), 1e-9)
-    if math.hypot(*line[1]) > _DRIFT_SHARE * own_mps + _DRIFT_MPS or float(np.median(off_m)) > _LOOSE_M:
+    if math.hypot(*line[1]) > _DRIFT_SHARE * own_mps + _DRIFT_MPS or weighted_median(off_m, points) > _ON_SIDE_M:
         return None
     return _Standing(here[0].stretch, line, middle_s)
 
@@ -103,5 +107,12 @@ def _line(times: F64, where: F64, weights: F64) -> tuple[F64, F64]:
         root = np.sqrt(weights * trust)[:, None]
         line = np.linalg.lstsq(terms * root, where * root, rcond=None)[0]
         off_m = np.hypot(*(where - terms @ line).T)
-        trust = _FAR_OFF_M / np.maximum(off_m, _FAR_OFF_M)
+        trust = _ON_SIDE_M / np.maximum(off_m, _ON_SIDE_M)
     return line, off_m
+
+
+def weighted_median(values: Sequence[float] | F64, weights: Sequence[float] | F64) -> float:
+    """The value below which half of the weight lies."""
+    order = np.argsort(values)
+    total = np.cumsum(np.asarray(weights, dtype=float)[order])
+    return float(values[order[int(np.searchsorted(total, total[-1] / 2))]])

@@ -49,13 +49,16 @@ export function begin() {
   show();
 }
 
-/** Follow the shared playhead again. @param {boolean} bringsIt whether it comes to this page's frame */
+/**
+ * Follow the shared playhead again.
+ * @param {boolean} bringsIt whether it comes to this page's frame, and stops unless this page plays
+ */
 export async function end(bringsIt) {
   if (!own) return;
-  const { index } = own;
+  const { index, playing } = own;
   own = null;
   clearTimeout(timer);
-  if (bringsIt) await request("api/playback", "POST", { seek: index }).catch(() => {});
+  if (bringsIt) await request("api/playback", "POST", { seek: index, playing }).catch(() => {});
   if (!own) tell("own", null);
 }
 

@@ -29,14 +29,17 @@ const COVERED = ["camera", "plan", "objects"];
 /** @type {Layout} */
 export const EVERYTHING = { hidden: [], grown: null, tab: "plan", sizes: {} };
 
-/** Below this width the inspector overlays the panes, so it starts closed. */
+/** Below this width the inspector overlays the panes, so it starts closed. The labels panel is beside them. */
 const NARROW = matchMedia("(max-width: 1180px)");
 const root = document.documentElement;
 
 export function setUp() {
   set("layout", { ...EVERYTHING, ...memory.read("layout", {}), grown: null });
   root.dataset.inspect = NARROW.matches ? "closed" : "open";
-  NARROW.addEventListener("change", () => showInspector(!NARROW.matches));
+  NARROW.addEventListener("change", () => {
+    if (document.body.classList.contains("is-labeling")) showInspector(true);
+    else resetInspector();
+  });
   for (const button of document.querySelectorAll("[data-grow]")) {
     if (button.matches(".grow")) button.append(icon("grow"));
     button.addEventListener("click", () =>
@@ -93,6 +96,11 @@ export function grow(pane) {
 
 export function toggleInspector() {
   showInspector(root.dataset.inspect === "closed");
+}
+
+/** Show the inspector where it overlays nothing. */
+export function resetInspector() {
+  showInspector(!NARROW.matches);
 }
 
 /** @param {boolean} shown */

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.labels.store.values import LONGEST_NAME
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.judges import LOW_CONTRAST
 from tests.browser.labels.hands import Labels, begin, draw
@@ -43,6 +44,59 @@ def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, hei
         assert box["y"] >= 0, part
         assert box["x"] + box["width"] <= width, part
         assert box["y"] + box["height"] <= height, part
+
+
+def test_the_labels_panel_stays_when_the_window_becomes_small(open_page: OpenPage, site: Site):
+    page = open_page(1440, 900)
+    Labels(page, site.address).clear(COUNT)
+    begin(page)
+    page.set_viewport_size({"width": 1024, "height": 768})
+    expect(page.locator("#label-pane")).to_be_in_viewport()
+    box = box_of(page.locator("#label-pane"))
+    assert box["x"] + box["width"] <= 1024
+    page.keyboard.press("Shift+L")
+    expect(page.locator("#label-pane")).to_be_hidden()
+    expect(page.locator(".side-column")).to_be_hidden()  # it would cover the views
+
+
+def test_a_name_is_no_longer_than_the_server_takes_and_leaves_the_bar_its_room(open_page: OpenPage):
+    page = open_page(1280, 720, locale="en")  # a locale: a page of its own, whose person is not known
+    page.evaluate("localStorage.removeItem('cipv.person')")
+    expect(page.locator("#label-button")).to_be_enabled()
+    page.keyboard.press("Shift+L")
+    page.get_by_role("textbox", name="Name", exact=True).press_sequentially("A" * (LONGEST_NAME + 9))
+    page.keyboard.press("Enter")
+    expect(page.locator(".annotator")).to_have_text("A" * LONGEST_NAME)
+    assert box_of(page.locator(".annotator"))["width"] <= 150
+    page.evaluate("localStorage.removeItem('cipv.person')")
+
+
+def test_name_tags_cover_no_vehicle_and_those_without_room_are_left_out(open_page: OpenPage):
+    """As bounds [left, top, right, bottom] of what is painted."""
+    page = open_page()
+    painted = page.evaluate(
+        """async () => {
+          const { Labels } = await import("/js/views/drawing/text_labels.js");
+          const canvas = new OffscreenCanvas(300, 200), ctx = canvas.getContext("2d", { willReadFrequently: true });
+          const painted = (weight, vehicles, end) => {
+            ctx.clearRect(0, 0, 300, 200);
+            const tags = new Labels(ctx, 300);
+            for (const each of vehicles) tags.keepFree(...each);
+            tags.put("#7", 120, 100, "#fff", weight, end);
+            const { data } = ctx.getImageData(0, 0, 300, 200), xs = [], ys = [];
+            for (let i = 0; i < 300 * 200; i++) if (data[4 * i + 3]) { xs.push(i % 300); ys.push(Math.floor(i / 300)); }
+            return xs.length ? [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)] : null;
+          };
+          const right = [110, 0, 190, 200], left = [0, 0, 100, 200];
+          return [painted("weak", [], 90), painted("weak", [right], 90), painted("weak", [left, right], 90),
+            painted("must", [left, right], 90)];
+        }"""
+    )
+    free, moved, left_out, always = painted
+    assert free[0] >= 120
+    assert moved[2] <= 90, "to the other side"
+    assert left_out is None
+    assert always is not None
 
 
 def nameless(page: Page) -> list[str]:

@@ -262,7 +262,7 @@ def test_a_label_without_a_cuboid_says_why_and_how_to_give_it_one(hand: Hand, la
     labels.act("Ada", {"kind": "add_track", "label": "car", "frame": START, "cuboid": None, "bbox": box})
     hand.page.locator(".track-row").click()
     facts = hand.page.locator(".track-detail .facts").first
-    expect(facts).to_contain_text("no LiDAR points")
+    expect(facts).to_contain_text("image box only")
     hand.keys("Shift+G")
     hand.drag(hand.plan(30, 3), hand.plan(34, 3))
     expect(facts).to_contain_text("m ahead")

@@ -49,5 +49,6 @@ def test_four_views_show_image_and_points_on_their_side() -> None:
 
 
 def test_what_a_frame_lacks_stays_empty() -> None:
-    empty = close_up(Frame(0, "0", 0), Sighting(0, None, (1.0, 2.0, 3.0, 4.0)), None)
-    assert empty.shape == (2 * HEIGHT_PX, 2 * WIDTH_PX, 3)
+    assert close_up(Frame(0, "0", 0), Sighting(0, CAR), None).shape == (2 * HEIGHT_PX, 2 * WIDTH_PX, 3)
+    box_alone = close_up(Frame(0, "0", 0), Sighting(0, None, (1.0, 2.0, 3.0, 4.0)), None)
+    assert box_alone.shape == (HEIGHT_PX, WIDTH_PX, 3), "no views from other sides"

@@ -119,6 +119,7 @@ export async function sendBack() {
     el("p", { textContent: `${under.name} goes back to its annotator.` }),
     "Comment",
     under.comment,
+    1000,
   );
   if (comment && (await act({ kind: "send_back", items: [under.ref], comment })) && isReviewing()) await goOn();
 }

@@ -45,7 +45,7 @@ const task = el(
   el("progress", { max: 1, aria: { label: "Progress" } }),
   el("span", { class: "facts" }),
 );
-const name = el("button", { type: "button", class: "quiet", title: "Annotator" });
+const name = el("button", { type: "button", class: "quiet annotator" });
 const back = el("button", {
   type: "button",
   class: "icon-button",
@@ -236,6 +236,7 @@ function reflect() {
   text(under, review.target()?.name ?? "nothing");
   press(fresh, get("labeling")?.tool === "new");
   text(name, shownName() || "your name");
+  name.title = `Annotator: ${shownName()}`;
 }
 
 /** @param {import("../state/types.js").LeadRange} range */

@@ -35,8 +35,16 @@ export function setUp(parent) {
   on(["state", "labels"], () => isSeen() && look(undefined));
 }
 
+/** Whether anything is labelled: neither proposals nor rejected labels are checked. */
+function hasLabels() {
+  const labels = get("labels");
+  const every = labels ? [...labels.tracks.values(), ...labels.leads] : [];
+  return every.some(({ state }) => state !== "proposed" && state !== "rejected");
+}
+
 /** @param {number} count */
 function words(count) {
+  if (!count && !hasLabels()) return "Nothing to check yet: proposals are not checked.";
   if (!count) return "No problems found: no jumps, overlaps, empty cuboids, misplaced boxes or leads without a track.";
   return count > MOST ? `${count} to check, the first ${MOST}:` : `${count} to check:`;
 }

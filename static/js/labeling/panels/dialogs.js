@@ -5,10 +5,11 @@ const dialog = $("#label-dialog", HTMLDialogElement);
 
 /**
  * Ask for a line of text; null if cancelled.
- * @param {string} title @param {Node} words @param {string} label @param {string} value @returns {Promise<string|null>}
+ * @param {string} title @param {Node} words @param {string} label @param {string} value
+ * @param {number} maxLength in characters; the server refuses longer ones @returns {Promise<string|null>}
  */
-export function ask(title, words, label, value) {
-  const input = el("input", { type: "text", value, maxLength: 200, required: true, aria: { label } });
+export function ask(title, words, label, value, maxLength) {
+  const input = el("input", { type: "text", value: value.slice(0, maxLength), maxLength, required: true, aria: { label } });
   return open(title, words, input, [
     ["Cancel", null],
     ["OK", () => input.value.trim() || null],

@@ -74,7 +74,7 @@ async function handOver() {
   const words = el("p", {
     textContent: "The labels are frozen under this name and removed. Undo brings them back.",
   });
-  const name = await dialogs.ask("Freeze and start without labels", words, "Version name", person);
+  const name = await dialogs.ask("Freeze and start without labels", words, "Version name", person, 60);
   if (name === null) return;
   try {
     await request("api/labels/versions", "POST", { name, person });

@@ -130,7 +130,7 @@ function placeWords({ keyframes, origin }, sighting) {
         ? "as proposed by the pipeline"
         : "no keyframe";
   if (!sighting.cuboid)
-    return `${kind} · image box only, no LiDAR points. Draw a cuboid (Shift G), or fit one to points in the box (S)`;
+    return `${kind} · image box only. Draw a cuboid in the plan (Shift G), or fit one to the points in the box (S)`;
   const {
     center: [x, y, z],
     size,

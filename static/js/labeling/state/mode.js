@@ -2,7 +2,7 @@
 import { $, isReloaded, press, tabMemory } from "../../core/dom.js";
 import { get, on, set } from "../../core/store.js";
 import * as playhead from "../../drive/own_playhead.js";
-import { toggle as togglePane } from "../../workspace/panes.js";
+import { resetInspector, toggle as togglePane } from "../../workspace/panes.js";
 import { personName } from "./person.js";
 
 /** @type {import("../../core/store.js").Labeling} */
@@ -31,7 +31,7 @@ export function toggle() {
   set("draft", null);
   set("marked", null);
   set("trimmed", null);
-  if (!isOn()) return;
+  if (!isOn()) return resetInspector();
   togglePane("params", true); // the labels panel is in the inspector column
   personName();
 }

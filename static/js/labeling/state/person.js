@@ -55,6 +55,7 @@ export function askName() {
     el("p", { class: "facts", textContent: "Stored with every label you make." }),
     "Name",
     knownName(),
+    80,
   ).then((name) => {
     asking = null;
     if (name) {

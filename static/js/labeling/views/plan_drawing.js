@@ -15,6 +15,8 @@ import { drawPathLabel } from "./path.js";
 /** Distance of the rotation knob from the front. */
 export const KNOB_PX = 16;
 const HANDLE_PX = 3.5;
+/** With more vehicles than this, their tags have no class: the list has it. */
+const FEW = 10;
 
 /** @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {Tags} tags */
 export function drawInPlan(ctx, view, tags) {
@@ -27,12 +29,7 @@ export function drawInPlan(ctx, view, tags) {
   for (const { cuboid, keyframe, look } of labels) drawOne(ctx, view, cuboid, keyframe, look);
   const chosen = labels.find(({ look }) => look.isChosen);
   if (chosen) drawHandles(ctx, view, chosen.cuboid);
-  for (const { cuboid, look, tint } of labels.sort((a, b) => Number(b.look.isChosen) - Number(a.look.isChosen))) {
-    const corners = footprint(cuboid),
-      u = Math.max(...corners.map(([, y]) => view.u(y))) + 4,
-      v = Math.min(...corners.map(([x]) => view.v(x))) + 14;
-    tags.put(look.name, u, v, look.isChosen ? "#fff" : tint, look.isLead ? "strong" : look.isChosen ? "must" : "weak");
-  }
+  drawTags(view, tags, labels);
   const draft = get("draft");
   if (draft?.track === null && draft.cuboid)
     drawOne(ctx, view, draft.cuboid, true, {
@@ -44,7 +41,30 @@ export function drawInPlan(ctx, view, tags) {
       isFacing: true,
       role: "path",
       name: "",
+      number: "",
     });
+}
+
+/**
+ * Name tags beside the vehicles, on none of them; first the selected one and the lead.
+ * @param {Viewport} view
+ * @param {Tags} tags
+ * @param {{cuboid: Cuboid, look: import("./style.js").Look, tint: string}[]} labels
+ */
+function drawTags(view, tags, labels) {
+  const placed = labels.map(({ cuboid, look, tint }) => {
+    const corners = footprint(cuboid),
+      us = corners.map(([, y]) => view.u(y)),
+      vs = corners.map(([x]) => view.v(x));
+    const rank = Number(look.isChosen) * 2 + Number(look.isLead);
+    return { look, tint, rank, u1: Math.min(...us), u2: Math.max(...us), v1: Math.min(...vs), v2: Math.max(...vs) };
+  });
+  for (const { u1, u2, v1, v2 } of placed) tags.keepFree(u1, v1, u2 - u1, v2 - v1);
+  for (const { look, tint, rank, u1, u2, v1 } of placed.sort((a, b) => b.rank - a.rank)) {
+    const name = rank || placed.length <= FEW ? look.name : look.number,
+      weight = look.isLead ? "strong" : look.isChosen ? "must" : "weak";
+    tags.put(name, u2 + 4, v1 + 14, look.isChosen ? "#fff" : tint, weight, u1 - 4);
+  }
 }
 
 /**

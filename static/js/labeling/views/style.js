@@ -6,7 +6,7 @@ import { isSure } from "../state/threshold.js";
 
 /**
  * @typedef {{tint: string, dash: number[], width: number, isLead: boolean, isChosen: boolean, isFacing: boolean,
- *   name: string, role: "cipv"|"path"|"fused"|"warning"}} Look
+ *   name: string, number: string, role: "cipv"|"path"|"fused"|"warning"}} Look
  *   isFacing: front and rear are told apart; role: of its colour
  */
 
@@ -15,7 +15,8 @@ export function lookOf(id, isOnImage) {
   const track = trackOf(id),
     isChosen = id === get("track");
   if (!track || (!isChosen && (track.state === "rejected" || !isSure(track)))) return null;
-  const isLead = leadAt(shown())?.lead === id;
+  const isLead = leadAt(shown())?.lead === id,
+    unclear = track.heading === "unknown" ? " ⇅?" : "";
   const shade = (/** @type {string} */ role) => (isOnImage ? onImage(role) : color(role));
   const role =
     track.state === "rejected" ? "warning" : isLead ? "cipv" : track.state === "proposed" ? "path" : "fused";
@@ -27,6 +28,7 @@ export function lookOf(id, isOnImage) {
     isLead,
     isChosen,
     isFacing: track.heading !== "unknown",
-    name: `${isLead ? "lead " : ""}#${id} ${track.label}${track.heading === "unknown" ? " ⇅?" : ""}`,
+    name: `${isLead ? "lead " : ""}#${id} ${track.label}${unclear}`,
+    number: `#${id}${unclear}`,
   };
 }

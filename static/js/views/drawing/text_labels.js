@@ -28,27 +28,21 @@ export class Labels {
   }
 
   /**
-   * Draw a label with its bottom left corner at (x, y), moved up to avoid others.
+   * Draw a label with its bottom left corner at (x, y), moved up, or to the other side, to avoid others.
    * @param {string} words @param {number} x @param {number} y @param {string} tint @param {Weight} [weight]
+   * @param {number} [end] where it ends on the other side; without it, there is none
    */
-  put(words, x, y, tint, weight = "weak") {
+  put(words, x, y, tint, weight = "weak", end) {
     const { ctx } = this,
       strong = weight === "strong";
     const h = strong ? HEIGHT + 4 : HEIGHT;
     ctx.font = `${strong ? "700 13px" : "600 11px"} system-ui, "DejaVu Sans", sans-serif`;
     const w = ctx.measureText(words).width + 10;
-    const right = this.width - w - 2;
-    const at = {
-      x: Math.max(2, Math.min(x, right)),
-      y: Math.max(this.top + 2, Math.min(y - h - 1, this.bottom - h - 2)),
-      w,
-      h,
-    };
-    for (let tries = 0; this.#overlaps(at); tries++) {
-      if (tries === 3 && weight === "weak") return;
-      if (tries === 12) break;
-      at.y = at.y - h - 1 > this.top ? at.y - h - 1 : at.y + (tries + 2) * (h + 1);
-    }
+    const at =
+      this.#free(x, y, w, h, 3) ??
+      (end === undefined ? null : this.#free(end - w, y, w, h, 3)) ??
+      (weight === "weak" ? null : (this.#free(x, y, w, h, 11) ?? this.#inside(x, y, w, h)));
+    if (!at) return;
     this.taken.push(at);
     ctx.fillStyle = strong ? tint : "rgb(8 10 13 / .78)";
     ctx.beginPath();
@@ -58,6 +52,29 @@ export class Labels {
     ctx.textBaseline = "middle";
     ctx.fillText(words, at.x + 5, at.y + h / 2 + 0.5);
     ctx.textBaseline = "alphabetic";
+  }
+
+  /**
+   * A rectangle near (x, y), its bottom left corner, that overlaps no other, or null. It is moved up this often.
+   * @param {number} x @param {number} y @param {number} w @param {number} h @param {number} moves
+   */
+  #free(x, y, w, h, moves) {
+    const at = this.#inside(x, y, w, h);
+    for (let tries = 0; this.#overlaps(at); tries++) {
+      if (tries === moves) return null;
+      at.y = at.y - h - 1 > this.top ? at.y - h - 1 : at.y + (tries + 2) * (h + 1);
+    }
+    return at;
+  }
+
+  /** @param {number} x @param {number} y @param {number} w @param {number} h */
+  #inside(x, y, w, h) {
+    return {
+      x: Math.max(2, Math.min(x, this.width - w - 2)),
+      y: Math.max(this.top + 2, Math.min(y - h - 1, this.bottom - h - 2)),
+      w,
+      h,
+    };
   }
 
   /** @param {{x: number, y: number, w: number, h: number}} a */

@@ -106,6 +106,26 @@ def test_what_is_nearly_along_the_road_is_turned_along_it() -> None:
     assert facing.sightings[0].cuboid.yaw_rad == pytest.approx(0.2 - math.pi, abs=0.05), "it keeps facing us"
 
 
+def test_where_the_road_goes_on_is_known_on_a_straight_road_but_not_beyond_a_bend() -> None:
+    """The own trajectory ends 30 m before the car, whose box is rotated by 6° to it."""
+
+    def turned(yaw_per_m: float) -> float:
+        poses = {at: Pose(1, 2.0 * at, 0.0, 2.0 * at * yaw_per_m, 2.0 * at, 0.2 * at) for at in range(6)}
+        last_rad = poses[5].yaw_rad - poses[0].yaw_rad
+        (found,) = along_road([track_of({0: standing(40.0, 0.0, last_rad + math.radians(6.0))})], poses)
+        assert found.sightings[0].cuboid is not None
+        return math.degrees(found.sightings[0].cuboid.yaw_rad - last_rad)
+
+    assert turned(0.0) == pytest.approx(0.15 * 6.0, abs=0.3)
+    assert turned(1.0 / 50.0) > 5.0, "half a turn more of this bend would fit as well"
+
+
+def test_without_own_motion_nothing_is_known_of_the_road() -> None:
+    track = track_of({0: standing(20.0, 3.0, 0.1), 1: standing(20.0, 3.0, -0.1)})
+    (found,) = along_road([track], {})
+    assert found.sightings == track.sightings
+
+
 def test_a_side_seen_to_its_end_says_how_long_a_small_car_is() -> None:
     """Of one whose rear alone is seen, the usual length is assumed; of a hidden part of a side as well."""
     small = (3.3, 1.6, 1.5)

@@ -38,7 +38,7 @@ def test_what_is_seen_from_near_by_places_a_parked_car_in_every_frame() -> None:
 
 
 def test_own_speed_that_is_wrong_by_some_percent_moves_no_parked_car() -> None:
-    seen = {at: parked(at, 0.2 * (-1) ** at, moved_m=0.03 * at) for at in range(20)}
+    seen = {at: parked(at, 0.1 * (-1) ** at, moved_m=0.03 * at) for at in range(20)}
     found = held_still(seen, dict.fromkeys(range(20), 100), POSES)
     assert max(apart(found[at], parked(at, moved_m=0.03 * at)) for at in found) < 0.1
 
@@ -57,6 +57,14 @@ def test_without_own_motion_or_over_a_gap_nothing_is_known_to_stand() -> None:
     assert held_still(seen, points, broken) == seen
     jumping = {at: parked(at, 2.0 * (-1) ** at) for at in range(20)}
     assert held_still(jumping, points, POSES) == jumping, "two vehicles, or none"
+
+
+def test_own_motion_that_contradicts_what_is_seen_from_near_by_places_nothing() -> None:
+    """The same error far away, where few points place a car, is no contradiction."""
+    seen = {at: parked(at, 0.3 * (-1) ** at) for at in range(20)}
+    assert held_still(seen, dict.fromkeys(range(20), 200), POSES) == seen
+    near = seen | {at: parked(at) for at in range(15, 20)}
+    assert held_still(near, {at: 10 if at < 15 else 200 for at in range(20)}, POSES) != near
 
 
 def later(pose: Pose) -> Pose:
