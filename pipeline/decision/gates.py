@@ -50,6 +50,8 @@ class Candidate(NamedTuple):
     """Limits of the conditions."""
     clears_path_s: float | None = None
     """How long before the car arrives it will have left the path that it crosses; None if it does not."""
+    has_driven: bool = False
+    """Whether it was seen to drive for long enough that it did not only seem to."""
 
     @property
     def aside_m(self) -> float:
@@ -252,13 +254,16 @@ def _needed_existence(who: Candidate) -> float:
 def _needed_probability(who: Candidate) -> float:
     """The probability that is required of being in the path."""
     if who.leads:
-        return who.params.stay_probability
+        was_parked = _may_stand(who.item) and not who.has_driven
+        return max(who.params.stay_probability, who.params.stay_standing if was_parked else 0.0)
     usual, params = who.params.become_probability, who.params
     if who.item.oncoming:
         return max(usual, params.become_oncoming)
-    moves = who.item.surely_moving and who.item.imaged
-    may_stand = who.item.surely_moving is not None and not moves
-    return max(usual, params.become_standing) if may_stand else usual
+    return max(usual, params.become_standing) if _may_stand(who.item) else usual
+
+
+def _may_stand(item: FusedObject) -> bool:
+    return item.surely_moving is not None and not (item.surely_moving and item.imaged)
 
 
 def _in_path_probability(who: Candidate) -> float:

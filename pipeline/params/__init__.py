@@ -167,8 +167,15 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "become_standing": 0.0,
             "become_oncoming": 0.0,
             "stay_probability": 0.0,
+            "stay_standing": 0.0,
         },
-        "acc": {"comfort_decel_mps2": 8.0, "comfort_jerk_mps3": 0.0, "approach_decel_mps2": 0.0, "confirm_frames": 1},
+        "acc": {
+            "comfort_decel_mps2": 8.0,
+            "comfort_jerk_mps3": 0.0,
+            "approach_decel_mps2": 0.0,
+            "gap_sigmas": 0.0,
+            "confirm_frames": 1,
+        },
         "aeb": {"enabled": False},
     },
 }

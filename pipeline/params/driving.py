@@ -168,6 +168,9 @@ class CipvParams(Section):
     stay_probability: float = slider(
         0.4, 0.0, 0.95, 0.05, "", "The lead is kept while both probabilities are at least this"
     )
+    stay_standing: float = slider(
+        0.6, 0.0, 0.95, 0.05, "", "The same for a lead that may be standing and was never seen to drive"
+    )
 
 
 class AccParams(Section):
@@ -209,6 +212,15 @@ class AccParams(Section):
         0.1,
         "m/s²",
         "Slow down for a lead beyond the desired gap once this deceleration is needed; 0: only at the gap (paper)",
+    )
+    gap_sigmas: float = slider(
+        1.0,
+        0.0,
+        3.0,
+        0.1,
+        "σ",
+        "Slow down only for a lead that is too near or closing in too fast by this many standard deviations, and do not "
+        "speed up behind one that may be too near; 0: as if nothing had an error (paper)",
     )
     brake_limit_mps2: float = slider(
         8.0,

@@ -165,3 +165,24 @@ def test_a_speed_that_is_mostly_noise_makes_no_traffic(sigma: float, leads: bool
     (judged,) = choice.objects
     assert (judged.in_path_probability or 0.0) > 0.5
     assert (choice.lead is not None) is leads
+
+
+@pytest.mark.parametrize(
+    ("driving_s", "leads"),
+    [
+        pytest.param(0.3, False, id="parked: it only seemed to drive while it came into view"),
+        pytest.param(2.0, True, id="it stopped in front of us"),
+    ],
+)
+def test_a_lead_that_proves_to_stand_at_the_edge_leads_only_if_it_has_driven(driving_s: float, leads: bool) -> None:
+    """In the path with a probability of 51 to 59 %."""
+    vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 1.5))
+    state, choice = CipvState(), None
+    for tick in range(40):
+        speed_mps = 5.0 if tick < 10 * driving_s else 0.0
+        item = fused(1, 20.0, 1.2, velocity=(speed_mps - EGO.speed_mps, 0.0))
+        (seen,) = describe((dataclasses.replace(item, existence=0.98),), EGO, MotionParams())
+        state, choice = choose(state, (seen,), vague, moment(EGO, 0.1), CipvParams())
+        assert choice.lead is not None or tick >= 10 * driving_s, "while it drives, it leads"
+    assert choice is not None
+    assert (choice.lead is not None) is leads
