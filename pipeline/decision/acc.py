@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from pipeline.decision.object_motion import closing_speed_mps, required_decel_mps2
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
@@ -55,18 +55,6 @@ class Demand:
     """Do not accelerate, even if the PID state would."""
 
 
-class Errors(NamedTuple):
-    """By how much a lead may be farther away, and how much more slowly its gap may shrink, than estimated."""
-
-    distance_m: float
-    """Of its distance."""
-    closing_mps: float
-    """Of its closing speed; 0 if a ranging sensor measures it."""
-
-
-NO_ERRORS = Errors(0.0, 0.0)
-
-
 def control(
     state: AccState, situation: Situation, params: AccParams, emergency: AebParams
 ) -> tuple[AccState, AccCommand | None]:
@@ -81,7 +69,7 @@ def control(
     # Each rule requests a speed, and the smallest one wins
     demand = min(
         (
-            follow(ego, situation.lead, _errors(situation, params), params),
+            follow(ego, situation.lead, _error_m(situation, params), params),
             *avoid(ego, confirmed, params),
             *hold(ego, situation.path, params),
         ),
@@ -142,14 +130,11 @@ def _required_mps2(object_id: int, item: FusedObject | None, situation: Situatio
     return required_decel_mps2(distance, ego.speed_mps if closing is None else closing, emergency)
 
 
-def _errors(situation: Situation, params: AccParams) -> Errors:
-    """Those of the lead."""
+def _error_m(situation: Situation, params: AccParams) -> float:
+    """By how much the lead may be farther away than estimated."""
     lead = situation.lead
     item = next((each for each in situation.objects if lead is not None and each.id == lead.id), None)
-    if item is None:
-        return NO_ERRORS
-    distance_m, closing_mps = item.distance_sigma_m or 0.0, item.camera_speed_sigma_mps or 0.0
-    return Errors(params.gap_sigmas * distance_m, params.gap_sigmas * closing_mps)
+    return params.gap_sigmas * ((item.distance_sigma_m if item is not None else None) or 0.0)
 
 
 def cruise(params: AccParams) -> Demand:
@@ -162,13 +147,14 @@ def desired_gap_m(speed_mps: float, params: AccParams) -> float:
     return params.min_gap_m + params.time_gap_s * speed_mps
 
 
-def follow(ego: EgoState, cipv: Cipv | None, errors: Errors, params: AccParams) -> Demand:
+def follow(ego: EgoState, cipv: Cipv | None, error_m: float, params: AccParams) -> Demand:
     """v_desired = v_current · (d − d_min) / (d_desired − d_min) (paper, Eq. acc), clipped to [0, set speed]. Beyond
     d_desired, where the law is not defined, the set speed.
 
-    A gap is a matter of comfort. At 50 m, a camera's distance is wrong by 10 m now and then (a van that it takes for a
-    car), and its closing speed by 10 m/s in the first half second, so the car slows down only for what is too near or
-    too fast beyond these errors. A collision is not a matter of comfort: emergency braking uses the values as they are.
+    error_m: by how much the lead may be farther away than estimated. A gap is a matter of comfort, and at 50 m a camera's
+    distance is wrong by 10 m now and then (a van that it takes for a car), so the car slows down only for a gap that is
+    too short beyond this error. Approaching a slower vehicle is no matter of comfort, and uses the distance as it is:
+    with the error, a car standing on a motorway would be hit at 15 to 30 km/h.
     """
     set_speed = params.set_speed_kmh / 3.6
     if cipv is None:
@@ -176,27 +162,27 @@ def follow(ego: EgoState, cipv: Cipv | None, errors: Errors, params: AccParams) 
     wanted = desired_gap_m(ego.speed_mps, params)
     if cipv.distance_m <= params.min_gap_m:
         return Demand(0.0, "stop", f"lead #{cipv.id} within the minimum gap of {params.min_gap_m:.1f} m", cipv.id)
-    gap_m = cipv.distance_m + errors.distance_m
+    gap_m = cipv.distance_m + error_m
     if gap_m > wanted:
-        safe = _approach_speed_mps(ego, cipv, errors, params)
+        safe = _approach_speed_mps(ego, cipv, params)
         if safe < min(ego.speed_mps, set_speed):
             return Demand(safe, "follow", f"closing in on lead #{cipv.id} too fast", cipv.id)
         if cipv.distance_m > wanted:
             return Demand(set_speed, "cruise", f"lead #{cipv.id} beyond the desired gap of {wanted:.1f} m")
-        within = f"lead #{cipv.id} at the desired gap of {wanted:.1f} m within ±{errors.distance_m:.1f} m"
+        within = f"lead #{cipv.id} at the desired gap of {wanted:.1f} m within ±{error_m:.1f} m"
         speed = min(ego.speed_mps, set_speed)
         return Demand(speed, "follow", f"{within}: ACC will not accelerate", cipv.id, no_faster=True)
     speed = ego.speed_mps * (gap_m - params.min_gap_m) / (wanted - params.min_gap_m)
     return Demand(min(speed, set_speed), "follow", f"lead #{cipv.id} within the desired gap of {wanted:.1f} m", cipv.id)
 
 
-def _approach_speed_mps(ego: EgoState, cipv: Cipv, errors: Errors, params: AccParams) -> float:
+def _approach_speed_mps(ego: EgoState, cipv: Cipv, params: AccParams) -> float:
     """The speed from which braking by ``approach_decel_mps2`` still ends at the lead's speed and the gap desired there.
     The paper's law starts at the desired gap, which is too late for a slow lead: from 100 km/h it would take 9 m/s²."""
     if params.approach_decel_mps2 <= 0.0 or cipv.closing_speed_mps is None:
         return math.inf
-    lead_mps = max(ego.speed_mps - cipv.closing_speed_mps + errors.closing_mps, 0.0)
-    spare_m = max(cipv.distance_m + errors.distance_m - desired_gap_m(lead_mps, params), 0.0)
+    lead_mps = max(ego.speed_mps - cipv.closing_speed_mps, 0.0)
+    spare_m = max(cipv.distance_m - desired_gap_m(lead_mps, params), 0.0)
     return lead_mps + math.sqrt(2.0 * params.approach_decel_mps2 * spare_m)
 
 

@@ -164,9 +164,11 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "decide_s": 0.0,
             "become_existence": 0.0,
             "become_probability": 0.0,
+            "become_camera": 0.0,
             "become_standing": 0.0,
             "become_oncoming": 0.0,
             "stay_probability": 0.0,
+            "stay_camera": 0.0,
             "stay_standing": 0.0,
         },
         "acc": {

@@ -149,6 +149,14 @@ class CipvParams(Section):
         "",
         "To become the lead, an object must exist and be in the path with at least this probability",
     )
+    become_camera: float = slider(
+        0.7,
+        0.0,
+        0.95,
+        0.01,
+        "",
+        "The same for an object that only the camera sees: one that hops along a row of parked cars seems to drive ahead",
+    )
     become_standing: float = slider(
         0.8,
         0.0,
@@ -168,6 +176,7 @@ class CipvParams(Section):
     stay_probability: float = slider(
         0.4, 0.0, 0.95, 0.05, "", "The lead is kept while both probabilities are at least this"
     )
+    stay_camera: float = slider(0.6, 0.0, 0.95, 0.05, "", "The same for a lead that only the camera sees")
     stay_standing: float = slider(
         0.6, 0.0, 0.95, 0.05, "", "The same for a lead that may be standing and was never seen to drive"
     )
@@ -219,8 +228,8 @@ class AccParams(Section):
         3.0,
         0.1,
         "σ",
-        "Slow down only for a lead that is too near or closing in too fast by this many standard deviations, and do not "
-        "speed up behind one that may be too near; 0: as if nothing had an error (paper)",
+        "Slow down for a short gap only beyond this many standard deviations of the distance, and do not speed up behind "
+        "a lead that may be too near; 0: as if distances had no error (paper)",
     )
     brake_limit_mps2: float = slider(
         8.0,
