@@ -151,10 +151,10 @@ def follow(ego: EgoState, cipv: Cipv | None, error_m: float, params: AccParams) 
     """v_desired = v_current · (d − d_min) / (d_desired − d_min) (paper, Eq. acc), clipped to [0, set speed]. Beyond
     d_desired, where the law is not defined, the set speed.
 
-    error_m: by how much the lead may be farther away than estimated. A gap is a matter of comfort, and at 50 m a camera's
-    distance is wrong by 10 m now and then (a van that it takes for a car), so the car slows down only for a gap that is
-    too short beyond this error. Approaching a slower vehicle is no matter of comfort, and uses the distance as it is:
-    with the error, a car standing on a motorway would be hit at 15 to 30 km/h.
+    error_m: by how much the lead may be farther away than estimated. A gap is a matter of comfort, and at 50 m a
+    camera's distance is wrong by 10 m now and then (a van that it takes for a car), so the car slows down only for a
+    gap that is too short beyond this error. Approaching a slower vehicle is no matter of comfort, and uses the distance
+    as it is: with the error, a car standing on a motorway would be hit at 15 to 30 km/h.
     """
     set_speed = params.set_speed_kmh / 3.6
     if cipv is None:

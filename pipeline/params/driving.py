@@ -155,7 +155,8 @@ class CipvParams(Section):
         0.95,
         0.01,
         "",
-        "The same for an object that only the camera sees: one that hops along a row of parked cars seems to drive ahead",
+        "The same for an object at the edge of the path that only the camera sees: a track that hops along a row of "
+        "parked cars seems to drive ahead",
     )
     become_standing: float = slider(
         0.8,
@@ -176,7 +177,6 @@ class CipvParams(Section):
     stay_probability: float = slider(
         0.4, 0.0, 0.95, 0.05, "", "The lead is kept while both probabilities are at least this"
     )
-    stay_camera: float = slider(0.6, 0.0, 0.95, 0.05, "", "The same for a lead that only the camera sees")
     stay_standing: float = slider(
         0.6, 0.0, 0.95, 0.05, "", "The same for a lead that may be standing and was never seen to drive"
     )
@@ -228,8 +228,8 @@ class AccParams(Section):
         3.0,
         0.1,
         "σ",
-        "Slow down for a short gap only beyond this many standard deviations of the distance, and do not speed up behind "
-        "a lead that may be too near; 0: as if distances had no error (paper)",
+        "Slow down for a short gap only beyond this many standard deviations of the distance, and do not speed up "
+        "behind a lead that may be too near; 0: as if distances had no error (paper)",
     )
     brake_limit_mps2: float = slider(
         8.0,

@@ -65,8 +65,8 @@ class RawBoxes:
     """How many candidates come from the second pass; they are the last ones."""
 
     def with_far(self, far: RawBoxes, kept: Mask) -> RawBoxes:
-        """These candidates, then those of the second pass for which ``kept`` (M,) holds. Duplicates are removed later by
-        non-maximum suppression."""
+        """These candidates, then those of the second pass for which ``kept`` (M,) holds. Duplicates are removed later,
+        by non-maximum suppression."""
         labels = tuple(label for label, is_kept in zip(far.labels, kept.tolist(), strict=True) if is_kept)
         return replace(
             self,

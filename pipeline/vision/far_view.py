@@ -35,9 +35,9 @@ _CUT_PX = 3.0
 """A box this close to an inner edge of the window is considered cut."""
 _SURE_PX = 50.0
 """Width of a box in the network's input from which the pass over the whole image finds every vehicle. Of 926 candidates
-this wide in the windows of Astyx, KITTI 0052 and 0009 and a video, 19 had no counterpart in the whole image, and none of
-the 19 was a vehicle: the road ahead taken for a car as wide as the window, the gap between vehicles, parts of them. Of
-those 12 to 16 px wide, 3 % had none, of smaller ones 20 % and more."""
+this wide in the windows of Astyx, KITTI 0052 and 0009 and a video, 19 had no counterpart in the whole image, and none
+of these was a vehicle: they were the road ahead, taken for a car as wide as the window, the gap between vehicles, and
+parts of them. Of those 12 to 16 px wide, 3 % had none, of smaller ones 20 % and more."""
 _COUNTERPART_IOU = 0.4
 
 
