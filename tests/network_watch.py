@@ -67,7 +67,7 @@ def watched(command: Sequence[str], **options: object) -> Iterator[tuple[subproc
 
     starter = threading.Thread(target=start)
     starter.start()
-    assert is_filtered.wait(10)
+    assert is_filtered.wait(60)
     watcher = threading.Thread(target=_watch, args=(listener[0], calls, has_ended))
     watcher.start()
     starter.join()

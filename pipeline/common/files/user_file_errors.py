@@ -42,9 +42,11 @@ def parse_yaml(text: str, what: str, refuse: Callable[[str], BadInput] = BadInpu
     """Like ``read_yaml``, for a text. The message gives the position of an error but never the content: a user who
     opens a file by mistake must not see what is in it."""
     try:
-        if _nodes_of(yaml.compose(text, yaml.SafeLoader), {}) > _MOST_NODES:
+        loader = yaml.SafeLoader(text)
+        node = loader.get_single_node()
+        if _nodes_of(node, {}) > _MOST_NODES:
             raise refuse(f"{what}: not YAML: its aliases expand to more than {_MOST_NODES} values")
-        return yaml.safe_load(text)
+        return None if node is None else loader.construct_document(node)
     except BadInput:
         raise
     except RecursionError:

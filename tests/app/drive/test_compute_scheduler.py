@@ -252,6 +252,6 @@ def test_the_background_works_while_live_sensors_are_waited_for() -> None:
     sensors.engine, sensors.let_through = engine, threading.Event()
     engine.start()
     try:
-        assert sensors.let_through.wait(4.0)
+        assert sensors.let_through.wait(WAIT_S)
     finally:
         engine.stop()

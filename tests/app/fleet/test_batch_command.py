@@ -48,7 +48,8 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
             assert line, "the scheduler ended"
             match = re.search(r"tcp://127\.0\.0\.1:\d+", line)
             address = match[0] if match else ""
-        options = ["--nthreads", "1", "--no-dashboard", "--death-timeout", "20"]
+        # it may take as long as it likes to start, and is killed below
+        options = ["--nthreads", "1", "--no-dashboard", "--no-nanny"]
         worker = subprocess.Popen(
             [*dask, "worker", address, *options],
             cwd=ROOT,

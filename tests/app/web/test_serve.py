@@ -26,6 +26,7 @@ from app.web.server import Server
 from pipeline.common.errors import BadInput
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import Recording, opener
+from tests.app.waiting import WAIT_S
 
 ROOT = Path(__file__).resolve().parents[3]
 PROGRAM = """
@@ -77,7 +78,7 @@ def test_it_passes_over_a_taken_port_answers_and_ends_with_open_streams(taken_po
         with connect(f"{address.replace('http', 'ws')}/api/stream", max_size=None) as stream:
             stream.recv(60)
             program.send_signal(signal.SIGINT)
-            _, errors = program.communicate(timeout=30)
+            _, errors = program.communicate(timeout=WAIT_S)
         assert program.returncode == 0
         assert errors.strip() == f"cipv: port {taken_port} is in use; using {port}"
     finally:
@@ -109,7 +110,7 @@ def test_for_other_machines_it_shows_links_with_tokens_and_lets_nobody_else_in()
             assert client.get("/", params={"token": person.partition("token=")[2]}).status_code == 200
             assert client.get("/api/state").json()["speed"] == 1.0
         program.send_signal(signal.SIGINT)
-        out, errors = program.communicate(timeout=30)
+        out, errors = program.communicate(timeout=WAIT_S)
         assert out == ""
         assert "token" not in errors, "it is shown once"
     finally:

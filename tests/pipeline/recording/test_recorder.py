@@ -30,6 +30,8 @@ from pipeline.types.camera_shot import Shot
 from tests.conftest import ROOT
 from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, image, same, sweep
 
+WAIT_S = 180.0
+
 
 def test_what_is_put_can_be_opened_afterwards(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.mcap", ABOUT)
@@ -232,12 +234,12 @@ def test_a_disk_that_hangs_is_not_waited_for_for_ever(tmp_path: Path, monkeypatc
         stopped: list[RecordingState] = []
         stopping = threading.Thread(target=lambda: stopped.append(recorder.stop()), daemon=True)
         stopping.start()
-        stopping.join(10.0)
+        stopping.join(WAIT_S)
         assert not stopping.is_alive()
         assert stopped[0].error == "recording stopped: the disk does not respond; the 0 frames before are saved"
         assert recorder.stop() == stopped[0]
         may_write.set()
-        recorder._thread.join(10.0)
+        recorder._thread.join(WAIT_S)
     assert not recorder._thread.is_alive(), "it ends once the disk answers"
     assert len(SessionSource("a", str(tmp_path / "a.mcap"))) == recorder.state.frames >= 2
 
@@ -360,7 +362,7 @@ def test_a_writer_that_is_slow_and_goes_on_is_waited_for(tmp_path: Path, monkeyp
     allowed, write = threading.Semaphore(0), Segments.write
 
     def when_allowed(self: Segments, *arguments: Any, **named: Any) -> None:
-        assert allowed.acquire(timeout=20.0)
+        assert allowed.acquire(timeout=WAIT_S)
         write(self, *arguments, **named)
 
     monkeypatch.setattr(Segments, "write", when_allowed)

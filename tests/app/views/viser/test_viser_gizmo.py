@@ -19,7 +19,7 @@ from pipeline.types import Frame, Result
 
 CAR = Cuboid((20.0, 1.0, 0.8), (4.0, 2.0, 1.5), 0.4)
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-WAIT_S = 15.0
+WAIT_S = 180.0
 Drags = queue.Queue[tuple[HeldCuboid, bool]]
 PAGE = object()
 

@@ -24,14 +24,14 @@ def answering(answer: bytes) -> Iterator[str]:
         def serve() -> None:
             client, _ = listener.accept()
             with client, suppress(ConnectionError):  # whoever asked may have heard enough
-                client.settimeout(10.0)
+                client.settimeout(60.0)
                 client.recv(65536)
                 client.sendall(answer)
 
         thread = threading.Thread(target=serve)
         thread.start()
         yield f"http://127.0.0.1:{listener.getsockname()[1]}/video?x=1"
-        thread.join(10.0)
+        thread.join(60.0)
 
 
 class StopAtLook(ReaderStop):
