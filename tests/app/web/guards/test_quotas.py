@@ -21,6 +21,7 @@ from websockets.sync.client import connect
 from app.core.jobs import Cancelled
 from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
+from app.labels.store.drive_labels import DriveLabels, LabelSetChanges
 from app.web.guards import quotas
 from app.web.guards.tokens import Tokens
 from app.web.routes import rerun
@@ -96,6 +97,41 @@ def test_displays_that_ask_for_much_hold_nobody_up_and_what_they_leave_ends(addr
     for client in clients:
         client.close()
     assert slow.cancelled.acquire(timeout=WAIT_S), "what nobody waits for ends"
+
+
+def test_whole_lists_of_labels_are_made_two_at_a_time_and_not_for_clients_that_left(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, go_on, made = threading.Semaphore(0), threading.Event(), DriveLabels.changes
+    known_gone, looks = set[int](), Request.is_disconnected
+
+    async def look(request: Request) -> bool:
+        if is_gone := await looks(request):
+            known_gone.add(id(request))
+        return is_gone
+
+    def slowly(labels: DriveLabels, since: int = 0) -> LabelSetChanges:
+        begun.release()
+        assert go_on.wait(WAIT_S)
+        return made(labels, since)
+
+    monkeypatch.setattr(DriveLabels, "changes", slowly)
+    monkeypatch.setattr(Request, "is_disconnected", look)
+    parts = urlsplit(address)
+    asking = f"GET /api/labels HTTP/1.1\r\nHost: {parts.netloc}\r\nAuthorization: Bearer {TOKENS.person}\r\n\r\n"
+    clients = [socket.create_connection((parts.hostname or "", parts.port or 0), timeout=WAIT_S) for _ in range(8)]
+    for client in clients:
+        client.sendall(asking.encode())
+    assert begun.acquire(timeout=WAIT_S)
+    assert begun.acquire(timeout=WAIT_S)
+    assert not begun.acquire(timeout=1.0), "a third list is made beside two"
+    for client in clients:
+        client.close()
+    assert wait_until(lambda: len(known_gone) == len(clients))
+    go_on.set()
+    assert httpx.get(f"{address}/api/labels", headers=as_role("person"), timeout=WAIT_S).status_code == 200
+    assert begun.acquire(timeout=WAIT_S)
+    assert not begun.acquire(blocking=False), "a list is made for a client that left"
 
 
 def test_a_client_that_leaves_is_no_error_of_the_program() -> None:
