@@ -127,7 +127,8 @@ def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
         frame = replace(frame, raw_boxes=ask(detectors.boxes, frame, bgr))
     if detectors.far is not None and detectors.looks_far(frame.index):
         far = ask(detectors.far.of(frame), frame, bgr)
-        frame = replace(frame, raw_boxes=frame.raw_boxes.with_far(far) if frame.raw_boxes is not None else far)
+        whole = frame.raw_boxes
+        frame = replace(frame, raw_boxes=detectors.far.added_to(whole, far) if whole is not None else far)
     if detectors.lanes is not None and detectors.looks_for_lanes(frame.index):
         frame = replace(frame, raw_lanes=ask(detectors.lanes, frame, bgr))
     return frame

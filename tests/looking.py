@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Generic
@@ -46,7 +47,7 @@ def far_view(data_dir: Path, width: int, height: int) -> FarView | None:
     """Its second pass over the far part of the image, as on the command line."""
     network = open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (width, height))
     far = open_far_view(network, (width, height))
-    return FarView(LooksOnce(far.detector), far.size_px) if far is not None else None
+    return replace(far, detector=LooksOnce(far.detector)) if far is not None else None
 
 
 @cache

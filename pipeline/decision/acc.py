@@ -69,7 +69,7 @@ def control(
     # Each rule requests a speed, and the smallest one wins
     demand = min(
         (
-            follow(ego, situation.lead, params),
+            follow(ego, situation.lead, _error_m(situation, params), params),
             *avoid(ego, confirmed, params),
             *hold(ego, situation.path, params),
         ),
@@ -130,6 +130,13 @@ def _required_mps2(object_id: int, item: FusedObject | None, situation: Situatio
     return required_decel_mps2(distance, ego.speed_mps if closing is None else closing, emergency)
 
 
+def _error_m(situation: Situation, params: AccParams) -> float:
+    """By how much the lead may be farther away than estimated."""
+    lead = situation.lead
+    item = next((each for each in situation.objects if lead is not None and each.id == lead.id), None)
+    return params.gap_sigmas * ((item.distance_sigma_m if item is not None else None) or 0.0)
+
+
 def cruise(params: AccParams) -> Demand:
     """The set speed."""
     return Demand(params.set_speed_kmh / 3.6, "cruise", "nothing to slow down for")
@@ -140,21 +147,32 @@ def desired_gap_m(speed_mps: float, params: AccParams) -> float:
     return params.min_gap_m + params.time_gap_s * speed_mps
 
 
-def follow(ego: EgoState, cipv: Cipv | None, params: AccParams) -> Demand:
+def follow(ego: EgoState, cipv: Cipv | None, error_m: float, params: AccParams) -> Demand:
     """v_desired = v_current · (d − d_min) / (d_desired − d_min) (paper, Eq. acc), clipped to [0, set speed]. Beyond
-    d_desired, where the law is not defined, the set speed."""
+    d_desired, where the law is not defined, the set speed.
+
+    error_m: by how much the lead may be farther away than estimated. A gap is a matter of comfort, and at 50 m a camera's
+    distance is wrong by 10 m now and then (a van that it takes for a car), so the car slows down only for a gap that is
+    too short beyond this error. Approaching a slower vehicle is no matter of comfort, and uses the distance as it is:
+    with the error, a car standing on a motorway would be hit at 15 to 30 km/h.
+    """
     set_speed = params.set_speed_kmh / 3.6
     if cipv is None:
         return cruise(params)
     wanted = desired_gap_m(ego.speed_mps, params)
-    if cipv.distance_m > wanted:
+    if cipv.distance_m <= params.min_gap_m:
+        return Demand(0.0, "stop", f"lead #{cipv.id} within the minimum gap of {params.min_gap_m:.1f} m", cipv.id)
+    gap_m = cipv.distance_m + error_m
+    if gap_m > wanted:
         safe = _approach_speed_mps(ego, cipv, params)
         if safe < min(ego.speed_mps, set_speed):
             return Demand(safe, "follow", f"closing in on lead #{cipv.id} too fast", cipv.id)
-        return Demand(set_speed, "cruise", f"lead #{cipv.id} beyond the desired gap of {wanted:.1f} m")
-    if cipv.distance_m <= params.min_gap_m:
-        return Demand(0.0, "stop", f"lead #{cipv.id} within the minimum gap of {params.min_gap_m:.1f} m", cipv.id)
-    speed = ego.speed_mps * (cipv.distance_m - params.min_gap_m) / (wanted - params.min_gap_m)
+        if cipv.distance_m > wanted:
+            return Demand(set_speed, "cruise", f"lead #{cipv.id} beyond the desired gap of {wanted:.1f} m")
+        within = f"lead #{cipv.id} at the desired gap of {wanted:.1f} m within ±{error_m:.1f} m"
+        speed = min(ego.speed_mps, set_speed)
+        return Demand(speed, "follow", f"{within}: ACC will not accelerate", cipv.id, no_faster=True)
+    speed = ego.speed_mps * (gap_m - params.min_gap_m) / (wanted - params.min_gap_m)
     return Demand(min(speed, set_speed), "follow", f"lead #{cipv.id} within the desired gap of {wanted:.1f} m", cipv.id)
 
 

@@ -26,6 +26,8 @@ AGREEMENT_SIGMAS = 3.0
 _BLUR_M = 0.2
 """Sightings of an object that moves sideways are averaged over at most the time in which it moves this far."""
 _HOVERS_MPS = 1.0
+_DRIVES_S = 1.0
+"""What was surely moving for this long has driven: a new side that comes into view moves an object for less."""
 _HALF_WAY = 0.7
 """A running mean reaches half of a step after 0.7 of its time constant: an object that moves sideways is judged at its
 predicted position at that time."""
@@ -41,6 +43,8 @@ class CipvState:
     """By object id, running mean of the log-odds that the object is in the path."""
     camera_ranges: dict[int, int] = field(default_factory=dict)
     """By object id, number of distances that the camera's position was based on."""
+    driving_s: dict[int, float] = field(default_factory=dict)
+    """By object id, time for which it was seen to drive."""
 
 
 class Choice(NamedTuple):
@@ -63,6 +67,8 @@ class _Judged(NamedTuple):
     """The object with its position relative to the path, its eligibility and its gates."""
     odds: float | None
     """Running mean of its log-odds; None if its position is not known."""
+    driving_s: float
+    """Time for which it was seen to drive."""
     why_not: str | None
     """Why it cannot be the lead; None if it can."""
 
@@ -90,7 +96,8 @@ def choose(
     )
     odds = {each.item.id: each.odds for each in judged if each.odds is not None}
     ranges = {each.item.id: each.item.camera_ranges for each in judged}
-    return CipvState(lead.id if lead is not None else None, odds, ranges), choice
+    driving_s = {each.item.id: each.driving_s for each in judged if each.driving_s > 0.0}
+    return CipvState(lead.id if lead is not None else None, odds, ranges, driving_s), choice
 
 
 def _judge(
@@ -113,10 +120,14 @@ def _judge(
         now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY) if clears_s is None else -SURE
         before = now if is_elsewhere else state.odds.get(item.id, now)
         odds = before + _fresh(moment.dt_s, decide_s) * (now - before)
+    driving_s = 0.0 if is_elsewhere else state.driving_s.get(item.id, 0.0)
+    if item.surely_moving:
+        driving_s += moment.dt_s or 0.0
+    has_driven = driving_s >= _DRIVES_S
     is_ahead = where is not None and where.ahead_m > 0.0
     probability = 1.0 / (1.0 + exp(-odds)) if is_ahead and odds is not None else 0.0
     is_in = probability > 0.5
-    verdict = judge(Candidate(item, where, odds or 0.0, leads, widening_m, path, params, clears_s))
+    verdict = judge(Candidate(item, where, odds or 0.0, leads, widening_m, path, params, clears_s, has_driven))
     if clears_s is None and where is not None and where.margin_m() >= 0.0 and is_ahead:
         comes_in = where.middle_m * where.believed_mps < 0.0
         if not is_in or (comes_in and not verdict.eligibility.probable):
@@ -132,11 +143,11 @@ def _judge(
         crossing_s=crossing_s,
         clears_path_s=clears_s,
     )
-    return _Judged(item, odds, verdict.why_not)
+    return _Judged(item, odds, driving_s, verdict.why_not)
 
 
 def _rejections(judged: list[_Judged], lead: FusedObject | None) -> Iterator[Rejection]:
-    for item, _, why_not in judged:
+    for item, _, _, why_not in judged:
         if why_not is not None:
             yield Rejection(item.id, why_not)
         elif lead is not None and item.id != lead.id:

@@ -60,21 +60,25 @@ class Fusion:
 
     def ranged_boxes(self) -> dict[int, tuple[float, float]]:
         """LiDAR distance and its standard deviation, by id of the vision track, for objects that both sensors surely
-        see now: boxes that overlap by less than a half may belong to two vehicles side by side."""
+        see now: boxes that overlap by less than a half across may belong to two vehicles side by side. Their heights
+        prove nothing, because a few rings see a part of a vehicle, and pitch shifts it."""
         return {
             item.vision_track: (item.distance_m, item.distance_sigma_m)
             for item in self.objects
             if item.vision_track is not None
             and item.seen_by_two_sensors
-            and self._overlap(item.id) >= _SURELY_ONE
+            and self._overlap_across(item.id) >= _SURELY_ONE
             and item.distance_m is not None
             and item.distance_sigma_m is not None
         }
 
-    def _overlap(self, number: int) -> float:
-        """IoU of an object's two boxes; 0 if one is missing."""
+    def _overlap_across(self, number: int) -> float:
+        """Horizontal overlap of an object's two boxes, as a share of both together; 0 if one is missing."""
         hit, seen = self.lidar_boxes.get(number), self.vision_boxes.get(number)
-        return float(iou_matrix(np.array([hit]), np.array([seen]))[0, 0]) if hit and seen else 0.0
+        if hit is None or seen is None:
+            return 0.0
+        common, both = min(hit[2], seen[2]) - max(hit[0], seen[0]), max(hit[2], seen[2]) - min(hit[0], seen[0])
+        return max(common, 0.0) / both if both > 0.0 else 0.0
 
 
 def fuse(

@@ -149,6 +149,14 @@ class CipvParams(Section):
         "",
         "To become the lead, an object must exist and be in the path with at least this probability",
     )
+    become_camera: float = slider(
+        0.7,
+        0.0,
+        0.95,
+        0.01,
+        "",
+        "The same for an object that only the camera sees: one that hops along a row of parked cars seems to drive ahead",
+    )
     become_standing: float = slider(
         0.8,
         0.0,
@@ -167,6 +175,10 @@ class CipvParams(Section):
     )
     stay_probability: float = slider(
         0.4, 0.0, 0.95, 0.05, "", "The lead is kept while both probabilities are at least this"
+    )
+    stay_camera: float = slider(0.6, 0.0, 0.95, 0.05, "", "The same for a lead that only the camera sees")
+    stay_standing: float = slider(
+        0.6, 0.0, 0.95, 0.05, "", "The same for a lead that may be standing and was never seen to drive"
     )
 
 
@@ -209,6 +221,15 @@ class AccParams(Section):
         0.1,
         "m/s²",
         "Slow down for a lead beyond the desired gap once this deceleration is needed; 0: only at the gap (paper)",
+    )
+    gap_sigmas: float = slider(
+        1.0,
+        0.0,
+        3.0,
+        0.1,
+        "σ",
+        "Slow down for a short gap only beyond this many standard deviations of the distance, and do not speed up behind "
+        "a lead that may be too near; 0: as if distances had no error (paper)",
     )
     brake_limit_mps2: float = slider(
         8.0,

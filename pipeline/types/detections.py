@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.types.arrays import F32, I32, PixelWindow
+from pipeline.types.arrays import F32, I32, Mask, PixelWindow
 
 
 @dataclass(frozen=True)
@@ -64,15 +64,17 @@ class RawBoxes:
     far_count: int = 0
     """How many candidates come from the second pass; they are the last ones."""
 
-    def with_far(self, far: RawBoxes) -> RawBoxes:
-        """The candidates of both passes. Duplicates are removed later by non-maximum suppression."""
+    def with_far(self, far: RawBoxes, kept: Mask) -> RawBoxes:
+        """These candidates, then those of the second pass for which ``kept`` (M,) holds. Duplicates are removed later by
+        non-maximum suppression."""
+        labels = tuple(label for label, is_kept in zip(far.labels, kept.tolist(), strict=True) if is_kept)
         return replace(
             self,
-            boxes=np.concatenate([self.boxes, far.boxes]),
-            scores=np.concatenate([self.scores, far.scores]),
-            labels=self.labels + far.labels,
+            boxes=np.concatenate([self.boxes, far.boxes[kept]]),
+            scores=np.concatenate([self.scores, far.scores[kept]]),
+            labels=self.labels + labels,
             far=far.far,
-            far_count=far.far_count,
+            far_count=len(labels),
         )
 
     def without_far(self) -> RawBoxes:

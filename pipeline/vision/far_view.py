@@ -9,11 +9,13 @@ frame alone, never on tracks, so boxes can be cached and computed ahead, and a w
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
+from pipeline.common.geometry import iou_matrix
 from pipeline.inference.graph import MULTIPLE
 from pipeline.inference.runtime import DetectorError
 from pipeline.types import F32, U8, Frame, Mask, PixelWindow, RawBoxes
@@ -31,6 +33,12 @@ _WORTH_IT = 0.8
 """If the whole image is already processed at this share of the native resolution, a second pass adds nothing."""
 _CUT_PX = 3.0
 """A box this close to an inner edge of the window is considered cut."""
+_SURE_PX = 50.0
+"""Width of a box in the network's input from which the pass over the whole image finds every vehicle. Of 926 candidates
+this wide in the windows of Astyx, KITTI 0052 and 0009 and a video, 19 had no counterpart in the whole image, and none of
+the 19 was a vehicle: the road ahead taken for a car as wide as the window, the gap between vehicles, parts of them. Of
+those 12 to 16 px wide, 3 % had none, of smaller ones 20 % and more."""
+_COUNTERPART_IOU = 0.4
 
 
 class WindowDetector(Protocol):
@@ -54,6 +62,8 @@ class FarView:
     """At the window's input size."""
     size_px: int = WINDOW_PX
     """Side of the window, in pixels of the image."""
+    sure_px: float = math.inf
+    """Boxes at least this wide, in pixels of the image, are also found in the whole image if they are vehicles."""
 
     @property
     def name(self) -> str:
@@ -63,6 +73,14 @@ class FarView:
     def of(self, frame: Frame | None) -> FarLook:
         """The far view of one frame's image; None uses the middle of an image of which nothing else is known."""
         return FarLook(self, frame)
+
+    def added_to(self, whole: RawBoxes, far: RawBoxes) -> RawBoxes:
+        """The candidates of both passes, except those of the window that the whole image would have to contain too."""
+        wide = far.boxes[:, 2] - far.boxes[:, 0] >= self.sure_px
+        kept = ~wide
+        if wide.any():
+            kept[wide] = (iou_matrix(far.boxes[wide], whole.boxes) > _COUNTERPART_IOU).any(axis=1)
+        return whole.with_far(far, kept)
 
 
 @dataclass(frozen=True)
@@ -108,14 +126,15 @@ def open_far_view(detector: Detector, image_size: tuple[int, int], size_px: int 
     """The far view with the same network as ``detector`` for images of (width, height). None if the whole image is
     already processed at nearly native resolution."""
     width, height = image_size
-    if min(detector.input_size[0] / height, detector.input_size[1] / width) >= _WORTH_IT:
+    scale = min(detector.input_size[0] / height, detector.input_size[1] / width)
+    if scale >= _WORTH_IT:
         return None
     sides = tuple(-(-min(size_px, side) // MULTIPLE) * MULTIPLE for side in (height, width))
     try:
         native = open_detector(str(detector.path), None, detector.threads, (sides[0], sides[1]))
     except DetectorError:  # the graph has a fixed size; the window is scaled to it
         native = open_detector(str(detector.path), None, detector.threads)
-    return FarView(native, size_px)
+    return FarView(native, size_px, _SURE_PX / scale)
 
 
 def window_of(frame: Frame | None, image_size: tuple[int, int], size_px: int = WINDOW_PX) -> PixelWindow:

@@ -28,7 +28,7 @@ from pipeline.run import Sensors, through
 from pipeline.sources import open_source
 from pipeline.types import U8, Frame, RawBoxes, Result
 from pipeline.vision.detector import open_detector
-from pipeline.vision.far_view import FarView, open_far_view
+from pipeline.vision.far_view import open_far_view
 from tests.accuracy.drives import FOLDERS, SCHEMES, SCORED_CLIPS
 from tests.soak.real_changes import HARSH, IMMATERIAL, Change, as_it_is
 
@@ -90,7 +90,7 @@ def run(folder: Path, kind: str, name: str, change: Change, sensors: Sensors) ->
     far = open_far_view(network, size)
     if name == "every fifth box missing":
         boxes = EveryFifthMissing(network)
-        far = FarView(EveryFifthMissing(far.detector), far.size_px) if far is not None else None
+        far = replace(far, detector=EveryFifthMissing(far.detector)) if far is not None else None
     lanes = lanes_for(source, "twinlitenet")
     detectors = Detectors(boxes, lanes, usual_every(lanes, source.rate_hz), far)
     done = list(through(frames, preset("default"), detectors, sensors))

@@ -19,7 +19,6 @@ from pipeline.inference.model_registry import EMBEDDED_FILE
 from pipeline.lanes.network import LaneNetwork
 from pipeline.types import U8, RawBoxes, RawLanes
 from pipeline.vision.detector import Detector
-from pipeline.vision.far_view import FarView
 
 _COMMAND = (sys.executable, "-m", "app.drive.look_ahead.process")
 _CPU = "CPUExecutionProvider"
@@ -60,7 +59,7 @@ class NetworkProcess:
         asked = self._detectors
         far = asked.far
         if far is not None:
-            far = FarView(cast("Any", self._there(far.detector)), far.size_px)
+            far = replace(far, detector=cast("Any", self._there(far.detector)))
         return replace(asked, boxes=self._there(asked.boxes), lanes=self._there(asked.lanes), far=far)
 
     def detect(self, number: int, bgr: U8) -> RawBoxes | RawLanes:

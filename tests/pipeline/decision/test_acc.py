@@ -192,12 +192,53 @@ def test_a_slow_lead_is_slowed_down_for_before_the_gap(
     case: str, distance_m: float, closing_mps: float | None, allowed_mps: float | None
 ) -> None:
     ego = EgoState(0, 27.0)
-    demand = follow(ego, Cipv(1, distance_m, closing_mps, None, ""), AccParams())
+    demand = follow(ego, Cipv(1, distance_m, closing_mps, None, ""), 0.0, AccParams())
     assert demand.object_id == (1 if allowed_mps else None), case
     if allowed_mps is not None:
         assert demand.speed_mps == pytest.approx(allowed_mps, abs=0.1), case
-    off = follow(ego, Cipv(1, distance_m, closing_mps, None, ""), AccParams(approach_decel_mps2=0.0))
+    off = follow(ego, Cipv(1, distance_m, closing_mps, None, ""), 0.0, AccParams(approach_decel_mps2=0.0))
     assert off.state == "cruise", "as in the paper"
+
+
+@pytest.mark.parametrize(
+    ("case", "distance_m", "sigma_m", "closing_mps", "slower_mps", "reason"),
+    [
+        ("beyond the gap", 60.0, 8.0, 0.0, None, "lead #1 beyond the desired gap of 53.6 m"),
+        ("surely too near", 40.0, 0.2, 0.0, 7.5, "lead #1 within the desired gap of 53.6 m"),
+        ("too near by more than the error", 40.0, 8.0, 0.0, 3.1, "lead #1 within the desired gap of 53.6 m"),
+        (
+            "too near by less than the error",
+            48.0,
+            8.0,
+            0.0,
+            0.0,
+            "lead #1 at the desired gap of 53.6 m within ±8.0 m: ACC will not accelerate",
+        ),
+        ("the same, but it brakes", 48.0, 8.0, 12.0, 3.1, "closing in on lead #1 too fast"),
+        ("nearer than the gap at standstill", 4.9, 8.0, 0.0, 27.0, "lead #1 within the minimum gap of 5.0 m"),
+    ],
+)
+def test_acc_slows_down_only_for_a_gap_that_is_too_short_beyond_its_error(
+    case: str, distance_m: float, sigma_m: float, closing_mps: float, slower_mps: float | None, reason: str
+) -> None:
+    ego, lead = EgoState(0, 27.0), Cipv(1, distance_m, closing_mps, None, "")
+    demand = follow(ego, lead, sigma_m, AccParams())
+    assert demand.reason == reason, case
+    if slower_mps is not None:
+        assert ego.speed_mps - demand.speed_mps == pytest.approx(slower_mps, abs=0.1), case
+    assert demand.no_faster is ("will not accelerate" in reason), case
+
+
+def test_the_error_of_a_gap_is_the_camera_s() -> None:
+    speeds = []
+    for source, sigma_m in (("V", 8.0), ("VL", 0.2)):
+        item = dataclasses.replace(fused(1, 48.0, source=source), distance_sigma_m=sigma_m)
+        situation = Situation(moment(EgoState(0, 27.0), 0.1), PATH, (item,), Cipv(1, 48.0, 0.0, None, ""))
+        result = control(AccState(), situation, AccParams(), AebParams())[1]
+        assert result is not None
+        speeds.append(result.desired_speed_mps)
+    assert speeds[0] == 27.0
+    assert speeds[1] < 25.0
 
 
 @pytest.mark.parametrize(

@@ -116,8 +116,8 @@ def test_a_camera_track_whose_place_was_reset_must_be_seen_again() -> None:
 def test_a_lead_whose_place_was_reset_has_no_privilege(ranges: int, source: Any, leads: bool) -> None:
     """At the edge of the path, where only the current lead may stay."""
     followed = dataclasses.replace(fused(1, 20.0, 1.7, source=source, hits=20), camera_ranges=20)
-    state = CipvState(1, camera_ranges={1: 20})
-    lead = choose(state, (dataclasses.replace(followed, camera_ranges=ranges),), PATH, moment(), PARAMS)[1].lead
+    state, params = CipvState(1, camera_ranges={1: 20}), PARAMS.model_copy(update={"stay_camera": 0.0})
+    lead = choose(state, (dataclasses.replace(followed, camera_ranges=ranges),), PATH, moment(), params)[1].lead
     assert (lead is not None) == leads
 
 

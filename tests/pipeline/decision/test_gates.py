@@ -160,8 +160,50 @@ def test_a_speed_that_is_mostly_noise_makes_no_traffic(sigma: float, leads: bool
     (moving,) = describe([seen], EGO, MotionParams())
     state, choice = CipvState(), None
     for _ in range(3):
-        state, choice = choose(state, (moving,), path, moment(EGO, 0.1), CipvParams())
+        state, choice = choose(state, (moving,), path, moment(EGO, 0.1), CipvParams(become_camera=0.0))
     assert choice is not None
     (judged,) = choice.objects
     assert (judged.in_path_probability or 0.0) > 0.5
     assert (choice.lead is not None) is leads
+
+
+@pytest.mark.parametrize(
+    ("driving_s", "leads"),
+    [
+        pytest.param(0.3, False, id="parked: it only seemed to drive while it came into view"),
+        pytest.param(2.0, True, id="it stopped in front of us"),
+    ],
+)
+def test_a_lead_that_proves_to_stand_at_the_edge_leads_only_if_it_has_driven(driving_s: float, leads: bool) -> None:
+    """In the path with a probability of 51 to 59 %."""
+    vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 1.5))
+    state, choice = CipvState(), None
+    for tick in range(40):
+        speed_mps = 5.0 if tick < 10 * driving_s else 0.0
+        item = fused(1, 20.0, 1.2, velocity=(speed_mps - EGO.speed_mps, 0.0))
+        (seen,) = describe((dataclasses.replace(item, existence=0.98),), EGO, MotionParams())
+        state, choice = choose(state, (seen,), vague, moment(EGO, 0.1), CipvParams())
+        assert choice.lead is not None or tick >= 10 * driving_s, "while it drives, it leads"
+    assert choice is not None
+    assert (choice.lead is not None) is leads
+
+
+@pytest.mark.parametrize(
+    ("source", "aside_m", "becomes", "stays"),
+    [
+        pytest.param("V", 1.2, False, False, id="by camera, at the edge: a track that hops along parked cars"),
+        pytest.param("VL", 1.2, True, True, id="the same by the LiDAR"),
+        pytest.param("V", 0.0, True, True, id="straight ahead on a road that is not known"),
+    ],
+)
+def test_what_only_the_camera_sees_at_the_edge_must_surely_be_in_the_path(
+    source: ObjectSource, aside_m: float, becomes: bool, stays: bool
+) -> None:
+    """It drives ahead, in the path with a probability between 50 and 70 %."""
+    vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 1.5))
+    item = fused(1, 30.0, aside_m, source=source, velocity=(9.0 - EGO.speed_mps, 0.0))
+    (seen,) = describe((dataclasses.replace(item, existence=0.98),), EGO, MotionParams())
+    for state, expected in ((CipvState(), becomes), (CipvState(1, {1: 0.2}, {1: 5}), stays)):
+        choice = choose(state, (seen,), vague, moment(EGO, 0.1), CipvParams())[1]
+        assert 0.5 < (choice.objects[0].in_path_probability or 0.0) < 0.7
+        assert (choice.lead is not None) is expected

@@ -124,6 +124,29 @@ def test_both_looks_at_one_car_are_one_detection_and_the_parameter_takes_one_bac
     assert select(seen.raw_boxes, DetectionParams(far_view=False)) == select(whole.answer, DetectionParams())
 
 
+@pytest.mark.parametrize(
+    ("case", "box", "is_kept"),
+    [
+        ("wide, and nowhere in the whole image: the empty road taken for a car", [10, 190, 400, 320], False),
+        ("wide, and in the whole image, too, with any score", [85, 155, 184, 233], True),
+        ("narrow: too small for the whole image", [200, 190, 220, 206], True),
+    ],
+)
+def test_a_large_vehicle_must_be_in_the_whole_image_too(case: str, box: list[float], is_kept: bool) -> None:
+    x1, y1, _, _ = window_of(None, WIDE)
+    whole = Answers("whole", raw([[x1 + 90, y1 + 150, x1 + 190, y1 + 230]], [0.06]))
+    view = FarView(Answers("native", raw([box, [300, 100, 310, 108]], [0.8, 0.7])), sure_px=90.0)
+    seen = detect(Frame(0, "0", 0, image=CameraImage(0, bright_at())), Detectors(whole, far=view)).raw_boxes
+    assert seen is not None
+    assert seen.without_far().boxes.tolist() == whole.answer.boxes.tolist(), case
+    in_window = (seen.boxes[1:] - [x1, y1, x1, y1]).tolist()
+    assert in_window == ([box, [300, 100, 310, 108]] if is_kept else [[300, 100, 310, 108]]), case
+
+
+def test_what_the_whole_image_cannot_miss_depends_on_its_scale(far: FarView) -> None:
+    assert far.sure_px == pytest.approx(50 * WIDE[0] / 832, rel=0.01), "the input's width for this image is 832"
+
+
 def test_every_nth_frame_by_its_index() -> None:
     native = Answers("native", raw([[85, 155, 184, 233]], [0.8]))
     asked = Detectors(Answers("whole", raw([[1, 1, 2, 2]], [0.1])), far=FarView(native), far_every=2)
