@@ -103,9 +103,10 @@ def test_whole_lists_of_labels_are_made_two_at_a_time_and_not_for_clients_that_l
     address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun, go_on, made = threading.Semaphore(0), threading.Event(), DriveLabels.changes
-    known_gone, looks = set[int](), Request.is_disconnected
+    waiting, known_gone, looks = set[int](), set[int](), Request.is_disconnected
 
     async def look(request: Request) -> bool:
+        waiting.add(id(request))
         if is_gone := await looks(request):
             known_gone.add(id(request))
         return is_gone
@@ -124,7 +125,8 @@ def test_whole_lists_of_labels_are_made_two_at_a_time_and_not_for_clients_that_l
         client.sendall(asking.encode())
     assert begun.acquire(timeout=WAIT_S)
     assert begun.acquire(timeout=WAIT_S)
-    assert not begun.acquire(timeout=1.0), "a third list is made beside two"
+    assert wait_until(lambda: len(waiting) == len(clients))
+    assert not begun.acquire(blocking=False), "a third list is made beside two"
     for client in clients:
         client.close()
     assert wait_until(lambda: len(known_gone) == len(clients))
