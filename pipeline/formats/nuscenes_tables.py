@@ -19,7 +19,7 @@ from pipeline.formats.file_reading import camera_matrix
 from pipeline.types import F64
 from pipeline.types.source import SourceError, TruthObject
 
-_LARGEST_TABLE_BYTES = 4 << 30
+_LARGEST_TABLE_BYTES = 2 << 30
 """Those of the whole data set have about one GB."""
 _LABELS = (
     ("vehicle.car", "car"),

@@ -27,6 +27,11 @@ from pipeline.types.source import Opening, SourceError, TruthObject
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png")
 _OPTIONS = ("rate_hz", "hfov_deg", "height_m", "nmea", "gpx", "rig", "gnss_offset_s")
+_RANGES = {"rate_hz": (0.01, 1000.0), "hfov_deg": (10.0, 170.0), "height_m": (0.1, 10.0)}
+"""Of options: from slow time lapses to high-speed cameras, from telephoto to wide-angle lenses, from low cars to
+trucks. With them, every image size that is accepted gives a focal length that is accepted."""
+_SIZES_PX = (16, 16384)
+"""Of images, as in ``CalibrationConfig``."""
 _RATE_HZ = 10.0
 """Frames per second used from a video: more do not improve tracking, but each costs a network run."""
 _DIAGONAL_DEG, _HEIGHT_M = 78.0, 1.3
@@ -41,7 +46,7 @@ def open_video(uri: str, rest: str, how: Opening) -> CameraAlone:
     path, options = split_options(rest, _OPTIONS)
     file = recording_file(path)
     video = VideoFile(file, how.progress)
-    wanted_hz = _positive(options, "rate_hz", _RATE_HZ)
+    wanted_hz = _in_range(options, "rate_hz", _RATE_HZ)
     steps = np.diff(video.times_ns)
     recorded_hz = 1e9 / float(np.median(steps)) if len(steps) else wanted_hz
     every = max(1, round(recorded_hz / wanted_hz))
@@ -63,7 +68,7 @@ def open_images(uri: str, rest: str, how: Opening) -> CameraAlone:
     names, paths = list(files), list(files.values())
     times = [_stamp_ns(name) for name in names]
     stamped = all(times) and bool(np.all(np.diff(times) > 0))
-    step_ns = round(1e9 / _positive(options, "rate_hz", _RATE_HZ))
+    step_ns = round(1e9 / _in_range(options, "rate_hz", _RATE_HZ))
     ticks = times if stamped else [index * step_ns for index in range(len(names))]
     notes = [] if stamped else [f"no timestamps in the names: {1e9 / step_ns:g} Hz assumed; ?rate_hz= overrides it"]
     return CameraAlone(uri, folder, options, ticks, lambda index: read_image(paths[index]), notes, names)
@@ -151,8 +156,12 @@ class CameraAlone:
         else:
             return None
         height, width = image.bgr.shape[:2]
+        if not all(_SIZES_PX[0] <= size <= _SIZES_PX[1] for size in (width, height)):
+            raise SourceError(
+                f"{self.title}: images of {width}×{height} pixels; they need {_SIZES_PX[0]} to {_SIZES_PX[1]}"
+            )
         if "hfov_deg" in options:
-            focal = 0.5 * width / tan(radians(_positive(options, "hfov_deg", 70.0)) / 2.0)
+            focal = 0.5 * width / tan(radians(_in_range(options, "hfov_deg", 70.0)) / 2.0)
         else:
             focal = 0.5 * hypot(width, height) / tan(radians(_DIAGONAL_DEG) / 2.0)
             notes.append(
@@ -162,7 +171,7 @@ class CameraAlone:
         pinhole = CalibrationConfig(
             fx_px=focal, fy_px=focal, cx_px=width / 2, cy_px=height / 2, width_px=width, height_px=height
         )
-        return evolve(pinhole.calibration(), road_z_m=-_positive(options, "height_m", _HEIGHT_M))
+        return evolve(pinhole.calibration(), road_z_m=-_in_range(options, "height_m", _HEIGHT_M))
 
 
 _NO_SPEED = "no ego speed recorded"
@@ -189,10 +198,10 @@ def _the_only_one(path: Path, options: dict[str, str], suffixes: tuple[str, ...]
     return found[0] if len(found) == 1 else None
 
 
-def _positive(options: dict[str, str], name: str, otherwise: float) -> float:
-    value = number_option(options, name, otherwise)
-    if value <= 0.0 or (name == "hfov_deg" and value >= 170.0):
-        raise SourceError(f"{name}={options[name]}: out of range")
+def _in_range(options: dict[str, str], name: str, otherwise: float) -> float:
+    value, (least, most) = number_option(options, name, otherwise), _RANGES[name]
+    if not least <= value <= most:
+        raise SourceError(f"{name}={options[name]}: must be between {least:g} and {most:g}")
     return value
 
 

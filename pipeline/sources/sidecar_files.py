@@ -3,6 +3,7 @@ recording's name, or named by options."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, Gnss
 from pipeline.types.source import SourceError
 
 OPTIONS = ("video", "video_offset_s", "nmea", "rig")
+_LARGEST_NMEA_BYTES = 1 << 30
+"""Ten sentences of 80 bytes ten times a second, for more than a day."""
 NMEA_SUFFIXES = (".nmea", ".nma", ".ubx.txt")
 _IMAGE_WITHIN_NS = 100_000_000
 FIX_WITHIN_NS = 1_500_000_000
@@ -126,6 +129,8 @@ def fixes_of(path: Path, near_ns: int, notes: list[str]) -> list[GnssFix]:
     reader, fixes = NmeaReader(), []
     try:
         with open_regular(path) as file:
+            if os.fstat(file.fileno()).st_size > _LARGEST_NMEA_BYTES:
+                raise SourceError(f"{path.name}: larger than {_LARGEST_NMEA_BYTES >> 20} MiB")
             while line := file.readline(_LONGEST_LINE):
                 fix = reader.push(line.decode("ascii", "replace"), near_ns) if line.strip() else None
                 if fix is not None:

@@ -8,24 +8,19 @@ import random
 import re
 import resource
 import signal
-import socket
 import subprocess
 import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 import httpx
 from sqlalchemy import select
-from websockets.sync.client import connect
 
 from app.labels.errors import DatabaseError
 from app.labels.store.database import Database
@@ -47,6 +42,8 @@ _FULL_S = 600.0
 """A disk is full after a second. A machine whose processors are taken needs minutes to start Python."""
 _JUMPS_S = (-86_400.0, -30.0, 30.0, 86_400.0)
 _FRAMES = 30
+_MOST_TRACKS = 500
+_PLACE = {"cuboid": CUBOID}
 _RECOVERY_S = 60.0
 """PostgreSQL's own recovery after a process was killed, on a machine whose processors and memory are taken."""
 
@@ -101,36 +98,56 @@ class LabelledServer:
         self._ahead_s = context.Value("d", 0.0)
         self.process: BaseProcess
         self.address = ""
-        self._said: dict[int, int] = {}
+        self._said: dict[int, tuple[int, int]] = {}
+        self._gone: set[int] = set()
         self._first_rows: dict[str, list[Any]] | None = None
         self._number = 0
         self.start()
+        httpx.get(f"{self.address}/api/labels", timeout=_ANSWER_S).raise_for_status()  # adds the drive to the database
 
     def start(self) -> None:
         self.process, self.address = started(self._context, self.url, self._ahead_s)
 
     def label(self, stop: threading.Event) -> None:
-        """Create one track after another until ``stop``; after each kill, on the next server."""
+        """Create one track after another until ``stop``; after each kill, on the next server. Once there are
+        ``_MOST_TRACKS``, each new one replaces the oldest, since the size of the labels is not what is tested."""
         while not stop.is_set():
             with httpx.Client(base_url=self.address, timeout=_ANSWER_S) as client:
                 try:
                     drive = client.get("/api/labels").json()["drive"]["id"]
                     while not stop.is_set():
                         self._label_once(client, drive)
+                        if len(self._said) > _MOST_TRACKS:
+                            self._remove_oldest(client, drive)
                 except (httpx.HTTPError, KeyError, ValueError):
                     self.figures.refused += 1
                     stop.wait(0.1)
 
     def _label_once(self, client: httpx.Client, drive: int) -> None:
         frame, self._number = self._number % _FRAMES, self._number + 1
-        body = {"kind": "add_track", "label": f"car {self._number}", "frame": frame, "cuboid": CUBOID}
-        answer = client.post("/api/labels/act", json={"person": "Ada", "act": body, "drive": drive})
+        done = self._done(client, drive, {"kind": "add_track", "label": f"car {self._number}", "frame": frame} | _PLACE)
+        if done is not None:
+            (track,) = done["changed"]["tracks"]
+            self._said[track["id"]] = frame, track["revision"]
+
+    def _remove_oldest(self, client: httpx.Client, drive: str) -> None:
+        """If the answer is lost, the track may be there or not, and is not looked for any more."""
+        track = next(iter(self._said))
+        _, revision = self._said.pop(track)
+        item = {"kind": "track", "id": track, "revision": revision}
+        if self._done(client, drive, {"kind": "remove", "items": [item]}) is not None:
+            self._gone.add(track)
+
+    def _done(self, client: httpx.Client, drive: str, act: dict[str, Any]) -> dict[str, Any] | None:
+        """The answer to an act; None if it was refused."""
+        answer = client.post("/api/labels/act", json={"person": "Ada", "act": act, "drive": drive})
         if answer.is_success:
-            self._said[answer.json()["act"]] = frame
             self.figures.acts += 1
-        else:
-            self.figures.refused += 1
-            time.sleep(0.05)
+            found: dict[str, Any] = answer.json()
+            return found
+        self.figures.refused += 1
+        time.sleep(0.05)
+        return None
 
     # ------------------------------------------------------------ faults
 
@@ -171,16 +188,21 @@ class LabelledServer:
 
     def check(self) -> None:
         """Check that every confirmed change is stored, and that every final frame equals the first computation."""
-        figures, said = self.figures, dict(self._said)
+        figures, said, gone = self.figures, dict(self._said), set(self._gone)
         database = _reached(self.url)
         try:
             with database.reading() as connection:
                 key = connection.scalars(select(DriveRow.key)).one()
             changes = DriveLabels(database, info(key, count=_FRAMES)).changes()
-            made = {item.revision: changes.extents[item.id][0] for item in changes.items}
+            made = {item.id: changes.extents[item.id][0] for item in changes.items}
         finally:
             database.close()
-        figures.wrong += [f"act {act} is lost" for act, frame in said.items() if made.get(act) != frame]
+        figures.wrong += [
+            f"track {track} is lost"
+            for track, (frame, _) in said.items()
+            if made.get(track) != frame and track in self._said
+        ]
+        figures.wrong += [f"track {track} is back" for track in gone & made.keys()]
         rows = self._rows()
         if self._first_rows is None:
             self._first_rows = rows
@@ -259,50 +281,3 @@ def _read_back(path: Path, figures: Figures) -> int:
         figures.wrong.append(f"{missing} frames are missing, {said} are said")
     session.close()
     return len(times)
-
-
-# ------------------------------------------------------------ misbehaving clients
-
-
-def half_open(server: LabelledServer, stop: threading.Event) -> None:
-    """A client that never completes its requests, and one that sends garbage."""
-    held: list[socket.socket] = []
-    while not stop.wait(0.05):
-        parts = urlsplit(server.address)
-        with contextlib.suppress(OSError):
-            held.append(socket.create_connection((parts.hostname or "", parts.port or 0), timeout=2.0))
-            held[-1].sendall(random.choice([b"GET / HTTP/1.1\r\nX:", random.randbytes(64), b""]))
-            server.figures.clients += 1
-        while len(held) > 150:
-            held.pop(0).close()
-    for each in held:
-        each.close()
-
-
-def deaf(server: LabelledServer, stop: threading.Event) -> None:
-    """Clients of the stream that never read, and send garbage."""
-    while not stop.is_set():
-        with (
-            contextlib.suppress(Exception),
-            connect(server.address.replace("http", "ws") + "/api/stream", max_queue=1) as stream,
-        ):
-            server.figures.clients += 1
-            for _ in range(50):
-                stream.send(random.choice(["{}", "null", '{"seek": 1e999}', random.randbytes(200), "[" * 5000]))
-                if stop.wait(0.1):
-                    break
-        stop.wait(0.2)
-
-
-@contextmanager
-def pressure() -> Iterator[None]:
-    """Run other programs: one that uses a processor, and one that uses memory."""
-    hungry = "import time; held = bytearray(300 << 20); held[::4096] = b'x' * len(held[::4096]); time.sleep(600)"
-    commands = [[sys.executable, "-c", text] for text in ("while True: pass", hungry)]
-    processes = [subprocess.Popen(command) for command in commands]
-    try:
-        yield
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()

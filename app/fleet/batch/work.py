@@ -33,7 +33,8 @@ from pipeline.types.result_json import to_line
 from pipeline.types.source import Source, SourceError
 
 MOST_LABELLED = 6000
-"""Results of labelled frames are held until the drive's end, some 20 KB each: no drive is scored against more."""
+"""Results of labelled frames are held until the drive's end, some 75 KB each with 16 objects: no drive is scored
+against more."""
 
 
 class WrongWorker(BadInput):

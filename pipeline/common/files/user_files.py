@@ -51,10 +51,12 @@ def open_regular(path: Path) -> BinaryIO:
 
 
 def read_regular(path: Path, largest: int) -> bytes:
-    """The whole content of such a file. OSError also if it is larger than ``largest`` bytes."""
+    """The whole content of such a file. OSError also if it is larger than ``largest`` bytes, of which none is read
+    then: limits of tables are gigabytes."""
     with open_regular(path) as file, overload_told_apart():
-        data = file.read(largest + 1)
-    if len(data) > largest:
+        is_larger = os.fstat(file.fileno()).st_size > largest
+        data = b"" if is_larger else file.read(largest + 1)
+    if is_larger or len(data) > largest:  # the second: it grew, or it is one of /proc, which have no size
         raise OSError(errno.EFBIG, f"larger than {largest >> 20} MiB", str(path))
     return data
 

@@ -131,7 +131,7 @@ class Capture:
                 self.damage = f"cut off after {origin} bytes"
                 return
             seconds, ticks, length, _ = record.unpack(head)
-            if length > _MAX_RECORD:
+            if not 0 < length <= _MAX_RECORD:  # none is empty; a disk that filled up leaves gigabytes of zeros
                 self.damage = f"damaged after {origin} bytes"
                 return
             data = file.read(length)

@@ -126,7 +126,7 @@ def test_options_give_the_rate_and_the_camera(video: Path) -> None:
     camera = source.frame(0).camera
     assert camera is not None
     assert camera.K[0, 0] == pytest.approx(160.0)
-    with pytest.raises(SourceError, match="hfov_deg=200: out of range"):
+    with pytest.raises(SourceError, match="hfov_deg=200: must be between 10 and 170"):
         open_source(f"{video}?hfov_deg=200")
 
 
@@ -154,3 +154,21 @@ def test_what_is_no_video_and_no_track_is_said_in_one_line(video: Path, tmp_path
     video.with_suffix(".gpx").write_text(GPX.format(""))
     with pytest.raises(SourceError, match=r"drive\.gpx: no track points with times"):
         open_source(str(video))
+
+
+@pytest.mark.parametrize("size", [(8, 400), (400, 8), (16_500, 16)])
+def test_images_that_no_camera_makes_are_refused_in_one_line(size: tuple[int, int], tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "0.png"), np.zeros((size[1], size[0], 3), np.uint8))
+    with pytest.raises(SourceError, match=f"images of {size[0]}×{size[1]} pixels; they need 16 to 16384$"):
+        open_source(f"pictures:{tmp_path}")
+
+
+@pytest.mark.parametrize(
+    "option", ["rate_hz=1e8", "rate_hz=1e-300", "hfov_deg=1e-9", "hfov_deg=170.1", "height_m=1e-9"]
+)
+@pytest.mark.parametrize("width", [16, 16_384])
+def test_options_that_no_camera_has_are_refused_in_one_line(width: int, option: str, tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "0.png"), np.zeros((16, width, 3), np.uint8))
+    open_source(f"pictures:{tmp_path}?rate_hz=1000&hfov_deg=10&height_m=0.1")
+    with pytest.raises(SourceError, match=r"^\w+=\S+: must be between \S+ and \S+$"):
+        open_source(f"pictures:{tmp_path}?{option}")

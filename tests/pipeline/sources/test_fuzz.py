@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -17,6 +19,7 @@ from tests.pipeline.sources.made.captures import write_capture
 from tests.pipeline.sources.made.clouds_on_disk import STAMPS_NS, write_clouds
 from tests.pipeline.sources.made.nuscenes_on_disk import START_US, write_nuscenes
 from tests.pipeline.sources.test_radiate import write_radiate
+from tests.pipeline.sources.test_route_files import GPX, POINTS
 
 
 def small_bag(folder: Path, kind: Kind = "db3") -> Path:
@@ -26,6 +29,15 @@ def small_bag(folder: Path, kind: Kind = "db3") -> Path:
         write_bag(folder / "drive.bag", kind, sweeps=2, every=50)
         return folder
     return write_bag(folder, kind, sweeps=2, every=50)
+
+
+def images_and_track(folder: Path) -> Path:
+    """A folder of two images and a GNSS track."""
+    folder.mkdir()
+    for index in range(2):
+        cv2.imwrite(str(folder / f"{index}.png"), np.full((24, 40, 3), 90, np.uint8))
+    (folder / "track.gpx").write_text(GPX.format(1, 1, f"<trk><trkseg>{POINTS.format('trkpt')}</trkseg></trk>"))
+    return folder
 
 
 two_of_nuscenes = partial(write_nuscenes, frames=2)
@@ -67,6 +79,8 @@ FILES = {
     "radiate sweep": (write_radiate, "radiate:{folder}", "velo_lidar/000002.csv"),
     "radiate times": (write_radiate, "radiate:{folder}", "velo_lidar.txt"),
     "radiate state": (write_radiate, "radiate:{folder}", "GPS_IMU_Twist/000002.txt"),
+    "first of images": (images_and_track, "pictures:{folder}", "0.png"),
+    "track of images": (images_and_track, "pictures:{folder}", "track.gpx"),
     "rosbag 1": (partial(small_bag, kind="ros1"), "rosbag:{folder}/drive.bag", "drive.bag"),
 }
 

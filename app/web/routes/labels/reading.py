@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import Annotated
 
-from fastapi import APIRouter, HTTPException, Query, Response
+from fastapi import APIRouter, HTTPException, Query, Request, Response
 from fastapi.responses import JSONResponse
 
 from app.labels.acts.request_fields import MOST_FRAMES, Id, Index, PersonOrNobody
@@ -12,6 +13,7 @@ from app.labels.service.answers import changes_json, history_json, track_json, w
 from app.labels.service.desk import LabelDesk
 from app.labels.service.next_work import Asked, What, where_next
 from app.labels.store.values import HistoryEntry, ItemKind
+from app.web.guards.quotas import while_waited_for
 from app.web.refusals import refusing
 from app.web.routes.drive import current
 from app.web.routes.labels.class_shapes import AttributeKindJson, ClassJson, ClassListJson
@@ -19,13 +21,19 @@ from app.web.routes.labels.score_shapes import BadFrameJson, ScoreJson, errors_j
 from app.web.routes.labels.shapes import ChecksJson, ItemKey, LabelsOfPerson, NextJson, ProblemJson
 from app.web.routes.labels.sighting_shapes import WholeTrack, Window
 from app.web.routes.shapes.common import MetricJson
+from pipeline.common.progress import Progress
 
 LONGEST_WINDOW = 200
+_LISTS_AT_ONCE = 2
+"""Maximum lists of changes made at a time. One of 10,000 labels takes about 20 MB; on a busy server, clients that ask
+again after their timeout would otherwise have many of them made at once. Further requests wait, and are dropped when
+the client disconnects."""
 
 
 def labels_router(desk: LabelDesk) -> APIRouter:
     """Routes that read labels."""
     router = APIRouter(prefix="/api/labels", tags=["labels"])
+    threads = ThreadPoolExecutor(_LISTS_AT_ONCE, "cipv-label-lists")
 
     @router.get("/classes")
     def classes() -> ClassListJson:
@@ -41,14 +49,21 @@ def labels_router(desk: LabelDesk) -> APIRouter:
         )
 
     @router.get("", responses={200: {"model": LabelsOfPerson}})
-    def changes(since: Annotated[Id, Query()] = 0, person: Annotated[PersonOrNobody, Query()] = "") -> Response:
+    async def changes(
+        request: Request, since: Annotated[Id, Query()] = 0, person: Annotated[PersonOrNobody, Query()] = ""
+    ) -> Response:
         """Get the labels that changed after act ``since``; 0 for all. Ask again whenever ``state.labels.revision`` has
         changed. can_undo, can_redo: for this person."""
-        with refusing():
-            labels = desk.labels
-            body = changes_json(labels.info, labels.changes(since))
-            can_undo, can_redo = desk.possible(person)
-        return JSONResponse(body | {"can_undo": can_undo, "can_redo": can_redo})
+
+        def listed(progress: Progress) -> Response:
+            progress(0, 1)
+            with refusing():
+                labels = desk.labels
+                body = changes_json(labels.info, labels.changes(since))
+                can_undo, can_redo = desk.possible(person)
+            return JSONResponse(body | {"can_undo": can_undo, "can_redo": can_redo})
+
+        return await while_waited_for(request, threads, listed)
 
     @router.get("/frames", responses={200: {"model": Window}})
     def frames(first: Annotated[Index, Query()], last: Annotated[Index, Query()]) -> Response:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import select
 import socket
 import threading
@@ -21,6 +22,7 @@ from websockets.sync.client import connect
 from app.core.jobs import Cancelled
 from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
+from app.labels.store.drive_labels import DriveLabels, LabelSetChanges
 from app.web.guards import quotas
 from app.web.guards.tokens import Tokens
 from app.web.routes import rerun
@@ -96,6 +98,33 @@ def test_displays_that_ask_for_much_hold_nobody_up_and_what_they_leave_ends(addr
     for client in clients:
         client.close()
     assert slow.cancelled.acquire(timeout=WAIT_S), "what nobody waits for ends"
+
+
+def test_whole_lists_of_labels_are_made_two_at_a_time(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    two, beside, made = threading.Barrier(2), list[int](), DriveLabels.changes
+    lock, running = threading.Lock(), set[int]()
+
+    def counted(labels: DriveLabels, since: int = 0) -> LabelSetChanges:
+        with lock:
+            running.add(threading.get_ident())
+            beside.append(len(running))
+        with contextlib.suppress(threading.BrokenBarrierError):
+            two.wait(WAIT_S)
+        try:
+            return made(labels, since)
+        finally:
+            with lock:
+                running.discard(threading.get_ident())
+
+    monkeypatch.setattr(DriveLabels, "changes", counted)
+    with ThreadPoolExecutor(8) as clients:
+        answers = list(
+            clients.map(
+                lambda _: httpx.get(f"{address}/api/labels", headers=as_role("person"), timeout=WAIT_S), range(8)
+            )
+        )
+    assert [answer.status_code for answer in answers] == [200] * 8
+    assert max(beside) == 2
 
 
 def test_a_client_that_leaves_is_no_error_of_the_program() -> None:

@@ -81,6 +81,23 @@ def test_a_file_beyond_its_size_is_refused(tmp_path: Path):
         read_regular(tmp_path / "x", 1 << 20)
 
 
+def _bytes_read() -> int:
+    """By this process so far."""
+    return int(Path("/proc/self/io").read_text().split()[1])
+
+
+@pytest.mark.skipif(not Path("/proc/self/io").exists(), reason="what was read is counted by Linux")
+def test_nothing_is_read_of_a_file_beyond_its_size(tmp_path: Path):
+    with (tmp_path / "x").open("wb") as file:
+        file.truncate(4 << 30)  # takes no space on the disk
+    before = _bytes_read()
+    with pytest.raises(OSError, match="larger than 512 MiB"):
+        read_regular(tmp_path / "x", 512 << 20)
+    assert _bytes_read() - before < 1 << 20
+    with pytest.raises(OSError, match="larger than 0 MiB"):
+        read_regular(Path("/proc/self/status"), 10)  # which has no size
+
+
 def test_outside_the_allowed_folders_nothing_is_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     inside, outside = tmp_path / "drives", tmp_path / "else"
     for folder in (inside, outside):

@@ -229,3 +229,16 @@ def test_stamps_of_a_damaged_header_do_not_go_back(tmp_path: Path) -> None:
     data[at : at + 4] = struct.pack("<I", 1)
     source = opened(tmp_path, bytes(data))
     assert np.all(np.diff([source.t_ns(index) for index in range(len(source))]) > 0)
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize(("name", "says"), [("drive.pcap", "damaged after"), ("drive.nmea", "larger than 1024 MiB")])
+def test_gigabytes_of_zeros_are_not_read_as_records(name: str, says: str, tmp_path: Path) -> None:
+    folder = write_capture(tmp_path / "recording")
+    with (folder / name).open("r+b") as file:
+        file.truncate(20 << 30)  # takes no space on the disk
+    try:
+        said = " ".join(open_source(f"pcap:{folder / 'drive.pcap'}").notes)
+    except SourceError as error:
+        said = str(error)
+    assert says in said
