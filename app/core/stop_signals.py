@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from threading import Event
 from typing import Any
 
@@ -62,6 +63,38 @@ def as_interrupts() -> Iterator[None]:
 
     with _handled(interrupt):
         yield
+
+
+@contextmanager
+def held_back() -> Iterator[None]:
+    """Raises KeyboardInterrupt at the end of the block, if a stop was asked for within: for a start of a few seconds
+    that leaves a mess if it is cut off. Processes started by threads that it starts ignore Ctrl-C, which a terminal
+    sends to all of them: their parent ends them."""
+    resource_tracker.ensure_running()  # its start would unblock Ctrl-C in the thread that needs it first
+    is_asked = False
+
+    def ask(*_: object) -> None:
+        nonlocal is_asked
+        is_asked = True
+
+    with _handled(ask):
+        with _blocked_interrupts():
+            yield
+    if is_asked:
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def _blocked_interrupts() -> Iterator[None]:
+    """Threads and processes inherit what is blocked. Has no effect on Windows."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

@@ -27,7 +27,7 @@ def is_dependable(item: FusedObject) -> bool:
 
 def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None) -> bool:
     """Whether the object is in the corridor, or its lateral motion takes it there before the car reaches it. An object
-    that stands still beside the road stays there: its lateral speed is noise.
+    that stands or may stand beside the road stays there: its lateral speed is noise, and half of its points may vanish.
 
     If the path's uncertainty exceeds its width, no course counts as leading into it: in a bend, other traffic follows
     the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty. Oncoming
@@ -41,7 +41,7 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None) -> bool:
         is_hidden = lead is not None and distance_m > lead.distance_m
         if is_hidden or sigma_m > path.half_width_m:
             return False
-    if item.moving is False or (item.in_path and not oncoming):
+    if item.surely_moving is False or (item.in_path and not oncoming):
         return item.in_path
     if item.closest_point is None or item.closest_point[0] < ABREAST_M:
         return False  # already beside the car: braking would not avoid it

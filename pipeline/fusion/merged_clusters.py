@@ -31,8 +31,9 @@ errors. Below it is the road, whose points do not count anyway."""
 _GAP_M, _FEWEST = 0.5, 20
 """A group of points ends at a larger gap in range than the first, and counts with at least the second number: a car at
 30 m returns 30 points."""
-_SIGMAS = 3.0
-"""If the camera knows a distance, the range must agree with it within this many standard deviations."""
+_COVERED = 0.5
+"""Share of the box's width over which the group must extend: in a row of parked cars, the flank of a nearer one reaches
+into the box of the next."""
 
 
 class SweepWithClusters(SweepReturns, Protocol):
@@ -51,7 +52,8 @@ def range_boxes(
     params: FusionParams,
 ) -> tuple[VisionMeasurement, ...] | None:
     """The boxes; those of near vehicles with points in a cluster that is longer than any vehicle of their class get
-    ``ranged_m`` and ``returns``, and a place if the camera gives none."""
+    ``ranged_m`` and ``returns``, and a place if the camera gives none. A camera's distance must agree with the range as
+    with that of a cluster (``range_gate_sigmas``)."""
     if not params.merged_clusters or not boxes or alignment is None or sweep.ground is None or not sweep.obstacles:
         return boxes
     asked = [each.detection.label in VEHICLES and (each.distance_m or 0.0) < FARTHEST_M for each in boxes]
@@ -59,31 +61,41 @@ def range_boxes(
     if not any(asked) or longest <= largest_size_m("car")[0]:
         return boxes
     return tuple(
-        _ranged(each, sweep, sweep.obstacles, alignment) if ask else each
+        _ranged(each, sweep, sweep.obstacles, alignment, params) if ask else each
         for each, ask in zip(boxes, asked, strict=True)
     )
 
 
 def _ranged(
-    seen: VisionMeasurement, sweep: SweepWithClusters, obstacles: Sequence[Obstacle], alignment: Alignment
+    seen: VisionMeasurement,
+    sweep: SweepWithClusters,
+    obstacles: Sequence[Obstacle],
+    alignment: Alignment,
+    params: FusionParams,
 ) -> VisionMeasurement:
     longest_m = largest_size_m(seen.detection.label)[0]
     merged = [each.cluster for each in obstacles if max(each.cuboid.size[:2]) > longest_m]
     points = sweep.points[np.isin(sweep.kind, merged), :3].astype(np.float64)
-    inside = points[_is_inside(alignment.project(points), seen.detection.bbox)]
+    uv = alignment.project(points)
+    is_inside = _is_inside(uv, seen.detection.bbox)
+    inside, across = points[is_inside], uv[is_inside, 0]
     assert sweep.ground is not None
     height_m = sweep.ground.above(inside)
-    inside = inside[(height_m > LOW_M) & (height_m < HIGH_M)]
+    on_body = (height_m > LOW_M) & (height_m < HIGH_M)
+    inside, across = inside[on_body], across[on_body]
     range_m = np.hypot(inside[:, 0], inside[:, 1])
     order = np.argsort(range_m, kind="stable")
     group = _nearest_group(range_m[order])
     if group is None:
         return seen
     rows = order[group]
+    x1, _, x2, _ = seen.detection.bbox
+    if np.ptp(across[rows]) < _COVERED * (x2 - x1):
+        return seen
     nearest_m = float(range_m[rows[0]])
     if seen.distance_m is not None and seen.sigma_m is not None:
-        if abs(nearest_m - seen.distance_m) > _SIGMAS * seen.sigma_m:
-            return seen
+        if abs(nearest_m - seen.distance_m) > params.range_gate_sigmas * seen.sigma_m:
+            return seen  # a nearer vehicle of the same cluster
         return evolve(seen, ranged_m=nearest_m, ranged_sigma_m=SIGMA_M, returns=len(rows))
     bearing = np.arctan2(np.median(inside[rows, 1]), np.median(inside[rows, 0]))
     place = (float(nearest_m * np.cos(bearing)), float(nearest_m * np.sin(bearing)))

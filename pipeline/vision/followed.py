@@ -188,6 +188,7 @@ def _hinted(followed: Followed, seen: VisionMeasurement, params: VisionTrackingP
     label = followed.track.label
     factor = max(seen.class_factors.get(label, 1.0), 1.0)
     height = hinted(shape if label == "car" else BoxShape(), contact, seen.size_share or 0.0, factor)
+    height = height._replace(contradictions=followed.height.contradictions)
     place = followed.place_filter
     if place is not None and height.mean != followed.height.mean:
         place = place_filter.scaled(place, height.factor / followed.height.factor)

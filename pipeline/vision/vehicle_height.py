@@ -26,6 +26,9 @@ _SETBACK_M = 0.5
 """Standard deviation of how far the roof's edge lies behind the bumper."""
 _MAX_SURPRISE = 10.8
 """Squared innovation beyond which a range is not this vehicle's: 99.9 % of χ² with one degree of freedom."""
+_INSISTS = 5
+"""After so many of these in a row, the range is right and the class is wrong: a lorry that is called a car. Half a
+second is longer than a pair of two vehicles lasts."""
 _USUAL_ASPECT = math.log(1.55 / 1.73)
 """ln(height / width) of the usual car from behind: medians of the labelled cars of Astyx (1.59 m, 1.80 m) and KITTI
 0009 (1.51 m, 1.65 m)."""
@@ -108,6 +111,8 @@ class Height(NamedTuple):
     """Its standard deviation; None while nothing is known but the class, and perhaps the shape of the boxes."""
     is_ranged: bool = False
     """Whether it was learned from measured ranges, after which hints no longer count."""
+    contradictions: int = 0
+    """Measured ranges in a row that contradict it."""
 
     @property
     def factor(self) -> float:
@@ -152,6 +157,8 @@ def learn(
     noise = noise_share**2 + (math.hypot(range_sigma_m, _SETBACK_M) / range_m) ** 2
     surprise = math.log(range_m / law_m) - height.mean
     if surprise**2 > _MAX_SURPRISE * (prior + noise):
-        return height
+        if height.contradictions + 1 < _INSISTS:
+            return height._replace(contradictions=height.contradictions + 1)
+        return Height(height.mean + surprise, max(math.sqrt(noise), FLOOR_SHARE), True)
     gain = prior / (prior + noise)
     return Height(height.mean + gain * surprise, max(math.sqrt((1.0 - gain) * prior), FLOOR_SHARE), True)

@@ -8,13 +8,14 @@ import os
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 import dask
 from distributed import Client, KilledWorker, LocalCluster, as_completed
 
+from app.core.stop_signals import held_back
 from app.fleet.batch.job import Job, Outcome, TooLong
 from app.fleet.batch.work import WrongWorker, look_at_piece, run_drive, set_aside
 from pipeline.common.errors import BadInput, first_line
@@ -91,17 +92,20 @@ def client_of(scheduler: str | None, workers: int, memory: str) -> Iterator[Clie
             with client:
                 yield client
             return
-        cluster = LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            memory_limit=memory,
-            host="127.0.0.1",
-            dashboard_address="127.0.0.1:0",
-            silence_logs=50,
-            security=True,  # other users of this machine cannot send it work
-        )
-        with cluster, Client(cluster) as client:
-            yield client
+        with ExitStack() as running:
+            with held_back():  # Dask cannot close a cluster that has not started
+                cluster = running.enter_context(
+                    LocalCluster(
+                        n_workers=workers,
+                        threads_per_worker=1,
+                        memory_limit=memory,
+                        host="127.0.0.1",
+                        dashboard_address="127.0.0.1:0",
+                        silence_logs=50,
+                        security=True,  # other users of this machine cannot send it work
+                    )
+                )
+            yield running.enter_context(Client(cluster))
 
 
 @contextmanager

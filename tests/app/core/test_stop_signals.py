@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
+import threading
 
 import pytest
 
-from app.core.stop_signals import asked_to_stop
+from app.core.stop_signals import as_interrupts, asked_to_stop, held_back
 
 
 def test_a_signal_that_arrives_while_another_is_handled_is_the_same_request() -> None:
@@ -34,3 +37,28 @@ def test_only_a_second_interrupt_ends_at_once() -> None:
         assert asked.is_set()
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_that_is_held_back_comes_at_the_end(number: signal.Signals) -> None:
+    reached = False
+    with as_interrupts(), pytest.raises(KeyboardInterrupt), held_back():
+        signal.raise_signal(number)
+        reached = True
+    assert reached
+
+
+def test_what_starts_while_a_stop_is_held_back_is_not_interrupted() -> None:
+    """A terminal sends Ctrl-C to every process. Dask starts its own from a thread."""
+    program = "import signal; signal.raise_signal(signal.SIGINT); print('goes on')"
+    printed: list[str] = []
+
+    def start() -> None:
+        ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+        printed.append(ended.stdout.strip())
+
+    with held_back():
+        thread = threading.Thread(target=start)
+        thread.start()
+    thread.join()
+    assert printed == ["goes on"]

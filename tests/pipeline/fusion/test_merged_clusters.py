@@ -26,6 +26,8 @@ class Scene:
     length_m: float = 15.0
     """Of the cluster of both."""
     car_points: int = 60
+    face_m: tuple[float, float] = (-0.8, 0.8)
+    """Where the car's points begin and end, to the left."""
     cluster: int = HEDGE
     """To which the car's points belong."""
     ground: Ground | None = field(default_factory=lambda: ROAD)
@@ -33,7 +35,7 @@ class Scene:
 
     @property
     def points(self) -> F32:
-        face, hedge = np.linspace(-0.8, 0.8, self.car_points), np.linspace(-6.0, 6.0, 200)
+        face, hedge = np.linspace(*self.face_m, self.car_points), np.linspace(-6.0, 6.0, 200)
         heights = np.tile([-0.4, 0.0, 0.3], 100)
         rows = [(CAR_M, y, z, 0.0) for y, z in zip(face, heights, strict=False)]
         rows += [(HEDGE_M, y, z, 0.0) for y, z in zip(hedge, heights, strict=False)]
@@ -90,6 +92,8 @@ def test_a_distance_by_the_camera_is_made_exact() -> None:
         pytest.param(box("bus"), Scene(), id="a bus may be that long"),
         pytest.param(box(), Scene(cluster=OTHER, car_points=250, length_m=4.5), id="another vehicle's cluster"),
         pytest.param(box(distance_m=20.0), Scene(), id="the camera says that it is elsewhere"),
+        pytest.param(box(distance_m=9.8), Scene(), id="the camera says that it is the next car of a row"),
+        pytest.param(box(), Scene(face_m=(0.4, 0.8)), id="the flank of a nearer car"),
         pytest.param(box("person"), Scene(), id="no vehicle"),
         pytest.param(box(distance_m=35.0), Scene(), id="far: single returns range it"),
         pytest.param(box(), replace(Scene(), ground=None), id="the road is not known"),
