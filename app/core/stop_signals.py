@@ -77,9 +77,8 @@ def held_back() -> Iterator[None]:
         nonlocal is_asked
         is_asked = True
 
-    with _handled(ask):
-        with _blocked_interrupts():
-            yield
+    with _handled(ask), _blocked_interrupts():
+        yield
     if is_asked:
         raise KeyboardInterrupt
 

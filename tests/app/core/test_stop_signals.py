@@ -41,11 +41,17 @@ def test_only_a_second_interrupt_ends_at_once() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_that_is_held_back_comes_at_the_end(number: signal.Signals) -> None:
-    reached = False
-    with as_interrupts(), pytest.raises(KeyboardInterrupt), held_back():
-        signal.raise_signal(number)
-        reached = True
-    assert reached
+    steps: list[str] = []
+
+    def start() -> None:
+        with as_interrupts(), held_back():
+            signal.raise_signal(number)
+            steps.append("started")
+        steps.append("went on")
+
+    with pytest.raises(KeyboardInterrupt):
+        start()
+    assert steps == ["started"]
 
 
 def test_what_starts_while_a_stop_is_held_back_is_not_interrupted() -> None:
