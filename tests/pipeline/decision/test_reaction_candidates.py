@@ -65,6 +65,9 @@ def test_nothing_is_dependable_before_it_was_judged() -> None:
             fused(1, 30.0, 3.5, velocity=(-20.0, -1.4)), 20.0, False, id="a post beside the road does not swerve"
         ),
         pytest.param(fused(1, 30.0, 2.0, velocity=(-10.0, -0.4)), 20.0, False, id="sideways noise is not believed"),
+        pytest.param(
+            fused(1, 22.0, -2.9, velocity=(-20.0, 1.9), hits=6), 20.0, False, id="half of a parked car's points vanish"
+        ),
         pytest.param(fused(1, 30.0, 0.5, velocity=(-20.0, 0.0)), 20.0, True, id="a standing obstacle in the corridor"),
         pytest.param(fused(1, 30.0, -8.0, velocity=(-20.0, 6.0)), 20.0, True, id="a crossing car will be there"),
         pytest.param(fused(1, 30.0, 3.5, velocity=(5.0, -2.0)), 20.0, False, id="it pulls away: never reached"),

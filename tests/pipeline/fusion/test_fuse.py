@@ -270,3 +270,23 @@ def test_an_object_that_the_lidar_has_just_found_keeps_the_cameras_velocity() ->
     assert result.objects[0].velocity_mps == (-12.0, 0.0)
     _, later = joined([lidar_track(1, 30.0, velocity=(-11.0, 0.0))], [closing])
     assert later.objects[0].velocity_mps == (-11.0, 0.0), "the LiDAR's own is the better one"
+
+
+@pytest.mark.parametrize(
+    ("case", "shift", "taller_px", "ranged"),
+    [
+        ("the same place", 0.0, 0.0, True),
+        ("two rings saw the lower half, and the camera nods", 0.0, 60.0, True),
+        ("two vehicles side by side", 0.6, 0.0, False),
+    ],
+)
+def test_heights_are_learned_where_boxes_overlap_across(
+    case: str, shift: float, taller_px: float, ranged: bool
+) -> None:
+    hit = lidar_track(1, 25.0, 0.0)
+    x1, y1, x2, y2 = box_of(hit)
+    aside = shift * (x2 - x1)
+    seen = vision_track(1, (x1 + aside, y1 - taller_px, x2 + aside, y2 - taller_px / 2), distance_m=25.0)
+    fused = joined([hit], [seen])[1]
+    assert [item.source for item in fused.objects] == ["VL"], case
+    assert (1 in fused.ranged_boxes()) is ranged, case
