@@ -56,8 +56,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFil
 
 
 class _Together(LoadFileScheduling):
-    """The first process takes the long files that stay together, then all that wait for a browser: one browser and one
-    dashboard are started, and the other processes compute while it waits. They help when nothing else is left."""
+    """The first process takes all files that wait for a browser: one browser and one dashboard are started, and the
+    other processes compute while it waits. They help when nothing else is left."""
 
     def _split_scope(self, nodeid: str) -> str:
         file = super()._split_scope(nodeid)
@@ -71,8 +71,7 @@ class _Together(LoadFileScheduling):
             super()._reschedule(node)
 
     def _assign_work_unit(self, node: WorkerController) -> None:
-        # its first unit is the first of all
-        is_for_browser = len(self.nodes) > 1 and node is self.nodes[0] and bool(self.assigned_work[node])
+        is_for_browser = len(self.nodes) > 1 and node is self.nodes[0]
         for scope in self.workqueue:
             if _waits(scope) == is_for_browser:
                 self.workqueue.move_to_end(scope, last=False)

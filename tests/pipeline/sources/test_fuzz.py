@@ -19,7 +19,7 @@ from tests.pipeline.sources.made.captures import write_capture
 from tests.pipeline.sources.made.clouds_on_disk import STAMPS_NS, write_clouds
 from tests.pipeline.sources.made.nuscenes_on_disk import START_US, write_nuscenes
 from tests.pipeline.sources.test_radiate import write_radiate
-from tests.pipeline.sources.test_route_files import GPX, POINTS
+from tests.pipeline.sources.test_route_files import GPX
 
 
 def small_bag(folder: Path, kind: Kind = "db3") -> Path:
@@ -36,7 +36,8 @@ def images_and_track(folder: Path) -> Path:
     folder.mkdir()
     for index in range(2):
         cv2.imwrite(str(folder / f"{index}.png"), np.full((24, 40, 3), 90, np.uint8))
-    (folder / "track.gpx").write_text(GPX.format(1, 1, f"<trk><trkseg>{POINTS.format('trkpt')}</trkseg></trk>"))
+    points = "".join(f'<trkpt lat="48.{n}" lon="11.2"><time>2024-05-01T12:00:0{n}Z</time></trkpt>' for n in range(2))
+    (folder / "track.gpx").write_text(GPX.format(1, 1, f"<trk><trkseg>{points}</trkseg></trk>"))
     return folder
 
 
@@ -131,7 +132,7 @@ def test_damage(what: str, tmp_path: Path) -> None:
             return
         for index in range(len(source)):
             frame = source.frame(index)
-            for branch in (frame.sweep, frame.image):
+            for branch in (frame.image,) if uri.startswith("pictures:") else (frame.sweep, frame.image):
                 assert branch is not None or frame.notes, "a missing branch says why"
             if frame.sweep is not None:
                 assert bool((abs(frame.sweep.points) < 1e7).all())

@@ -45,7 +45,7 @@ const task = el(
   el("progress", { max: 1, aria: { label: "Progress" } }),
   el("span", { class: "facts" }),
 );
-const name = el("button", { type: "button", class: "quiet annotator" });
+const name = el("button", { type: "button", class: "quiet annotator", title: "Annotator" });
 const back = el("button", {
   type: "button",
   class: "icon-button",
@@ -235,8 +235,7 @@ function reflect() {
   reviewed.hidden = !review.isReviewing();
   text(under, review.target()?.name ?? "nothing");
   press(fresh, get("labeling")?.tool === "new");
-  text(name, shownName() || "your name");
-  name.title = `Annotator: ${shownName()}`;
+  Object.assign(name, { textContent: shownName() || "your name", title: `Annotator: ${shownName()}` });
 }
 
 /** @param {import("../state/types.js").LeadRange} range */

@@ -9,7 +9,8 @@ const dialog = $("#label-dialog", HTMLDialogElement);
  * @param {number} maxLength in characters; the server refuses longer ones @returns {Promise<string|null>}
  */
 export function ask(title, words, label, value, maxLength) {
-  const input = el("input", { type: "text", value: value.slice(0, maxLength), maxLength, required: true, aria: { label } });
+  const short = value.slice(0, maxLength);
+  const input = el("input", { type: "text", value: short, maxLength, required: true, aria: { label } });
   return open(title, words, input, [
     ["Cancel", null],
     ["OK", () => input.value.trim() || null],
