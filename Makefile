@@ -2,12 +2,12 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
-PROCESSES ?= 4
+PROCESSES ?= 3
 
 # Where this is set, each process compiles every library anew: seconds per start, minutes per run of the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install demo test check check-types check-layers check-style check-tests fix bench docs screenshots suite soak fuzz sbom lock clean
+.PHONY: install demo test check check-types check-layers check-style fix bench docs screenshots suite soak fuzz sbom lock clean
 
 # On a terminal, uv shows its own progress bar; in CI and into a file, it only reports errors.
 QUIET := $(shell test -t 2 && test -z "$$CI" || echo --quiet)
@@ -34,11 +34,11 @@ install: .venv/.compiled
 demo: install
 	@$(BIN)/cipv demo
 
-# A file's tests stay in one process: they share servers; those of tests/accuracy all do: they share what the networks saw;
-# and those of tests/browser: they share a browser. Four processes on two cores too: many tests wait for a browser or a
-# sensor's next packet. tests/conftest.py says who stays together, and orders the files, the long ones first.
+# A file's tests stay in one process: they share servers and browsers; those of tests/accuracy all do: they share what the
+# networks saw. Three processes on two cores too: many tests wait for a browser or a sensor's next packet.
+# tests/conftest.py says who stays together, and orders the files, the long ones first.
 test: .venv/.installed
-	@$(MAKE) --no-print-directory --jobs 2 --output-sync .venv/.compiled check-types check-layers check-style check-tests
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync .venv/.compiled check-types check-layers check-style
 	@$(BIN)/python -m pytest -q --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder $(TESTS)
 
 check: .venv/.installed
@@ -53,10 +53,6 @@ check-layers:
 check-style:
 	@$(BIN)/ruff check app pipeline tests
 	@$(BIN)/ruff format --check app pipeline tests
-
-# That every test can be imported. The processes of `make test` then find them compiled instead of each compiling all.
-check-tests:
-	@said=$$($(BIN)/python -m pytest -qq --collect-only $(TESTS) 2>&1) || { echo "$$said" | tail -40; exit 1; }
 
 fix: install
 	@$(BIN)/ruff check --fix app pipeline tests

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import settings
 from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
-from xdist.workermanage import WorkerController
 
 from pipeline.common.files.data_dir import data_dir as recordings
 
@@ -56,34 +55,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFil
 
 
 class _Together(LoadFileScheduling):
-    """The first process takes all files that wait for a browser: one browser and one dashboard are started, and the
-    other processes compute while it waits. They help when nothing else is left."""
-
     def _split_scope(self, nodeid: str) -> str:
         file = super()._split_scope(nodeid)
         return next((place for place in _TOGETHER if _is_in(ROOT / file, place)), file)
-
-    def _reschedule(self, node: WorkerController) -> None:
-        others = [each for each in self.nodes if each is not node and not self._has_browser(each)]
-        if self._has_browser(node) and others and not any(map(_waits, self.workqueue)):
-            node.shutdown()  # what is left cannot run beside the browser's event loop
-        else:
-            super()._reschedule(node)
-
-    def _assign_work_unit(self, node: WorkerController) -> None:
-        is_for_browser = len(self.nodes) > 1 and node is self.nodes[0]
-        for scope in self.workqueue:
-            if _waits(scope) == is_for_browser:
-                self.workqueue.move_to_end(scope, last=False)
-                break
-        super()._assign_work_unit(node)
-
-    def _has_browser(self, node: WorkerController) -> bool:
-        return any(map(_waits, self.assigned_work[node]))
-
-
-def _waits(scope: str) -> bool:
-    return _is_in(ROOT / scope, "browser")
 
 
 def _is_in(file: Path, place: str) -> bool:
