@@ -41,15 +41,18 @@ def test_a_sensor_that_fails_is_seen_by_colour_word_and_shape(open_display: Open
 def test_a_further_sensor_is_named(open_display: OpenDisplay, site: Site):
     page = open_display(site.address)
     expect(page.locator("#sensors li")).to_have_count(3)
-    page.evaluate(
+    # again and again: the server may send the same frame once more
+    page.wait_for_function(
         """async () => {
           const { get, set } = await import("/js/core/store.js");
           const frame = get("frame"), { result } = frame;
           const sensors = { ...result.sensors, radar: { age_ms: 0, points: 3 } };
           set("frame", { ...frame, result: { ...result, sensors } });
+          await new Promise(requestAnimationFrame);
+          const names = [...document.querySelectorAll("#sensors li")].map((item) => item.textContent.trim());
+          return names.join() === "LiDAR,Camera,Ego speed,Radar";
         }"""
     )
-    expect(page.locator("#sensors li")).to_have_text(["LiDAR", "Camera", "Ego speed", "Radar"])
 
 
 CUT_OFF = """() => {
