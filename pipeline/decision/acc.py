@@ -99,7 +99,7 @@ def _hardest_mps2(
     assert situation.now.ego is not None
     required, strongest = 0.0, params.comfort_decel_mps2  # also applies when slowing to the set speed
     if object_id is not None:
-        item = next((each for each in situation.objects if each.id == object_id), None)
+        item = situation.object(object_id)
         required = _required_mps2(object_id, item, situation, emergency)
         if item is None or item.justifies is Braking.FULL:
             strongest = max(strongest, required)
@@ -132,9 +132,8 @@ def _required_mps2(object_id: int, item: FusedObject | None, situation: Situatio
 
 def _error_m(situation: Situation, params: AccParams) -> float:
     """By how much the lead may be farther away than estimated."""
-    lead = situation.lead
-    item = next((each for each in situation.objects if lead is not None and each.id == lead.id), None)
-    return params.gap_sigmas * ((item.distance_sigma_m if item is not None else None) or 0.0)
+    lead = situation.object(situation.lead.id) if situation.lead is not None else None
+    return params.gap_sigmas * ((lead.distance_sigma_m if lead is not None else None) or 0.0)
 
 
 def cruise(params: AccParams) -> Demand:

@@ -43,3 +43,7 @@ class Situation(NamedTuple):
     """All objects, each already judged against the path (``pipeline.decision.cipv``)."""
     lead: Cipv | None
     """The closest in-path vehicle; None without one."""
+
+    def object(self, number: int | None) -> FusedObject | None:
+        """The object with this id; None without one."""
+        return next((each for each in self.objects if each.id == number), None)
