@@ -284,10 +284,7 @@ def _may_stand(item: FusedObject) -> bool:
 def _in_path_probability(who: Candidate) -> float:
     if who.leads or who.place is None:
         return 1.0 / (1.0 + exp(-who.odds))
-    as_measured = who.place.probability(who.widening_m)
-    if not who.item.surely_moving or not who.item.imaged or who.item.oncoming:
-        return as_measured
-    return max(as_measured, who.place.lane_probability(who.widening_m))
+    return who.place.probability(who.widening_m)
 
 
 def _improbable(who: Candidate) -> str:

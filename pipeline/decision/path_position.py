@@ -9,7 +9,7 @@ is outside but which leaves no room to pass is in the path too.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import copysign, erf, exp, nan, sqrt
+from math import copysign, erf, nan, sqrt
 from typing import NamedTuple
 
 import numba
@@ -43,8 +43,6 @@ _CAR_LENGTH_M, _SLOWEST_MPS, _MOST_TURNED = 4.5, 5.0, 0.2
 third; its nose is ahead by the first."""
 _SURELY_RIGID = 0.5
 """``rigid_mps`` is the slower side's speed minus two standard deviations, so it is lower than that speed."""
-_IN_LANE_SIGMA_M = 0.4
-"""Standard deviation of a vehicle's middle from that of its lane: 0.2 to 0.4 m on straight roads, more in bends."""
 _NO_SIDES = ((nan, nan), (nan, nan))
 _SUREST_M = 0.01
 SURE = 4.0
@@ -93,18 +91,6 @@ class Place(NamedTuple):
         left_m, right_m = self.left_m + extra_m - self.middle_m, self.right_m + extra_m + self.middle_m
         scale = 1.0 / (max(self.sigma_m, _SUREST_M) * sqrt(2.0))
         return max(0.0, 0.5 * (erf(left_m * scale) + erf(right_m * scale)))
-
-    def lane_probability(self, extra_m: float = 0.0) -> float:
-        """The same for a vehicle that surely drives ahead. Such a vehicle is in a lane: in ours, or in one of the two
-        on either side, which are as wide and as likely. A vehicle measured in the middle of ours may thus be 3 m beside
-        it, but not 2 m. Where the path is known well, this is as strict as ``probability`` at the edge."""
-        width_m = self.left_m + self.right_m + 2.0 * extra_m
-        spread_m2 = self.sigma_m**2 + _IN_LANE_SIGMA_M**2
-        aside_m = self.middle_m - 0.5 * (self.left_m - self.right_m)
-        # the exponents are relative to the largest, so that one of them is 1 however small the spread is
-        exponents = [-0.5 * (aside_m - lane * width_m) ** 2 / spread_m2 for lane in (-2, -1, 0, 1, 2)]
-        shares = [exp(each - max(exponents)) for each in exponents]
-        return shares[2] / sum(shares)
 
     def log_odds(self, extra_m: float, moves_m: float) -> float:
         """Log-odds from this sighting that the object is in the path: the log-likelihood ratio of its position compared

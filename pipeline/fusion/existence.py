@@ -200,6 +200,8 @@ def _said_by_lidar(item: FusedObject, rays: Rays | None, was_followed: bool) -> 
     the two clusters have merged; if the LiDAR never tracked it, it is a second box on the neighbour."""
     if item.seen_by_lidar:
         return _CLUSTER
+    if item.returns >= MIN_RAYS:  # others passed over it: beyond a crest, the road is lower than it seems
+        return _RETURNS
     if rays is not None and rays.is_free:
         return _PIERCED
     if item.returns:
