@@ -12,7 +12,10 @@ frame, its branch predicts, and its results say so.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from pipeline import lidar_branch
 from pipeline.alignment import projection
@@ -41,6 +44,10 @@ from pipeline.types import (
 )
 from pipeline.vision import distance, nms
 from pipeline.vision import tracking as vision_tracking
+
+_FAR_ASIDE = 0.01
+_FAR_AHEAD = 1000.0 * np.array([[1.0, _FAR_ASIDE, 0.0], [1.0, -_FAR_ASIDE, 0.0]])
+"""Two points straight ahead, this much to either side (as a tangent)."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +114,7 @@ def step(
     boxes = ground_contact.measure_contacts(boxes, road, aligned, params.fusion)
     clock.lap("distance")
     vision_state, vision_tracks = vision_tracking.track(
-        state.vision, boxes, now.dt_s, params.vision_tracking, now.speed_mps
+        state.vision, boxes, now.dt_s, params.vision_tracking, now.speed_mps, _pan_pxps(aligned, now.ego)
     )
     clock.lap("vision_tracking")
 
@@ -234,6 +241,17 @@ def _measure_boxes(
         return None
     detections = nms.select(frame.raw_boxes, params.detection)
     return distance.measure(detections, aligned, frame.camera, params.distance, frame.raw_boxes.law)
+
+
+def _pan_pxps(aligned: projection.Alignment | None, ego: EgoState | None) -> float | None:
+    """Speed at which a distant object straight ahead moves to the right in the image because the car turns; None if
+    that is not known."""
+    rate_radps = yaw_rate.usable_rate(ego) if ego is not None and ego.coasting is None else None
+    if aligned is None or rate_radps is None:
+        return None
+    (left, _), (right, _) = aligned.project(_FAR_AHEAD).tolist()
+    pan = rate_radps * (right - left) / (2.0 * _FAR_ASIDE)
+    return pan if math.isfinite(pan) else None
 
 
 def _vehicle_boxes(boxes: tuple[VisionMeasurement, ...] | None) -> list[Box]:

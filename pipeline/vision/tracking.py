@@ -47,6 +47,9 @@ _EDGE_PX = 2.0
 """Minimum noise of a box's edges."""
 _TURN_PXPS2 = 150.0
 """Angular acceleration of the image when the car starts to turn: 0.2 rad/s² through a lens of 720 px."""
+_MEASURED_TURN_PXPS2, _ASIDE_MPS2 = 40.0, 1.5
+"""Where the yaw rate is measured, boxes are predicted with it, and what remains is its error, 0.3 °/s from image to
+image, and the lateral acceleration of vehicles that change lanes quickly."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,8 @@ class VisionTrackerState:
     """Number of the next new track; numbers are never reused."""
     followed: tuple[Followed, ...] = field(default=())
     """All live tracks."""
+    pan_pxps: float | None = None
+    """Speed of the image to the right due to the yaw rate at the last tick; None if that was not known."""
 
 
 def track(
@@ -65,15 +70,19 @@ def track(
     dt_s: float | None,
     params: VisionTrackingParams,
     ego_speed_mps: float | None = None,
+    pan_pxps: float | None = None,
 ) -> tuple[VisionTrackerState, tuple[VisionTrack, ...]]:
     """One tick. ``measurements`` None: no image; time passes, but the objects do not count as missed. ``dt_s`` None:
-    the first tick. ``ego_speed_mps``: used to guess the speed of a new object. Tracks are returned by id."""
+    the first tick. ``ego_speed_mps``: used to guess the speed of a new object. ``pan_pxps``: speed at which a distant
+    object moves to the right in the image because the car turns to the left, pixels/s; None if that is not known.
+    Tracks are returned by id."""
     # Predict every track to now; without an image that is all
     guess = _first_guess(ego_speed_mps)
-    expected = _predict(state.followed, dt_s or 0.0, params)
+    change = pan_pxps - state.pan_pxps if pan_pxps is not None and state.pan_pxps is not None else None
+    expected = _predict(state.followed, dt_s or 0.0, change, params)
     if measurements is None:
         kept = tuple(followed for followed in expected if followed.unseen_s <= params.max_missed_s)
-        return evolve(state, followed=kept), tuple(followed.track for followed in kept)
+        return evolve(state, followed=kept, pan_pxps=pan_pxps), tuple(followed.track for followed in kept)
     # Match tracks and boxes one-to-one; a track without a box was missed in this image
     partner = match([_expected(followed, params) for followed in expected], measurements, params)
     corrected = _correct(expected, measurements, partner, params)
@@ -87,7 +96,10 @@ def track(
     taken = set(partner.values())
     fresh = [measurement for column, measurement in enumerate(measurements) if column not in taken]
     on = first_box_on(fresh, [each.track for each in kept_list])
-    kept_list += [_new(state.next_id + n, *each, guess, params) for n, each in enumerate(zip(fresh, on, strict=True))]
+    kept_list += [
+        _new(state.next_id + n, *each, guess, pan_pxps or 0.0, params)
+        for n, each in enumerate(zip(fresh, on, strict=True))
+    ]
     alive = tuple(
         followed
         for followed in kept_list
@@ -95,7 +107,8 @@ def track(
     )
     if params.filter == "kalman":
         alive = _without_ghosts(alive, params)
-    return VisionTrackerState(state.next_id + len(fresh), alive), tuple(followed.track for followed in alive)
+    after = VisionTrackerState(state.next_id + len(fresh), alive, pan_pxps)
+    return after, tuple(followed.track for followed in alive)
 
 
 def learn_heights(
@@ -135,14 +148,24 @@ def _without_ghosts(alive: tuple[Followed, ...], params: VisionTrackingParams) -
     return tuple(followed for followed in alive if followed.track.id not in ghosts) if ghosts else alive
 
 
-def _predict(followed: Sequence[Followed], dt_s: float, params: VisionTrackingParams) -> list[Followed]:
+def _predict(
+    followed: Sequence[Followed], dt_s: float, pan_change_pxps: float | None, params: VisionTrackingParams
+) -> list[Followed]:
     """The objects predicted to now; each counts as carried until a box confirms it. All filters of a kind are predicted
-    together."""
+    together. pan_change_pxps: by how much the image moves faster to the right than at the last tick; None if not
+    known."""
     if params.filter == "queue":
         tracks = [evolve(each.track, carried=True, measured=False, returns=0) for each in followed]
         return [_aged(each, dt_s, track=track) for each, track in zip(followed, tracks, strict=True)]
-    lively = [params.accel_sigma_mps2 * _width(each.track.bbox) / _CAR_WIDTH_M + _TURN_PXPS2 for each in followed]
+    per_m = [_width(each.track.bbox) / _CAR_WIDTH_M for each in followed]
+    if pan_change_pxps is None:
+        lively = [params.accel_sigma_mps2 * each + _TURN_PXPS2 for each in per_m]
+    else:
+        lively = [math.hypot(_ASIDE_MPS2 * each, _MEASURED_TURN_PXPS2) for each in per_m]
     boxes = kalman.predict(kalman.stacked([each.box_filter for each in followed]), dt_s, lively)
+    if pan_change_pxps is not None:
+        boxes.mean[..., 0] += 0.5 * pan_change_pxps * dt_s
+        boxes.mean[..., 2] += pan_change_pxps
     places = predict_places(followed, dt_s, params)
     return [
         _predicted(each, box, place, dt_s)
@@ -200,7 +223,12 @@ def _first_guess(ego_speed_mps: float | None) -> SpeedGuess:
 
 
 def _new(
-    track_id: int, seen: VisionMeasurement, double_of: int | None, guess: SpeedGuess, params: VisionTrackingParams
+    track_id: int,
+    seen: VisionMeasurement,
+    double_of: int | None,
+    guess: SpeedGuess,
+    pan_pxps: float,
+    params: VisionTrackingParams,
 ) -> Followed:
     detection = seen.detection
     shown = VisionTrack(
@@ -220,6 +248,7 @@ def _new(
     )
     noise = _centre_variance(detection.bbox, params) * np.eye(2)
     box_filter = kalman.start(_centre(detection.bbox), noise, _box_speed_sigma(detection.bbox))
+    box_filter.mean[2] = pan_pxps
     votes = ((detection.label, detection.score),)
     unplaced_s = 0.0 if seen.position else math.inf
     followed = Followed(shown, 0.0, unplaced_s, 0, box_filter, None, votes, double_of=double_of)

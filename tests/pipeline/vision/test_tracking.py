@@ -254,6 +254,34 @@ def test_a_carried_box_on_a_seen_one_is_a_ghost() -> None:
     assert [(track.id, track.carried) for track in jumped[-1]] == [(2, False)]
 
 
+def test_a_known_turn_keeps_the_number_of_a_small_box_that_is_missed_meanwhile() -> None:
+    """A car 70 m ahead; ours turns ever faster for 0.8 s, in which the car is missed."""
+    state, u_off, ids = VisionTrackerState(), 0.0, []
+    for k in range(24):
+        pan_pxps = FOCAL_PX * 0.4 * max(0.0, 0.1 * (k - 10))
+        u_off += 0.1 * pan_pxps
+        seen = (_car(70.0, -u_off / FOCAL_PX * 70.0),) if not 10 <= k < 18 else ()
+        state, tracks = track(state, seen, 0.1 if k else None, KALMAN, 10.0, pan_pxps)
+        ids += [each.id for each in tracks if not each.carried]
+    assert set(ids) == {1}
+
+
+@pytest.mark.parametrize(("aside_m", "same"), [(0.3, True), (2.5, False)])
+def test_a_missed_car_does_not_give_its_number_to_a_neighbour(aside_m: float, same: bool) -> None:
+    """Straight on, with a measured yaw rate: the car's own box hardly moves in 0.6 s, so another box is another car."""
+    state = VisionTrackerState()
+    for k in range(22):
+        seen = (_car(48.0),) if k < 15 else () if k < 21 else (_car(48.0, aside_m),)
+        state, tracks = track(state, seen, 0.1 if k else None, KALMAN, 20.0, 0.0)
+    assert ([each.id for each in tracks if not each.carried] == [1]) is same
+
+
+def test_a_new_far_box_moves_with_the_image() -> None:
+    state, _ = track(VisionTrackerState(), (_car(70.0),), None, KALMAN, 10.0, 250.0)
+    _, (shown,) = track(state, None, 0.1, KALMAN, 10.0, 250.0)
+    assert (shown.bbox[0] + shown.bbox[2]) / 2 == pytest.approx(CENTRE_PX + 25.0, abs=0.5)
+
+
 @BOTH
 def test_a_track_says_whether_its_distance_was_measured_now(params: VisionTrackingParams) -> None:
     car = _car(20.0)
