@@ -62,8 +62,8 @@ _LOW_BOTTOM_SHARE = 0.2
 degree between the sensors is 0.26 m at 30 m."""
 _LOW_SIGMAS, _LOW_SPAN = 1.5, 0.5
 """Number of standard deviations by which its range may differ from the camera's, and minimum share of the box's width
-that it spans: the same as for points of merged clusters. In 200 frames of Astyx and KITTI, which have no crest, two rows
-pass, neither on a vehicle that could lead."""
+that it spans: the same as for points of merged clusters. In 200 frames of Astyx and KITTI, which have no crest, two
+rows pass, neither on a vehicle that could lead."""
 _LOW_FROM_SHARE, _LOW_TO_SHARE = 0.35, 0.95
 """The road beside a vehicle is searched from here to there outside the box, in box widths. Half a degree between the
 sensors and the box's own error shift the vehicle's points by up to the first."""
