@@ -241,7 +241,7 @@ def opening(pages: Pages, site: Site) -> Iterator[OpenPage]:
         page = pages.take(width, height, color_scheme, **context)
         listeners = {"console": said, "request": asked, "pageerror": lambda error: complain(str(error))}
         opened.append((page, listeners, own == site.address and not context))
-        page.set_default_timeout(WAIT_MS)
+        page.context.set_default_timeout(WAIT_MS)  # of the requests, too, that the test sends itself
         for event, listener in listeners.items():
             page.on(event, listener)
         page.goto(address or site.address)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 import os
+import sys
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -14,8 +15,10 @@ from typing import Any
 
 import dask
 from distributed import Client, KilledWorker, LocalCluster, as_completed
+from distributed.utils import get_mp_context
 
 from app.core.stop_signals import held_back
+from app.fleet.batch import work
 from app.fleet.batch.job import Job, Outcome, TooLong
 from app.fleet.batch.work import WrongWorker, look_at_piece, run_drive, set_aside
 from pipeline.common.errors import BadInput, first_line
@@ -26,6 +29,8 @@ IN_FLIGHT_A_THREAD = 3
 TRIES = 2
 """Number of times that a piece is submitted: if its worker died too often for Dask, it is submitted again before it is
 set aside."""
+CAN_FORK = sys.platform == "linux"
+"""macOS's own libraries do not survive a fork."""
 _SETTINGS = {
     "distributed.scheduler.allowed-failures": 5,
     # the same number of threads as in `cipv run`: another order of summation would give other bytes
@@ -34,6 +39,8 @@ _SETTINGS = {
     "distributed.comm.timeouts.connect": "60s",
     "distributed.scheduler.work-stealing": True,
     "distributed.admin.large-graph-warning-threshold": "100MB",
+    # workers are forked from a process that has imported what they need, which takes each of them seconds
+    "distributed.worker.multiprocessing-method": "forkserver" if CAN_FORK else "spawn",
 }
 
 
@@ -94,6 +101,7 @@ def client_of(scheduler: str | None, workers: int, memory: str) -> Iterator[Clie
             return
         with ExitStack() as running:
             with held_back():  # Dask cannot close a cluster that has not started
+                _import_for_workers()
                 cluster = running.enter_context(
                     LocalCluster(
                         n_workers=workers,
@@ -103,9 +111,17 @@ def client_of(scheduler: str | None, workers: int, memory: str) -> Iterator[Clie
                         dashboard_address="127.0.0.1:0",
                         silence_logs=50,
                         security=True,  # other users of this machine cannot send it work
+                        env=dict(os.environ),  # a forked worker has the environment of the first one
                     )
                 )
             yield running.enter_context(Client(cluster))
+
+
+def _import_for_workers() -> None:
+    """Name the modules that workers are forked with, where they are forked. None of them starts threads that a worker
+    uses: networks are opened and kernels compiled in the worker."""
+    if CAN_FORK:
+        get_mp_context().set_forkserver_preload(["distributed", work.__name__])
 
 
 @contextmanager

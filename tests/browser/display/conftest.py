@@ -33,7 +33,7 @@ def open_display(browser: Browser, request: pytest.FixtureRequest) -> Iterator[O
     def begin(address: str, width: int = 1024, height: int = 600, *, quiet: bool = True, **context: Any) -> Page:
         page = browser.new_page(viewport={"width": width, "height": height}, has_touch=True, **context)
         pages.append(page)
-        page.set_default_timeout(WAIT_MS)
+        page.context.set_default_timeout(WAIT_MS)
         if quiet:
             page.on("console", lambda m: complaints.append(m.text) if m.type in ("error", "warning") else None)
             page.on("pageerror", lambda error: complaints.append(str(error)))
