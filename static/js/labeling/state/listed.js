@@ -30,12 +30,15 @@ export function listed() {
   return tracks;
 }
 
-/** The one after a track in the list; after the last one, the first. @param {LabelTrack} track */
+/**
+ * What is to do after a track, which may be done itself; after the last one, the first.
+ * @param {LabelTrack} track @returns {LabelTrack|null}
+ */
 export function following(track) {
-  const all = listed(),
-    at = all.findIndex(({ id }) => id === track.id),
-    next = all[(at + 1) % all.length];
-  return at >= 0 && next.id !== track.id ? next : null;
+  const others = [...(get("labels")?.tracks.values() ?? [])]
+    .filter((other) => other.id !== track.id && isOpen(other) && isSure(other))
+    .sort(bySureness);
+  return others.find((other) => bySureness(track, other) < 0) ?? others[0] ?? null;
 }
 
 /** Sent back first, then the surest proposals, then by number. @param {LabelTrack} a @param {LabelTrack} b */
