@@ -37,7 +37,7 @@ def crowd(labels: Labels) -> None:
 
 
 @pytest.mark.parametrize(
-    ("width", "height", "theme"), [(1440, 900, "light"), (1280, 720, "dark"), (1440, 900, "dark"), (1280, 720, "light")]
+    ("width", "height", "theme"), [(1440, 900, "light"), (1440, 900, "dark"), (1280, 720, "light"), (1024, 600, "dark")]
 )
 def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, height: int, theme: str):
     page = open_page(width, height, color_scheme=theme)
