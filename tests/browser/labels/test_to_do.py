@@ -8,7 +8,7 @@ from tests.browser.conftest import START
 from tests.browser.labels.hands import Hand, Labels
 
 
-def test_what_is_accepted_or_rejected_in_the_list_selects_the_next_one(hand: Hand, labels: Labels):
+def test_what_is_accepted_or_rejected_in_the_list_selects_the_next_one(hand: Hand, labels: Labels) -> None:
     page = hand.page
     for at in range(3):
         shape = {"center": [20.0 + 8 * at, 3.0, 0.7], "size": [4.2, 1.8, 1.5], "yaw_rad": 0.0}
