@@ -7,7 +7,8 @@ from pathlib import Path
 import onnx
 import pytest
 
-from pipeline.inference import model_registry, used_files
+from pipeline.inference import used_files
+from pipeline.inference.known_networks import KNOWN
 from pipeline.inference.model_registry import register, store
 from pipeline.inference.used_files import file_notes
 from pipeline.vision.detector import open_detector
@@ -59,7 +60,7 @@ def test_a_file_that_only_has_the_name_of_an_official_network_is_called_so(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     content = hashlib.sha256(file.read_bytes()).hexdigest()
-    known = tuple(replace(each, sha256=content) for each in model_registry.KNOWN if each.name == "yolox_nano")
+    known = tuple(replace(each, sha256=content) for each in KNOWN if each.name == "yolox_nano")
     monkeypatch.setattr(used_files, "KNOWN", known)
     named = file.rename(file.with_name("yolox_nano.onnx"))
     assert file_notes(named, content) == ()
