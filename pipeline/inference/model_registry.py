@@ -149,8 +149,8 @@ def register(path: Path, name: str, task: Task = "detector", default: bool = Tru
 
 def read_verified(path: Path) -> bytes:
     """A network's file. ModelError if it differs from the installed one: a registered file from its registration, an
-    official one from its publication, the embedded one from that of the program. Other files are not checked. OSError
-    if it cannot be read."""
+    official one from its publication, the embedded one from that of the program. Other files are not checked
+    (``used_files`` reports their changes). OSError if it cannot be read."""
     data, expected = read_regular(path, _LARGEST_BYTES), _expected_sha256(path)
     found = hashlib.sha256(data).hexdigest()
     if expected is not None and found != expected:
@@ -159,6 +159,11 @@ def read_verified(path: Path) -> bytes:
             "pull or register it again"
         )
     return data
+
+
+def is_checked(path: Path) -> bool:
+    """Whether ``read_verified`` knows what the file should contain."""
+    return _expected_sha256(path) is not None
 
 
 def _expected_sha256(path: Path) -> str | None:

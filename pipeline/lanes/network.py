@@ -24,6 +24,7 @@ from pipeline.inference.runtime import (
     run_session,
 )
 from pipeline.inference.tuning import USUAL_THREADS
+from pipeline.inference.used_files import file_notes
 from pipeline.lanes.heads import LaneHead, UnknownLaneHead, pick_head
 from pipeline.lanes.horizon import horizon_share
 from pipeline.types import F32, U8, CameraCalibration, RawLanes
@@ -140,7 +141,7 @@ def load_lane_network(path: Path, threads: int, horizon: float) -> LaneNetwork:
     name = f"{path.stem}-{sha256[:12]}"
     if head.horizon is not None:
         name += f"-{horizon:.3f}"
-    notes = (f"Lane lines by the network {path.stem}",)
+    notes = (f"Lane lines by the network {path.stem}", *file_notes(path, sha256))
     count = session.get_session_options().intra_op_num_threads
     return LaneNetwork(path, name, tuple(session.get_providers()), size, head, notes, count, horizon, sha256, session)
 

@@ -29,6 +29,7 @@ from pipeline.inference.runtime import (
     run_session,
 )
 from pipeline.inference.tuning import USUAL_THREADS
+from pipeline.inference.used_files import file_notes
 from pipeline.types import F32, REAL_VEHICLES, U8, DistanceLaw, RawBoxes
 from pipeline.vision.classes import class_names
 from pipeline.vision.heads import Decoder, UnknownHead, pick_decoder
@@ -183,7 +184,7 @@ def _at_size(
         labels,
         found.law or REAL_VEHICLES,
         decoder.name,
-        (*notes, *((found.note,) if found.note else ())),
+        (*notes, *((found.note,) if found.note else ()), *file_notes(path, sha256)),
         session.get_session_options().intra_op_num_threads,
         sha256,
         graph,

@@ -76,7 +76,10 @@ class Person:
         is_at(self.page, frame)
 
     def select(self, track: int) -> None:
+        """By a click on its row, if it is not selected already."""
         row = self.page.locator(f".track-row[data-id='{track}']")
+        if row.get_attribute("aria-selected") == "true":
+            return
         row.click()
         self.hand.counts["acts"] += 1
         self.hand.counts["presses"] += 1
@@ -117,6 +120,13 @@ class Person:
         self.hand.keys(*keys)
         self.wait_changed(track, revision)
 
+    def extend(self, track: int) -> None:
+        """The selected track, as far as its points are found."""
+        self.hand.keys("Shift+C")
+        expect(self.page.locator(".said")).to_contain_text(f"#{track}")
+        is_saved(self.page)
+        self.note("extended")
+
     def draw(self, frame: int, true: Cuboid, track: int | None) -> int:
         """Draw a cuboid from its rear to its front: a new track, or the selected one again."""
         self.go_to(frame)
@@ -149,11 +159,13 @@ def label_everything(person: Person) -> None:
     labels.wait_for(lambda now: len(now.leads) > 0)
     is_saved(page)
     taken: dict[int, int] = {}
+    extended: set[int] = set()
     proposed = person.cuboids(("proposed",))
     page.get_by_role("button", name="To do", exact=True).click()
     page.get_by_label("Minimum confidence of proposals").fill("0")
     person.hand.counts["presses"] += 2
-    for track in sorted(proposed, key=lambda each: -len(proposed[each])):
+    sure = {number: track["confidence"] or 0.0 for number, track in labels.tracks.items()}
+    for track in sorted(proposed, key=lambda each: (-sure[each], each)):
         number = person.whose(proposed[track])
         if number is None:
             continue
@@ -168,8 +180,12 @@ def label_everything(person: Person) -> None:
             person.draw(best_frame(true, set(common)), true[best_frame(true, set(common))], track)
             person.key(track, "w")
             person.note("corrected")
+        if not set(true) <= proposed[track].keys() and number not in taken:
+            person.extend(track)
+            extended.add(track)
         if labels.tracks[track]["state"] == "proposed":
             person.key(track, "a")
+            expect(page.locator(f".track-row[data-id='{track}']")).to_have_count(0)  # the next one is selected
         person.note("accepted")
         taken.setdefault(number, track)
     slider = page.get_by_label("Minimum confidence of proposals")
@@ -185,15 +201,12 @@ def label_everything(person: Person) -> None:
             at = best_frame(true, set(true))
             drawn = person.draw(at, true[at], None)
             person.note("drawn")
-        elif set(true) <= person.cuboids(("accepted", "corrected"))[drawn].keys():
+        elif set(true) <= person.cuboids(("accepted", "corrected"))[drawn].keys() or drawn in extended:
             continue
         else:
             person.select(drawn)
         if len(true) > 1:
-            hand.keys("Shift+C")
-            expect(page.locator(".said")).to_contain_text(f"#{drawn}")
-            is_saved(page)
-            person.note("extended")
+            person.extend(drawn)
     for lead in labels.everything["leads"]:
         if lead["state"] == "proposed":
             person.go_to(lead["first"])

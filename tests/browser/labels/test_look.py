@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -22,11 +23,27 @@ pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 EXPORT = "#label-pane .pane-bar > button"
 
 
-@pytest.mark.parametrize(("width", "height", "theme"), [(1440, 900, "light"), (1024, 600, "dark")])
+VEHICLES = 30
+
+
+def crowd(labels: Labels) -> None:
+    """Vehicles in three lanes, the left one oncoming, in the shown frame."""
+    for number in range(VEHICLES):
+        row, lane = divmod(number, 3)
+        center = [8.0 + 6.5 * row, 3.5 * (1 - lane), 0.8]
+        shape = {"center": center, "size": [4.3, 1.8, 1.5], "yaw_rad": math.pi if lane == 0 else 0.0}
+        label = ("car", "truck", "bus")[row % 3]
+        labels.act("Bob", {"kind": "add_track", "frame": START, "label": label, "cuboid": shape})
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "theme"), [(1440, 900, "light"), (1440, 900, "dark"), (1280, 720, "light"), (1024, 600, "dark")]
+)
 def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, height: int, theme: str):
     page = open_page(width, height, color_scheme=theme)
     labels = Labels(page, site.address)
     labels.clear(COUNT)
+    crowd(labels)
     wait_for_frame(page, START)
     draw(begin(page), labels)
     pixels(page, "#timeline-back")

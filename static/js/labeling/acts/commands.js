@@ -6,6 +6,7 @@ import { act } from "./queue.js";
 import { grown, moved, turned } from "../views/cuboid.js";
 import { classNames, usualSize } from "../state/classes.js";
 import * as draft from "../state/draft.js";
+import { following, which } from "../state/listed.js";
 import { chosen, leadAt, shown, trackOf } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
 import { isSure, parted } from "../state/threshold.js";
@@ -54,13 +55,25 @@ function offerComputed() {
 const computed = () => get("drive")?.now?.done ?? 0;
 
 /**
- * Accept or reject the selected track; without a selection, the lead range at this frame.
+ * Accept or reject the selected track; without a selection, the lead range at this frame. In the list of what is to do,
+ * the next one is selected at once.
  * @param {"accept"|"reject"} kind
  */
-export function judge(kind) {
+export async function judge(kind) {
   const track = chosen();
-  if (track) act({ kind, items: [refOf(track)] });
-  else if (!span.judge(kind)) say("No label selected, and no lead in this frame");
+  if (!track) return span.judge(kind) || say("No label selected, and no lead in this frame");
+  const next = which() === "open" ? following(track) : null;
+  const sent = act({ kind, items: [refOf(track)] });
+  if (!next) return;
+  select(next);
+  if (!(await sent) && get("track") === next.id) select(track);
+}
+
+/** Select a track, and seek to it if it is not in this frame. @param {LabelTrack} track */
+export function select({ id, first, last }) {
+  set("track", id);
+  const here = get("scrub") ?? shown();
+  if (first !== null && last !== null && (here < first || here > last)) seekTo(here < first ? first : last);
 }
 
 /** Accept all proposals in the current frame: tracks and lead. */

@@ -1,18 +1,16 @@
 /** The list of labelled tracks: state, class, frames, author. */
-import { el, memory, press, text, within } from "../../core/dom.js";
+import { el, press, text, within } from "../../core/dom.js";
 import { percent } from "../../core/format.js";
-import { seekTo } from "../../drive/seek.js";
 import { LongList } from "../../core/long_list.js";
-import { get, paintAfter, set } from "../../core/store.js";
-import { mergeWith, propose, rejectHidden } from "../acts/commands.js";
-import { present } from "../state/draft.js";
+import { get, paintAfter } from "../../core/store.js";
+import { mergeWith, propose, rejectHidden, select } from "../acts/commands.js";
+import { listThe, listed, which } from "../state/listed.js";
 import { isKnown } from "../state/sightings.js";
 import { isSentBack, shown, stateWords, trackOf } from "../state/labels.js";
-import { isSure, parted, setThreshold, threshold } from "../state/threshold.js";
-import { isReviewing } from "../acts/review.js";
+import { parted, setThreshold, threshold } from "../state/threshold.js";
 
 /** @typedef {import("../state/types.js").LabelTrack} LabelTrack */
-/** @typedef {"here"|"open"|"all"} Which */
+/** @typedef {import("../state/listed.js").Which} Which */
 
 /** Maximum number of rows. */
 const MOST = 100;
@@ -52,8 +50,6 @@ const slider = el("input", {
 const list = new LongList(body, (/** @type {LabelTrack} */ { id }) => id, create, update);
 /** The selected track that was brought into view. @type {number|null} */
 let scrolledTo = null;
-/** @type {Which} */
-let which = memory.read("labelTracks", "here");
 
 /** @param {HTMLElement} parent */
 export function setUp(parent) {
@@ -78,17 +74,16 @@ export function setUp(parent) {
   const reflect = paintAfter(["labels", "labelFrames", "frame", "track", "labeling", "draft", "threshold"], show);
   /** @param {Which} key */
   function choose(key) {
-    which = key;
-    memory.write("labelTracks", key);
+    listThe(key);
     reflect();
   }
   /** Redraw the list. */
   function show() {
     if (!get("labeling")?.on) return;
-    for (const button of buttons) press(button, button.dataset.which === which);
+    for (const button of buttons) press(button, button.dataset.which === which());
     showSureness();
-    if (which === "here" && !isKnown(shown())) return;
-    const found = fitting();
+    if (which() === "here" && !isKnown(shown())) return;
+    const found = listed();
     text(count, found.length > MOST ? `${MOST} of ${found.length}` : String(found.length));
     list.show(found.slice(0, MOST));
     for (const row of body.querySelectorAll("[aria-selected=true]")) markSelected(/** @type {HTMLElement} */ (row));
@@ -119,29 +114,9 @@ function showSureness() {
   text(above, `≥ ${percent(threshold())}: ${left.length} proposed, ${hidden.length} hidden`);
 }
 
-/** Sent back first, then the surest proposals, then by number. @param {LabelTrack} a @param {LabelTrack} b */
-const bySureness = (a, b) => rank(b) - rank(a) || a.id - b.id;
-/** @param {LabelTrack} track */
-const rank = ({ comment, confidence }) => (comment ? 2 : (confidence ?? 0));
-
-/** @returns {LabelTrack[]} */
-function fitting() {
-  const isListed = (/** @type {LabelTrack} */ track) => isSure(track) || track.id === get("track"),
-    tracks = [...(get("labels")?.tracks.values() ?? [])].filter(isListed).sort((a, b) => a.id - b.id),
-    here = new Set(present().map(({ track }) => track));
-  if (which === "here") return tracks.filter(({ id }) => here.has(id));
-  if (which === "open") return isReviewing() ? tracks.filter(isUnreviewed) : tracks.filter(isOpen).sort(bySureness);
-  return tracks;
-}
-
-/** @param {LabelTrack} track */
-const isOpen = ({ state, comment }) => state === "proposed" || (Boolean(comment) && state !== "rejected");
-/** @param {LabelTrack} track */
-const isUnreviewed = ({ state, reviewer }) => (state === "accepted" || state === "corrected") && !reviewer;
-
 function emptyWords() {
   if (!get("labels")?.tracks.size) return "No labels yet. Propose labels from the pipeline (P), or draw one (G).";
-  return which === "open" ? "Nothing left to do." : "No labels in this frame.";
+  return which() === "open" ? "Nothing left to do." : "No labels in this frame.";
 }
 
 function create() {
@@ -186,13 +161,10 @@ function update(row, track) {
   row.title = [`${state}${comment ? `, sent back: ${comment}` : ""}`, made, origin.how].filter(Boolean).join("; ");
 }
 
-/** Select a track, and seek to it if it is not in this frame. @param {HTMLElement|null} row */
+/** @param {HTMLElement|null} row */
 function pick(row) {
   const track = trackOf(Number(row?.dataset.id ?? -1));
   if (!track) return;
   if (get("labeling")?.tool === "merge") return mergeWith(track.id);
-  set("track", track.id);
-  const here = shown();
-  if (track.first !== null && track.last !== null && (here < track.first || here > track.last))
-    seekTo(here < track.first ? track.first : track.last);
+  select(track);
 }
