@@ -121,7 +121,14 @@ class Watch:
             self._wrong_s, self._wrong = t_s, told
 
     def outcome(self, traffic_s: float) -> Outcome:
-        return Outcome(self._found_s, traffic_s, self._found_at_s, self._has_lines, self._wrong_s, self._wrong)
+        return Outcome(
+            found_after_s=self._found_s,
+            found_at_s=self._found_at_s,
+            has_lines=self._has_lines,
+            traffic_s=traffic_s,
+            wrong_at_s=self._wrong_s,
+            wrong=self._wrong,
+        )
 
 
 def drive(seed: int, number: int) -> tuple[float, dict[str, Outcome]]:
