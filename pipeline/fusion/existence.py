@@ -41,6 +41,11 @@ _ALONG, _ALONG_AFTER_M, _ALONG_SHARE = 2.0, 25.0, 0.5
 the share of it by which the object's distance has then shrunk at most. False boxes lie on static structures, which come
 nearer by every metre that the car drives. At 50 m the distance from a box varies by 7 % from image to image, so half of
 25 m is more than two standard deviations of a difference."""
+_FIRST_SIGMAS, _IMAGE_SHARE = 3.0, 0.1
+"""A static object comes nearer by the distance driven. If one came nearer by more than that and this many standard
+deviations of a difference of two distances (the share: 7 % from image to image, times √2), then its first distance was
+wrong, or it is oncoming; either way it is judged from here on. Otherwise one false box at 160 m would exclude for 200 m
+of driving that a car at 60 m drives ahead."""
 _UNBOXED, _LOOKS = -1.3, 3
 """Log-odds added for each image in which the camera must have seen what the LiDAR tracks and no box was on it, up to
 this number of images; void with the first box. Of confirmed clusters as large as a vehicle, on Astyx and KITTI, 48 of
@@ -170,6 +175,8 @@ def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bo
         travelled_m += now.speed_mps * dt_s
         if item.measured and item.distance_m is not None:
             judged_m, shrunk_m = travelled_m, from_m - item.distance_m
+            if shrunk_m > judged_m + _FIRST_SIGMAS * _IMAGE_SHARE * item.distance_m:
+                from_m, travelled_m, judged_m, shrunk_m = item.distance_m, 0.0, 0.0, 0.0
     cluster_s = before.cluster_s + (dt_s if item.seen_by_lidar else 0.0)
     lidar = _bounded(lidar + _said_by_lidar(item, rays, cluster_s >= _FOLLOWED_S) + _said_by_others(item))
     return Existence(
@@ -193,6 +200,8 @@ def _said_by_lidar(item: FusedObject, rays: Rays | None, was_followed: bool) -> 
     the two clusters have merged; if the LiDAR never tracked it, it is a second box on the neighbour."""
     if item.seen_by_lidar:
         return _CLUSTER
+    if item.returns >= MIN_RAYS:  # others passed over it: beyond a crest, the road is lower than it seems
+        return _RETURNS
     if rays is not None and rays.is_free:
         return _PIERCED
     if item.returns:

@@ -11,6 +11,10 @@ tests decide that:
 - no second group of points fits the box about as well.
 
 Points of a cluster are left to fusion, so no object is duplicated.
+
+Beyond a crest, a vehicle may be hit by one ring only, about where that ring would meet a level road, and its points are
+taken for road. Such a row is the vehicle's if it lies well above the lower edge of the box, where the vehicle meets the
+road, and ends on both sides, where a road would continue.
 """
 
 from __future__ import annotations
@@ -51,6 +55,17 @@ _BESIDE_SHARE = 0.6
 _SAME_RANGE_M, _SAME_HEIGHT_DEG = 1.5, 1.0
 _CLEARLY = 1.0
 """Minimum difference of log-likelihood between the best and the second-best group."""
+_LOW_NEAREST_M, _LOW_POINTS = 20.0, 3
+"""Minimum distance of a vehicle that only one ring hits, and minimum number of its points: one or two may be dirt."""
+_LOW_BOTTOM_SHARE = 0.2
+"""Minimum height of such a row above the lower edge of the box, as a share of the box's height: 0.3 m of a car. At 30 m,
+half a degree between the sensors is 0.26 m."""
+_LOW_SIGMAS, _LOW_SPAN = 1.5, 0.5
+"""Number of standard deviations by which its range may differ from the camera's, and minimum share of the box's width
+that it spans: the same as for points of merged clusters."""
+_LOW_FROM_SHARE, _LOW_TO_SHARE = 0.35, 0.95
+"""The road beside a vehicle is searched from here to there outside the box, in box widths. Half a degree between the
+sensors and the box's own error shift the vehicle's points by up to the first."""
 
 
 class SweepReturns(SweepRays, Protocol):
@@ -63,7 +78,7 @@ class SweepReturns(SweepRays, Protocol):
 
 
 class _Points(NamedTuple):
-    """The far points of a sweep that are above the road."""
+    """Far points of a sweep: those above the road, or those taken for road."""
 
     uv: F64
     range_m: F64
@@ -90,15 +105,19 @@ def range_boxes(
     """The boxes; those of far vehicles get ``ranged_m`` and ``returns`` if the sweep contains returns from them."""
     if not params.single_returns or not boxes or alignment is None or sweep.ground is None:
         return boxes
-    asked = [each.detection.label in VEHICLES and (each.distance_m or 0.0) >= NEAREST_M for each in boxes]
+    asked = [each.detection.label in VEHICLES and (each.distance_m or 0.0) >= _LOW_NEAREST_M for each in boxes]
     if not any(asked):
         return boxes
-    points = _above_the_road(sweep, sweep.ground, alignment)
-    return tuple(_ranged(each, points) if ask else each for each, ask in zip(boxes, asked, strict=True))
+    rows, range_m = _far_and_high(
+        sweep.points, sweep.kind, sweep.ground.planes, sweep.ground.edges, NEAREST_M / 2, LOW_M, HIGH_M
+    )
+    points = _points(sweep, rows, range_m, alignment)
+    rows, range_m = _far_road(sweep.points, sweep.kind, _LOW_NEAREST_M / 2)
+    road = _points(sweep, rows, range_m, alignment)
+    return tuple(_ranged(each, points, road) if ask else each for each, ask in zip(boxes, asked, strict=True))
 
 
-def _above_the_road(sweep: SweepReturns, ground: Ground, alignment: Alignment) -> _Points:
-    rows, range_m = _far_and_high(sweep.points, sweep.kind, ground.planes, ground.edges, NEAREST_M / 2, LOW_M, HIGH_M)
+def _points(sweep: SweepReturns, rows: np.ndarray, range_m: F64, alignment: Alignment) -> _Points:
     xyz = sweep.points[rows, :3].astype(np.float64)
     seen = xyz - np.array(sweep.origin)
     elevation_deg = np.degrees(np.arctan2(seen[:, 2], np.hypot(seen[:, 0], seen[:, 1])))
@@ -124,7 +143,47 @@ def _far_and_high(points, kind, planes, edges, nearest_m, low_m, high_m):  # typ
     return rows[:count].copy(), ranges_m[:count].copy()
 
 
-def _ranged(seen: VisionMeasurement, points: _Points) -> VisionMeasurement:
+@numba.njit(cache=True, nogil=True)
+def _far_road(points, kind, nearest_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(M,) rows of the points ahead that are farther than ``nearest_m`` and were taken for road; (M,) their ranges."""
+    rows, ranges_m = np.empty(len(points), np.int64), np.empty(len(points))
+    count = 0
+    for n in range(len(points)):
+        x, y = np.float64(points[n, 0]), np.float64(points[n, 1])
+        if kind[n] == GROUND and x > 0.0 and np.hypot(x, y) > nearest_m:
+            rows[count], ranges_m[count] = n, np.hypot(x, y)
+            count += 1
+    return rows[:count].copy(), ranges_m[:count].copy()
+
+
+def _ranged(seen: VisionMeasurement, points: _Points, road: _Points) -> VisionMeasurement:
+    by_returns = _by_returns(seen, points) if (seen.distance_m or 0.0) >= NEAREST_M else seen
+    return by_returns if by_returns.returns else _by_low_row(seen, road)
+
+
+def _by_low_row(seen: VisionMeasurement, road: _Points) -> VisionMeasurement:
+    """The box ranged by a row of points that were taken for road."""
+    assert seen.distance_m is not None
+    assert seen.sigma_m is not None
+    x1, y1, x2, y2 = seen.detection.bbox
+    inner = (x1, y1, x2, y2 - _LOW_BOTTOM_SHARE * (y2 - y1))
+    share = _LOW_SIGMAS / _SIGMAS * seen.sigma_m / seen.distance_m
+    rows = _inside(road.uv, road.range_m, inner, seen.distance_m, share)
+    groups = np.split(rows, np.flatnonzero(np.diff(road.range_m[rows]) > _GAP_M) + 1)
+    row = max(groups, key=len)
+    if len(row) < _LOW_POINTS or np.ptp(road.uv[row, 0]) < _LOW_SPAN * (x2 - x1):
+        return seen
+    near, far = _LOW_FROM_SHARE * (x2 - x1), _LOW_TO_SHARE * (x2 - x1)
+    u, alike = road.uv[:, 0], np.abs(road.range_m - road.range_m[row[0]]) < _SAME_RANGE_M
+    with np.errstate(invalid="ignore"):
+        beside = ((u > x1 - far) & (u < x1 - near)) | ((u > x2 + near) & (u < x2 + far))
+    if (alike & beside).any():
+        return seen
+    return evolve(seen, ranged_m=float(road.range_m[row[0]]), ranged_sigma_m=SIGMA_M, returns=len(row))
+
+
+def _by_returns(seen: VisionMeasurement, points: _Points) -> VisionMeasurement:
+    """The box ranged by points above the road."""
     assert seen.distance_m is not None
     assert seen.sigma_m is not None
     x1, y1, x2, y2 = seen.detection.bbox
@@ -183,4 +242,5 @@ def warm_up() -> None:
     planes, edges = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0])
     for points, _ in made_sweeps():
         _far_and_high(points, np.zeros(2, np.int32), planes, edges, 1.0, 0.0, 2.0)
+        _far_road(points, np.zeros(2, np.int32), 1.0)
     _inside(np.zeros((1, 2)), np.ones(1), (0.0, 0.0, 1.0, 1.0), 1.0, 0.1)

@@ -312,6 +312,34 @@ def test_a_weak_box_that_goes_along_is_a_vehicle(case: str, closing_mps: float, 
     assert begun == pytest.approx(0.5), "a place begun anew may be another thing"
 
 
+@pytest.mark.parametrize(
+    ("case", "first_m", "closing_mps", "along"),
+    [
+        ("a box at 160 m, then a car that keeps its distance", 160.0, 0.0, True),
+        ("a box at 160 m, then a static object", 160.0, 20.0, False),
+        ("oncoming at our speed", 60.0, 40.0, False),
+    ],
+)
+def test_a_wrong_first_distance_does_not_hide_that_a_car_goes_along(
+    case: str, first_m: float, closing_mps: float, along: bool
+) -> None:
+    """At 72 km/h, for 2.4 s; the first distance is that of a false box."""
+    state = ExistenceState()
+    for k in range(24):
+        car = replace(camera_car(first_m if k == 0 else 100.0 - 0.1 * closing_mps * k, score=0.45), camera_ranges=k + 1)
+        now = moment(EgoState(0, 20.0), 0.1 if k else None)
+        state, _ = weigh(state, (car,), Rays(NOTHING), FRAME, now, PARAMS)
+    assert state.known[1].goes_along is along, case
+
+
+@pytest.mark.parametrize(("count", "exists"), [(0, False), (2, False), (3, True)])
+def test_what_returns_several_rays_is_there_though_others_pass_over_it(count: int, exists: bool) -> None:
+    """Beyond a crest the road is lower than it seems, so rays that pass over a vehicle seem to pass through it."""
+    found = after(replace(camera_car(28.0), returns=count), Rays(returns(60.0)))
+    assert found.existence is not None
+    assert (found.existence > 0.5) is exists
+
+
 def test_what_is_only_predicted_does_not_go_along() -> None:
     """A weak box on a static object, seen for 0.4 s; then the car drives 36 m without measuring it again."""
     state = ExistenceState()

@@ -92,3 +92,32 @@ def test_who_is_not_asked() -> None:
     assert range_boxes((box(),), sweep, aligned(), FusionParams(single_returns=False)) == (box(),)
     assert range_boxes((box(),), sweep, None, FusionParams()) == (box(),)
     assert range_boxes(None, sweep, aligned(), FusionParams()) is None
+
+
+def row(z: float, ys: list[float], x: float = 46.0) -> list[tuple[float, float, float, int]]:
+    return [(x, y, z, GROUND) for y in ys]
+
+
+REAR = [0.2 * n for n in range(-4, 5)]
+
+
+@pytest.mark.parametrize(
+    ("case", "rows", "expected_m"),
+    [
+        ("a rear beyond a crest", row(-0.4, REAR), 46.0),
+        ("the road under the vehicle", row(-0.8, REAR), None),
+        ("the road, which goes on to the left", row(-0.4, [*REAR, 1.8, 2.0]), None),
+        ("the road, which goes on to the right", row(-0.4, [*REAR, -1.8, -2.0]), None),
+        ("a calibration off by half a degree", row(-0.4, [y + 0.4 for y in REAR]), 46.0),
+        ("a car in the next lane at another range", [*row(-0.4, REAR), *row(-0.4, [2.0, 2.2], x=40.0)], 46.0),
+        ("narrower than half of the box", row(-0.4, [0.0, 0.2, 0.4]), None),
+        ("two points", row(-0.4, [-0.8, 0.8]), None),
+        ("half as far again as the camera says", row(-0.4, [1.6 * y for y in REAR], x=75.0), None),
+        ("returns above the road count first", [ON_IT, *row(-0.4, REAR, x=52.0)], 46.0),
+    ],
+)
+def test_which_rows_of_road_are_a_vehicles(
+    case: str, rows: list[tuple[float, float, float, int]], expected_m: float | None
+) -> None:
+    (found,) = range_boxes((box(),), Scene(rows).sweep(), aligned(), FusionParams()) or ()
+    assert (found.ranged_m and round(found.ranged_m, 1)) == expected_m, case
