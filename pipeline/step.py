@@ -25,6 +25,7 @@ from pipeline.ego_motion import own_motion
 from pipeline.fusion import agreement, existence, ground_contact, merged_clusters, returns
 from pipeline.fusion import fuse as fusion
 from pipeline.fusion.drift import follow as drift
+from pipeline.fusion.drift import lines as drift_lines
 from pipeline.lanes import road_lines as lanes
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.params import Params
@@ -126,9 +127,6 @@ def step(
         state.fusion, lidar_tracks, vision_tracks, aligned, frame.image_size, params.fusion, ranged
     )
     vision_state = vision_tracking.learn_heights(vision_state, fused.ranged_boxes(), params.vision_tracking)
-    # A knocked mount: both sensors see the same vehicles, but with an angle between them
-    shown = drift.Seen(frame.t_ns, frame.name, lidar_tracks, boxes, road, frame.image_size)
-    drift_state, turned = drift.follow(state.drift, shown, aligned, params.alignment, params.fusion)
     clock.lap("fusion")
     # Existence: evidence from each sensor for and against every object being at its reported position
     existence_state, objects = existence.weigh(state.existence, fused.objects, sweep, frame, now, params.existence)
@@ -140,6 +138,18 @@ def step(
     view = lanes.RoadView(aligned, sweep.ground, road_z_m, _vehicle_boxes(boxes))
     lane_state, lane = lanes.follow(state.lanes, frame.raw_lanes, view, now, params.lanes)
     clock.lap("lanes")
+    # A knocked mount: both sensors see the same vehicles and road, but with an angle between them
+    shown = drift.Seen(
+        frame.t_ns,
+        frame.name,
+        lidar_tracks,
+        boxes,
+        road,
+        frame.image_size,
+        _road_lines(lane_state.measured, now.measured),
+    )
+    drift_state, turned = drift.follow(state.drift, shown, aligned, params.alignment, params.fusion)
+    clock.lap("drift")
     ring = frame.sweep.ring if frame.sweep is not None else None
     around = road_edges.Surroundings(
         sweep.points, sweep.kind, ring, sweep.ground, lidar_tracks, objects, sweep.sensor_height_m, sweep.origin
@@ -220,6 +230,15 @@ def step(
         aeb=aeb_state,
     )
     return following, result
+
+
+def _road_lines(measured: lanes.LaneMeasurement | None, ego: EgoState | None) -> drift_lines.RoadLines | None:
+    """The lines of this image that are certain, for the comparison with the car's own motion."""
+    if measured is None:
+        return None
+    return drift_lines.of_measured(
+        measured.lines, measured.pitch.rad, *((ego.speed_mps, ego.yaw_rate_radps) if ego is not None else (None, None))
+    )
 
 
 def _note_of(turned: drift.Drift | None) -> tuple[str, ...]:

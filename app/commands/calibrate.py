@@ -16,6 +16,7 @@ import yaml
 from rich.console import Console
 from rich.table import Table
 
+from app.commands.support.alignment_pictures import write_residual_pictures
 from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress, task_progress
@@ -60,6 +61,8 @@ class Calibrate:
     """alignment: also fit the pinhole camera's lateral and vertical position; the angles become less certain"""
     out: Annotated[Path | None, option("PATH")] = None
     """Write a preset file for `cipv run --params`; mount: a rig file"""
+    pictures: Annotated[Path | None, option("FOLDER")] = None
+    """alignment: write pictures of up to six frames with boxes, and clusters before and after the fit"""
     keep: bool = False
     """Store the law with the detector; it is then used with that network unless a parameter overrides it"""
     json: bool = False
@@ -79,6 +82,7 @@ class Calibrate:
         belongs = {
             "--model": (self.model != "pinhole", "alignment"),
             "--offset": (self.offset, "alignment"),
+            "--pictures": (self.pictures is not None, "alignment"),
             "--truth": (self.truth != "labels", "distance"),
             "--free-exponent": (self.free_exponent, "distance"),
             "--keep": (self.keep, "distance"),
@@ -128,6 +132,8 @@ class Calibrate:
         if self.out is not None:
             section = {"model": fit.model, **fit.values}
             self.out.write_text(yaml.safe_dump({"alignment": section}, sort_keys=False), encoding="utf-8")
+        if self.pictures is not None:
+            write_residual_pictures(self.pictures, frame_of, len(source), fit, params)
         return 0
 
     def _fit_time(self, params: Params, source: Source) -> int:

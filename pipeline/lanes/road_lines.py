@@ -87,6 +87,8 @@ class LaneState:
     the first of them."""
     sweeps: int = 0
     """Number of sweeps in which it was visible."""
+    measured: LaneMeasurement | None = None
+    """The lines of this frame's image, before tracking; None if it was not processed."""
 
 
 class RoadView(NamedTuple):
@@ -124,7 +126,7 @@ def follow(
     if measured is not None:
         tracks = tracking.update(tracks, measured.source, measured.lines, params)
     lane = tracking.ego_lane(tracks, pitch.rad, road, params)
-    return LaneState(tracks, pitch, plane, sweeps), lane
+    return LaneState(tracks, pitch, plane, sweeps, measured), lane
 
 
 def measure(

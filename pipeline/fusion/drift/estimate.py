@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.types import F64, I64
+from pipeline.types import F64, I64, Mask
 
 LASTING_SHARE, LASTING_DEG = 0.06, 0.12
 """Error of a vehicle that lasts: of its box, as a share of the height, and of its cluster, whose sides lie between
@@ -36,22 +36,26 @@ DOUBTED, ROUNDS = 2.0, 5
 rounds of re-weighting."""
 
 
-class PairedBoxes(NamedTuple):
-    """Vehicles in pieces of time, M rows."""
+class AngleSightings(NamedTuple):
+    """What vehicles and lane lines show in pieces of time, M rows."""
 
     piece: I64
     """(M,) number of the piece of time; ascending."""
     vehicle: I64
-    """(M,) which vehicle, from 0 without gaps."""
+    """(M,) which vehicle, from 0 without gaps. All lane lines together are one more."""
     track: I64
     """(M,) which track, from 0 without gaps. A track whose size jumps counts as several vehicles, each with an error of
     its own, but not as several witnesses."""
     frames: F64
     """(M,) number of frames."""
-    height_deg: F64
-    """(M,) height of its box, mean."""
     rate_degps: F64
-    """(M,) rate of its bearing, mean."""
+    """(M,) rate of its bearing, mean; 0 for lines and for elevations."""
+    sigma_deg: F64
+    """(M,) standard deviation of the error that is new in each piece."""
+    lasting_deg: F64
+    """(M,) standard deviation of the error of the vehicle that lasts."""
+    is_line: Mask
+    """(M,) whether lane lines show it."""
 
 
 class AngleChange(NamedTuple):
@@ -73,19 +77,19 @@ class AngleChange(NamedTuple):
     """(T, V) error of each vehicle."""
 
 
-def changes(seen: PairedBoxes, values: F64, moments: I64) -> AngleChange:
+def box_errors(frames: F64, height_deg: F64, rate_degps: F64) -> tuple[F64, F64]:
+    """(M,) and (M,) standard deviations of the new and the lasting error of a vehicle's angle in a piece of time.
+    frames: in which it was seen. height_deg: of its box. rate_degps: of its bearing."""
+    passing = (PASSING_S * rate_degps) ** 2
+    new = (FRAME_SHARE * height_deg) ** 2 / frames + SLOW_DEG**2 + (SLOW_SHARE * height_deg) ** 2 + passing
+    return np.sqrt(new), np.sqrt(LASTING_DEG**2 + (LASTING_SHARE * height_deg) ** 2 + passing)
+
+
+def changes(seen: AngleSightings, values: F64, moments: I64) -> AngleChange:
     """For each moment, the angle before it and from then on. values: (M,) degrees. moments: (T,) pieces of time."""
     count = int(seen.vehicle.max()) + 1
     of_vehicle = np.equal.outer(seen.vehicle, np.arange(count)).astype(np.float64)
-    usual = _means(seen.height_deg, of_vehicle)
-    passing = np.abs(_means(seen.rate_degps, of_vehicle))
-    own_sigma = np.sqrt(LASTING_DEG**2 + (LASTING_SHARE * usual) ** 2 + (PASSING_S * passing) ** 2)
-    sigma = np.sqrt(
-        (FRAME_SHARE * seen.height_deg) ** 2 / seen.frames
-        + SLOW_DEG**2
-        + (SLOW_SHARE * seen.height_deg) ** 2
-        + (PASSING_S * seen.rate_degps) ** 2
-    )
+    own_sigma, sigma = _means(seen.lasting_deg, of_vehicle), seen.sigma_deg
     is_after = (seen.piece[None] >= moments[:, None]).astype(np.float64)
     design = np.stack([1.0 - is_after, is_after, np.broadcast_to(seen.rate_degps, is_after.shape)], axis=1)
     prior = np.diag([ALIGNED_DEG**-2, WIDEST_DEG**-2, TIME_SIGMA_S**-2])

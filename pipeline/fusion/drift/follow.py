@@ -1,9 +1,10 @@
-"""Detects whether camera or LiDAR has been turned, since when, and by which angle, from vehicles that both sensors see.
+"""Detects whether camera or LiDAR has been turned, since when, and by which angle, from vehicles that both sensors see
+and from lane lines.
 
 A vehicle's cluster should coincide with its box. If all vehicles are off by the same angle, the mounts are turned
-relative to the calibration. ``compare`` finds the pairs of a frame, ``estimate`` and ``judge`` decide about the last
-``fusion.drift_s`` seconds. Nothing is corrected; the angles are reported until the alignment is changed or vehicles
-show that they no longer hold.
+relative to the calibration. ``compare`` finds the pairs of a frame, ``lines`` compares lane lines with own motion and
+the LiDAR's road, and ``estimate`` and ``judge`` decide about the last ``fusion.drift_s`` seconds. Nothing is corrected;
+the angles are reported until the alignment is changed, or until vehicles or lines show that they no longer hold.
 
 A wrong distance law moves no box, and a bend in the road moves cluster and box alike, so neither looks like a turn. A
 time offset between the sensors moves each vehicle by the rate of its bearing; it is estimated together with the angle.
@@ -17,8 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.alignment.projection import Alignment
+from pipeline.fusion.drift import lines as lane_lines
 from pipeline.fusion.drift.compare import Offset, offsets
-from pipeline.fusion.drift.estimate import PairedBoxes
+from pipeline.fusion.drift.estimate import AngleSightings, box_errors
 from pipeline.fusion.drift.judge import FEWEST_FRAMES, PIECE_S, SMALLEST_DEG, MountTurn, TurnEstimates, judge
 from pipeline.lidar.road_profile import RoadProfile
 from pipeline.params import AlignmentParams, FusionParams
@@ -55,6 +57,8 @@ class Drift(NamedTuple):
     """Number of vehicles that it was estimated from."""
     since: str | None
     """Name of the frame since which it holds; None if it held from the beginning."""
+    is_camera: bool = False
+    """Whether lane lines show that the camera has turned, not the LiDAR."""
 
     @property
     def note(self) -> str:
@@ -62,8 +66,9 @@ class Drift(NamedTuple):
         since = f" since about frame {self.since}" if self.since is not None else ""
         yaw = f"yaw {self.yaw_deg:+.1f}° ± {self.yaw_sigma_deg:.1f}°"
         pitch = f"pitch {self.pitch_deg:+.1f}° ± {self.pitch_sigma_deg:.1f}°"
+        sensor = "Camera" if self.is_camera else "Camera or LiDAR"
         return (
-            f"Camera or LiDAR has turned{since}: {yaw}, {pitch}. Nothing is corrected; objects may appear twice, and "
+            f"{sensor} has turned{since}: {yaw}, {pitch}. Nothing is corrected; objects may appear twice, and "
             "ACC does not accelerate while they do. Check with Align, then Fit."
         )
 
@@ -109,6 +114,8 @@ class DriftState(NamedTuple):
     """Rows of the piece under way, one for each vehicle and frame."""
     rows: F64 = np.zeros((0, 8))
     """(M, 8) means over earlier pieces: piece, vehicle, frames, yaw, pitch, rate, height, track."""
+    lines: lane_lines.LineState = lane_lines.LineState()
+    """What lane lines have shown."""
     names: tuple[tuple[int, str], ...] = ()
     """Name of the first frame of each piece."""
     found: _Found = _Found()
@@ -132,6 +139,8 @@ class Seen(NamedTuple):
     """The road ahead; None while unknown."""
     image_size: tuple[int, int] | None
     """Width and height."""
+    lines: lane_lines.RoadLines | None = None
+    """Lane lines of the image; None if none were looked for."""
 
 
 def follow(
@@ -150,6 +159,8 @@ def follow(
         held = (state.told.yaw_deg, state.told.pitch_deg) if state.told is not None else (0.0, 0.0)
         pairs = offsets(seen.tracks, seen.boxes, aligned, seen.image_size, held, seen.road)
         state = _noted(state, pairs, seen.t_ns)
+    if seen.lines is not None:
+        state = state._replace(lines=lane_lines.noted(state.lines, seen.lines, seen.t_ns))
     return state, state.told
 
 
@@ -189,24 +200,42 @@ def _closed(state: DriftState, piece: int, params: FusionParams) -> DriftState:
         rows = np.vstack([rows, np.column_stack([np.full(len(numbers), state.piece), numbers, frames, *means])])
     oldest = piece - params.drift_s / PIECE_S
     names = tuple(each for each in state.names if each[0] > oldest)
-    return state._replace(rows=rows[rows[:, _PIECE] > oldest], fresh=(), names=names)
+    lines = lane_lines.closed(state.lines, state.piece, oldest)
+    return state._replace(rows=rows[rows[:, _PIECE] > oldest], lines=lines, fresh=(), names=names)
 
 
 def _judged(state: DriftState, params: FusionParams) -> DriftState:
     """With the verdict about one axis, in turn."""
-    numbers, at = np.unique(state.rows[:, _VEHICLE], return_inverse=True)
-    often = np.bincount(at, state.rows[:, _FRAMES], len(numbers)) >= FEWEST_FRAMES
-    rows = state.rows[often[at]]
-    if not len(rows):
-        return state
     axis = state.piece % 2
-    rate = rows[:, _RATE] if axis == 0 else np.zeros(len(rows))
-    vehicle = np.unique(rows[:, _VEHICLE], return_inverse=True)[1]
-    track = np.unique(rows[:, _TRACK], return_inverse=True)[1]
-    seen = PairedBoxes(rows[:, _PIECE].astype(np.int64), vehicle, track, rows[:, _FRAMES], rows[:, _HEIGHT], rate)
-    verdict = judge(seen, rows[:, _AXES[axis]])
+    seen, values = _sightings(state, axis)
+    if not len(values):
+        return state
+    verdict = judge(seen, values)
     found = _updated(state.found, axis, verdict, params)
     return state._replace(found=found, told=_told(state, found, axis, verdict))
+
+
+def _sightings(state: DriftState, axis: int) -> tuple[AngleSightings, F64]:
+    """What vehicles seen often enough, and lines, have shown of an axis, and the angles, degrees."""
+    numbers, at = np.unique(state.rows[:, _VEHICLE], return_inverse=True)
+    often = np.bincount(at, state.rows[:, _FRAMES], len(numbers)) >= FEWEST_FRAMES
+    rows, line = state.rows[often[at]], lane_lines.angles(state.lines, axis)
+    count = len(line.values)
+    new, lasting = box_errors(rows[:, _FRAMES], rows[:, _HEIGHT], rows[:, _RATE] if axis == 0 else 0.0 * rows[:, _RATE])
+    rate = np.concatenate([rows[:, _RATE] * (axis == 0), np.zeros(count)])
+    piece = np.concatenate([rows[:, _PIECE], line.piece])
+    order = np.argsort(piece, kind="stable")
+    seen = AngleSightings(
+        piece[order].astype(np.int64),
+        np.unique(np.concatenate([rows[:, _VEHICLE], np.full(count, -1.0)])[order], return_inverse=True)[1],
+        np.unique(np.concatenate([rows[:, _TRACK], np.full(count, -1.0)])[order], return_inverse=True)[1],
+        np.concatenate([rows[:, _FRAMES], line.frames])[order],
+        rate[order],
+        np.concatenate([new, line.sigma_deg])[order],
+        np.concatenate([lasting, np.full(count, lane_lines.LASTING_DEG[axis])])[order],
+        order >= len(rows),
+    )
+    return seen, np.concatenate([rows[:, _AXES[axis]], line.values])[order]
 
 
 def _updated(found: _Found, axis: int, verdict: TurnEstimates, params: FusionParams) -> _Found:
@@ -228,7 +257,9 @@ def _told(state: DriftState, found: _Found, axis: int, verdict: TurnEstimates) -
         yaw, pitch = (each or MountTurn(0.0, 0.0, 0, None) for each in found.estimates)
         since = since or (before.since if before is not None else None)
         count = max(each.vehicles for each in clear)
-        return Drift(yaw.angle_deg, pitch.angle_deg, yaw.sigma_deg, pitch.sigma_deg, count, since)
+        # lines show yaw against the direction of travel, but pitch against the LiDAR's road
+        is_camera = found.held[0] >= HELD and found.turns[0] is not None and found.turns[0].by_lines
+        return Drift(yaw.angle_deg, pitch.angle_deg, yaw.sigma_deg, pitch.sigma_deg, count, since, is_camera)
     if before is None:
         return None
     told_deg = (before.yaw_deg, before.pitch_deg)[axis]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.fusion.drift.estimate import PairedBoxes, changes
+from pipeline.fusion.drift.estimate import AngleSightings, changes
 from pipeline.types import F64, Mask
 
 PIECE_S = 0.5
@@ -26,6 +26,21 @@ BEFORE, AFTER, LONG = 6, 8, 20
 """A single vehicle is believed if it was seen in so many pieces before and after the turn, because its own error cannot
 look like a turn then; or if it was seen in so many pieces, since a wrong pair does not last."""
 
+SHARED_DEG = 0.12
+"""Standard deviation of the errors that all vehicles share, such as a detector that draws every box too low: as
+measured for fits to real drives (``calibration.alignment.fit.SHARED_DEG``, 0.1° in yaw and 0.15° in pitch)."""
+LINE_WITNESSES = 2
+"""Lane lines count as so many vehicles: they are judged by their own motion, not by pairs that may be wrong."""
+LINES_BEFORE, LINES_AFTER, LINES_DENY = 6, 8, 2
+"""Pieces of time with lines before and after a turn from which they can show it, and after it from which they can deny
+it: a turn of the camera changes lines at once."""
+DENIED_SIGMAS, FEWEST_DENIED = 3.0, 3
+"""A yaw that lines deny is one of the LiDAR, or vehicles err together: it must be this much clearer, and shown by so
+many vehicles."""
+STEP_SIGMA_DEG = 0.1
+"""Standard deviation of a change that lines show, besides that of their positions: load, wind, the camber of the road
+before and after."""
+
 
 class MountTurn(NamedTuple):
     """A turn about one axis."""
@@ -38,6 +53,8 @@ class MountTurn(NamedTuple):
     """Number of vehicles that it was estimated from."""
     since: int | None
     """Piece of time at which it happened; None if it was so from the beginning of what is remembered."""
+    by_lines: bool = False
+    """Whether lane lines show it, too."""
 
 
 class TurnEstimates(NamedTuple):
@@ -53,6 +70,8 @@ class TurnEstimates(NamedTuple):
     """(T,) that were seen from then on."""
     is_sound: Mask
     """(T,) whether enough vehicles agree."""
+    by_lines: Mask
+    """(T,) whether lane lines show the turn, too."""
     sigmas: F64
     """(T,) the angle in standard deviations; 0 where it is not sound or too small."""
 
@@ -64,31 +83,59 @@ class TurnEstimates(NamedTuple):
     def at(self, k: int) -> MountTurn:
         """The turn at the k-th moment."""
         since = int(self.moments[k]) if k else None
-        return MountTurn(float(self.angle_deg[k]), float(self.sigma_deg[k]), int(self.vehicles[k]), since)
+        return MountTurn(
+            float(self.angle_deg[k]), float(self.sigma_deg[k]), int(self.vehicles[k]), since, bool(self.by_lines[k])
+        )
 
     def since(self, piece: int | None) -> MountTurn:
         """The estimate from a piece of time on."""
         return self.at(0 if piece is None else max(int(np.searchsorted(self.moments, piece, "right")) - 1, 0))
 
 
-def judge(seen: PairedBoxes, values: F64) -> TurnEstimates:
+def judge(seen: AngleSightings, values: F64) -> TurnEstimates:
     """values: (M,) angles of the sightings about one axis, degrees."""
     first, last = int(seen.piece[0]), int(seen.piece[-1])
     moments = np.concatenate([[first], np.arange(first + FIRST, last - 1, EVERY)])
     found = changes(seen, values, moments)
-    of_vehicle = np.equal.outer(seen.vehicle, np.arange(int(seen.vehicle.max()) + 1)).astype(np.float64)
     is_after = (seen.piece[None] >= moments[:, None]).astype(np.float64)
-    of_track = np.equal.outer(seen.track, np.arange(int(seen.track.max()) + 1)).astype(np.float64)
-    frames = (is_after * seen.frames) @ of_track
-    timed = values - found.time_s[:, None] * seen.rate_degps
-    shown = ((is_after * seen.frames * timed) @ of_track) / np.maximum(frames, 1.0)
-    counts = frames >= FEWEST_FRAMES
     near = np.maximum(AGREE_DEG, AGREE_SHARE * np.abs(found.after))
+    boxes = ~seen.is_line
+    of_vehicle = np.equal.outer(seen.vehicle[boxes], np.unique(seen.vehicle[boxes])).astype(np.float64)
+    of_track = np.equal.outer(seen.track[boxes], np.unique(seen.track[boxes])).astype(np.float64)
+    weight = is_after[:, boxes] * seen.frames[boxes]
+    frames = weight @ of_track
+    timed = values[boxes] - found.time_s[:, None] * seen.rate_degps[boxes]
+    shown = ((weight * timed) @ of_track) / np.maximum(frames, 1.0)
+    counts = frames >= FEWEST_FRAMES
     agreeing = np.sum(counts & (np.abs(shown - found.after[:, None]) < near[:, None]), axis=1)
     vehicles = np.sum(counts, axis=1)
-    pieces, earlier = is_after @ of_vehicle, (1.0 - is_after) @ of_vehicle
+    pieces, earlier = is_after[:, boxes] @ of_vehicle, (1.0 - is_after[:, boxes]) @ of_vehicle
     followed = ((pieces >= LONG) | ((pieces >= AFTER) & (earlier >= BEFORE))).any(axis=1)
-    is_sound = (agreeing >= AGREEING_SHARE * vehicles) & (agreeing >= np.where(followed, 1, 2))
-    sigmas = np.abs(found.after) / found.after_sigma - FEW_SIGMAS * np.maximum(FEW - vehicles, 0)
-    sigmas = np.where(is_sound & (np.abs(found.after) > SMALLEST_DEG), sigmas, 0.0)
-    return TurnEstimates(moments, found.after, found.after_sigma, vehicles, is_sound, sigmas)
+    lines = _lines(seen, values, is_after, found.after - found.before, near)
+    agreeing, witnesses = agreeing + LINE_WITNESSES * lines.agree, vehicles + LINE_WITNESSES * lines.agree
+    fewest = np.where(lines.deny, FEWEST_DENIED, np.where(followed, 1, 2))
+    is_sound = (agreeing >= AGREEING_SHARE * witnesses) & (agreeing >= fewest)
+    clear = np.abs(found.after) / np.hypot(found.after_sigma, SHARED_DEG)
+    step = np.abs(found.after - found.before) / np.hypot(found.step_sigma, STEP_SIGMA_DEG)
+    clear = np.where(lines.agree, np.maximum(clear, step), clear)
+    clear = clear - FEW_SIGMAS * np.maximum(FEW - witnesses, 0) - DENIED_SIGMAS * lines.deny
+    clear = np.where(is_sound & (np.abs(found.after) > SMALLEST_DEG), clear, 0.0)
+    return TurnEstimates(moments, found.after, found.after_sigma, vehicles, is_sound, lines.agree, clear)
+
+
+class _Lines(NamedTuple):
+    """What lane lines say about a turn at each of T moments."""
+
+    agree: Mask
+    """(T,) whether they show it, too."""
+    deny: Mask
+    """(T,) whether they show that it did not happen."""
+
+
+def _lines(seen: AngleSightings, values: F64, is_after: F64, step: F64, near: F64) -> _Lines:
+    """Only a change counts: the level contains how the LiDAR is mounted in the car."""
+    after, before = is_after * seen.is_line, (1.0 - is_after) * seen.is_line
+    many, few = after.sum(axis=1), before.sum(axis=1)
+    shown = after @ values / np.maximum(many, 1.0) - before @ values / np.maximum(few, 1.0)
+    same, known = np.abs(shown - step) < near, few >= LINES_BEFORE
+    return _Lines(known & (many >= LINES_AFTER) & same, known & (many >= LINES_DENY) & ~same)

@@ -13,8 +13,9 @@ import yaml
 from pipeline.common.geometry import inverse, rotation
 from pipeline.formats.calibration_files import FORMATS, kalibr
 from pipeline.formats.calibration_files.ros import TRANSFORM
+from pipeline.formats.extrinsic_mistakes import T_OPTICAL_BODY
 from pipeline.sources.rig import load_rig
-from pipeline.types import CameraCalibration
+from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 from tests.pipeline.calibration.alignment.made_drive import CAMERA
 
@@ -59,6 +60,40 @@ def test_a_rig_file_is_that_of_captures(tmp_path: Path):
 def test_kitti_needs_the_size(tmp_path: Path):
     with pytest.raises(SourceError, match="image size"):
         FORMATS["kitti"].read(written("kitti", STRAIGHT, tmp_path), None)  # type: ignore[misc]
+
+
+TO_BODY = np.linalg.inv(T_OPTICAL_BODY)
+LEFT, BACK = np.eye(4), np.diag([-1.0, -1.0, 1.0, 1.0])
+LEFT[:3, :3] = rotation(0.0, 0.0, np.pi / 2)
+
+
+@pytest.mark.parametrize(
+    ("T_camera_ego", "named"),
+    [
+        (inverse(STRAIGHT.T_camera_ego), "is its extrinsic inverted"),
+        (TO_BODY @ STRAIGHT.T_camera_ego, "body axes"),
+        (STRAIGHT.T_camera_ego @ LEFT, "axes are swapped"),
+        (STRAIGHT.T_camera_ego @ BACK, "points backwards"),
+    ],
+    ids=["inverted", "body axes", "swapped axes", "backwards"],
+)
+@pytest.mark.parametrize("name", ["kitti", "ros", "opencv", "kalibr"])
+def test_a_wrong_extrinsic_is_named_in_every_format(name: str, T_camera_ego: F64, named: str, tmp_path: Path):
+    path, read = written(name, replace(STRAIGHT, T_camera_ego=T_camera_ego), tmp_path), FORMATS[name].read
+    assert read is not None
+    with pytest.raises(SourceError, match=named):
+        read(path, (STRAIGHT.width, STRAIGHT.height))
+
+
+@pytest.mark.parametrize(
+    ("T_camera_ego", "named"),
+    [(inverse(BENT.T_camera_ego), "is its extrinsic inverted"), (BENT.T_camera_ego @ LEFT, "axes are swapped")],
+    ids=["inverted", "swapped axes"],
+)
+def test_a_wrong_extrinsic_of_a_rig_file_is_named(T_camera_ego: F64, named: str, tmp_path: Path):
+    path = written("rig", replace(BENT, T_camera_ego=T_camera_ego), tmp_path)
+    with pytest.raises(SourceError, match=named):
+        load_rig(path)
 
 
 def changed(path: Path, **values: object) -> Path:

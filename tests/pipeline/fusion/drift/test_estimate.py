@@ -5,25 +5,27 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.fusion.drift.estimate import AngleChange, PairedBoxes, changes
+from pipeline.fusion.drift.estimate import AngleChange, AngleSightings, box_errors, changes
 from pipeline.types import F64
 
 
-def sightings(vehicles: int, pieces: int, rates: F64 | None = None) -> PairedBoxes:
+def sightings(vehicles: int, pieces: int, rates: F64 | None = None) -> AngleSightings:
     """Every vehicle in every time interval."""
     piece, vehicle = (each.ravel() for each in np.meshgrid(np.arange(pieces), np.arange(vehicles), indexing="ij"))
     rate = np.zeros(len(piece)) if rates is None else rates[vehicle]
-    return PairedBoxes(piece, vehicle, vehicle, np.full(len(piece), 5.0), np.full(len(piece), 3.0), rate)
+    frames, count = np.full(len(piece), 5.0), len(piece)
+    new, lasting = box_errors(frames, np.full(count, 3.0), rate)
+    return AngleSightings(piece, vehicle, vehicle, frames, rate, new, lasting, np.zeros(count, bool))
 
 
-def shown(seen: PairedBoxes, before: float, after: float, at: int, time_s: float = 0.0, seed: int = 0) -> F64:
+def shown(seen: AngleSightings, before: float, after: float, at: int, time_s: float = 0.0, seed: int = 0) -> F64:
     rng = np.random.default_rng(seed)
     own = rng.normal(0.0, 0.2, seen.vehicle.max() + 1)
     angle = np.where(seen.piece >= at, after, before)
     return angle + own[seen.vehicle] + time_s * seen.rate_degps + rng.normal(0.0, 0.2, len(seen.piece))
 
 
-def one(seen: PairedBoxes, values: F64, moment: int) -> AngleChange:
+def one(seen: AngleSightings, values: F64, moment: int) -> AngleChange:
     return changes(seen, values, np.array([moment]))
 
 

@@ -5,19 +5,26 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.fusion.drift.estimate import PairedBoxes
+from pipeline.fusion.drift.estimate import AngleSightings, box_errors
 from pipeline.fusion.drift.judge import MountTurn, judge
 
 SIGMAS = 4.0
 
 
-def turn(angles_deg: list[list[float]], frames: int = 5, tracks: tuple[int, ...] | None = None) -> MountTurn | None:
-    """angles_deg: of each vehicle in each time interval. tracks: of each vehicle; without it each has its own."""
-    values = np.array(angles_deg).T
+def turn(
+    angles_deg: list[list[float]], tracks: tuple[int, ...] | None = None, lines_deg: list[float] | None = None
+) -> MountTurn | None:
+    """angles_deg: of each vehicle in each time interval. tracks: of each vehicle; without it each has its own.
+    lines_deg: shown by lane lines in each time interval."""
+    values = np.array([*angles_deg, *([] if lines_deg is None else [lines_deg])]).T
     pieces, vehicles = values.shape
     piece, vehicle = (each.ravel() for each in np.meshgrid(np.arange(pieces), np.arange(vehicles), indexing="ij"))
     count, track = len(piece), vehicle if tracks is None else np.array(tracks)[vehicle]
-    seen = PairedBoxes(piece, vehicle, track, np.full(count, float(frames)), np.full(count, 3.0), np.zeros(count))
+    frames, rate = np.full(count, 5.0), np.zeros(count)
+    new, lasting = box_errors(frames, np.full(count, 3.0), rate)
+    is_line = vehicle == (vehicles - 1 if lines_deg is not None else vehicles)
+    new, lasting = np.where(is_line, 0.2, new), np.where(is_line, 0.5, lasting)
+    seen = AngleSightings(piece, vehicle, track, frames, rate, new, lasting, is_line)
     return judge(seen, values.ravel()).turn(SIGMAS)
 
 
@@ -56,3 +63,22 @@ def test_a_single_vehicle_is_believed_when_it_was_followed_before_or_for_long():
     assert found is not None
     assert found.vehicles == 1
     assert turn([[0.2] * 2 + [1.7] * 16]) is None
+
+
+def test_lines_show_a_turn_without_any_vehicle():
+    found = turn([], lines_deg=[0.7] * 16 + [1.7] * 12)
+    assert found is not None
+    assert found.by_lines
+    assert found.since == 16
+    assert found.angle_deg == pytest.approx(1.0, abs=0.35), "the level is how the LiDAR is mounted in the car"
+    assert turn([], lines_deg=[1.0] * 40) is None
+
+
+def test_lines_confirm_small_turns_and_contradict_vehicles_that_err():
+    quiet, shifted = [0.0] * 16 + [0.5] * 16, [0.0] * 16 + [0.9] * 16
+    assert turn([quiet, quiet]) is None
+    confirmed = turn([quiet, quiet], lines_deg=quiet)
+    assert confirmed is not None
+    assert confirmed.by_lines
+    assert turn([shifted] * 3) is not None
+    assert turn([shifted] * 3, lines_deg=[0.0] * 32) is None

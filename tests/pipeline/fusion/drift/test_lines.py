@@ -1,0 +1,82 @@
+"""A camera that has turned sees every lane line turned, while the car drives along them as before."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.fusion.drift.lines import LineState, RoadLines, angles, closed, noted
+from pipeline.types import F64
+
+FRAME_NS, SPEED_MPS = 100_000_000, 15.0
+
+
+def driven(
+    frames: int,
+    turned_deg: float = 0.0,
+    heading_deg: float = 0.0,
+    curvature_per_m: float = 0.0,
+    pitch_deg: float | None = None,
+    speed_mps: float = SPEED_MPS,
+    knows_turning: bool = True,
+) -> LineState:
+    """A lane of 3.5 m whose lines the car crosses at an angle. turned_deg: of the camera, to the left. heading_deg: of
+    the lines against the car. curvature_per_m: of car and lines."""
+    state = LineState()
+    for k in range(frames):
+        across = np.radians(heading_deg) * speed_mps * k * FRAME_NS / 1e9
+        slope = np.radians(heading_deg - turned_deg)
+        lines = np.array([[y + across, slope, curvature_per_m / 2.0, 0.0] for y in (1.75, -1.75)])
+        turning = curvature_per_m * speed_mps if knows_turning else None
+        state = noted(state, RoadLines(lines, pitch_deg, speed_mps, turning), k * FRAME_NS)
+    return closed(state, 7, 0.0)
+
+
+def yaws(state: LineState) -> F64:
+    return angles(state, 0).values
+
+
+@pytest.mark.parametrize("turned_deg", [-2.0, 0.0, 0.5])
+@pytest.mark.parametrize("heading_deg", [0.0, 1.5])
+@pytest.mark.parametrize("curvature_per_m", [0.0, 1e-3])
+def test_the_yaw_is_told_also_in_a_lane_change_and_in_a_bend(
+    turned_deg: float, heading_deg: float, curvature_per_m: float
+):
+    assert yaws(driven(6, turned_deg, heading_deg, curvature_per_m)) == pytest.approx([turned_deg], abs=0.02)
+
+
+def test_it_is_more_certain_at_speed():
+    slow, fast = (angles(driven(6, speed_mps=speed), 0).sigma_deg[0] for speed in (5.0, 30.0))
+    assert slow > 2.0 * fast
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [{"speed_mps": 1.0}, {"knows_turning": False}, {"curvature_per_m": 0.01}, {"frames": 2}],
+    ids=["walking pace", "unknown yaw rate", "sharp bend", "too short"],
+)
+def test_nothing_is_said_where_motion_is_no_measure(drive: dict[str, float]):
+    assert not len(yaws(driven(**{"frames": 6, **drive})))  # type: ignore[arg-type]
+
+
+def test_another_line_is_not_compared():
+    """The left line ends, and another one begins 2 m beside it."""
+    state = LineState()
+    for k in range(6):
+        y = 1.75 if k < 3 else 3.75
+        lines = np.array([[y, 0.0, 0.0, 0.0], [-1.75, 0.0, 0.0, 0.0]])
+        state = noted(state, RoadLines(lines, None, SPEED_MPS, 0.0), k * FRAME_NS)
+    assert yaws(closed(state, 0, -1.0)) == pytest.approx([0.0])
+
+
+def test_the_pitch_is_the_mean_of_the_images_with_two_lines():
+    found = angles(driven(5, pitch_deg=1.2), 1)
+    assert found.values == pytest.approx([1.2])
+    assert found.frames == pytest.approx([5.0])
+    assert not len(angles(driven(5), 1).values)
+
+
+def test_what_is_old_is_forgotten():
+    state = driven(6, 1.0)
+    assert len(closed(state, 8, 6.0).rows) == 1
+    assert len(closed(state, 8, 7.0).rows) == 0
