@@ -16,10 +16,10 @@ import yaml
 from rich.console import Console
 from rich.table import Table
 
-from app.commands.support.alignment_pictures import write_residual_pictures
 from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress, task_progress
+from app.commands.support.residual_images import write_residual_images
 from pipeline.calibration.alignment.drive import fit_drive
 from pipeline.calibration.alignment.fit import overlap_sentence
 from pipeline.calibration.distance import LawFit, as_law, as_overrides, collect_pairs, fit_laws
@@ -61,8 +61,8 @@ class Calibrate:
     """alignment: also fit the pinhole camera's lateral and vertical position; the angles become less certain"""
     out: Annotated[Path | None, option("PATH")] = None
     """Write a preset file for `cipv run --params`; mount: a rig file"""
-    pictures: Annotated[Path | None, option("FOLDER")] = None
-    """alignment: write pictures of up to six frames with boxes, and clusters before and after the fit"""
+    images: Annotated[Path | None, option("FOLDER")] = None
+    """alignment: write images of up to six frames with boxes, and clusters before and after the fit"""
     keep: bool = False
     """Store the law with the detector; it is then used with that network unless a parameter overrides it"""
     json: bool = False
@@ -82,7 +82,7 @@ class Calibrate:
         belongs = {
             "--model": (self.model != "pinhole", "alignment"),
             "--offset": (self.offset, "alignment"),
-            "--pictures": (self.pictures is not None, "alignment"),
+            "--images": (self.images is not None, "alignment"),
             "--truth": (self.truth != "labels", "distance"),
             "--free-exponent": (self.free_exponent, "distance"),
             "--keep": (self.keep, "distance"),
@@ -132,8 +132,8 @@ class Calibrate:
         if self.out is not None:
             section = {"model": fit.model, **fit.values}
             self.out.write_text(yaml.safe_dump({"alignment": section}, sort_keys=False), encoding="utf-8")
-        if self.pictures is not None:
-            write_residual_pictures(self.pictures, frame_of, len(source), fit, params)
+        if self.images is not None:
+            write_residual_images(self.images, frame_of, len(source), fit, params)
         return 0
 
     def _fit_time(self, params: Params, source: Source) -> int:

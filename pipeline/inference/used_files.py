@@ -43,17 +43,8 @@ def file_notes(path: Path, sha256: str) -> tuple[str, ...]:
     for a file whose content ``read_verified`` checks."""
     if is_checked(path):
         return ()
-    official = next((known.sha256 for known in KNOWN if known.name == path.stem), None)
-    if sha256 == official:
+    if any(sha256 == known.sha256 for known in KNOWN):
         return ()
-    notes = [_since_last_use(path, sha256)]
-    if official is not None:
-        notes.append(f"{path.name} is not the official network of this name: its SHA-256 is {sha256[:_SHOWN]}…")
-    return tuple(note for note in notes if note)
-
-
-def _since_last_use(path: Path, sha256: str) -> str:
-    """Empty if it has not changed."""
     rows, key = _read(), str(path.resolve())
     last = rows.get(key)
     now = _Used(sha256, datetime.now(UTC).strftime("%Y-%m-%d %H:%M"))
@@ -64,11 +55,11 @@ def _since_last_use(path: Path, sha256: str) -> str:
     if now != last:
         _write(rows | {key: now})
     if not now.before:
-        return ""
+        return ()
     return (
         f"{path.name} has changed: since {now.since} its SHA-256 is {now.sha256[:_SHOWN]}…, when used on {now.until} "
         f"it was {now.before[:_SHOWN]}… (UTC). If nobody changed it on purpose, it is damaged. A network installed "
-        "with `cipv models register` is checked whenever it is opened."
+        "with `cipv models register` is checked whenever it is opened.",
     )
 
 

@@ -104,7 +104,7 @@ class LineAngles(NamedTuple):
     piece: F64
     """(M,) number of the piece."""
     values: F64
-    """(M,)."""
+    """(M,) the angle in each piece."""
     sigma_deg: F64
     """(M,) of the piece's own error."""
     frames: F64

@@ -92,8 +92,8 @@ def test_what_cannot_be_kept_is_refused(
 def test_an_alignment_is_fitted_and_written_as_parameters(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = tmp_path / "turned.yaml", tmp_path / "alignment.yaml"
     path.write_text(SCENE + "detections: {boxes: {}}\nfaults: {camera_yaw_deg: 2.0, camera_pitch_deg: -1.5}\n")
-    pictures = tmp_path / "pictures"
-    more = ("--out", str(out), "--pictures", str(pictures), "--json")
+    images = tmp_path / "images"
+    more = ("--out", str(out), "--images", str(images), "--json")
     assert calibrate(f"sim:{path}", *more, what="alignment") == 0
     printed = capsys.readouterr()
     assert yaml.safe_load(out.read_text())["alignment"] == {"model": "pinhole", **json.loads(printed.out)["values"]}
@@ -101,8 +101,8 @@ def test_an_alignment_is_fitted_and_written_as_parameters(tmp_path: Path, capsys
     assert fitted.yaw_deg == pytest.approx(2.0, abs=0.3)
     assert fitted.pitch_deg == pytest.approx(-1.5, abs=0.3)
     assert "only" in printed.err, "one second of three cars"
-    files = sorted(pictures.iterdir())
-    assert f"{len(files)} pictures" in printed.err
+    files = sorted(images.iterdir())
+    assert f"{len(files)} images" in printed.err
     assert files
     assert all(cv2.imread(str(file)).shape == (720, 1280, 3) for file in files)
 
@@ -113,7 +113,7 @@ def test_an_alignment_is_fitted_and_written_as_parameters(tmp_path: Path, capsys
         ("mount", ["--model", "angular"]),
         ("alignment", ["--keep"]),
         ("distance", ["--offset"]),
-        ("time", ["--pictures", "folder"]),
+        ("time", ["--images", "folder"]),
         ("alignment", ["--offset", "--model", "angular"]),
     ],
 )

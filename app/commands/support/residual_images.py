@@ -1,4 +1,4 @@
-"""Writes the pictures of a fit of the alignment as PNG files."""
+"""Writes the images of a fit of the alignment as PNG files."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 
 from pipeline.calibration.alignment.fit import AlignmentFit
-from pipeline.calibration.alignment.pictures import FRAMES, residual_picture
+from pipeline.calibration.alignment.residual_image import FRAMES, residual_image
 from pipeline.common.errors import BadInput
 from pipeline.params import Params
 from pipeline.types import Frame
 
 
-def write_residual_pictures(
+def write_residual_images(
     folder: Path, frame_of: Callable[[int], Frame], count: int, fit: AlignmentFit, params: Params
 ) -> None:
     """One file for each of ``FRAMES`` frames over the drive in which vehicles are paired, named after the frame.
@@ -24,14 +24,14 @@ def write_residual_pictures(
     written = 0
     for index in np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int)).tolist():
         frame = frame_of(index)
-        picture = residual_picture(frame, fit, params)
-        if picture is None:
+        drawn = residual_image(frame, fit, params)
+        if drawn is None:
             continue
         path = folder / f"{frame.name}.png"
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
+            path.write_bytes(cv2.imencode(".png", drawn)[1].tobytes())
         except OSError as error:
-            raise BadInput(f"--pictures: {path}: {error.strerror}") from None
+            raise BadInput(f"--images: {path}: {error.strerror}") from None
         written += 1
-    print(f"cipv: {written} pictures in {folder}", file=sys.stderr)
+    print(f"cipv: {written} images in {folder}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""Pictures of a fit's residuals: detected boxes and projected clusters in a frame, before and after the fit."""
+"""Images of a fit's residuals: detected boxes and projected clusters in a frame, before and after the fit."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from pipeline.params import AlignmentParams, Params
 from pipeline.types import F64, U8, Frame
 
 FRAMES = 6
-"""Number of pictures, evenly over the drive."""
+"""Number of images, evenly over the drive."""
 _BOX, _BEFORE, _AFTER = (255, 255, 255), (60, 160, 255), (90, 220, 90)
 """Blue, green, red."""
 _CAPTION_PX = 26
 
 
-def residual_picture(frame: Frame, fit: AlignmentFit, params: Params) -> U8 | None:
+def residual_image(frame: Frame, fit: AlignmentFit, params: Params) -> U8 | None:
     """(H, W, 3) uint8 blue green red. White: boxes of vehicles that the fit pairs with a cluster. Orange: the cluster
     with the alignment in ``params``, if complete. Green: with the fit. The caption gives the root mean square distance
     of their edges, in pixels. None if no vehicle in the frame is paired."""
