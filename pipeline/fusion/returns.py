@@ -64,6 +64,9 @@ _LOW_SIGMAS, _LOW_SPAN = 1.5, 0.5
 """Number of standard deviations by which its range may differ from the camera's, and minimum share of the box's width
 that it spans: the same as for points of merged clusters. In 200 frames of Astyx and KITTI, which have no crest, two
 rows pass, neither on a vehicle that could lead."""
+_LOW_BEYOND = 0.5
+"""The same for a row that is farther away than the camera says: it may be the road behind the vehicle, between the
+shadows of others, where the sensors are not aligned."""
 _LOW_FROM_SHARE, _LOW_TO_SHARE = 0.35, 0.95
 """The road beside a vehicle is searched from here to there outside the box, in box widths. Half a degree between the
 sensors and the box's own error shift the vehicle's points by up to the first."""
@@ -170,6 +173,7 @@ def _by_low_row(seen: VisionMeasurement, road: _Points) -> VisionMeasurement:
     inner = (x1, y1, x2, y2 - _LOW_BOTTOM_SHARE * (y2 - y1))
     share = _LOW_SIGMAS / _SIGMAS * seen.sigma_m / seen.distance_m
     rows = _inside(road.uv, road.range_m, inner, seen.distance_m, share)
+    rows = rows[road.range_m[rows] < seen.distance_m * math.exp(_LOW_BEYOND * seen.sigma_m / seen.distance_m)]
     groups = np.split(rows, np.flatnonzero(np.diff(road.range_m[rows]) > _GAP_M) + 1)
     row = max(groups, key=len)
     if len(row) < _LOW_POINTS or np.ptp(road.uv[row, 0]) < _LOW_SPAN * (x2 - x1):

@@ -112,6 +112,7 @@ REAR = [0.2 * n for n in range(-4, 5)]
         ("a car in the next lane at another range", [*row(-0.4, REAR), *row(-0.4, [2.0, 2.2], x=40.0)], 46.0),
         ("narrower than half of the box", row(-0.4, [0.0, 0.2, 0.4]), None),
         ("two points", row(-0.4, [-0.8, 0.8]), None),
+        ("a sixth farther than the camera says: the road behind", row(-0.4, [1.2 * y for y in REAR], x=58.0), None),
         ("half as far again as the camera says", row(-0.4, [1.6 * y for y in REAR], x=75.0), None),
         ("returns above the road count first", [ON_IT, *row(-0.4, REAR, x=52.0)], 46.0),
     ],
