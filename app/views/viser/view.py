@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, get_args
@@ -27,6 +28,9 @@ from app.views.viser.internal_port import PAGE, demanding_the_secret
 from app.views.viser.nodes import Strokes
 from pipeline.params import Params
 from pipeline.types import Frame, FusedObject, Point3, Result
+
+# A browser may leave while its view is drawn; viser drops the message, and its warning would only worry the user.
+warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
 
 OnPick = Callable[[str, int | None], None]
 ViewOf = Callable[[str], PageView]
