@@ -126,9 +126,8 @@ export function setUp() {
     setNewLabel(kind.value);
     kind.blur();
   });
-  name.addEventListener("click", async () => {
-    if (!hasAccount()) await askName();
-    reflect();
+  name.addEventListener("click", () => {
+    if (!hasAccount()) void askName();
   });
   const next = (/** @type {string} */ words, /** @type {string} */ title, /** @type {commands.Wanted} */ what) =>
     el("button", {
@@ -168,7 +167,7 @@ export function setUp() {
   scrolls(leads);
   showKeys();
   on(["keys", "person"], showKeys);
-  paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft"], reflect);
+  paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft", "person"], reflect);
   on(["saving", "said", "link"], reflectSaving);
   on(["state"], reflectTask);
   on(["state", "steps"], () => {
