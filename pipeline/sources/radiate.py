@@ -10,6 +10,7 @@ Mounts and the camera's calibration are those of the SDK's ``default-calib.yaml`
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -171,7 +172,7 @@ def parse_state(data: bytes, file: str, t_ns: int) -> tuple[EgoState, GnssFix]:
     try:
         rows = [[float(word) for word in line.split(",")] for line in lines]
         (lat_deg, lon_deg, alt_m), (north, east, _), (_, _, down_radps) = rows[0], rows[16], rows[17]
-        sigma_m = max(float(rows[1][0]), float(rows[2][1])) ** 0.5
+        sigma_m = math.sqrt(max(rows[1][0], rows[2][1]))  # ValueError for a negative one
         numbers = np.array([lat_deg, lon_deg, alt_m, north, east, down_radps, sigma_m])
     except (ValueError, IndexError, TypeError):
         raise SourceError(f"{file}: not a record of the GNSS/INS") from None

@@ -1,7 +1,8 @@
-"""Limits how often the server's libraries log the same line: clients decide how often that happens.
+"""Limits how often libraries log the same line: clients decide how often that happens.
 
 Without descriptors asyncio reports each connection that it cannot accept with a traceback, thousands a second, and
-uvicorn each request that is none: logs would fill the disk that recordings are on.
+uvicorn each request that is none, websockets each message that viser does not understand: logs would fill the disk
+that recordings are on.
 """
 
 from __future__ import annotations
@@ -31,9 +32,14 @@ class OncePerPeriod(logging.Filter):
 
 
 _ONCE = OncePerPeriod()
+_ONCE_OF_THE_REST = OncePerPeriod()
+"""For all loggers without a handler of their own, whose messages Python's last resort prints. Its own memory, because
+messages of ``LOGGERS`` may have been counted already."""
 
 
 def limit_logs() -> None:
-    """Install the limit for this process; may be called repeatedly."""
+    """Install the limits for this process; may be called repeatedly."""
     for name in LOGGERS:
         logging.getLogger(name).addFilter(_ONCE)
+    if logging.lastResort is not None:
+        logging.lastResort.addFilter(_ONCE_OF_THE_REST)

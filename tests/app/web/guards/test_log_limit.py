@@ -7,7 +7,7 @@ import logging
 import pytest
 
 from app.web.guards import log_limit
-from app.web.guards.log_limit import OncePerPeriod
+from app.web.guards.log_limit import OncePerPeriod, limit_logs
 from app.web.server import create_app
 from tests.app.web.guards.test_connections import half_open, hangs_up
 from tests.app.web.serving import running, serving
@@ -37,3 +37,10 @@ def test_requests_that_are_none_are_logged_once(capfd: pytest.CaptureFixture[str
                 while not hangs_up(client):
                     pass
     assert capfd.readouterr().err.count("Invalid HTTP request") == 1
+
+
+def test_libraries_without_a_handler_are_limited_too() -> None:
+    limit_logs()
+    assert logging.lastResort is not None
+    failed = logging.LogRecord("websockets.server", logging.ERROR, "", 0, "connection handler failed", None, None)
+    assert [bool(logging.lastResort.filter(failed)) for _ in range(3)] == [True, False, False]
