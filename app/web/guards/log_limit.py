@@ -7,6 +7,7 @@ that recordings are on.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import time
 
@@ -16,13 +17,16 @@ _MOST_KNOWN = 200
 
 
 class OncePerPeriod(logging.Filter):
-    """Drops a message that was logged within the last ``PERIOD_S``, and any beyond 200 messages in that time."""
+    """Drops a message that was logged within the last ``PERIOD_S``, any beyond 200 messages in that time, and requests
+    that end with the server, which are no errors."""
 
     def __init__(self) -> None:
         super().__init__()
         self._said_s: dict[str, float] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
+        if record.exc_info is not None and isinstance(record.exc_info[1], asyncio.CancelledError):
+            return False
         text, now_s = record.getMessage(), time.monotonic()
         self._said_s = {each: at_s for each, at_s in self._said_s.items() if now_s - at_s < PERIOD_S}
         if text in self._said_s or len(self._said_s) >= _MOST_KNOWN:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 
 import pytest
@@ -27,6 +28,14 @@ def test_a_line_is_logged_once_in_its_period_and_again_after_it(monkeypatch: pyt
 def test_many_different_lines_are_limited_too() -> None:
     limit = OncePerPeriod()
     assert sum(limit.filter(record(str(number))) for number in range(10_000)) == 200
+
+
+def test_a_request_that_ends_with_the_server_is_no_error() -> None:
+    cancelled = asyncio.CancelledError("Task cancelled, timeout graceful shutdown exceeded")
+    ended = logging.LogRecord(
+        "uvicorn.error", logging.ERROR, "", 0, "Exception in ASGI application", None, (type(cancelled), cancelled, None)
+    )
+    assert not OncePerPeriod().filter(ended)
 
 
 def test_requests_that_are_none_are_logged_once(capfd: pytest.CaptureFixture[str]) -> None:
