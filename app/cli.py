@@ -17,6 +17,7 @@ from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, Pri
 from app.core.stop_signals import as_interrupts
 from app.core.terminal import make_safe, one_line
 from pipeline.common.errors import BadInput
+from pipeline.common.files.user_files import Overloaded
 
 COMMANDS = {
     "demo": "app.commands.serve:Demo",
@@ -69,6 +70,9 @@ def main(arguments: list[str] | None = None) -> None:
     except BadInput as error:
         print(f"cipv: {one_line(error)}", file=sys.stderr)
         raise SystemExit(2) from None
+    except Overloaded as error:
+        print(f"cipv: {one_line(error)}", file=sys.stderr)
+        raise SystemExit(1) from None
     except BrokenPipeError:
         # the reader of our output has exited (`cipv run … | head`): not an error, but nothing more can be written
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Generic, Literal, TypeVar
 
 from pipeline.common.errors import BadInput, first_line
+from pipeline.common.files.user_files import Overloaded
 from pipeline.common.progress import Progress
 
 logger = logging.getLogger("cipv.jobs")
@@ -116,7 +117,7 @@ class BackgroundJob(Generic[ResultT]):
             result = work(self._progress)
         except Cancelled:
             self._end("cancelled")
-        except BadInput as error:
+        except (BadInput, Overloaded) as error:
             self._end("failed", error=str(error))
         except Exception as error:  # a failing job must not affect anything else
             logger.exception("%s", self._name)

@@ -68,14 +68,12 @@ def serve(
         try:
             from app.web.server import Server, TlsFiles, create_app
 
-            files = TlsFiles(*tls) if tls is not None else None
-            if files is not None:
-                files.check()
+            context = TlsFiles(*tls).context() if tls is not None else None
             marks, audit = Marks(SESSIONS / "marks"), SESSIONS / "audit.jsonl"
             alignments = AlignmentVersions(SESSIONS / "alignments.json")
             app = create_app(engine, viser_port, (*hosts, host), marks, looks, tokens, audit, alignments, fleet)
             freeze_loaded_objects()
-            Server(app, address, on_ready, tokens, asked, files).run(sockets=[bound])
+            Server(app, address, on_ready, tokens, asked, context).run(sockets=[bound])
         finally:
             engine.stop()
             bound.close()

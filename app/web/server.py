@@ -9,6 +9,7 @@ import threading
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import uvicorn
@@ -31,7 +32,7 @@ from app.views.viser.proxy import viser_router
 from app.web.api_description import REFUSALS, titled
 from app.web.guards.access import Access, Guard
 from app.web.guards.audit import Audit
-from app.web.guards.connections import LimitedProtocol
+from app.web.guards.connections import LimitedProtocol, TlsHandshake
 from app.web.guards.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
 from app.web.guards.log_limit import limit_logs
 from app.web.guards.own_name import own_name
@@ -126,13 +127,15 @@ class TlsFiles:
     key: Path
     """Key of the certificate, without a passphrase."""
 
-    def check(self) -> None:
-        """BadInput if they cannot be used."""
+    def context(self) -> ssl.SSLContext:
+        """For a server. BadInput if they cannot be used."""
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         try:
-            ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.certificate, self.key, password=_no_password)
+            context.load_cert_chain(self.certificate, self.key, password=_no_password)
         except (OSError, ValueError) as error:  # SSLError is a subclass of OSError
             reason = getattr(error, "reason", None) or getattr(error, "strerror", None) or str(error)
             raise BadInput(f"{self.certificate}, {self.key}: cannot be used for TLS: {reason}") from None
+        return context
 
 
 def _no_password() -> str:
@@ -150,20 +153,21 @@ class Server(uvicorn.Server):
         on_ready: Callable[[str], None] | None,
         tokens: Tokens | None = None,
         asked: threading.Event | None = None,
-        tls: TlsFiles | None = None,
+        tls: ssl.SSLContext | None = None,
     ) -> None:
+        def shaking_hands(**given: Any) -> asyncio.Protocol:
+            return LimitedProtocol(**given) if tls is None else TlsHandshake(tls, partial(LimitedProtocol, **given))
+
         super().__init__(
             uvicorn.Config(
                 app,
-                http=LimitedProtocol,
+                http=shaking_hands,  # type: ignore[arg-type]
                 log_level="warning",
                 access_log=False,
                 ws_per_message_deflate=False,
                 ws_max_size=LARGEST_MESSAGE,
                 timeout_graceful_shutdown=1,
                 backlog=_BACKLOG,
-                ssl_certfile=tls.certificate if tls is not None else None,
-                ssl_keyfile=tls.key if tls is not None else None,
             )
         )
         limit_logs()

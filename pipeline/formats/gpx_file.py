@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 from pyproj import Geod
 
+from pipeline.common.time_range import is_time
 from pipeline.formats.xml_text import parse_xml
 from pipeline.types import GnssFix
 from pipeline.types.source import SourceError
@@ -55,4 +56,7 @@ def _utc_ns(text: str) -> int:
     """``2024-05-01T12:00:00.5Z`` as ns since 1970; without a zone it is UTC. ValueError where it is no time."""
     when = datetime.fromisoformat(text.strip())
     when = when if when.tzinfo is not None else when.replace(tzinfo=UTC)
-    return round(when.timestamp() * 1e6) * 1000
+    t_ns = round(when.timestamp() * 1e6) * 1000
+    if not is_time(t_ns):
+        raise ValueError
+    return t_ns

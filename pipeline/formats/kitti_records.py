@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.common.geometry import Cuboid, inverse, transform
+from pipeline.common.time_range import is_time
 from pipeline.types import F64, Box, GnssQuality
 from pipeline.types.source import SourceError, TruthObject
 
@@ -210,6 +211,7 @@ def _nanoseconds(text: str) -> int:
     whole, _, fraction = text.partition(".")
     try:
         seconds = int(datetime.strptime(whole, "%Y-%m-%d %H:%M:%S").replace(tzinfo=UTC).timestamp())
-        return seconds * 1_000_000_000 + (int(fraction[:9].ljust(9, "0")) if fraction else 0)
+        t_ns = seconds * 1_000_000_000 + (int(fraction[:9].ljust(9, "0")) if fraction else 0)
+        return t_ns if is_time(t_ns) else 0
     except (ValueError, OverflowError):
         return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from threading import Lock
 
@@ -26,13 +27,18 @@ _TELL_EVERY = 256
 """Images between two words of progress."""
 _PLACES = 2
 """What is shown, and what is computed beside it."""
+PATIENCE_S = 10.0
+"""Maximum time until the next image's data are found: a disk reads half a gigabyte in it, an image has a few MB. FFmpeg
+searches damaged files and gigabytes of zeros byte by byte, and nothing else interrupts it."""
 
 
 def open_video(path: Path) -> av.container.InputContainer:
     """A video file, ready to be decoded within the budget of an image. OSError for what is no regular file. What a
-    playlist in it names is not opened: FFmpeg would fetch it from any server."""
+    playlist in it names is not opened: FFmpeg would fetch it from any server. Reading on raises av.ExitError if nothing
+    is found within ``PATIENCE_S``."""
     check_regular(path)
-    container = av.open(str(path.resolve()), options={"protocol_whitelist": "file", "format_whitelist": _FORMATS})
+    options = {"protocol_whitelist": "file", "format_whitelist": _FORMATS}
+    container = av.open(str(path.resolve()), options=options, timeout=PATIENCE_S)
     within_budget(container)
     return container
 
@@ -56,7 +62,7 @@ class VideoFile:
         try:
             with open_video(path) as container:
                 stamps, tick_ns = _stamps(container, progress)
-        except av.InvalidDataError:
+        except (av.InvalidDataError, av.ExitError):
             raise SourceError(f"{path.name}: not a readable video: cut off, or something else") from None
         except (av.FFmpegError, OSError, ValueError) as error:
             raise SourceError(f"{path.name}: not a readable video: {reason_of(error)}") from None
@@ -79,7 +85,8 @@ class VideoFile:
             with overload_told_apart():
                 return place.image(wanted_ns)
         except (av.FFmpegError, OSError, ValueError, StopIteration) as error:
-            raise SourceError(f"{self.path.name}: image {index} cannot be decoded: {reason_of(error)}") from None
+            reason = f"not found within {PATIENCE_S:g} s" if isinstance(error, av.ExitError) else reason_of(error)
+            raise SourceError(f"{self.path.name}: image {index} cannot be decoded: {reason}") from None
 
 
 class _Place:
@@ -136,17 +143,18 @@ class _Place:
 
 
 def _stamps(container: av.container.InputContainer, progress: Progress) -> tuple[np.ndarray, float]:
-    """Presentation stamps of every image, ascending, and nanoseconds a tick; nothing is decoded. progress: of the
-    file's bytes."""
+    """Presentation stamps of every image, ascending, and nanoseconds a tick; nothing is decoded. Of a file in which no
+    further image is found in time, those before. progress: of the file's bytes."""
     if not container.streams.video:
         raise ValueError("no video stream")
     stream = container.streams.video[0]
     if stream.time_base is None:
         raise ValueError("its images have no times")
     stamps = []
-    for count, packet in enumerate(container.demux(stream)):
-        if packet.pts is not None:
-            stamps.append(packet.pts)
-        if count % _TELL_EVERY == 0 and packet.pos is not None:
-            progress(packet.pos, container.size)
+    with suppress(av.ExitError):
+        for count, packet in enumerate(container.demux(stream)):
+            if packet.pts is not None:
+                stamps.append(packet.pts)
+            if count % _TELL_EVERY == 0 and packet.pos is not None:
+                progress(packet.pos, container.size)
     return np.unique(np.array(stamps, dtype=np.int64)), float(stream.time_base) * _NS

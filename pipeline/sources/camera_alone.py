@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.common.fast_replace import evolve
 from pipeline.common.nearest_in_time import Timeline
+from pipeline.common.time_range import is_time
 from pipeline.ego_motion.from_gnss import MotionFromGnss
 from pipeline.formats.file_reading import files_by_name, read_bytes, read_image, recording_file, recording_folder
 from pipeline.formats.gpx_file import parse_gpx
@@ -210,7 +211,7 @@ def _stamp_ns(name: str) -> int:
     if not _STAMP.match(name):
         return 0
     t_ns = int(name) * (1000 if len(name) == 16 else 1)
-    return t_ns if t_ns > _EPOCH_NS else 0
+    return t_ns if t_ns > _EPOCH_NS and is_time(t_ns) else 0
 
 
 def _ordinal(number: int) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 
 from pipeline.common.geometry import inverse
 from pipeline.common.nearest_in_time import nearest
+from pipeline.common.time_range import END_OF_TIME_NS
 from pipeline.ego_motion.from_poses import motion_along
 from pipeline.formats.file_reading import check_looks_ahead, image_of, image_size, read_bytes, recording_folder
 from pipeline.formats.float_points import parse_points
@@ -41,8 +42,6 @@ _LIDAR, _CAMERA = "LIDAR_TOP", "CAM_FRONT"
 _NO_IMAGES = f"no images: no {_CAMERA} files that calibrated_sensor.json knows"
 _CHANNELS = 32
 _NOMINAL_SIZE = (1600, 900)
-_LATEST_US = 9_000_000_000_000_000
-"""Later times do not fit into 64 bits of nanoseconds and are invalid."""
 _IMAGE_WITHIN_NS = 60_000_000
 """With a camera at 12 Hz, the nearest image is at most 42 ms away."""
 
@@ -208,7 +207,9 @@ def _rows_of(
 ) -> list[SampleDataRow]:
     """The existing files of a sensor, below the data set's folder, in order of time."""
     of_channel = {token for token, (_, name) in sensors.items() if name == channel}
-    of_sensor = [row for row in rows if row.calibrated_sensor_token in of_channel and 0 < row.timestamp < _LATEST_US]
+    of_sensor = [
+        row for row in rows if row.calibrated_sensor_token in of_channel and 0 < row.timestamp < END_OF_TIME_NS // 1000
+    ]
     found = [row for row in of_sensor if _is_below(folder, row.filename)]
     return sorted(found, key=lambda row: row.timestamp)
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.common.time_range import is_time
 from pipeline.formats.file_reading import files_by_name, image_of, image_size, read_bytes, recording_folder
 from pipeline.formats.pcd_file import parse_pcd
 from pipeline.formats.point_cloud_fields import cloud_of
@@ -111,7 +112,7 @@ def _stamp_ns(name: str) -> int | None:
     value = int(whole)
     for least, unit_ns in _UNITS_NS:
         if value >= least:
-            return value * unit_ns
+            return value * unit_ns if is_time(value * unit_ns) else None
     if value < _EPOCH_S:
         return None
     return value * 1_000_000_000 + int(fraction[:9].ljust(9, "0") if fraction else 0)

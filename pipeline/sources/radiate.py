@@ -10,6 +10,7 @@ Mounts and the camera's calibration are those of the SDK's ``default-calib.yaml`
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,6 +20,7 @@ import numpy as np
 
 from pipeline.common.geometry import inverse
 from pipeline.common.nearest_in_time import Times, nearest
+from pipeline.common.time_range import is_time
 from pipeline.formats.file_reading import files_by_name, image_of, image_size, read_bytes, recording_folder
 from pipeline.formats.text_rows import parse_rows
 from pipeline.sources import rig as rig_files
@@ -171,7 +173,7 @@ def parse_state(data: bytes, file: str, t_ns: int) -> tuple[EgoState, GnssFix]:
     try:
         rows = [[float(word) for word in line.split(",")] for line in lines]
         (lat_deg, lon_deg, alt_m), (north, east, _), (_, _, down_radps) = rows[0], rows[16], rows[17]
-        sigma_m = max(float(rows[1][0]), float(rows[2][1])) ** 0.5
+        sigma_m = math.sqrt(max(rows[1][0], rows[2][1]))  # ValueError for a negative one
         numbers = np.array([lat_deg, lon_deg, alt_m, north, east, down_radps, sigma_m])
     except (ValueError, IndexError, TypeError):
         raise SourceError(f"{file}: not a record of the GNSS/INS") from None
@@ -208,9 +210,9 @@ def _files_in_time(folder: Path, name: str, suffixes: tuple[str, ...]) -> TimedF
     except SourceError:
         lines = []
     found = [match for line in lines if (match := _STAMP.match(line.strip()))]
-    stamps = [int(each[2]) * 1_000_000_000 + int(each[3].ljust(9, b"0")) for each in found]
-    by_number = dict(zip((int(each[1]) for each in found), stamps, strict=True))
+    numbered = [(int(each[1]), int(each[2]) * 1_000_000_000 + int(each[3].ljust(9, b"0"))) for each in found]
+    by_number = {number: t_ns for number, t_ns in numbered if is_time(t_ns)}
     if not files.keys() <= by_number.keys():
-        by_number = dict(enumerate(stamps, start=1))
+        by_number = {k: t_ns for k, (_, t_ns) in enumerate(numbered, start=1) if is_time(t_ns)}
     known = sorted((by_number[number], path) for number, path in files.items() if number in by_number)
     return TimedFiles(np.array([t_ns for t_ns, _ in known], dtype=np.int64), [path for _, path in known])

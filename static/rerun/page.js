@@ -38,14 +38,16 @@ function recording() {
 
 /**
  * The viewer would ask its maker's servers for updates and tell them about its use. The policy of this page forbids it;
- * here such a request gets an empty answer before the browser has to refuse it.
+ * here such a request gets an empty answer before the browser has to refuse it. For the recording it asks without
+ * cookies, and so without the token that a server may require: requests to this server get them.
  */
 function stayHere() {
   const ask = window.fetch.bind(window);
   window.fetch = (input, init) => {
     const url = new URL(input instanceof Request ? input.url : String(input), location.href);
     const isOurs = url.origin === location.origin || url.protocol === "blob:" || url.protocol === "data:";
-    return isOurs ? ask(input, init) : Promise.resolve(new Response(null, { status: 204 }));
+    if (!isOurs) return Promise.resolve(new Response(null, { status: 204 }));
+    return ask(input, { ...init, credentials: "same-origin" });
   };
 }
 

@@ -7,6 +7,9 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.sync_api import Browser, expect
 
+from app.web.guards.tokens import Tokens
+from app.web.server import create_app
+from tests.app.web.serving import serving
 from tests.browser.conftest import Site
 from tests.browser.test_look import SCREENS
 
@@ -44,3 +47,20 @@ def test_one_click_opens_this_drive_and_no_request_leaves_the_machine(site: Site
     hosts = {urlsplit(url).netloc for url in asked if url.startswith("http")}
     assert hosts == {urlsplit(site.address).netloc}
     assert errors == []
+
+
+@pytest.mark.usefixtures("paused_in_traffic")
+def test_the_viewer_opens_the_drive_of_a_server_that_requires_a_token(site: Site, browser: Browser):
+    tokens = Tokens("person-0123456789abcdef", "display-0123456789abcde")
+    context = browser.new_context(viewport={"width": 600, "height": 400})
+    try:
+        with serving(create_app(site.engine, tokens=tokens)) as address:
+            page = context.new_page()
+            page.goto(f"{address}/icon.svg?token={tokens.person}")
+            with page.expect_response(lambda response: "/api/rerun.rrd" in response.url, timeout=WAIT_MS) as replay:
+                page.goto(f"{address}/rerun/?first=0&last=1&paused=1&compact=1")
+            assert replay.value.status == 200
+            expect(page.locator("html")).to_have_attribute("data-viewer", "started", timeout=WAIT_MS)
+            expect(page.locator("#said")).to_have_text("")
+    finally:
+        context.close()

@@ -3,11 +3,13 @@
 viser supports neither tokens nor origin checks, and every program and web page on this machine can reach loopback. Each
 request and each WebSocket must therefore carry a secret of this process in a header, which the proxy adds and a page
 cannot set. viser offers no hook for this check, but the ``serve`` function of the websockets library that it calls gets
-one during startup.
+one during startup. Programs that connect and do not shake hands would fill this process's file descriptors, so only
+the newest few of these stay connected.
 """
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import http
 import secrets
@@ -21,6 +23,7 @@ import websockets.asyncio.server
 from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
+from websockets.protocol import State
 
 _NAME = "x-cipv-internal"
 HEADERS = {_NAME: secrets.token_urlsafe(32)}
@@ -29,6 +32,8 @@ PAGE_HEADER = "x-cipv-page"
 """Header with which the proxy identifies the page that contains the 3D view."""
 PAGE: ContextVar[str] = ContextVar("page", default="")
 """That page's name, in everything that viser runs on its event loop for this browser; empty if unknown."""
+MOST_NEWCOMERS = 16
+"""Limit of connections that have not yet shaken hands; the proxy needs a few milliseconds for that."""
 _starting = threading.Lock()
 Respond = Callable[[ServerConnection, Request], Response | None]
 
@@ -43,7 +48,8 @@ def demanding_the_secret() -> Iterator[None]:
         def serve(handler: Any, *arguments: Any, process_request: Respond, **options: Any) -> Any:
             nonlocal guarded
             guarded = True
-            return usual(handler, *arguments, process_request=_checked(process_request), **options)
+            options |= {"process_request": _checked(process_request), "create_connection": _limited()}
+            return usual(handler, *arguments, **options)
 
         websockets.asyncio.server.serve = serve  # type: ignore[assignment, misc]
         try:
@@ -52,6 +58,25 @@ def demanding_the_secret() -> Iterator[None]:
             websockets.asyncio.server.serve = usual  # type: ignore[misc]
     if not guarded:
         raise RuntimeError("viser's server was started without the check of its internal secret")
+
+
+def _limited() -> type[ServerConnection]:
+    """The class of one server's connections, which keeps their number small until they have shaken hands."""
+    newcomers: list[ServerConnection] = []
+
+    class Limited(ServerConnection):
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            super().connection_made(transport)
+            newcomers[:] = [each for each in newcomers if each.state is State.CONNECTING] + [self]
+            if len(newcomers) > MOST_NEWCOMERS:
+                newcomers.pop(0).transport.abort()
+
+        def connection_lost(self, exc: Exception | None) -> None:
+            super().connection_lost(exc)
+            if self in newcomers:
+                newcomers.remove(self)
+
+    return Limited
 
 
 def _checked(answer: Respond) -> Respond:

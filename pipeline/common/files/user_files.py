@@ -19,6 +19,10 @@ FOLDERS_VARIABLE = "CIPV_FOLDERS"
 """Folders, joined as in PATH. If set, user-supplied paths outside these folders are refused."""
 LARGEST_TEXT_BYTES = 16 << 20
 """For settings, scenarios, calibrations and signal definitions; the largest DBC files have a few MB."""
+_READING = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+_HANDLES = "/proc/self/fd"
+_HAS_HANDLES = hasattr(os, "O_PATH") and os.path.isdir(_HANDLES)
+"""Whether a file can be opened in two steps, the first of which has no effect: on Linux."""
 
 
 class Overloaded(Exception):
@@ -38,16 +42,33 @@ def overload_told_apart() -> Iterator[None]:
 
 
 def open_regular(path: Path) -> BinaryIO:
-    """A file, open for reading. OSError if it is not a regular file or is outside the allowed folders."""
+    """A file, open for reading. OSError if it is not a regular file or is outside the allowed folders, also if its name
+    comes to mean another file meanwhile."""
     check_allowed(path)
     with overload_told_apart():
-        number = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        number = _open_by_handle(path) if _HAS_HANDLES else os.open(path, _READING)
     try:
         _check(os.fstat(number).st_mode, path)
         return os.fdopen(number, "rb")
     except BaseException:
         os.close(number)
         raise
+
+
+def _open_by_handle(path: Path) -> int:
+    """Checks what the name means before it is opened: opening a device or a pipe has effects of its own, such as a
+    started watchdog or a woken writer."""
+    handle = os.open(path, os.O_PATH)
+    try:
+        _check(os.fstat(handle).st_mode, path)
+        itself = f"{_HANDLES}/{handle}"
+        if not _is_inside(Path(os.readlink(itself))):
+            raise _outside(path)
+        return os.open(itself, _READING)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
+    finally:
+        os.close(handle)
 
 
 def read_regular(path: Path, largest: int) -> bytes:
@@ -70,12 +91,18 @@ def check_regular(path: Path) -> None:
 def check_allowed(path: Path) -> None:
     """OSError for a path that resolves, including symbolic links, to a place outside the folders of
     ``CIPV_FOLDERS``."""
+    if os.environ.get(FOLDERS_VARIABLE) is not None and not _is_inside(path.resolve()):
+        raise _outside(path)
+
+
+def _is_inside(target: Path) -> bool:
+    """Whether a path without symbolic links is inside an allowed folder."""
     named = os.environ.get(FOLDERS_VARIABLE)
-    if named is None:
-        return
-    target = path.resolve()
-    if not any(target.is_relative_to(Path(each).resolve()) for each in named.split(os.pathsep) if each):
-        raise OSError(errno.EACCES, "outside the allowed folders", str(path))
+    return named is None or any(target.is_relative_to(Path(each).resolve()) for each in named.split(os.pathsep) if each)
+
+
+def _outside(path: Path) -> OSError:
+    return OSError(errno.EACCES, "outside the allowed folders", str(path))
 
 
 def _check(mode: int, path: Path) -> None:

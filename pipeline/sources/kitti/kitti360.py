@@ -20,6 +20,8 @@ from pipeline.types import F64, EgoState
 from pipeline.types.source import SourceError
 
 _SWEEPS, _IMAGES = "data_3d_raw", "data_2d_raw"
+BEYOND_ANY_MAP_M = 1e8
+"""Ten times the largest coordinate of a map of the Earth (UTM): a number of a pose that large is damaged."""
 
 
 def root_of(folder: Path) -> tuple[Path, str | None] | None:
@@ -56,7 +58,7 @@ def motion_of_camera(path: Path, stamps: Sequence[int], T_rect_ego: F64) -> list
     """Own motion in each frame from ``cam0_to_world.txt``: a frame number and 16 numbers of T_map_rect per line. Frames
     without a pose get the motion between the poses around them. SourceError for an invalid file."""
     rows = parse_number_lines(read_bytes(path), 17)
-    rows = rows[(np.abs(rows) < 1e8).all(axis=1)]
+    rows = rows[(np.abs(rows) < BEYOND_ANY_MAP_M).all(axis=1)]
     number = rows[:, 0].astype(np.int64)
     good = (number >= 0) & (number < len(stamps)) & (np.diff(number, prepend=-1) > 0)
     rows, number = rows[good], number[good]

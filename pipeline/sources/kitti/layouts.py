@@ -84,6 +84,8 @@ def motion_of(files: Files, calibration: KittiCalibration) -> list[EgoState | No
         rows = np.array([line.split() for line in read_bytes(files.poses).decode().splitlines() if line], dtype=float)
         T_start_camera = np.tile(np.eye(4), (len(rows), 1, 1))
         T_start_camera[:, :3] = rows.reshape(-1, 3, 4)
+        if not (np.abs(T_start_camera) < kitti360.BEYOND_ANY_MAP_M).all():
+            raise ValueError
     except ValueError:
         raise SourceError(f"{files.poses.name}: expected poses of 12 numbers per line") from None
     T = T_start_camera @ calibration.T_rect_ego

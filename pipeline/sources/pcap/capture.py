@@ -17,12 +17,11 @@ from typing import BinaryIO, NamedTuple
 
 from pipeline.common.files.user_file_errors import reason_of
 from pipeline.common.files.user_files import open_regular
+from pipeline.common.time_range import is_time
 from pipeline.types.source import SourceError
 
 _MAX_RECORD = 1 << 18
 """libpcap's own limit; a longer record is damaged."""
-_END_OF_TIME_NS = 1 << 63
-"""From the year 2262, nanoseconds since 1970 do not fit into 64 bits; a later packet is damaged."""
 _CLASSIC = {
     b"\xd4\xc3\xb2\xa1": ("<", 1000),
     b"\xa1\xb2\xc3\xd4": (">", 1000),
@@ -171,7 +170,7 @@ class Capture:
                 if number < len(section.interfaces) and section.interfaces[number].origin < origin:
                     _, link, tick_ns = section.interfaces[number]
                     t_ns = round((high << 32 | low) * tick_ns)
-                    if t_ns < _END_OF_TIME_NS:
+                    if is_time(t_ns):
                         yield origin, t_ns, link, body[20 : 20 + captured]
             origin += length
             self._described_to = max(self._described_to, origin)

@@ -17,6 +17,9 @@ from pipeline.sources.rosbag import unpack_budget
 from pipeline.types.source import SourceError
 
 _SUFFIXES = (".bag", ".db3", ".mcap")
+_TEXTS = (".yaml", ".yml")
+_LARGEST_TEXT_BYTES = 4 << 20
+"""Of the description, which the library reads as a whole: that of ten thousand files has 3 MB."""
 
 
 class Topic(NamedTuple):
@@ -82,8 +85,10 @@ def bag_path(path: str) -> Path:
         if bag.is_dir() and not (bag / "metadata.yaml").is_file():
             raise SourceError(f"{path}: not a ROS 2 bag: it has no metadata.yaml")
         for each in bag.iterdir() if bag.is_dir() else [bag]:
-            if each.suffix in (*_SUFFIXES, ".yaml", ".yml") or each == bag:
+            if each.suffix in (*_SUFFIXES, *_TEXTS) or each == bag:
                 check_regular(each)
+            if each.suffix in _TEXTS and each.stat().st_size > _LARGEST_TEXT_BYTES:
+                raise ValueError(f"{each.name} is larger than {_LARGEST_TEXT_BYTES >> 20} MiB")
     except (OSError, RuntimeError, ValueError) as error:
         raise SourceError(f"{path}: cannot be opened: {_in_words(error)}") from None
     if bag.is_file() and bag.suffix not in _SUFFIXES:

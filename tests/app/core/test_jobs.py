@@ -6,6 +6,7 @@ import pytest
 
 from app.core.jobs import BackgroundJob, JobStatus
 from pipeline.common.errors import BadInput
+from pipeline.common.files.user_files import Overloaded
 from pipeline.common.progress import Progress
 
 
@@ -38,16 +39,21 @@ def test_progress_is_not_told_more_often_than_asked_for_but_the_end_always_is():
 
 @pytest.mark.parametrize(
     ("error", "said"),
-    [(BadInput("the disk is full"), "the disk is full"), (ValueError("oops\nand more"), "ValueError: oops")],
-    ids=["a person's fault", "ours"],
+    [
+        (BadInput("the disk is full"), "the disk is full"),
+        (Overloaded("s3://a/b: store error"), "s3://a/b: store error"),
+        (ValueError("oops\nand more"), "ValueError: oops"),
+    ],
+    ids=["a person's fault", "a store's", "ours"],
 )
-def test_what_the_work_raises_becomes_the_error(error: Exception, said: str):
+def test_what_the_work_raises_becomes_the_error(error: Exception, said: str, caplog: pytest.LogCaptureFixture):
     def fails(progress: Progress) -> None:
         raise error
 
     job = BackgroundJob(fails)
     job.run()
     assert (job.status.state, job.status.error, job.result) == ("failed", said, None)
+    assert bool(caplog.records) is isinstance(error, ValueError), "a traceback is for what we did wrong"
 
 
 def test_a_cancelled_job_ends_at_its_next_progress_and_has_no_result():

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ssl
+import subprocess
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from fastapi import FastAPI
 
@@ -42,11 +45,11 @@ def running(
 
 
 @contextmanager
-def serving(app: FastAPI) -> Iterator[str]:
+def serving(app: FastAPI, tls: ssl.SSLContext | None = None) -> Iterator[str]:
     """The address of the app, once it responds there."""
     bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
-    address = f"http://127.0.0.1:{bound.getsockname()[1]}"
-    server = Server(app, address, lambda _: is_ready.set())
+    address = f"{'http' if tls is None else 'https'}://127.0.0.1:{bound.getsockname()[1]}"
+    server = Server(app, address, lambda _: is_ready.set(), tls=tls)
     thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
     thread.start()
     assert is_ready.wait(WAIT_S)
@@ -56,3 +59,12 @@ def serving(app: FastAPI) -> Iterator[str]:
         server.should_exit = True
         thread.join()
         bound.close()
+
+
+def certificate(folder: Path) -> tuple[Path, Path]:
+    """A new certificate of 127.0.0.1, and its key."""
+    cert, key = folder / "cert.pem", folder / "key.pem"
+    make = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "1"]
+    named = ["-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1"]
+    subprocess.run([*make, *named, "-keyout", str(key), "-out", str(cert)], check=True, capture_output=True)
+    return cert, key

@@ -27,6 +27,7 @@ from pipeline.common.errors import BadInput
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import Recording, opener
 from tests.app.waiting import WAIT_S
+from tests.app.web.serving import certificate
 
 ROOT = Path(__file__).resolve().parents[3]
 PROGRAM = """
@@ -211,10 +212,7 @@ def test_disks_and_databases_that_hang_for_ever_keep_neither_the_recording_open_
 
 
 def test_https_with_a_token_on_this_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    cert, key = tmp_path / "cert.pem", tmp_path / "key.pem"
-    make = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "1"]
-    named = ["-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1"]
-    subprocess.run([*make, *named, "-keyout", str(key), "-out", str(cert)], check=True, capture_output=True)
+    cert, key = certificate(tmp_path)
     monkeypatch.setattr("app.web.serve.SESSIONS", tmp_path)
     answers: list[httpx.Response] = []
     asked = threading.Event()

@@ -35,6 +35,17 @@ def test_no_video(data: bytes, tmp_path: Path) -> None:
         VideoFile(tmp_path / "a.avi")
 
 
+@pytest.mark.timeout(120)
+def test_gigabytes_of_zeros_after_a_video_are_not_searched_to_their_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    write_video(tmp_path / "a.avi", IMAGES)
+    with open(tmp_path / "a.avi", "r+b") as file:
+        file.truncate(1 << 40)
+    monkeypatch.setattr(video_file, "PATIENCE_S", 0.5)
+    assert len(VideoFile(tmp_path / "a.avi").times_ns) == IMAGES
+
+
 def test_a_video_that_goes_away(tmp_path: Path) -> None:
     write_video(tmp_path / "a.avi", 3)
     video = VideoFile(tmp_path / "a.avi")

@@ -144,6 +144,23 @@ def test_a_folder_of_images(tmp_path: Path) -> None:
     assert open_source(str(tmp_path)).frame(3).notes == ("1700000000900000000.png: the image is truncated",)
 
 
+@pytest.mark.parametrize(
+    "names", [("9999999999999998", "9999999999999999"), ("9223372036854775807", "9223372036854775808")]
+)
+def test_names_of_images_beyond_64_bits_are_no_times(names: tuple[str, str], tmp_path: Path) -> None:
+    for name in names:
+        cv2.imwrite(str(tmp_path / f"{name}.png"), np.full((40, 60, 3), 9, np.uint8))
+    source = open_source(f"pictures:{tmp_path}")
+    assert [source.frame(index).t_ns for index in range(2)] == [0, 100_000_000]
+
+
+@pytest.mark.parametrize("year", ["9999", "0001"])
+def test_a_track_beyond_64_bits_of_time_is_said_in_one_line(year: str, video: Path) -> None:
+    video.with_suffix(".gpx").write_text(track(5).replace("2024-", f"{year}-"))
+    with pytest.raises(SourceError, match=r"\.gpx: no track points with times"):
+        open_source(f"video:{video}")
+
+
 def test_what_is_no_video_and_no_track_is_said_in_one_line(video: Path, tmp_path: Path) -> None:
     (tmp_path / "cut.mp4").write_bytes(video.read_bytes()[:200])
     with pytest.raises(SourceError, match=r"cut\.mp4: not a readable video"):

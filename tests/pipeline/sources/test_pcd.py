@@ -136,6 +136,11 @@ def test_names_that_are_times(name: str, t_ns: int, tmp_path: Path) -> None:
     assert open_source(f"pcd:{tmp_path}").t_ns(0) == t_ns
 
 
+def test_names_beyond_64_bits_are_no_times(tmp_path: Path) -> None:
+    (tmp_path / "9999999999999999999.pcd").write_bytes(pcd(ROWS))
+    assert open_source(f"pcd:{tmp_path}").t_ns(0) == 0
+
+
 def test_a_damaged_file_degrades_its_frame(tmp_path: Path) -> None:
     folder = write_clouds(tmp_path / "c")
     (folder / f"{STAMPS_NS[0]}.pcd").write_bytes(b"garbage")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import cv2
@@ -159,6 +160,19 @@ def test_a_cut_file_leaves_its_branch_empty_and_says_so(sequence: Path) -> None:
     assert frame.notes == ("000001.csv: no LiDAR points", "000001.txt: not a record of the GNSS/INS")
     (sequence / "velo_lidar" / "000002.csv").write_text(wall() + "1,2,3,999,4\nx,y\n")
     assert open_source(str(sequence)).frame(1).notes == ("000002.csv: 2 unreadable rows skipped",)
+
+
+def test_times_beyond_64_bits_are_left_out(sequence: Path) -> None:
+    file = sequence / "velo_lidar.txt"
+    whole = len(open_source(str(sequence)))
+    file.write_text(re.sub(r"Time: \d+", "Time: 9999999999", file.read_text(), count=1))
+    assert len(open_source(str(sequence))) == whole - 1
+
+
+def test_a_negative_variance_is_damage() -> None:
+    damaged = re.sub(r"-?\d+\.?\d*(e[-+]?\d+)?", "-1", state())
+    with pytest.raises(SourceError, match="a: not a record of the GNSS/INS"):
+        parse_state(damaged.encode(), "a", 5)
 
 
 def test_a_standing_car_has_no_course() -> None:

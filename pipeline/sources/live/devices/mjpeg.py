@@ -7,6 +7,7 @@ import http.client
 from collections.abc import Callable, Mapping
 from urllib.parse import urlsplit
 
+from pipeline.common.time_range import END_OF_TIME_NS
 from pipeline.sources.live.devices.device_reader import CONNECT_S, SILENCE_S, DeviceLost, ReaderStop
 
 _LARGEST = 32 << 20
@@ -15,9 +16,6 @@ _MOST_LINES = 100
 """Maximum lines between two images: a part has a handful of headers."""
 _STAMPS = ("x-timestamp", "x-sendtimestamp")
 """Headers with seconds since 1970, as sent by mjpg-streamer, µStreamer and others."""
-
-_END_OF_TIME_US = (1 << 63) // 1000
-"""Later times, from the year 2262, do not fit into 64 bits of nanoseconds."""
 
 ReceiveImage = Callable[[bytes, int | None], None]
 """Takes a JPEG and its timestamp, µs since 1970, if it has one."""
@@ -122,6 +120,6 @@ def _stamp_us(headers: Mapping[str, str]) -> int | None:
             stamp_us = round(float(headers[name]) * 1e6)
         except (KeyError, ValueError, OverflowError):
             continue
-        if 0 < stamp_us < _END_OF_TIME_US:
+        if 0 < stamp_us < END_OF_TIME_NS // 1000:
             return stamp_us
     return None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 
 import httpx
 import pytest
@@ -49,6 +51,15 @@ def test_the_proxy_gets_both(port: int):
     subprotocols = [Subprotocol(f"viser-v{viser.__version__}")]
     with connect(f"ws://127.0.0.1:{port}", subprotocols=subprotocols, additional_headers=HEADERS, proxy=None) as scene:
         assert scene.recv(10.0)
+
+
+def test_strangers_who_only_connect_make_room_for_the_proxy(port: int):
+    with ExitStack() as stack:
+        strangers = [stack.enter_context(socket.create_connection(("127.0.0.1", port), 60)) for _ in range(60)]
+        assert httpx.get(f"http://127.0.0.1:{port}/", headers=HEADERS, trust_env=False).status_code == 200
+        for stranger in strangers[: -internal_port.MOST_NEWCOMERS]:
+            with suppress(ConnectionResetError):
+                assert stranger.recv(1) == b"", "the oldest are hung up on"
 
 
 def test_a_server_that_was_started_without_it_is_an_error():

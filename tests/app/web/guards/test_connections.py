@@ -1,17 +1,23 @@
-"""Clients that never finish a request do not affect others."""
+"""Clients that never finish a handshake or a request, or never take a response, do not affect others."""
 
 from __future__ import annotations
 
 import socket
+import ssl
+import threading
 from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import httpx
 import pytest
+from fastapi import FastAPI
+from fastapi.responses import Response
 
 from app.web.guards import connections
-from app.web.server import create_app
-from tests.app.web.serving import WAIT_S, running, serving
+from app.web.server import TlsFiles, create_app
+from tests.app.web.serving import WAIT_S, certificate, running, serving
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +70,95 @@ def test_too_many_make_room_for_who_says_what_they_want(address: str, monkeypatc
     finally:
         for client in clients:
             client.close()
+
+
+LARGE = b"a" * (16 << 20)
+"""More than the system keeps for a client that does not read."""
+
+
+@pytest.fixture(scope="module")
+def large() -> Iterator[str]:
+    """The address of a server with a large file and a small one."""
+    app = FastAPI()
+    app.add_api_route("/large", lambda: Response(LARGE))
+    app.add_api_route("/small", lambda: Response(b"a"))
+    with serving(app) as address:
+        yield address
+
+
+WITHOUT_READING = b"GET /large HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+
+
+def test_too_many_who_take_nothing_of_a_response_make_room(large: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(connections, "MOST_CONNECTIONS", 8)
+    with ExitStack() as stack:
+        clients = [stack.enter_context(half_open(large, WITHOUT_READING)) for _ in range(8)]
+        for client in clients:
+            assert client.recv(9) == b"HTTP/1.1 ", "its response is under way"
+        for _ in range(6):
+            assert httpx.get(f"{large}/small", timeout=WAIT_S).status_code == 200
+
+
+def test_who_takes_nothing_of_a_response_is_hung_up_on(large: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(connections, "STALLED_S", 0.2)
+    is_dropped, drop = threading.Event(), connections.LimitedProtocol.drop
+    monkeypatch.setattr(connections.LimitedProtocol, "drop", lambda self: (drop(self), is_dropped.set()))
+    with half_open(large, WITHOUT_READING) as client:
+        assert is_dropped.wait(WAIT_S)
+        assert sum(len(data) for data in iter(lambda: client.recv(1 << 20), b"")) < len(LARGE)
+
+
+@pytest.fixture(scope="module")
+def over_tls(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, ssl.SSLContext]]:
+    """The address of a server over HTTPS, and what a client needs to trust it."""
+    files = certificate(tmp_path_factory.mktemp("tls"))
+    with serving(FastAPI(), TlsFiles(*map(Path, files)).context()) as address:
+        yield address, ssl.create_default_context(cafile=str(files[0]))
+
+
+def answers(address: str, tls: ssl.SSLContext) -> bool:
+    with httpx.Client(verify=tls, timeout=WAIT_S) as client:
+        return client.get(address).status_code == 404
+
+
+def test_who_does_not_shake_hands_makes_room_too(over_tls: tuple[str, ssl.SSLContext], monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(connections, "MOST_CONNECTIONS", 20)
+    with ExitStack() as stack:
+        clients = [stack.enter_context(half_open(over_tls[0], b"")) for _ in range(60)]
+        assert answers(*over_tls)
+        assert all(hangs_up(client) for client in clients[:40]), "the oldest first"
+
+
+@pytest.mark.parametrize("said", [b"", b"\x16\x03\x01\x02\x00", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"])
+def test_who_does_not_shake_hands_is_hung_up_on(
+    over_tls: tuple[str, ssl.SSLContext], said: bytes, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(connections, "HEADER_S", 0.2)
+    with half_open(over_tls[0], said) as client:
+        while not hangs_up(client):
+            pass  # TLS names the error first
+    monkeypatch.undo()
+    assert answers(*over_tls)
+
+
+def test_a_request_that_comes_with_the_end_of_the_handshake_is_answered(over_tls: tuple[str, ssl.SSLContext]):
+    address, tls = over_tls
+    parts = urlsplit(address)
+    into, out = ssl.MemoryBIO(), ssl.MemoryBIO()
+    client = tls.wrap_bio(into, out, server_hostname=parts.hostname)
+    with half_open(address, b"") as plain:
+        while True:
+            try:
+                client.do_handshake()
+                break
+            except ssl.SSLWantReadError:
+                plain.sendall(out.read())
+                into.write(plain.recv(1 << 16))
+        client.write(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        plain.sendall(out.read())  # its last message of the handshake and the request in one packet
+        while True:
+            try:
+                assert client.read(12) == b"HTTP/1.1 404"
+                break
+            except ssl.SSLWantReadError:
+                into.write(plain.recv(1 << 16))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import cv2
@@ -160,3 +161,42 @@ def test_a_lack_of_descriptors_says_nothing_of_a_frame(tmp_path: Path, monkeypat
             source.frame(1)
     after = source.frame(1)
     assert (after.notes, after.sweep is None, after.image is None) == (before.notes, False, False)
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.skipif(not hasattr(os, "O_PATH"), reason="needs Linux")
+def test_a_pipe_that_is_refused_does_not_wake_its_writer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    os.mkfifo(tmp_path / "pipe")
+    is_open, opened = [], os.open
+
+    def opening(path: str | Path, flags: int, *rest: int) -> int:
+        number = opened(path, flags, *rest)
+        with suppress(OSError):  # refused as long as nobody reads it
+            os.close(opened(tmp_path / "pipe", os.O_WRONLY | os.O_NONBLOCK))
+            is_open.append(path)
+        return number
+
+    monkeypatch.setattr(os, "open", opening)
+    with pytest.raises(OSError, match="not a regular file"):
+        open_regular(tmp_path / "pipe")
+    assert is_open == []
+
+
+@pytest.mark.skipif(not hasattr(os, "O_PATH"), reason="needs Linux")
+def test_a_name_that_changes_after_it_was_checked_leads_nowhere_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    allowed, secret, link = tmp_path / "allowed", tmp_path / "secret", tmp_path / "allowed" / "a"
+    allowed.mkdir()
+    secret.write_text("secret")
+    (allowed / "mine").write_text("mine")
+    link.symlink_to("mine")
+    monkeypatch.setenv(FOLDERS_VARIABLE, str(allowed))
+    check = user_files.check_allowed
+
+    def changing(path: Path) -> None:
+        check(path)
+        link.unlink()
+        link.symlink_to(secret)
+
+    monkeypatch.setattr(user_files, "check_allowed", changing)
+    with pytest.raises(OSError, match="outside the allowed folders"):
+        open_regular(link)

@@ -63,9 +63,10 @@ def test_a_sequence_opens_by_its_bare_path_with_own_motion_from_its_poses(sequen
 
 def test_without_poses_it_has_no_own_motion_and_damaged_ones_are_said(sequence: Path) -> None:
     poses = sequence.parent.parent / "poses" / "04.txt"
-    poses.write_text("1 2 3\n")
-    with pytest.raises(SourceError, match=r"04\.txt: expected poses of 12 numbers per line"):
-        open_source(str(sequence))
+    for damaged in ("1 2 3\n", "1e308 " * 12 + "\n", "inf 0 0 " * 4 + "\n", "nan 0 0 " * 4 + "\n"):
+        poses.write_text(damaged)
+        with pytest.raises(SourceError, match=r"04\.txt: expected poses of 12 numbers per line"):
+            open_source(str(sequence))
     poses.unlink()
     source = open_source(str(sequence))
     assert source.frame(0).ego is None

@@ -114,6 +114,7 @@ def test_a_broken_label_is_refused(line: str) -> None:
 def test_timestamps_keep_nanoseconds_and_places() -> None:
     stamps = parse_timestamps(b"2011-09-26 13:04:32.349808512\nrubbish\n2011-09-26 13:04:33\n")
     assert stamps == (1317042272349808512, 0, 1317042273000000000)
+    assert parse_timestamps(b"9999-12-31 23:59:59.9\n0001-01-01 00:00:00.0\n") == (0, 0), "beyond 64 bits"
 
 
 def test_oxts_needs_all_fields() -> None:

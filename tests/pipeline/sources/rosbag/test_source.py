@@ -327,3 +327,12 @@ def test_frames_from_several_threads(kind: Kind, tmp_path: Path) -> None:
         frames = list(pool.map(source.frame, [0, 1, 2] * 4))
     assert [frame.index for frame in frames] == [0, 1, 2] * 4
     assert all(frame.sweep is not None and frame.image is not None for frame in frames)
+
+
+@pytest.mark.timeout(60)
+def test_a_huge_description_is_refused_without_reading_it(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", "db3", sweeps=1, every=50)
+    with open(bag / "metadata.yaml", "r+b") as file:
+        file.truncate(5 << 20)
+    with pytest.raises(SourceError, match=r"metadata\.yaml is larger than 4 MiB"):
+        open_source(f"rosbag:{bag}")
