@@ -22,6 +22,7 @@ import numpy as np
 from pipeline.common.geometry import Cuboid
 from pipeline.common.progress import Progress, silent
 from pipeline.fusion.vehicle_sizes import largest_size_m, usual_size_m
+from pipeline.labels.cuboids.across import turned_across
 from pipeline.labels.cuboids.aggregate import Aggregate, Planar, Sweeps, aggregated
 from pipeline.labels.cuboids.outline import Outline, outline, placed
 from pipeline.labels.cuboids.road_headings import along_road
@@ -65,7 +66,7 @@ def refined(
     sweeps: of every frame. poses: own motion by frame, if known.
     """
     out = []
-    turned = along_road([_of_one_body(track, poses) for track in tracks], poses)
+    turned = turned_across(along_road([_of_one_body(track, poses) for track in tracks], poses), sweeps, poses)
     for count, track in enumerate(turned):
         out.append(replace(track, sightings=_on_points(track, sweeps, poses)))
         progress(count + 1, len(turned))

@@ -53,9 +53,12 @@ on labelled vehicles got worse (by more than 0.02 IoU) in 4 % (Astyx), 12 % (its
 63)."""
 _WHOLE = 0.8
 """Share of length and width that the points must span to show the whole vehicle: its corners are round."""
-_EXPLAINED_M = 0.15
-"""Points farther than this from the fitted sides on average belong to more than one vehicle, or not to its sides: that
-is the accuracy of a side with points on it."""
+_FEWEST_TO_TURN = 2
+"""A rotation found in a single sweep needs points over the whole vehicle: a part of one side, or a bumper's corner, has
+a yaw of its own."""
+_EXPLAINED_M = 0.12
+"""Points farther than this from the fitted sides on average belong to more than one vehicle, or not to its sides. A
+side counts as hit up to this distance (``outline``)."""
 _WIDER_M = 0.3
 """Bodies that grow by more than this in width include a neighbour; two mirrors add 0.2 to 0.25 m."""
 _SAME_YAW_RAD = 1e-6
@@ -136,7 +139,9 @@ def _best(own: Aggregate, every: Aggregate, ground: Ground, cuboid: Cuboid) -> C
             gain_m = own_m + every_m - (_TURN_COSTS_M if turn_rad else 0.0)
             is_better = min(own_m, every_m) > _BETTER_M and gain_m > best_m and left_m[0] < _EXPLAINED_M
             is_alike = not others or _apart_m(one, others) <= _AGREE_M
-            if is_better and is_alike and _is_near(one, cuboid) and not (is_contained and _is_hidden(every, one)):
+            # what the points do not span needs a second witness
+            is_bold = is_contained or (turn_rad != 0.0 and len(every.placed) < _FEWEST_TO_TURN)
+            if is_better and is_alike and _is_near(one, cuboid) and not (is_bold and _is_hidden(every, one)):
                 best, best_m = one, gain_m
     return best
 
