@@ -168,7 +168,7 @@ export function setUp() {
   scrolls(leads);
   showKeys();
   on(["keys", "person"], showKeys);
-  paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft"], reflect);
+  paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft", "person"], reflect);
   on(["saving", "said", "link"], reflectSaving);
   on(["state"], reflectTask);
   on(["state", "steps"], () => {
