@@ -12,10 +12,7 @@ frame, its branch predicts, and its results say so.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-
-import numpy as np
 
 from pipeline import lidar_branch
 from pipeline.alignment import projection
@@ -45,10 +42,6 @@ from pipeline.types import (
 )
 from pipeline.vision import distance, nms
 from pipeline.vision import tracking as vision_tracking
-
-_FAR_ASIDE = 0.01
-_FAR_AHEAD = 1000.0 * np.array([[1.0, _FAR_ASIDE, 0.0], [1.0, -_FAR_ASIDE, 0.0]])
-"""Two points straight ahead, this much to either side (as a tangent)."""
 
 
 @dataclass(frozen=True)
@@ -266,11 +259,8 @@ def _pan_pxps(aligned: projection.Alignment | None, ego: EgoState | None) -> flo
     """Speed at which a distant object straight ahead moves to the right in the image because the car turns; None if
     that is not known."""
     rate_radps = yaw_rate.usable_rate(ego) if ego is not None and ego.coasting is None else None
-    if aligned is None or rate_radps is None:
-        return None
-    (left, _), (right, _) = aligned.project(_FAR_AHEAD).tolist()
-    pan = rate_radps * (right - left) / (2.0 * _FAR_ASIDE)
-    return pan if math.isfinite(pan) else None
+    px_per_rad = projection.pixels_per_radian(aligned) if aligned is not None else None
+    return rate_radps * px_per_rad if rate_radps is not None and px_per_rad is not None else None
 
 
 def _vehicle_boxes(boxes: tuple[VisionMeasurement, ...] | None) -> list[Box]:

@@ -1,6 +1,6 @@
 """Benchmarks the two parts of a step without networks (what runs beside them, and what is left when their outputs are
-there), both next to a busy network, and the whole pipeline as the command line runs it: reading, decoding, both
-networks, step."""
+there), both next to a busy network, and the whole pipeline as the command line runs it: reading, decoding, the detector
+in both views, the lane network, step."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ import numpy as np
 
 from app.bench.timing import figures
 from pipeline import lidar_branch
-from pipeline.detection import Detectors, Detects, detect
+from pipeline.detection import Detectors, detect
 from pipeline.params import Params
 from pipeline.run import advance
 from pipeline.step import State, step
-from pipeline.types import Frame, RawBoxes
+from pipeline.types import Frame
 from pipeline.types.source import Source
 from pipeline.warm_up import warm_up
 
@@ -43,7 +43,8 @@ def stages(
     """
     warm_up()
     detector = detectors.boxes
-    seen = [detect(source.frame(index), Detectors(detector)) for index in range(count)]
+    both_views = Detectors(detector, far=detectors.far, far_every=detectors.far_every)
+    seen = [detect(source.frame(index), both_views) for index in range(count)]
     idle = _Steps(cycle(seen), params)
     if detector is None:
         idle.go_on(budget_s)
@@ -51,13 +52,18 @@ def stages(
     beside, whole = _Steps(cycle(seen), params), _Whole(_read(source, count), params, detectors)
     for _ in range(_ROUNDS):
         idle.go_on(budget_s * _IDLE / _ROUNDS)
-        with _Busy(detector, seen):
+        with _Busy(both_views, seen):
             _Steps(cycle(seen), params).go_on(_SETTLE_S)
             beside.go_on(budget_s * _BESIDE / _ROUNDS - _SETTLE_S)
     whole.go_on(budget_s * (1.0 - _IDLE - _BESIDE))
     alone, row, line = idle.rest.row(), beside.rest.row(), whole.laps.row()
     del line["cpu_ms"]  # networks compute in other threads
-    named = {"detector": _name(detector), "lanes": _name(detectors.lanes), "lanes_every": detectors.lanes_every}
+    named = {
+        "detector": _name(detector),
+        "far_view": _name(detectors.far),
+        "lanes": _name(detectors.lanes),
+        "lanes_every": detectors.lanes_every,
+    }
     return {
         "lidar_branch": idle.branch.row(),
         "step": alone,
@@ -133,11 +139,11 @@ class _Whole:
 
 
 class _Busy:
-    """Keeps the network busy on its own thread, like a player that reads ahead."""
+    """Keeps the network busy on its own thread, in both views, like a player that reads ahead."""
 
-    def __init__(self, detector: Detects[RawBoxes], frames: list[Frame]) -> None:
+    def __init__(self, detectors: Detectors, frames: list[Frame]) -> None:
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._work, args=(detector, frames), daemon=True)
+        self._thread = threading.Thread(target=self._work, args=(detectors, frames), daemon=True)
 
     def __enter__(self) -> None:
         self._thread.start()
@@ -146,8 +152,8 @@ class _Busy:
         self._ended.set()
         self._thread.join()
 
-    def _work(self, detector: Detects[RawBoxes], frames: list[Frame]) -> None:
+    def _work(self, detectors: Detectors, frames: list[Frame]) -> None:
         for frame in cycle(frames):
             if self._ended.is_set():
                 return
-            detect(frame, Detectors(detector))
+            detect(frame, detectors)

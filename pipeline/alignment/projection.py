@@ -13,6 +13,7 @@ y = −d·sin(x_img·h_res). The printed arctan(−y/x) is an atan2 here, and th
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol
 
@@ -22,6 +23,10 @@ import numpy as np
 from pipeline.common.geometry import F64, inverse, rotation, transform
 from pipeline.params import AlignmentParams
 from pipeline.types import Box, CameraCalibration
+
+_FAR_ASIDE = 0.01
+_FAR_AHEAD = 1000.0 * np.array([[1.0, _FAR_ASIDE, 0.0], [1.0, -_FAR_ASIDE, 0.0]])
+"""Two points straight ahead, this much to either side (as a tangent)."""
 
 
 class Alignment(Protocol):
@@ -122,6 +127,14 @@ class Pinhole:
             flat = (pixels - self.K[:2, 2]) / [self.K[0, 0], self.K[1, 1]]
         rotation, offset = self.T_camera_ego[:3, :3], self.T_camera_ego[:3, 3]
         return -offset @ rotation, flat @ rotation[:2] + rotation[2]
+
+
+def pixels_per_radian(alignment: Alignment) -> float | None:
+    """How far a distant object straight ahead moves to the right in the image, per radian that the car turns to the
+    left; None if the camera does not look ahead."""
+    (left, _), (right, _) = alignment.project(_FAR_AHEAD).tolist()
+    shift = float(right - left) / (2.0 * _FAR_ASIDE)
+    return shift if math.isfinite(shift) else None
 
 
 def angular_from_calibration(camera: CameraCalibration) -> Angular:

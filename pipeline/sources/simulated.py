@@ -53,7 +53,9 @@ class SimulatedSource:
 
     def frame(self, index: int) -> Frame:
         now = self._world(index)
-        return self._senses.sensed(self._sensors.frame(now, index, self.t_ns(index)), now)
+        shot = self._senses.shot(now, index, self._sensors.camera)
+        seen = self._sensors.frame(now, index, self.t_ns(index), image=shot is not None, shot=shot)
+        return self._senses.sensed(seen, now)
 
     def outlines(self) -> Iterator[Frame]:
         for index in range(len(self)):

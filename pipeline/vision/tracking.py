@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.common import kalman
 from pipeline.common.fast_replace import evolve
-from pipeline.common.geometry import F64, iou_matrix
+from pipeline.common.geometry import iou_matrix
 from pipeline.common.kalman import CvState
 from pipeline.params import VisionTrackingParams
-from pipeline.types import Box, VisionMeasurement, VisionTrack
+from pipeline.types import VisionMeasurement, VisionTrack
+from pipeline.vision import box_filter
 from pipeline.vision.association import Expected, first_box_on, match, same_kind
 from pipeline.vision.followed import (
     Followed,
@@ -36,20 +36,6 @@ from pipeline.vision.followed import (
     take_place,
     with_place,
 )
-
-SPEED_SIGMA_MPS = 8.0
-"""Standard deviation of a new object's relative speed before a second sighting."""
-_CAR_WIDTH_M = 1.8
-"""Converts box widths to metres, so that process noise in the image corresponds to that on the road."""
-_CENTRE_NOISE = 0.04
-"""Noise of a box's centre, as a share of the box width."""
-_EDGE_PX = 2.0
-"""Minimum noise of a box's edges."""
-_TURN_PXPS2 = 150.0
-"""Angular acceleration of the image when the car starts to turn: 0.2 rad/s² through a lens of 720 px."""
-_MEASURED_TURN_PXPS2, _ASIDE_MPS2 = 40.0, 1.5
-"""Where the yaw rate is measured, boxes are predicted with it, and what remains is its error, 0.3 °/s from image to
-image, and the lateral acceleration of vehicles that change lanes quickly."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +118,7 @@ def learn_heights(
 
 def _expected(followed: Followed, params: VisionTrackingParams) -> Expected:
     """The prediction that the next box of an object is compared with."""
-    noise = _centre_variance(followed.track.bbox, params)
+    noise = box_filter.centre_variance(followed.track.bbox, params)
     spread = math.sqrt(followed.box_filter.cov[0, 0] + noise)
     return Expected(followed.track, spread, math.sqrt(noise), followed.unseen_s, followed.double_of)
 
@@ -157,20 +143,11 @@ def _predict(
     if params.filter == "queue":
         tracks = [evolve(each.track, carried=True, measured=False, returns=0) for each in followed]
         return [_aged(each, dt_s, track=track) for each, track in zip(followed, tracks, strict=True)]
-    per_m = [_width(each.track.bbox) / _CAR_WIDTH_M for each in followed]
-    if pan_change_pxps is None:
-        lively = [params.accel_sigma_mps2 * each + _TURN_PXPS2 for each in per_m]
-    else:
-        lively = [math.hypot(_ASIDE_MPS2 * each, _MEASURED_TURN_PXPS2) for each in per_m]
-    boxes = kalman.predict(kalman.stacked([each.box_filter for each in followed]), dt_s, lively)
-    if pan_change_pxps is not None:
-        boxes.mean[..., 0] += 0.5 * pan_change_pxps * dt_s
-        boxes.mean[..., 2] += pan_change_pxps
+    boxes = box_filter.predict(
+        [each.box_filter for each in followed], [each.track.bbox for each in followed], dt_s, pan_change_pxps, params
+    )
     places = predict_places(followed, dt_s, params)
-    return [
-        _predicted(each, box, place, dt_s)
-        for each, box, place in zip(followed, kalman.unstacked(boxes), places, strict=True)
-    ]
+    return [_predicted(each, box, place, dt_s) for each, box, place in zip(followed, boxes, places, strict=True)]
 
 
 def _predicted(followed: Followed, moved: CvState, predicted: PredictedPlace, dt_s: float) -> Followed:
@@ -179,7 +156,7 @@ def _predicted(followed: Followed, moved: CvState, predicted: PredictedPlace, dt
         "carried": True,
         "measured": False,
         "returns": 0,
-        "bbox": _around(moved.mean, followed.track.bbox, growth),
+        "bbox": box_filter.around(moved.mean, followed.track.bbox, growth),
     }
     if place is not None:
         track = with_place(followed.track, place, followed.placed, **unseen)
@@ -207,10 +184,8 @@ def _correct(
     if params.filter == "queue":
         return {row: expected[row].box_filter for row in partner}
     boxes = [measurements[column].detection.bbox for column in partner.values()]
-    noise = [_box_noise(box, params, expected[row].track.bbox) for row, box in zip(partner, boxes, strict=True)]
-    before = kalman.stacked([expected[row].box_filter for row in partner])
-    after = kalman.update(before, [_centre(box) for box in boxes], np.array(noise).reshape(-1, 2, 2))
-    return dict(zip(partner, kalman.unstacked(after), strict=True))
+    before, predicted = [expected[row].box_filter for row in partner], [expected[row].track.bbox for row in partner]
+    return dict(zip(partner, box_filter.update(before, boxes, predicted, params), strict=True))
 
 
 def _first_guess(ego_speed_mps: float | None) -> SpeedGuess:
@@ -218,8 +193,8 @@ def _first_guess(ego_speed_mps: float | None) -> SpeedGuess:
     0 ± 8 m/s, it would take 2 s to recognise that a car ahead of a fast ego vehicle stands still. Without ego speed
     this is the fallback."""
     if ego_speed_mps is None:
-        return SpeedGuess(0.0, SPEED_SIGMA_MPS)
-    return SpeedGuess(-ego_speed_mps / 2, max(SPEED_SIGMA_MPS, ego_speed_mps / 2))
+        return SpeedGuess(0.0, box_filter.SPEED_SIGMA_MPS)
+    return SpeedGuess(-ego_speed_mps / 2, max(box_filter.SPEED_SIGMA_MPS, ego_speed_mps / 2))
 
 
 def _new(
@@ -246,31 +221,29 @@ def _new(
         measured=seen.distance_m is not None,
         ranges=int(seen.distance_m is not None),
     )
-    noise = _centre_variance(detection.bbox, params) * np.eye(2)
-    box_filter = kalman.start(_centre(detection.bbox), noise, _box_speed_sigma(detection.bbox))
-    box_filter.mean[2] = pan_pxps
+    centre = box_filter.start(detection.bbox, pan_pxps, params)
     votes = ((detection.label, detection.score),)
     unplaced_s = 0.0 if seen.position else math.inf
-    followed = Followed(shown, 0.0, unplaced_s, 0, box_filter, None, votes, double_of=double_of)
+    followed = Followed(shown, 0.0, unplaced_s, 0, centre, None, votes, double_of=double_of)
     return take_place(followed, seen, guess, None, params) if params.filter == "kalman" else followed
 
 
 def _seen(
     followed: Followed,
     seen: VisionMeasurement,
-    box_filter: CvState,
+    centre: CvState,
     guess: SpeedGuess,
     ego_speed_mps: float | None,
     params: VisionTrackingParams,
 ) -> Followed:
-    """The object updated by this image's box and distance. box_filter: its filter, already updated by the box."""
+    """The object updated by this image's box and distance. centre: its box filter, already updated by the box."""
     detection = seen.detection
     label, votes, slip = detection.label, followed.votes, 0.0
     if params.filter == "kalman":
         tally = dict(votes)
         tally[label] = tally.get(label, 0.0) + detection.score
         label, votes = max(tally, key=lambda name: tally[name]), tuple(tally.items())
-        slip = _slip_px(detection.bbox, followed.track.bbox, 0) / _width(detection.bbox)
+        slip = box_filter.slip_px(detection.bbox, followed.track.bbox, 0) / box_filter.width(detection.bbox)
     track = evolve(
         followed.track,
         bbox=detection.bbox,
@@ -285,46 +258,10 @@ def _seen(
         ranges = track.ranges + 1 if seen.distance_m is not None else 0
         track = evolve(track, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position, ranges=ranges)
     followed = renamed(followed, label, seen)
-    current = evolve(followed, track=track, unseen_s=0.0, votes=votes, box_filter=box_filter)
-    slip_m = slip * _CAR_WIDTH_M
+    current = evolve(followed, track=track, unseen_s=0.0, votes=votes, box_filter=centre)
+    slip_m = slip * box_filter.CAR_WIDTH_M
     return take_place(current, seen, guess, ego_speed_mps, params, slip_m) if params.filter == "kalman" else current
 
 
 def _missed(followed: Followed) -> Followed:
     return evolve(followed, track=evolve(followed.track, missed=followed.track.missed + 1))
-
-
-def _centre_variance(box: Box, params: VisionTrackingParams) -> float:
-    """Variance of a box's centre along each axis of the image, as far as its width tells."""
-    return float(max(_CENTRE_NOISE * _width(box), _EDGE_PX) ** 2 + params.shift_px**2)
-
-
-def _box_noise(box: Box, params: VisionTrackingParams, expected: Box) -> tuple[tuple[float, float], ...]:
-    """Covariance (2, 2) of a box's centre, including the deviation of its size from the expected size."""
-    variance = _centre_variance(box, params)
-    across, down = (variance + _slip_px(box, expected, axis) ** 2 for axis in (0, 1))
-    return (across, 0.0), (0.0, down)
-
-
-def _slip_px(box: Box, expected: Box, axis: int) -> float:
-    """How far the centre may be off because the box covers only a part of the object, or more than the object: one edge
-    is then correct, and the centre is off by half the difference in size (axis 0: width, 1: height)."""
-    return abs((box[axis + 2] - box[axis]) - (expected[axis + 2] - expected[axis])) / 2
-
-
-def _box_speed_sigma(box: Box) -> float:
-    return SPEED_SIGMA_MPS * _width(box) / _CAR_WIDTH_M
-
-
-def _around(centre: F64, box: Box, scale: float) -> Box:
-    half_w, half_h = _width(box) / 2 * scale, (box[3] - box[1]) / 2 * scale
-    u, v = float(centre[0]), float(centre[1])
-    return u - half_w, v - half_h, u + half_w, v + half_h
-
-
-def _centre(box: Box) -> tuple[float, float]:
-    return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
-
-
-def _width(box: Box) -> float:
-    return box[2] - box[0]

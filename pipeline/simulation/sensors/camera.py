@@ -15,6 +15,7 @@ from pipeline.simulation.drawing.canvas import Canvas, Colour
 from pipeline.simulation.drawing.lens import ORDINARY, CameraModel, ImageSensor
 from pipeline.simulation.drawing.road_markings import paint_ground
 from pipeline.simulation.drawing.roadside_shapes import add_thing
+from pipeline.simulation.drawing.turned_view import margin_for, turned, with_margin
 from pipeline.simulation.drawing.vehicle_meshes import mesh
 from pipeline.simulation.world.roads import Road
 from pipeline.simulation.world.roadside import Roadside
@@ -42,30 +43,40 @@ def calibration(model: CameraModel = ORDINARY) -> CameraCalibration:
 
 
 @lru_cache(maxsize=2)
-def _prepared(model: CameraModel, seed: int) -> tuple[ImageSensor, backdrop.GroundTexture]:
+def _prepared(model: CameraModel, seed: int, margin_px: int) -> tuple[ImageSensor, backdrop.GroundTexture]:
     """Data shared by all images, which takes as long to compute as a dozen of them; cached for scenarios that are
     opened again."""
     camera = calibration(model)
-    return ImageSensor(camera, model, seed), backdrop.GroundTexture(camera, -LIDAR_HEIGHT_M, seed)
+    ground = backdrop.GroundTexture(with_margin(camera, margin_px), -LIDAR_HEIGHT_M, seed)
+    return ImageSensor(camera, model, seed), ground
 
 
 class DrawnCamera:
-    """Renders the world of one scenario. Static content is prepared once."""
+    """Renders the world of one scenario. Static content is prepared once. turns_rad: largest angle by which the camera
+    may be turned in its mount."""
 
-    def __init__(self, road: Road, roadside: Roadside, seed: int, model: CameraModel = ORDINARY) -> None:
+    def __init__(
+        self, road: Road, roadside: Roadside, seed: int, model: CameraModel = ORDINARY, turns_rad: float = 0.0
+    ) -> None:
         self.camera = calibration(model)
-        self._sensor, self._ground = _prepared(model, seed)
+        self._margin_px = margin_for(self.camera, turns_rad)
+        self._wide = with_margin(self.camera, self._margin_px)
+        self._sensor, self._ground = _prepared(model, seed, self._margin_px)
         self._road, self._roadside = road, roadside
-        self._sky = backdrop.sky(WIDTH, self._ground.horizon, seed)
+        self._sky = backdrop.sky(self._wide.width, self._ground.horizon, seed)
 
-    def image(self, world: World) -> U8:
-        """(720, 1280, 3) uint8 blue green red of one moment."""
-        return self._sensor.expose(self._drawn(world), world.t_s)
+    def image(self, world: World, actual: CameraCalibration | None = None) -> U8:
+        """(720, 1280, 3) uint8 blue green red of one moment. actual: the camera as it really looks; None if as
+        calibrated."""
+        drawn = self._drawn(world)
+        if self._margin_px:
+            drawn = turned(drawn, self.camera, self._margin_px, actual if actual is not None else self.camera)
+        return self._sensor.expose(drawn, world.t_s)
 
     def _drawn(self, world: World) -> U8:
-        """The ideal image: sharp and without noise."""
-        bgr = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
-        canvas = Canvas(bgr, self.camera)
+        """The ideal image, with its margin: sharp and without noise."""
+        bgr = np.empty((self._wide.height, self._wide.width, 3), dtype=np.uint8)
+        canvas = Canvas(bgr, self._wide)
         horizon = self._ground.horizon
         self._paint_sky(bgr[:horizon], world)
         paint_ground(canvas, self._road, world, horizon)

@@ -60,6 +60,18 @@ class Faults(ScenarioPart):
 NONE = Faults()
 
 
+def most_turned_rad(faults: Faults) -> float:
+    """An angle by which the faults never turn the camera in its mount more, about all axes together. Nods are normally
+    distributed, so it includes five of their standard deviations."""
+    knock = faults.knock or Knock(at_s=0.0)
+    angles = (
+        abs(faults.camera_yaw_deg) + abs(knock.yaw_deg),
+        abs(faults.camera_pitch_deg) + abs(knock.pitch_deg) + 5.0 * faults.nods_deg,
+        abs(faults.camera_roll_deg) + abs(knock.roll_deg),
+    )
+    return float(np.radians(np.hypot(np.hypot(*angles[:2]), angles[2])))
+
+
 def nods_rad(faults: Faults, seed: int, frames: int, rate_hz: float) -> F32:
     """(frames,) downward pitch of the car in each frame."""
     kept = np.array([np.exp(-1.0 / (_NODS_FOR_S * rate_hz))])

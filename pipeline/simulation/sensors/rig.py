@@ -5,7 +5,7 @@ and closed loops both use it, so both see the same.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from pipeline.common.fast_replace import evolve
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import gnss
 from pipeline.simulation.sensors.camera import DrawnCamera, calibration
+from pipeline.simulation.sensors.faults import most_turned_rad
 from pipeline.simulation.sensors.lidar.sensor import Lidar
 from pipeline.simulation.sensors.planned_route import planned_route
 from pipeline.simulation.world.roadside import Roadside
@@ -30,6 +31,15 @@ class Simulator(Protocol):
         ...
 
 
+class Shot(NamedTuple):
+    """What an image shows."""
+
+    world: World
+    """The world at the time of exposure."""
+    camera: CameraCalibration
+    """The camera as it really looks."""
+
+
 class SensorRig:
     """LiDAR, camera, speedometer, GNSS and the scenario's further sensors. end_m: the farthest position of the ego
     vehicle along the road; the roadside ends 600 m beyond. The same world and index give the same frame."""
@@ -41,13 +51,15 @@ class SensorRig:
             scenario.road, scenario.seed, scenario.ego.start_m - _BEFORE_M, end_m + _BEYOND_M
         )
 
-    def frame(self, now: World, index: int, t_ns: int, image: bool = True) -> Frame:
+    def frame(self, now: World, index: int, t_ns: int, image: bool = True, shot: Shot | None = None) -> Frame:
         """What the sensors deliver at one tick. image: render the camera's image; without it the frame is made ten
-        times faster and still has the camera calibration."""
+        times faster and still has the camera calibration. shot: when and where to the camera really looks; None if now
+        and as calibrated."""
+        seen = shot or Shot(now, self.camera)
         return evolve(
             self.outline(now, index, t_ns),
             sweep=self.sweep(now, index, t_ns),
-            image=CameraImage(t_ns, self._camera.image(now)) if image else None,
+            image=CameraImage(t_ns, self._camera.image(*seen)) if image else None,
             route=self._route,
             scans={
                 kind.name: kind.simulate(now, self._scenario.seed, index, t_ns)
@@ -87,4 +99,5 @@ class SensorRig:
 
     @cached_property
     def _camera(self) -> DrawnCamera:
-        return DrawnCamera(self._scenario.road, self._roadside, self._scenario.seed, self._scenario.camera)
+        scene = self._scenario
+        return DrawnCamera(scene.road, self._roadside, scene.seed, scene.camera, most_turned_rad(scene.faults))

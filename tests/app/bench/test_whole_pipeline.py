@@ -17,6 +17,7 @@ from pipeline.params import Params
 from pipeline.sources import open_source
 from pipeline.types import U8, RawBoxes, RawLanes
 from pipeline.vision.detector import Detector, open_detector
+from pipeline.vision.far_view import open_far_view
 from tests.pipeline.vision import networks
 
 
@@ -36,20 +37,24 @@ class Paint:
 def test_the_step_is_measured_alone_and_beside_the_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     source = open_source("sim:straight")
     detector = open_detector(str(networks.yolox(tmp_path / "tiny.onnx")), (128, 128))
-    asked: set[str] = set()
+    asked: set[tuple[str, int]] = set()
     look = Detector.detect
 
     def noting(self: Detector, bgr: U8) -> RawBoxes:
-        asked.add("here" if threading.current_thread() is threading.main_thread() else "beside")
+        where = "here" if threading.current_thread() is threading.main_thread() else "beside"
+        asked.add((where, bgr.shape[0]))
         return look(self, bgr)
 
     monkeypatch.setattr(Detector, "detect", noting)
     lanes = Paint()
-    figures = whole_pipeline.stages(source, 3, Params(), Detectors(detector, lanes, 2), 0.4)
+    far = open_far_view(detector, (1280, 720), 128)
+    assert far is not None
+    figures = whole_pipeline.stages(source, 3, Params(), Detectors(detector, lanes, 2, far), 0.4)
     assert list(figures) == ["lidar_branch", "step", "step_beside_network", "line"]
-    assert asked == {"here", "beside"}
+    assert asked == {(where, height) for where in ("here", "beside") for height in (720, 128)}, "both views"
     assert lanes.asked > 0
     assert (figures["line"]["lanes"], figures["line"]["lanes_every"]) == ("paint", 2)
+    assert figures["line"]["far_view"] == far.name
     for row in figures.values():
         assert 0.0 < row["median_ms"] <= row["p99_ms"]
         assert row["samples"] >= 1

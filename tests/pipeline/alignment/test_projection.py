@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.alignment.projection import Angular, Pinhole, angular_from_calibration, project_cuboid, resolve
+from pipeline.alignment.projection import (
+    Angular,
+    Pinhole,
+    angular_from_calibration,
+    pixels_per_radian,
+    project_cuboid,
+    resolve,
+)
 from pipeline.common.geometry import Cuboid
 from pipeline.params import AlignmentParams
 from pipeline.types import CameraCalibration
@@ -153,3 +160,18 @@ def test_cuboid_box(center: tuple[float, float, float], visible: bool) -> None:
         assert box == pytest.approx((595.0, 322.5, 684.9, 397.5), abs=15.0)
         assert 0 <= box[0] < box[2] <= 1280
         assert 0 <= box[1] < box[3] <= 720
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_left_turn_moves_what_is_far_ahead_to_the_right(name: str) -> None:
+    model, turn_rad = MODELS[name], np.radians(0.1)
+    far = 1e6 * np.array([[1.0, 0.0, 0.0], [np.cos(turn_rad), -np.sin(turn_rad), 0.0]])
+    before, after = model.project(far)[:, 0]
+    assert after > before
+    assert (after - before) / turn_rad == pytest.approx(pixels_per_radian(model), rel=2e-3)
+
+
+def test_a_camera_that_looks_back_shows_nothing_ahead() -> None:
+    back = camera()
+    back.T_camera_ego[:3, :3] = LOOKS_ALONG_X @ np.diag([-1.0, -1.0, 1.0])
+    assert pixels_per_radian(pinhole(back)) is None

@@ -103,6 +103,34 @@ def test_what_stays_as_it_is(seen: VisionMeasurement, scene: Scene) -> None:
     assert ranged(seen, scene) == seen
 
 
+@dataclass(frozen=True)
+class Alongside(Scene):
+    """A van parked beside the path, of whose flank the box shows the part from 3 to 7 m ahead."""
+
+    @property
+    def points(self) -> F32:
+        points = super().points
+        points[: self.car_points, 0] = np.linspace(3.0, 7.0, self.car_points)
+        points[: self.car_points, 1] = -2.05
+        return points
+
+
+@pytest.mark.parametrize("distance_m", [3.8, None])
+def test_a_vehicle_beside_the_path_is_where_its_nearest_points_are(distance_m: float | None) -> None:
+    scene, alignment = Alongside(), aligned()
+    u, v = alignment.project(scene.points[: scene.car_points, :3].astype(np.float64)).T
+    bbox = (u.min() - 40.0, v.min() - 300.0, u.max() + 60.0, v.max() + 40.0)
+    _, rays = alignment.rays(np.array([[(bbox[0] + bbox[2]) / 2, 360.0]]))
+    middle = rays[0][:2] / np.hypot(*rays[0][:2])
+    place = None if distance_m is None else (distance_m * middle[0], distance_m * middle[1])
+    seen = VisionMeasurement(Detection(bbox, "car", 0.8), distance_m, distance_m and 0.1 * distance_m, place)
+    found = ranged(seen, scene)
+    assert found.ranged_m == pytest.approx(np.hypot(3.3, 2.05), abs=0.3)
+    assert found.position is not None
+    assert -2.05 < found.position[1] < -1.7
+    assert middle[1] * found.ranged_m > -1.7, "the middle of the box would be in the path"
+
+
 def test_a_few_points_before_the_hedge_are_no_face() -> None:
     assert ranged(box(), Scene(car_points=10)).ranged_m == pytest.approx(HEDGE_M, abs=0.2)
 

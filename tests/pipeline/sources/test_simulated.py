@@ -11,6 +11,7 @@ from pipeline.alignment.projection import project_cuboid, resolve
 from pipeline.params import AlignmentParams
 from pipeline.sources import SourceError, open_source
 from pipeline.types import Frame
+from pipeline.types.source import Source
 
 
 @pytest.fixture(scope="module")
@@ -87,6 +88,49 @@ def test_a_scenario_of_ones_own(tmp_path: Path) -> None:
     path.write_text("{title: Mine, colour: red}")
     with pytest.raises(SourceError, match=r"mine\.yaml: "):
         open_source(f"sim:{path}")
+
+
+def _with_faults(tmp_path: Path, name: str, faults: str) -> Source:
+    path = tmp_path / f"{name}.yaml"
+    path.write_text(
+        "{title: Faulty, duration_s: 2, road: {segments: [{length_m: 900}]}, ego: {lane: -2, speed_mps: {0: 20}}, "
+        "actors: [{id: 1, kind: car, lane: -2, ahead_m: 20, colour: '#ff1010', speed_mps: {0: 10}}], "
+        f"camera: {{noise: 0, exposure_stops: 0}}, faults: {{{faults}}}}}"
+    )
+    return open_source(f"sim:{path}")
+
+
+def _red_columns(frame: Frame) -> tuple[int, int]:
+    """First and last column of the red car."""
+    assert frame.image is not None
+    blue, green, red = np.moveaxis(frame.image.bgr.astype(int), 2, 0)
+    columns = np.flatnonzero((red - np.maximum(blue, green) > 60).any(axis=0))
+    return int(columns[0]), int(columns[-1])
+
+
+def test_a_knocked_camera_shows_it_in_the_image_and_not_in_its_calibration(tmp_path: Path) -> None:
+    sound = _with_faults(tmp_path, "sound", "")
+    knocked = _with_faults(tmp_path, "knocked", "knock: {at_s: 1.0, yaw_deg: 2.0}")
+    camera = knocked.frame(15).camera
+    assert camera is not None
+    assert np.array_equal(camera.T_camera_ego, sound.frame(15).camera.T_camera_ego)  # type: ignore[union-attr]
+    assert _red_columns(knocked.frame(5)) == pytest.approx(_red_columns(sound.frame(5)), abs=2)
+    moved_px = np.subtract(_red_columns(knocked.frame(15)), _red_columns(sound.frame(15)))
+    assert moved_px == pytest.approx([camera.K[0, 0] * np.tan(np.radians(2.0))] * 2, abs=4.0)
+
+
+def test_a_late_image_shows_the_world_of_later(tmp_path: Path) -> None:
+    sound, late = _with_faults(tmp_path, "sound", ""), _with_faults(tmp_path, "late", "camera_skew_ms: 200")
+    width = [np.ptp(_red_columns(source.frame(index))) for source, index in ((sound, 10), (late, 10), (sound, 12))]
+    assert width[0] < width[1]
+    assert width[1] == pytest.approx(width[2], abs=1)
+
+
+def test_lost_images_are_missing(tmp_path: Path) -> None:
+    source = _with_faults(tmp_path, "lossy", "pictures_lost: 0.5")
+    frames = [source.frame(index) for index in range(len(source))]
+    assert 4 <= sum(frame.image is None for frame in frames) <= 16
+    assert all(frame.sweep is not None and frame.camera is not None for frame in frames)
 
 
 def test_gnss_tells_the_way_driven(frames: dict[int, Frame]) -> None:

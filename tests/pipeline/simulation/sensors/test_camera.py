@@ -12,9 +12,11 @@ from pipeline.alignment.projection import Pinhole
 from pipeline.simulation.drawing.canvas import NEAR_M, clip_near
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import camera
+from pipeline.simulation.sensors.faults import Faults, most_turned_rad, true_camera
+from pipeline.simulation.sensors.truth_boxes import in_image
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.roadside import Roadside
-from pipeline.types import F64, U8
+from pipeline.types import F64, U8, CameraCalibration
 from tests.pipeline.simulation.worlds import with_actors
 
 
@@ -22,6 +24,9 @@ def draw(scene: Scenario, t_s: float = 0.0) -> tuple[U8, world_state.World]:
     roadside = Roadside.build(scene.road, scene.seed, 0.0, 600.0)
     now = world_state.at(scene, t_s)
     return camera.DrawnCamera(scene.road, roadside, scene.seed).image(now), now
+
+
+TURNED = Faults(camera_yaw_deg=2.0, camera_pitch_deg=-1.0, camera_roll_deg=1.5)
 
 
 def is_colour(image: U8, strong: tuple[int, ...], weak: tuple[int, ...], by: int) -> npt.NDArray[np.bool_]:
@@ -42,6 +47,25 @@ def test_the_calibration_is_a_78_degree_720p_camera() -> None:
     straight_ahead = pixels(np.array([[1e6, 0.0, 0.8]]))[0]
     assert straight_ahead[0] == pytest.approx(640.0)
     assert straight_ahead[1] == pytest.approx(360.0 - model.K[1, 1] * np.tan(np.radians(2.0)), abs=0.1)
+
+
+def test_a_turned_camera_sees_vehicles_where_its_own_mount_shows_them() -> None:
+    red = "{id: 1, kind: car, lane: -2, ahead_m: 18, colour: '#ff1010', speed_mps: {0: 10}}"
+    scene = with_actors(red)
+    now, level = world_state.at(scene, 0.0), camera.calibration()
+    actual = true_camera(level, TURNED)
+    roadside = Roadside.build(scene.road, scene.seed, 0.0, 600.0)
+    drawn = camera.DrawnCamera(scene.road, roadside, scene.seed, turns_rad=most_turned_rad(TURNED))
+
+    def misses_px(calibrated: CameraCalibration) -> float:
+        rows, columns = np.nonzero(is_colour(drawn.image(now, actual), (2,), (0, 1), 60))
+        (seen,) = in_image(now, calibrated)
+        return float(
+            np.abs(np.subtract((columns.min(), rows.min(), columns.max(), rows.max()), seen.bbox))[[0, 2]].max()
+        )
+
+    assert misses_px(actual) < 6.0
+    assert misses_px(level) > 20.0
 
 
 @pytest.mark.parametrize("segments", ["{length_m: 2000}", "{length_m: 2000, curvature_per_m: 0.004}"])
