@@ -20,6 +20,7 @@ from pipeline.labels.cuboids.outline import extent
 from pipeline.labels.cuboids.points_of import whole_cluster
 from pipeline.labels.headings import Pose
 from pipeline.labels.model import LabelTrack, Sighting
+from pipeline.types import VEHICLES
 
 _WIDEST_M = 2.2
 """No car's body is wider: the widest measure 2.05 m, and the edges of a cluster vary by a beam's spacing."""
@@ -51,8 +52,8 @@ def turned_across(tracks: Sequence[LabelTrack], sweeps: Sweeps, poses: Mapping[i
 
     sweeps: of every frame. poses: own motion by frame, if known.
     """
-    bodies = [_by_shape(track, sweeps, poses) if _is_unsure(track) else _Body(track, True) for track in tracks]
-    waiting = [each for each in bodies if not each.is_known]
+    bodies = [_by_shape(track, sweeps, poses) if _may_turn(track) else _Body(track, _drives(track)) for track in tracks]
+    waiting = [each for each in bodies if not each.is_known and _may_turn(each.track)]
     known = [each for each in bodies if each.is_known]
     while found := [each for each in waiting if _follows(each, known)]:
         known = found
@@ -60,8 +61,13 @@ def turned_across(tracks: Sequence[LabelTrack], sweeps: Sweeps, poses: Mapping[i
     return tuple(each.track for each in bodies)
 
 
-def _is_unsure(track: LabelTrack) -> bool:
+def _may_turn(track: LabelTrack) -> bool:
     return track.label == "car" and track.heading != "motion"
+
+
+def _drives(track: LabelTrack) -> bool:
+    """Whether its motion shows the axis of a vehicle. People walk in any direction between cars."""
+    return track.label in VEHICLES and track.heading == "motion"
 
 
 def _by_shape(track: LabelTrack, sweeps: Sweeps, poses: Mapping[int, Pose]) -> _Body:

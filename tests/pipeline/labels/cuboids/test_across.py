@@ -82,6 +82,17 @@ def test_cars_beside_each_other_are_parallel_as_far_as_the_row_goes() -> None:
     assert [is_turned(*pair) for pair in zip(tracks, turned, strict=True)] == [True, True, True, False]
 
 
+def test_a_person_between_cars_turns_none() -> None:
+    """Nor does a parked truck, whose box is no better known."""
+    car, other = standing(20.0, 4.0), standing(22.0, 6.5, math.pi / 2)
+    seen = {0: scene(car, faces="rear")}
+    tracks = [track_of({0: car}), replace(track_of({0: other}), id=2, label="person")]
+    assert turned_across(tracks, seen.get, {})[0] == tracks[0]
+    assert turned_across([tracks[0], replace(tracks[1], label="truck")], seen.get, {})[0] == tracks[0]
+    driving = replace(tracks[1], label="truck", heading="motion")
+    assert is_turned(tracks[0], turned_across([tracks[0], driving], seen.get, {})[0])
+
+
 def test_a_track_has_one_axis_over_ground() -> None:
     """Its box was across in one frame; the car turned by 60° meanwhile, so that another seems to be."""
     cars = {0: standing(20.0, 4.0), 1: standing(19.0, 4.0), 2: standing(18.0, 4.0, math.radians(-60.0))}
