@@ -34,7 +34,7 @@ _FEWEST_POINTS = 5
 
 
 @dataclass
-class _Body:
+class _AxisOfTrack:
     """A track and what is known of its direction."""
 
     track: LabelTrack
@@ -52,7 +52,9 @@ def turned_across(tracks: Sequence[LabelTrack], sweeps: Sweeps, poses: Mapping[i
 
     sweeps: of every frame. poses: own motion by frame, if known.
     """
-    bodies = [_by_shape(track, sweeps, poses) if _may_turn(track) else _Body(track, _drives(track)) for track in tracks]
+    bodies = [
+        _by_shape(track, sweeps, poses) if _may_turn(track) else _AxisOfTrack(track, _drives(track)) for track in tracks
+    ]
     waiting = [each for each in bodies if not each.is_known and _may_turn(each.track)]
     known = [each for each in bodies if each.is_known]
     while found := [each for each in waiting if _follows(each, known)]:
@@ -70,24 +72,24 @@ def _drives(track: LabelTrack) -> bool:
     return track.label in VEHICLES and track.heading == "motion"
 
 
-def _by_shape(track: LabelTrack, sweeps: Sweeps, poses: Mapping[int, Pose]) -> _Body:
+def _by_shape(track: LabelTrack, sweeps: Sweeps, poses: Mapping[int, Pose]) -> _AxisOfTrack:
     """Turned if its points show a face across that is wider than a car, and consistently in all frames."""
     seen = {each.frame: _seen(each, sweeps) for each in track.sightings}
     with_points = {frame: each for frame, each in seen.items() if each is not None}
     if not with_points:
-        return _Body(track, False)
+        return _AxisOfTrack(track, False)
     best = max(with_points, key=lambda frame: (with_points[frame].is_long, with_points[frame].points))
     if not with_points[best].is_alone:
-        return _Body(track, False)
+        return _AxisOfTrack(track, False)
     track = _parallel(track, best, poses)
     whole = aggregated(track.sightings, best, sweeps, poses)
     cuboid = next(each.cuboid for each in track.sightings if each.frame == best)
     if whole is None or cuboid is None:
-        return _Body(track, False)
+        return _AxisOfTrack(track, False)
     along, across = extent(whole.points, cuboid.yaw_rad)
     if _is_side(across, along):
-        return _Body(_turned(track), True)
-    return _Body(track, _is_side(along, across))
+        return _AxisOfTrack(_turned(track), True)
+    return _AxisOfTrack(track, _is_side(along, across))
 
 
 def _is_side(side_m: float, other_m: float) -> bool:
@@ -96,7 +98,7 @@ def _is_side(side_m: float, other_m: float) -> bool:
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _InSweep:
     """A vehicle in one sweep."""
 
     points: int
@@ -107,13 +109,13 @@ class _Seen:
     """Whether its cluster is no longer than a car."""
 
 
-def _seen(sighting: Sighting, sweeps: Sweeps) -> _Seen | None:
+def _seen(sighting: Sighting, sweeps: Sweeps) -> _InSweep | None:
     sweep = sweeps(sighting.frame)
     points = whole_cluster(sweep, sighting.cuboid) if sweep is not None and sighting.cuboid is not None else None
     if points is None or len(points) < _FEWEST_POINTS or sighting.cuboid is None:
         return None
     sides = extent(points, sighting.cuboid.yaw_rad)
-    return _Seen(len(points), _is_side(float(sides.max()), float(sides.min())), float(sides.max()) <= _LONGEST_M)
+    return _InSweep(len(points), _is_side(float(sides.max()), float(sides.min())), float(sides.max()) <= _LONGEST_M)
 
 
 def _parallel(track: LabelTrack, best: int, poses: Mapping[int, Pose]) -> LabelTrack:
@@ -131,7 +133,7 @@ def _own_turn_rad(a: int, b: int, poses: Mapping[int, Pose]) -> float:
     return to.yaw_rad - at.yaw_rad if at and to and at.stretch == to.stretch else 0.0
 
 
-def _follows(body: _Body, known: Sequence[_Body]) -> bool:
+def _follows(body: _AxisOfTrack, known: Sequence[_AxisOfTrack]) -> bool:
     """Whether known ones beside it show its direction; it is turned accordingly, and known from now on."""
     mine = body.cuboids
     beside = [
