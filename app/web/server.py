@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import socket
 import ssl
 import threading
@@ -11,14 +10,11 @@ from collections.abc import AsyncIterator, Callable, Iterable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import uvicorn
 from fastapi import Depends, FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
-from fastapi.staticfiles import StaticFiles
-from starlette.types import Scope
 
 from app.clips.export_queue import ExportQueue
 from app.core.shared_view_state import SharedViewState
@@ -42,6 +38,7 @@ from app.web.guards.own_name import own_name
 from app.web.guards.quotas import RoleQuota
 from app.web.guards.tokens import Tokens
 from app.web.metrics import Metrics
+from app.web.page_files import PageFiles
 from app.web.routers import ROUTERS, Services
 from app.web.routes.labels.files import IMPORT
 from pipeline.common.errors import BadInput
@@ -50,7 +47,6 @@ from pipeline.common.files.user_files import Overloaded
 _BACKLOG = 100
 """Connections queued by the system until they are accepted. When file descriptors run out, Python 3.11 tries to accept
 this many at once."""
-STATIC = Path(__file__).resolve().parents[2] / "static"
 
 
 def create_app(
@@ -117,7 +113,7 @@ def create_app(
         app.include_router(make_router(services))
     app.include_router(viser_router(viser_port, access.allowed))
     app.add_api_route("/palette.css", _palette, include_in_schema=False)
-    app.mount("/", _Pages(engine.drives.turn.asked), name="pages")
+    app.mount("/", PageFiles(engine.drives.turn.asked), name="pages")
     return app
 
 
@@ -196,30 +192,6 @@ class Server(uvicorn.Server):
                 print(f"in-vehicle display: {self._address}/drive/?token={self._tokens.shown('display')}", flush=True)
             if self._on_ready is not None:
                 await asyncio.to_thread(self._on_ready, link)
-
-
-def _file_of(path: str) -> str:
-    """Path under ``static/`` for a page's address: the in-vehicle page is served as ``/drive/``."""
-    first, *rest = Path(path).parts or ("",)
-    return os.path.join("incar", *rest) if first == "drive" else path
-
-
-class _Pages(StaticFiles):
-    """Static files that browsers revalidate each time, so that an update is never half applied. on_ask: called for each
-    of them, because a user waits for a page."""
-
-    def __init__(self, on_ask: Callable[[], object]) -> None:
-        super().__init__(directory=STATIC, html=True)
-        self._on_ask = on_ask
-
-    async def get_response(self, path: str, scope: Scope) -> Response:
-        self._on_ask()
-        return await super().get_response(_file_of(path), scope)
-
-    def file_response(self, *args: Any, **kwargs: Any) -> Response:
-        response = super().file_response(*args, **kwargs)
-        response.headers["cache-control"] = "no-cache"
-        return response
 
 
 def _overloaded(_: Request, error: Exception) -> Response:

@@ -37,7 +37,8 @@ _SILENT_RAYS = 10
 """Minimum number of rays without a return for this to be evidence: two rings, 1° each."""
 _SILENT_M = 36.0
 """Closer than this, the body of a vehicle returns rays whatever its paint. Measured for vehicles within 30 m (see
-``existence``), whose position uncertainty extends to this distance."""
+``existence``), whose position uncertainty extends to this distance. Missing returns say nothing of an object that may
+be farther away, its tail included."""
 NEAR_M = 20.0
 """Closer than this, every vehicle has a cluster: of 47 labelled ones on Astyx and KITTI, none was seen by the camera
 alone."""
@@ -50,6 +51,9 @@ _MIN_RING = 5
 """Number of returns of a ring ahead needed to determine its elevation."""
 _SIGMAS, _MARGIN_M = 2.0, 1.0
 """The searched range extends this many standard deviations plus a metre to either side of the reported distance."""
+_TAIL_SIGMAS = 1.5
+"""What stands above the road in the object's direction, up to so many more standard deviations beyond that range, may
+be the object itself, so a ray that ended there says nothing: a box drawn too high stays so for seconds."""
 _FLANK_M = 3.0
 """If a vehicle stands at an angle, its middle is up to this much farther than its nearest corner."""
 
@@ -143,11 +147,12 @@ def rays_to(objects: tuple[FusedObject, ...], sweep: SweepRays) -> dict[int, Ray
         return {}
     origin = sweep.origin
     places = np.array([_place(item, origin) for item in asked])
+    tails = np.array([_TAIL_SIGMAS * (item.distance_sigma_m or 0.0) for item in asked])
     ends = np.concatenate([places[:, :2] * places[:, 2:3], places[:, :2] * places[:, 3:4]]) + np.array(origin[:2])
     road = sweep.ground.height(ends).reshape(2, -1).T - origin[2]
     at = np.asarray(origin, dtype=np.float64)
     beams = _beams(sweep.points, sweep.ring, at)
-    wanted = np.concatenate([places, road], axis=1)
+    wanted = np.concatenate([places, road, tails[:, None]], axis=1)
     rows = _count(sweep.points, sweep.ring, sweep.kind, at, wanted, beams.slope, beams.step_rad, _SILENT_M)
     return {item.id: Rays(*row) for item, row in zip(asked, rows.tolist(), strict=True)}
 
@@ -175,7 +180,7 @@ def _beams(points: F32, ring: U8, origin: F64) -> _Beams:
 
 def warm_up() -> None:
     """Compile the kernels."""
-    place = np.array([[1.0, 0.0, 1.0, 2.0, 1.0, 0.0, 0.0]])
+    place = np.array([[1.0, 0.0, 1.0, 2.0, 1.0, 0.0, 0.0, 0.0]])
     kind, origin = np.zeros(2, np.int32), np.zeros(3)
     for points, ring in made_sweeps():
         slope, _ = _slopes(points, ring, origin)
@@ -218,7 +223,7 @@ def _diamond(x, y):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 @numba.njit(cache=True, nogil=True)
 def _by_direction(places):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """The places (K, 7), as in ``_count``, that may lie in each direction: those of bin b are
+    """The places (K, 8), as in ``_count``, that may lie in each direction: those of bin b are
     ``which[first[b] : first[b + 1]]``."""
     reached = np.zeros((_BINS, len(places)), np.bool_)
     for k in range(len(places)):
@@ -238,7 +243,7 @@ def _by_direction(places):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 @numba.njit(cache=True, nogil=True)
 def _slices(places):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """The slices of the places (K, 7), as in ``_count``: (K,) their number, and (K, most) for each the distance of its
+    """The slices of the places (K, 8), as in ``_count``: (K,) their number, and (K, most) for each the distance of its
     middle and the height of the road there above that at the near end."""
     counts = np.empty(len(places), np.int64)
     middles, roads = np.empty((len(places), _MOST_SLICES)), np.empty((len(places), _MOST_SLICES))
@@ -254,8 +259,8 @@ def _slices(places):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 @numba.njit(cache=True, nogil=True)
 def _count(points, ring, kind, origin, places, slope, step_rad, silent_m):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(K, 6) fields of ``Rays`` for (K, 7) places: unit x, y, near, far, tangent of half the angle, and the road's
-    height at near and far, all relative to ``origin``. slope, step_rad: the beams."""
+    """(K, 6) fields of ``Rays`` for (K, 8) places: unit x, y, near, far, tangent of half the angle, height of the road
+    at near and far, and how far beyond far the object may be, all relative to ``origin``. slope, step_rad: beams."""
     out = np.zeros((len(places), 6))
     through, stopped = np.zeros((len(places), _MOST_SLICES)), np.zeros((len(places), _MOST_SLICES))
     taken = np.zeros((len(places), _MOST_SLICES))
@@ -272,7 +277,10 @@ def _count(points, ring, kind, origin, places, slope, step_rad, silent_m):  # ty
             seen[k, ring[i]] += 1.0
             near, deep = places[k, 2], places[k, 3] - places[k, 2]
             over_road = z - places[k, 5] - (places[k, 6] - places[k, 5]) * (along - near) / deep
-            hidden[k] += over_road > _BODY_LOW_M and (along < near or 0.0 < along - places[k, 3] < _FLANK_M)
+            beyond = along - places[k, 3]
+            hidden[k] += over_road > _BODY_LOW_M and (along < near or 0.0 < beyond < _FLANK_M)
+            if over_road > _BODY_LOW_M and 0.0 < beyond < places[k, 7]:
+                continue
             half = 0.5 * deep / counts[k]
             for b in range(counts[k]):
                 at = middles[k, b]
@@ -284,14 +292,15 @@ def _count(points, ring, kind, origin, places, slope, step_rad, silent_m):  # ty
                     stopped[k, b] += kind[i] < 0 and at - half <= along <= at + half
                     taken[k, b] += kind[i] >= 0 and at - half <= along <= at + half
     for k in range(len(places)):
-        rays, live = 2.0 * places[k, 4] / step_rad, seen[k].sum() >= MIN_RAYS and hidden[k] < MIN_RAYS
+        is_near = places[k, 3] + places[k, 7] <= silent_m
+        rays, live = 2.0 * places[k, 4] / step_rad, is_near and seen[k].sum() >= MIN_RAYS and hidden[k] < MIN_RAYS
         out[k, 0] = out[k, 3] = out[k, 4] = out[k, 5] = np.inf
         for b in range(counts[k]):
             at = middles[k, b]
             silent = 0.0
             for c in range(len(slope)):
                 height = slope[c] * at - places[k, 5] - roads[k, b]
-                if live and at <= silent_m and _BODY_LOW_M <= height <= _BODY_HIGH_M:
+                if live and _BODY_LOW_M <= height <= _BODY_HIGH_M:
                     silent += max(rays - seen[k, c], 0.0)
             passed, ended = through[k, b] + silent, stopped[k, b] + taken[k, b]
             out[k, 0] = min(out[k, 0], through[k, b])

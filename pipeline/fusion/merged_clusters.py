@@ -19,7 +19,7 @@ from pipeline.common.geometry import F64
 from pipeline.fusion.returns import HIGH_M, LOW_M, SweepReturns
 from pipeline.fusion.vehicle_sizes import largest_size_m
 from pipeline.params import FusionParams
-from pipeline.types import VEHICLES, Obstacle, VisionMeasurement
+from pipeline.types import VEHICLES, Ground, Obstacle, VisionMeasurement
 
 FARTHEST_M = 30.0
 """Beyond this, points are few, and ``returns`` ranges boxes by single ones."""
@@ -33,11 +33,16 @@ _GAP_M, _FEWEST = 0.5, 20
 30 m returns 30 points."""
 _FACE_M = 0.5
 """Depth of the nearest face. The vehicle is where these points are. In the middle of its box, whose points may be
-metres farther away, a vehicle beside the path would seem to be in it: of four boxes on a car whose flank Astyx shows,
-the middle is 1.0 m nearer to the path than its nearest corner, the face 0.1 m."""
+metres farther away, a vehicle parked beside the path would seem to be in it."""
 _COVERED = 0.5
 """Share of the box's width over which the group must extend: in a row of parked cars, the flank of a nearer one reaches
 into the box of the next."""
+
+
+_BESIDE_FROM, _BESIDE_TO, _ON_LINE_M = 0.05, 0.3, 0.3
+"""A fence, a hedge or a wall before a vehicle is about as straight as the third, leaves the box on both sides, and goes
+on there: between the first two, in box widths. A vehicle's face ends in the box. Boxes that the image's edge cuts are
+exempt, because the vehicle goes on there itself."""
 
 
 class SweepWithClusters(SweepReturns, Protocol):
@@ -98,6 +103,8 @@ def _ranged(
         return seen
     nearest_m = float(range_m[rows[0]])
     if seen.distance_m is not None and seen.sigma_m is not None:
+        if _continues(points, uv[:, 0], sweep.ground, inside[rows], (x1, x2)):
+            return seen  # a fence or a hedge before the vehicle
         if abs(nearest_m - seen.distance_m) > params.range_gate_sigmas * seen.sigma_m:
             return seen  # a nearer vehicle of the same cluster
     else:
@@ -111,6 +118,22 @@ def _ranged(
         ranged_sigma_m=SIGMA_M,
         returns=len(rows),
     )
+
+
+def _continues(points: F64, u: F64, ground: Ground, group: F64, edges_px: tuple[float, float]) -> bool:
+    """Whether a group of points (M, 3) is a straight line that goes on beyond both sides of a box. points, u: (N, 3)
+    and (N,) columns of all long clusters."""
+    middle = group[:, :2].mean(axis=0)
+    normal = np.linalg.svd(group[:, :2] - middle, full_matrices=False)[2][1]
+    if np.sqrt(np.mean(((group[:, :2] - middle) @ normal) ** 2)) > _ON_LINE_M:
+        return False
+    above_m = ground.above(points)
+    with np.errstate(invalid="ignore"):
+        on_line = (above_m > LOW_M) & (above_m < HIGH_M) & (np.abs((points[:, :2] - middle) @ normal) < _ON_LINE_M)
+        (left_px, right_px), width = edges_px, edges_px[1] - edges_px[0]
+        is_left = (u > left_px - _BESIDE_TO * width) & (u < left_px - _BESIDE_FROM * width)
+        is_right = (u > right_px + _BESIDE_FROM * width) & (u < right_px + _BESIDE_TO * width)
+    return bool((on_line & is_left).any() and (on_line & is_right).any())
 
 
 def _is_inside(uv: F64, bbox: tuple[float, float, float, float]) -> np.ndarray:

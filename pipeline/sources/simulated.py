@@ -53,8 +53,8 @@ class SimulatedSource:
 
     def frame(self, index: int) -> Frame:
         now = self._world(index)
-        shot = self._senses.shot(now, index, self._sensors.camera)
-        seen = self._sensors.frame(now, index, self.t_ns(index), image=shot is not None, shot=shot)
+        exposure = self._senses.exposure(now, index, self._sensors.camera)
+        seen = self._sensors.frame(now, index, self.t_ns(index), image=exposure is not None, exposure=exposure)
         return self._senses.sensed(seen, now)
 
     def outlines(self) -> Iterator[Frame]:

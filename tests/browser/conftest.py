@@ -12,8 +12,6 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, ViewportSize, expect, sync_playwright
-from starlette.datastructures import MutableHeaders
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.bench.page.devtools import CHROMIUM, FLAGS
 from app.core.server_address import listen_socket
@@ -61,23 +59,6 @@ class CountedDetector:
         return RawBoxes(self.name, np.zeros((0, 4), np.float32), np.zeros(0, np.float32), ())
 
 
-class FilesStay:
-    """Lets a browser cache the page's files, which do not change during tests: revalidating them takes half the time of
-    opening a page. (The server's real cache headers are tested in tests/app/web/test_api.py.)"""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        async def say(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                MutableHeaders(scope=message)["cache-control"] = "max-age=3600"
-            await send(message)
-
-        stays = scope["type"] == "http" and scope["path"].endswith((".js", ".css", ".svg"))
-        await self._app(scope, receive, say if stays else send)
-
-
 @dataclass
 class Site:
     """A running dashboard. ``stop`` ends its server; for the pages, that looks like a crash."""
@@ -105,7 +86,6 @@ class Site:
         self.port = bound.getsockname()[1]
         viser_port = self.scene.port if self.scene is not None else lambda: None
         app = create_app(self.engine, viser_port, looks=self.looks, fleet=self.fleet)
-        app.add_middleware(FilesStay)
         server = Server(app, self.address, lambda _: is_ready.set())
         self._server, self._thread = server, threading.Thread(target=lambda: server.run(sockets=[bound]))
         self._thread.start()

@@ -45,8 +45,9 @@ _LABEL_ROLES: dict[tuple[str, str], AccountRole] = {
 _COOKIE_DAYS = 400
 """The longest lifetime that browsers permit: a display in a car has no keyboard to type a link again."""
 
+_SCRIPTS = "script-src 'self'"
 _POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
+    f"default-src 'none'; {_SCRIPTS}; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
     "frame-src 'self'; font-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
 _SECURITY_HEADERS = {
@@ -58,6 +59,11 @@ _SECURITY_HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "permissions-policy": "camera=(), microphone=(), geolocation=()",
 }
+
+
+def page_policy(inline: str) -> str:
+    """The content security policy of a page with one inline script. inline: its SHA-256, base64."""
+    return _POLICY.replace(_SCRIPTS, f"{_SCRIPTS} 'sha256-{inline}'")
 
 
 _GUESSER_WAITS_S = 1.0

@@ -31,7 +31,7 @@ class Simulator(Protocol):
         ...
 
 
-class Shot(NamedTuple):
+class Exposure(NamedTuple):
     """What an image shows."""
 
     world: World
@@ -51,11 +51,11 @@ class SensorRig:
             scenario.road, scenario.seed, scenario.ego.start_m - _BEFORE_M, end_m + _BEYOND_M
         )
 
-    def frame(self, now: World, index: int, t_ns: int, image: bool = True, shot: Shot | None = None) -> Frame:
+    def frame(self, now: World, index: int, t_ns: int, image: bool = True, exposure: Exposure | None = None) -> Frame:
         """What the sensors deliver at one tick. image: render the camera's image; without it the frame is made ten
-        times faster and still has the camera calibration. shot: when and where to the camera really looks; None if now
+        times faster and still has the camera calibration. exposure: when and where the camera really looks; None if now
         and as calibrated."""
-        seen = shot or Shot(now, self.camera)
+        seen = exposure or Exposure(now, self.camera)
         return evolve(
             self.outline(now, index, t_ns),
             sweep=self.sweep(now, index, t_ns),

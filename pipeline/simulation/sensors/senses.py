@@ -16,7 +16,7 @@ from pipeline.simulation.sensors import truth_boxes
 from pipeline.simulation.sensors.detection_model import Detections
 from pipeline.simulation.sensors.faults import NONE, disturb_sweep, nods_rad, true_camera
 from pipeline.simulation.sensors.real_detector import RealDetector
-from pipeline.simulation.sensors.rig import Shot
+from pipeline.simulation.sensors.rig import Exposure
 from pipeline.simulation.sensors.truth_lanes import lane_points
 from pipeline.simulation.world import world_state
 from pipeline.simulation.world.world_state import World
@@ -49,26 +49,26 @@ class Senses:
             return sweep
         return disturb_sweep(sweep, self._faults, self._scenario.seed, index, self._nod_rad(index))
 
-    def shot(self, now: World, index: int, camera: CameraCalibration) -> Shot | None:
+    def exposure(self, now: World, index: int, camera: CameraCalibration) -> Exposure | None:
         """What the image of this frame shows, with the scenario's faults; None if it is lost. camera: its
         calibration."""
         scene, faults = self._scenario, self._faults
         if faults == NONE:
-            return Shot(now, camera)
+            return Exposure(now, camera)
         if np.random.default_rng([scene.seed, 22, index]).random() < faults.pictures_lost:
             return None
         camera = true_camera(camera, faults, self._nod_rad(index), now.t_s)
         if faults.camera_skew_ms:
             now = world_state.at(scene, max(now.t_s + faults.camera_skew_ms / 1e3, 0.0))
-        return Shot(now, camera)
+        return Exposure(now, camera)
 
     def _detected(self, frame: Frame, now: World, noise: Detections) -> Frame:
         scene, seed, index = self._scenario, self._scenario.seed, frame.index
         assert frame.camera is not None
-        shot = self.shot(now, index, frame.camera)
-        if shot is None:
+        exposure = self.exposure(now, index, frame.camera)
+        if exposure is None:
             return frame
-        now, camera = shot
+        now, camera = exposure
         boxes = None
         if noise.measured:
             boxes = self._detector.boxes(now, camera, index)

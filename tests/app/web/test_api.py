@@ -28,12 +28,6 @@ def test_health_state_and_result(client: httpx.Client, engine: Engine):
     assert client.get("/api/result").json() == json.loads(json.dumps(to_json(tick.result)))
 
 
-def test_a_browser_asks_about_the_pages_files_again_so_that_none_is_of_an_older_version(client):
-    first = client.get("/js/main.js")
-    assert first.headers["cache-control"] == "no-cache"
-    assert client.get("/js/main.js", headers={"if-none-match": first.headers["etag"]}).status_code == 304
-
-
 def test_every_parameter_is_described_with_bounds_unit_and_help(client: httpx.Client):
     answer = client.get("/api/params").json()
     described = {f"{s['name']}.{p['key']}": p for s in answer["sections"] for p in s["params"]}

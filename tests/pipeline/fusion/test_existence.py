@@ -152,10 +152,23 @@ def test_rays_start_at_the_sensor() -> None:
 
 
 def test_a_vague_distance_needs_rays_through_all_of_it() -> None:
-    """At 12 ± 1.2 m with a wall at 17 m, the car cannot exist. At 12 ± 4 m, it may be the wall."""
-    wall = Rays(returns(17.0))
+    """At 12 ± 1.2 m with a wall at 18 m, the car cannot exist. At 12 ± 4 m, it may be the wall."""
+    wall = Rays(returns(18.0))
     assert gate(after(camera_car(sigma_m=1.2), wall)) is False
     assert gate(after(camera_car(sigma_m=4.0), wall)) is True
+
+
+def test_what_stands_a_little_farther_away_than_its_box_says_may_be_the_car() -> None:
+    """At 12 ± 1.2 m, the car cannot be at 18 m, but perhaps at 16.5 m. The road farther away is no car."""
+    wall, road = after(camera_car(), Rays(returns(16.5))), after(camera_car(), Rays(returns(40.0, height_m=0.0)))
+    assert (gate(wall), wall.existence) == (None, after(camera_car(), Rays(NOTHING)).existence)
+    assert gate(road) is False
+
+
+def test_missing_returns_say_nothing_of_a_car_that_may_be_too_far() -> None:
+    missing = Rays(np.concatenate([ASIDE, TARMAC]))
+    assert gate(after(camera_car(27.0, sigma_m=1.0), missing)) is False
+    assert gate(after(camera_car(27.0, sigma_m=2.7), missing)) is None
 
 
 def test_rays_that_end_somewhere_in_a_vague_distance_do_not_speak_for_it() -> None:

@@ -131,6 +131,28 @@ def test_a_vehicle_beside_the_path_is_where_its_nearest_points_are(distance_m: f
     assert middle[1] * found.ranged_m > -1.7, "the middle of the box would be in the path"
 
 
+@dataclass(frozen=True)
+class Fence(Scene):
+    """A fence that runs past the car, between it and the sensor."""
+
+    half_m: float = 8.0
+    """Half of its length."""
+
+    @property
+    def points(self) -> F32:
+        points = super().points
+        along = np.linspace(-self.half_m, self.half_m, self.car_points)
+        points[: self.car_points, 0], points[: self.car_points, 1] = CAR_M + 0.2 * along, along
+        return points
+
+
+def test_a_fence_that_goes_on_beside_the_box_is_no_face() -> None:
+    seen = VisionMeasurement(Detection((850.0, 150.0, 1170.0, 618.0), "car", 0.8), 9.0, 0.9, (9.0, 0.0))
+    assert ranged(seen, Fence()) == seen
+    ends_with_it = ranged(seen, Fence(half_m=0.8))
+    assert ends_with_it.ranged_m == pytest.approx(CAR_M, abs=0.3)
+
+
 def test_a_few_points_before_the_hedge_are_no_face() -> None:
     assert ranged(box(), Scene(car_points=10)).ranged_m == pytest.approx(HEDGE_M, abs=0.2)
 

@@ -126,9 +126,8 @@ export function setUp() {
     setNewLabel(kind.value);
     kind.blur();
   });
-  name.addEventListener("click", async () => {
-    if (!hasAccount()) await askName();
-    reflect();
+  name.addEventListener("click", () => {
+    if (!hasAccount()) void askName();
   });
   const next = (/** @type {string} */ words, /** @type {string} */ title, /** @type {commands.Wanted} */ what) =>
     el("button", {
