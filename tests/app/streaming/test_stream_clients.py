@@ -369,6 +369,7 @@ def test_playback_is_paused_when_no_page_follows_it(site: Site):
         go_to(labeling, 2)
         assert len(site.pauses) == 1, "sensors go on"
     with site.connected("?own=1") as reloaded:
+        header_where(reloaded, lambda header: index_of(header) == 1)  # it has come
         site.show(4, playing=True)
         go_to(reloaded, 2)
         assert len(site.pauses) == 2, "who watched has gone"
