@@ -23,7 +23,7 @@ import asyncio
 import json
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -65,9 +65,16 @@ class _Encoded:
 class Stream:
     """Between the engine's thread, which publishes, and the clients' slots on the event loop."""
 
-    def __init__(self, looks: SharedViewState | None = None, frames: PageFrames | None = None) -> None:
-        """frames: for pages with their own playhead; without it all pages follow the shared one."""
+    def __init__(
+        self,
+        looks: SharedViewState | None = None,
+        frames: PageFrames | None = None,
+        pause: Callable[[], object] = lambda: None,
+    ) -> None:
+        """frames: for pages with their own playhead; without it all pages follow the shared one. pause: stops the
+        playback of a recording; called if every connected page has its own playhead, so that nobody follows it."""
         self.traffic = FrameCounts()
+        self._pause = pause
         self._page_frames = frames
         self._pages = ThreadPoolExecutor(1, "cipv-pages")
         self._looks = looks or SharedViewState()
@@ -162,6 +169,15 @@ class Stream:
                 index, self._page_frames, self._pages, self._newest, lambda *each: self._tell_own(slot, *each)
             )
         slot.own.show(index)
+        self._pause_unfollowed()
+
+    def _pause_unfollowed(self) -> None:
+        """Playback that no page follows would only take processor time from those that label. A session that is being
+        recorded needs it."""
+        shown = self._snapshot
+        plays = shown is not None and shown.playing and not shown.live and shown.recording is None
+        if plays and all(slot.own is not None for slot in self._slots):
+            self._pause()
 
     def _newest(self) -> tuple[Snapshot | None, int]:
         """The shared snapshot, and the width of sent images. Any thread."""

@@ -67,7 +67,7 @@ def create_app(
     none. ``alignments``: saved alignments; None discards them at the end. ``fleet``: the tables that the Fleet view
     searches."""
     access = Access(hosts)
-    stream = Stream(looks, engine.page_frames)
+    stream = Stream(looks, engine.page_frames, lambda: engine.control.change(playing=False))
     exports, viewer, metrics = ExportQueue(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
     services = Services(
         engine,

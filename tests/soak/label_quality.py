@@ -52,6 +52,9 @@ FARTHEST_M = 50.0
 ENOUGH_POINTS = 5
 SAME_PLACE_M = 2.5
 """A track within this distance of a labelled vehicle in most frames is that vehicle."""
+SNAP_STEP_M = 10
+NOTABLE = 0.02
+"""A smaller change of the IoU is not counted."""
 START_M = 18.0
 """Extend starts at the frame in which a vehicle is about this far away."""
 
@@ -185,7 +188,7 @@ def report_clutter(name: str, drive: Drive, tracks: Sequence[LabelTrack]) -> Non
 
 def report_snap(name: str, drive: Drive) -> None:
     """Of cuboids drawn by hand on every labelled vehicle."""
-    rng, gains, left = np.random.default_rng(0), [], 0
+    rng, gains, far_m, left = np.random.default_rng(0), [], [], 0
     for track in vehicles(drive.truth):
         hand = hand_drawn(track.sightings, rng)
         for true, drawn in zip(track.sightings, hand, strict=True):
@@ -199,12 +202,18 @@ def report_snap(name: str, drive: Drive) -> None:
             except TooFewPoints:
                 continue
             gains.append(bev_iou(found.cuboid, true.cuboid) - bev_iou(drawn.cuboid, true.cuboid))
+            far_m.append(math.hypot(*true.cuboid.center[:2]))
             left += not found.is_better
-    gain = np.array(gains)
-    print(
-        f"{name}: Snap: {len(gain)} cuboids, left as they are {left / len(gain):.0%}, IoU better by 0.02 in "
-        f"{np.mean(gain > 0.02):.0%}, worse in {np.mean(gain < -0.02):.0%}, by 0.1 in {np.mean(gain < -0.1):.0%}"
-    )
+    gain, far = np.array(gains), np.array(far_m)
+    print(f"{name}: Snap: {len(gain)} cuboids, left as they are {left / len(gain):.0%}")
+    for first_m in range(0, int(FARTHEST_M), SNAP_STEP_M):
+        here = gain[(far >= first_m) & (far < first_m + SNAP_STEP_M)]
+        if len(here):
+            better, worse = int((here > NOTABLE).sum()), int((here < -NOTABLE).sum())
+            print(
+                f"{name}: Snap: {first_m}–{first_m + SNAP_STEP_M} m: {len(here)} cuboids, IoU better by {NOTABLE} in "
+                f"{better}, worse in {worse}, by {max(0.0, -here.min()):.2f} at most"
+            )
 
 
 def report_extend(name: str, drive: Drive) -> None:

@@ -67,7 +67,7 @@ def refitted(
         seen = lift(frame, params, track.label, sighting.bbox)
         if not seen.points:
             raise ActRefused(f"#{act.track}: {seen.how}; too rough for a label: draw it by hand")
-        cuboid, note = seen.cuboid, seen.how
+        cuboid, note = seen.cuboid, f"{seen.how}; check its front (Shift X reverses it)"
     placed = SetSighting(
         kind="set_sighting",
         track=act.track,

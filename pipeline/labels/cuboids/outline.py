@@ -71,6 +71,13 @@ def outline(points: F32, eyes: F64, yaw_rad: float) -> Outline:
     return Outline(axes, low, high, (seen[0], seen[1]), (firm[0], firm[1]), far)
 
 
+def extent(points: F32, yaw_rad: float) -> F64:
+    """(2,) length and width of (N, 4) points in this direction, without single points beside them."""
+    axes = np.array([[math.cos(yaw_rad), math.sin(yaw_rad)], [-math.sin(yaw_rad), math.cos(yaw_rad)]])
+    low, high = np.quantile(points[:, :2].astype(np.float64) @ axes.T, [_EDGE, 1.0 - _EDGE], axis=0)
+    return np.asarray(high - low)
+
+
 def _far_end_rad(eyes: F64, low: F64, high: F64) -> float:
     """eyes: (K, 2) along and across a side. low, high: (2,) extent of the points."""
     beside = np.maximum(low[1] - eyes[:, 1], eyes[:, 1] - high[1])

@@ -43,16 +43,27 @@ def clustered(sweep: F32) -> Clustered:
 
 
 def points_of(sweep: Clustered, cuboid: Cuboid) -> F32 | None:
-    """(M, 4) points of the cluster with the most points in the cuboid, else near it; None without one."""
-    near = inside(sweep.points, cuboid, MARGIN_M)
+    """(M, 4) points of the cluster with the most points in the cuboid, else near it, without those of anything grown
+    together with the vehicle; None without one."""
+    whole = _cluster(sweep, cuboid)
+    if whole is None:
+        return None
+    grown_together = bool((whole & ~inside(sweep.points, cuboid, _LONGEST_M)).any())
+    return sweep.points[whole & inside(sweep.points, cuboid, MARGIN_M)] if grown_together else sweep.points[whole]
+
+
+def whole_cluster(sweep: Clustered, cuboid: Cuboid) -> F32 | None:
+    """(M, 4) all points of the cluster that ``points_of`` takes points from; None without one."""
+    whole = _cluster(sweep, cuboid)
+    return sweep.points[whole] if whole is not None else None
+
+
+def _cluster(sweep: Clustered, cuboid: Cuboid) -> np.ndarray | None:
+    """(N,) bool."""
     found = sweep.labels[inside(sweep.points, cuboid, _INSIDE_M) & (sweep.labels >= 0)]
     if len(found) == 0:
-        found = sweep.labels[near & (sweep.labels >= 0)]
-    if len(found) == 0:
-        return None
-    whole = sweep.labels == np.bincount(found).argmax()
-    grown_together = bool((whole & ~inside(sweep.points, cuboid, _LONGEST_M)).any())
-    return sweep.points[whole & near] if grown_together else sweep.points[whole]
+        found = sweep.labels[inside(sweep.points, cuboid, MARGIN_M) & (sweep.labels >= 0)]
+    return sweep.labels == np.bincount(found).argmax() if len(found) else None
 
 
 def inside(points: F32, cuboid: Cuboid, margin_m: float) -> np.ndarray:

@@ -1,7 +1,8 @@
 """Boxes in images as COCO has them (Lin et al. 2014; cocodataset.org, "Data format"), with the ``videos`` and
 ``tracks`` that TAO adds for objects over time (Dave et al. 2020).
 
-``bbox`` is left, top, width, height in pixels of the raw image. ``id`` of an image is 1 + the frame.
+``bbox`` is left, top, width, height in pixels of the raw image. ``id`` of an image is 1 + the frame. Regions without
+labels are ``iscrowd``, which scores and most training code ignore.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pathlib import Path
 from pydantic import BaseModel, Field, TypeAdapter
 
 from pipeline.common.errors import BadInput
+from pipeline.formats.kitti_records import UNLABELLED
 from pipeline.labels.formats.base import Imported, LabeledDrive, write_file
 from pipeline.labels.formats.reading import parse_as, read_bytes
 from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
@@ -131,7 +133,7 @@ def _annotations(labels: LabelSet, categories: dict[str, int]) -> list[dict[str,
             "category_id": categories[label],
             "bbox": [x1, y1, x2 - x1, y2 - y1],
             "area": (x2 - x1) * (y2 - y1),
-            "iscrowd": 0,
+            "iscrowd": int(label == UNLABELLED),
             "segmentation": [],
             "track_id": track,
             "video_id": _VIDEO,

@@ -8,7 +8,8 @@ import struct
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
@@ -30,10 +31,12 @@ from app.web.server import Server
 from pipeline.common.geometry import Cuboid
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
+from pipeline.recording.recorder import RecordingState
 from pipeline.types import CameraImage
 from tests.app.engine.recording_helpers import CountingDetector, Recording
 
 WAIT_S = 180.0
+RECORDING = RecordingState(Path("a.mcap"), (Path("a.mcap"),), 1, 0.1, 9, 0, None)
 FAST_FRAMES = 40
 """More than the system's buffers hold between a server and a client that does not read."""
 
@@ -45,6 +48,8 @@ class Site:
     stream: Stream
     port: int
     first: Snapshot
+    pauses: list[bool] = field(default_factory=list)
+    """One entry for each time that the stream paused playback."""
 
     def show(self, sequence: int, **changes: Any) -> None:
         self.stream.publish(replace(self.first, sequence=sequence, index=sequence, **changes))
@@ -63,14 +68,15 @@ class Site:
 def site() -> Iterator[Site]:
     frames = PageFrames(nullcontext)
     frames.open(_pipeline())
-    stream = Stream(frames=frames)
+    pauses: list[bool] = []
+    stream = Stream(frames=frames, pause=lambda: pauses.append(True))
     bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
     app = Starlette(routes=[WebSocketRoute("/", stream.serve)])
     server = Server(app, "http://ready", lambda _: is_ready.set())  # type: ignore[arg-type]
     thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
     thread.start()
     assert is_ready.wait(WAIT_S)
-    site = Site(stream, bound.getsockname()[1], _first())
+    site = Site(stream, bound.getsockname()[1], _first(), pauses)
     site.show(0)
     yield site
     server.should_exit = True
@@ -344,6 +350,34 @@ def test_a_page_with_its_own_playhead_is_moved_by_nobody_and_moves_nobody(site: 
         assert not any(each["state"]["playing"] for each in came)
         own.send(json.dumps({"own": None}))
         assert index_of(header_where(own, lambda header: index_of(header) != 2)) == 5
+
+
+def test_playback_is_paused_when_no_page_follows_it(site: Site):
+    with site.connected() as watching, site.connected() as labeling:
+        next_header(watching)
+        next_header(labeling)
+        site.show(1, playing=True)
+        go_to(labeling, 3)
+        assert site.pauses == [], "somebody watches"
+        watching.send(json.dumps({"own": 2}))
+        header_where(watching, lambda header: index_of(header) == 2)
+        assert len(site.pauses) == 1
+        site.show(2, playing=True, recording=RECORDING)
+        go_to(labeling, 1)
+        assert len(site.pauses) == 1, "what is recorded goes on"
+        site.show(3, playing=True, live=True)
+        go_to(labeling, 2)
+        assert len(site.pauses) == 1, "sensors go on"
+    with site.connected("?own=1") as reloaded:
+        header_where(reloaded, lambda header: index_of(header) == 1)  # it has come
+        site.show(4, playing=True)
+        go_to(reloaded, 2)
+        assert len(site.pauses) == 2, "who watched has gone"
+
+
+def go_to(client: ClientConnection, index: int) -> None:
+    client.send(json.dumps({"own": index}))
+    header_where(client, lambda header: index_of(header) == index)
 
 
 def test_a_page_with_its_own_playhead_gets_its_frame_again_with_other_parameters_and_after_a_loss(site: Site):

@@ -12,6 +12,7 @@ import pytest
 from pipeline.alignment.projection import project_cuboid, resolve
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.cuboid_from_pixel import NothingThere, lift
+from pipeline.labels.cuboids import snap
 from pipeline.labels.cuboids.snap import TooFewPoints, refit
 from pipeline.params import Params
 from pipeline.sources import open_source
@@ -92,6 +93,14 @@ def test_of_a_car_seen_from_behind_length_and_turn_are_a_hands() -> None:
     assert found.cuboid.size == pytest.approx(car.size, abs=0.1)
     assert found.cuboid.center[0] == pytest.approx(15.0, abs=0.1)
     assert found.cuboid.center[2] == pytest.approx(car.center[2], abs=0.05)
+
+
+def test_a_part_seen_in_one_sweep_turns_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rear and a metre of the side: a corner has a yaw of its own."""
+    sweep, drawn = sweep_of(standing(13.4, 3.84, 0.1, (1.2, 1.8, 1.5))), standing(14.7, 4.1, 0.0)
+    assert not refit(sweep, drawn).turned
+    monkeypatch.setattr(snap, "_FEWEST_TO_TURN", 0)
+    assert refit(sweep, drawn).turned, "the points would have it so"
 
 
 def test_a_cuboid_that_is_too_small_grows() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from pipeline.common.geometry import Cuboid
+from pipeline.formats.kitti_records import UNLABELLED
 from pipeline.labels.formats.registry import FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelTrack, LeadRange, Origin, Sighting
 from tests.pipeline.labels.formats.sets import IMPORT, drive
@@ -31,6 +32,14 @@ def test_coco(tmp_path: Path) -> None:
     assert [first["image_id"], second["image_id"]] == [1, 2]
     image = coco["images"][1]
     assert (image["id"], image["width"], image["height"], image["frame_index"]) == (2, 1280, 720, 1)
+
+
+def test_coco_regions_without_labels_are_ignored_by_scores(tmp_path: Path) -> None:
+    labels = full_set()
+    region = LabelTrack(9, UNLABELLED, (Sighting(1, None, (10.0, 20.0, 60.0, 40.0)),), "accepted", IMPORT)
+    export_labels(replace(labels, tracks=(*labels.tracks, region)), drive(), "coco", tmp_path / "out")
+    annotations = json.loads((tmp_path / "out").read_text())["annotations"]
+    assert {each["track_id"]: each["iscrowd"] for each in annotations} == {3: 0, 5: 0, 9: 1}
 
 
 def test_openlabel(tmp_path: Path) -> None:
