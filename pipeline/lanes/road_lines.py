@@ -113,6 +113,11 @@ def follow(
     level_m = view.road_z_m if view.road_z_m is not None else -params.mount_height_m
     road = plane if plane is not None else np.array([0.0, 0.0, level_m])
 
+    # In front of a standing car only traffic moves, and the vehicle before it hides the lines
+    if now.stands and state.pitch is not None and tracking.is_settled(state.tracks, params):
+        lane = tracking.ego_lane(state.tracks, state.pitch.rad, road, params)
+        return LaneState(state.tracks, state.pitch, plane, sweeps), lane
+
     # A processed image gives lines on the road, and the pitch for which they are parallel
     pitch = _drifted(state.pitch, now.dt_s, params)
     measured = None

@@ -37,6 +37,9 @@ _SEEN_GAIN = 0.35
 _FADE_S = 0.8
 """Time in which the quality of an unseen line falls to a third."""
 _FORGOTTEN = 0.1
+_SETTLED = 10
+"""Number of images in which a line was seen, after which images of the same place say nothing new of it: their errors
+are the same, and would only make a wrong line look certain."""
 _UNKNOWN_DRIFT_MPS = 0.5
 """Lateral speed of lines assumed if own motion is not known."""
 _YAW_RATE_SIGMA_RADPS = 0.01
@@ -112,6 +115,11 @@ def update(tracks: LaneTracks, source: str, measured: tuple[FittedLine, ...], pa
     new = [found for j, found in enumerate(measured) if j not in pairs.values()]
     lines += [LineTrack(f.coefficients, f.covariance, f.x_min_m, f.x_max_m, f.quality) for f in new]
     return LaneTracks(tuple(line for line in lines if line.quality >= _FORGOTTEN), source, 0.0)
+
+
+def is_settled(tracks: LaneTracks, params: LaneParams) -> bool:
+    """Whether the lines of a standing car are known: further images of the same view say nothing new."""
+    return any(line.seen >= _SETTLED and _quality_now(line) >= params.min_quality for line in tracks.lines)
 
 
 def ego_lane(tracks: LaneTracks, pitch_rad: float, plane: F64, params: LaneParams) -> EgoLane | None:

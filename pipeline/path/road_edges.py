@@ -22,8 +22,6 @@ the time."""
 _DROVE_S = 0.5
 """A vehicle that the LiDAR has seen driving for so long and that then stands is traffic, not part of the roadside. To
 the camera alone, a parked car may seem to drive for as long."""
-_STANDS_MPS = 0.3
-"""A standing car learns nothing more about the road: what changes in front of it is traffic, not the roadside."""
 _LOWEST_M = 0.1
 """Minimum sensor height above the road; a lower value means that there is no road below it."""
 
@@ -86,7 +84,7 @@ def follow(
     ego, dt_s = now.ego, now.dt_s
     if ego is None or not params.use_edges:
         return EdgeState(), None
-    if abs(ego.speed_mps) < _STANDS_MPS and state.edges is not None:
+    if now.stands and state.edges is not None:
         return state, None if is_shown else state.edges
     # Structure beside the road from earlier sweeps, moved by own motion, and from this sweep; without vehicles that
     # drive or drove here, and without the trail that they left

@@ -8,6 +8,9 @@ from pipeline.types.frame import EgoState
 from pipeline.types.objects import FusedObject
 from pipeline.types.result import Cipv, Path
 
+STANDS_MPS = 0.3
+"""Odometry does not tell lower speeds from a standstill."""
+
 
 class Moment(NamedTuple):
     """Time of a frame, and the car's motion in it."""
@@ -30,6 +33,12 @@ class Moment(NamedTuple):
     def speed_mps(self) -> float | None:
         """Own speed while it is recent enough to drive by."""
         return self.ego.speed_mps if self.ego is not None else None
+
+    @property
+    def stands(self) -> bool:
+        """Whether the car stands, as far as is known. What changes in front of a standing car is traffic, not the
+        road."""
+        return self.ego is not None and abs(self.ego.speed_mps) < STANDS_MPS
 
 
 class Situation(NamedTuple):

@@ -264,3 +264,42 @@ def test_the_pitch_stays_where_it_is(curvature: float) -> None:
     assert lane.left is not None
     assert lane.left.x_max_m > 48.0
     assert float(lane.left.y_m(50.0)) == pytest.approx(1.75 + bends[2] * 2500.0, abs=0.6)
+
+
+ASIDE = ((3.3, 0.0, 0.0, 0.0), (-0.2, 0.0, 0.0, 0.0))
+"""What looks like a lane beside the real one while a vehicle hides the road."""
+
+
+def test_in_front_of_a_standing_car_the_lane_does_not_move() -> None:
+    state, before = LaneState(), None
+    for k in range(15):
+        ego = moment(EgoState(0, max(5.0 - 0.5 * k, 0.0), 0.0), 0.1 if k else None)
+        state, before = follow(state, paint(), RoadView(aligned()), ego, PARAMS)
+    assert before is not None
+    stands = moment(EgoState(0, 0.0, 0.0), 0.1)
+    for k in range(60):
+        raw = paint(ASIDE) if k % 3 else None
+        state, lane = follow(state, raw, RoadView(aligned()), stands, PARAMS)
+    assert lane is not None
+    for now, then in ((lane.left, before.left), (lane.right, before.right)):
+        assert now is not None
+        assert then is not None
+        assert now.coefficients == pytest.approx(then.coefficients, abs=0.01)
+        assert now.quality == pytest.approx(then.quality, abs=0.02)
+    drives = moment(EgoState(0, 5.0, 0.0), 0.1)
+    for _ in range(30):
+        state, lane = follow(state, paint(ASIDE), RoadView(aligned()), drives, PARAMS)
+    assert lane is not None
+    assert lane.left is not None
+    assert lane.left.coefficients[0] == pytest.approx(3.3, abs=0.2), "a lane that is really there is found again"
+
+
+def test_a_car_that_stands_from_the_start_finds_its_lane() -> None:
+    state = LaneState()
+    for k in range(20):
+        state, lane = follow(
+            state, paint(), RoadView(aligned()), moment(EgoState(0, 0.0, 0.0), 0.1 if k else None), PARAMS
+        )
+    assert lane is not None
+    assert lane.left is not None
+    assert lane.left.coefficients[0] == pytest.approx(1.75, abs=0.1)
