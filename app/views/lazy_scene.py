@@ -27,7 +27,7 @@ class LateScene:
                 from app.views.scene_feed import SceneFeed
 
                 self._port = self._running.enter_context(SceneFeed(self._engine, self._looks)).port
-                freeze_loaded_objects()
+                freeze_loaded_objects("viser")
             return self._port
 
     def __enter__(self) -> LateScene:

@@ -72,7 +72,7 @@ def serve(
             marks, audit = Marks(SESSIONS / "marks"), SESSIONS / "audit.jsonl"
             alignments = AlignmentVersions(SESSIONS / "alignments.json")
             app = create_app(engine, viser_port, (*hosts, host), marks, looks, tokens, audit, alignments, fleet)
-            freeze_loaded_objects()
+            freeze_loaded_objects("server")
             Server(app, address, on_ready, tokens, asked, context).run(sockets=[bound])
         finally:
             engine.stop()

@@ -15,6 +15,8 @@ from threading import Lock
 _COLLECT_AFTER = 5_000
 """More than the objects made in one frame; reference counting frees those when the next result replaces this one."""
 
+_FROZEN: set[str] = set()
+
 
 class _Pause:
     """Counts nested and concurrent pauses, so that collection resumes when the last one ends."""
@@ -50,19 +52,22 @@ def gc_paused() -> Iterator[None]:
         _PAUSE.end()
 
 
-def freeze_loaded_objects() -> None:
+def freeze_loaded_objects(loaded: str) -> None:
     """Exempt all existing objects from collection. Modules and compiled kernels live as long as the process, and a full
     collection that traverses them takes 0.1 s in the middle of a frame.
 
-    Call it again after a large import. It does not collect first: imports leave only a few dozen unreachable objects,
-    and finding them would add 0.06 s to every start.
+    loaded: what has just been imported, which happens once in a process. Only the first call with it has an effect: a
+    second one would exempt whatever else exists by then, such as a closed server with its images, for good. It does not
+    collect first: imports leave only a few dozen unreachable objects, and finding them would add 0.06 s to every start.
     """
-    gc.freeze()
+    if loaded not in _FROZEN:
+        _FROZEN.add(loaded)
+        gc.freeze()
 
 
 def collect_rarely() -> None:
     """Configure the collector for a process that runs the pipeline: loaded objects are exempt, and a generation-0
     collection runs only after more allocations than one frame makes."""
-    freeze_loaded_objects()
+    freeze_loaded_objects("pipeline")
     atexit.register(gc.unfreeze)  # otherwise extension modules report leaks at exit
     gc.set_threshold(_COLLECT_AFTER, *gc.get_threshold()[1:])

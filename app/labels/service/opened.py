@@ -59,7 +59,7 @@ class KeptLabels:
         with self._opening:
             if self._database is None:
                 self._database = (self._open_later or _temporary)()
-                freeze_loaded_objects()
+                freeze_loaded_objects("labels")
             return self._database
 
 

@@ -1,13 +1,14 @@
-"""Garbage collection is paused for as long as requested, and no longer."""
+"""Garbage collection is paused for as long as requested, and what is loaded is exempt from it, but nothing else."""
 
 from __future__ import annotations
 
 import gc
+import weakref
 from collections.abc import Iterator
 
 import pytest
 
-from pipeline.common.garbage_collection import gc_paused
+from pipeline.common.garbage_collection import freeze_loaded_objects, gc_paused
 
 
 @pytest.fixture(autouse=True)
@@ -39,3 +40,19 @@ def test_where_it_was_off_it_stays_off() -> None:
     with gc_paused():
         pass
     assert not gc.isenabled()
+
+
+def test_what_is_loaded_is_exempt_once_and_a_closed_server_is_not() -> None:
+    class Server:
+        def __init__(self) -> None:
+            self.itself = self
+
+    freeze_loaded_objects("a module of this test")
+    frozen = gc.get_freeze_count()
+    closed = Server()
+    gone = weakref.ref(closed)
+    del closed
+    freeze_loaded_objects("a module of this test")
+    assert gc.get_freeze_count() <= frozen
+    gc.collect()
+    assert gone() is None
