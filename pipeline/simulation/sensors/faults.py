@@ -61,8 +61,8 @@ NONE = Faults()
 
 
 def most_turned_rad(faults: Faults) -> float:
-    """An angle by which the faults never turn the camera in its mount more, about all axes together. Nods are normally
-    distributed, so it includes five of their standard deviations."""
+    """Upper limit of the angle by which the faults turn the camera, about all axes together. For nods, which are
+    normally distributed, five standard deviations."""
     knock = faults.knock or Knock(at_s=0.0)
     angles = (
         abs(faults.camera_yaw_deg) + abs(knock.yaw_deg),
