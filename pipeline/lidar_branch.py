@@ -9,11 +9,12 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 from pipeline.common.clips import begins_clip
+from pipeline.common.kalman import Transition
 from pipeline.common.stopwatch import Stopwatch
-from pipeline.ego_motion import coasting, own_motion
+from pipeline.ego_motion import coasting, frame_change, own_motion
 from pipeline.lidar import segmentation
 from pipeline.lidar import tracking as lidar_tracking
-from pipeline.params import Params, Section
+from pipeline.params import MotionParams, Params, Section
 from pipeline.path import yaw_rate
 from pipeline.types import EgoState, Frame, Ground, LidarTrack, Moment
 
@@ -63,6 +64,8 @@ class LidarBranch(NamedTuple):
     """For the next frame."""
     tracks: tuple[LidarTrack, ...]
     """The obstacles, tracked from sweep to sweep."""
+    change: Transition | None
+    """Of relative motion since the last frame, because the car turned, braked or accelerated."""
     timing_ms: dict[str, float]
     """Milliseconds by stage."""
     params: Params
@@ -80,22 +83,27 @@ def follow(before: Before, frame: Frame, params: Params, earlier: LidarBranch | 
     if earlier is not None and _motion_sections(params) == _motion_sections(earlier.params):
         if _lidar_sections(params) == _lidar_sections(earlier.params):
             return earlier._replace(params=params, timing_ms=dict.fromkeys(earlier.timing_ms, 0.0))
-        motion, now = earlier.motion, earlier.now
+        motion, now, change = earlier.motion, earlier.now, earlier.change
     else:
         motion = _measure_motion(before, frame, dt_s, params)
         last = before.own if dt_s is not None else None
         moved = coasting.follow(last, motion.ego, dt_s, params.motion)
         now = Moment(frame.t_ns, dt_s, moved, coasting.recent(moved, params.motion))
+        change = _frame_change(coasting.recent(last, params.motion), now, params.motion)
     clock.lap("own_motion")
 
     # Objects on the ground in this sweep, tracked from sweep to sweep
     tracker = before.lidar if dt_s is not None else lidar_tracking.LidarTrackerState()
     sweep = segmentation.segment(frame.sweep, now.ego, params, clock, tracker, dt_s)
-    tracker, tracks = lidar_tracking.track(tracker, sweep.obstacles, dt_s, params.lidar_tracking)
+    tracker, tracks = lidar_tracking.track(tracker, sweep.obstacles, dt_s, params.lidar_tracking, change)
     clock.lap("lidar_tracking")
     timing_ms = clock.timing_ms()
     del timing_ms["total"]
-    return LidarBranch(motion, now, sweep, tracker, tracks, timing_ms, params)
+    return LidarBranch(motion, now, sweep, tracker, tracks, change, timing_ms, params)
+
+
+def _frame_change(before: EgoState | None, now: Moment, params: MotionParams) -> Transition | None:
+    return frame_change.between(before, now.ego, now.dt_s) if params.keep_over_ground else None
 
 
 def _motion_sections(params: Params) -> tuple[Section, ...]:

@@ -108,7 +108,13 @@ def step(
     boxes = ground_contact.measure_contacts(boxes, road, aligned, params.fusion)
     clock.lap("distance")
     vision_state, vision_tracks = vision_tracking.track(
-        state.vision, boxes, now.dt_s, params.vision_tracking, now.speed_mps, _pan_pxps(aligned, now.ego)
+        state.vision,
+        boxes,
+        now.dt_s,
+        params.vision_tracking,
+        now.speed_mps,
+        _pan_pxps(aligned, now.ego),
+        lidar.change,
     )
     clock.lap("vision_tracking")
 

@@ -30,6 +30,15 @@ class CvState(NamedTuple):
     """(…, 4, 4) float64, symmetric, positive semi-definite."""
 
 
+class Transition(NamedTuple):
+    """A linear change of the state x → F x + b."""
+
+    matrix: F64
+    """(4, 4) float64 F."""
+    offset: F64
+    """(4,) float64 b."""
+
+
 def start(position: npt.ArrayLike, R: F64, speed_sigma: float) -> CvState:
     """State of a new track: the measured position, with velocity 0 ± ``speed_sigma`` m/s along each axis.
 
@@ -53,15 +62,22 @@ def unstacked(state: CvState) -> list[CvState]:
     return list(map(CvState, state.mean, state.cov))
 
 
-def predict(state: CvState, dt_s: float, accel_sigma: npt.ArrayLike) -> CvState:
+def predict(state: CvState, dt_s: float, accel_sigma: npt.ArrayLike, transition: Transition | None = None) -> CvState:
     """The state ``dt_s`` ≥ 0 seconds later. ``accel_sigma``: m/s², along each axis; for all filters, or (…) for
-    each. ValueError for a negative dt."""
+    each. transition: what the state becomes in that time; None for constant velocity. ValueError for a negative dt."""
     if dt_s < 0.0:
         raise ValueError(f"a filter cannot run back in time: dt = {dt_s} s")
+    F, b = transition if transition is not None else _constant_velocity(dt_s)
     mean, cov = state.mean.reshape(-1, 4), state.cov.reshape(-1, 4, 4)
     accel_var = np.zeros(len(mean)) + np.square(accel_sigma)
-    mean, cov = _predict(mean, cov, dt_s, accel_var)
+    mean, cov = _predict(mean, cov, F, b, dt_s, accel_var)
     return CvState(mean.reshape(state.mean.shape), cov.reshape(state.cov.shape))
+
+
+def _constant_velocity(dt_s: float) -> Transition:
+    F = np.eye(4)
+    F[0, 2] = F[1, 3] = dt_s
+    return Transition(F, np.zeros(4))
 
 
 def update(state: CvState, z: npt.ArrayLike, R: F64) -> CvState:
@@ -74,18 +90,26 @@ def update(state: CvState, z: npt.ArrayLike, R: F64) -> CvState:
 
 
 @numba.njit(cache=True, nogil=True)
-def _predict(mean, cov, dt, accel_var):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """F P Fᵀ + Q written out: position and velocity are two 2×2 blocks."""
-    new_mean, new_cov = mean.copy(), cov.copy()
+def _predict(mean, cov, F, b, dt, accel_var):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """F x + b and F P Fᵀ + Q, with loops written out: BLAS is slower for 4 × 4."""
+    new_mean, new_cov = np.empty_like(mean), np.empty_like(cov)
+    half = np.empty((4, 4))
     for t in range(len(mean)):
+        for i in range(4):
+            new_mean[t, i] = b[i]
+            for k in range(4):
+                new_mean[t, i] += F[i, k] * mean[t, k]
+            for j in range(4):
+                half[i, j] = 0.0
+                for k in range(4):
+                    half[i, j] += F[i, k] * cov[t, k, j]
+        for i in range(4):
+            for j in range(i + 1):
+                total = 0.0
+                for k in range(4):
+                    total += half[i, k] * F[j, k]
+                new_cov[t, i, j] = new_cov[t, j, i] = total
         for i in range(2):
-            new_mean[t, i] += dt * mean[t, i + 2]
-        for i in range(2):
-            for j in range(2):
-                vp, pv, vv = cov[t, i + 2, j], cov[t, i, j + 2], cov[t, i + 2, j + 2]
-                new_cov[t, i, j] += dt * (vp + pv) + dt * dt * vv
-                new_cov[t, i, j + 2] += dt * vv
-                new_cov[t, i + 2, j] += dt * vv
             new_cov[t, i, i] += accel_var[t] * dt**4 / 4
             new_cov[t, i, i + 2] += accel_var[t] * dt**3 / 2
             new_cov[t, i + 2, i] += accel_var[t] * dt**3 / 2

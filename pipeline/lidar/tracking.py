@@ -8,7 +8,7 @@ a cluster moves by metres when a vehicle's flank comes into view or leaves it, a
 corner to the other; the rear of a vehicle ahead is stable in both x and y. For oncoming traffic it is the front.
 
 The paper computes velocity "from the trajectory": ``trajectory`` fits a line to the last positions by their stamps.
-``kalman`` is a constant-velocity filter. Velocities are relative to ego.
+``kalman`` is a constant-velocity filter. Velocities are relative to ego, and change with own motion where it is known.
 """
 
 from __future__ import annotations
@@ -79,11 +79,13 @@ def track(
     obstacles: tuple[Obstacle, ...] | None,
     dt_s: float | None,
     params: LidarTrackingParams,
+    change: kalman.Transition | None = None,
 ) -> tuple[LidarTrackerState, tuple[LidarTrack, ...]]:
     """One tick: the next state, and all live tracks by ascending id.
 
     obstacles: None if the LiDAR delivered nothing; then every track is predicted without an update. dt_s: seconds ≥ 0
-    since the previous tick; None at the first tick, which drops earlier tracks.
+    since the previous tick; None at the first tick, which drops earlier tracks. change: of relative motion since then
+    (``pipeline.ego_motion.frame_change``); None if own motion is unknown.
     """
     if dt_s is None:
         state, dt_s = LidarTrackerState(next_id=state.next_id, clock_s=state.clock_s), 0.0
@@ -91,14 +93,15 @@ def track(
     clock_s = state.clock_s + dt_s
     sweep, has_sweep = obstacles or (), obstacles is not None
     seen = looks(sweep)
-    filters = kalman.predict(state.filters, dt_s, params.accel_sigma_mps2)
+    filters = kalman.predict(state.filters, dt_s, params.accel_sigma_mps2, change)
+    expected = filters.mean
     partner = associate(state, filters, seen, dt_s, params)
     jumped = _jumped(filters, seen, partner)
     filters = _correct(filters, seen.place, partner, params)
     where = np.concatenate([seen.place, seen.sides], axis=1)
     history = recorded(state.history, partner, where, clock_s, max(params.trajectory_frames, _SIDES_FRAMES))
-    velocity = filters.mean[:, 2:]
-    if params.filter == "trajectory":
+    velocity, is_filtered = filters.mean[:, 2:], params.filter == "kalman"
+    if not is_filtered:
         velocity = slopes(history[:, -params.trajectory_frames :, :3])
     sideways: list[float | None] = [None] * len(history)
     if params.rigid_sideways:
@@ -112,7 +115,7 @@ def track(
             steady = 0 if jumped[i] and last.hits > 1 else last.steady + 1
             tracks.append(LidarTrack(last.id, sweep[j], known, last.hits + 1, 0, False, 0.0, sideways[i], steady))
         elif _lives_on(last, last.unseen_s + dt_s, has_sweep, params):
-            tracks.append(_carried(last, dt_s))
+            tracks.append(_carried(last, dt_s, expected[i] - state.filters.mean[i] if is_filtered else None))
         else:
             continue
         rows.append(i)
@@ -261,16 +264,19 @@ def _lives_on(last: LidarTrack, unseen_s: float, has_sweep: bool, params: LidarT
     return not too_young and unseen_s <= params.max_missed_s + 1e-9
 
 
-def _carried(last: LidarTrack, dt_s: float) -> LidarTrack:
-    """The obstacle of an unseen track, moved by its velocity. It belongs to no cluster of this sweep (−1)."""
-    vx, vy = last.velocity_mps or (0.0, 0.0)
+def _carried(last: LidarTrack, dt_s: float, change: F64 | None) -> LidarTrack:
+    """The obstacle of an unseen track, moved with its filter. It belongs to no cluster of this sweep (−1). change: (4,)
+    of the filter's mean; None without a filter, where the last velocity goes on."""
+    velocity = last.velocity_mps
+    dx, dy = (each * dt_s for each in velocity or (0.0, 0.0))
+    if change is not None and velocity is not None:
+        dx, dy, dvx, dvy = change.tolist()
+        velocity = velocity[0] + dvx, velocity[1] + dvy
     _, cuboid, closest, points, density, spread = last.obstacle
-    there = Cuboid(_moved(cuboid.center, vx * dt_s, vy * dt_s), cuboid.size, cuboid.yaw_rad)
-    moved = Obstacle(-1, there, _moved(closest, vx * dt_s, vy * dt_s), points, density, spread)
+    there = Cuboid(_moved(cuboid.center, dx, dy), cuboid.size, cuboid.yaw_rad)
+    moved = Obstacle(-1, there, _moved(closest, dx, dy), points, density, spread)
     unseen_s = last.unseen_s + dt_s
-    return LidarTrack(
-        last.id, moved, last.velocity_mps, last.hits, last.missed + 1, True, unseen_s, last.rigid_mps, last.steady
-    )
+    return LidarTrack(last.id, moved, velocity, last.hits, last.missed + 1, True, unseen_s, last.rigid_mps, last.steady)
 
 
 def _moved(point: Point3, dx: float, dy: float) -> Point3:

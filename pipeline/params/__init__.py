@@ -127,7 +127,7 @@ class Params(Section):
 PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "default": {},
     "paper": {
-        "motion": {"source": "can"},
+        "motion": {"source": "can", "keep_over_ground": False},
         "cluster": {"divide_m": 3.0, "divide_tracked": False},
         "box": {"method": "axis_aligned"},
         "lidar_tracking": {"filter": "trajectory", "rigid_sideways": False},

@@ -24,6 +24,11 @@ class MotionParams(Section):
     coast_turn_radps2: float = slider(
         0.03, 0.001, 0.2, 0.001, "rad/s²", "Assumed change of the yaw rate while it is not measured"
     )
+    keep_over_ground: bool = choice(
+        True,
+        "From frame to frame, objects keep their velocity over the ground; off: their velocity relative to the car, "
+        "also while it turns or brakes",
+    )
 
 
 class PathParams(Section):

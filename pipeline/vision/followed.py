@@ -75,11 +75,13 @@ class PredictedPlace(NamedTuple):
     """How much its box has grown as the range changed."""
 
 
-def predict_places(followed: Sequence[Followed], dt_s: float, params: VisionTrackingParams) -> list[PredictedPlace]:
+def predict_places(
+    followed: Sequence[Followed], dt_s: float, change: kalman.Transition | None, params: VisionTrackingParams
+) -> list[PredictedPlace]:
     """The place of each object ``dt_s`` later. A place not measured for ``max_missed_s`` is forgotten, though its box
-    be seen (it may be too near to be measured)."""
+    be seen (it may be too near to be measured). change: of relative motion (``pipeline.ego_motion.frame_change``)."""
     known = [each.place_filter for each in followed if each.place_filter is not None]
-    moved = iter(kalman.unstacked(kalman.predict(kalman.stacked(known), dt_s, params.accel_sigma_mps2)))
+    moved = iter(kalman.unstacked(kalman.predict(kalman.stacked(known), dt_s, params.accel_sigma_mps2, change)))
     return [
         _predicted(each, each.place_filter, next(moved), dt_s, params)
         if each.place_filter is not None

@@ -49,6 +49,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "ACC acts on one frame": {"acc.confirm_frames": 1},
     "no confirmation": {"cipv.confirm_hits": 1},
     "in path decided per frame": {"cipv.decide_s": 0.0},
+    "motion kept relative to the car": {"motion.keep_over_ground": False},
     "no innovation gate": {"vision_tracking.max_nis": 1000.0},
     "wide camera gate": {"vision_tracking.gate_sigmas": 10.0},
     "no road edges": {"path.use_edges": False},
