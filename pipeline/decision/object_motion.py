@@ -19,6 +19,10 @@ SMALLEST_CLOSING_MPS = 0.1
 """If a gap shrinks more slowly than this, it is not measurable, and there is no TTC."""
 _SMALLEST_GAP_M = 0.1
 _SURE_SIGMAS = 2.0
+_ONE_SHARE = 0.5
+"""Share of images that must have the box of what only the camera sees: less often a vehicle near enough to matter is
+not found, but a track that hops from one parked car to the next is. On 24 random drives, no such lead that was a true
+one had less (1,030 frames), and 10 of the 63 false ones had."""
 _STEADY_S = 0.5
 """Time for which a ranging sensor must have seen an object steadily before its speed is sure: a new side that comes
 into view moves it by metres."""
@@ -75,9 +79,14 @@ def _described(item: FusedObject, ego: EgoState | None, params: MotionParams, dt
         ttc_s=ttc,
         speed_over_ground_mps=speed,
         moving=speed > params.moving_mps,
-        surely_moving=speed - _SURE_SIGMAS * _speed_sigma_mps(item, dt_s) > params.moving_mps,
+        surely_moving=_is_one(item) and speed - _SURE_SIGMAS * _speed_sigma_mps(item, dt_s) > params.moving_mps,
         oncoming=-vx > max(_ONCOMING_MPS, abs(vy)),
     )
+
+
+def _is_one(item: FusedObject) -> bool:
+    """Whether the positions that its speed comes from are of one object."""
+    return item.ranged or item.boxed_share >= _ONE_SHARE
 
 
 def _speed_sigma_mps(item: FusedObject, dt_s: float) -> float:

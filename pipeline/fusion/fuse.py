@@ -209,16 +209,16 @@ def _gates(
     rows, columns = np.nonzero(overlap > 0)
     for i, j, iou in zip(rows.tolist(), columns.tolist(), overlap[rows, columns].tolist(), strict=True):
         tests = [Gate("iou", iou, params.min_iou, iou >= params.min_iou)]
-        distance, sigma = vision[i].distance_m, vision[i].sigma_m
+        distance, sigma, was_one = vision[i].distance_m, vision[i].sigma_m, bool(were_one[i, j])
         # boxes of nearly the same place and size are one object: then the height law is wrong, not the LiDAR
-        doubtful = params.range_gate and iou < params.sure_iou
+        doubtful = params.range_gate and iou + _KEPT_IOU * was_one < params.sure_iou
         if doubtful and distance is not None and sigma is not None:
             gap = abs(distance - ranges_m[j]) / math.hypot(sigma, sigmas_m[j])
             tests.append(Gate("range_sigmas", gap, params.range_gate_sigmas, gap <= params.range_gate_sigmas))
         longest_m = LONGEST_M.get(vision[i].label) if params.size_gate else None
         if longest_m is not None:
             tests.append(Gate("class_size", lengths_m[j], longest_m, lengths_m[j] <= longest_m))
-        if is_held[i] and not were_one[i, j]:
+        if is_held[i] and not was_one:
             hits = lidar[j].hits
             tests.append(Gate("cluster_hits", hits, _TAKES_OVER_HITS, hits >= _TAKES_OVER_HITS))
         if has_vehicle[j] and vision[i].label not in VEHICLES:

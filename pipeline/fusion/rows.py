@@ -71,6 +71,7 @@ def hit_row(
             "hits": max(hit.hits, seen.hits),
             "vision_track": seen.id,
             "camera_ranges": seen.ranges,
+            "boxed_share": seen.boxed_share,
             "box_sides": sides,
         }
     )
@@ -112,6 +113,7 @@ def box_row(object_id: int, seen: VisionTrack, gates: tuple[Gate, ...], sides: S
         hits=seen.hits,
         vision_track=seen.id,
         camera_ranges=seen.ranges,
+        boxed_share=seen.boxed_share,
         camera_speed_sigma_mps=seen.speed_sigma_mps,
         returns=seen.returns,
         height_from=seen.height_from,

@@ -76,6 +76,13 @@ class VisionTrack:
     speed_sigma_mps: float | None = None
     """Standard deviation of its velocity along the line of sight, with that of the law's lasting error; None without a
     velocity."""
+    images: int = 1
+    """Images since its first sighting, with that one, in which the detector ran."""
+
+    @property
+    def boxed_share(self) -> float:
+        """Share of these images that have its box."""
+        return self.hits / self.images
 
 
 class RangedTrack(NamedTuple):
@@ -184,6 +191,8 @@ class FusedObject:
     """Distances in a row that its vision track took in."""
     camera_speed_sigma_mps: float | None = None
     """Standard deviation of its velocity along the line of sight where that comes from its image boxes."""
+    boxed_share: float = 1.0
+    """Share of the images since its first box that have one; 1 without a vision track."""
     returns: int = 0
     """LiDAR returns inside its image box that ranged it in this frame, where it has no cluster."""
     height_from: HeightFrom = None

@@ -21,6 +21,11 @@ FASTEST_OVER_GROUND_MPS = 70.0
 """250 km/h: nothing on a road is faster, and a filter that says so has run away."""
 FASTEST_ONCOMING_MPS = 45.0
 """160 km/h: the same for what comes towards us."""
+_WANDER_SHARE = 0.08
+"""Share of the distance by which the height of a box makes it wander within a second: an error that lasts, which the
+filter, whose noise is new in every image, takes for motion. Without it, 2 σ held 77 % of the radial speeds of parked
+cars on KITTI 0009 after 9 to 20 sightings (63 % of the filter's own), and 65 % on four simulated drives; with it, 90
+and 86 %."""
 _SETTLED = 3
 """Sightings after which a place is trusted against a single one that contradicts it."""
 
@@ -237,6 +242,9 @@ def with_place(
     """
     x, y, vx, vy = place.mean.tolist()
     range_m, (range_sigma, speed_sigma) = math.hypot(x, y), place_filter.radial_sigmas(place)
+    # a line through positions over the time T has σ_v = √3 σ_r / T at its end
+    memory_s = math.sqrt(3.0) * range_sigma / speed_sigma
+    wander_mps = _WANDER_SHARE * range_m / math.sqrt(memory_s)
     if share is None:
         share = track.sigma_m / track.distance_m if track.sigma_m and track.distance_m else 0.0
     return evolve(
@@ -246,7 +254,7 @@ def with_place(
         position=(x, y),
         velocity_mps=(vx, vy) if placed >= 2 else None,
         # what stays wrong with the distance is wrong with its change in the same proportion
-        speed_sigma_mps=math.hypot(speed_sigma, share * math.hypot(vx, vy)),
+        speed_sigma_mps=math.hypot(speed_sigma, share * math.hypot(vx, vy), wander_mps),
         ranges=placed,
         **others,
     )

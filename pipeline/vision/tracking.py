@@ -256,6 +256,7 @@ def _seen(
         label=label,
         score=detection.score,
         hits=followed.track.hits + 1,
+        images=followed.track.images + 1,
         missed=0,
         carried=False,
         measured=seen.distance_m is not None,
@@ -270,4 +271,5 @@ def _seen(
 
 
 def _missed(followed: Followed) -> Followed:
-    return evolve(followed, track=evolve(followed.track, missed=followed.track.missed + 1))
+    track = evolve(followed.track, missed=followed.track.missed + 1, images=followed.track.images + 1)
+    return evolve(followed, track=track)
