@@ -1,4 +1,4 @@
-"""Relative motion while the car turns and brakes, against objects that keep their velocity over the road."""
+"""Relative motion while the car turns and brakes, of what stands and of what drives ahead."""
 
 from __future__ import annotations
 
@@ -44,17 +44,28 @@ def driven(first: EgoState, last: EgoState, steps: int = 100) -> tuple[float, fl
     return x, y, heading
 
 
-@given(speeds, speeds, rates, rates, st.tuples(*[st.floats(-60.0, 60.0)] * 2), st.tuples(*[st.floats(-20.0, 20.0)] * 2))
-def test_an_object_keeps_its_velocity_over_the_road(
-    v0: float, v1: float, w0: float, w1: float, at: tuple[float, float], velocity: tuple[float, float]
+@given(speeds, speeds, rates, rates, st.tuples(*[st.floats(-60.0, 60.0)] * 2))
+def test_what_stands_goes_on_standing(v0: float, v1: float, w0: float, w1: float, at: tuple[float, float]) -> None:
+    first, last = ego(v0, w0), ego(v0 + (v1 - v0) * 0.03, w0 + (w1 - w0) * 0.1)
+    change = frame_change.between(first, last, DT_S)
+    assert change is not None
+    before = relative((0.0, 0.0, 0.0), first, np.array(at), np.zeros(2))
+    expected = relative(driven(first, last), last, np.array(at), np.zeros(2))
+    assert change.matrix @ before + change.offset == pytest.approx(expected, abs=0.01)
+
+
+@given(speeds, speeds, rates, rates, st.floats(0.0, 40.0), st.tuples(*[st.floats(-60.0, 60.0)] * 2))
+def test_what_drives_ahead_turns_with_the_car(
+    v0: float, v1: float, w0: float, w1: float, speed: float, at: tuple[float, float]
 ) -> None:
     first, last = ego(v0, w0), ego(v0 + (v1 - v0) * 0.03, w0 + (w1 - w0) * 0.1)
     change = frame_change.between(first, last, DT_S)
     assert change is not None
-    place, moves = np.array(at), np.array(velocity)
-    before = relative((0.0, 0.0, 0.0), first, place, moves)
-    expected = relative(driven(first, last), last, place + moves * DT_S, moves)
-    assert change.matrix @ before + change.offset == pytest.approx(expected, abs=0.01)
+    x, y, turned = driven(ego(speed, first.yaw_rate_radps), ego(speed, last.yaw_rate_radps))
+    before = relative((0.0, 0.0, 0.0), first, np.array(at), np.array([speed, 0.0]))
+    later = speed * np.array([cos(turned), sin(turned)])
+    expected = relative(driven(first, last), last, np.array([at[0] + x, at[1] + y]), later)
+    assert change.matrix @ before + change.offset == pytest.approx(expected, abs=0.02)
 
 
 def test_a_parked_car_stands_while_the_car_leaves_a_bend() -> None:
