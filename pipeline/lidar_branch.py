@@ -64,8 +64,6 @@ class LidarBranch(NamedTuple):
     """For the next frame."""
     tracks: tuple[LidarTrack, ...]
     """The obstacles, tracked from sweep to sweep."""
-    change: Transition | None
-    """Of relative motion since the last frame, because the car turned, braked or accelerated."""
     timing_ms: dict[str, float]
     """Milliseconds by stage."""
     params: Params
@@ -79,31 +77,33 @@ def follow(before: Before, frame: Frame, params: Params, earlier: LidarBranch | 
     change is taken from it.
     """
     dt_s = _since(before.t_ns, frame, params)
+    last = before.own if dt_s is not None else None
     clock = Stopwatch()
     if earlier is not None and _motion_sections(params) == _motion_sections(earlier.params):
         if _lidar_sections(params) == _lidar_sections(earlier.params):
             return earlier._replace(params=params, timing_ms=dict.fromkeys(earlier.timing_ms, 0.0))
-        motion, now, change = earlier.motion, earlier.now, earlier.change
+        motion, now = earlier.motion, earlier.now
     else:
         motion = _measure_motion(before, frame, dt_s, params)
-        last = before.own if dt_s is not None else None
         moved = coasting.follow(last, motion.ego, dt_s, params.motion)
         now = Moment(frame.t_ns, dt_s, moved, coasting.recent(moved, params.motion))
-        change = _frame_change(coasting.recent(last, params.motion), now, params.motion)
     clock.lap("own_motion")
 
     # Objects on the ground in this sweep, tracked from sweep to sweep
     tracker = before.lidar if dt_s is not None else lidar_tracking.LidarTrackerState()
     sweep = segmentation.segment(frame.sweep, now.ego, params, clock, tracker, dt_s)
+    change = _frame_change(last, now, params.motion)
     tracker, tracks = lidar_tracking.track(tracker, sweep.obstacles, dt_s, params.lidar_tracking, change)
     clock.lap("lidar_tracking")
     timing_ms = clock.timing_ms()
     del timing_ms["total"]
-    return LidarBranch(motion, now, sweep, tracker, tracks, change, timing_ms, params)
+    return LidarBranch(motion, now, sweep, tracker, tracks, timing_ms, params)
 
 
-def _frame_change(before: EgoState | None, now: Moment, params: MotionParams) -> Transition | None:
-    return frame_change.between(before, now.ego, now.dt_s) if params.keep_over_ground else None
+def _frame_change(last: EgoState | None, now: Moment, params: MotionParams) -> Transition | None:
+    """How relative motion has changed since the last frame, whose own motion was ``last``."""
+    before = coasting.recent(last, params) if params.keep_over_ground else None
+    return frame_change.between(before, now.ego, now.dt_s)
 
 
 def _motion_sections(params: Params) -> tuple[Section, ...]:

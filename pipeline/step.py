@@ -108,13 +108,7 @@ def step(
     boxes = ground_contact.measure_contacts(boxes, road, aligned, params.fusion)
     clock.lap("distance")
     vision_state, vision_tracks = vision_tracking.track(
-        state.vision,
-        boxes,
-        now.dt_s,
-        params.vision_tracking,
-        now.speed_mps,
-        _pan_pxps(aligned, now.ego),
-        lidar.change,
+        state.vision, boxes, now.dt_s, params.vision_tracking, now.speed_mps, _pan_pxps(aligned, now.ego)
     )
     clock.lap("vision_tracking")
 

@@ -93,7 +93,7 @@ def _speed_sigma_mps(item: FusedObject, dt_s: float) -> float:
     """Standard deviation of its speed: that of the camera, or that of a line through the sightings of a ranging sensor,
     one every ``dt_s``."""
     if item.camera_speed_sigma_mps is not None or not item.ranged:
-        return item.camera_speed_sigma_mps or 0.0
+        return hypot(item.camera_speed_sigma_mps or 0.0, item.camera_wander_mps)
     steady = item.ranged_steady
     if steady * dt_s < _STEADY_S - _SAME_TIME_S:
         return inf

@@ -115,6 +115,7 @@ def box_row(object_id: int, seen: VisionTrack, gates: tuple[Gate, ...], sides: S
         camera_ranges=seen.ranges,
         boxed_share=seen.boxed_share,
         camera_speed_sigma_mps=seen.speed_sigma_mps,
+        camera_wander_mps=seen.wander_mps,
         returns=seen.returns,
         height_from=seen.height_from,
         gates=gates,

@@ -26,8 +26,8 @@ class MotionParams(Section):
     )
     keep_over_ground: bool = choice(
         True,
-        "From frame to frame, objects keep their velocity over the ground; off: their velocity relative to the car, "
-        "also while it turns or brakes",
+        "From sweep to sweep, the LiDAR's objects keep their velocity over the ground; off: their velocity relative to "
+        "the car, also while it turns or brakes",
     )
 
 

@@ -76,6 +76,8 @@ class VisionTrack:
     speed_sigma_mps: float | None = None
     """Standard deviation of its velocity along the line of sight, with that of the law's lasting error; None without a
     velocity."""
+    wander_mps: float = 0.0
+    """The same because boxes wander: errors that last for a second or more seem to be motion."""
     images: int = 1
     """Images since its first sighting, with that one, in which the detector ran."""
 
@@ -191,6 +193,8 @@ class FusedObject:
     """Distances in a row that its vision track took in."""
     camera_speed_sigma_mps: float | None = None
     """Standard deviation of its velocity along the line of sight where that comes from its image boxes."""
+    camera_wander_mps: float = 0.0
+    """The same because its boxes wander, which matters for whether it moves at all."""
     boxed_share: float = 1.0
     """Share of the images since its first box that have one; 1 without a vision track."""
     returns: int = 0

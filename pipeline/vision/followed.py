@@ -24,8 +24,7 @@ FASTEST_ONCOMING_MPS = 45.0
 _WANDER_SHARE = 0.08
 """Share of the distance by which the height of a box makes it wander within a second: an error that lasts, which the
 filter, whose noise is new in every image, takes for motion. Without it, 2 σ held 77 % of the radial speeds of parked
-cars on KITTI 0009 after 9 to 20 sightings (63 % of the filter's own), and 65 % on four simulated drives; with it, 90
-and 86 %."""
+cars on KITTI 0009 after 9 to 20 sightings, and 65 % on four simulated drives; with it, 90 and 86 %."""
 _SETTLED = 3
 """Sightings after which a place is trusted against a single one that contradicts it."""
 
@@ -80,13 +79,11 @@ class PredictedPlace(NamedTuple):
     """How much its box has grown as the range changed."""
 
 
-def predict_places(
-    followed: Sequence[Followed], dt_s: float, change: kalman.Transition | None, params: VisionTrackingParams
-) -> list[PredictedPlace]:
+def predict_places(followed: Sequence[Followed], dt_s: float, params: VisionTrackingParams) -> list[PredictedPlace]:
     """The place of each object ``dt_s`` later. A place not measured for ``max_missed_s`` is forgotten, though its box
-    be seen (it may be too near to be measured). change: of relative motion (``pipeline.ego_motion.frame_change``)."""
+    be seen (it may be too near to be measured)."""
     known = [each.place_filter for each in followed if each.place_filter is not None]
-    moved = iter(kalman.unstacked(kalman.predict(kalman.stacked(known), dt_s, params.accel_sigma_mps2, change)))
+    moved = iter(kalman.unstacked(kalman.predict(kalman.stacked(known), dt_s, params.accel_sigma_mps2)))
     return [
         _predicted(each, each.place_filter, next(moved), dt_s, params)
         if each.place_filter is not None
@@ -244,7 +241,6 @@ def with_place(
     range_m, (range_sigma, speed_sigma) = math.hypot(x, y), place_filter.radial_sigmas(place)
     # a line through positions over the time T has σ_v = √3 σ_r / T at its end
     memory_s = math.sqrt(3.0) * range_sigma / speed_sigma
-    wander_mps = _WANDER_SHARE * range_m / math.sqrt(memory_s)
     if share is None:
         share = track.sigma_m / track.distance_m if track.sigma_m and track.distance_m else 0.0
     return evolve(
@@ -254,7 +250,8 @@ def with_place(
         position=(x, y),
         velocity_mps=(vx, vy) if placed >= 2 else None,
         # what stays wrong with the distance is wrong with its change in the same proportion
-        speed_sigma_mps=math.hypot(speed_sigma, share * math.hypot(vx, vy), wander_mps),
+        speed_sigma_mps=math.hypot(speed_sigma, share * math.hypot(vx, vy)),
+        wander_mps=_WANDER_SHARE * range_m / math.sqrt(memory_s),
         ranges=placed,
         **others,
     )

@@ -21,7 +21,7 @@ import numpy as np
 
 from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import iou_matrix
-from pipeline.common.kalman import CvState, Transition
+from pipeline.common.kalman import CvState
 from pipeline.params import VisionTrackingParams
 from pipeline.types import VisionMeasurement, VisionTrack
 from pipeline.vision import box_filter
@@ -57,17 +57,15 @@ def track(
     params: VisionTrackingParams,
     ego_speed_mps: float | None = None,
     pan_pxps: float | None = None,
-    change: Transition | None = None,
 ) -> tuple[VisionTrackerState, tuple[VisionTrack, ...]]:
     """One tick. ``measurements`` None: no image; time passes, but the objects do not count as missed. ``dt_s`` None:
     the first tick. ``ego_speed_mps``: used to guess the speed of a new object. ``pan_pxps``: speed at which a distant
     object moves to the right in the image because the car turns to the left, pixels/s; None if that is not known.
-    ``change``: of relative motion since the last tick (``pipeline.ego_motion.frame_change``); None if not known.
     Tracks are returned by id."""
     # Predict every track to now; without an image that is all
     guess = _first_guess(ego_speed_mps)
-    pan_change = pan_pxps - state.pan_pxps if pan_pxps is not None and state.pan_pxps is not None else None
-    expected = _predict(state.followed, dt_s or 0.0, pan_change, change, params)
+    change = pan_pxps - state.pan_pxps if pan_pxps is not None and state.pan_pxps is not None else None
+    expected = _predict(state.followed, dt_s or 0.0, change, params)
     if measurements is None:
         kept = tuple(followed for followed in expected if followed.unseen_s <= params.max_missed_s)
         return evolve(state, followed=kept, pan_pxps=pan_pxps), tuple(followed.track for followed in kept)
@@ -137,22 +135,18 @@ def _without_ghosts(alive: tuple[Followed, ...], params: VisionTrackingParams) -
 
 
 def _predict(
-    followed: Sequence[Followed],
-    dt_s: float,
-    pan_change_pxps: float | None,
-    change: Transition | None,
-    params: VisionTrackingParams,
+    followed: Sequence[Followed], dt_s: float, pan_change_pxps: float | None, params: VisionTrackingParams
 ) -> list[Followed]:
     """The objects predicted to now; each counts as carried until a box confirms it. All filters of a kind are predicted
     together. pan_change_pxps: by how much the image moves faster to the right than at the last tick; None if not
-    known. change: as for ``track``."""
+    known."""
     if params.filter == "queue":
         tracks = [evolve(each.track, carried=True, measured=False, returns=0) for each in followed]
         return [_aged(each, dt_s, track=track) for each, track in zip(followed, tracks, strict=True)]
     boxes = box_filter.predict(
         [each.box_filter for each in followed], [each.track.bbox for each in followed], dt_s, pan_change_pxps, params
     )
-    places = predict_places(followed, dt_s, change, params)
+    places = predict_places(followed, dt_s, params)
     return [_predicted(each, box, place, dt_s) for each, box, place in zip(followed, boxes, places, strict=True)]
 
 
