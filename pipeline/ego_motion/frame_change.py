@@ -3,8 +3,8 @@
 Tracks are kept in the ego frame, with velocities relative to the car. Between two frames the car's own motion changes,
 and that is not a manoeuvre of anything else: in a bend at 13 m/s and 0.15 rad/s, a parked car at 20 m has a lateral
 relative velocity of 3 m/s, and when the bend ends it has none. Objects keep their speed over the road instead, so the
-change of the car's motion is applied to the LiDAR's tracks as a known input (Bar-Shalom, Li, Kirubarajan 2001, section 6.3.2,
-with the transport theorem for rotating frames).
+change of the car's motion is applied to the LiDAR's tracks as a known input (Bar-Shalom, Li, Kirubarajan 2001, section
+6.3.2, with the transport theorem for rotating frames).
 
 What drives ahead turns with the road, as the car does, so its velocity is taken to turn with the car. For what stands
 this makes no difference, and for what crosses or comes towards the car it is an error of 1 m/s² at 10 m/s and

@@ -7,7 +7,7 @@ import pytest
 from pipeline.common.fast_replace import evolve
 from pipeline.decision.object_motion import closing_speed_mps, describe
 from pipeline.params import MotionParams
-from pipeline.types import EgoState
+from pipeline.types import EgoState, ObjectSource
 from tests.pipeline.build import fused
 
 PARAMS = MotionParams()
@@ -112,4 +112,21 @@ def test_a_speed_from_a_few_clusters_proves_no_motion(speed: float, sightings: i
 @pytest.mark.parametrize(("dt_s", "surely"), [(0.1, False), (0.3, True)])
 def test_at_a_lower_rate_fewer_sightings_prove_motion(dt_s: float, surely: bool) -> None:
     (item,) = describe([fused(1, 30.0, hits=3)], EgoState(0, 10.0, 0.0), PARAMS, dt_s)
+    assert item.surely_moving is surely
+
+
+@pytest.mark.parametrize(
+    ("source", "share", "wander_mps", "surely"),
+    [
+        pytest.param("V", 0.8, 0.0, True, id="boxed in most images"),
+        pytest.param("V", 0.2, 0.0, False, id="boxed in every fifth: perhaps another car each time"),
+        pytest.param("VL", 0.2, 0.0, True, id="the LiDAR follows it"),
+        pytest.param("V", 0.8, 5.0, False, id="its boxes wander by as much"),
+    ],
+)
+def test_boxes_that_hop_or_wander_prove_no_motion(
+    source: ObjectSource, share: float, wander_mps: float, surely: bool
+) -> None:
+    seen = evolve(fused(1, 40.0, source=source), boxed_share=share, camera_wander_mps=wander_mps)
+    (item,) = describe([seen], EgoState(0, 10.0, 0.0), PARAMS)
     assert item.surely_moving is surely

@@ -164,6 +164,18 @@ def test_the_cluster_of_a_vehicle_that_is_still_boxed_becomes_nothing_else(label
     assert pair.vision_track == who
 
 
+@pytest.mark.parametrize(("known", "sources"), [(True, ["VL"]), (False, ["V", "L"])], ids=["joined before", "new"])
+def test_a_pair_stays_joined_when_its_overlap_falls_a_little(known: bool, sources: list[str]) -> None:
+    """A lorry that is called a car seems to be at half of its distance. With a few rings, the overlap of its cluster
+    and its box varies from sweep to sweep."""
+    lorry = lidar_track(1, 56.0)
+    x1, y1, x2, y2 = box_of(lorry)
+    taller = vision_track(1, (x1, y1 - 4.5 * (y2 - y1), x2, y2), 25.0, sigma_m=4.0)
+    state, _ = joined([lorry], [replace(taller, bbox=(x1, y1, x2, y2))])
+    _, result = joined([lorry], [taller], OPTIMAL, state if known else FusionState())
+    assert [item.source for item in result.objects] == sources
+
+
 def test_a_slightly_better_overlap_is_no_reason_to_change() -> None:
     lead, beside = lidar_track(1, 30.0), lidar_track(2, 29.5, 0.3)._replace(hits=9)
     state, _ = joined([lead], [vision_track(1, box_of(lead), 30.0)])

@@ -10,11 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.common.geometry import Cuboid
+from pipeline.ego_motion import frame_change
 from pipeline.lidar.tracking import LidarTrackerState, looks, track
 from pipeline.params import LidarTrackingParams
-from pipeline.types import LidarTrack, Obstacle
+from pipeline.types import EgoState, LidarTrack, Obstacle
 
 FILTERS = ("kalman", "trajectory")
+STEADY = frame_change.between(EgoState(0, 10.0, 0.0), EgoState(0, 10.0, 0.0), 0.1)
 
 
 def _car(x: float, y: float = 0.0, *, points: int = 40, length_m: float = 0.3, yaw_rad: float = 0.0) -> Obstacle:
@@ -200,3 +202,21 @@ def test_a_rear_with_and_without_a_bit_of_flank_is_one_car(filter_name: str) -> 
     )
     seen = _drive([(thin,), (thick,), (thin,), (thick,)], params)
     assert [t.id for tracks in seen for t in tracks] == [1] * 4
+
+
+@pytest.mark.parametrize("speed_mps", [10.0, 9.0], ids=["steady", "braking hard"])
+def test_a_missed_track_comes_nearer_as_fast_as_the_car_now_drives(speed_mps: float) -> None:
+    params = LidarTrackingParams()
+    state = LidarTrackerState()
+    for k in range(10):
+        state, _ = track(state, (_car(34.0 - k),), None if k == 0 else 0.1, params, STEADY if k else None)
+    braked = frame_change.between(EgoState(0, 10.0, 0.0), EgoState(0, speed_mps, 0.0), 0.1)
+    steady = frame_change.between(EgoState(0, speed_mps, 0.0), EgoState(0, speed_mps, 0.0), 0.1)
+    state, _ = track(state, (), 0.1, params, braked)
+    state, (carried,) = track(state, None, 0.1, params, steady)
+    state, (carried,) = track(state, None, 0.1, params, steady)
+    assert carried.carried
+    assert carried.velocity_mps == pytest.approx((-speed_mps, 0.0), abs=0.1)
+    assert carried.obstacle.closest_point[0] == pytest.approx(
+        25.0 - (10.0 + speed_mps) / 20.0 - speed_mps / 5.0, abs=0.1
+    )
