@@ -19,7 +19,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline.calibration.alignment.doubts import Found, warnings_of
+from pipeline.alignment.projection import corrected
+from pipeline.calibration.alignment.doubts import Found, looks_like_radians, warnings_of
 from pipeline.calibration.alignment.edge_fit import STEPS as EDGE_STEPS
 from pipeline.calibration.alignment.edge_fit import fit_edges
 from pipeline.calibration.alignment.edges import EdgeView, RollScores, roll_scores
@@ -146,6 +147,10 @@ def fit_alignment(
     warnings = warnings_of(table, model, found, sigmas)
     if looks_undistorted(table, model, vector, blocks):
         warnings += ("the boxes fit better without lens distortion: are the images already undistorted?",)
+    if model.camera is not None and model.name == "pinhole":
+        fitted = corrected(model.params(vector), model.camera)
+        if looks_like_radians(model.camera, fitted):
+            warnings += ("the angles of the calibration's mount look like radians where degrees are expected",)
     judged = PairTable.of([scenes[k] for k in held]) if held else table
     start = model.vector(present)
     after, *before = _overlaps(judged, model, [vector, *([start] if start is not None else [])])
