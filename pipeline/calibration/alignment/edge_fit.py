@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import Bounds, minimize
 
 from pipeline.calibration.alignment.edges import WIDEST_DEG, EdgeStack, EdgeView, stack_of
 from pipeline.calibration.alignment.models import FitModel
@@ -48,7 +48,7 @@ class EdgeFit(NamedTuple):
 
 
 def fit_edges(
-    views: Sequence[EdgeView], model: FitModel, start: F64, progress: Callable[[int], None] = lambda _: None
+    views: Sequence[EdgeView], model: FitModel, start: F64, progress: Callable[[int], object] = lambda _: None
 ) -> EdgeFit | None:
     """The best mount near ``start``, a vector of a pinhole model; None with too few edges, or if none stands out.
     progress: is given the steps done, 0 to ``STEPS`` − 1."""
@@ -71,11 +71,11 @@ def fit_edges(
         progress(1 + number)
         centre = around[k] / unit
         low, high = start / unit - reach, start / unit + reach
-        found = minimize(
+        found = minimize(  # type: ignore[call-overload]  # the stubs know no options of Powell's
             lambda at: -score(at * unit) / scale,
             np.clip(centre, low, high),
             method="Powell",
-            bounds=list(zip(low, high, strict=True)),
+            bounds=Bounds(low, high),
             options={"maxfev": _EVALUATIONS, "xtol": 0.03, "ftol": 1e-4},
         )
         if -found.fun > best_score:

@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.calibration.alignment.models import REACH_DEG, FitModel
 from pipeline.calibration.depth_edges import EdgeScene
-from pipeline.types import F64, I64
+from pipeline.types import F64, I64, Mask
 
 MEMORY = 100_000_000
 """Bytes that the edge images of a drive may take: 120 frames of 1242 × 375 pixels take 56 MB, 48 of full HD 100 MB."""
@@ -61,7 +61,7 @@ class EdgeStack:
         """(B,) sums of edge strength at the depth edges of each piece, for one alignment."""
         uv, found = model.aligned(vector).project(self._points), np.zeros(len(self.blocks))
         height, width = self._scenes[0].strength.shape
-        inside = ((uv >= 0.0) & (uv < [width, height])).all(axis=1)  # false for NaN, behind the camera
+        inside: Mask = ((uv >= 0.0) & (uv < [width, height])).all(axis=1)  # false for NaN, behind the camera
         pixels = np.where(inside[:, None], uv, 0.0).astype(np.int64)
         for scene, block, (first, last) in zip(self._scenes, self._block, pairwise(self._cuts), strict=True):
             column, row = pixels[first:last].T
