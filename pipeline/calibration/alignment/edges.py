@@ -61,7 +61,7 @@ class EdgeStack:
         """(B,) sums of edge strength at the depth edges of each piece, for one alignment."""
         uv, found = model.aligned(vector).project(self._points), np.zeros(len(self.blocks))
         height, width = self._scenes[0].strength.shape
-        inside: Mask = ((uv >= 0.0) & (uv < [width, height])).all(axis=1)  # false for NaN, behind the camera
+        inside: Mask = np.all((uv >= 0.0) & (uv < [width, height]), axis=1)  # false for NaN, behind the camera
         pixels = np.where(inside[:, None], uv, 0.0).astype(np.int64)
         for scene, block, (first, last) in zip(self._scenes, self._block, pairwise(self._cuts), strict=True):
             column, row = pixels[first:last].T
