@@ -41,6 +41,9 @@ STEPS = SEARCH_STEPS + EDGE_STEPS + BOOTSTRAPS
 AGREED = 0.8
 """Share of what the boxes' mount explains that the edges' mount has to explain too. The boxes' shared error of some per
 cent of their sides costs less than that; a mount that lies on other edges pairs fewer vehicles."""
+AGREED_SIGMAS = 2.0
+"""Largest difference of the two mounts in yaw and pitch, in standard deviations of both, with shared errors. Where
+few edges end above or below, as in drawn images, edges put the pitch half a degree off."""
 CLEAR_SIGMAS = 3.0
 """Random differences between blocks of the drive stay below this many standard deviations in sum."""
 BLOCK_NS = 1_000_000_000
@@ -174,7 +177,11 @@ def _by_edges(
     if model.name != "pinhole":
         return boxes, None
     edges = fit_edges(views, model, boxes.vector, lambda done: progress(SEARCH_STEPS + done, STEPS))
-    if edges is None or explained(table, model, edges.vector) < AGREED * boxes.explained:
+    if edges is None:
+        return boxes, None
+    shared = np.array(list(SHARED_DEG.values()))
+    off = np.abs(edges.vector - boxes.vector)[:2] / np.hypot(np.hypot(edges.sigmas[:2], shared), shared)
+    if off.max() > AGREED_SIGMAS or explained(table, model, edges.vector) < AGREED * boxes.explained:
         return boxes, None
     rows = table.matched(table.residuals(model.aligned(edges.vector), GATES[-1][0]), GATES[-1][1])
     found = Found(edges.vector, rows, explained(table, model, edges.vector))
