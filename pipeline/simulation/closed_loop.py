@@ -20,7 +20,8 @@ from pipeline.run import only
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import truth_boxes
 from pipeline.simulation.sensors.detection_model import BoxNoise
-from pipeline.simulation.sensors.rig import SensorRig
+from pipeline.simulation.sensors.rig import Exposure, SensorRig
+from pipeline.simulation.sensors.senses import Senses
 from pipeline.simulation.world import actors, world_state
 from pipeline.simulation.world import ego_vehicle as vehicle
 from pipeline.simulation.world.ego_vehicle import Pedals, VehicleModel, VehicleState
@@ -40,8 +41,8 @@ class Eyes(Protocol):
     @property
     def needs_image(self) -> bool: ...
 
-    def look(self, frame: Frame, now: World, seed: int) -> Frame:
-        """The frame with ``raw_boxes``."""
+    def look(self, frame: Frame, seen: Exposure, seed: int) -> Frame:
+        """The frame with ``raw_boxes``. seen: what its image shows."""
         ...
 
 
@@ -54,9 +55,8 @@ class TruthEyes:
     needs_image: bool = False
     """No image is drawn."""
 
-    def look(self, frame: Frame, now: World, seed: int) -> Frame:
-        assert frame.camera is not None
-        return evolve(frame, raw_boxes=truth_boxes.boxes(now, frame.camera, self.noise, seed, frame.index))
+    def look(self, frame: Frame, seen: Exposure, seed: int) -> Frame:
+        return evolve(frame, raw_boxes=truth_boxes.boxes(*seen, self.noise, seed, frame.index))
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class NetworkEyes:
     needs_image: bool = True
     """The image is drawn for it."""
 
-    def look(self, frame: Frame, now: World, seed: int) -> Frame:
+    def look(self, frame: Frame, seen: Exposure, seed: int) -> Frame:
         return detect(frame, Detectors(self.detector, far=self.far))
 
 
@@ -114,7 +114,7 @@ def drive(scenario: Scenario, setup: Setup) -> Iterator[LoopStep]:
     """Every tick of the scenario, until its end or until the caller stops."""
     warm_up()
     period_s = 1.0 / scenario.rate_hz
-    sensors = SensorRig(scenario, _furthest_m(scenario))
+    sensors, senses = SensorRig(scenario, _furthest_m(scenario)), Senses(scenario)
     car = _at_start(scenario)
     state = State()
     for index in range(scenario.frame_count()):
@@ -122,18 +122,22 @@ def drive(scenario: Scenario, setup: Setup) -> Iterator[LoopStep]:
         if not setup.closed:
             car = _scripted(scenario, t_s)
         now = world_state.at(scenario, t_s, car.motion())
-        frame = _look(sensors, setup, scenario, now, index)
+        frame = _look(sensors, senses, setup, car, now, index)
         state, result = step(state, frame, setup.params)
         yield LoopStep(index, now, frame, result, car)
         if setup.closed:
             car = _drive_on(vehicle.command(car, _pedals(result.acc), setup.model), scenario, period_s, setup.model)
 
 
-def _look(sensors: SensorRig, setup: Setup, scenario: Scenario, now: World, index: int) -> Frame:
-    wants_boxes = setup.sensors != "lidar"
-    frame = sensors.frame(now, index, round(now.t_s * 1e9), image=wants_boxes and setup.eyes.needs_image)
-    if wants_boxes:
-        frame = setup.eyes.look(frame, now, scenario.seed)
+def _look(sensors: SensorRig, senses: Senses, setup: Setup, car: VehicleState, now: World, index: int) -> Frame:
+    """What the car's sensors deliver, with the scenario's faults, and what is detected in it."""
+    seen = senses.exposure(now, index, sensors.camera, car.motion_at) if setup.sensors != "lidar" else None
+    wants_image = seen is not None and setup.eyes.needs_image
+    frame = sensors.frame(now, index, round(now.t_s * 1e9), image=wants_image, exposure=seen)
+    if frame.sweep is not None:
+        frame = evolve(frame, sweep=senses.disturbed(frame.sweep, index))
+    if seen is not None:
+        frame = setup.eyes.look(frame, seen, senses.seed)
     return only(frame, setup.sensors)
 
 

@@ -19,8 +19,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.alignment.projection import corrected
-from pipeline.calibration.alignment.edges import FRAMES as EDGE_FRAMES
-from pipeline.calibration.alignment.edges import EdgeView
+from pipeline.calibration.alignment.edges import EdgeView, frames_kept
 from pipeline.calibration.alignment.fit import AlignmentFit, NothingToFit, fit_alignment
 from pipeline.calibration.alignment.models import FitModel, ModelName
 from pipeline.calibration.alignment.pairs import PairTable
@@ -133,7 +132,7 @@ def start(views: Sequence[View], frames: int, number: int, model: ModelName, off
         K[1, 1] *= 1.0 + rng.uniform(-OFF_SHARE, OFF_SHARE)
         given = replace(given, K=K)
     scenes = [replace(views[k].scene, camera=given) for k in chosen]
-    edges = [views[k].edges for k in chosen][:: -(-len(chosen) // EDGE_FRAMES)]
+    edges = [views[chosen[k]].edges for k in frames_kept(len(chosen), scenes[0].size)]
     try:
         fit = fit_alignment(scenes, model, AlignmentParams(), offset, edges=edges)
     except NothingToFit:

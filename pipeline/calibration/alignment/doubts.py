@@ -9,7 +9,8 @@ import numpy as np
 
 from pipeline.calibration.alignment.models import FitModel
 from pipeline.calibration.alignment.pairs import PairTable
-from pipeline.types import F64, I64
+from pipeline.common.geometry import inverse
+from pipeline.types import F64, I64, CameraCalibration
 
 FEW_PAIRS = 40
 SAME_RANGE = 1.5
@@ -20,6 +21,11 @@ UNSURE = {"yaw_deg": 0.3, "pitch_deg": 0.3, "roll_deg": 1.0, "left_m": 0.1, "up_
 """Standard deviations from which a warning says that the drive does not determine the parameter."""
 AMBIGUOUS = 0.8
 """If another solution explains at least this share of what the best one explains, the fit is ambiguous."""
+
+
+RADIANS_DEG, TURNED_DEG = 0.5, 2.0
+"""A mount counts as given in radians if its angles, taken as radians, are this close to the fit, three standard
+deviations of a fit's yaw and pitch; and if the fit turns it by so much that other reasons rarely lead there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +62,19 @@ def warnings_of(
     if others and others[0].explained > AMBIGUOUS * best.explained:
         warnings.append("another alignment explains the drive nearly as well: choose a drive with more traffic")
     return tuple(warnings)
+
+
+def looks_like_radians(camera: CameraCalibration, fitted: CameraCalibration) -> bool:
+    """Whether the fit asks for the angles of the calibration's mount as if radians had been given for degrees."""
+    given, found = (_yaw_pitch_deg(each) for each in (camera, fitted))
+    is_turned = np.abs(found - given).max() > TURNED_DEG
+    return bool(is_turned and np.abs(found - np.degrees(given)).max() < RADIANS_DEG)
+
+
+def _yaw_pitch_deg(camera: CameraCalibration) -> F64:
+    """(2,) of the optical axis in the ego frame; positive to the left, and down."""
+    x, y, z = inverse(camera.T_camera_ego)[:3, 2]
+    return np.degrees([np.arctan2(y, x), -np.arctan2(z, np.hypot(x, y))])
 
 
 def _apart(model: FitModel, a: F64, b: F64) -> bool:

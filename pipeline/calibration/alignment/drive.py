@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.calibration.alignment.edges import FRAMES as EDGE_FRAMES
-from pipeline.calibration.alignment.edges import EdgeView
+from pipeline.calibration.alignment.edges import EdgeView, frames_kept
 from pipeline.calibration.alignment.fit import STEPS, AlignmentFit, fit_alignment
 from pipeline.calibration.alignment.models import ModelName
 from pipeline.calibration.alignment.scenes import FitScene, fit_scene
@@ -37,7 +36,7 @@ def fit_drive(
     total = len(indices) + STEPS
     scenes: list[FitScene] = []
     edges: list[EdgeView] = []
-    every = -(-len(indices) // EDGE_FRAMES)
+    kept: set[int] | None = None
     for number, index in enumerate(indices):
         progress(number, total)
         frame = frame_of(index)
@@ -45,7 +44,8 @@ def fit_drive(
         if scene is None:
             continue
         scenes.append(scene)
-        if name == "pinhole" and number % every == 0 and frame.sweep is not None and frame.image is not None:
+        kept = set(frames_kept(len(indices), scene.size).tolist()) if kept is None else kept
+        if name == "pinhole" and number in kept and frame.sweep is not None and frame.image is not None:
             edges.append(EdgeView(edge_scene(frame.sweep, frame.image.bgr), frame.t_ns))
     looked = len(indices)
 

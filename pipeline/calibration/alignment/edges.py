@@ -8,17 +8,18 @@ the roll whose projected depth edges lie on the strongest edges of the images is
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.calibration.alignment.models import REACH_DEG, FitModel
 from pipeline.calibration.depth_edges import EdgeScene
-from pipeline.types import F64, I64
+from pipeline.types import F64, I64, Mask
 
-FRAMES = 40
-"""Number of frames whose edges are used; their edge images take 20 to 50 MB."""
-MOST = 15_000
+MEMORY = 100_000_000
+"""Bytes that the edge images of a drive may take: 120 frames of 1242 × 375 pixels take 56 MB, 48 of full HD 100 MB."""
+MOST = 30_000
 """Maximum number of evaluated depth edges: if there are more, every second, third …"""
 COARSE_DEG, FINE_DEG = 1.0, 0.25
 """Steps of the search over rolls."""
@@ -42,6 +43,39 @@ class EdgeView(NamedTuple):
     """What does not depend on the alignment."""
     t_ns: int
     """The tick."""
+
+
+class EdgeStack:
+    """The depth edges of several frames of one camera, ready to be scored."""
+
+    def __init__(self, views: Sequence[EdgeView]) -> None:
+        every = -(-sum(len(each.scene.points) for each in views) // MOST) or 1
+        kept = [each.scene.points[::every] for each in views]
+        self._scenes = [each.scene for each in views]
+        self._points = np.concatenate(kept)
+        self._cuts = np.cumsum([0, *map(len, kept)])
+        self.blocks, self._block = np.unique([each.t_ns // BLOCK_NS for each in views], return_inverse=True)
+        """(B,) numbers of the pieces of the drive."""
+
+    def strengths(self, model: FitModel, vector: F64) -> F64:
+        """(B,) sums of edge strength at the depth edges of each piece, for one alignment."""
+        uv, found = model.aligned(vector).project(self._points), np.zeros(len(self.blocks))
+        height, width = self._scenes[0].strength.shape
+        inside: Mask = np.all((uv >= 0.0) & (uv < [width, height]), axis=1)  # false for NaN, behind the camera
+        pixels = np.where(inside[:, None], uv, 0.0).astype(np.int64)
+        for scene, block, (first, last) in zip(self._scenes, self._block, pairwise(self._cuts), strict=True):
+            column, row = pixels[first:last].T
+            met = scene.strength[row, column] - scene.usual[row]
+            found[block] += float(met[inside[first:last]].sum())
+        return found
+
+
+def stack_of(views: Sequence[EdgeView]) -> EdgeStack | None:
+    """None if there are too few edges to say anything."""
+    if sum(len(each.scene.points) for each in views) < FEWEST:
+        return None
+    stack = EdgeStack(views)
+    return stack if len(stack.blocks) >= FEWEST_BLOCKS else None
 
 
 class RollScores(NamedTuple):
@@ -71,44 +105,33 @@ class RollScores(NamedTuple):
         return max(float(np.std(found)), _NEAREST_SIGMA_DEG)
 
 
+def frames_kept(count: int, size: tuple[int, int]) -> I64:
+    """Which of ``count`` frames to take the edges of, so that the edge images fit into ``MEMORY``. size: width and
+    height of the images."""
+    return np.unique(np.linspace(0, count - 1, min(count, max(MEMORY // (size[0] * size[1]), 1))).round().astype(int))
+
+
 def roll_scores(views: Sequence[EdgeView], model: FitModel, with_roll: Callable[[float], F64]) -> RollScores | None:
     """Scores around the best roll; None if no roll stands out. with_roll: gives the vector that the boxes ask for at a
     roll in degrees."""
-    blocks = np.unique([each.t_ns // BLOCK_NS for each in views])
-    if len(blocks) < FEWEST_BLOCKS or sum(len(each.scene.points) for each in views) < FEWEST:
+    stack = stack_of(views)
+    if stack is None:
         return None
-    coarse = _scores(views, blocks, model, with_roll, np.arange(-REACH_DEG + 1.0, REACH_DEG, COARSE_DEG))
+    coarse = _scores(stack, model, with_roll, np.arange(-REACH_DEG + 1.0, REACH_DEG, COARSE_DEG))
     around = coarse.best_deg() + np.arange(-1.5, 1.51, FINE_DEG)
-    found = _scores(views, blocks, model, with_roll, around)
+    found = _scores(stack, model, with_roll, around)
     is_inside = around[0] < found.best_deg() < around[-1]
     return found if is_inside and found.sigma_deg() < WIDEST_DEG else None
 
 
-def _scores(
-    views: Sequence[EdgeView], blocks: I64, model: FitModel, with_roll: Callable[[float], F64], rolls_deg: F64
-) -> RollScores:
+def _scores(stack: EdgeStack, model: FitModel, with_roll: Callable[[float], F64], rolls_deg: F64) -> RollScores:
     """With the best of the yaws for each roll, over all pieces."""
-    strengths = np.zeros((len(blocks), len(rolls_deg)))
-    every = -(-sum(len(each.scene.points) for each in views) // MOST)
+    strengths = np.zeros((len(stack.blocks), len(rolls_deg)))
     for k, roll in enumerate(rolls_deg.tolist()):
         vector = with_roll(roll)
-        by_yaw = [_strengths(views, blocks, model, vector + _turned(yaw, len(vector)), every) for yaw in YAWS_DEG]
+        by_yaw = [stack.strengths(model, vector + _turned(yaw, len(vector))) for yaw in YAWS_DEG]
         strengths[:, k] = max(by_yaw, key=lambda each: float(each.sum()))
-    return RollScores(rolls_deg, blocks, strengths)
-
-
-def _strengths(views: Sequence[EdgeView], blocks: I64, model: FitModel, vector: F64, every: int) -> F64:
-    """(B,) for one alignment."""
-    aligned, found = model.aligned(vector), np.zeros(len(blocks))
-    for view in views:
-        scene = view.scene
-        height, width = scene.strength.shape
-        uv = aligned.project(scene.points[::every])
-        inside = ((uv >= 0.0) & (uv < [width, height])).all(axis=1)  # false for NaN, behind the camera
-        column, row = uv[inside].astype(np.int64).T
-        met = scene.strength[row, column] - scene.usual[row]
-        found[np.searchsorted(blocks, view.t_ns // BLOCK_NS)] += float(met.sum())
-    return found
+    return RollScores(rolls_deg, stack.blocks, strengths)
 
 
 def _turned(yaw_deg: float, unknowns: int) -> F64:

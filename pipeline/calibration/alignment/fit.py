@@ -5,8 +5,11 @@
 2. **Fine.** From the best few mounts: pair each box with its cluster, move the projected edges onto the box's edges
    with a robust loss, and pair again more strictly, until both converge.
 3. **Roll.** Boxes ahead hardly determine it; edges of the images do (``edges``).
-4. **Uncertainty.** The fit is repeated on frames resampled from blocks of the drive (bootstrap); the spread is the
-   uncertainty. Held-out frames show how good the result is, and the drive itself whether it could determine it.
+4. **Edges.** Near that mount, the same edges determine all of it, without the errors that a detector's boxes share in
+   all frames (``edge_fit``).
+5. **Uncertainty.** Where boxes alone determine the mount, the fit is repeated on frames resampled from blocks of the
+   drive (bootstrap); where edges do, their blocks are compared. Held-out frames show how good the result is, and the
+   drive itself whether it could determine it.
 """
 
 from __future__ import annotations
@@ -16,7 +19,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline.calibration.alignment.doubts import warnings_of
+from pipeline.alignment.projection import corrected
+from pipeline.calibration.alignment.doubts import Found, looks_like_radians, warnings_of
+from pipeline.calibration.alignment.edge_fit import STEPS as EDGE_STEPS
+from pipeline.calibration.alignment.edge_fit import fit_edges
 from pipeline.calibration.alignment.edges import EdgeView, RollScores, roll_scores
 from pipeline.calibration.alignment.models import FitModel, ModelName
 from pipeline.calibration.alignment.pairs import PairTable
@@ -30,8 +36,14 @@ from pipeline.types import F64, I64
 _EXACT_DEG = 0.01
 """Standard deviation that holds a roll in place."""
 BOOTSTRAPS = 24
-STEPS = SEARCH_STEPS + BOOTSTRAPS
+STEPS = SEARCH_STEPS + EDGE_STEPS + BOOTSTRAPS
 """Number of progress steps of a fit."""
+AGREED = 0.8
+"""Share of what the boxes' mount explains that the edges' mount has to explain too. The boxes' shared error of some per
+cent of their sides costs less than that; a mount that lies on other edges pairs fewer vehicles."""
+AGREED_SIGMAS = 2.0
+"""Largest difference of the two mounts in yaw and pitch, in standard deviations of both, with shared errors. Where
+few edges end above or below, as in drawn images, edges put the pitch half a degree off."""
 CLEAR_SIGMAS = 3.0
 """Random differences between blocks of the drive stay below this many standard deviations in sum."""
 BLOCK_NS = 1_000_000_000
@@ -123,17 +135,25 @@ def fit_alignment(
     if len(found[0].rows) < FEWEST_PAIRS:
         raise NothingToFit(_too_few(len(found[0].rows), len(table.boxes)))
     numbers = {scenes[k].t_ns // BLOCK_NS for k in train}
-    rolls = _rolls(table, model, found[0].vector, [each for each in edges if each.t_ns // BLOCK_NS in numbers])
+    views = [each for each in edges if each.t_ns // BLOCK_NS in numbers]
+    rolls = _rolls(table, model, found[0].vector, views)
     if rolls is not None:
         model = replace(model, roll_deg=(rolls.best_deg(), rolls.sigma_deg()))
         found = [refine(table, model, found[0].vector, GATES[-3:]), *found[1:]]
+    better, by_edges = _by_edges(table, model, found[0], views, progress)
+    found = [better, *found[1:]]
     vector, rows = found[0].vector, found[0].rows
     blocks = _blocks([scenes[k] for k in train])
-    spread = _bootstrap(table, model, vector, blocks, rolls, progress)
-    sigmas = _with_shared(model, vector, model.spread(spread))
+    if by_edges is None:
+        by_edges = model.spread(_bootstrap(table, model, vector, blocks, rolls, progress))
+    sigmas = _with_shared(model, vector, by_edges)
     warnings = warnings_of(table, model, found, sigmas)
     if looks_undistorted(table, model, vector, blocks):
         warnings += ("the boxes fit better without lens distortion: are the images already undistorted?",)
+    if model.camera is not None and model.name == "pinhole":
+        fitted = corrected(model.params(vector), model.camera)
+        if looks_like_radians(model.camera, fitted):
+            warnings += ("the angles of the calibration's mount look like radians where degrees are expected",)
     judged = PairTable.of([scenes[k] for k in held]) if held else table
     start = model.vector(present)
     after, *before = _overlaps(judged, model, [vector, *([start] if start is not None else [])])
@@ -148,6 +168,24 @@ def fit_alignment(
         held_out=bool(held),
         warnings=warnings,
     )
+
+
+def _by_edges(
+    table: PairTable, model: FitModel, boxes: Found, views: Sequence[EdgeView], progress: Progress
+) -> tuple[Found, Mapping[str, float] | None]:
+    """The mount by depth edges with its standard deviations; that of the boxes and None where they contradict it."""
+    if model.name != "pinhole":
+        return boxes, None
+    edges = fit_edges(views, model, boxes.vector, lambda done: progress(SEARCH_STEPS + done, STEPS))
+    if edges is None:
+        return boxes, None
+    shared = np.array(list(SHARED_DEG.values()))
+    off = np.abs(edges.vector - boxes.vector)[:2] / np.hypot(np.hypot(edges.sigmas[:2], shared), shared)
+    if off.max() > AGREED_SIGMAS or explained(table, model, edges.vector) < AGREED * boxes.explained:
+        return boxes, None
+    rows = table.matched(table.residuals(model.aligned(edges.vector), GATES[-1][0]), GATES[-1][1])
+    found = Found(edges.vector, rows, explained(table, model, edges.vector))
+    return found, dict(zip(model.unknowns, edges.sigmas.tolist(), strict=True))
 
 
 def looks_undistorted(table: PairTable, model: FitModel, vector: F64, blocks: list[I64]) -> bool:
@@ -178,7 +216,7 @@ def _bootstrap(
     """(K, P) vectors fitted to resampled blocks of frames, with the roll of resampled edges."""
     rng, found = np.random.default_rng(0), []
     for number in range(BOOTSTRAPS):
-        progress(SEARCH_STEPS + number, STEPS)
+        progress(SEARCH_STEPS + EDGE_STEPS + number, STEPS)
         drawn = np.concatenate([blocks[k] for k in rng.integers(0, len(blocks), len(blocks))])
         if rolls is not None:
             roll_deg = rolls.best_deg(rng.integers(0, len(rolls.blocks), len(rolls.blocks)))

@@ -6,6 +6,7 @@ opened again.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +20,7 @@ from pipeline.simulation.sensors.real_detector import RealDetector
 from pipeline.simulation.sensors.rig import Exposure
 from pipeline.simulation.sensors.truth_lanes import lane_points
 from pipeline.simulation.world import world_state
+from pipeline.simulation.world.actors import Motion
 from pipeline.simulation.world.world_state import World
 from pipeline.types import CameraCalibration, Frame, Sweep
 
@@ -29,6 +31,8 @@ class Senses:
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._faults = scenario.faults
+        self.seed = scenario.seed
+        """Of all random numbers of the drive."""
 
     def sensed(self, frame: Frame, now: World) -> Frame:
         """The frame as sensed by the scenario's car, with the scenario's detections. The image stays even if it is not
@@ -49,9 +53,11 @@ class Senses:
             return sweep
         return disturb_sweep(sweep, self._faults, self._scenario.seed, index, self._nod_rad(index))
 
-    def exposure(self, now: World, index: int, camera: CameraCalibration) -> Exposure | None:
-        """What the image of this frame shows, with the scenario's faults; None if it is lost. camera: its
-        calibration."""
+    def exposure(
+        self, now: World, index: int, camera: CameraCalibration, moving: Callable[[float], Motion] | None = None
+    ) -> Exposure | None:
+        """What the image of this frame shows, with the scenario's faults; None if it is lost. camera: its calibration.
+        moving: the ego vehicle's motion at a time in seconds close to now; None if it follows the scenario."""
         scene, faults = self._scenario, self._faults
         if faults == NONE:
             return Exposure(now, camera)
@@ -59,7 +65,8 @@ class Senses:
             return None
         camera = true_camera(camera, faults, self._nod_rad(index), now.t_s)
         if faults.camera_skew_ms:
-            now = world_state.at(scene, max(now.t_s + faults.camera_skew_ms / 1e3, 0.0))
+            t_s = max(now.t_s + faults.camera_skew_ms / 1e3, 0.0)
+            now = world_state.at(scene, t_s, moving(t_s) if moving is not None else None)
         return Exposure(now, camera)
 
     def _detected(self, frame: Frame, now: World, noise: Detections) -> Frame:

@@ -77,7 +77,22 @@ class VehicleState:
 
     def motion(self) -> Motion:
         """In the form used by the world."""
-        return Motion(self.travelled_m, self.d_m, self.speed_mps, self.accel_mps2, self.d_rate_mps, self.d_accel_mps2)
+        return self.motion_at(self.t_s)
+
+    def motion_at(self, t_s: float) -> Motion:
+        """The same a moment earlier or later, at constant acceleration down to standstill."""
+        after_s = t_s - self.t_s
+        if self.accel_mps2 < 0.0:
+            after_s = min(after_s, self.speed_mps / -self.accel_mps2)
+        speed_mps = self.speed_mps + self.accel_mps2 * after_s
+        return Motion(
+            self.travelled_m + (self.speed_mps + speed_mps) / 2.0 * after_s,
+            self.d_m + (self.d_rate_mps + self.d_accel_mps2 * after_s / 2.0) * after_s,
+            speed_mps,
+            self.accel_mps2,
+            self.d_rate_mps + self.d_accel_mps2 * after_s,
+            self.d_accel_mps2,
+        )
 
 
 def command(state: VehicleState, pedals: Pedals, model: VehicleModel) -> VehicleState:

@@ -3,12 +3,13 @@ rejected."""
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from pipeline.common.files.user_file_errors import first_complaint, given_path, parse_yaml
 from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
@@ -19,7 +20,18 @@ from pipeline.types.source import SourceError
 
 Port = Annotated[int, Field(ge=1, le=65535)]
 Metres = Annotated[float, Field(ge=-20.0, le=20.0)]
-Degrees = Annotated[float, Field(ge=-180.0, le=180.0)]
+
+
+def _is_in_degrees(given: float) -> float:
+    """ValueError for a usual angle in radians, to the four places that it is written with."""
+    turned_deg = next((each for each in _USUAL_DEG if abs(abs(given) - math.radians(each)) <= _WRITTEN_RAD), None)
+    if turned_deg is not None:
+        text = f"{given:g} is {math.copysign(turned_deg, given):g}° in radians; the angles of a mount are in degrees"
+        raise ValueError(text)
+    return given
+
+
+Degrees = Annotated[float, Field(ge=-180.0, le=180.0), AfterValidator(_is_in_degrees)]
 Host = Annotated[str, Field(pattern=r"^\d{1,3}(\.\d{1,3}){3}$")]
 OffsetMs = Annotated[float, Field(ge=-2000.0, le=2000.0)]
 
@@ -32,6 +44,9 @@ def _is_device(given: object) -> object:
     raise ValueError(f"0 to {_DEVICES - 1}, or a path such as /dev/v4l/by-id/…")
 
 
+_USUAL_DEG, _WRITTEN_RAD = (30.0, 45.0, 60.0, 90.0, 120.0, 135.0, 180.0), 0.5e-4
+"""Angles by which sensors are turned on purpose, none of which is a number with three places in radians; and half the
+fourth place. One in 4000 other angles between 0.5 and 3.2 degrees, with four places, looks like one of them."""
 _SUFFIXES = (".yaml", ".yml")
 _DEVICES, _DEVICE_PATH = 64, re.compile(r"/dev/[^\s\0]+")
 Device = Annotated[int | str, BeforeValidator(_is_device)]

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from pipeline.params import Params, with_changes
-from pipeline.simulation.closed_loop import LoopStep, NetworkEyes, Setup, drive
+from pipeline.simulation.closed_loop import LoopStep, NetworkEyes, Setup, TruthEyes, drive
 from pipeline.simulation.scenario import Scenario
-from pipeline.types import RawBoxes
+from pipeline.simulation.sensors.detection_model import BoxNoise
+from pipeline.simulation.sensors.faults import Faults, Knock
+from pipeline.types import F64, RawBoxes
 from tests.pipeline.simulation.worlds import with_actors
 
 SLOWER = "{id: 1, kind: car, lane: -2, ahead_m: 28, speed_mps: {0: 12}}"
@@ -74,3 +77,44 @@ def test_a_network_gets_the_drawn_image() -> None:
     drove = list(drive(scene, Setup(eyes=NetworkEyes(counting))))  # type: ignore[arg-type]
     assert counting.shapes == [(720, 1280, 3)] * 3
     assert all(tick.frame.image is not None for tick in drove)
+
+
+def edges_px(tick: LoopStep) -> F64 | None:
+    """(4,) of the only vehicle's box; None if it is not detected."""
+    boxes = tick.frame.raw_boxes.boxes if tick.frame.raw_boxes is not None else ()
+    return np.asarray(boxes[0], dtype=np.float64) if len(boxes) else None
+
+
+def test_the_cars_sensors_have_the_scenarios_faults() -> None:
+    faults = Faults(knock=Knock(at_s=1.0, yaw_deg=3.0), sweeps_lost=0.3, pictures_lost=0.3)
+    eyes = TruthEyes(BoxNoise(lasting_share=0.0, frame_share=0.0, edge_px=0.0, missed=0.0))
+    right, wrong = (list(drive(scene, Setup(eyes=eyes, closed=False))) for scene in (short(SLOWER, 2.0), with_(faults)))
+    lost = [sum(each(tick) is None for tick in wrong) for each in (lambda tick: tick.frame.sweep, edges_px)]
+    assert all(0 < count < len(wrong) for count in lost)
+    off_px = [
+        (own.t_s >= 1.0, seen[0] - there[0])
+        for own, other in zip(right, wrong, strict=True)
+        if (there := edges_px(own)) is not None and (seen := edges_px(other)) is not None
+    ]
+    camera, calibrated = wrong[-1].frame.camera, right[-1].frame.camera
+    assert camera is not None
+    assert calibrated is not None
+    turned_px = camera.K[0, 0] * np.tan(np.radians(3.0))
+    assert all(off == pytest.approx(turned_px, rel=0.3) for is_knocked, off in off_px if is_knocked)
+    assert all(off == pytest.approx(0.0, abs=1e-3) for is_knocked, off in off_px if not is_knocked)
+    assert (camera.T_camera_ego == calibrated.T_camera_ego).all(), "the calibration does not know of it"
+
+
+def test_a_late_image_shows_the_lead_nearer() -> None:
+    def height_px(skew_ms: float) -> float:
+        eyes = TruthEyes(BoxNoise(lasting_share=0.0, frame_share=0.0, edge_px=0.0, missed=0.0))
+        *_, last = drive(with_(Faults(camera_skew_ms=skew_ms), 0.5), Setup(eyes=eyes))
+        edges = edges_px(last)
+        assert edges is not None
+        return float(edges[3] - edges[1])
+
+    assert height_px(-200.0) < height_px(0.0) < height_px(200.0), "the car catches up with its lead"
+
+
+def with_(faults: Faults, seconds: float = 2.0) -> Scenario:
+    return short(SLOWER, seconds).model_copy(update={"faults": faults})

@@ -98,6 +98,22 @@ def test_undistorted_images_with_the_distortion_of_raw_ones_are_noticed(are_undi
     assert any("already undistorted" in each for each in warnings) == are_undistorted
 
 
+@pytest.mark.parametrize(("given_deg", "is_noticed"), [(np.radians(4.0), True), (4.0, False), (0.0, False)])
+def test_a_mount_in_radians_where_degrees_are_expected_is_noticed(given_deg: float, is_noticed: bool):
+    """The camera looks 4° down and 3° to the left."""
+
+    def mounted(pitch_deg: float, yaw_deg: float) -> CameraCalibration:
+        turn = np.eye(4)
+        turn[:3, :3] = rotation(*np.radians([0.0, pitch_deg, yaw_deg]))
+        return replace(CAMERA, T_camera_ego=CAMERA.T_camera_ego @ inverse(turn))
+
+    true = resolve(AlignmentParams(), mounted(4.0, 3.0))
+    assert true is not None
+    scenes = drive(true, camera=mounted(given_deg, given_deg * 0.75))
+    warnings = fit_alignment(scenes, "pinhole", AlignmentParams()).warnings
+    assert any("look like radians" in each for each in warnings) == is_noticed
+
+
 def test_a_fit_in_words():
     fit = fit_alignment(made(), "pinhole", AlignmentParams())
     assert "boxes of held-out frames" in overlap_sentence(fit)

@@ -49,6 +49,7 @@ def test_defaults_of_the_written_file_are_the_programs() -> None:
         ("unknown key", "lidar: {colour: 1}", "lidar.colour: no such setting"),
         ("misspelt", "lidar: {data_prot: 1}", "lidar.data_prot: no such setting; did you mean data_port?"),
         ("misspelt below", "lidar: {mount: {yaw_dg: 1}}", "lidar.mount.yaw_dg: no such setting; did you mean yaw_deg?"),
+        ("radians", "lidar: {mount: {yaw_deg: -1.5708}}", "lidar.mount.yaw_deg: -1.5708 is -90° in radians"),
         ("nothing to look with", "title: x", "neither lidar nor camera"),
         ("port out of range", "lidar: {data_port: 70000}", "lidar.data_port"),
         ("another model", "lidar: {model: HDL-32E}", "lidar.model"),
@@ -126,3 +127,8 @@ def test_a_camera_sits_where_its_mount_says(mount: dict[str, Any], seen_at: tupl
     x, y, z = (calibration.T_camera_ego @ np.array([20.0, 0.0, 0.0, 1.0]))[:3]
     uv = 640.0 + 900.0 * x / z, 360.0 + 900.0 * y / z
     np.testing.assert_allclose(uv, seen_at, atol=1e-6)
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 1.571, -2.618, 0.52, 3.0, 90.0, -180.0])
+def test_angles_in_degrees_are_taken_as_they_are(angle_deg: float) -> None:
+    assert live_config.Mount(yaw_deg=angle_deg).yaw_deg == angle_deg
