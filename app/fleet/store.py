@@ -107,7 +107,9 @@ class Store:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                raise BadInput(f"{self.address}: another batch is writing there; wait for it, or give another --out")
+                raise BadInput(
+                    f"{self.address}: another batch is writing there; wait for it, or give another --out"
+                ) from None
             except OSError:  # a network disk without locks
                 pass
             yield
