@@ -4,6 +4,7 @@ query can read the batch's folder and nothing else."""
 from __future__ import annotations
 
 import math
+import re
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -28,6 +29,13 @@ _SHOWN: dict[QueryTable, tuple[str, ...]] = {
     "objects": ("id", "source", "type", "distance_m", "closing_speed_mps", "ttc_s", "in_path", "vl_gap_sigmas"),
     "drives": ("title", "frames", "duration_s", "mean_speed_mps", "frames_with_lead"),
 }
+_ORDER: dict[QueryTable, tuple[str, ...]] = {
+    "events": ("drive", "index", "kind", "id"),
+    "frames": ("drive", "index"),
+    "objects": ("drive", "index", "distance_m", "id"),
+    "drives": ("drive",),
+}
+"""Columns that no two rows share, so that the same question has the same answer each time."""
 NAMED = {
     "disagreement": "max_gap_sigmas > 3",
     "close": "min_ttc_s < 1.5",
@@ -36,6 +44,8 @@ NAMED = {
 }
 """Conditions by name, beside the kinds of event: usable in events like a column."""
 
+
+_UNKNOWN_COLUMN = re.compile(r'Referenced column (".*") not found')
 
 MOST_BYTES = 2 << 30
 """Memory that questions with a time limit may take; the usual ones on 10,000 drives take a tenth."""
@@ -86,7 +96,7 @@ class FleetTables:
         order: str = "",
         descending: bool = False,
     ) -> QueryResult:
-        """The rows that meet a condition, by drive and time.
+        """The rows that meet a condition, by drive and time, objects nearest first.
 
         Args:
             where: an SQL condition over the columns of docs/reference/fleet-tables.md, names of events and ``NAMED``.
@@ -102,7 +112,7 @@ class FleetTables:
         names = ", ".join(_quoted(name) for name in shown)
         condition = where.strip() or "true"
         first = [f"{_quoted(order)} {'DESC' if descending else 'ASC'} NULLS LAST"] if order else []
-        ordered = ", ".join([*first, *(_quoted(name) for name in shown if name in ("drive", "index"))])
+        ordered = ", ".join([*first, *map(_quoted, _ORDER[of])])
         # on a line of its own, so that a comment ends with it
         fulfilled = f"FROM {of} WHERE (\n{condition}\n)"
         counted = f"SELECT {names}, count(*) OVER () AS found {fulfilled}"
@@ -245,5 +255,7 @@ def _plain(value: Any) -> Any:
 def _reason(error: Exception) -> str:
     """DuckDB's message, without the position in the generated statement."""
     first = str(error).strip().splitlines()[0]
+    if unknown := _UNKNOWN_COLUMN.search(first):
+        return f'no column {unknown[1]} here; the reference page "Tables of a fleet" lists them'
     _, _, said = first.partition(": ")
     return (said or first).rstrip()

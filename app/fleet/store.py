@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,13 @@ from pipeline.common.errors import BadInput
 from pipeline.common.files.remote_files import NotReachable, file_system, is_remote, patiently
 from pipeline.common.files.whole_files import replacing
 
+try:
+    import fcntl
+except ImportError:  # Windows: nothing keeps two batches apart
+    fcntl = None  # type: ignore[assignment]
+
 _BLOCK_BYTES = 1 << 20
+_LOCK = ".lock"
 
 
 class Store:
@@ -81,6 +89,30 @@ class Store:
                 shutil.copyfileobj(source, written, _BLOCK_BYTES)
         except OSError as error:
             raise _not_writable(target, error) from None
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keeps other batches out of a folder on this machine for the block: two that pack the same tables would leave
+        drives out. Stores have no locks. Raises BadInput while another one is at work, or if it is not writable."""
+        if self.folder is None or fcntl is None:
+            yield
+            return
+        target = self.folder / _LOCK
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            lock = target.open("a")
+        except OSError as error:
+            raise _not_writable(target, error) from None
+        with lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise BadInput(
+                    f"{self.address}: another batch is writing there; wait for it, or give another --out"
+                ) from None
+            except OSError:  # a network disk without locks
+                pass
+            yield
 
     def names(self, folder: str) -> list[str]:
         """Every file below a folder, as names of this store, sorted; none where there is no such folder."""

@@ -101,10 +101,20 @@ def _iou(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 def closest_on_polygon(corners: npt.NDArray[np.floating]) -> tuple[float, float]:
     """The point of a convex polygon's outline, (K, 2) corners in order, nearest to the origin."""
-    start = np.asarray(corners, dtype=np.float64)
-    edge = np.roll(start, -1, axis=0) - start
-    length2 = np.maximum(np.sum(edge**2, axis=1), 1e-12)
-    t = np.clip(-np.sum(start * edge, axis=1) / length2, 0.0, 1.0)
-    on_edge = start + t[:, None] * edge
-    best = int(np.argmin(np.sum(on_edge**2, axis=1)))
-    return float(on_edge[best, 0]), float(on_edge[best, 1])
+    x, y = _closest_on_polygon(np.asarray(corners, dtype=np.float64))
+    return float(x), float(y)
+
+
+@numba.njit(cache=True, nogil=True)
+def _closest_on_polygon(corners):  # type: ignore[no-untyped-def]  # pragma: no cover
+    count = len(corners)
+    best2, best_x, best_y = np.inf, np.nan, np.nan
+    for i in range(count):
+        x, y = corners[i, 0], corners[i, 1]
+        dx, dy = corners[(i + 1) % count, 0] - x, corners[(i + 1) % count, 1] - y
+        t = min(max(-(x * dx + y * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
+        at_x, at_y = x + t * dx, y + t * dy
+        away2 = at_x * at_x + at_y * at_y
+        if away2 < best2:
+            best2, best_x, best_y = away2, at_x, at_y
+    return best_x, best_y

@@ -62,21 +62,22 @@ class Batch:
         store = Store(self.out)
         plan = Plan.load(store) if self.resume else self._plan()
         work = work_of(plan, store)
-        begin(plan, work, store)
-        tally = tally_of(work)
-        start = time.monotonic()
-        if work.jobs:
-            try:
-                with self.cluster.client(len(work.jobs)) as client:
-                    run_with_bar(client, work, tally)
-            except SchedulerLost as lost:
-                print(
-                    f"cipv: connection to Dask lost: {lost}; `cipv batch --resume --out {self.out}` continues",
-                    file=sys.stderr,
-                )
-                return 1
-        with share_progress() as bar:
-            pack(store, work.key.name, task_progress(bar, "packing the tables"))
+        with store.alone():
+            begin(plan, work, store)
+            tally = tally_of(work)
+            start = time.monotonic()
+            if work.jobs:
+                try:
+                    with self.cluster.client(len(work.jobs)) as client:
+                        run_with_bar(client, work, tally)
+                except SchedulerLost as lost:
+                    print(
+                        f"cipv: connection to Dask lost: {lost}; `cipv batch --resume --out {self.out}` continues",
+                        file=sys.stderr,
+                    )
+                    return 1
+            with share_progress() as bar:
+                pack(store, work.key.name, task_progress(bar, "packing the tables"))
         self._tell(work.key.name, tally, time.monotonic() - start)
         return 1 if tally.failed else 0
 

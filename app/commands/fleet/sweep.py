@@ -72,6 +72,10 @@ class ParameterSweep:
         base = self.pipeline.parameters()
         propose, count = self._proposer(base)
         plan = Plan(tuple(map(absolute, self.addresses)), base, self.pipeline.choice(), self.sensors, self.rings)
+        for file in (self.save, self.report):
+            if file is not None:
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.open("a").close()  # report an unwritable file before the work, not after it
         try:
             tried, names = self._run(plan, propose, count, Store(self.out))
         except SchedulerLost as lost:
@@ -120,7 +124,8 @@ class ParameterSweep:
         runs: list[tuple[str, Mapping[str, Any]]] = []
         values: dict[str, dict[str, float | None]] = {}
         tried, names = _judged(runs, values)
-        with self.cluster.client(len(work_of(plan, store).all)) as client:
+        drives = len(work_of(plan, store).all)
+        with store.alone(), self.cluster.client(drives) as client:
             while (changes := propose(tried)) is not None:
                 this = replace(plan, params=with_changes(plan.params, changes))
                 work = work_of(this, store)

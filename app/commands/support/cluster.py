@@ -22,6 +22,11 @@ if TYPE_CHECKING:
     from app.fleet.batch.schedule import Tally
 
 
+LEAST_MEMORY_MB = 500
+"""Of one process. With its libraries, it takes 260 MB, and networks come on top; Dask restarts it at 95 % of its limit
+before it could say so, again and again."""
+
+
 @dataclass(frozen=True)
 class ClusterOptions:
     """Where drives are run."""
@@ -37,6 +42,14 @@ class ClusterOptions:
         """BadInput if an option has an impossible value."""
         if self.workers is not None and self.workers < 1:
             raise BadInput(f"--workers {self.workers}: expected at least 1")
+        from dask.utils import parse_bytes
+
+        try:
+            memory_bytes = parse_bytes(self.memory)
+        except ValueError:
+            raise BadInput(f"--memory {self.memory}: expected a size such as 3GB") from None
+        if memory_bytes < LEAST_MEMORY_MB * 1e6:
+            raise BadInput(f"--memory {self.memory}: expected at least {LEAST_MEMORY_MB}MB")
 
     @contextmanager
     def client(self, drives: int) -> Iterator[Client]:

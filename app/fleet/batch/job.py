@@ -32,6 +32,11 @@ class Job:
         """Store name of these detectors' detections in the piece that begins with frame ``first``."""
         return answers_file(self.recording.mark, detectors, first, self.piece_frames)
 
+    def reason(self, text: str) -> str:
+        """A message about the recording, without its address in front, which is told beside it."""
+        _, _, path = self.recording.address.partition(":")
+        return text.removeprefix(f"{self.recording.address}: ").removeprefix(f"{path}: ")
+
     @property
     def done_file(self) -> str:
         """Name of the file whose presence means that all of the drive's files are complete."""

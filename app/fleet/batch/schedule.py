@@ -245,12 +245,11 @@ class _Batch:
 
     def _set_aside(self, piece: _Piece, reason: str) -> None:
         if self._gives_up(piece):
-            set_aside(piece.job, reason)
-            self._tally.aside[piece.job.recording.address] = reason
+            self._tally.aside[piece.job.recording.address] = set_aside(piece.job, reason).reason
 
     def _fail(self, piece: _Piece, reason: str) -> None:
         if self._gives_up(piece):
-            self._tally.failed[piece.job.recording.address] = reason
+            self._tally.failed[piece.job.recording.address] = piece.job.reason(reason)
 
     def _gives_up(self, piece: _Piece) -> bool:
         """Whether a drive is set aside now; false if it already was because of another piece."""

@@ -11,6 +11,7 @@ from time import perf_counter
 
 import numpy as np
 import zstandard
+from distributed import get_worker
 
 from app.drive.events import find_events
 from app.drive.events.event import event_fields
@@ -66,7 +67,7 @@ def run_drive(job: Job, may_split: bool = False) -> Outcome | TooLong:
         detectors = detectors_for(source, job)
         if may_split and _missing_pieces(source, detectors, job):
             return TooLong(tuple(range(0, len(source), job.piece_frames)))
-        with tempfile.TemporaryDirectory(prefix="cipv-batch-") as folder:
+        with tempfile.TemporaryDirectory(prefix="cipv-batch-", dir=_scratch()) as folder:
             looked_at = _run(job, source, detectors, Path(folder))
     except WrongWorker:
         raise
@@ -74,6 +75,14 @@ def run_drive(job: Job, may_split: bool = False) -> Outcome | TooLong:
         return set_aside(job, str(error), perf_counter() - start)
     _write(job, job.done_file, {"frames": len(source)})
     return Outcome(job.recording.drive, len(source), looked_at, perf_counter() - start)
+
+
+def _scratch() -> str | None:
+    """A worker's own folder, which Dask clears after one that was killed; None outside of a worker."""
+    try:
+        return str(get_worker().local_directory)
+    except ValueError:
+        return None
 
 
 def look_at_piece(job: Job, first: int) -> int:
@@ -93,6 +102,7 @@ def look_at_piece(job: Job, first: int) -> int:
 
 def set_aside(job: Job, reason: str, seconds: float = 0.0) -> Outcome:
     """Note why a recording could not be run; it is not tried again unless it changes."""
+    reason = job.reason(reason)
     _write(job, aside_file(job.key.name, job.recording), {"reason": reason})
     return Outcome(job.recording.drive, 0, 0, seconds, reason)
 

@@ -68,16 +68,26 @@ def patiently(work: Callable[[], _T], what: str) -> _T:
     for left in reversed(range(_TRIES)):
         try:
             return work()
-        except FileNotFoundError:
-            raise NotReachable(f"{what}: not found") from None
         except PermissionError as error:
             raise NotReachable(f"{what}: access denied: {first_line(error)}") from None
         except Exception as error:  # each store's package has its own errors, without a common base class
+            if isinstance(error, FileNotFoundError) and not _may_pass(error.__cause__):
+                raise NotReachable(f"{what}: not found") from None
             if not left:
-                raise Overloaded(f"{what}: store error: {first_line(error)}") from error
+                failure = error.__cause__ if isinstance(error, FileNotFoundError) else error
+                raise Overloaded(f"{what}: store error: {first_line(failure or error)}") from error
             time.sleep(pause_s)
             pause_s *= 2
     raise AssertionError("unreachable")
+
+
+def _may_pass(cause: BaseException | None) -> bool:
+    """Whether a file that "was not found" may be there later: fsspec says so of every file of a web server that does
+    not answer, or answers with an error of its own (5xx) or "too many requests" (429)."""
+    if type(cause).__module__.partition(".")[0] != "aiohttp":  # its errors are those of web servers
+        return isinstance(cause, TimeoutError)
+    status: int | None = getattr(cause, "status", None)
+    return status is None or status == 429 or status >= 500
 
 
 def facts(address: str) -> dict[str, Any]:

@@ -201,9 +201,15 @@ def _speed_mps(corners: list[tuple[float, float]], t_s: float) -> float:
 
 def _travelled_m(corners: list[tuple[float, float]], t_s: float) -> float:
     """Integral of the speed from 0 to t, by trapezoids over the corners in between: exact for linear pieces."""
-    stops = [0.0, *(time for time, _ in corners if 0.0 < time < t_s), t_s]
-    speeds = [_speed_mps(corners, stop) for stop in stops]
-    return sum((stops[i + 1] - stops[i]) * (speeds[i] + speeds[i + 1]) / 2 for i in range(len(stops) - 1))
+    travelled_m, at_s, speed, before = 0.0, 0.0, _speed_mps(corners, 0.0), corners[0][1]
+    for time_s, after in corners:
+        if time_s >= t_s:
+            break
+        there, before = before + (after - before), after  # rounded as ``_speed_mps`` is
+        if time_s > 0.0:
+            travelled_m += (time_s - at_s) * (speed + there) / 2
+            at_s, speed = time_s, there
+    return travelled_m + (t_s - at_s) * (speed + _speed_mps(corners, t_s)) / 2
 
 
 def _offset(script: Script, road: Road, t_s: float) -> tuple[float, float, float]:

@@ -17,6 +17,7 @@ import pytest
 from app.cli import main
 from app.fleet import extra
 from app.fleet.batch.work import run_drive
+from app.fleet.store import Store
 from tests.app.fleet.fleets import COPIES, LENGTH, SESSIONS, begun, contents, plan_of
 from tests.app.waiting import wait_until
 from tests.conftest import ROOT
@@ -122,6 +123,8 @@ WRONG = {
     "live sensors": ("batch", "live:car.yaml", "--out", "x"),
     "no batch to resume": ("batch", "--resume", "--out", "docs"),
     "no workers": ("batch", "sim:straight", "--out", "x", "--workers", "0"),
+    "memory that is no size": ("batch", "sim:straight", "--out", "x", "--memory", "lots"),
+    "memory that no worker starts in": ("batch", "sim:straight", "--out", "x", "--memory", "10MB"),
     "a store nobody knows": ("batch", "nowhere://bucket", "--out", "x"),
 }
 
@@ -135,6 +138,20 @@ def test_bad_input_is_said_in_one_line(
     assert len(said) == 1, said
     assert said[0].startswith("cipv: ")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_second_batch_in_a_folder_is_refused_while_the_first_one_runs(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    typed = ("batch", fleet / "near-0.mcap", "--out", tmp_path / "out", *LIDAR)
+    with Store(str(tmp_path / "out")).alone():
+        assert cipv(*typed) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert "another batch" in said
+    assert contents(tmp_path / "out") == {}
+    with Store(str(tmp_path / "out")).alone():
+        pass  # the first one has ended
 
 
 def test_without_the_extra_one_line_says_what_to_install(

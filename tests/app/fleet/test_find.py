@@ -110,8 +110,16 @@ def test_rows_come_in_the_order_that_is_asked_for(tables: FleetTables):
         assert known == sorted(known, reverse=descending)
         assert shown[: len(known)] == known
         assert None in shown
-    with pytest.raises(BadInput, match="no_such"):
+    with pytest.raises(BadInput, match='no column "no_such" here'):
         tables.find("", "frames", order="no_such")
+
+
+def test_moments_of_a_frame_come_in_the_same_order_each_time(tables: FleetTables):
+    for of, names in (("events", ("drive", "index", "kind")), ("objects", ("drive", "index", "distance_m"))):
+        found = tables.find("", of, 1000, columns=("kind",) if of == "events" else ("distance_m",))  # type: ignore[arg-type]
+        places = [found.columns.index(name) for name in names]
+        rows = [tuple(row[n] for n in places) for row in found.rows]
+        assert rows == sorted(rows, key=lambda row: (row[:2], row[2] is None, row[2]))
 
 
 def test_a_question_without_end_is_stopped(batch: Path):

@@ -125,6 +125,8 @@ def test_what_is_wrong_is_said_before_any_work(tmp_path: Path, capsys: pytest.Ca
         ("--over", "cluster.min_points=4,5", "--search", "0"),
         ("--over", "cluster.min_points=4,5", "--search", "2", "--latin", "2"),
         ("--over", "cluster.min_points=4:500:3", "--search", "2"),
+        ("--over", "cluster.min_points=4,5", "--save", str(tmp_path)),
+        ("--over", "cluster.min_points=4,5", "--report", str(tmp_path)),
     ):
         assert _cipv("sweep", "sim:straight", "--out", str(tmp_path / "out"), *more) == 2
         assert len(capsys.readouterr().err.strip().splitlines()) == 1

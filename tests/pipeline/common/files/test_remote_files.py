@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 
 import fsspec
 import pytest
@@ -89,6 +91,41 @@ def test_a_store_that_goes_on_failing_is_overloaded_and_says_nothing_of_the_file
 
     with pytest.raises(Overloaded, match="s3://x: store error: slow down"):
         patiently(work, "s3://x")
+
+
+class _WebServer(BaseHTTPRequestHandler):
+    """Answers every request with the status in the path."""
+
+    def do_GET(self) -> None:
+        self.send_response(int(self.path[1:4]))
+        self.send_header("Content-Length", "0")
+        self.end_headers()
+
+    do_HEAD = do_GET
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+def test_a_web_server_that_fails_does_not_say_that_a_file_is_not_there(in_no_time):
+    """A batch sets what is not there aside for good, and tries what failed again."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), _WebServer)
+    thread = Thread(target=server.serve_forever)
+    thread.start()
+    address = f"http://127.0.0.1:{server.server_port}"
+    try:
+        for status in (404, 410, 403):
+            with pytest.raises(NotReachable):
+                remote_files.facts(f"{address}/{status}.mcap")
+        for status in (500, 503, 429):
+            with pytest.raises(Overloaded, match=str(status)):
+                remote_files.facts(f"{address}/{status}.mcap")
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+    with pytest.raises(Overloaded, match="Cannot connect"):
+        remote_files.facts(f"{address}/a.mcap")
 
 
 def test_a_chunk_that_a_store_does_not_give_is_no_damage(session, in_no_time, monkeypatch: pytest.MonkeyPatch):
