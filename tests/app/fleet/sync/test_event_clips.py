@@ -28,7 +28,7 @@ def test_the_events_are_those_of_the_run_that_was_recorded(tmp_path: Path):
     expected = [each for each in find_events(rows, objects, Params()) if each.kind != "vl_disagreement"]
     found = recorded_events(SessionSource("b", str(file)), "info")
     assert [each for each in found if each.kind != "mark"] == expected
-    assert {"cut_in", "ttc_minimum"} <= {each.kind for each in found}
+    assert {"cut_in", "brake"} <= {each.kind for each in found}
     assert [each.index for each in found if each.kind == "mark"] == [MARKED - FIRST]
 
 
