@@ -197,6 +197,20 @@ def test_an_address_that_could_not_be_opened_is_there_to_be_mended(open_page: Op
         expect(address).to_be_hidden()
 
 
+def test_a_key_right_after_a_dialog_is_the_pages(open_page: OpenPage):
+    page = open_page()
+    page.keyboard.press("f")
+    address = page.get_by_label("Recording URI")
+    expect(address).to_be_visible()
+    address.evaluate(
+        """field => {
+          field.closest("dialog").close();
+          field.dispatchEvent(new KeyboardEvent("keydown", { key: "f", code: "KeyF", bubbles: true }));
+        }"""
+    )
+    expect(address).to_be_visible()
+
+
 def test_the_3d_view_keeps_the_keys_that_fly_and_leaves_the_page_the_others(open_page: OpenPage, site: Site):
     page = open_page()
     page.route("**/viser/**", lambda route: route.fulfill(body="<input>", content_type="text/html"))

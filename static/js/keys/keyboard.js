@@ -68,7 +68,8 @@ function isTaken({ target, key, ctrlKey, metaKey }) {
   if (document.querySelector("dialog[open]") || (key === "Escape" && document.querySelector(":popover-open")))
     return true;
   const focused = /** @type {Element} */ (target); // maybe another page's, whose elements are none of our HTMLElement
-  if (!("matches" in focused)) return false;
+  // a field of a dialog that has just closed keeps the focus until the page is painted
+  if (!("matches" in focused) || !focused.checkVisibility()) return false;
   if (focused.matches("select, textarea, input:not([type=range]):not([type=checkbox])")) return true;
   if (ctrlKey || metaKey) return false;
   if (focused.matches("input[type=range]")) return key.startsWith("Arrow") || key === "Home" || key === "End";
