@@ -20,9 +20,9 @@ SMALLEST_CLOSING_MPS = 0.1
 _SMALLEST_GAP_M = 0.1
 _SURE_SIGMAS = 2.0
 _ONE_SHARE = 0.5
-"""Share of images that must have the box of what only the camera sees: less often a vehicle near enough to matter is
-not found, but a track that hops from one parked car to the next is. On 24 random drives, no such lead that was a true
-one had less (1,030 frames), and 10 of the 63 false ones had."""
+"""Least share of the images that have a box of what only the camera sees. A vehicle near enough to matter is found
+more often; a track that hops from one parked car to the next is not. On 24 random drives, none of 1,030 true leads by
+the camera alone had a smaller share, and 10 of 63 false ones had."""
 _STEADY_S = 0.5
 """Time for which a ranging sensor must have seen an object steadily before its speed is sure: a new side that comes
 into view moves it by metres."""
