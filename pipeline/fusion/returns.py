@@ -2,10 +2,11 @@
 cluster.
 
 Beyond 35 m, a VLP-16 puts one to four points on a car: too few for a cluster, but accurate. Where the camera gives a
-vehicle's direction and approximate distance, such a point gives the exact distance, if it belongs to the vehicle. Four
+vehicle's direction and approximate distance, such a point gives the exact distance, if it belongs to the vehicle. Five
 tests decide that:
 
 - it is inside the box, away from its edges, above the road, and no higher than a vehicle;
+- no box of a nearer vehicle covers it;
 - its range agrees with the camera's, within the variation of vehicle heights;
 - its surface ends with the vehicle: a wall, a hedge or the road behind continues on both sides at the same range;
 - no second group of points fits the box about as well.
@@ -27,7 +28,7 @@ import numpy as np
 
 from pipeline.alignment.projection import Alignment
 from pipeline.common.fast_replace import evolve
-from pipeline.common.geometry import F64
+from pipeline.common.geometry import F64, iou_matrix
 from pipeline.common.made_sweeps import made_sweeps
 from pipeline.fusion.free_road import SweepRays
 from pipeline.params import FusionParams
@@ -55,6 +56,9 @@ _BESIDE_SHARE = 0.6
 _SAME_RANGE_M, _SAME_HEIGHT_DEG = 1.5, 1.0
 _CLEARLY = 1.0
 """Minimum difference of log-likelihood between the best and the second-best group."""
+_EDGE_PX, _SAME_IOU = 2.0, 0.5
+"""A box that ends farther down by more than the noise of its edge is of something nearer, unless both are on one
+vehicle."""
 _LOW_NEAREST_M, _LOW_POINTS = 20.0, 3
 """Minimum distance of a vehicle that only one ring hits, and minimum number of its points: one or two may be dirt."""
 _LOW_BOTTOM_SHARE = 0.2
@@ -118,7 +122,20 @@ def range_boxes(
     points = _points(sweep, rows, range_m, alignment)
     rows, range_m = _far_road(sweep.points, sweep.kind, _LOW_NEAREST_M / 2)
     road = _points(sweep, rows, range_m, alignment)
-    return tuple(_ranged(each, points, road) if ask else each for each, ask in zip(boxes, asked, strict=True))
+    bbox = np.array([each.detection.bbox for each in boxes])
+    return tuple(
+        _ranged(each, points, road, bbox[_in_front(bbox, row)]) if asked[row] else each
+        for row, each in enumerate(boxes)
+    )
+
+
+def _in_front(bbox: F64, row: int) -> np.ndarray:
+    """(M,) whether each of the boxes (M, 4) is of something nearer than one of them that may cover it: on a level road,
+    what is nearer ends farther down. Two boxes on one vehicle do not cover each other."""
+    x1, _, x2, y2 = bbox.T
+    beside = (x1 < x2[row]) & (x1[row] < x2)
+    covers = beside & (y2 > y2[row] + _EDGE_PX) & (iou_matrix(bbox[row : row + 1], bbox)[0] < _SAME_IOU)
+    return np.asarray(covers)
 
 
 def _points(sweep: SweepReturns, rows: np.ndarray, range_m: F64, alignment: Alignment) -> _Points:
@@ -160,8 +177,8 @@ def _far_road(points, kind, nearest_m):  # type: ignore[no-untyped-def]  # pragm
     return rows[:count].copy(), ranges_m[:count].copy()
 
 
-def _ranged(seen: VisionMeasurement, points: _Points, road: _Points) -> VisionMeasurement:
-    by_returns = _by_returns(seen, points) if (seen.distance_m or 0.0) >= NEAREST_M else seen
+def _ranged(seen: VisionMeasurement, points: _Points, road: _Points, in_front: F64) -> VisionMeasurement:
+    by_returns = _by_returns(seen, points, in_front) if (seen.distance_m or 0.0) >= NEAREST_M else seen
     return by_returns if by_returns.returns else _by_low_row(seen, road)
 
 
@@ -187,14 +204,17 @@ def _by_low_row(seen: VisionMeasurement, road: _Points) -> VisionMeasurement:
     return evolve(seen, ranged_m=float(road.range_m[row[0]]), ranged_sigma_m=SIGMA_M, returns=len(row))
 
 
-def _by_returns(seen: VisionMeasurement, points: _Points) -> VisionMeasurement:
-    """The box ranged by points above the road."""
+def _by_returns(seen: VisionMeasurement, points: _Points, in_front: F64) -> VisionMeasurement:
+    """The box ranged by points above the road. in_front: (K, 4) boxes that may cover it, whose points are not its."""
     assert seen.distance_m is not None
     assert seen.sigma_m is not None
     x1, y1, x2, y2 = seen.detection.bbox
     side, bottom, share = _EDGE_SHARE * (x2 - x1), _BOTTOM_SHARE * (y2 - y1), seen.sigma_m / seen.distance_m
     inner = (x1 + side, y1, x2 - side, y2 - bottom)
     rows = _inside(points.uv, points.range_m, inner, seen.distance_m, share)
+    u, v = points.uv[rows].T[:, :, None]
+    covered = (u > in_front[:, 0]) & (u < in_front[:, 2]) & (v > in_front[:, 1]) & (v < in_front[:, 3])
+    rows = rows[~covered.any(axis=1)]
     if not len(rows):
         return seen
     off = np.log(points.range_m[rows] / seen.distance_m) / share
