@@ -6,7 +6,7 @@ vehicle's direction and approximate distance, such a point gives the exact dista
 tests decide that:
 
 - it is inside the box, away from its edges, above the road, and no higher than a vehicle;
-- no box of a nearer vehicle covers it;
+- it cannot be of a nearer vehicle, whose box covers it;
 - its range agrees with the camera's, within the variation of vehicle heights;
 - its surface ends with the vehicle: a wall, a hedge or the road behind continues on both sides at the same range;
 - no second group of points fits the box about as well.
@@ -122,11 +122,23 @@ def range_boxes(
     points = _points(sweep, rows, range_m, alignment)
     rows, range_m = _far_road(sweep.points, sweep.kind, _LOW_NEAREST_M / 2)
     road = _points(sweep, rows, range_m, alignment)
-    bbox = np.array([each.detection.bbox for each in boxes])
+    placed = _placed(boxes)
     return tuple(
-        _ranged(each, points, road, bbox[_in_front(bbox, row)]) if asked[row] else each
+        _ranged(each, points, road, placed[_in_front(placed[:, :4], row)]) if asked[row] else each
         for row, each in enumerate(boxes)
     )
+
+
+def _placed(boxes: tuple[VisionMeasurement, ...]) -> F64:
+    """(M, 6): each box, and the ranges between which returns from it lie; any range where it has no distance."""
+    rows = []
+    for each in boxes:
+        nearest_m, farthest_m = 0.0, math.inf
+        if each.distance_m is not None and each.sigma_m is not None:
+            spread = math.exp(_SIGMAS * each.sigma_m / each.distance_m)
+            nearest_m, farthest_m = each.distance_m / spread, each.distance_m * spread
+        rows.append((*each.detection.bbox, nearest_m, farthest_m))
+    return np.array(rows, dtype=np.float64)
 
 
 def _in_front(bbox: F64, row: int) -> np.ndarray:
@@ -205,16 +217,14 @@ def _by_low_row(seen: VisionMeasurement, road: _Points) -> VisionMeasurement:
 
 
 def _by_returns(seen: VisionMeasurement, points: _Points, in_front: F64) -> VisionMeasurement:
-    """The box ranged by points above the road. in_front: (K, 4) boxes that may cover it, whose points are not its."""
+    """The box ranged by points above the road. in_front: (K, 6) boxes that may cover it, as returned by ``_placed``."""
     assert seen.distance_m is not None
     assert seen.sigma_m is not None
     x1, y1, x2, y2 = seen.detection.bbox
     side, bottom, share = _EDGE_SHARE * (x2 - x1), _BOTTOM_SHARE * (y2 - y1), seen.sigma_m / seen.distance_m
     inner = (x1 + side, y1, x2 - side, y2 - bottom)
     rows = _inside(points.uv, points.range_m, inner, seen.distance_m, share)
-    u, v = points.uv[rows].T[:, :, None]
-    covered = (u > in_front[:, 0]) & (u < in_front[:, 2]) & (v > in_front[:, 1]) & (v < in_front[:, 3])
-    rows = rows[~covered.any(axis=1)]
+    rows = rows[~_may_be_of(in_front, points.uv[rows], points.range_m[rows])]
     if not len(rows):
         return seen
     off = np.log(points.range_m[rows] / seen.distance_m) / share
@@ -231,6 +241,15 @@ def _by_returns(seen: VisionMeasurement, points: _Points, in_front: F64) -> Visi
     if points.clustered[best].any() or _goes_on(points, best, (x1, x2)):
         return seen
     return evolve(seen, ranged_m=float(points.range_m[best[0]]), ranged_sigma_m=SIGMA_M, returns=len(best))
+
+
+def _may_be_of(in_front: F64, uv: F64, range_m: F64) -> np.ndarray:
+    """(P,) whether points may be of one of the boxes in front, (K, 6): they lie in it at a range that it may have. What
+    is seen over or through a nearer vehicle is far beyond it."""
+    x1, y1, x2, y2, nearest_m, farthest_m = in_front.T
+    u, v, r = uv[:, :1], uv[:, 1:], range_m[:, None]
+    inside = (u > x1) & (u < x2) & (v > y1) & (v < y2)
+    return np.asarray((inside & (r > nearest_m) & (r < farthest_m)).any(axis=1))
 
 
 def _goes_on(points: _Points, group: np.ndarray, box: tuple[float, float]) -> bool:
