@@ -76,7 +76,6 @@ def test_filters_find_what_the_tables_hold(open_fleet: OpenPage, tables: FleetTa
     assert found(page) == tables.find("").total > 0
     page.get_by_role("group", name="Kinds of event").get_by_role("button", name="first acquisition").click()
     expect(page.locator("#fleet-facts")).to_contain_text(f"{tables.find('first_acquisition').total} events")
-    settled(page)  # until then, its charts and their fields are replaced
     distances = [row[4] for row in tables.find("first_acquisition", columns=("distance_m",)).rows]
     middle = f"{sum(distances) / len(distances):.2f}"
     page.get_by_label("Distance of the CIPV to").fill(middle)
@@ -91,6 +90,41 @@ def test_filters_find_what_the_tables_hold(open_fleet: OpenPage, tables: FleetTa
     settled(page)
     page.get_by_role("button", name="Clear filters").click()
     expect(page.locator("#fleet-facts")).to_contain_text(f"{tables.find('').total} events")
+    settled(page)
+
+
+def test_what_is_typed_while_charts_load_is_kept(open_fleet: OpenPage, tables: FleetTables):
+    page = open_fleet()
+    held: list[Route] = []
+    is_slow = True
+
+    def answer(route: Route) -> None:
+        if is_slow:
+            held.append(route)
+        else:
+            route.continue_()
+
+    page.route("**/api/fleet/histogram?*", answer)
+    with page.expect_request("**/api/fleet/histogram?*"):
+        page.get_by_role("group", name="Kinds of event").get_by_role("button", name="first acquisition").click()
+    low, high = (page.get_by_label(f"Distance of the CIPV {word}") for word in ("from", "to"))
+    low.fill("5")
+    high.fill("60")
+    page.get_by_label("Ego speed from").press_sequentially("1")
+    is_slow = False
+    for each in held:
+        each.continue_()
+    both = tables.find("first_acquisition and distance_m >= 5 and distance_m <= 60").total
+    assert 0 < both <= tables.find("first_acquisition").total
+    expect(page.locator("#fleet-facts")).to_contain_text(f"{both} events")
+    settled(page)
+    expect(low).to_have_value("5")
+    expect(high).to_have_value("60")
+    expect(page.get_by_label("Ego speed from")).to_have_value("1")
+    expect(page.get_by_label("Ego speed from")).to_be_focused()
+    page.get_by_role("button", name="Clear filters").click()
+    expect(low).to_have_value("")
+    expect(high).to_have_value("")
     settled(page)
 
 

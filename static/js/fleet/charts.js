@@ -32,65 +32,92 @@ function chip(words, isOn, title, act) {
 }
 
 /**
- * A histogram of a column. Dragging over bars, or filling in the fields below, sets a range.
- * @param {import("./filters.js").Chart} chart
- * @param {{edges: number[], counts: number[]}} found
- * @param {Range} chosen
- * @param {(range: Range) => void} onRange
+ * A histogram of a column and the fields of its range. box: its element. fill: shows what was found. refresh: shows the
+ * chosen range; not in a field that the user is typing in.
+ * @typedef {object} Histogram
+ * @property {HTMLElement} box
+ * @property {(found: {edges: number[], counts: number[]}) => void} fill
+ * @property {() => void} refresh
  */
-export function histogram(chart, found, chosen, onRange) {
-  const { edges, counts } = found,
-    highest = Math.max(...counts, 1);
-  const isInside = (/** @type {number} */ n) =>
-    (chosen[0] === null || edges[n + 1] > chosen[0]) && (chosen[1] === null || edges[n] < chosen[1]);
-  const bars = counts.map((count, n) =>
-    el("i", {
-      style: { "--part": `${(100 * count) / highest}%` },
-      data: { inside: String(isInside(n)) },
-      title: `${number(edges[n])} – ${number(edges[n + 1])} ${chart.unit}: ${count.toLocaleString("en")}`,
-    }),
-  );
-  const plot = el("div", { class: "fleet-bars" }, ...bars);
-  if (counts.length) dragging(plot, edges, onRange);
-  else plot.append(el("span", { class: "facts", textContent: "no values" }));
+
+/**
+ * A histogram that is filled, and filled again, while it stays: what is typed in its fields meanwhile is not lost.
+ * Dragging over bars, or filling in the fields below, sets a range.
+ * @param {import("./filters.js").Chart} chart
+ * @param {() => Range} chosen the range that is chosen now
+ * @param {(range: Range) => void} onRange
+ * @returns {Histogram}
+ */
+export function histogram(chart, chosen, onRange) {
+  const bars = el("div", { class: "fleet-bars" });
+  /** @type {number[]} */
+  let edges = [];
+  dragging(bars, () => edges, onRange);
   const fields = ["from", "to"].map((word, place) => {
-    const edge = edges.length ? number(edges[place ? edges.length - 1 : 0]) : "";
-    const field = el("input", {
-      type: "number",
-      step: "any",
-      value: chosen[place] === null ? "" : String(chosen[place]),
-      placeholder: edge,
-      aria: { label: `${chart.title} ${word}` },
-    });
+    const field = el("input", { type: "number", step: "any", aria: { label: `${chart.title} ${word}` } });
     field.addEventListener("change", () => {
       /** @type {Range} */
-      const range = [...chosen];
+      const range = [...chosen()];
       range[place] = field.value === "" ? null : field.valueAsNumber;
       onRange(range);
     });
     return field;
   });
+  function refresh() {
+    const range = chosen();
+    fields.forEach((field, place) => {
+      if (field !== document.activeElement) field.value = range[place] === null ? "" : String(range[place]);
+    });
+  }
+  refresh();
   const unit = chart.unit ? ` (${chart.unit})` : "";
-  return el(
+  const box = el(
     "section",
     { class: "fleet-chart", aria: { label: chart.title } },
     el("h3", { textContent: `${chart.title}${unit}` }),
-    plot,
+    bars,
     el("div", { class: "fleet-range" }, fields[0], "–", fields[1]),
+  );
+  return {
+    box,
+    refresh,
+    fill(found) {
+      edges = found.edges;
+      bars.replaceChildren(...barsOf(chart, found, chosen()));
+      if (!found.counts.length) bars.append(el("span", { class: "facts", textContent: "no values" }));
+      fields.forEach((field, place) => {
+        field.placeholder = edges.length ? number(edges[place ? edges.length - 1 : 0]) : "";
+      });
+    },
+  };
+}
+
+/**
+ * @param {import("./filters.js").Chart} chart @param {{edges: number[], counts: number[]}} found @param {Range} chosen
+ */
+function barsOf(chart, { edges, counts }, [low, high]) {
+  const highest = Math.max(...counts, 1);
+  return counts.map((count, n) =>
+    el("i", {
+      style: { "--part": `${(100 * count) / highest}%` },
+      data: { inside: String((low === null || edges[n + 1] > low) && (high === null || edges[n] < high)) },
+      title: `${number(edges[n])} – ${number(edges[n + 1])} ${chart.unit}: ${count.toLocaleString("en")}`,
+    }),
   );
 }
 
-/** @param {HTMLElement} plot @param {number[]} edges @param {(range: Range) => void} onRange */
-function dragging(plot, edges, onRange) {
-  const bins = edges.length - 1;
+/** @param {HTMLElement} plot @param {() => number[]} edgesNow @param {(range: Range) => void} onRange */
+function dragging(plot, edgesNow, onRange) {
   const binAt = (/** @type {PointerEvent} */ event) => {
-    const box = plot.getBoundingClientRect();
+    const box = plot.getBoundingClientRect(),
+      bins = edgesNow().length - 1;
     return Math.min(bins - 1, Math.max(0, Math.floor(((event.clientX - box.left) / box.width) * bins)));
   };
   /** @type {number|null} */
   let begun = null;
   const between = (/** @type {PointerEvent} */ event) => [begun ?? 0, binAt(event)].sort((a, b) => a - b);
   plot.addEventListener("pointerdown", (event) => {
+    if (edgesNow().length < 2) return;
     begun = binAt(event);
     plot.setPointerCapture(event.pointerId);
   });
@@ -103,7 +130,8 @@ function dragging(plot, edges, onRange) {
   });
   plot.addEventListener("pointerup", (event) => {
     if (begun === null) return;
-    const [first, last] = between(event);
+    const [first, last] = between(event),
+      edges = edgesNow();
     begun = null;
     onRange([rounded(edges[first]), rounded(edges[last + 1])]);
   });

@@ -21,6 +21,8 @@ const TABLES = /** @type {const} */ (["events", "frames", "objects", "drives"]);
 const dialog = $("#fleet-dialog", HTMLDialogElement);
 /** @type {Fleet|null} */
 let fleet = null;
+/** Those of the chosen table. @type {import("./charts.js").Histogram[]} */
+let charts = [];
 
 export function setUp() {
   $("#fleet-button").addEventListener("click", open);
@@ -31,6 +33,7 @@ async function open() {
   if (!fleet?.address) return showHint();
   if (!filters.run || !fleet.runs.includes(filters.run)) filters.run = fleet.runs[0];
   build();
+  buildCharts();
   dialog.showModal();
   $("#fleet-where").focus();
   await load();
@@ -57,7 +60,7 @@ function build() {
   dialog.classList.add("is-full");
   const tabs = TABLES.map((name) => {
     const button = el("button", { type: "button", textContent: name, data: { of: name }, aria: { role: "tab" } });
-    button.addEventListener("click", () => changed(() => toggleTable(name)));
+    button.addEventListener("click", () => changed(() => chooseTable(name)));
     return button;
   });
   const runs = el(
@@ -101,6 +104,13 @@ function build() {
   );
 }
 
+/** @param {import("./filters.js").Table} name */
+function chooseTable(name) {
+  if (name === filters.of) return;
+  toggleTable(name);
+  buildCharts();
+}
+
 function clear() {
   const field = $("#fleet-where", HTMLInputElement);
   field.value = "";
@@ -115,6 +125,7 @@ function clear() {
 /** Change the filters and query again. @param {() => unknown} change */
 function changed(change) {
   change();
+  for (const { refresh } of charts) refresh();
   memory.write("fleet.of", filters.of);
   load();
 }
@@ -150,13 +161,23 @@ async function loadCharts() {
     (name) => changed(() => toggleNamed(name)),
     filters,
   );
-  const boxes = [];
-  for (const chart of CHARTS[of]) {
+  for (const [place, chart] of CHARTS[of].entries()) {
     const found = await ask("histogram", { column: chart.column }, { chart });
-    const onRange = (/** @type {import("./filters.js").Range} */ range) => changed(() => setRange(chart.column, range));
-    boxes.push(histogram(chart, found, filters.ranges.get(chart.column) ?? [null, null], onRange));
+    if (filters.of !== of) return; // another table was chosen meanwhile: its charts are loaded next
+    charts[place].fill(found);
   }
-  $("#fleet-charts").replaceChildren(...boxes);
+}
+
+/** The charts of the chosen table, still without bars. They stay until another is chosen. */
+function buildCharts() {
+  charts = CHARTS[filters.of].map((chart) =>
+    histogram(
+      chart,
+      () => filters.ranges.get(chart.column) ?? [null, null],
+      (range) => changed(() => setRange(chart.column, range)),
+    ),
+  );
+  $("#fleet-charts").replaceChildren(...charts.map(({ box }) => box));
 }
 
 /**
