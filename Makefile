@@ -36,7 +36,7 @@ demo: install
 
 # A file's tests stay in one process: they share servers and browsers; those of tests/accuracy all do: they share what the
 # networks saw. Three processes on two cores too: many tests wait for a browser or a sensor's next packet.
-# tests/conftest.py says who stays together, and orders the files, the long ones first.
+# tests/conftest.py says who stays together, orders the files, the long ones first, and keeps one process for the browser.
 test: .venv/.installed
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync .venv/.compiled check-types check-layers check-style
 	@$(BIN)/python -m pytest -q --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder $(TESTS)

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import settings
 from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
+from xdist.workermanage import WorkerController
 
 from pipeline.common.files.data_dir import data_dir as recordings
 
@@ -28,7 +29,15 @@ _TOGETHER = ("accuracy",)
 """Folders whose files stay in one process: they use the same recordings and networks, and each image is processed once
 (``tests.looking``)."""
 _LONG = ("accuracy", "soak", "golden", "app/commands", "app/labels/test_kill.py", "pipeline/experiments")
-_WAITING = ("browser/test_dashboard.py", "browser/labels/test_astyx.py", "browser/test_rerun.py", "browser")
+_BROWSER = "browser"
+_WAITING = (
+    "browser/test_align.py",
+    "browser/labels/test_tasks.py",
+    "browser/labels/test_astyx.py",
+    "browser/test_dashboard.py",
+    "browser/test_rerun.py",
+    _BROWSER,
+)
 """The files that take longest, by what they do: compute, or wait for a browser."""
 
 # Shells start background jobs with Ctrl-C ignored, but some tests send it.
@@ -42,7 +51,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     long, waiting = (
         [file for place in places for file in files if _is_in(file, place)] for places in (_LONG, _WAITING)
     )
-    # a browser keeps an event loop in its process that excludes others, so its files come last
+    # last: in a single process, nothing else can run after them
     others = [file for file in files if file not in waiting]
     order = {file: number for number, file in enumerate(dict.fromkeys([*long, *others, *waiting]))}
     items.sort(key=lambda item: order[item.path])
@@ -50,14 +59,42 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFileScheduling:
-    """Each process takes the next file, or the next folder whose files stay together."""
+    """Each process takes the next file that it may run, or the next folder whose files stay together."""
     return _Together(config, log)
 
 
 class _Together(LoadFileScheduling):
+    """One process has browser files from the beginning, so that it waits while the others compute; those come to them
+    last. A process that has had a browser file gets no other, since a browser keeps an event loop in its process."""
+
     def _split_scope(self, nodeid: str) -> str:
         file = super()._split_scope(nodeid)
         return next((place for place in _TOGETHER if _is_in(ROOT / file, place)), file)
+
+    def _reschedule(self, node: WorkerController) -> None:
+        if self.workqueue and self._next_for(node) is None:
+            node.shutdown()  # what is left is for the others
+        else:
+            super()._reschedule(node)
+
+    def _assign_work_unit(self, node: WorkerController) -> None:
+        chosen = self._next_for(node)
+        assert chosen is not None
+        self.workqueue.move_to_end(chosen, last=False)
+        super()._assign_work_unit(node)
+
+    def _next_for(self, node: WorkerController) -> str | None:
+        """The scope that a process runs next; None if it may run none of those left."""
+        has_browser = any(map(_needs_browser, self.assigned_work[node]))
+        is_first = len(self.nodes) > 1 and node is self.nodes[0]
+        for wants_browser in (True,) if has_browser else (is_first, not is_first):
+            if found := next((scope for scope in self.workqueue if _needs_browser(scope) == wants_browser), None):
+                return found
+        return None
+
+
+def _needs_browser(scope: str) -> bool:
+    return scope.startswith(f"tests/{_BROWSER}/")
 
 
 def _is_in(file: Path, place: str) -> bool:
