@@ -10,7 +10,8 @@ import argparse
 import re
 import tomllib
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
@@ -28,18 +29,8 @@ _MADE = "*This page is generated from the code by `make docs`; change the declar
 
 def main() -> None:
     """Write all generated pages."""
-    for name, text in pages().items():
-        (DOCS / name).write_text(text, encoding="utf-8")
-
-
-def pages() -> dict[str, str]:
-    """File below ``docs/`` → its text."""
-    return {
-        "reference/parameters.md": parameters_page(),
-        "reference/cli.md": cli_page(),
-        "reference/fleet-tables.md": tables_page(_MADE),
-        "architecture.md": with_layers((DOCS / "architecture.md").read_text(encoding="utf-8")),
-    }
+    for name, make in PAGES.items():
+        (DOCS / name).write_text(make(), encoding="utf-8")
 
 
 # ---------------------------------------------------------------- layers
@@ -180,6 +171,7 @@ _SHARED = (
 parser."""
 
 
+@cache
 def commands() -> list[str]:
     """Every command by its words, including each subcommand of a group."""
     found: list[str] = []
@@ -188,6 +180,7 @@ def commands() -> list[str]:
     return list(dict.fromkeys(found))
 
 
+@cache
 def parser_of(name: str) -> argparse.ArgumentParser:
     """The parser of a command, or of a group's subcommand."""
     group, _, word = name.partition(" ")
@@ -280,6 +273,15 @@ def _flat(text: str | None) -> str:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|")
+
+
+PAGES: dict[str, Callable[[], str]] = {
+    "reference/parameters.md": parameters_page,
+    "reference/cli.md": cli_page,
+    "reference/fleet-tables.md": lambda: tables_page(_MADE),
+    "architecture.md": lambda: with_layers((DOCS / "architecture.md").read_text(encoding="utf-8")),
+}
+"""File below ``docs/`` → what makes its text."""
 
 
 if __name__ == "__main__":

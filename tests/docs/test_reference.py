@@ -9,16 +9,16 @@ import pytest
 from pipeline.decision.gates import CONDITIONS
 from pipeline.labels.formats.registry import FORMATS
 from tests.docs.pages import DOCS, code_spans
-from tests.docs.reference_pages import pages
+from tests.docs.reference_pages import PAGES
 from tests.pipeline.types.test_result_json import FIELDS
 
 RESULTS = "docs/reference/results.md"
 
 
-@pytest.mark.parametrize("name", pages())
+@pytest.mark.parametrize("name", PAGES)
 def test_a_made_page_is_up_to_date(name: str) -> None:
     text = (DOCS / name).read_text(encoding="utf-8")
-    assert text == pages()[name], "run `make docs`"
+    assert text == PAGES[name](), "run `make docs`"
 
 
 @pytest.mark.parametrize("path", FIELDS)

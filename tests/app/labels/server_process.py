@@ -1,5 +1,4 @@
-"""A real server in a process of its own, which can be killed at any moment. What it imports and compiles is there
-already in the process that the servers are forked from."""
+"""A real server in a process of its own, which can be killed at any moment."""
 
 from __future__ import annotations
 
@@ -19,11 +18,8 @@ from app.labels.service.desk import LabelDesk
 from app.labels.store.database import Database
 from app.web.server import Server, create_app
 from pipeline.params import Params
-from pipeline.warm_up import warm_up
 from tests.app.engine.recording_helpers import Recording, opener
 from tests.app.web.serving import WAIT_S
-
-warm_up()
 
 
 def _serve(file: Path | str, tell: Connection, ahead_s: Any) -> None:
@@ -49,7 +45,7 @@ def _serve(file: Path | str, tell: Connection, ahead_s: Any) -> None:
 def forking() -> Iterator[ForkServerContext]:
     """The process that forks servers."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["tests.app.labels.server_process"])
+    context.set_forkserver_preload(["tests.app.labels.preloaded"])
     yield context
 
 
