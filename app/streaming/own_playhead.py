@@ -34,8 +34,10 @@ class OwnPlayhead:
         self._wanted = 0
 
     def show(self, index: int) -> None:
-        """Go to a frame; aborts making another one."""
+        """Go to a frame; aborts making another one. Once left, it makes none."""
         self.index = index
+        if self._is_left:
+            return
         self._wanted += 1
         self._threads.submit(self._make, self._wanted)
 

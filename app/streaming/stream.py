@@ -107,6 +107,15 @@ class Stream:
         except RuntimeError:  # the server has closed its loop in the meantime
             return
 
+    def close(self) -> None:
+        """End the threads that make frames: what waits for them is dropped, and a page's own frame in progress is given
+        up at the next opportunity. Nothing is waited for, since a disk may hang. A closed stream serves nobody."""
+        for slot in list(self._slots):
+            if slot.own is not None:
+                slot.own.leave()
+        for threads in (self._pages, self._threads):
+            threads.shutdown(wait=False, cancel_futures=True)
+
     async def serve(self, socket: WebSocket) -> None:
         """Serve one client until it disconnects. It may send ``{"ping": t}`` and gets ``t`` back with the server's
         clock."""

@@ -91,6 +91,7 @@ def create_app(
         yield
         for end in ends:
             end()
+        stream.close()
         await asyncio.to_thread(exports.close)
         viewer.close()
 
