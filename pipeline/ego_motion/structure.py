@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from pipeline.common.made_sweeps import made_sweeps
+from pipeline.common.made_sweep import made_sweep
 from pipeline.types import F32, F64, Ground, LidarTrack, Sweep
 from pipeline.types.ground_planes import height_above
 
@@ -65,8 +65,8 @@ def _vehicles(tracks: tuple[LidarTrack, ...], dt_s: float) -> F64:
 def warm_up() -> None:
     """Compile every kernel, or load it from numba's cache."""
     planes, edges, boxes = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0]), np.zeros((1, 6))
-    for points, _ in made_sweeps():
-        support(_standing(points, planes, edges, boxes, np.float32(0.0), np.float32(9.0), 0.0))
+    points, _ = made_sweep()
+    support(_standing(points, planes, edges, boxes, np.float32(0.0), np.float32(9.0), 0.0))
 
 
 class Support(NamedTuple):

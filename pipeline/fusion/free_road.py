@@ -21,7 +21,7 @@ import numba
 import numpy as np
 
 from pipeline.common.geometry import F64
-from pipeline.common.made_sweeps import made_sweeps
+from pipeline.common.made_sweep import made_sweep
 from pipeline.fusion.vehicle_sizes import usual_size_m
 from pipeline.types import F32, I32, U8, FusedObject, Ground, Point3
 
@@ -182,9 +182,9 @@ def warm_up() -> None:
     """Compile the kernels."""
     place = np.array([[1.0, 0.0, 1.0, 2.0, 1.0, 0.0, 0.0, 0.0]])
     kind, origin = np.zeros(2, np.int32), np.zeros(3)
-    for points, ring in made_sweeps():
-        slope, _ = _slopes(points, ring, origin)
-        _count(points, ring, kind, origin, place, slope, 0.1, _SILENT_M)
+    points, ring = made_sweep()
+    slope, _ = _slopes(points, ring, origin)
+    _count(points, ring, kind, origin, place, slope, 0.1, _SILENT_M)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -29,7 +29,7 @@ import numpy as np
 from pipeline.alignment.projection import Alignment
 from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64, iou_matrix
-from pipeline.common.made_sweeps import made_sweeps
+from pipeline.common.made_sweep import made_sweep
 from pipeline.fusion.free_road import SweepRays
 from pipeline.params import FusionParams
 from pipeline.types import GROUND, I32, VEHICLES, VisionMeasurement
@@ -284,7 +284,7 @@ def _inside(uv, range_m, box, distance_m, share):  # type: ignore[no-untyped-def
 def warm_up() -> None:
     """Compile the kernels, or load them from numba's cache."""
     planes, edges = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0])
-    for points, _ in made_sweeps():
-        _far_and_high(points, np.zeros(2, np.int32), planes, edges, 1.0, 0.0, 2.0)
-        _far_road(points, np.zeros(2, np.int32), 1.0)
+    points, _ = made_sweep()
+    _far_and_high(points, np.zeros(2, np.int32), planes, edges, 1.0, 0.0, 2.0)
+    _far_road(points, np.zeros(2, np.int32), 1.0)
     _inside(np.zeros((1, 2)), np.ones(1), (0.0, 0.0, 1.0, 1.0), 1.0, 0.1)

@@ -21,10 +21,7 @@ from pipeline.types import EgoState, Sweep
 
 
 def warm_up() -> None:
-    """Compile every kernel, or load it from numba's cache, using a synthetic sweep: a flat road with one wall on it.
-
-    Done twice, since numba treats read-only arrays, such as those read from a file, as a separate type.
-    """
+    """Compile every kernel, or load it from numba's cache, using a synthetic sweep: a flat road with one wall on it."""
     params = Params()
     x, y = np.meshgrid(np.linspace(3.0, 20.0, 20), np.linspace(-5.0, 5.0, 20))
     road = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, -1.5), np.zeros(x.size)])
@@ -34,15 +31,13 @@ def warm_up() -> None:
     time_s = np.zeros(len(points), np.float32)
     sweep = Sweep(0, points, np.zeros(len(points), np.uint8), 16, time_s)
     track_history.warm_up()
-    for writeable in (True, False):
-        points.flags.writeable = time_s.flags.writeable = writeable
-        plane = ground.fit_ground(points, keep, params.ground)
-        labels = cluster.cluster(points, cluster.candidates(points, plane, keep, params.cluster), params.cluster)
-        obstacles = boxes.fit_obstacles(points, labels, plane, params.box)
-        state, _ = tracking.track(tracking.LidarTrackerState(), obstacles, None, params.lidar_tracking)
-        state, tracks = tracking.track(state, obstacles, 0.1, params.lidar_tracking)
-        divide_tracked.warm_up(points, labels, tracks)
-        cluster.kinds(labels, keep, plane.mask)
-        road_profile.fit_road_profile(points, plane.mask)
-        deskew.deskew(sweep, EgoState(0, 10.0, 0.0), DeskewParams(enabled=True))
-        downsample.keep_mask(sweep, params.downsample)
+    plane = ground.fit_ground(points, keep, params.ground)
+    labels = cluster.cluster(points, cluster.candidates(points, plane, keep, params.cluster), params.cluster)
+    obstacles = boxes.fit_obstacles(points, labels, plane, params.box)
+    state, _ = tracking.track(tracking.LidarTrackerState(), obstacles, None, params.lidar_tracking)
+    state, tracks = tracking.track(state, obstacles, 0.1, params.lidar_tracking)
+    divide_tracked.warm_up(points, labels, tracks)
+    cluster.kinds(labels, keep, plane.mask)
+    road_profile.fit_road_profile(points, plane.mask)
+    deskew.deskew(sweep, EgoState(0, 10.0, 0.0), DeskewParams(enabled=True))
+    downsample.keep_mask(sweep, params.downsample)

@@ -13,7 +13,7 @@ import cv2
 import numba
 import numpy as np
 
-from pipeline.common.made_sweeps import made_sweeps
+from pipeline.common.made_sweep import made_sweep
 from pipeline.path import vanished
 from pipeline.path.ground_points import now_at
 from pipeline.types import F32, F64, GROUND, I32, I64, U8, VEHICLES, EgoState, FusedObject, Ground, Point3
@@ -192,9 +192,9 @@ def _kerbs(xy: F64, ring: U8, above: F64, height_m: float) -> F64:
 def warm_up() -> None:
     """Compile the kernels, or load them from numba's cache; import what is imported on use."""
     planes, edges, kind = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0]), np.zeros(2, np.int32)
-    for points, ring in made_sweeps():
-        _, _, low, low_ring, low_above = _sorted(points, kind, ring, planes, edges, np.zeros(1, np.bool_))
-        _kerbs(low, low_ring, low_above, 1.0)
+    points, ring = made_sweep()
+    _, _, low, low_ring, low_above = _sorted(points, kind, ring, planes, edges, np.zeros(1, np.bool_))
+    _kerbs(low, low_ring, low_above, 1.0)
     _is_beside_none(np.zeros((1, 2)), np.zeros((1, 9)), _MARGIN_M)
     thinned(Cells(np.zeros((1, 2)), np.zeros(1), np.zeros(1), np.zeros(1, np.bool_), np.zeros(1)))
     vanished.warm_up()

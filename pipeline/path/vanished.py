@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from pipeline.common.geometry import F64
-from pipeline.common.made_sweeps import made_sweeps
+from pipeline.common.made_sweep import made_sweep
 from pipeline.types import F32, U8
 from pipeline.types.arrays import Mask
 
@@ -61,8 +61,8 @@ def is_gone(
 
 def warm_up() -> None:
     """Compile the kernel, or load it from numba's cache."""
-    for points, ring in made_sweeps():
-        is_gone(np.ones((1, 2)), np.zeros(1), points, ring, (0.0, 0.0, 0.0), 1.0, 0.5)
+    points, ring = made_sweep()
+    is_gone(np.ones((1, 2)), np.zeros(1), points, ring, (0.0, 0.0, 0.0), 1.0, 0.5)
 
 
 @numba.njit(cache=True, nogil=True)

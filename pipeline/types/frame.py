@@ -27,6 +27,14 @@ class Sweep:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Ego x y z of the sensor, where its rays start."""
 
+    def __post_init__(self) -> None:
+        """Copies read-only arrays, such as those in a file's bytes: for numba they are another type, and every kernel
+        would be compiled for both."""
+        for name in ("points", "ring", "time_s"):
+            array = getattr(self, name)
+            if array is not None and not array.flags.writeable:
+                object.__setattr__(self, name, array.copy())
+
 
 @dataclass(frozen=True)
 class RangeScan:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from pipeline.common.made_sweeps import made_sweeps
+from pipeline.common.made_sweep import made_sweep
 
 
 @numba.njit(cache=True, nogil=True)
@@ -56,5 +56,5 @@ def warm_up() -> None:
     planes, edges = np.array([[0.0, 0.0, 1.0, 0.0]]), np.array([0.0, 1.0])
     grounds_z(planes, edges, np.zeros((1, 2)))
     heights_above(planes, edges, np.zeros((1, 3)))
-    for points, _ in made_sweeps():
-        heights_above(planes, edges, points)
+    points, _ = made_sweep()
+    heights_above(planes, edges, points)

@@ -8,6 +8,7 @@ from numba.core.dispatcher import Dispatcher
 
 from pipeline.lidar import boxes, cluster, ground, ground_kernels, plane_kernels, warm_up
 from pipeline.params import Params
+from pipeline.types import Sweep
 from tests.pipeline.lidar.scenes import scan
 
 
@@ -28,6 +29,7 @@ def test_a_first_sweep_compiles_nothing(writeable: bool) -> None:
     assert before["pipeline.lidar.ground_kernels.ground"] >= 1
     points = scan([(12.0, -0.9, -1.5, 16.0, 0.9, 0.0)])
     points.flags.writeable = writeable
+    points = Sweep(0, points, np.zeros(len(points), np.uint8), 16).points
     params, keep = Params(), np.ones(len(points), np.bool_)
     plane = ground.fit_ground(points, keep, params.ground)
     labels = cluster.cluster(points, cluster.candidates(points, plane, keep, params.cluster), params.cluster)
