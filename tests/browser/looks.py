@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 
 from playwright.sync_api import FloatRect, Locator, Page, expect
 
@@ -50,10 +51,18 @@ _TWO_TURNS = "() => new Promise((done) => requestAnimationFrame(() => requestAni
 """Two screen refreshes: pending drawing is done, and so are the texts that follow it."""
 
 
-def pixels(page: Page, canvas: str) -> str:
-    """The canvas's content, once nothing more is to be painted."""
-    page.evaluate(_TWO_TURNS)
-    return page.evaluate(f"document.querySelector('{canvas}').toDataURL()")
+_DIGEST = """async ([selector, pauseMs]) => {
+  if (pauseMs) await new Promise((done) => setTimeout(done, pauseMs));
+  for (let turn = 0; turn < 2; turn++) await new Promise(requestAnimationFrame);
+  const image = new TextEncoder().encode(document.querySelector(selector).toDataURL());
+  return [...new Uint8Array(await crypto.subtle.digest("SHA-256", image))].join(" ");
+}"""
+"""After as many screen refreshes. The image itself is megabytes of text, which two processes would parse."""
+
+
+def pixels(page: Page, canvas: str, pause_ms: float = 0.0) -> str:
+    """A digest of the canvas's content, once nothing more is to be painted."""
+    return page.evaluate(_DIGEST, [canvas, pause_ms])
 
 
 def table(page: Page) -> str:
@@ -67,13 +76,18 @@ def table(page: Page) -> str:
 
 
 def repainted(page: Page, canvas: str, old: str, *, like: bool = False) -> bool:
-    """True once the canvas differs from ``old``, or equals it with ``like``. Checked once per painted frame, since the
-    page's policy forbids Playwright's own waiting, which evaluates text."""
-    deadline = time.monotonic() + WAIT_MS / 1e3
+    """True once the canvas differs from ``old``, or equals it with ``like``. Checked after a painted frame, less and
+    less often, since encoding an image takes from what is waited for. The page's policy forbids Playwright's own
+    waiting, which evaluates text."""
+    return any((pixels(page, canvas, pause_ms) == old) == like for pause_ms in pauses())
+
+
+def pauses() -> Iterator[float]:
+    """Milliseconds to wait before looking again, until ``WAIT_MS`` have passed: 0, 20, 40 … 320, 320."""
+    deadline, pause_ms = time.monotonic() + WAIT_MS / 1e3, 0.0
     while time.monotonic() < deadline:
-        if (pixels(page, canvas) == old) == like:
-            return True
-    return False
+        yield pause_ms
+        pause_ms = min(max(2 * pause_ms, 20.0), 320.0)
 
 
 def colours(page: Page, canvas: str) -> int:

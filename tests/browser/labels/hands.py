@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.conftest import WAIT_MS
-from tests.browser.looks import box_of
+from tests.browser.looks import box_of, pauses
 
 FROM_M, TO_M, HALF_M, TOOLS_PX = -5.0, 74.0, 13.0, 36
 """Initial extent of the plan (static/js/views/drawing/viewport.js)."""
@@ -131,10 +129,11 @@ class Labels:
 
     def wait_for(self, holds: Callable[[Labels], bool]) -> None:
         """Wait until the server has it, since the page's requests are asynchronous."""
-        deadline = time.monotonic() + WAIT_MS / 1e3
-        while not holds(self):
-            assert time.monotonic() < deadline, json.dumps(self.everything)[:2000]
-            self._page.evaluate("() => new Promise((done) => setTimeout(done, 20))")
+        for pause_ms in pauses():
+            self._page.evaluate("(ms) => new Promise((done) => setTimeout(done, ms))", pause_ms)
+            if holds(self):
+                return
+        raise AssertionError(json.dumps(self.everything)[:2000])
 
     def clear(self, count: int) -> None:
         """Remove all labels."""
