@@ -21,6 +21,7 @@ from app.core.kept_detections import KeptDetections
 from app.core.server_address import DEFAULT_PORT
 from app.core.session_folder import SESSIONS
 from app.core.shared_view_state import SharedViewState
+from app.core.stop_signals import skip_teardown
 from app.engine.engine import Engine
 from app.labels import URL_VARIABLE
 from app.labels.project_classes import project_classes
@@ -110,6 +111,7 @@ class ServerOptions:
                 ends_process=True,
                 fleet=fleet,
             )
+        skip_teardown(0)
         return 0
 
 

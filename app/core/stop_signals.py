@@ -3,6 +3,7 @@ connection)."""
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
@@ -10,7 +11,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from multiprocessing import resource_tracker
 from threading import Event
 from typing import Any
 
@@ -54,6 +54,37 @@ def end_process_once(asked: Event, save: Callable[[], object]) -> None:
     threading.Thread(target=end, name="cipv-shutdown", daemon=True).start()
 
 
+class _Teardown:
+    """Python's teardown of the interpreter at exit, which frees every module and object one by one.
+
+    With the libraries and a drive of a server that takes over a second of processor time, so many seconds on a busy
+    machine. No thread runs any more then, so that of ``end_process_once`` cannot end it either.
+    """
+
+    def __init__(self) -> None:
+        self.skipped_with: int | None = None
+        atexit.register(self._skip)  # on import, before other modules register theirs: the last to be called
+
+    def _skip(self) -> None:
+        if self.skipped_with is None:
+            return
+        try:
+            sys.stdout.flush()
+            sys.stderr.flush()
+        except (OSError, ValueError):
+            return  # Python reports output that cannot be written
+        os._exit(self.skipped_with)
+
+
+_TEARDOWN = _Teardown()
+
+
+def skip_teardown(status: int) -> None:
+    """Call when everything is closed and written: the process exits with ``status`` once its threads have ended and all
+    functions registered with ``atexit`` were called, without freeing its memory first."""
+    _TEARDOWN.skipped_with = status
+
+
 @contextmanager
 def as_interrupts() -> Iterator[None]:
     """SIGTERM and SIGHUP raise KeyboardInterrupt, like Ctrl-C, so that a command closes its files in all cases."""
@@ -70,6 +101,8 @@ def held_back() -> Iterator[None]:
     """Raises KeyboardInterrupt at the end of the block, if a stop was asked for within: for a start of a few seconds
     that leaves a mess if it is cut off. Processes started by threads that it starts ignore Ctrl-C, which a terminal
     sends to all of them: their parent ends them."""
+    from multiprocessing import resource_tracker  # registers an exit handler, which is to be called before ours
+
     resource_tracker.ensure_running()  # its start would unblock Ctrl-C in the thread that needs it first
     is_asked = False
 

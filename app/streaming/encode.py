@@ -170,4 +170,5 @@ def _image_json(image: SentImage | None, frame: Frame) -> dict[str, Any] | None:
         "scale": image.scale,
         "bytes": len(image.jpeg),
         "full_width": frame.image.bgr.shape[1],
+        "full_height": frame.image.bgr.shape[0],
     }

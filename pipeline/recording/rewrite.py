@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
 from pipeline.recording import topics
 from pipeline.recording.drawn_labels import NOTHING_DRAWN, Drawn
@@ -42,11 +43,13 @@ class Recovered:
 def recover(path: Path, out: Path, progress: Progress = silent) -> Recovered:
     """Write every message of every complete chunk of ``path`` to a new, complete file ``out``.
 
-    BadInput if ``path`` is not an MCAP file or ``out`` exists.
+    BadInput if ``path`` is not an MCAP file or has no complete chunk, or if ``out`` exists.
     """
     with McapFile(path, walk=True) as file:
         directory = file.directory
         total = len(directory.chunks)
+        if not total:
+            raise BadInput(f"{path}: no complete chunk: nothing can be recovered")
 
         def messages() -> Iterator[Stored]:
             for place in range(total):

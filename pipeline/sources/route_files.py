@@ -17,7 +17,7 @@ from statistics import median
 from xml.etree import ElementTree
 
 import numpy as np
-from pyproj import Transformer
+from pyproj import Geod, Transformer
 
 from pipeline.common.errors import BadInput
 from pipeline.common.files.user_file_errors import given_path
@@ -37,6 +37,11 @@ SIGMA_BY_NMEA_QUALITY_M = {1: 2.0, 2: 0.8, 4: 0.02, 5: 0.3}
 _UNKNOWN_SIGMA_M = 0.5
 """For a file without accuracy: a drawn or surveyed route."""
 _LARGEST_FILE_BYTES = 200_000_000
+_LONGEST_GAP_M = 250e3
+"""Between neighbouring positions. The longest straight road, on Saudi Arabia's Highway 10, has 240 km; a file of other
+numbers, read as degrees, jumps farther."""
+_LONGEST_M = 5e6
+"""Of a whole route: two days of driving. It is resampled at every metre, which takes 16 bytes each."""
 
 PositionRows = list[tuple[float, float]]
 
@@ -75,6 +80,13 @@ def _route(name: str, rows: PositionRows, sigma_m: float, path: str) -> Route:
     if len(set(good)) < 2:
         raise RouteError(f"{path}: no route: {len(set(good))} distinct valid positions; at least 2 are needed")
     lat, lon = np.array(good).T
+    apart_m = Geod(ellps="WGS84").inv(lon[:-1], lat[:-1], lon[1:], lat[1:])[2]
+    if apart_m.max() > _LONGEST_GAP_M or apart_m.sum() > _LONGEST_M:
+        raise RouteError(
+            f"{path}: no route: it is {apart_m.sum() / 1e3:,.0f} km long, with {apart_m.max() / 1e3:,.0f} km between "
+            f"two positions; at most {_LONGEST_M / 1e3:,.0f} and {_LONGEST_GAP_M / 1e3:,.0f} km are possible: are "
+            "these latitudes and longitudes in degrees?"
+        )
     return Route(name, lat.copy(), lon.copy(), sigma_m)
 
 

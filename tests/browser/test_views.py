@@ -260,3 +260,25 @@ def test_a_message_that_cannot_be_read_does_not_end_the_stream(browser: Browser,
         wait_for_frame(page, START + 1)
     finally:
         page.context.close()
+
+
+CUT = """facts => {
+  const box = facts.getBoundingClientRect(), words = facts.lastChild, range = document.createRange();
+  return words.data.split(" ·").filter(fact => {
+    const at = words.data.indexOf(fact);
+    range.setStart(words, at);
+    range.setEnd(words, at + fact.length);
+    const { top, right } = range.getBoundingClientRect();
+    return top < box.bottom - 2 && right > box.right + 1;
+  });
+}"""
+
+
+@pytest.mark.parametrize("width", [1440, 1280, 1100])
+def test_what_the_camera_pane_says_is_whole_or_absent(width: int, open_page: OpenPage, site: Site) -> None:
+    page = open_page()
+    page.set_viewport_size({"width": width, "height": 720})
+    wait_for_frame(page, START)
+    facts = page.locator("#camera-facts")
+    expect(facts).to_contain_text("1280×720 ·")
+    assert facts.evaluate(CUT) == []

@@ -36,7 +36,7 @@ def proposing(labels: DriveLabels, recording: OpenRecording, person: str, first:
     last = min(last, recording.setup.total - 1)
     if run is None or run.done <= last:
         done = run.done if run is not None else 0
-        raise ActRefused(f"{done} of {last + 1} frames are computed: wait, or propose these")
+        raise ActRefused(f"{done} of {last + 1} frames are computed: wait for the rest")
     if first > last:
         raise ActRefused(outside_text(first, last, recording.setup.total))
 

@@ -56,7 +56,8 @@ class SessionSource:
             about = self._about(path)
             self._log_ns, self._t_ns = self._frames(progress)
             if not len(self._t_ns):
-                raise SourceError(f"{path}: the session holds no frames")
+                cut = ": it was cut off before the first" if self.file.directory.is_cut else ""
+                raise SourceError(f"{path}: the session holds no frames{cut}")
         except SourceError:
             self.file.close()
             raise

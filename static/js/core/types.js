@@ -178,6 +178,7 @@
  * @property {number} height
  * @property {number} scale
  * @property {number} bytes
+ * @property {number} full_height  pixels of the camera, as full_width
  * @property {number} full_width
  *
  * @typedef {object} Frame  one decoded message: see protocol.js

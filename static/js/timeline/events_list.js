@@ -14,9 +14,13 @@ const list = $("#events-list");
 let rows = [];
 /** @type {DriveEvent[]|null} */
 let shown = null;
+/** @type {DriveEvent[]} */
+const EMPTY = [];
+const none = el("p", { class: "facts pad" });
 
 export function setUp() {
-  paint(["drive", "theme"], build);
+  paint(["drive", "state"], build);
+  paint(["theme"], recolour);
   on(["state"], reflect);
   $("#mark-button").addEventListener("click", addMark);
 }
@@ -26,21 +30,28 @@ export function addMark() {
   request("api/marks", "POST", { index: get("state")?.index ?? 0, text: "" }).catch(refused);
 }
 
+function recolour() {
+  shown = null;
+  build();
+}
+
 function build() {
-  const events = get("drive")?.events ?? [];
+  const events = get("drive")?.events ?? EMPTY;
   text($("#events-facts"), String(events.length));
   if (events === shown) return;
   shown = events;
   rows = events.map((event) => ({ event, row: rowOf(event) }));
   list.replaceChildren(...rows.map(({ row }) => row));
-  if (!rows.length) list.append(el("p", { class: "facts pad", textContent: nothing() }));
+  if (!rows.length) list.append(none);
   reflect();
 }
 
 function nothing() {
   const state = get("state");
   if (state?.live) return "Marks appear here. Events are detected in recordings only.";
-  return state?.drive?.running ? "Searching …" : "No events in this recording.";
+  if (state?.drive?.phase === "failed") return "Not searched: the run over the drive failed.";
+  const isSearched = state && state.drive.run !== null && !state.drive.running; // no run yet: the pipeline is starting
+  return isSearched ? "No events in this recording." : "Searching …";
 }
 
 /** @param {DriveEvent} event */
@@ -80,6 +91,7 @@ function jump({ index, ids }) {
 function reflect() {
   const state = get("state"),
     index = state?.live ? null : state?.index;
+  text(none, nothing());
   for (const { event, row } of rows) {
     const isHere = event.index === index;
     if (row.classList.contains("is-here") === isHere) continue;

@@ -20,6 +20,7 @@ import { drawTape, measure } from "./measuring_tape.js";
 /** @typedef {(ctx: CanvasRenderingContext2D, frame: Frame, place: Place) => void} Layer */
 
 const UNSEEN = -32768;
+const NBSP = "\u00a0";
 /** From this zoom on, single pixels are shown. */
 const SINGLE_PX = 3;
 const PICK_PX = 8,
@@ -155,10 +156,10 @@ function layOut({ width, height }) {
 
 /** @param {Frame} frame */
 function describe({ result: { sensors }, image }) {
-  const facts = image ? [`${image.full_width}×${Math.round(image.height / image.scale)}`] : [];
+  const facts = image ? [`${image.full_width}×${image.full_height}`] : [];
   if (sensors.lidar?.points) facts.push(`${sensors.lidar.points.toLocaleString("en")} points`);
   if (sensors.camera?.skew_ms) facts.push(`camera skew ${num(sensors.camera.skew_ms, 0)} ms`);
-  text($("#camera-facts"), facts.join(" · "));
+  text($("#camera-facts"), facts.map((fact) => fact.replaceAll(" ", NBSP)).join(` ·${NBSP}`));
 }
 
 /** Ground points first, smaller and fainter. @param {CanvasRenderingContext2D} ctx @param {Frame} frame */

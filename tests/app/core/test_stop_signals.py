@@ -6,10 +6,13 @@ import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
 from app.core.stop_signals import as_interrupts, asked_to_stop, held_back
+
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_a_signal_that_arrives_while_another_is_handled_is_the_same_request() -> None:
@@ -68,3 +71,30 @@ def test_what_starts_while_a_stop_is_held_back_is_not_interrupted() -> None:
         thread.start()
     thread.join()
     assert printed == ["goes on"]
+
+
+KEPT = """
+import sys
+from app.core.stop_signals import skip_teardown
+import atexit
+
+class Kept:
+    def __del__(self):
+        print("freed")
+
+kept = Kept()
+atexit.register(print, "exit handler")
+if len(sys.argv) > 1:
+    skip_teardown(0)
+print("closed")
+"""
+
+
+@pytest.mark.parametrize(("arguments", "said"), [([], "closed exit handler freed"), (["skip"], "closed exit handler")])
+def test_what_is_closed_is_not_torn_down(arguments: list[str], said: str) -> None:
+    """That takes seconds on a busy machine; exit handlers are called, and what was printed is not lost."""
+    ended = subprocess.run(
+        [sys.executable, "-c", KEPT, *arguments], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert ended.stdout.split() == said.split()
+    assert ended.returncode == 0

@@ -157,6 +157,14 @@ def test_boxes_are_in_pixels_of_the_sent_image():
     assert box == pytest.approx([300, 50, 450, 100], abs=1.0)
 
 
+def test_the_size_of_the_camera_is_not_that_of_the_sent_image_scaled_back():
+    """618 rows sent at 1280 of 2048 columns are 386, which would be 617.6."""
+    bgr: U8 = np.zeros((618, 2048, 3), np.uint8)
+    bgr[300:400, 600:900] = (20, 20, 220)
+    header, _, _ = taken_apart(Encoder().message(snapshot(image=CameraImage(0, bgr), index=0)) or b"")
+    assert (header["picture"]["full_width"], header["picture"]["full_height"]) == (2048, 618)
+
+
 @pytest.mark.parametrize("missing", ["image", "sweep", "camera", "ego"])
 def test_a_frame_that_lacks_something_still_makes_a_message(missing: str):
     header, jpeg, arrays = taken_apart(Encoder().message(snapshot(**{missing: None})) or b"")

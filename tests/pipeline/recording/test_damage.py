@@ -136,3 +136,15 @@ def test_recovering_a_whole_file_loses_nothing(whole: bytes, tmp_path: Path) -> 
     with pytest.raises(BadInput):
         recover(path, path)
     assert path.read_bytes() == whole
+
+
+def test_nothing_is_written_when_there_is_nothing_to_recover(whole: bytes, tmp_path: Path) -> None:
+    path, out = tmp_path / "a.mcap", tmp_path / "out.mcap"
+    path.write_bytes(whole)
+    first = SessionSource("a", str(path)).file.directory.chunks[0]
+    path.write_bytes(whole[: first.offset + first.length - 1])
+    with pytest.raises(SourceError, match=r"a.mcap: the session holds no frames: it was cut off before the first$"):
+        SessionSource("a", str(path))
+    with pytest.raises(BadInput, match=r"a.mcap: no complete chunk: nothing can be recovered$"):
+        recover(path, out)
+    assert not out.exists()

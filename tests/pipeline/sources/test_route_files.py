@@ -180,3 +180,17 @@ def test_a_source_along_a_route() -> None:
     own = source.frame(3).route
     assert own is not None
     assert own.name.startswith("planned")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param("0 2 356.4 195.8\n0 40 545.9 182.2\n1 3 374.1 216.6\n", id="another file's numbers"),
+        pytest.param("lat,lon\n48.1,11.2\n0.01,0.01\n48.2,11.3\n", id="a jump"),
+        pytest.param("lat,lon\n" + "48.0,11.0\n49.0,11.0\n" * 30, id="6,600 km"),
+    ],
+)
+def test_a_route_that_nobody_can_drive_is_refused(tmp_path: Path, text: str) -> None:
+    """Resampled at every metre, it would fill the memory before the first frame."""
+    with pytest.raises(RouteError, match=r"no route: it is [\d,]+ km long, with [\d,]+ km between two positions"):
+        load_route(written(tmp_path, "a.txt", text))

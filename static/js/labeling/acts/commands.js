@@ -40,12 +40,11 @@ export async function propose() {
 
 /** Offer to propose what is computed so far, until everything is. */
 function offerComputed() {
-  const done = computed(),
-    all = get("state")?.count ?? 0;
-  if (!done || done >= all) return;
+  const all = get("state")?.count ?? 0;
+  if (!computed() || computed() >= all) return;
   set("offer", {
-    words: `Propose these ${done}`,
-    take: () => act({ kind: "propose", first: 0, last: done - 1, from: "run" }),
+    words: "Propose what is computed", // by the time it is pressed
+    take: () => act({ kind: "propose", first: 0, last: computed() - 1, from: "run" }),
     isOpen: () => computed() < all,
     about: get("said") ?? "",
   });
