@@ -22,13 +22,13 @@ def through_lens(points: F64, T_camera: F64, K: F64, distortion: F64, nearest_m:
     T_camera: (4, 4), takes the points to the camera frame. K: (3, 3). distortion: OpenCV's coefficients, empty without
     distortion.
     """
-    # Copies have one layout each, so that one compiled version does for all callers
-    rows, uv = np.array(points, dtype=np.float64).reshape(-1, 3), np.empty((len(points), 2))
-    coefficients = np.zeros(_COMPILED)
+    rows = np.array(points, dtype=np.float64)  # copies have one layout, so that one compiled version does for all
+    uv, coefficients = np.empty((len(rows), 2)), np.zeros(_COMPILED)
     if distortion.size > _COMPILED and np.any(distortion[_COMPILED:]):
         in_camera = transform(T_camera, rows)
         in_camera[in_camera[:, 2] < nearest_m] = np.nan
-        uv[:] = cv2.projectPoints(in_camera, np.zeros(3), np.zeros(3), K, distortion)[0].reshape(-1, 2)
+        if len(rows):  # OpenCV returns None for no points
+            uv[:] = cv2.projectPoints(in_camera, np.zeros(3), np.zeros(3), K, distortion)[0].reshape(-1, 2)
         return uv
     coefficients[: min(distortion.size, _COMPILED)] = distortion.ravel()[:_COMPILED]
     _project(rows, np.array(T_camera), K[0, 0], K[1, 1], K[0, 2], K[1, 2], coefficients, nearest_m, uv)
