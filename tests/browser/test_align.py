@@ -122,6 +122,16 @@ def test_in_a_small_window_nothing_covers_the_image_and_every_button_is_in_sight
         button = bar.get_by_role("button", name=name, exact=True)
         expect(button).to_be_in_viewport(ratio=1.0)
         button.click(trial=True)
+    bar.get_by_role("button", name="Fit", exact=True).click()
+    result = page.get_by_label("Fitted alignment")
+    apply = result.get_by_role("button", name="Apply")
+    expect(apply).to_be_in_viewport(ratio=1.0)
+    apply.click(trial=True)
+    result.get_by_role("button", name="Dismiss").click()
+    bar.get_by_role("button", name="Versions").click()
+    save = page.get_by_label("Saved alignments").get_by_role("button", name="Save")
+    expect(save).to_be_in_viewport(ratio=1.0)
+    save.click(trial=True)
 
 
 LATE_MS = 100.0
