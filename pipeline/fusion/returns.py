@@ -2,10 +2,11 @@
 cluster.
 
 Beyond 35 m, a VLP-16 puts one to four points on a car: too few for a cluster, but accurate. Where the camera gives a
-vehicle's direction and approximate distance, such a point gives the exact distance, if it belongs to the vehicle. Four
+vehicle's direction and approximate distance, such a point gives the exact distance, if it belongs to the vehicle. Five
 tests decide that:
 
 - it is inside the box, away from its edges, above the road, and no higher than a vehicle;
+- it cannot be of a nearer vehicle, whose box covers it;
 - its range agrees with the camera's, within the variation of vehicle heights;
 - its surface ends with the vehicle: a wall, a hedge or the road behind continues on both sides at the same range;
 - no second group of points fits the box about as well.
@@ -27,7 +28,7 @@ import numpy as np
 
 from pipeline.alignment.projection import Alignment
 from pipeline.common.fast_replace import evolve
-from pipeline.common.geometry import F64
+from pipeline.common.geometry import F64, iou_matrix
 from pipeline.common.made_sweeps import made_sweeps
 from pipeline.fusion.free_road import SweepRays
 from pipeline.params import FusionParams
@@ -55,6 +56,9 @@ _BESIDE_SHARE = 0.6
 _SAME_RANGE_M, _SAME_HEIGHT_DEG = 1.5, 1.0
 _CLEARLY = 1.0
 """Minimum difference of log-likelihood between the best and the second-best group."""
+_EDGE_PX, _SAME_IOU = 2.0, 0.5
+"""A box that ends farther down by more than the noise of its edge is of something nearer, unless both are on one
+vehicle."""
 _LOW_NEAREST_M, _LOW_POINTS = 20.0, 3
 """Minimum distance of a vehicle that only one ring hits, and minimum number of its points: one or two may be dirt."""
 _LOW_BOTTOM_SHARE = 0.2
@@ -118,7 +122,32 @@ def range_boxes(
     points = _points(sweep, rows, range_m, alignment)
     rows, range_m = _far_road(sweep.points, sweep.kind, _LOW_NEAREST_M / 2)
     road = _points(sweep, rows, range_m, alignment)
-    return tuple(_ranged(each, points, road) if ask else each for each, ask in zip(boxes, asked, strict=True))
+    placed = _placed(boxes)
+    return tuple(
+        _ranged(each, points, road, placed[_in_front(placed[:, :4], row)]) if asked[row] else each
+        for row, each in enumerate(boxes)
+    )
+
+
+def _placed(boxes: tuple[VisionMeasurement, ...]) -> F64:
+    """(M, 6): each box, and the ranges between which returns from it lie; any range where it has no distance."""
+    rows = []
+    for each in boxes:
+        nearest_m, farthest_m = 0.0, math.inf
+        if each.distance_m is not None and each.sigma_m is not None:
+            spread = math.exp(_SIGMAS * each.sigma_m / each.distance_m)
+            nearest_m, farthest_m = each.distance_m / spread, each.distance_m * spread
+        rows.append((*each.detection.bbox, nearest_m, farthest_m))
+    return np.array(rows, dtype=np.float64)
+
+
+def _in_front(bbox: F64, row: int) -> np.ndarray:
+    """(M,) whether each of the boxes (M, 4) is of something nearer than one of them that may cover it: on a level road,
+    what is nearer ends farther down. Two boxes on one vehicle do not cover each other."""
+    x1, _, x2, y2 = bbox.T
+    beside = (x1 < x2[row]) & (x1[row] < x2)
+    covers = beside & (y2 > y2[row] + _EDGE_PX) & (iou_matrix(bbox[row : row + 1], bbox)[0] < _SAME_IOU)
+    return np.asarray(covers)
 
 
 def _points(sweep: SweepReturns, rows: np.ndarray, range_m: F64, alignment: Alignment) -> _Points:
@@ -160,8 +189,8 @@ def _far_road(points, kind, nearest_m):  # type: ignore[no-untyped-def]  # pragm
     return rows[:count].copy(), ranges_m[:count].copy()
 
 
-def _ranged(seen: VisionMeasurement, points: _Points, road: _Points) -> VisionMeasurement:
-    by_returns = _by_returns(seen, points) if (seen.distance_m or 0.0) >= NEAREST_M else seen
+def _ranged(seen: VisionMeasurement, points: _Points, road: _Points, in_front: F64) -> VisionMeasurement:
+    by_returns = _by_returns(seen, points, in_front) if (seen.distance_m or 0.0) >= NEAREST_M else seen
     return by_returns if by_returns.returns else _by_low_row(seen, road)
 
 
@@ -187,14 +216,15 @@ def _by_low_row(seen: VisionMeasurement, road: _Points) -> VisionMeasurement:
     return evolve(seen, ranged_m=float(road.range_m[row[0]]), ranged_sigma_m=SIGMA_M, returns=len(row))
 
 
-def _by_returns(seen: VisionMeasurement, points: _Points) -> VisionMeasurement:
-    """The box ranged by points above the road."""
+def _by_returns(seen: VisionMeasurement, points: _Points, in_front: F64) -> VisionMeasurement:
+    """The box ranged by points above the road. in_front: (K, 6) boxes that may cover it, as returned by ``_placed``."""
     assert seen.distance_m is not None
     assert seen.sigma_m is not None
     x1, y1, x2, y2 = seen.detection.bbox
     side, bottom, share = _EDGE_SHARE * (x2 - x1), _BOTTOM_SHARE * (y2 - y1), seen.sigma_m / seen.distance_m
     inner = (x1 + side, y1, x2 - side, y2 - bottom)
     rows = _inside(points.uv, points.range_m, inner, seen.distance_m, share)
+    rows = rows[~_may_be_of(in_front, points.uv[rows], points.range_m[rows])]
     if not len(rows):
         return seen
     off = np.log(points.range_m[rows] / seen.distance_m) / share
@@ -211,6 +241,15 @@ def _by_returns(seen: VisionMeasurement, points: _Points) -> VisionMeasurement:
     if points.clustered[best].any() or _goes_on(points, best, (x1, x2)):
         return seen
     return evolve(seen, ranged_m=float(points.range_m[best[0]]), ranged_sigma_m=SIGMA_M, returns=len(best))
+
+
+def _may_be_of(in_front: F64, uv: F64, range_m: F64) -> np.ndarray:
+    """(P,) whether points may be of one of the boxes in front, (K, 6): they lie in it at a range that it may have. What
+    is seen over or through a nearer vehicle is far beyond it."""
+    x1, y1, x2, y2, nearest_m, farthest_m = in_front.T
+    u, v, r = uv[:, :1], uv[:, 1:], range_m[:, None]
+    inside = (u > x1) & (u < x2) & (v > y1) & (v < y2)
+    return np.asarray((inside & (r > nearest_m) & (r < farthest_m)).any(axis=1))
 
 
 def _goes_on(points: _Points, group: np.ndarray, box: tuple[float, float]) -> bool:

@@ -85,6 +85,26 @@ def test_which_returns_are_a_vehicles(
     assert expected_m is None or found.ranged_sigma_m == SIGMA_M
 
 
+@pytest.mark.parametrize(
+    ("case", "other", "at_m", "expected_m"),
+    [
+        ("a nearer vehicle covers the point", (900.0, 220.0, 1010.0, 370.0), 35.0, None),
+        ("a nearer vehicle at an unknown distance", (900.0, 220.0, 1010.0, 370.0), None, None),
+        ("a nearer vehicle covers only the other side", (900.0, 220.0, 1000.0, 370.0), 35.0, 46.0),
+        ("it is seen through the windows of a much nearer one", (900.0, 220.0, 1010.0, 370.0), 15.0, 46.0),
+        ("one behind it", (985.0, 240.0, 1039.0, 320.0), 55.0, 46.0),
+        ("another box of the same vehicle", (978.0, 268.0, 1046.0, 334.0), 48.0, 46.0),
+    ],
+)
+def test_a_point_inside_a_nearer_box_is_that_vehicles(
+    case: str, other: tuple[float, float, float, float], at_m: float | None, expected_m: float | None
+) -> None:
+    place = (at_m, 0.0) if at_m is not None else None
+    covering = VisionMeasurement(Detection(other, "car", 0.8), at_m, at_m and 0.2 * at_m, place, 0.05, 0.2)
+    found, _ = range_boxes((box(), covering), Scene([ON_IT]).sweep(), aligned(), FusionParams()) or ()
+    assert (found.ranged_m and round(found.ranged_m, 1)) == expected_m, case
+
+
 def test_who_is_not_asked() -> None:
     seen = (box("person"), box(distance_m=15.0))
     sweep = Scene([ON_IT, (15.0, 0.1, 0.0, LOOSE)]).sweep()
