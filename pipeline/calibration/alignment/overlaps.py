@@ -58,7 +58,7 @@ def most_overlap(table: PairTable, model: FitModel, start: F64) -> F64:
     def missing(at: F64) -> float:
         return -float(_best(near, model, start + at * _UNIT)[covered].mean())
 
-    found = minimize(  # type: ignore[call-overload]  # the stubs know no options of Powell's
+    found = minimize(
         missing, np.zeros(len(start)), method="Powell", options={"maxfev": _EVALUATIONS, "xtol": 0.02, "ftol": 1e-4}
     )
     return np.asarray(start + found.x * _UNIT)

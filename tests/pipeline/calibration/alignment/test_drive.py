@@ -52,7 +52,7 @@ def test_frames_are_read_one_ahead_and_no_more_after_the_end():
     def frame_of(index: int) -> Frame:
         read.append(index)
         readers.add(threading.get_ident())
-        return Frame(index, str(index), index * 100_000_000, 0.1)
+        return Frame(index, str(index), index * 100_000_000)
 
     def ended(done: int, total: int) -> None:
         assert len(read) <= done + 2
