@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from pipeline import lidar
+from pipeline.alignment import lens
 from pipeline.common import kalman
 from pipeline.common.garbage_collection import collect_rarely
 from pipeline.common.geometry import iou_matrix
@@ -39,6 +40,7 @@ def is_warm() -> bool:
 def _warm_up() -> None:
     ground_planes.warm_up()
     lane.warm_up()
+    lens.warm_up()
     lidar.warm_up()
     one = np.eye(2)
     kalman.update(kalman.predict(kalman.start((0.0, 0.0), one, 1.0), 0.1, 1.0), (0.0, 0.0), one)

@@ -20,7 +20,8 @@ from typing import ClassVar, Protocol
 import cv2
 import numpy as np
 
-from pipeline.common.geometry import F64, inverse, rotation, transform
+from pipeline.alignment.lens import through_lens
+from pipeline.common.geometry import F64, inverse, rotation
 from pipeline.params import AlignmentParams
 from pipeline.types import Box, CameraCalibration
 
@@ -97,17 +98,8 @@ class Pinhole:
     _NEAREST_M = 0.3
 
     def project(self, points: F64) -> F64:
-        in_camera = transform(self.T_camera_ego, np.asarray(points, dtype=np.float64).reshape(-1, 3))
-        behind = in_camera[:, 2] < self._NEAREST_M
-        in_camera[behind] = (0.0, 0.0, 1.0)
-        uv: F64 = np.empty((len(in_camera), 2))
-        if self.distortion.size and len(in_camera):  # OpenCV returns None for no points
-            uv[:] = cv2.projectPoints(in_camera, np.zeros(3), np.zeros(3), self.K, self.distortion)[0].reshape(-1, 2)
-        else:
-            for axis in (0, 1):  # in numpy, rows of two take four times as long
-                uv[:, axis] = in_camera[:, axis] / in_camera[:, 2] * self.K[axis, axis] + self.K[axis, 2]
-        uv[behind] = np.nan
-        return uv
+        rows = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        return through_lens(rows, self.T_camera_ego, self.K, self.distortion, self._NEAREST_M)
 
     def unproject(self, pixels: F64, range_m: F64) -> F64:
         """The point on the pixel's ray whose horizontal range from the ego origin is ``range_m``."""

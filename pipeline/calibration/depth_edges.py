@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import cv2
+import numba
 import numpy as np
 
 from pipeline.types import F32, F64, U8, Sweep
@@ -78,16 +79,21 @@ def upright_edges(bgr: U8) -> U8:
     change = np.abs(cv2.Sobel(grey, cv2.CV_32F, 1, 0))
     around = int(AROUND_WIDTHS * width) | 1
     relative = np.minimum(change / (FLAT + cv2.blur(change, (around, around))), STRONGEST)
-    spread = _spread(relative.astype(np.float32), np.exp(-1.0 / (SPREAD_WIDTHS * width)))
-    return np.round(spread * (255.0 / STRONGEST)).astype(np.uint8)
+    spread = np.ascontiguousarray(relative, dtype=np.float32)
+    _spread(spread, np.float32(np.exp(-1.0 / (SPREAD_WIDTHS * width))))
+    return np.round(spread * np.float32(255.0 / STRONGEST)).astype(np.uint8)
 
 
-def _spread(strength: F32, keeps: float) -> F32:
-    """Maximum over the neighbours of each pixel in its row, attenuated by this factor per step (inverse distance
-    transform along rows). (H, W) → (H, W)."""
-    columns = np.ascontiguousarray(strength.T)
-    for at in range(1, len(columns)):
-        np.maximum(columns[at], columns[at - 1] * np.float32(keeps), out=columns[at])
-    for at in range(len(columns) - 2, -1, -1):
-        np.maximum(columns[at], columns[at + 1] * np.float32(keeps), out=columns[at])
-    return np.ascontiguousarray(columns.T)
+@numba.njit(cache=True, nogil=True)
+def _spread(strength, keeps):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Raises each pixel to the maximum over the neighbours in its row, attenuated by this factor per step (inverse
+    distance transform along rows). strength: (H, W) float32, changed in place."""
+    for row in range(strength.shape[0]):
+        reached = np.float32(0.0)
+        for at in range(strength.shape[1]):
+            reached = max(strength[row, at], reached * keeps)
+            strength[row, at] = reached
+        reached = np.float32(0.0)
+        for at in range(strength.shape[1] - 1, -1, -1):
+            reached = max(strength[row, at], reached * keeps)
+            strength[row, at] = reached

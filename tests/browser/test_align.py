@@ -112,6 +112,28 @@ def test_a_fit_is_cancelled_and_changes_nothing(page: Page, knocked: Site):
     assert alignment(knocked) == Params()
 
 
+def test_in_a_small_window_nothing_covers_the_image_and_every_button_is_in_sight(page: Page):
+    page.keyboard.press("a")
+    page.set_viewport_size({"width": 800, "height": 480})
+    page.keyboard.press("a")
+    expect(page.locator("html")).to_have_attribute("data-inspect", "closed")
+    bar = page.locator("#align-bar")
+    for name in ("pinhole", "Fit", "Time", "Versions", "Edges", "Regions"):
+        button = bar.get_by_role("button", name=name, exact=True)
+        expect(button).to_be_in_viewport(ratio=1.0)
+        button.click(trial=True)
+    bar.get_by_role("button", name="Fit", exact=True).click()
+    result = page.get_by_label("Fitted alignment")
+    apply = result.get_by_role("button", name="Apply")
+    expect(apply).to_be_in_viewport(ratio=1.0)
+    apply.click(trial=True)
+    result.get_by_role("button", name="Dismiss").click()
+    bar.get_by_role("button", name="Versions").click()
+    save = page.get_by_label("Saved alignments").get_by_role("button", name="Save")
+    expect(save).to_be_in_viewport(ratio=1.0)
+    save.click(trial=True)
+
+
 LATE_MS = 100.0
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 
@@ -29,17 +31,16 @@ def fit_drive(
 ) -> AlignmentFit:
     """The alignment of a drive of ``count`` frames. An exception of ``progress`` ends it.
 
-    frame_of: returns a frame by its index, with its detections. offset: also fit the camera's position. NothingToFit if
-    too little is visible.
+    frame_of: returns a frame by its index, with its detections; called from a thread of its own. offset: also fit the
+    camera's position. NothingToFit if too little is visible.
     """
     indices = np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int)).tolist()
     total = len(indices) + STEPS
     scenes: list[FitScene] = []
     edges: list[EdgeView] = []
     kept: set[int] | None = None
-    for number, index in enumerate(indices):
+    for number, frame in enumerate(_read_ahead(frame_of, indices)):
         progress(number, total)
-        frame = frame_of(index)
         scene = fit_scene(frame, params)
         if scene is None:
             continue
@@ -55,3 +56,16 @@ def fit_drive(
     found = fit_alignment(scenes, name, params.alignment, offset, told, edges)
     progress(total, total)
     return found
+
+
+def _read_ahead(frame_of: Callable[[int], Frame], indices: Sequence[int]) -> Iterator[Frame]:
+    """The frames in this order, each read while the one before it is worked on: reading, or rendering, and detection
+    take longer than all else."""
+    with ThreadPoolExecutor(1, "cipv-fit-frames") as reader:
+        coming: deque[Future[Frame]] = deque()
+        for index in indices:
+            coming.append(reader.submit(frame_of, index))
+            if len(coming) > 1:
+                yield coming.popleft().result()
+        for last in coming:
+            yield last.result()

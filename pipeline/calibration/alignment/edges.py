@@ -11,18 +11,22 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from pipeline.calibration.alignment.models import REACH_DEG, FitModel
 from pipeline.calibration.depth_edges import EdgeScene
-from pipeline.types import F64, I64, Mask
+from pipeline.types import F64, I64
 
 MEMORY = 100_000_000
 """Bytes that the edge images of a drive may take: 120 frames of 1242 × 375 pixels take 56 MB, 48 of full HD 100 MB."""
 MOST = 30_000
 """Maximum number of evaluated depth edges: if there are more, every second, third …"""
-COARSE_DEG, FINE_DEG = 1.0, 0.25
-"""Steps of the search over rolls."""
+COARSE_DEG = np.arange(-REACH_DEG + 1.0, REACH_DEG, 1.0)
+FINE_DEG = np.arange(-1.5, 1.51, 0.25)
+"""Rolls of the search, and those around the best of them."""
+ROLL_STEPS = len(COARSE_DEG) + len(FINE_DEG)
+"""Number of progress steps of the search."""
 YAWS_DEG = tuple(np.arange(-0.6, 0.61, 0.2).round(2).tolist())
 """Yaws relative to that of the boxes: a box and the edge of a vehicle may differ by a few pixels everywhere."""
 BLOCK_NS = 500_000_000
@@ -60,14 +64,22 @@ class EdgeStack:
     def strengths(self, model: FitModel, vector: F64) -> F64:
         """(B,) sums of edge strength at the depth edges of each piece, for one alignment."""
         uv, found = model.aligned(vector).project(self._points), np.zeros(len(self.blocks))
-        height, width = self._scenes[0].strength.shape
-        inside: Mask = np.all((uv >= 0.0) & (uv < [width, height]), axis=1)  # false for NaN, behind the camera
-        pixels = np.where(inside[:, None], uv, 0.0).astype(np.int64)
         for scene, block, (first, last) in zip(self._scenes, self._block, pairwise(self._cuts), strict=True):
-            column, row = pixels[first:last].T
-            met = scene.strength[row, column] - scene.usual[row]
-            found[block] += float(met[inside[first:last]].sum())
+            found[block] += _met(uv[first:last], scene.strength, scene.usual)
         return found
+
+
+@numba.njit(cache=True, nogil=True)
+def _met(uv, strength, usual):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Sum of what the edge image (H, W) has more than the mean of its row (H,), at (E, 2) pixels. NaN is outside."""
+    height, width = strength.shape
+    total = 0.0
+    for n in range(len(uv)):
+        u, v = uv[n]
+        if 0.0 <= u < width and 0.0 <= v < height:
+            row = int(v)
+            total += strength[row, int(u)] - usual[row]
+    return total
 
 
 def stack_of(views: Sequence[EdgeView]) -> EdgeStack | None:
@@ -111,23 +123,35 @@ def frames_kept(count: int, size: tuple[int, int]) -> I64:
     return np.unique(np.linspace(0, count - 1, min(count, max(MEMORY // (size[0] * size[1]), 1))).round().astype(int))
 
 
-def roll_scores(views: Sequence[EdgeView], model: FitModel, with_roll: Callable[[float], F64]) -> RollScores | None:
+def roll_scores(
+    views: Sequence[EdgeView],
+    model: FitModel,
+    with_roll: Callable[[float], F64],
+    progress: Callable[[int], object] = lambda _: None,
+) -> RollScores | None:
     """Scores around the best roll; None if no roll stands out. with_roll: gives the vector that the boxes ask for at a
-    roll in degrees."""
+    roll in degrees. progress: is given the steps done, 0 to ``ROLL_STEPS`` − 1."""
     stack = stack_of(views)
     if stack is None:
         return None
-    coarse = _scores(stack, model, with_roll, np.arange(-REACH_DEG + 1.0, REACH_DEG, COARSE_DEG))
-    around = coarse.best_deg() + np.arange(-1.5, 1.51, FINE_DEG)
-    found = _scores(stack, model, with_roll, around)
+    coarse = _scores(stack, model, with_roll, COARSE_DEG, progress)
+    around = coarse.best_deg() + FINE_DEG
+    found = _scores(stack, model, with_roll, around, lambda done: progress(len(COARSE_DEG) + done))
     is_inside = around[0] < found.best_deg() < around[-1]
     return found if is_inside and found.sigma_deg() < WIDEST_DEG else None
 
 
-def _scores(stack: EdgeStack, model: FitModel, with_roll: Callable[[float], F64], rolls_deg: F64) -> RollScores:
+def _scores(
+    stack: EdgeStack,
+    model: FitModel,
+    with_roll: Callable[[float], F64],
+    rolls_deg: F64,
+    progress: Callable[[int], object],
+) -> RollScores:
     """With the best of the yaws for each roll, over all pieces."""
     strengths = np.zeros((len(stack.blocks), len(rolls_deg)))
     for k, roll in enumerate(rolls_deg.tolist()):
+        progress(k)
         vector = with_roll(roll)
         by_yaw = [stack.strengths(model, vector + _turned(yaw, len(vector))) for yaw in YAWS_DEG]
         strengths[:, k] = max(by_yaw, key=lambda each: float(each.sum()))

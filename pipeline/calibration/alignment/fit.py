@@ -6,7 +6,8 @@
    with a robust loss, and pair again more strictly, until both converge.
 3. **Roll.** Boxes ahead hardly determine it; edges of the images do (``edges``).
 4. **Edges.** Near that mount, the same edges determine all of it, without the errors that a detector's boxes share in
-   all frames (``edge_fit``).
+   all frames (``edge_fit``). An angular model has no mount; its four numbers are those with the
+   largest overlap (``overlaps``).
 5. **Uncertainty.** Where boxes alone determine the mount, the fit is repeated on frames resampled from blocks of the
    drive (bootstrap); where edges do, their blocks are compared. Held-out frames show how good the result is, and the
    drive itself whether it could determine it.
@@ -23,8 +24,9 @@ from pipeline.alignment.projection import corrected
 from pipeline.calibration.alignment.doubts import Found, looks_like_radians, warnings_of
 from pipeline.calibration.alignment.edge_fit import STEPS as EDGE_STEPS
 from pipeline.calibration.alignment.edge_fit import fit_edges
-from pipeline.calibration.alignment.edges import EdgeView, RollScores, roll_scores
+from pipeline.calibration.alignment.edges import ROLL_STEPS, EdgeView, RollScores, roll_scores
 from pipeline.calibration.alignment.models import FitModel, ModelName
+from pipeline.calibration.alignment.overlaps import Overlaps, most_overlap, overlaps_of
 from pipeline.calibration.alignment.pairs import PairTable
 from pipeline.calibration.alignment.scenes import FitScene
 from pipeline.calibration.alignment.search import GATES, SEARCH_STEPS, explained, refine, search
@@ -36,14 +38,17 @@ from pipeline.types import F64, I64
 _EXACT_DEG = 0.01
 """Standard deviation that holds a roll in place."""
 BOOTSTRAPS = 24
-STEPS = SEARCH_STEPS + EDGE_STEPS + BOOTSTRAPS
+_ROLLS_FROM = SEARCH_STEPS
+_EDGES_FROM = _ROLLS_FROM + ROLL_STEPS
+_BOOTSTRAPS_FROM = _EDGES_FROM + EDGE_STEPS
+STEPS = _BOOTSTRAPS_FROM + BOOTSTRAPS
 """Number of progress steps of a fit."""
 AGREED = 0.8
 """Share of what the boxes' mount explains that the edges' mount has to explain too. The boxes' shared error of some per
 cent of their sides costs less than that; a mount that lies on other edges pairs fewer vehicles."""
 AGREED_SIGMAS = 2.0
-"""Largest difference of the two mounts in yaw and pitch, in standard deviations of both, with shared errors. Where
-few edges end above or below, as in drawn images, edges put the pitch half a degree off."""
+"""Largest turn in yaw and pitch that boxes ask for at the edges' mount, in standard deviations of both, with shared
+errors. Where few edges end above or below, as in drawn images, edges put the pitch half a degree off."""
 CLEAR_SIGMAS = 3.0
 """Random differences between blocks of the drive stay below this many standard deviations in sum."""
 BLOCK_NS = 1_000_000_000
@@ -54,26 +59,12 @@ SHARED_DEG = {"yaw_deg": 0.1, "pitch_deg": 0.15}
 """Standard deviation of errors that all frames share and resampling cannot show: a detector draws the lower edge of
 every car a few pixels too high or too low, and the LiDAR misses the sides of every car. Root mean square of the median
 errors on KITTI 0009, KITTI 0052 and Astyx; those of any two of them cover the third within two standard deviations."""
-COVERED_IOU = 0.3
-"""A box with a smaller overlap may belong to an object that only the camera sees."""
 FEWEST_PAIRS = 12
 """Minimum number of pairs for a fit."""
 
 
 class NothingToFit(BadInput):
     """A drive with too little information for a fit; the text says what is missing."""
-
-
-@dataclass(frozen=True)
-class Overlaps:
-    """Overlap of projected clusters and boxes, over the held-out frames."""
-
-    mean_iou: float
-    """Over the boxes that are covered by a cluster, before or after the fit."""
-    paired: int
-    """Number of these boxes with an IoU of at least one half."""
-    boxes: int
-    """Number of these boxes."""
 
 
 @dataclass(frozen=True)
@@ -136,11 +127,15 @@ def fit_alignment(
         raise NothingToFit(_too_few(len(found[0].rows), len(table.boxes)))
     numbers = {scenes[k].t_ns // BLOCK_NS for k in train}
     views = [each for each in edges if each.t_ns // BLOCK_NS in numbers]
-    rolls = _rolls(table, model, found[0].vector, views)
+    rolls = _rolls(table, model, found[0].vector, views, progress)
     if rolls is not None:
         model = replace(model, roll_deg=(rolls.best_deg(), rolls.sigma_deg()))
         found = [refine(table, model, found[0].vector, GATES[-3:]), *found[1:]]
-    better, by_edges = _by_edges(table, model, found[0], views, progress)
+    by_edges: Mapping[str, float] | None = None
+    if name == "angular":
+        better = _found(table, model, most_overlap(table, model, found[0].vector))
+    else:
+        better, by_edges = _by_edges(table, model, found[0], views, progress)
     found = [better, *found[1:]]
     vector, rows = found[0].vector, found[0].rows
     blocks = _blocks([scenes[k] for k in train])
@@ -156,7 +151,7 @@ def fit_alignment(
             warnings += ("the angles of the calibration's mount look like radians where degrees are expected",)
     judged = PairTable.of([scenes[k] for k in held]) if held else table
     start = model.vector(present)
-    after, *before = _overlaps(judged, model, [vector, *([start] if start is not None else [])])
+    after, *before = overlaps_of(judged, model, [vector, *([start] if start is not None else [])])
     return AlignmentFit(
         model=name,
         values=_rounded(model.values(vector)),
@@ -174,18 +169,29 @@ def _by_edges(
     table: PairTable, model: FitModel, boxes: Found, views: Sequence[EdgeView], progress: Progress
 ) -> tuple[Found, Mapping[str, float] | None]:
     """The mount by depth edges with its standard deviations; that of the boxes and None where they contradict it."""
-    if model.name != "pinhole":
-        return boxes, None
-    edges = fit_edges(views, model, boxes.vector, lambda done: progress(SEARCH_STEPS + done, STEPS))
+    edges = fit_edges(views, model, boxes.vector, lambda done: progress(_EDGES_FROM + done, STEPS))
     if edges is None:
         return boxes, None
     shared = np.array(list(SHARED_DEG.values()))
-    off = np.abs(edges.vector - boxes.vector)[:2] / np.hypot(np.hypot(edges.sigmas[:2], shared), shared)
+    off = np.abs(_boxes_off(table, model, edges.vector)) / np.hypot(np.hypot(edges.sigmas[:2], shared), shared)
     if off.max() > AGREED_SIGMAS or explained(table, model, edges.vector) < AGREED * boxes.explained:
         return boxes, None
-    rows = table.matched(table.residuals(model.aligned(edges.vector), GATES[-1][0]), GATES[-1][1])
-    found = Found(edges.vector, rows, explained(table, model, edges.vector))
-    return found, dict(zip(model.unknowns, edges.sigmas.tolist(), strict=True))
+    return _found(table, model, edges.vector), dict(zip(model.unknowns, edges.sigmas.tolist(), strict=True))
+
+
+def _found(table: PairTable, model: FitModel, vector: F64) -> Found:
+    """A result that pairs do not ask for alone."""
+    rows = table.matched(table.residuals(model.aligned(vector), GATES[-1][0]), GATES[-1][1])
+    return Found(vector, rows, explained(table, model, vector))
+
+
+def _boxes_off(table: PairTable, model: FitModel, vector: F64) -> F64:
+    """(2,) yaw and pitch, degrees, by which the boxes would turn a mount, with its roll and place as they are: boxes
+    hardly determine these, and where they are wrong, so are the boxes' yaw and pitch."""
+    assert model.camera is not None
+    camera = corrected(model.params(vector), model.camera)
+    near = replace(model, camera=camera, offset=False, roll_deg=(0.0, _EXACT_DEG))
+    return refine(table, near, np.zeros(3), GATES[-3:]).vector[:2]
 
 
 def looks_undistorted(table: PairTable, model: FitModel, vector: F64, blocks: list[I64]) -> bool:
@@ -216,7 +222,7 @@ def _bootstrap(
     """(K, P) vectors fitted to resampled blocks of frames, with the roll of resampled edges."""
     rng, found = np.random.default_rng(0), []
     for number in range(BOOTSTRAPS):
-        progress(SEARCH_STEPS + EDGE_STEPS + number, STEPS)
+        progress(_BOOTSTRAPS_FROM + number, STEPS)
         drawn = np.concatenate([blocks[k] for k in rng.integers(0, len(blocks), len(blocks))])
         if rolls is not None:
             roll_deg = rolls.best_deg(rng.integers(0, len(rolls.blocks), len(rolls.blocks)))
@@ -225,7 +231,9 @@ def _bootstrap(
     return np.array(found)
 
 
-def _rolls(table: PairTable, model: FitModel, vector: F64, edges: Sequence[EdgeView]) -> RollScores | None:
+def _rolls(
+    table: PairTable, model: FitModel, vector: F64, edges: Sequence[EdgeView], progress: Progress
+) -> RollScores | None:
     """How well edges match by roll; None for an angular model, and if no roll stands out."""
     if model.name != "pinhole":
         return None
@@ -234,7 +242,7 @@ def _rolls(table: PairTable, model: FitModel, vector: F64, edges: Sequence[EdgeV
         start = np.array([*vector[:2], roll_deg, *vector[3:]])
         return refine(table, replace(model, roll_deg=(roll_deg, _EXACT_DEG)), start, GATES[-2:]).vector
 
-    return roll_scores(edges, model, with_roll)
+    return roll_scores(edges, model, with_roll, lambda done: progress(_ROLLS_FROM + done, STEPS))
 
 
 def _blocks(scenes: Sequence[FitScene]) -> list[I64]:
@@ -250,19 +258,6 @@ def _split(scenes: Sequence[FitScene]) -> tuple[list[int], list[int]]:
         return list(range(len(scenes))), []
     held = {int(k) for number, block in enumerate(blocks) if number % HELD_OUT == HELD_OUT // 2 for k in block}
     return [k for k in range(len(scenes)) if k not in held], sorted(held)
-
-
-def _overlaps(table: PairTable, model: FitModel, vectors: Sequence[F64]) -> list[Overlaps]:
-    """The overlaps for each vector, over the same boxes: those seen by both sensors. Distant ones have no cluster in
-    any case."""
-    best = np.zeros((len(vectors), len(table.boxes)))
-    for row, vector in zip(best, vectors, strict=True):
-        np.maximum.at(row, table.box, table.overlap(model.aligned(vector)))
-    shared = best[:, best.max(axis=0) >= COVERED_IOU]
-    return [
-        Overlaps(round(float(row.mean()), 4) if len(row) else 0.0, int(np.count_nonzero(row >= 0.5)), len(row))
-        for row in shared
-    ]
 
 
 def _of_one_camera(scenes: Sequence[FitScene]) -> list[FitScene]:

@@ -12,7 +12,7 @@ import { versionsButton, versionsPanel } from "./versions.js";
 import { followHand } from "./pointer.js";
 import { drawEdges } from "./image_edges.js";
 import { addLayer } from "../views/camera.js";
-import { grow } from "../workspace/panes.js";
+import { grow, resetInspector } from "../workspace/panes.js";
 
 /** Pause between two scores during a drag: each takes the server 0.1 s. */
 const PAUSE_MS = 250;
@@ -76,6 +76,7 @@ export function toggleAlign() {
   if (isOn() !== (get("layout")?.grown === "camera")) grow("camera");
   if (!isOn()) return;
   reveal("alignment.model");
+  resetInspector(); // in a narrow window, the sliders would cover the image that is being aligned
   fetchScore(undefined);
 }
 

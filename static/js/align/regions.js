@@ -35,6 +35,8 @@ on(["align"], () => press(regionsButton, get("align")?.regions === true));
 /** @param {AlignmentScore|null} score */
 export function showRegions(score) {
   known = score;
+  rangesRow.title = "";
+  if (score?.score === null) return rangesRow.replaceChildren(score.text);
   rangesRow.replaceChildren("Match by distance: ", ...(score?.ranges ?? []).flatMap(rangeText));
   rangesRow.title = score
     ? `Match by distance, and how far the points should move there. “?”: too few or unclear edges.`
