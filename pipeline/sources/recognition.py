@@ -41,6 +41,7 @@ _FILES: tuple[tuple[tuple[str, ...], str], ...] = (
     ((".osf",), "an Ouster recording; convert it to a ROS bag of PointCloud2 or to PCD files"),
     ((".rrd",), "an export for the rerun viewer; open the recording that it was made from"),
     ((".blf", ".asc", ".mf4", ".dbc"), "a log or definition of a vehicle bus, without LiDAR and images"),
+    ((".xosc", ".xodr"), "an unsupported OpenSCENARIO or OpenDRIVE file; a scenario here is a YAML file, sim:FILE"),
 )
 """Common other files, by suffix: what they are, and what to do."""
 _FOLDERS: tuple[tuple[str, str], ...] = (
@@ -188,15 +189,19 @@ def _about_file(path: Path) -> str:
     begin = _first_bytes(path)
     if not begin:
         return "an empty file"
-    for suffixes, what in _FILES:
-        if path.suffix.lower() in suffixes:
-            return what.format(path=path)
+    what = _about_suffix(path)
+    if what is not None:
+        return what
     for magic, what in _BEGINS:
         if begin.startswith(magic):
             return what
     is_text = all(byte >= 32 or byte in b"\t\r\n" for byte in begin)
     of = f" ({path.suffix})" if path.suffix else ""
     return f"a text file{of}" if is_text else f"a file of unknown content{of}"
+
+
+def _about_suffix(path: Path) -> str | None:
+    return next((what.format(path=path) for suffixes, what in _FILES if path.suffix.lower() in suffixes), None)
 
 
 def _about_folder(folder: Path) -> str:
@@ -211,10 +216,12 @@ def _about_folder(folder: Path) -> str:
         return f"it holds recordings; open one of them, for example {example}"
     folders = [each.name for each in inside if os.path.isdir(each)]
     suffixes = Counter(each.suffix or "unnamed" for each in inside if not os.path.isdir(each))
-    parts = [f"{count} {suffix} files" for suffix, count in suffixes.most_common(3)]
-    parts += [f"folders {', '.join(folders[:4])}"] if folders else []
+    parts = [f"{count} {suffix} file{'s' * (count > 1)}" for suffix, count in suffixes.most_common(3)]
+    parts += [f"folder{'s' * (len(folders) > 1)} {', '.join(folders[:4])}"] if folders else []
     several = "at least " if len(inside) == _MOST_ENTRIES else ""
-    return f"it holds {several}{' and '.join(parts)}"
+    usual = next((each for each in inside if suffixes and each.suffix == suffixes.most_common(1)[0][0]), None)
+    what = _about_suffix(usual) if usual is not None else None
+    return f"it holds {several}{' and '.join(parts)}" + (f" ({usual.name}: {what})" if usual and what else "")
 
 
 def _recordings_below(folder: Path) -> Iterator[Path]:

@@ -194,6 +194,10 @@ OTHERS: dict[str, tuple[Write, str]] = {
     "one point cloud": (some_file("a.pcd", b"# .PCD v.7"), "one point cloud; open its folder"),
     "one sweep of KITTI": (some_file("000000.bin", b"\1\2\3\4"), "raw points or packets; open the folder"),
     "a GNSS track": (some_file("a.gpx", b"<gpx>"), "a GNSS track; open the video"),
+    "an OpenSCENARIO file": (
+        some_file("a.xosc", b"<?xml"),
+        "an unsupported OpenSCENARIO or OpenDRIVE file; .* sim:FILE$",
+    ),
     "settings": (some_file("car.yaml", b"lidar:"), r"a settings file; use live:.*car\.yaml for sensors, sim:"),
     "an archive": (some_file("a.zip", b"PK\3\4"), "an archive; unpack it"),
     "an archive of no suffix": (some_file("a", b"PK\3\4"), "an archive; unpack it"),
@@ -207,7 +211,10 @@ OTHERS: dict[str, tuple[Write, str]] = {
     ),
     "Argoverse 2": (holding("sensors/lidar"), "an unsupported Argoverse 2 log; convert it"),
     "poses alone": (holding("poses"), "poses of KITTI's odometry sequences; the folders with .* are missing"),
-    "unrelated files": (unrelated, r"it holds 1 \.csv files and folders radar; use one of"),
+    "unrelated files": (
+        unrelated,
+        r"it holds 1 \.csv file and folder radar \(a\.csv: a point cloud or table; convert.*\)$",
+    ),
     "thousands of files": (thousands, r"it holds at least 1000 \.doc files; use one of"),
     "two recordings": (copies(write_astyx), r"it holds recordings; open one of them, for example .*/one$"),
     "recordings two folders down": (
@@ -215,7 +222,7 @@ OTHERS: dict[str, tuple[Write, str]] = {
         r"it holds recordings; open one of them, for example .*/a/b/one$",
     ),
     "a link to itself": (link_to_itself, "a broken link|cannot be read"),
-    "a folder in itself": (folder_in_itself, "it holds folders again"),
+    "a folder in itself": (folder_in_itself, "it holds folder again"),
     "a pipe": (pipe, "not a file or folder"),
     "a video's first bytes": (some_file("a", b"\0\0\0\x20ftypisom"), "a: not a readable video: cut off, or something"),
     "a capture's first bytes": (some_file("a", b"\xd4\xc3\xb2\xa1"), "a: no Velodyne packets .* the file is cut off"),
