@@ -15,6 +15,7 @@ from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 from app.commands.support.sensor_wait import Waiting
+from pipeline.common.files.whole_files import written_text
 from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.run import run, run_live
@@ -50,7 +51,7 @@ class RunPipeline:
             out = None
             if self.out is not None:
                 to_stdout = str(self.out) == "-"
-                out = sys.stdout if to_stdout else stack.enter_context(self.out.open("w", encoding="utf-8"))
+                out = sys.stdout if to_stdout else stack.enter_context(written_text(self.out))
             rerun_sink = None
             if self.rrd is not None:
                 from app.views.rerun.view import RerunSink  # takes half a second to import

@@ -1,16 +1,20 @@
-"""Small files that hold a person's work: replaced as a whole or not at all, never overwritten when damaged."""
+"""Writing files: small ones that hold a person's work are replaced as a whole or not at all, and never overwritten when
+damaged; results grow line by line."""
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TextIO
 
 _LOG = logging.getLogger(__name__)
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""What the system says of a disk, a quota or a limit that is exhausted, without naming the file."""
 
 
 @contextmanager
@@ -30,6 +34,18 @@ def replacing(target: Path) -> Iterator[BinaryIO]:
         part.replace(target)
     finally:
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def written_text(target: Path) -> Iterator[TextIO]:
+    """A UTF-8 text file that grows while it is written. OSError, with the file's name, if it cannot be written."""
+    try:
+        with target.open("w", encoding="utf-8") as file:
+            yield file
+    except OSError as error:
+        if error.errno in _FULL and error.filename is None:
+            error.filename = str(target)
+        raise
 
 
 def replace_text(target: Path, text: str) -> None:

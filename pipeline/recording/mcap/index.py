@@ -230,6 +230,7 @@ class _Walk:
         found.problem = "it was not closed properly and has no index"
         if not has_ended:
             found.is_cut = True
-            found.problem = f"it is cut off after {offset / 1e6:.1f} MB"
+            size = f"{offset / 1e6:.1f} MB" if offset >= 1e6 else f"{offset:,} bytes"
+            found.problem = f"it is cut off after {size}"
             if found.chunks:  # its message indexes may be truncated as well
                 found.chunks[-1] = replace(found.chunks[-1], channels=None)

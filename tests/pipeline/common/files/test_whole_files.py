@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.common.files.whole_files import replace_text, replacing, set_aside
+from pipeline.common.files.whole_files import replace_text, replacing, set_aside, written_text
 
 
 def test_the_old_content_is_there_until_the_new_one_is_whole(tmp_path: Path) -> None:
@@ -49,3 +49,20 @@ def test_files_set_aside_are_all_kept(tmp_path: Path) -> None:
         set_aside(target)
         assert not target.exists()
     assert {each.read_text() for each in tmp_path.iterdir()} == {"one", "two"}
+
+
+FULL = Path("/dev/full")
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="this system has no /dev/full")
+def test_a_full_disk_is_said_with_the_file() -> None:
+    with pytest.raises(OSError, match="full") as found, written_text(FULL) as file:  # noqa: PT012
+        file.write("x" * 100_000)
+        file.flush()
+    assert found.value.filename == str(FULL)
+
+
+def test_an_error_of_something_else_is_not_the_files(tmp_path: Path) -> None:
+    with pytest.raises(ConnectionError) as found, written_text(tmp_path / "a.jsonl"):
+        raise ConnectionError("the sensor is gone")
+    assert found.value.filename is None
