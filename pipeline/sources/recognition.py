@@ -220,8 +220,8 @@ def _about_folder(folder: Path) -> str:
     parts += [f"folder{'s' * (len(folders) > 1)} {', '.join(folders[:4])}"] if folders else []
     several = "at least " if len(inside) == _MOST_ENTRIES else ""
     usual = next((each for each in inside if suffixes and each.suffix == suffixes.most_common(1)[0][0]), None)
-    what = _about_suffix(usual) if usual is not None else None
-    return f"it holds {several}{' and '.join(parts)}" + (f" ({usual.name}: {what})" if usual and what else "")
+    meaning = _about_suffix(usual) if usual is not None else None
+    return f"it holds {several}{' and '.join(parts)}" + (f" ({usual.name}: {meaning})" if usual and meaning else "")
 
 
 def _recordings_below(folder: Path) -> Iterator[Path]:
