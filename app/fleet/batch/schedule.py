@@ -10,7 +10,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import dask
@@ -29,6 +29,8 @@ IN_FLIGHT_A_THREAD = 3
 TRIES = 2
 """Number of times that a piece is submitted: if its worker died too often for Dask, it is submitted again before it is
 set aside."""
+_LOSSES = 3
+"""Number of times that a piece that Dask dropped is submitted again."""
 CAN_FORK = sys.platform == "linux"
 """macOS's own libraries do not survive a fork."""
 _SETTINGS = {
@@ -165,6 +167,8 @@ class _Piece:
     is_last_look: bool = False
     """For a whole drive: whether its images have been processed."""
     tries: int = 1
+    losses: int = 0
+    """How often Dask dropped it without a result."""
 
 
 class _Batch:
@@ -203,13 +207,17 @@ class _Batch:
         if future.status == "finished":
             self._finished(piece, future.result())
             return
-        if future.status == "lost" or future.status == "cancelled":
-            raise SchedulerLost("the scheduler lost the task")
+        if future.status in ("lost", "cancelled"):
+            # workers that die one after the other can make Dask drop a task; without a scheduler, it drops all
+            if self._client.status != "running" or piece.losses == _LOSSES:
+                raise SchedulerLost("the scheduler lost the task")
+            self._waiting.append(replace(piece, losses=piece.losses + 1))
+            return
         error = future.exception()
         if isinstance(error, WrongWorker):
             raise error
         if isinstance(error, KilledWorker) and piece.tries < TRIES:
-            self._waiting.append(_Piece(piece.job, piece.first, piece.is_last_look, piece.tries + 1))
+            self._waiting.append(replace(piece, tries=piece.tries + 1))
         elif isinstance(error, KilledWorker):
             self._set_aside(piece, "every worker that opened it died: out of memory, or a crash")
         elif isinstance(error, BadInput):
@@ -267,4 +275,4 @@ def _key(piece: _Piece) -> str:
     """Its name at Dask's, and on Dask's page."""
     what = "run" if piece.first is None else f"look-{piece.first}"
     last = "-whole" if piece.is_last_look else ""
-    return f"{what}{last}-{piece.job.recording.drive}-{piece.job.key.name}-{piece.tries}"
+    return f"{what}{last}-{piece.job.recording.drive}-{piece.job.key.name}-{piece.tries + piece.losses}"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import fsspec
 import pytest
+from distributed import Future
 
 from app.fleet.batch.schedule import Tally, client_of, run_batch
 from app.fleet.batch.work import run_drive
@@ -38,6 +39,22 @@ def test_two_workers_give_the_bytes_of_none(fleet: Path, tmp_path: Path, expecte
     assert said == sorted(said, reverse=True)
     assert contents(tmp_path) == expected
     assert begun(plan_of(fleet, results=True), tmp_path).jobs == ()
+
+
+def test_tasks_that_dask_drops_are_submitted_again(fleet: Path, tmp_path: Path, expected: dict[str, str]):
+    work = begun(plan_of(fleet, results=True), tmp_path)
+    tally, dropped = Tally(len(work.all)), list[str]()
+
+    def drop(_: Tally) -> None:
+        if not dropped:
+            dropped.extend(str(key) for key in client.futures)
+            client.cancel([Future(key, client=client) for key in dropped])
+
+    with client_of(None, 1, MEMORY) as client:
+        run_batch(client, work.jobs, tally, drop)
+    assert dropped
+    assert (tally.done, tally.failed) == (SESSIONS, {})
+    assert contents(tmp_path) == expected
 
 
 def test_a_store_that_fails_every_twentieth_request_and_workers_that_are_killed_change_nothing(

@@ -84,7 +84,8 @@ class Labels:
         self._page, self._address = page, address
 
     def get(self, path: str) -> Any:
-        answer = self._page.request.get(f"{self._address}/api/labels{path}")
+        # a kept connection may be closed by the server in the moment in which it is used again
+        answer = self._page.request.get(f"{self._address}/api/labels{path}", max_retries=2)
         assert answer.ok, (path, answer.text())
         return answer.json()
 
