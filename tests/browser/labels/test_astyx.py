@@ -30,7 +30,7 @@ from pipeline.sources import open_source
 from pipeline.types.source import TruthObject
 from tests.browser.conftest import OpenPage, Site
 from tests.browser.labels.hands import KEYSTROKE_S, Hand, Labels, begin, is_at, is_saved
-from tests.browser.looks import pixels, repainted
+from tests.browser.looks import pauses, pixels, repainted
 
 FRAMES = range(414, 426)
 COUNT = len(FRAMES)
@@ -126,9 +126,13 @@ def judge_the_rest(hand: Hand, labels: Labels, objects: list[tuple[TruthObject, 
         for each in rows:
             if each["cuboid"] is not None and each["track"] in seen:
                 seen[each["track"]].append(on_a_vehicle(each["cuboid"], objects[int(index)]))
+    expect(page.locator(".track-row")).to_have_count(len(left))  # the list has followed the slider
     for number in left:
         row = page.locator(f".track-row[data-id='{number}']")
-        row.click()
+        for _ in pauses():
+            row.click()  # on nothing if the list moves under it between button down and up
+            if row.get_attribute("aria-selected") == "true":
+                break
         hand.counts["acts"] += 1
         hand.counts["presses"] += 1
         expect(row).to_have_attribute("aria-selected", "true")
