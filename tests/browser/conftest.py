@@ -98,6 +98,19 @@ class Site:
         self._thread.join()
 
 
+@contextmanager
+def serving(engine: Engine) -> Iterator[Site]:
+    """The dashboard of an engine of its own, which both end with the block."""
+    engine.start()
+    site = Site(engine, 0)
+    site.start()
+    try:
+        yield site
+    finally:
+        site.stop()
+        engine.stop()
+
+
 @pytest.fixture(scope="session")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """The dashboard on ``sim:straight``, paused on its first frame."""

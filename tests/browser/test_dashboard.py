@@ -8,7 +8,7 @@ from playwright.sync_api import expect
 from app.engine.engine import Engine
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
-from tests.browser.conftest import START, WAIT_MS, OpenPage, Site
+from tests.browser.conftest import START, WAIT_MS, OpenPage, Site, serving
 from tests.browser.looks import colours, frame_name, go_to, pixels, repainted, table, wait_for_frame, whole_drive
 
 WAIT_S = WAIT_MS / 1e3
@@ -288,20 +288,16 @@ def test_a_lost_connection_is_said_and_found_again(browser, site: Site):
     """Old data never looks fresh. The browser logs refused connections here, so the console is not checked."""
     recording = Recording()
     engine = Engine(opener(recording), lambda _: CountingDetector(), Params(), uri=recording.uri)
-    engine.start()
-    own = Site(engine, 0)
-    own.start()
-    page = browser.new_page()
-    try:
-        page.goto(own.address)
-        expect(page.locator("#link")).to_have_text("live", timeout=WAIT_S * 1000)
-        own.stop()
-        expect(page.locator("#notices")).to_contain_text("Connection lost", timeout=WAIT_S * 1000)
-        expect(page.locator("#link")).to_have_text("connection lost")
-        own.start()
-        expect(page.locator("#link")).to_have_text("live", timeout=WAIT_S * 1000)
-        expect(page.locator("#notices")).not_to_contain_text("Connection lost")
-    finally:
-        page.context.close()
-        own.stop()
-        engine.stop()
+    with serving(engine) as own:
+        page = browser.new_page()
+        try:
+            page.goto(own.address)
+            expect(page.locator("#link")).to_have_text("live", timeout=WAIT_S * 1000)
+            own.stop()
+            expect(page.locator("#notices")).to_contain_text("Connection lost", timeout=WAIT_S * 1000)
+            expect(page.locator("#link")).to_have_text("connection lost")
+            own.start()
+            expect(page.locator("#link")).to_have_text("live", timeout=WAIT_S * 1000)
+            expect(page.locator("#notices")).not_to_contain_text("Connection lost")
+        finally:
+            page.context.close()

@@ -9,6 +9,7 @@ The ego frame is the Velodyne's axes. Intensity, 0–1 in the files, is 0–255 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -219,9 +220,22 @@ class KittiSource:
             notes.append(f"{len(self._channels)} of a VLP-16's 16 rings remain: the HDL-64 reaches only about +3°")
         if not self._files.lidar_stamps and not self._files.camera_stamps:
             notes.append("no timestamps: 10 Hz assumed")
+        notes += self._about_times()
         if not self._files.oxts and not self._moved:
             notes.append("no ego speed recorded")
         return tuple(notes)
+
+    def _about_times(self) -> list[str]:
+        """What contradicts a drive in its timestamps: the program goes by them, so that a damaged file has to be named."""
+        """What in the timestamps contradicts a drive: the pipeline relies on them, so damage has to be named."""
+        apart_ns = max((abs(lidar - camera) for lidar, camera in pairs if lidar and camera), default=0)
+        backwards = sum(later <= earlier for earlier, later in pairwise(self._ticks))
+        notes = []
+        if apart_ns > _STEP_NS:
+            notes.append(f"images and sweeps are up to {apart_ns / 1e9:.1f} s apart by their timestamps")
+        if backwards:
+            notes.append(f"timestamps run backwards at {backwards} of {len(self._ticks)} frames")
+        return notes
 
 
 def parse_velodyne(data: bytes, file: str, notes: list[str]) -> F32:

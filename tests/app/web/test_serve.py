@@ -42,6 +42,18 @@ serve(engine, port=int(sys.argv[1]), host=sys.argv[2])
 """
 
 
+def begun(program: str, *arguments: str, **variables: str) -> subprocess.Popen[str]:
+    """A Python program with arguments and environment variables, whose output is read."""
+    return subprocess.Popen(
+        [sys.executable, "-c", program, *arguments],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | variables,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
 @pytest.fixture
 def taken_port() -> Iterator[int]:
     """A port that another program listens on."""
@@ -62,14 +74,7 @@ def test_two_servers_of_one_machine_keep_their_parameters_apart(
 
 
 def test_it_passes_over_a_taken_port_answers_and_ends_with_open_streams(taken_port: int):
-    program = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, str(taken_port), "127.0.0.1"],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    program = begun(PROGRAM, str(taken_port), "127.0.0.1")
     try:
         assert program.stdout is not None
         address = program.stdout.readline().strip()
@@ -89,14 +94,7 @@ def test_it_passes_over_a_taken_port_answers_and_ends_with_open_streams(taken_po
 
 def test_for_other_machines_it_shows_links_with_tokens_and_lets_nobody_else_in():
     token = "chosen-for-the-display-1234"
-    program = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, "0", "0.0.0.0"],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "CIPV_DISPLAY_TOKEN": token},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    program = begun(PROGRAM, "0", "0.0.0.0", CIPV_DISPLAY_TOKEN=token)
     try:
         assert program.stdout is not None
         address, person, display = (program.stdout.readline().strip() for _ in range(3))
@@ -125,13 +123,7 @@ RECORDING = PROGRAM.replace("playing=True", "playing=True, desk=SessionRecorder(
 
 @pytest.mark.parametrize("numbers", [[signal.SIGINT], [signal.SIGTERM], [signal.SIGHUP, signal.SIGTERM]])
 def test_whoever_ends_it_its_recording_is_closed_first(tmp_path: Path, numbers: list[signal.Signals]):
-    program = subprocess.Popen(
-        [sys.executable, "-c", RECORDING, "0", "127.0.0.1", str(tmp_path)],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+    program = begun(RECORDING, "0", "127.0.0.1", str(tmp_path))
     try:
         assert program.stdout is not None
         with httpx.Client(base_url=program.stdout.readline().strip(), timeout=60) as client:
@@ -179,14 +171,7 @@ def test_disks_and_databases_that_hang_for_ever_keep_neither_the_recording_open_
 ) -> None:
     with listen_socket("127.0.0.1", 0) as free:
         port = free.getsockname()[1]
-    program = subprocess.Popen(
-        [sys.executable, "-c", HANGING, str(tmp_path), str(port)],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    program = begun(HANGING, str(tmp_path), str(port))
     try:
         assert program.stdout is not None
         said = [program.stdout.readline()]
@@ -231,13 +216,7 @@ def test_it_does_not_free_its_memory_before_it_exits() -> None:
     """A second of processor time and more, which on a busy machine exceeds the 5 s that supervisors wait."""
     with listen_socket("127.0.0.1", 0) as free:
         port = free.getsockname()[1]
-    program = subprocess.Popen(
-        [sys.executable, "-c", FREED, str(port)],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+    program = begun(FREED, str(port))
     try:
         assert program.stdout is not None
         assert program.stdout.readline().startswith("http")

@@ -75,6 +75,16 @@ def test_raw_layout(kitti_raw: Path) -> None:
     assert (gap.ego.speed_mps, gap.ego.yaw_rate_radps) == (15.5, 0.02)
 
 
+def test_a_damaged_timestamps_file_is_named(kitti_raw: Path) -> None:
+    """Its lines in reverse order: times run backwards, and an image is up to 0.3 s from its sweep."""
+    assert not any("timestamps" in note for note in open_source(f"kitti:{kitti_raw}").notes)
+    (file,) = kitti_raw.rglob("velodyne_points/timestamps.txt")
+    file.write_text("".join(reversed(file.read_text().splitlines(keepends=True))))
+    notes = open_source(f"kitti:{kitti_raw}").notes
+    assert "images and sweeps are up to 0.3 s apart by their timestamps" in notes
+    assert "timestamps run backwards at 3 of 4 frames" in notes
+
+
 def test_oxts_says_where_the_velodyne_is(kitti_raw: Path) -> None:
     """The unit drives north; the Velodyne sits 0.81 m ahead of it and 0.32 m to its right, which is east."""
     source = open_source(f"kitti:{kitti_raw}")
