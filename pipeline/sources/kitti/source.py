@@ -226,8 +226,8 @@ class KittiSource:
         return tuple(notes)
 
     def _about_times(self) -> list[str]:
-        """What contradicts a drive in its timestamps: the program goes by them, so that a damaged file has to be named."""
         """What in the timestamps contradicts a drive: the pipeline relies on them, so damage has to be named."""
+        pairs = [(_stamp(self._files.lidar_stamps, n), _stamp(self._files.camera_stamps, n)) for n in self._names]
         apart_ns = max((abs(lidar - camera) for lidar, camera in pairs if lidar and camera), default=0)
         backwards = sum(later <= earlier for earlier, later in pairwise(self._ticks))
         notes = []
