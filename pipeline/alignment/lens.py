@@ -1,6 +1,6 @@
 """OpenCV's camera model, compiled: a mount, a pinhole, and radial, tangential and thin-prism distortion.
 
-``cv2.projectPoints`` takes some 20 times as long for each of many points, and was most of a fit of the alignment.
+``cv2.projectPoints`` takes more than ten times as long for each of many points, and was most of a fit of the alignment.
 Source: OpenCV 4, "Camera Calibration and 3D Reconstruction", detailed description.
 """
 

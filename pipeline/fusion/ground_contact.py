@@ -15,7 +15,8 @@ import numpy as np
 
 from pipeline.alignment.projection import Alignment
 from pipeline.common.fast_replace import evolve
-from pipeline.common.geometry import F64, iou_matrix
+from pipeline.common.geometry import F64
+from pipeline.fusion.boxes_in_front import EDGE_PX, nearer
 from pipeline.lidar.road_profile import ASIDE_M, RoadProfile, fit_road_profile
 from pipeline.params import FusionParams
 from pipeline.types import F32, VEHICLES, Ground, Mask, VisionMeasurement
@@ -23,19 +24,15 @@ from pipeline.types import F32, VEHICLES, Ground, Mask, VisionMeasurement
 NEAREST_M = 10.0
 """Minimum distance by the box's height. Nearer, the lower edge is as often a shadow as a tyre
 (``pipeline.vision.vehicle_height``)."""
-_EDGE_PX = 2.0
-"""Standard deviation of a box's lower edge from image to image."""
 _FLOOR_SHARE = 0.07
 """Relative error from the edge being drawn below the axle, the bumper or the shadow. With this value, one sigma covers
 76 and 79 % of the errors, and two sigmas 94 %, of labelled vehicles on Astyx and KITTI 0009 at 20–30 m, where the road
 is known; beyond that, 86 and 94 % or more."""
 _PITCH_SIGMA_RAD = np.radians(0.15)
-"""Standard deviation of the alignment between the sensors. A fit to traffic determines its pitch to 0.13–0.36° in the
-median (docs/reference/accuracy.md); a calibration target is more accurate."""
+"""Standard deviation of the alignment between the sensors. A fit to traffic determines its pitch to within so much from
+nine of ten starts (docs/reference/accuracy.md); a calibration target is more accurate."""
 _HIDDEN_SHARE = 0.3
 """Covered share of a box's lower edge above which the network draws it where the nearer vehicle begins."""
-_SAME_IOU = 0.5
-"""Boxes that overlap by more than this are of the same vehicle."""
 _WORTHLESS_SHARE = 0.35
 """Above this relative sigma, a contact says less than the vehicle's class does."""
 
@@ -72,7 +69,7 @@ def road_ahead(
         u, v = alignment.project(points[rows, :3].astype(np.float64)).T[:, :, None]
         x1, y1, x2, y2 = bbox.T
         with np.errstate(invalid="ignore"):
-            covered = ((u > x1) & (u < x2) & (v > y1) & (v < y2 - _EDGE_PX)).any(axis=1)
+            covered = ((u > x1) & (u < x2) & (v > y1) & (v < y2 - EDGE_PX)).any(axis=1)
         mask = mask.copy()
         mask[rows[covered]] = False
     return fit_road_profile(points, mask, speed_mps)
@@ -109,15 +106,14 @@ def _hidden_below(bbox: F64) -> Mask:
     """(M,) whether a nearer box covers much of the lower edge of a box (M, 4). Two boxes on one vehicle do not."""
     x1, y1, x2, y2 = bbox.T[:, :, None]
     covered = (np.minimum(x2, x2.T) - np.maximum(x1, x1.T)) / np.maximum(x2 - x1, 1.0)
-    is_nearer = (y2 + _EDGE_PX < y2.T) & (y2 > y1.T) & (iou_matrix(bbox, bbox) < _SAME_IOU)
-    hidden: Mask = (is_nearer & (covered > _HIDDEN_SHARE)).any(axis=1)
+    hidden: Mask = (nearer(bbox) & (y2 > y1.T) & (covered > _HIDDEN_SHARE)).any(axis=1)
     return hidden
 
 
 def _contacts(bbox: F64, alignment: Alignment, road: RoadProfile) -> _Contacts:
     """Where the lower edges of boxes (M, 4) meet the road."""
     middle, lower = (bbox[:, 0] + bbox[:, 2]) / 2.0, bbox[:, 3]
-    edges = np.concatenate([lower, lower - _EDGE_PX, lower + _EDGE_PX])
+    edges = np.concatenate([lower, lower - EDGE_PX, lower + EDGE_PX])
     meets = _meets(np.column_stack([np.tile(middle, 3), edges]), alignment, road)
     (x, _, _), (range_m, far_m, near_m), (closing, _, _) = (each.reshape(3, -1) for each in meets)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -28,8 +28,9 @@ import numpy as np
 
 from pipeline.alignment.projection import Alignment
 from pipeline.common.fast_replace import evolve
-from pipeline.common.geometry import F64, iou_matrix
+from pipeline.common.geometry import F64
 from pipeline.common.made_sweep import made_sweep
+from pipeline.fusion.boxes_in_front import nearer
 from pipeline.fusion.free_road import SweepRays
 from pipeline.params import FusionParams
 from pipeline.types import GROUND, I32, VEHICLES, VisionMeasurement
@@ -56,9 +57,6 @@ _BESIDE_SHARE = 0.6
 _SAME_RANGE_M, _SAME_HEIGHT_DEG = 1.5, 1.0
 _CLEARLY = 1.0
 """Minimum difference of log-likelihood between the best and the second-best group."""
-_EDGE_PX, _SAME_IOU = 2.0, 0.5
-"""A box that ends farther down by more than the noise of its edge is of something nearer, unless both are on one
-vehicle."""
 _LOW_NEAREST_M, _LOW_POINTS = 20.0, 3
 """Minimum distance of a vehicle that only one ring hits, and minimum number of its points: one or two may be dirt."""
 _LOW_BOTTOM_SHARE = 0.2
@@ -123,9 +121,10 @@ def range_boxes(
     rows, range_m = _far_road(sweep.points, sweep.kind, _LOW_NEAREST_M / 2)
     road = _points(sweep, rows, range_m, alignment)
     placed = _placed(boxes)
+    in_front = nearer(placed[:, :4])
     return tuple(
-        _ranged(each, points, road, placed[_in_front(placed[:, :4], row)]) if asked[row] else each
-        for row, each in enumerate(boxes)
+        _ranged(each, points, road, placed[covers]) if ask else each
+        for each, ask, covers in zip(boxes, asked, in_front, strict=True)
     )
 
 
@@ -139,15 +138,6 @@ def _placed(boxes: tuple[VisionMeasurement, ...]) -> F64:
             nearest_m, farthest_m = each.distance_m / spread, each.distance_m * spread
         rows.append((*each.detection.bbox, nearest_m, farthest_m))
     return np.array(rows, dtype=np.float64)
-
-
-def _in_front(bbox: F64, row: int) -> np.ndarray:
-    """(M,) whether each of the boxes (M, 4) is of something nearer than one of them that may cover it: on a level road,
-    what is nearer ends farther down. Two boxes on one vehicle do not cover each other."""
-    x1, _, x2, y2 = bbox.T
-    beside = (x1 < x2[row]) & (x1[row] < x2)
-    covers = beside & (y2 > y2[row] + _EDGE_PX) & (iou_matrix(bbox[row : row + 1], bbox)[0] < _SAME_IOU)
-    return np.asarray(covers)
 
 
 def _points(sweep: SweepReturns, rows: np.ndarray, range_m: F64, alignment: Alignment) -> _Points:
@@ -217,7 +207,7 @@ def _by_low_row(seen: VisionMeasurement, road: _Points) -> VisionMeasurement:
 
 
 def _by_returns(seen: VisionMeasurement, points: _Points, in_front: F64) -> VisionMeasurement:
-    """The box ranged by points above the road. in_front: (K, 6) boxes that may cover it, as returned by ``_placed``."""
+    """The box ranged by points above the road. in_front: (K, 6) nearer boxes, as returned by ``_placed``."""
     assert seen.distance_m is not None
     assert seen.sigma_m is not None
     x1, y1, x2, y2 = seen.detection.bbox

@@ -232,9 +232,9 @@ class KittiSource:
         backwards = sum(later <= earlier for earlier, later in pairwise(self._ticks))
         notes = []
         if apart_ns > _STEP_NS:
-            notes.append(f"images and sweeps are up to {apart_ns / 1e9:.1f} s apart by their timestamps")
+            notes.append(f"the timestamps of images and sweeps differ by up to {apart_ns / 1e9:.1f} s")
         if backwards:
-            notes.append(f"timestamps run backwards at {backwards} of {len(self._ticks)} frames")
+            notes.append(f"timestamps run backwards in {backwards} of {len(self._ticks)} frames")
         return notes
 
 

@@ -120,7 +120,9 @@ def _sentence(found: EdgeScore) -> str:
     if found.borders < FEWEST:
         return "Too few LiDAR depth edges in the images for a score"
     if found.score is None:
-        return f"No mount rotation within {REACH_DEG:.0f}° matches best; on a recording, Fit searches farther"
+        return (
+            f"No mount rotation within {REACH_DEG:.0f}° is clearly the best match; on a recording, Fit searches farther"
+        )
     if found.better:
         return f"LiDAR depth edges match the image edges better with {_words(found.better)}"
     return f"No mount rotation within {REACH_DEG:.0f}° matches the image edges clearly better than the current one"

@@ -43,7 +43,7 @@ function offerComputed() {
   const all = get("state")?.count ?? 0;
   if (!computed() || computed() >= all) return;
   set("offer", {
-    words: "Propose what is computed", // by the time it is pressed
+    words: "Propose the computed frames", // those computed when it is pressed
     take: () => act({ kind: "propose", first: 0, last: computed() - 1, from: "run" }),
     isOpen: () => computed() < all,
     about: get("said") ?? "",

@@ -81,8 +81,8 @@ def test_a_damaged_timestamps_file_is_named(kitti_raw: Path) -> None:
     (file,) = kitti_raw.rglob("velodyne_points/timestamps.txt")
     file.write_text("".join(reversed(file.read_text().splitlines(keepends=True))))
     notes = open_source(f"kitti:{kitti_raw}").notes
-    assert "images and sweeps are up to 0.3 s apart by their timestamps" in notes
-    assert "timestamps run backwards at 3 of 4 frames" in notes
+    assert "the timestamps of images and sweeps differ by up to 0.3 s" in notes
+    assert "timestamps run backwards in 3 of 4 frames" in notes
 
 
 def test_oxts_says_where_the_velodyne_is(kitti_raw: Path) -> None:
