@@ -145,7 +145,7 @@ function changed(change) {
 }
 
 const load = newestOnly(async (/** @type {void} */ _) => {
-  const { of, run } = filters;
+  const { of } = filters;
   dialog.ariaBusy = "true";
   $("#fleet-facts").textContent = "Searching…";
   for (const tab of dialog.querySelectorAll("[role=tab]"))
@@ -154,7 +154,7 @@ const load = newestOnly(async (/** @type {void} */ _) => {
     const found = await ask("rows", { order: filters.order, descending: String(filters.descending) });
     showRows(found, show, (column) => changed(() => sort(column)), filters);
     const more = found.total > found.rows.length ? `, the first ${found.rows.length} shown` : "";
-    $("#fleet-facts").textContent = `${found.total.toLocaleString("en")} ${of}${more} · run ${run}`;
+    $("#fleet-facts").textContent = `${found.total.toLocaleString("en")} ${of}${more}`;
     await loadCharts();
     problem("");
   } catch (error) {

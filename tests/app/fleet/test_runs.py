@@ -31,7 +31,7 @@ def test_a_run_is_described_by_what_is_not_usual(runs: tuple[Store, str, str]):
 
 
 def test_differences_of_two_runs(runs: tuple[Store, str, str]):
-    store, usual, other = (runs[0], *(about_run(runs[0], name) for name in runs[1:]))
+    usual, other = (about_run(runs[0], name) for name in runs[1:])
     assert differences(usual, usual) == []
     assert set(differences(usual, other)) == {
         "sensors both → lidar",
