@@ -1,7 +1,7 @@
 """Records beside the pipeline: a separate thread writes, and nothing ever waits for the disk.
 
-Frames, and messages that sensors send in between, go into a bounded queue. When the disk is too slow, data that does
-not fit is dropped, counted by kind, logged, and noted in the session itself. A chunk is written when it is full and at
+Frames, and messages that sensors send in between, go into a bounded queue. When the disk or the machine is too slow,
+data that does not fit is dropped, counted by kind, logged, and noted in the session itself, with the cause. A chunk is written when it is full and at
 least every ``FLUSH_S``, and is synced to disk every ``SYNC_S``: a crash of the process costs at most a second, a power
 failure ``SYNC_S``.
 """
@@ -43,6 +43,11 @@ _PATIENCE_S = 15.0
 """At the end, a disk that writes nothing for this long is not waited for. As long as it makes any progress, it is,
 because a loaded machine may be slow."""
 
+_DISK, _BUSY = "the disk was too slow", "the machine was too busy"
+_DISK_SHARE = 0.5
+"""If the writer's thread has spent more than this share of its time in writes and syncs since it last had nothing to
+do, the disk is what it waits for; otherwise encoding and compressing have too little of a processor."""
+
 _Do = Callable[[Segments], None]
 _Kind = Literal["frames", "packets", "sweeps", "images", "samples"]
 
@@ -71,6 +76,8 @@ class RecordingState:
     """Frames, batches of packets, sweeps, images and samples dropped because the queue was full."""
     error: str | None
     """Why it ended by itself; None without an error."""
+    dropped_because: str | None = None
+    """What was too slow when data was last dropped; None if nothing was."""
 
     def to_json(self) -> dict[str, Any]:
         """In the format of the page and ``/api/recording``."""
@@ -81,6 +88,7 @@ class RecordingState:
             "bytes": self.bytes,
             "dropped": self.dropped,
             "error": self.error,
+            "dropped_because": self.dropped_because,
         }
 
 
@@ -108,6 +116,8 @@ class Recorder:
         self._marks: deque[tuple[int, str]] = deque()
         self._batch: list[tuple[int, bytes]] = []
         self._dropped: Counter[_Kind] = Counter()
+        self._because: str | None = None
+        self._busy_since: tuple[float, float] | None = None
         self._error: str | None = None
         self.hangs = False
         self._thread = threading.Thread(target=self._work, name="cipv-recorder", daemon=True)
@@ -179,10 +189,11 @@ class Recorder:
             segments.bytes_written,
             self._dropped.total(),
             self._error,
+            self._because,
         )
 
     def stop(self) -> RecordingState:
-        """Write what is queued, close the file, and return the final state. Safe to call twice. If the disk hangs,
+        """Write what is queued, close the file, and return the final state. Safe to call twice. If writing hangs,
         gives up ``_PATIENCE_S`` after the last progress, and the error reports this."""
         if self._thread.is_alive() and not self.hangs:
             if self._batch:
@@ -192,7 +203,8 @@ class Recorder:
             if not self._ends():
                 self.hangs = True
                 kept = self._segments.kept_frames
-                self._error = f"recording stopped: the disk does not respond; the {kept} frames before are saved"
+                what = "the disk does not respond" if self._segments.disk.is_waiting else "its writer does not respond"
+                self._error = f"recording stopped: {what}; the {kept} frames before are saved"
                 logger.error("%s: %s", self._segments.files[-1], self._error)
         return self.state
 
@@ -217,10 +229,18 @@ class Recorder:
                 self._taken += 1
             else:
                 self._dropped[kind] += 1
+                self._because = self._what_is_slow()
             is_first = not has_room and self._dropped.total() == 1
         if is_first:
-            logger.warning("%s: the disk is too slow, %s are dropped", self._segments.files[-1], kind)
+            logger.warning("%s: %s, %s were dropped", self._segments.files[-1], self._because, kind)
         return has_room
+
+    def _what_is_slow(self) -> str:
+        since = self._busy_since
+        if since is None:
+            return _BUSY  # its thread has not even begun
+        passed_s, waited_s = time.monotonic() - since[0], self._segments.disk.total_s() - since[1]
+        return _DISK if waited_s > _DISK_SHARE * passed_s else _BUSY
 
     # ------------------------------------------------------------ the writer's thread
 
@@ -237,11 +257,15 @@ class Recorder:
         noted: Counter[_Kind] = Counter()
         flushed_s = synced_s = time.monotonic()
         while True:
+            if self._jobs.empty():
+                self._busy_since = None
             try:
                 job = self._jobs.get(timeout=FLUSH_S)
             except queue.Empty:
                 pass
             else:
+                if self._busy_since is None:
+                    self._busy_since = time.monotonic(), self._segments.disk.total_s()
                 if job is None:
                     break
                 self._do(job)
@@ -269,7 +293,7 @@ class Recorder:
         since = dropped - noted
         if since:
             what = ", ".join(f"{count} {kind}" for kind, count in sorted(since.items()))
-            self._segments.write_note(f"{what} were dropped here: the disk was too slow")
+            self._segments.write_note(f"{what} were dropped here: {self._because}")
         return dropped
 
     def _write_marks(self) -> None:
