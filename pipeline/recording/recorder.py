@@ -1,25 +1,26 @@
 """Records beside the pipeline: a separate thread writes, and nothing ever waits for the disk.
 
 Frames, and messages that sensors send in between, go into a bounded queue. When the disk or the machine is too slow,
-data that does not fit is dropped, counted by kind, logged, and noted in the session itself, with the cause. A chunk is written when it is full and at
-least every ``FLUSH_S``, and is synced to disk every ``SYNC_S``: a crash of the process costs at most a second, a power
-failure ``SYNC_S``.
+data that does not fit is dropped, counted by kind, logged, and noted in the session itself, with the cause. A chunk is
+written when it is full and at least every ``FLUSH_S``, and is synced to disk every ``SYNC_S``: a crash of the process
+costs at most a second, a power failure ``SYNC_S``.
 """
 
 from __future__ import annotations
 
 import logging
+import math
 import queue
 import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from pipeline.params import Params
+from pipeline.recording.recording_state import RecordingState
 from pipeline.recording.segments import NEVER, FileRotation, Segments
 from pipeline.recording.session.provenance import About
 from pipeline.recording.session.velodyne_scan import RawLidar
@@ -43,7 +44,7 @@ _PATIENCE_S = 15.0
 """At the end, a disk that writes nothing for this long is not waited for. As long as it makes any progress, it is,
 because a loaded machine may be slow."""
 
-_DISK, _BUSY = "the disk was too slow", "the machine was too busy"
+_DISK, _BUSY, _ENDED = "the disk was too slow", "the machine was too busy", "there was no time left to write them"
 _DISK_SHARE = 0.5
 """If the writer's thread has spent more than this share of its time in writes and syncs since it last had nothing to
 do, the disk is what it waits for; otherwise encoding and compressing have too little of a processor."""
@@ -56,40 +57,6 @@ class _Job(NamedTuple):
     do: _Do
     kind: _Kind
     bytes: int
-
-
-@dataclass(frozen=True)
-class RecordingState:
-    """State of a recording."""
-
-    file: Path
-    """The newest of ``files``."""
-    files: tuple[Path, ...]
-    """In order of time."""
-    frames: int
-    """Number written so far, over all files."""
-    seconds: float
-    """Duration over all files."""
-    bytes: int
-    """Size over all files."""
-    dropped: int
-    """Frames, batches of packets, sweeps, images and samples dropped because the queue was full."""
-    error: str | None
-    """Why it ended by itself; None without an error."""
-    dropped_because: str | None = None
-    """What was too slow when data was last dropped; None if nothing was."""
-
-    def to_json(self) -> dict[str, Any]:
-        """In the format of the page and ``/api/recording``."""
-        return {
-            "file": str(self.file),
-            "frames": self.frames,
-            "seconds": round(self.seconds, 3),
-            "bytes": self.bytes,
-            "dropped": self.dropped,
-            "error": self.error,
-            "dropped_because": self.dropped_because,
-        }
 
 
 class Recorder:
@@ -117,6 +84,7 @@ class Recorder:
         self._batch: list[tuple[int, bytes]] = []
         self._dropped: Counter[_Kind] = Counter()
         self._because: str | None = None
+        self._ends_by_s = math.inf
         self._busy_since: tuple[float, float] | None = None
         self._error: str | None = None
         self.hangs = False
@@ -192,9 +160,11 @@ class Recorder:
             self._because,
         )
 
-    def stop(self) -> RecordingState:
-        """Write what is queued, close the file, and return the final state. Safe to call twice. If writing hangs,
-        gives up ``_PATIENCE_S`` after the last progress, and the error reports this."""
+    def stop(self, within_s: float = math.inf) -> RecordingState:
+        """Write what is queued, close the file, and return the final state. Safe to call twice. What is still queued
+        after ``within_s`` is dropped and noted. If writing hangs, gives up ``_PATIENCE_S`` after the last progress, and
+        the error reports this."""
+        self._ends_by_s = time.monotonic() + within_s
         if self._thread.is_alive() and not self.hangs:
             if self._batch:
                 batch, self._batch = self._batch, []
@@ -269,9 +239,11 @@ class Recorder:
                 if job is None:
                     break
                 self._do(job)
+            now_s = time.monotonic()
+            if now_s > self._ends_by_s:
+                continue
             self._write_marks()
             noted = self._note_dropped(noted)
-            now_s = time.monotonic()
             if now_s - flushed_s >= FLUSH_S:
                 is_due = now_s - synced_s >= SYNC_S
                 self._segments.flush(to_disk=is_due)
@@ -283,7 +255,12 @@ class Recorder:
         with self._lock:
             self._waiting[job.kind] -= 1
             self._waiting_bytes -= job.bytes
-        job.do(self._segments)
+            has_time = time.monotonic() <= self._ends_by_s
+            if not has_time:
+                self._dropped[job.kind] += 1
+                self._because = _ENDED
+        if has_time:
+            job.do(self._segments)
         self._done += 1
 
     def _note_dropped(self, noted: Counter[_Kind]) -> Counter[_Kind]:

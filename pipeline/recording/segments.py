@@ -36,8 +36,8 @@ _PACKETS_CARRIED = 6
 class Segments:
     """Writes to ``path`` and, after rotation, to ``<stem>_001.mcap`` and so on beside it. Not thread-safe.
 
-    frames, seconds: over all files, seconds by log time. disk: time spent waiting for it. BadInput if a file exists; OSError if a file cannot be written
-    any more: after that nothing can be written, and earlier data is complete.
+    frames, seconds: over all files, seconds by log time. disk: time spent waiting for it. BadInput if a file exists;
+    OSError if a file cannot be written any more: after that nothing can be written, and earlier data is complete.
     """
 
     def __init__(

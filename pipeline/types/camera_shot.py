@@ -47,8 +47,8 @@ _of_thread = _OfThread()
 
 
 def _converted(frame: Any) -> U8:
-    """A video decoder's frame as (H, W, 3) uint8. The converter that PyAV keeps in each frame starts threads for it, and
-    hangs for good if the pipeline and the recorder convert the same frame at once; this one belongs to a thread."""
+    """A video decoder's frame as (H, W, 3) uint8. The converter that PyAV keeps in each frame starts threads, and
+    hangs for good if the pipeline and the recorder convert one frame at once; this one belongs to the thread."""
     if _of_thread.converter is None:
         from av.video.reformatter import VideoReformatter  # whoever has a frame has imported PyAV already
 

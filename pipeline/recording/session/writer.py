@@ -8,9 +8,9 @@ from typing import Any
 
 from pipeline.params import Params
 from pipeline.recording import topics
+from pipeline.recording.mcap.disk_time import DiskTime
 from pipeline.recording.mcap.output import Compression, Output
 from pipeline.recording.mcap.written_index import WrittenIndex
-from pipeline.recording.mcap.disk_time import DiskTime
 from pipeline.recording.session.detections import given_of
 from pipeline.recording.session.frame_list import FrameList
 from pipeline.recording.session.frame_record import (
