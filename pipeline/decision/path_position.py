@@ -44,10 +44,12 @@ third; its nose is ahead by the first."""
 _SURELY_RIGID = 0.5
 """``rigid_mps`` is the slower side's speed minus two standard deviations, so it is lower than that speed."""
 _NO_SIDES = ((nan, nan), (nan, nan))
-_GOES_ON, _BENDS = 0.3, 1.2
+_GOES_ON, _BENDS = 0.3, 1.4
 """Usual and rare errors of a path without lines or a route, as shares of its sigma: most roads go on as they begin,
-some bend. Maximum likelihood, with the weight ``cipv.road_goes_on``, on 893 points 10 to 50 m ahead on two random
-streets."""
+some bend. Maximum likelihood, with the weight ``cipv.road_goes_on``, on 1,991 points 20 to 50 m ahead on seven random
+streets. Fitted without any one of them and tried on that one, it is better than one normal distribution on six, by 0.25
+to 0.46 per point, and worse on one, by 0.08. On KITTI 0009, half of the errors are within 0.3 to 0.5 sigma, and 90 %
+within 0.75."""
 
 
 def believed_mps(sideways_mps: float | None, item: FusedObject) -> float:

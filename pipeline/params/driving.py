@@ -129,7 +129,7 @@ class CipvParams(Section):
     )
     max_sigma_m: float = slider(4.0, 0.5, 20.0, 0.1, "m", "Largest standard deviation of a lead's lateral position")
     road_goes_on: float = slider(
-        0.85,
+        0.75,
         0.0,
         0.95,
         0.05,
