@@ -19,6 +19,7 @@ from app.fleet.pack_index import packed_file, packs_of
 from app.fleet.runs import latest_run, runs_of
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
+from pipeline.common.files.user_file_errors import did_you_mean
 
 QueryTable = Literal["events", "frames", "objects", "drives"]
 Answer = TypeVar("Answer")
@@ -45,7 +46,7 @@ NAMED = {
 """Conditions by name, beside the kinds of event: usable in events like a column."""
 
 
-_UNKNOWN_COLUMN = re.compile(r'Referenced column (".*") not found')
+_UNKNOWN_COLUMN = re.compile(r'Referenced column "(.*)" not found')
 
 MOST_BYTES = 2 << 30
 """Memory that questions with a time limit may take; the usual ones on 10,000 drives take a tenth."""
@@ -116,7 +117,7 @@ class FleetTables:
         # on a line of its own, so that a comment ends with it
         fulfilled = f"FROM {of} WHERE (\n{condition}\n)"
         counted = f"SELECT {names}, count(*) OVER () AS found {fulfilled}"
-        rows = self._ask(f"{counted} ORDER BY {ordered} LIMIT {limit}", where)
+        rows = self._ask(f"{counted} ORDER BY {ordered} LIMIT {limit}", of)
         total = int(rows[0][-1]) if rows else 0
         return QueryResult(tuple(shown), tuple(tuple(map(_plain, row[:-1])) for row in rows), total)
 
@@ -152,12 +153,12 @@ class FleetTables:
         ``find`` raises."""
         name, condition = _quoted(column), where.strip() or "true"
         values = f"SELECT {name}::DOUBLE AS v FROM {of} WHERE (\n{condition}\n) AND isfinite({name}::DOUBLE)"
-        low, high = self._ask(f"SELECT min(v), max(v) FROM ({values})", where)[0]
+        low, high = self._ask(f"SELECT min(v), max(v) FROM ({values})", of)[0]
         if low is None:
             return [], []
         width = (high - low) / bins or 1.0
         place = f"least({bins - 1}, floor((v - {low!r}) / {width!r}))::INT"
-        counts = dict(self._ask(f"SELECT {place} AS b, count(*) FROM ({values}) GROUP BY b", where))
+        counts = dict(self._ask(f"SELECT {place} AS b, count(*) FROM ({values}) GROUP BY b", of))
         return [low + n * width for n in range(bins + 1)], [int(counts.get(n, 0)) for n in range(bins)]
 
     def counts(self, where: str, of: QueryTable, column: str, most: int = 30) -> list[tuple[str | None, int]]:
@@ -165,24 +166,37 @@ class FleetTables:
         ``find`` raises."""
         name, condition = _quoted(column), where.strip() or "true"
         grouped = f"SELECT {name}::VARCHAR AS v, count(*) AS n FROM {of} WHERE (\n{condition}\n) GROUP BY v"
-        return [(value, int(n)) for value, n in self._ask(f"{grouped} ORDER BY n DESC, v LIMIT {most}", where)]
+        return [(value, int(n)) for value, n in self._ask(f"{grouped} ORDER BY n DESC, v LIMIT {most}", of)]
 
-    def _ask(self, sql: str, where: str) -> list[tuple[Any, ...]]:
+    def _ask(self, sql: str, of: QueryTable) -> list[tuple[Any, ...]]:
         stop = threading.Timer(self._most_s, self._duckdb.interrupt) if self._most_s is not None else None
         try:
             if stop is not None:
                 stop.start()
             statements = self._duckdb.extract_statements(sql)
             if len(statements) != 1 or statements[0].type != duckdb.StatementType.SELECT:
-                raise BadInput(f"{where!r}: expected one condition")
+                raise BadInput("expected one condition, without a semicolon")
             return self._rows(statements[0])
         except duckdb.InterruptException:
-            raise BadInput(f"{where!r}: stopped after {self._most_s:g} s") from None
+            raise BadInput(f"the search was stopped after {self._most_s:g} s") from None
         except duckdb.Error as error:
-            raise BadInput(f"{where!r}: {_reason(error)}") from None
+            raise BadInput(self._reason(error, of)) from None
         finally:
             if stop is not None:
                 stop.cancel()
+
+    def _reason(self, error: Exception, of: QueryTable) -> str:
+        """DuckDB's message, without the position in the generated statement."""
+        first = str(error).strip().splitlines()[0]
+        if unknown := _UNKNOWN_COLUMN.search(first):
+            name = unknown[1]
+            columns = [column[0] for column in self._duckdb.execute(f"SELECT * FROM {of} LIMIT 0").description or ()]
+            hint = did_you_mean(name, columns) or (
+                f"; a text needs single quotes: '{name}'; for the columns, see the reference page \"Tables of a fleet\""
+            )
+            return f'no column "{name}" in {of}{hint}'
+        _, _, said = first.partition(": ")
+        return f"condition: {(said or first).rstrip()}"
 
     def _rows(self, query: str | duckdb.Statement) -> list[tuple[Any, ...]]:
         return self._interruptibly(lambda: self._duckdb.execute(query).fetchall())
@@ -250,12 +264,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return round(value, 4) if math.isfinite(value) else None
     return value
-
-
-def _reason(error: Exception) -> str:
-    """DuckDB's message, without the position in the generated statement."""
-    first = str(error).strip().splitlines()[0]
-    if unknown := _UNKNOWN_COLUMN.search(first):
-        return f'no column {unknown[1]} here; the reference page "Tables of a fleet" lists them'
-    _, _, said = first.partition(": ")
-    return (said or first).rstrip()

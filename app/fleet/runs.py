@@ -1,19 +1,29 @@
-"""Which runs a batch's folder holds."""
+"""Which runs a batch's folder holds, and what they are made from."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
+from pipeline.params import Params
 
 LATEST = "latest.json"
+_PARTS = ("code", "networks", "sensors", "rings")
+_RINGS = 16
+"""Usual number of LiDAR channels that are kept."""
 
 
 def runs_of(store: Store) -> list[str]:
     """Names of all runs, sorted."""
     return [name.removeprefix("runs/").removesuffix(".json") for name in store.names("runs")]
+
+
+def make_latest(store: Store, run: str) -> None:
+    """Make a run the one that is searched and compared unless another is named."""
+    store.write(LATEST, json.dumps({"run": run}).encode())
 
 
 def latest_run(store: Store) -> str:
@@ -25,12 +35,40 @@ def latest_run(store: Store) -> str:
 
 
 def about_run(store: Store, run: str) -> dict[str, Any]:
-    """What a run is made from: code, networks, parameters."""
+    """What a run is made from, by name: code, networks, sensors, rings, and every parameter, such as
+    ``cluster.tolerance_m``. Raises BadInput if there is no such run."""
     data = store.read(f"runs/{run}.json")
     if data is None:
         raise BadInput(f"{store.address}: no run {run!r}; there are {', '.join(runs_of(store)) or 'none'}")
-    found: dict[str, Any] = json.loads(data)
-    return found
+    said: dict[str, Any] = json.loads(data)
+    return {name: said.get(name) for name in _PARTS} | _flat(said.get("params", {}))
+
+
+def summary(about: Mapping[str, Any]) -> str:
+    """What distinguishes a run from one with default settings, in a line: ``cluster.tolerance_m=0.7, lidar only``."""
+    usual = _flat(Params().model_dump(mode="json"))
+    said = [f"{name}={about[name]}" for name in usual if name in about and about[name] != usual[name]]
+    if about.get("sensors") not in (None, "both"):
+        said.append(f"{about['sensors']} only")
+    if about.get("rings") not in (None, _RINGS):
+        said.append(f"{about['rings']} rings")
+    return ", ".join(said) or "default parameters"
+
+
+def differences(base: Mapping[str, Any], run: Mapping[str, Any]) -> list[str]:
+    """What differs between two runs, one entry each: ``cluster.tolerance_m 0.6 → 0.7``, ``other code``."""
+    said = [f"other {name}" for name in ("code", "networks") if base.get(name) != run.get(name)]
+    names = [name for name in dict.fromkeys((*base, *run)) if name not in ("code", "networks")]
+    changed = [name for name in names if base.get(name) != run.get(name)]
+    return said + [f"{name} {_value(base.get(name))} → {_value(run.get(name))}" for name in changed]
+
+
+def _flat(params: Mapping[str, Any]) -> dict[str, Any]:
+    return {f"{section}.{name}": value for section, values in params.items() for name, value in values.items()}
+
+
+def _value(value: object) -> str:
+    return "–" if value is None else str(value)
 
 
 def set_aside(store: Store, run: str) -> dict[str, str]:

@@ -7,7 +7,7 @@ are left to the robust fit in ground coordinates (``pipeline.lanes.line_fit``).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
@@ -52,6 +52,10 @@ class ClassicalLanes:
             return RawLanes(self.name, np.zeros((0, 2), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int32))
         points, scores = _paint(np.ascontiguousarray(bgr), rows, paint_px, _MIN_CONTRAST, _FULL_CONTRAST)
         return RawLanes(self.name, points, scores, np.full(len(points), -1, np.int32))
+
+    def of_camera(self, camera: CameraCalibration | None) -> ClassicalLanes:
+        """The same for images of another camera; None if it is not known."""
+        return replace(open_classical(camera), notes=self.notes)
 
 
 def open_classical(camera: CameraCalibration | None) -> ClassicalLanes:

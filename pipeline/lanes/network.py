@@ -5,7 +5,7 @@ The paper uses ENet-SAD; any network whose outputs ``pipeline.lanes.heads`` supp
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
@@ -75,6 +75,11 @@ class LaneNetwork:
         inside = np.all((uv >= 0.0) & (uv <= (bgr.shape[1] - 1, bgr.shape[0] - 1)), axis=1)
         return RawLanes(self.name, uv[inside].astype(np.float32), found.score[keep][inside], found.line[keep][inside])
 
+    def of_camera(self, camera: CameraCalibration | None) -> LaneNetwork:
+        """The same network, without loading it again, for images of another camera; None if it is not known."""
+        horizon = horizon_share(camera)
+        return replace(self, name=_name(self.path, self.sha256, self.head, horizon), horizon=horizon)
+
     def _blob(self, bgr: U8, placed: _Placed) -> F32:
         """(1, 3, h, w) float32, the network's input."""
         height, width = placed.size
@@ -138,12 +143,16 @@ def load_lane_network(path: Path, threads: int, horizon: float) -> LaneNetwork:
     except UnknownLaneHead as error:
         raise DetectorError(f"{path.name}: {error}") from None
     sha256 = file_sha256(path)
-    name = f"{path.stem}-{sha256[:12]}"
-    if head.horizon is not None:
-        name += f"-{horizon:.3f}"
+    name = _name(path, sha256, head, horizon)
     notes = (f"Lane lines by the network {path.stem}", *file_notes(path, sha256))
     count = session.get_session_options().intra_op_num_threads
     return LaneNetwork(path, name, tuple(session.get_providers()), size, head, notes, count, horizon, sha256, session)
+
+
+def _name(path: Path, sha256: str, head: LaneHead, horizon: float) -> str:
+    """Of a network. The horizon is part of it if the network's input depends on it."""
+    name = f"{path.stem}-{sha256[:12]}"
+    return name if head.horizon is None else f"{name}-{horizon:.3f}"
 
 
 def _placed(image: Size, size: Size, head: LaneHead, horizon: float) -> _Placed:

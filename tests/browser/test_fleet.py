@@ -87,6 +87,7 @@ def test_filters_find_what_the_tables_hold(open_fleet: OpenPage, tables: FleetTa
     page.get_by_label("Condition").fill("false -- nothing")
     page.keyboard.press("Enter")
     expect(page.locator("#fleet-facts")).to_contain_text("0 events")
+    expect(page.locator("#fleet-rows tbody")).to_have_text("Nothing meets these filters.")
     settled(page)
     page.get_by_role("button", name="Clear filters").click()
     expect(page.locator("#fleet-facts")).to_contain_text(f"{tables.find('').total} events")

@@ -35,7 +35,7 @@ class Scores:
         from app.fleet.compare.worth import values_of, worths
         from app.fleet.find import FleetTables
         from app.fleet.pack_index import packs_of
-        from app.fleet.runs import runs_of
+        from app.fleet.runs import about_run, runs_of, summary
         from app.fleet.store import Store
         from app.reports.terminal_tables import show
         from pipeline.evaluation.label_free.score import SCORES
@@ -48,8 +48,10 @@ class Scores:
         rows = {name: FleetTables(store, name).scores() for name in names}
         values = {name: values_of(found) for name, found in rows.items()}
         worth = worths(rows)
+        about = {name: summary(about_run(store, name)) for name in names}
         if self.json:
-            print(json.dumps({"runs": values, "worth": {each.score.name: _json(each) for each in worth}}, indent=1))
+            said = {"runs": values, "about": about, "worth": {each.score.name: _json(each) for each in worth}}
+            print(json.dumps(said, indent=1))
             return 0
         by_run = tuple((each.title, each.unit, *(values[name].get(each.name) for name in names)) for each in SCORES)
         against = tuple(
@@ -59,7 +61,11 @@ class Scores:
             for each in worth
             if each.pairs
         )
-        tables = [Table("Scores without labels", ("score", "unit", *names), by_run, decimals=3)]
+        settings = tuple((name, about[name], len({drive for drive, *_ in rows[name]})) for name in names)
+        tables = [
+            Table("Runs", ("run", "settings", "drives"), settings),
+            Table("Scores without labels", ("score", "unit", *names), by_run, decimals=3),
+        ]
         if against:
             heads = ("score", "against labels", "drives", "pairs", "rank correlation", "95 % low", "high", "over runs")
             tables.append(Table("Compared with labels", heads, against))

@@ -66,6 +66,7 @@ class ParameterSweep:
         from app.fleet.batch.addresses import absolute
         from app.fleet.batch.plan import Plan
         from app.fleet.batch.schedule import SchedulerLost
+        from app.fleet.runs import make_latest
         from app.fleet.store import Store
         from app.fleet.sweep import best_of, front
 
@@ -82,6 +83,7 @@ class ParameterSweep:
             print(f"cipv: connection to Dask lost: {lost}; run the same command again to continue", file=sys.stderr)
             return 1
         best = best_of(tried)
+        make_latest(Store(self.out), (best or tried[-1]).run)  # usually searched and compared next
         self._tell(tried, front(tried), best, names)
         if self.save is not None and best is not None:
             self.save.write_text(to_yaml(with_changes(base, best.changes)), encoding="utf-8")
@@ -115,8 +117,8 @@ class ParameterSweep:
         return fixed(sets), len(sets)
 
     def _run(self, plan: Plan, propose: Proposer, count: int, store: Store) -> tuple[list[Tried], tuple[str, str]]:
-        """Every set with its two scores, and the names of these."""
-        from app.fleet.batch.plan import begin, work_of
+        """Every set with its two scores, and the names of these. The plan of a batch in the folder stays as it is."""
+        from app.fleet.batch.plan import note_run, work_of
         from app.fleet.compare.worth import values_of
         from app.fleet.find import FleetTables
         from app.fleet.pack import pack
@@ -129,7 +131,7 @@ class ParameterSweep:
             while (changes := propose(tried)) is not None:
                 this = replace(plan, params=with_changes(plan.params, changes))
                 work = work_of(this, store)
-                begin(this, work, store)
+                note_run(this, work, store)
                 tally = tally_of(work)
                 if work.jobs:
                     run_with_bar(client, work, tally, f"set {len(runs) + 1} of {count}")

@@ -9,7 +9,7 @@ from typing import Any
 from app.fleet.batch.addresses import Recording, recordings
 from app.fleet.batch.job import Job, aside_file, done_file
 from app.fleet.batch.keys import RunKey, code_digest, networks_digest
-from app.fleet.runs import LATEST
+from app.fleet.runs import make_latest
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
 from pipeline.detection import DetectorChoice
@@ -107,5 +107,10 @@ def work_of(plan: Plan, store: Store) -> PlannedWork:
 def begin(plan: Plan, work: PlannedWork, store: Store) -> None:
     """Save the plan before the first drive runs. Raises BadInput if the store is not writable."""
     plan.save(store)
-    store.write(LATEST, json.dumps({"run": work.key.name}).encode())
+    make_latest(store, work.key.name)
+    note_run(plan, work, store)
+
+
+def note_run(plan: Plan, work: PlannedWork, store: Store) -> None:
+    """Save what a run is made from. Raises BadInput if the store is not writable."""
     store.write(f"runs/{work.key.name}.json", json.dumps(work.key.to_json(plan.choice), indent=1).encode())

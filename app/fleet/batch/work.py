@@ -22,6 +22,7 @@ from app.fleet.batch.drive_tables import FrameTables, Gap, gap_of, write_drive, 
 from app.fleet.batch.job import Job, Outcome, TooLong, aside_file
 from app.fleet.batch.keys import code_digest, networks_digest
 from app.fleet.batch.tables import DRIVES, EVENTS, FRAMES, OBJECTS, SCORES, TIMINGS, file_of
+from app.fleet.batch.unused_memory import return_unused
 from app.fleet.batch.worker_detectors import detectors_for
 from pipeline.common.errors import BadInput
 from pipeline.detection import Detectors, detect
@@ -73,6 +74,8 @@ def run_drive(job: Job, may_split: bool = False) -> Outcome | TooLong:
         raise
     except BadInput as error:
         return set_aside(job, str(error), perf_counter() - start)
+    finally:
+        return_unused()
     _write(job, job.done_file, {"frames": len(source)})
     return Outcome(job.recording.drive, len(source), looked_at, perf_counter() - start)
 
@@ -97,6 +100,7 @@ def look_at_piece(job: Job, first: int) -> int:
     for index in range(first, min(first + job.piece_frames, len(source))):
         detect(patiently(source, index), used(detectors, job.key.params), kept)
     kept.close()
+    return_unused()
     return kept.asked
 
 

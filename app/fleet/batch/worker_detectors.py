@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 from app.fleet.batch.job import Job
 from pipeline.detection import DetectorChoice, Detectors, image_size, open_detectors
+from pipeline.lanes.open_detector import LaneDetector, usual_every
 from pipeline.run import patiently
 from pipeline.types.source import Source, is_simulated
 
+_KINDS = 4
+"""Kinds of image whose networks stay open, at 20 MB each with YOLOX-nano alone. Opening them again takes as long as
+processing several images."""
+
 
 def detectors_for(source: Source, job: Job) -> Detectors:
-    """The detectors for a recording. Networks are opened once per kind of image and, for the classical lane detector,
-    camera."""
+    """The detectors for a recording. Networks are opened once per kind of image, whatever the camera's calibration,
+    which differs from car to car."""
     if job.key.sensors == "lidar":
         return Detectors()
     first = patiently(source, 0)
-    camera = first.camera
-    numbers = () if camera is None else (camera.K.tobytes(), camera.T_camera_ego.tobytes(), camera.road_z_m)
-    kind = (is_simulated(source), image_size(source), source.rate_hz, first.detections_given, numbers)
-    return _opened(_Opening(source, kind), job.choice, job.key.sensors)
+    if first.detections_given:
+        return Detectors()
+    opened = _opened(_Opening(source, (is_simulated(source), image_size(source))), job.choice, job.key.sensors)
+    if not isinstance(opened.lanes, LaneDetector):
+        return opened
+    lanes = opened.lanes.of_camera(first.camera)
+    return replace(opened, lanes=lanes, lanes_every=job.choice.lanes_every or usual_every(lanes, source.rate_hz))
 
 
 class _Opening:
@@ -35,7 +44,7 @@ class _Opening:
         return isinstance(other, _Opening) and self._kind == other._kind
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=_KINDS)
 def _opened(opening: _Opening, choice: DetectorChoice, sensors: str) -> Detectors:
     detectors = open_detectors(opening.source, choice, sensors)
     del opening.source  # only its kind is held

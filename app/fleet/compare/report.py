@@ -9,6 +9,7 @@ from typing import Any
 from app.fleet.compare.changes import EventChange, LeadChange, changed_drives, changed_events
 from app.fleet.compare.paired import CONDITIONS, FEW, PairedScore, paired
 from app.fleet.find import FleetTables
+from app.fleet.runs import about_run, differences
 from pipeline.common.errors import BadInput
 from pipeline.evaluation.report_sections import Linked, ReportSection, Table
 
@@ -24,6 +25,8 @@ class FleetComparison:
     """Name of the run that is compared with."""
     run: str
     """Name of the run that is judged."""
+    differences: tuple[str, ...]
+    """Parameters, code and networks that the runs differ in."""
     drives: int
     """That both have."""
     scores: tuple[PairedScore, ...]
@@ -57,6 +60,7 @@ def compare_runs(base: FleetTables, run: FleetTables, most: int = 20) -> FleetCo
     return FleetComparison(
         base.run,
         run.run,
+        tuple(differences(about_run(base.store, base.run), about_run(run.store, run.run))),
         len(shared),
         tuple(paired(ours, theirs, shared)),
         by_condition,
@@ -70,6 +74,7 @@ def compare_runs(base: FleetTables, run: FleetTables, most: int = 20) -> FleetCo
 def sections(told: FleetComparison, link: FrameUrl) -> list[ReportSection]:
     """For people."""
     text = (
+        f"Differences: {', '.join(told.differences) or 'none'}.",
         f"{told.drives} drives are in both runs. The lead differs in {told.differing} of {told.frames} frames.",
         "Intervals resample whole drives in pairs. Better or worse is reported where the interval excludes 0, from "
         f"{FEW} drives on.",
@@ -102,6 +107,7 @@ def as_json(told: FleetComparison, link: FrameUrl) -> dict[str, Any]:
     return {
         "base": told.base,
         "run": told.run,
+        "differences": list(told.differences),
         "drives": told.drives,
         "frames": told.frames,
         "frames_with_another_lead": told.differing,

@@ -26,6 +26,8 @@ class FleetJson(ApiModel):
     """Folder of the batch; null without a fleet."""
     runs: list[str]
     """Names of all runs, the last batch's first."""
+    about: dict[str, str]
+    """By run: parameters and sensors that differ from the default, in a line."""
     kinds: list[str]
     """Kinds of event, each a boolean column of ``events``."""
     named: dict[str, str]
@@ -76,12 +78,13 @@ def fleet_router(fleet: FleetDesk | None) -> APIRouter:
     def about() -> FleetJson:
         """Get what can be searched."""
         if fleet is None:
-            return FleetJson(address=None, runs=[], kinds=[], named={})
+            return FleetJson(address=None, runs=[], about={}, kinds=[], named={})
         from app.fleet.find import NAMED
 
         with refusing():
-            runs = fleet.runs()
-        return FleetJson(address=fleet.store.address, runs=runs, kinds=list(event_kinds()), named=NAMED)
+            about = fleet.about()
+        known = {"kinds": list(event_kinds()), "named": NAMED}
+        return FleetJson(address=fleet.store.address, runs=list(about), about=about, **known)
 
     @router.get("/rows")
     def rows(

@@ -43,7 +43,8 @@ export function showRows(found, onOpen, onSort, sorted) {
     });
     return line;
   });
-  $("#fleet-rows tbody").replaceChildren(...rows);
+  const nothing = el("td", { class: "left facts", colSpan: shown.length, textContent: "Nothing meets these filters." });
+  $("#fleet-rows tbody").replaceChildren(...(rows.length ? rows : [el("tr", { class: "fleet-none" }, nothing)]));
 }
 
 /** @param {string} name @param {any} value */

@@ -4,6 +4,7 @@
  */
 import { newestOnly, request } from "../core/api.js";
 import { $, el, memory } from "../core/dom.js";
+import { refused } from "../panels/notices.js";
 import { goTo } from "../workspace/share_link.js";
 import { histogram, showKinds } from "./charts.js";
 import { CHARTS, condition, filters, setRange, toggleKind, toggleNamed, toggleTable } from "./filters.js";
@@ -13,6 +14,7 @@ import { showRows } from "./rows.js";
  * @typedef {object} Fleet
  * @property {string|null} address
  * @property {string[]} runs
+ * @property {Record<string, string>} about what distinguishes each run
  * @property {string[]} kinds
  * @property {Record<string, string>} named
  */
@@ -29,7 +31,11 @@ export function setUp() {
 }
 
 async function open() {
-  fleet = await request("api/fleet").catch(() => null);
+  try {
+    fleet = await request("api/fleet");
+  } catch (error) {
+    return void refused(/** @type {Error} */ (error));
+  }
   if (!fleet?.address) return showHint();
   if (!filters.run || !fleet.runs.includes(filters.run)) filters.run = fleet.runs[0];
   build();
@@ -65,11 +71,19 @@ function build() {
   });
   const runs = el(
     "select",
-    { aria: { label: "Run" }, title: "Run" },
-    ...known.runs.map((name, place) => el("option", { value: name, textContent: place ? name : `${name} (last)` })),
+    { class: "fleet-runs", aria: { label: "Run" } },
+    ...known.runs.map((name, place) => {
+      const words = `${name}${place ? "" : " (last)"} · ${known.about[name]}`;
+      return el("option", { value: name, textContent: words });
+    }),
   );
   runs.value = filters.run;
-  runs.addEventListener("change", () => changed(() => (filters.run = runs.value)));
+  const describe = () => (runs.title = `Run ${filters.run}: ${known.about[filters.run]}`);
+  describe();
+  runs.addEventListener("change", () => {
+    changed(() => (filters.run = runs.value));
+    describe();
+  });
   const typed = el("input", {
     type: "search",
     id: "fleet-where",
@@ -131,7 +145,7 @@ function changed(change) {
 }
 
 const load = newestOnly(async (/** @type {void} */ _) => {
-  const { of, run } = filters;
+  const { of } = filters;
   dialog.ariaBusy = "true";
   $("#fleet-facts").textContent = "Searching…";
   for (const tab of dialog.querySelectorAll("[role=tab]"))
@@ -140,7 +154,7 @@ const load = newestOnly(async (/** @type {void} */ _) => {
     const found = await ask("rows", { order: filters.order, descending: String(filters.descending) });
     showRows(found, show, (column) => changed(() => sort(column)), filters);
     const more = found.total > found.rows.length ? `, the first ${found.rows.length} shown` : "";
-    $("#fleet-facts").textContent = `${found.total.toLocaleString("en")} ${of}${more} · run ${run}`;
+    $("#fleet-facts").textContent = `${found.total.toLocaleString("en")} ${of}${more}`;
     await loadCharts();
     problem("");
   } catch (error) {

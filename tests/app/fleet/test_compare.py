@@ -153,6 +153,7 @@ def test_the_gate_lets_a_run_pass_and_refuses_a_blind_one(
     assert figures["scores"]["labelled.lead_missed"]["verdict"] == "worse"
     assert len(figures["broken"]) == said.err.count("FAILED")
     assert figures["changes"][0]["link"].startswith("http")
+    assert {each.split()[0] for each in figures["differences"]} == BLIND.keys()
     assert _cipv(*typed, "--base", blind, "--run", sane, "--report", report) == 0
     assert "Largest changes" in report.read_text(encoding="utf-8")
 

@@ -110,8 +110,26 @@ def test_rows_come_in_the_order_that_is_asked_for(tables: FleetTables):
         assert known == sorted(known, reverse=descending)
         assert shown[: len(known)] == known
         assert None in shown
-    with pytest.raises(BadInput, match='no column "no_such" here'):
+    with pytest.raises(BadInput, match='no column "no_such" in frames'):
         tables.find("", "frames", order="no_such")
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ("sped_mps > 20", 'no column "sped_mps" in events; did you mean speed_mps?'),
+        ('severity = "hefty"', "a text needs single quotes: 'hefty'"),
+        ("speed_mps >", "condition: syntax error"),
+        ("speed_mps > 1; true", "one condition, without a semicolon"),
+    ],
+)
+def test_what_is_wrong_with_a_condition_is_told_without_repeating_it(tables: FleetTables, typed: str, said: str):
+    for wrapped in (typed, f"(\n{typed}\n)"):
+        with pytest.raises(BadInput) as refused:
+            tables.find(wrapped)
+        assert said in str(refused.value)
+        assert "\n" not in str(refused.value)
+        assert wrapped not in str(refused.value)
 
 
 def test_moments_of_a_frame_come_in_the_same_order_each_time(tables: FleetTables):

@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from app.cli import main
+from app.fleet.runs import latest_run
+from app.fleet.store import Store
 from app.fleet.sweep import Axis, Tried, best_of, fixed, front, grid, latin, parse_axis, searching
 from pipeline.common.errors import BadInput
 from pipeline.params import Params, from_yaml
+from tests.app.fleet.fleets import begun, plan_of
 
 
 def test_a_grid_has_every_combination():
@@ -103,6 +106,16 @@ def test_a_sweep_saves_the_best_as_a_preset(fleet: Path, tmp_path: Path, capsys:
     assert said["best"] == sane["run"]
     assert from_yaml(tmp_path / "best.yaml", Params()).cluster.min_points == 4
     assert "<svg" in (tmp_path / "sweep.html").read_text(encoding="utf-8")
+    assert latest_run(Store(str(tmp_path / "out"))) == sane["run"]
+
+
+def test_a_sweep_leaves_the_plan_of_a_batch_as_it_is(fleet: Path, tmp_path: Path):
+    work = begun(plan_of(fleet, sensors="lidar"), tmp_path)
+    before = (tmp_path / "batch.json").read_bytes()
+    typed = ["--over", "cluster.min_points=49,50", "--sensors", "lidar", "--lanes", "off", "--far-view-px", "0"]
+    assert _cipv("sweep", str(fleet / "far-0.mcap"), "--out", str(tmp_path), *typed) == 0
+    assert (tmp_path / "batch.json").read_bytes() == before
+    assert latest_run(work.store) != work.key.name
 
 
 def test_a_search_runs_every_set_that_it_proposes(fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):

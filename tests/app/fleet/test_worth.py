@@ -76,6 +76,7 @@ def test_cipv_scores_prints_both(fleet: Path, tmp_path: Path, capsys: pytest.Cap
     assert end.value.code == 0
     said = json.loads(capsys.readouterr().out)
     assert said["runs"][work.key.name]["labelled.cipv_correct"] is not None
+    assert said["about"][work.key.name] == "lidar only"
     assert said["worth"]["late_leads"]["drives"] == SESSIONS
     with pytest.raises(SystemExit) as end:
         main(["scores", "--out", str(tmp_path)])

@@ -104,3 +104,7 @@ def test_points_lie_in_the_image() -> None:
     assert np.all((raw.points >= 0) & (raw.points < (WIDTH, HEIGHT)))
     assert np.all((raw.scores >= 0) & (raw.scores <= 1))
     assert np.all(raw.line == -1)
+
+
+def test_another_camera():
+    assert open_classical(None).of_camera(camera(3.0)) == open_classical(camera(3.0))

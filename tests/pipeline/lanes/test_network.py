@@ -62,6 +62,25 @@ def test_curves_lie_in_the_image_whose_sky_was_cut_off_at_the_cameras_horizon(tm
     assert raw.points[:, 1].max() == pytest.approx(HEIGHT, abs=5.0)
 
 
+def test_a_network_for_another_camera_is_the_one_that_is_opened_for_it(tmp_path: Path) -> None:
+    level = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    low, high = (
+        CameraCalibration(
+            np.array([[1000.0, 0.0, 640.0], [0.0, 1000.0, share * HEIGHT], [0.0, 0.0, 1.0]]),
+            np.zeros(0),
+            level,
+            WIDTH,
+            HEIGHT,
+        )
+        for share in (0.4, 0.57)
+    )
+    file = str(lane_networks.lstr(tmp_path / "lstr.onnx"))
+    turned, opened = open_lane_network(file, camera=low).of_camera(high), open_lane_network(file, camera=high)
+    assert turned == opened
+    assert np.array_equal(turned.detect(image()).points, opened.detect(image()).points)
+    assert turned.name != open_lane_network(file, camera=low).name
+
+
 @pytest.mark.parametrize("kind", MASKS)
 def test_a_line_is_found_where_it_is_in_the_image(tmp_path: Path, kind: str) -> None:
     make, size, head = MASKS[kind]

@@ -37,6 +37,7 @@ def test_rows_histograms_and_counts_are_those_of_the_tables(client: httpx.Client
     tables = FleetTables(Store(str(out)))
     about = client.get("/api/fleet").json()
     assert (about["address"], about["runs"]) == (str(out), [tables.run])
+    assert about["about"] == {tables.run: "default parameters"}
     asked = {"of": "frames", "where": "distance_m < 20"}
     rows = client.get("/api/fleet/rows", params=asked | {"order": "distance_m", "limit": 7}).json()
     expected = tables.find("distance_m < 20", "frames", 7, order="distance_m")
