@@ -76,7 +76,8 @@ class Record:
         return 0
 
     def _live(self, source: LiveSource, params: Params, asked: Event) -> int:
-        """Record from live sensors, which do not wait: frames are dropped and counted if the disk is too slow."""
+        """Record from live sensors, which do not wait: what the disk or the machine is too slow for is
+        dropped and counted."""
         detectors, waiting = self.pipeline.open_detectors(source), Waiting(source)
         recorder = self._recorder(source, detectors)
 
@@ -109,7 +110,7 @@ class Record:
                 file=sys.stderr,
             )
         if state.dropped:
-            print(f"cipv: {state.dropped} frames or samples dropped because the disk was too slow", file=sys.stderr)
+            print(f"cipv: {state.dropped} frames or samples dropped because {state.dropped_because}", file=sys.stderr)
         if state.error is not None:
             print(f"cipv: {state.error}", file=sys.stderr)
         return 0 if state.error is None else 1

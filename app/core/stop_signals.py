@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from threading import Event
 from typing import Any
 
-REST_S = 3.0
-"""Together with the time for saving, this is less than the 5 s after which impatient supervisors kill."""
+SAVE_S, REST_S = 1.5, 3.0
+"""For what is not written yet, and for everything else: less than the 5 s after which impatient supervisors kill."""
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, *((signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()))
 
 

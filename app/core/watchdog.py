@@ -100,6 +100,11 @@ def busy_share() -> float:
         return 0.0
 
 
+def _load() -> float:
+    """By how much longer everything takes than on an idle machine."""
+    return max(1.0, busy_share())
+
+
 class _OfThread(threading.local):
     heart: _Heart | None = None
     watchdog: Watchdog | None = None
@@ -139,7 +144,8 @@ class Watchdog:
         self._patience_s, self._first_s = patience_s, first_s
         self._lock = threading.Lock()
         self._hearts: set[_Heart] = set()
-        self._took_s: dict[str, deque[float]] = {}
+        self._took: dict[str, deque[tuple[float, float]]] = {}
+        self._load = _load()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="cipv-watchdog", daemon=True)
 
@@ -171,22 +177,25 @@ class Watchdog:
         now_s = time.monotonic()
         with self._lock:
             if heart.doing is not None:
-                self._took_s.setdefault(heart.doing, deque(maxlen=_KEPT)).append(now_s - heart.since_s)
+                took = now_s - heart.since_s, self._load
+                self._took.setdefault(heart.doing, deque(maxlen=_KEPT)).append(took)
             heart.doing, heart.since_s, heart.starved_s = doing, now_s, 0.0
             if process != heart.process:
                 heart.process, heart.delayed_s = process, None
 
     def allowed_s(self, doing: str, process: int | None = None) -> float:
-        """Time limit of an operation. A process at idle priority may not run for a while, and nobody waits for it, so
-        it always has the time of a first run."""
-        took_s = self._took_s.get(doing, ())
-        is_known = len(took_s) >= _FEWEST and process is None
-        idle_s = max(took_s) + self._patience_s if is_known else self._first_s
-        return idle_s * max(1.0, busy_share())
+        """Time limit of an operation. What it took is extended only as far as the machine is busier now than it was
+        then. A process at idle priority may not run for a while, and nobody waits for it, so it always has the time of
+        a first run."""
+        load, took = _load(), self._took.get(doing, ())
+        if len(took) < _FEWEST or process is not None:
+            return self._first_s * load
+        return max(took_s * max(1.0, load / load_then) for took_s, load_then in took) + self._patience_s * load
 
     def look(self, now_s: float, late_s: float = 0.0) -> list[Stuck]:
         """Retire stuck workers and call their callbacks. late_s: delay of this check."""
         found: list[tuple[_Heart, Stuck]] = []
+        self._load = _load()
         with self._lock:
             for heart in self._hearts:
                 if late_s > _LATE_S:

@@ -15,6 +15,7 @@ from typing import cast
 from app.core.control import Control, Wish
 from app.core.detection_cache import DetectionCache
 from app.core.jobs import BackgroundJob, JobStatus
+from app.core.stop_signals import SAVE_S
 from app.core.watchdog import Stuck, Watchdog, at_work
 from app.drive.background_runs import BackgroundRuns
 from app.drive.open_recording import RunSetup
@@ -103,7 +104,7 @@ class Engine:
         """Close the recording, if any, then end the worker. A network run or a read in progress is finished first, but
         waited for no longer than systems wait for a program that was asked to end."""
         self.control.change(stop=True)
-        self.desk.stop()
+        self.desk.stop(SAVE_S)
         ends_s = time.monotonic() + _PATIENCE_S
         self.drives.stop(_PATIENCE_S)
         self.takeovers.end(max(0.0, ends_s - time.monotonic()))

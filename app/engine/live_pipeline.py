@@ -44,6 +44,7 @@ class LivePipeline:
         """Continues from the newest tick with the same sensors, which stay open, and other detectors."""
         fresh = LivePipeline(self.source, detectors, self._sensors)
         fresh.newest, fresh._first_ns = self.newest, self._first_ns
+        fresh._silence = self._silence  # its notice is still shown
         return fresh
 
     def wait(self, params: Params, timeout_s: float) -> Frame | None:
@@ -62,6 +63,7 @@ class LivePipeline:
         self.newest = ProcessedFrame(
             before, ran.frame, ran.state, ran.result, ran.lidar, params, ask.spent_ms, exact=True
         )
+        self._ticked_s = monotonic()  # on a busy machine, a tick may take longer than sensors may be silent
         return self.newest
 
     def with_silence(self, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import threading
 import time
@@ -15,7 +16,8 @@ from pipeline.types.source import AnySource, LiveSource, is_live_source
 
 if TYPE_CHECKING:
     from pipeline.detection import Detectors
-    from pipeline.recording.recorder import Recorder, RecordingState
+    from pipeline.recording.recorder import Recorder
+    from pipeline.recording.recording_state import RecordingState
 
 
 _LONGEST_NAME = 60
@@ -74,11 +76,11 @@ class SessionRecorder:
                 self._live.tap(recorder)
             return recorder.state
 
-    def stop(self) -> RecordingState | None:
-        """End the recording, wait until it is written, and return its final state; None (and no file) if it is
-        empty."""
+    def stop(self, within_s: float = math.inf) -> RecordingState | None:
+        """End the recording, wait until it is written, and return its final state; None (and no file) if it is empty.
+        within_s: see ``Recorder.stop``."""
         with self._lock:
-            return self._end()
+            return self._end(within_s)
 
     def mark(self, text: str) -> bool:
         """Add a mark at the newest frame; false if nothing is being recorded."""
@@ -116,7 +118,7 @@ class SessionRecorder:
         for text in marks:
             recorder.mark(text)
 
-    def _end(self) -> RecordingState | None:
+    def _end(self, within_s: float = math.inf) -> RecordingState | None:
         if self._live is not None:
             self._live.tap(None)
         with self._feeding:
@@ -126,7 +128,7 @@ class SessionRecorder:
             self._last = self._live = None
         if recorder is None:
             return None
-        state = recorder.stop()
+        state = recorder.stop(within_s)
         if state.frames == 0 and not recorder.hangs:
             state.file.unlink(missing_ok=True)
             return None

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from app.core.control import Wish
     from app.engine.player import Player
     from pipeline.detection import Detectors
-    from pipeline.recording.recorder import RecordingState
+    from pipeline.recording.recording_state import RecordingState
 
 
 @dataclass(frozen=True)

@@ -94,6 +94,6 @@ class _Now(Collector):
         )
         yield GaugeMetricFamily(
             "cipv_recording_frames_dropped",
-            "Frames dropped because the disk was too slow",
+            "Frames and messages dropped because the disk or the machine was too slow",
             recording.dropped if recording else 0,
         )

@@ -10,12 +10,13 @@ import socket
 import sys
 import warnings
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 
 from app.core.server_address import DEFAULT_PORT, is_loopback, listen_socket, reachable
 from app.core.session_folder import SESSIONS
 from app.core.shared_view_state import SharedViewState
-from app.core.stop_signals import asked_to_stop, end_process_once
+from app.core.stop_signals import SAVE_S, asked_to_stop, end_process_once
 from app.drive.alignment_versions import AlignmentVersions
 from app.drive.marks import Marks
 from app.engine.engine import Engine
@@ -63,10 +64,11 @@ def serve(
     warnings.filterwarnings("ignore", message="The 'alias' attribute with value")
     with asked_to_stop() as asked:
         if ends_process:
-            end_process_once(asked, engine.desk.stop)
+            end_process_once(asked, partial(engine.desk.stop, SAVE_S))
         engine.start()
         try:
-            from app.web.server import Server, TlsFiles, create_app
+            from app.web.server import Server, create_app
+            from app.web.tls_files import TlsFiles
 
             context = TlsFiles(*tls).context() if tls is not None else None
             marks, audit = Marks(SESSIONS / "marks"), SESSIONS / "audit.jsonl"

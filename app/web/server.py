@@ -8,7 +8,6 @@ import ssl
 import threading
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator
 from contextlib import asynccontextmanager, contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -43,7 +42,6 @@ from app.web.metrics import Metrics
 from app.web.page_files import PageFiles
 from app.web.routers import ROUTERS, Services
 from app.web.routes.labels.files import IMPORT
-from pipeline.common.errors import BadInput
 from pipeline.common.files.user_files import Overloaded
 
 _BACKLOG = 100
@@ -118,30 +116,6 @@ def create_app(
     app.add_api_route("/palette.css", _palette, include_in_schema=False)
     app.mount("/", PageFiles(engine.drives.turn.asked), name="pages")
     return app
-
-
-@dataclass(frozen=True)
-class TlsFiles:
-    """Files for HTTPS, PEM."""
-
-    certificate: Path
-    """Including its chain up to the root, if any."""
-    key: Path
-    """Key of the certificate, without a passphrase."""
-
-    def context(self) -> ssl.SSLContext:
-        """For a server. BadInput if they cannot be used."""
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        try:
-            context.load_cert_chain(self.certificate, self.key, password=_no_password)
-        except (OSError, ValueError) as error:  # SSLError is a subclass of OSError
-            reason = getattr(error, "reason", None) or getattr(error, "strerror", None) or str(error)
-            raise BadInput(f"{self.certificate}, {self.key}: cannot be used for TLS: {reason}") from None
-        return context
-
-
-def _no_password() -> str:
-    raise ValueError("the key needs a password")
 
 
 class Server(uvicorn.Server):

@@ -18,7 +18,8 @@ from pipeline.common.fast_replace import evolve
 from pipeline.decision.crossing import clears_path_s
 from pipeline.decision.gates import Candidate, judge, may_cut_in
 from pipeline.decision.object_motion import closing_speed_mps
-from pipeline.decision.path_position import SURE, Place, place
+from pipeline.decision.path_position import place
+from pipeline.decision.place import SURE, Place
 from pipeline.params import CipvParams
 from pipeline.types import Cipv, FusedObject, Moment, Path, Rejection, sensors_in_words
 

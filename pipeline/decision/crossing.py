@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import inf
 
-from pipeline.decision.path_position import Place
+from pipeline.decision.place import Place
 from pipeline.params import CipvParams
 from pipeline.types import FusedObject
 

@@ -11,7 +11,7 @@ from functools import partial
 from math import copysign, exp, sqrt
 from typing import NamedTuple
 
-from pipeline.decision.path_position import Place
+from pipeline.decision.place import Place
 from pipeline.params import CipvParams
 from pipeline.types import VEHICLES, Conditions, Eligibility, FusedObject, Gate, Path
 

@@ -9,13 +9,13 @@ is outside but which leaves no room to pass is in the path too.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import copysign, erf, nan, sqrt
-from typing import NamedTuple
+from math import copysign, nan
 
 import numba
 import numpy as np
 
 from pipeline.common.near_face import outlines, without_flank
+from pipeline.decision.place import Place
 from pipeline.fusion.vehicle_sizes import LONGEST_M
 from pipeline.params import CipvParams
 from pipeline.path.corridor import nearest
@@ -44,78 +44,12 @@ third; its nose is ahead by the first."""
 _SURELY_RIGID = 0.5
 """``rigid_mps`` is the slower side's speed minus two standard deviations, so it is lower than that speed."""
 _NO_SIDES = ((nan, nan), (nan, nan))
-_SUREST_M = 0.01
-SURE = 4.0
-"""Limit of the log-odds: the sigmas themselves are not known that precisely."""
-
-
-class Place(NamedTuple):
-    """Position of one object relative to the path. Lateral values are positive to the left of the path's centre."""
-
-    offset_m: float
-    """Lateral offset of the middle of its nearest face."""
-    ahead_m: float
-    """Path length to the foot of that point on the centre line."""
-    low_m: float
-    """Its rightmost extent across the path."""
-    high_m: float
-    """Its leftmost extent across the path."""
-    middle_m: float
-    """Middle between the two."""
-    left_m: float
-    """How far to the left the middle may be for the object to be in the path."""
-    right_m: float
-    """The same to the right."""
-    sigma_m: float
-    """Standard deviation of its lateral position relative to the path, including the path's error."""
-    sideways_mps: float | None
-    """Speed to the left of the path, over ground; None if its velocity is not known."""
-    forward_mps: float = 0.0
-    """Speed along the path, over ground; relative to the car while ego speed is unknown."""
-    believed_mps: float = 0.0
-    """The part of ``sideways_mps`` that is surely motion: see ``believed_mps`` below."""
-
-    @property
-    def limit_m(self) -> float:
-        """``left_m`` or ``right_m``, for the side where it is."""
-        return self.left_m if self.middle_m >= 0.0 else self.right_m
-
-    def margin_m(self, extra_m: float = 0.0) -> float:
-        """How far inside the path it is; negative if outside. extra_m widens the path."""
-        return min(self.left_m + extra_m - self.middle_m, self.right_m + extra_m + self.middle_m)
-
-    def probability(self, extra_m: float = 0.0) -> float:
-        """Probability that it is in the path, for a normal distribution around its measured position. Unlike
-        ``log_odds``, which only depends on the side of the edge, this is below a half if the path's uncertainty exceeds
-        its width."""
-        left_m, right_m = self.left_m + extra_m - self.middle_m, self.right_m + extra_m + self.middle_m
-        scale = 1.0 / (max(self.sigma_m, _SUREST_M) * sqrt(2.0))
-        return max(0.0, 0.5 * (erf(left_m * scale) + erf(right_m * scale)))
-
-    def log_odds(self, extra_m: float, moves_m: float) -> float:
-        """Log-odds from this sighting that the object is in the path: the log-likelihood ratio of its position compared
-        with the nearest position on the other side of the edge, at most ±4. moves_m: distance to the left by which the
-        object is assumed to have moved since."""
-        if self.ahead_m <= 0.0:
-            return -SURE
-        middle = self.middle_m + moves_m
-        margin = min(self.left_m + extra_m - middle, self.right_m + extra_m + middle)
-        surety = min(0.5 * (margin / self.sigma_m) ** 2, SURE)
-        return surety if margin >= 0.0 else -surety
-
-    def crossing_s(self, half_left_m: float, half_right_m: float) -> float | None:
-        """Seconds until the nearer side of an object outside the path crosses the edge, or until an object inside has
-        left; None if its estimated lateral speed (positive to the left) leads to neither. 0: on the edge."""
-        if self.believed_mps == 0.0 or self.ahead_m <= 0.0:
-            return None
-        outwards = (self.middle_m > 0.0) == (self.believed_mps > 0.0)
-        if outwards != (self.margin_m() >= 0.0):  # it moves towards the middle inside the path, or away outside it
-            return None
-        if outwards:
-            way = self.margin_m()
-        else:
-            way = self.low_m - half_left_m if self.middle_m > 0.0 else -half_right_m - self.high_m
-        return max(way, 0.0) / abs(self.believed_mps)
+_GOES_ON, _BENDS = 0.3, 1.4
+"""Usual and rare errors of a path without lines or a route, as shares of its sigma: most roads go on as they begin,
+some bend. Maximum likelihood, with the weight ``cipv.road_goes_on``, on 1,991 points 20 to 50 m ahead on seven random
+streets. Fitted without any one of them and tried on that one, it is better than one normal distribution on six, by 0.25
+to 0.46 per point, and worse on one, by 0.08. On KITTI 0009, half of the errors are within 0.3 to 0.5 sigma, and 90 %
+within 0.75."""
 
 
 def believed_mps(sideways_mps: float | None, item: FusedObject) -> float:
@@ -162,7 +96,7 @@ def place(
         motion = (
             (sideways, forward, believed_mps(sideways, item)) if item.velocity_mps is not None else (None, 0.0, 0.0)
         )
-        there = Place._make((*numbers, *motion))
+        there = Place._make((*numbers, *motion, params.road_goes_on if _drives_ahead(item) else 0.0))
         placed.append((there, there.crossing_s(half_left, half_right)))
     following = iter(placed)
     return [next(following) if item.bev is not None else None for item in objects]
@@ -196,8 +130,13 @@ def _numbers(item: FusedObject) -> tuple[float, ...]:
         *f,
         _rigid_share(item),
         _flank_m(item),
-        item.imaged and bool(item.surely_moving) and not item.oncoming,
+        _drives_ahead(item),
     )
+
+
+def _drives_ahead(item: FusedObject) -> bool:
+    """Whether it drives where the road goes."""
+    return item.imaged and bool(item.surely_moving) and not item.oncoming
 
 
 def _flank_m(item: FusedObject) -> float:
@@ -207,8 +146,8 @@ def _flank_m(item: FusedObject) -> float:
 
 @numba.njit(cache=True, nogil=True)
 def _against(rows, center, left, right, half_width, sigmas, step, overlap, use_flank, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]
-    """(N, 12) from (N, 21) rows of ``_numbers``: distances from the centre to the left and to the right edge at the
-    object, speed to the left of the path and along it, then the fields of ``Place`` up to ``sigma_m``. half_width: for
+    """(N, 14) from (N, 21) rows of ``_numbers``: distances from the centre to the left and to the right edge at the
+    object, speed to the left of the path and along it, then the fields of ``Place`` up to ``rare_m``. half_width: for
     a path without edges, else 0. sigmas: (2, K) ``profile_m`` and ``corner_m`` of the path."""
     middles = np.empty((len(rows), 2))
     for n in range(len(rows)):
@@ -228,7 +167,7 @@ def _against(rows, center, left, right, half_width, sigmas, step, overlap, use_f
             edge = rows[n // 2, 14 + 2 * (n % 2) + k]
             edges[n, k] = edge if np.isfinite(edge) else 0.0  # the kernel below assumes no NaN
     beside, _ = nearest(center, edges)
-    out = np.empty((len(rows), 12))
+    out = np.empty((len(rows), 14))
     for n in range(len(rows)):
         offsets, ahead = aside[5 * n : 5 * n + 5], reached[5 * n]
         near_x, near_y = corners[5 * n, 0], corners[5 * n, 1]
@@ -257,7 +196,9 @@ def _against(rows, center, left, right, half_width, sigmas, step, overlap, use_f
         out[n, 9], out[n, 10] = half_left + spare, half_right + spare
         own = _sigma_m(near_x, near_y, cos, sin, rows[n, 11], rows[n, 12], rows[n, 13])
         turns_off = 0.0 if rows[n, 20] else sigmas[1, k]  # a vehicle that drives ahead is where the road goes
-        out[n, 11] = np.sqrt(sigmas[0, k] ** 2 + turns_off**2 + own**2 + flanks[n] ** 2)
+        without_path = turns_off**2 + own**2 + flanks[n] ** 2
+        for field, share in ((11, 1.0), (12, _GOES_ON), (13, _BENDS)):
+            out[n, field] = np.sqrt((share * sigmas[0, k]) ** 2 + without_path)
     return out
 
 

@@ -25,9 +25,10 @@ NEAREST_M = 10.0
 """Minimum distance by the box's height. Nearer, the lower edge is as often a shadow as a tyre
 (``pipeline.vision.vehicle_height``)."""
 _FLOOR_SHARE = 0.07
-"""Relative error from the edge being drawn below the axle, the bumper or the shadow. With this value, one sigma covers
-76 and 79 % of the errors, and two sigmas 94 %, of labelled vehicles on Astyx and KITTI 0009 at 20–30 m, where the road
-is known; beyond that, 86 and 94 % or more."""
+"""Standard deviation of the edge, as a share of the box's height, because it is drawn at the axle, the bumper or the
+shadow. A car is about as tall as the camera is high, so its distance is off by the same share; that of a lorry by twice
+as much. With this value, one sigma covers 76 and 79 % of the errors, and two sigmas 94 %, of labelled vehicles on Astyx
+and KITTI 0009 at 20–30 m, where the road is known; beyond that, 86 and 94 % or more."""
 _PITCH_SIGMA_RAD = np.radians(0.15)
 """Standard deviation of the alignment between the sensors. A fit to traffic determines its pitch to within so much from
 nine of ten starts (docs/reference/accuracy.md); a calibration target is more accurate."""
@@ -112,15 +113,24 @@ def _hidden_below(bbox: F64) -> Mask:
 
 def _contacts(bbox: F64, alignment: Alignment, road: RoadProfile) -> _Contacts:
     """Where the lower edges of boxes (M, 4) meet the road."""
-    middle, lower = (bbox[:, 0] + bbox[:, 2]) / 2.0, bbox[:, 3]
+    middle, upper, lower = (bbox[:, 0] + bbox[:, 2]) / 2.0, bbox[:, 1], bbox[:, 3]
     edges = np.concatenate([lower, lower - EDGE_PX, lower + EDGE_PX])
     meets = _meets(np.column_stack([np.tile(middle, 3), edges]), alignment, road)
     (x, _, _), (range_m, far_m, near_m), (closing, _, _) = (each.reshape(3, -1) for each in meets)
+    tall_rad = _elevation(alignment, middle, upper) - _elevation(alignment, middle, lower)
     with np.errstate(invalid="ignore", divide="ignore"):
         by_edge = np.log(far_m / near_m) / 2.0
         by_road = road.height_sigma_m(x) / closing / range_m
         by_pitch = _PITCH_SIGMA_RAD / closing
-    return _Contacts(range_m, np.sqrt(by_road**2 + by_pitch**2 + _FLOOR_SHARE**2), by_edge)
+        by_floor = _FLOOR_SHARE * np.maximum(tall_rad / closing, 1.0)
+    return _Contacts(range_m, np.sqrt(by_road**2 + by_pitch**2 + by_floor**2), by_edge)
+
+
+def _elevation(alignment: Alignment, u: F64, v: F64) -> F64:
+    """(M,) slope of the lines of sight of pixels u, v (M,): rise per horizontal metre."""
+    _, rays = alignment.rays(np.column_stack([u, v]))
+    slope: F64 = rays[:, 2] / np.hypot(rays[:, 0], rays[:, 1])
+    return slope
 
 
 def _meets(pixels: F64, alignment: Alignment, road: RoadProfile) -> tuple[F64, F64, F64]:

@@ -161,6 +161,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "carried_may_become_lead": True,
             "hysteresis_m": 0.0,
             "use_flank": False,
+            "road_goes_on": 0.0,
             "decide_s": 0.0,
             "become_existence": 0.0,
             "become_probability": 0.0,

@@ -128,6 +128,15 @@ class CipvParams(Section):
         0.3, 0.0, 2.0, 0.05, "s", "In path: time over which detections are averaged; 0: this frame only"
     )
     max_sigma_m: float = slider(4.0, 0.5, 20.0, 0.1, "m", "Largest standard deviation of a lead's lateral position")
+    road_goes_on: float = slider(
+        0.75,
+        0.0,
+        0.95,
+        0.05,
+        "",
+        "Vehicles that drive ahead: probability that the road goes on as the path says, within a small part of its "
+        "sigma; 0: errors of the path have one normal distribution",
+    )
     cut_in_s: float = slider(3.0, 0.5, 6.0, 0.1, "s", "Cut-ins and cut-outs are predicted this far ahead")
     use_crossing: bool = choice(True, "A crossing object is in the path only if it is still there when the car arrives")
     crossing_margin_s: float = slider(

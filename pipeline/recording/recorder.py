@@ -1,25 +1,26 @@
 """Records beside the pipeline: a separate thread writes, and nothing ever waits for the disk.
 
-Frames, and messages that sensors send in between, go into a bounded queue. When the disk is too slow, data that does
-not fit is dropped, counted by kind, logged, and noted in the session itself. A chunk is written when it is full and at
-least every ``FLUSH_S``, and is synced to disk every ``SYNC_S``: a crash of the process costs at most a second, a power
-failure ``SYNC_S``.
+Frames, and messages that sensors send in between, go into a bounded queue. When the disk or the machine is too slow,
+data that does not fit is dropped, counted by kind, logged, and noted in the session itself, with the cause. A chunk is
+written when it is full and at least every ``FLUSH_S``, and is synced to disk every ``SYNC_S``: a crash of the process
+costs at most a second, a power failure ``SYNC_S``.
 """
 
 from __future__ import annotations
 
 import logging
+import math
 import queue
 import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from pipeline.params import Params
+from pipeline.recording.recording_state import RecordingState
 from pipeline.recording.segments import NEVER, FileRotation, Segments
 from pipeline.recording.session.provenance import About
 from pipeline.recording.session.velodyne_scan import RawLidar
@@ -43,6 +44,11 @@ _PATIENCE_S = 15.0
 """At the end, a disk that writes nothing for this long is not waited for. As long as it makes any progress, it is,
 because a loaded machine may be slow."""
 
+_DISK, _BUSY, _ENDED = "the disk was too slow", "the machine was too busy", "there was no time left to write them"
+_DISK_SHARE = 0.5
+"""If the writer's thread has spent more than this share of its time in writes and syncs since it last had nothing to
+do, the disk is what it waits for; otherwise encoding and compressing have too little of a processor."""
+
 _Do = Callable[[Segments], None]
 _Kind = Literal["frames", "packets", "sweeps", "images", "samples"]
 
@@ -51,37 +57,6 @@ class _Job(NamedTuple):
     do: _Do
     kind: _Kind
     bytes: int
-
-
-@dataclass(frozen=True)
-class RecordingState:
-    """State of a recording."""
-
-    file: Path
-    """The newest of ``files``."""
-    files: tuple[Path, ...]
-    """In order of time."""
-    frames: int
-    """Number written so far, over all files."""
-    seconds: float
-    """Duration over all files."""
-    bytes: int
-    """Size over all files."""
-    dropped: int
-    """Frames, batches of packets, sweeps, images and samples dropped because the queue was full."""
-    error: str | None
-    """Why it ended by itself; None without an error."""
-
-    def to_json(self) -> dict[str, Any]:
-        """In the format of the page and ``/api/recording``."""
-        return {
-            "file": str(self.file),
-            "frames": self.frames,
-            "seconds": round(self.seconds, 3),
-            "bytes": self.bytes,
-            "dropped": self.dropped,
-            "error": self.error,
-        }
 
 
 class Recorder:
@@ -108,6 +83,9 @@ class Recorder:
         self._marks: deque[tuple[int, str]] = deque()
         self._batch: list[tuple[int, bytes]] = []
         self._dropped: Counter[_Kind] = Counter()
+        self._because: str | None = None
+        self._ends_by_s = math.inf
+        self._busy_since: tuple[float, float] | None = None
         self._error: str | None = None
         self.hangs = False
         self._thread = threading.Thread(target=self._work, name="cipv-recorder", daemon=True)
@@ -179,11 +157,14 @@ class Recorder:
             segments.bytes_written,
             self._dropped.total(),
             self._error,
+            self._because,
         )
 
-    def stop(self) -> RecordingState:
-        """Write what is queued, close the file, and return the final state. Safe to call twice. If the disk hangs,
-        gives up ``_PATIENCE_S`` after the last progress, and the error reports this."""
+    def stop(self, within_s: float = math.inf) -> RecordingState:
+        """Write what is queued, close the file, and return the final state. Safe to call twice. What is still queued
+        after ``within_s`` is dropped and noted. If writing hangs, gives up ``_PATIENCE_S`` after the last progress, and
+        the error reports this."""
+        self._ends_by_s = time.monotonic() + within_s
         if self._thread.is_alive() and not self.hangs:
             if self._batch:
                 batch, self._batch = self._batch, []
@@ -192,7 +173,8 @@ class Recorder:
             if not self._ends():
                 self.hangs = True
                 kept = self._segments.kept_frames
-                self._error = f"recording stopped: the disk does not respond; the {kept} frames before are saved"
+                what = "the disk does not respond" if self._segments.disk.is_waiting else "its writer does not respond"
+                self._error = f"recording stopped: {what}; the {kept} frames before are saved"
                 logger.error("%s: %s", self._segments.files[-1], self._error)
         return self.state
 
@@ -217,10 +199,18 @@ class Recorder:
                 self._taken += 1
             else:
                 self._dropped[kind] += 1
+                self._because = self._what_is_slow()
             is_first = not has_room and self._dropped.total() == 1
         if is_first:
-            logger.warning("%s: the disk is too slow, %s are dropped", self._segments.files[-1], kind)
+            logger.warning("%s: %s, %s were dropped", self._segments.files[-1], self._because, kind)
         return has_room
+
+    def _what_is_slow(self) -> str:
+        since = self._busy_since
+        if since is None:
+            return _BUSY  # its thread has not even begun
+        passed_s, waited_s = time.monotonic() - since[0], self._segments.disk.total_s() - since[1]
+        return _DISK if waited_s > _DISK_SHARE * passed_s else _BUSY
 
     # ------------------------------------------------------------ the writer's thread
 
@@ -237,17 +227,23 @@ class Recorder:
         noted: Counter[_Kind] = Counter()
         flushed_s = synced_s = time.monotonic()
         while True:
+            if self._jobs.empty():
+                self._busy_since = None
             try:
                 job = self._jobs.get(timeout=FLUSH_S)
             except queue.Empty:
                 pass
             else:
+                if self._busy_since is None:
+                    self._busy_since = time.monotonic(), self._segments.disk.total_s()
                 if job is None:
                     break
                 self._do(job)
+            now_s = time.monotonic()
+            if now_s > self._ends_by_s:
+                continue
             self._write_marks()
             noted = self._note_dropped(noted)
-            now_s = time.monotonic()
             if now_s - flushed_s >= FLUSH_S:
                 is_due = now_s - synced_s >= SYNC_S
                 self._segments.flush(to_disk=is_due)
@@ -259,7 +255,12 @@ class Recorder:
         with self._lock:
             self._waiting[job.kind] -= 1
             self._waiting_bytes -= job.bytes
-        job.do(self._segments)
+            has_time = time.monotonic() <= self._ends_by_s
+            if not has_time:
+                self._dropped[job.kind] += 1
+                self._because = _ENDED
+        if has_time:
+            job.do(self._segments)
         self._done += 1
 
     def _note_dropped(self, noted: Counter[_Kind]) -> Counter[_Kind]:
@@ -269,7 +270,7 @@ class Recorder:
         since = dropped - noted
         if since:
             what = ", ".join(f"{count} {kind}" for kind, count in sorted(since.items()))
-            self._segments.write_note(f"{what} were dropped here: the disk was too slow")
+            self._segments.write_note(f"{what} were dropped here: {self._because}")
         return dropped
 
     def _write_marks(self) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.params import Params
+from pipeline.recording.mcap.disk_time import DiskTime
 from pipeline.recording.mcap.output import Compression
 from pipeline.recording.session.log_time import SessionClock
 from pipeline.recording.session.provenance import About
@@ -35,8 +36,8 @@ _PACKETS_CARRIED = 6
 class Segments:
     """Writes to ``path`` and, after rotation, to ``<stem>_001.mcap`` and so on beside it. Not thread-safe.
 
-    frames, seconds: over all files, seconds by log time. BadInput if a file exists; OSError if a file cannot be written
-    any more: after that nothing can be written, and earlier data is complete.
+    frames, seconds: over all files, seconds by log time. disk: time spent waiting for it. BadInput if a file exists;
+    OSError if a file cannot be written any more: after that nothing can be written, and earlier data is complete.
     """
 
     def __init__(
@@ -53,6 +54,7 @@ class Segments:
         self._clock = SessionClock()
         self._earlier_frames, self._earlier_bytes = 0, 0
         self._earlier_s = 0.0
+        self.disk = DiskTime()
         self.files = [path]
         self._writer = self._open(path)
 
@@ -147,5 +149,10 @@ class Segments:
 
     def _open(self, path: Path) -> SessionWriter:
         return SessionWriter(
-            path, self._about, compression=self._compression, clock=self._clock, raw_lidar=self._raw_lidar
+            path,
+            self._about,
+            compression=self._compression,
+            clock=self._clock,
+            raw_lidar=self._raw_lidar,
+            disk=self.disk,
         )

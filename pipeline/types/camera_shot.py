@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,10 +33,28 @@ class Shot:
         try:
             if self.frame is not None:
                 check_pixels(self.frame.width, self.frame.height)
-                return np.ascontiguousarray(self.frame.to_ndarray(format="bgr24"), dtype=np.uint8)
+                return _converted(self.frame)
             return decode_within_budget(self.encoded or b"")
         except TooMuch:
             return None
+
+
+class _OfThread(threading.local):
+    converter: Any = None
+
+
+_of_thread = _OfThread()
+
+
+def _converted(frame: Any) -> U8:
+    """A video decoder's frame as (H, W, 3) uint8. The converter that PyAV keeps in each frame starts threads, and
+    hangs for good if the pipeline and the recorder convert one frame at once; this one belongs to the thread."""
+    if _of_thread.converter is None:
+        from av.video.reformatter import VideoReformatter  # whoever has a frame has imported PyAV already
+
+        _of_thread.converter = VideoReformatter()
+    bgr = _of_thread.converter.reformat(frame, format="bgr24", threads=1).to_ndarray()
+    return np.ascontiguousarray(bgr, dtype=np.uint8)
 
 
 def is_whole_jpeg(data: bytes) -> bool:

@@ -124,11 +124,13 @@ class Height(NamedTuple):
     def share(self, size_share: float) -> float:
         """Standard deviation of the distance for not knowing the height, as a share of it. size_share: the spread
         within the class."""
-        return size_share if self.sigma is None else min(size_share, max(self.sigma, FLOOR_SHARE))
+        return size_share if self.sigma is None else max(self.sigma, FLOOR_SHARE)
 
 
 def hinted(shape: BoxShape, contact: RoadContact, size_share: float, class_factor: float = 1.0) -> Height:
     """The height before any range: of the class, changed by the shape of the boxes and by where they meet the road.
+    Where class and road contradict each other, one of them is wrong, and the sigma grows by the Birge ratio (R. T.
+    Birge, Phys. Rev. 40, 207 (1932)).
 
     size_share: standard deviation of ln(height) within the class. class_factor: height of the class over a car's; what
     is called a truck may be a car.
@@ -137,8 +139,10 @@ def hinted(shape: BoxShape, contact: RoadContact, size_share: float, class_facto
     possible = min(max(contact.log_ratio, _LOWEST - math.log(class_factor)), _TALLEST)
     if not contact.sightings or abs(contact.log_ratio - possible) > _MAX_SIGMAS * math.sqrt(noise):
         return Height(shape.height)
+    apart = possible - shape.height
     gain = prior / (prior + noise)
-    return Height(shape.height + gain * (possible - shape.height), math.sqrt((1.0 - gain) * prior))
+    birge = max(1.0, abs(apart) / math.sqrt(prior + noise))
+    return Height(shape.height + gain * apart, birge * math.sqrt((1.0 - gain) * prior))
 
 
 def learn(

@@ -91,5 +91,7 @@ function reasonOf(kind) {
   if (kind === "paused") return state?.live ? "not live" : "";
   if (kind === "waiting") return state?.busy ?? "for the first frame";
   const since = age === null ? "" : `last frame ${num(age / 1000)} s ago`;
-  return kind === "lost" ? `reconnecting · ${since}` : since;
+  if (kind === "lost") return `reconnecting · ${since}`;
+  const problems = state?.notices.filter(({ level }) => level !== "info").map((notice) => notice.text) ?? [];
+  return [since, ...problems].join(" · ");
 }

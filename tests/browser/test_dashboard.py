@@ -26,7 +26,7 @@ def test_it_opens_and_shows_the_frame_everywhere(open_page: OpenPage, site: Site
     pixels(page, "#camera")
     assert colours(page, "#camera") > 1000, "an image"
     assert colours(page, "#bev") > 8, "a plan with points and objects"
-    expect(page.locator("#link")).to_have_text("live")
+    expect(page.locator("#link")).to_have_text("connected")
 
 
 def test_the_banner_says_what_the_result_says(open_page: OpenPage, site: Site):
@@ -292,12 +292,12 @@ def test_a_lost_connection_is_said_and_found_again(browser, site: Site):
         page = browser.new_page()
         try:
             page.goto(own.address)
-            expect(page.locator("#link")).to_have_text("live", timeout=WAIT_S * 1000)
+            expect(page.locator("#link")).to_have_text("connected", timeout=WAIT_S * 1000)
             own.stop()
             expect(page.locator("#notices")).to_contain_text("Connection lost", timeout=WAIT_S * 1000)
             expect(page.locator("#link")).to_have_text("connection lost")
             own.start()
-            expect(page.locator("#link")).to_have_text("live", timeout=WAIT_S * 1000)
+            expect(page.locator("#link")).to_have_text("connected", timeout=WAIT_S * 1000)
             expect(page.locator("#notices")).not_to_contain_text("Connection lost")
         finally:
             page.context.close()

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from html import escape
 from urllib.parse import quote, urlencode, urlsplit
 
@@ -24,6 +24,7 @@ from starlette.websockets import WebSocket
 
 from app.core.client_role import AccountRole, includes, set_client
 from app.core.server_address import LOOPBACK_HOSTS, WILDCARDS, is_address
+from app.web.guards.revocation import serve_while_valid
 from app.web.guards.tokens import Guesses, Tokens
 
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -121,12 +122,20 @@ class Guard:
         is_socket = scope["type"] == "websocket"
         answer = self._refused(HTTPConnection(scope), is_socket or scope["method"] not in _READING)
         if answer is None:
+            if is_socket and self._tokens is not None:
+                return await serve_while_valid(self._app, scope, receive, send, self._still(HTTPConnection(scope)))
             return await self._app(scope, receive, send if is_socket else _with_headers(send))
         if answer is _TOO_MANY_GUESSES:
             await asyncio.sleep(_GUESSER_WAITS_S)
         if is_socket:
             return await WebSocket(scope, receive, send).close(code=1008)
         await answer(scope, receive, _with_headers(send))
+
+    def _still(self, connection: HTTPConnection) -> Callable[[], bool]:
+        """Whether a client is still the one as which it was accepted."""
+        given, tokens = _given(connection), self._tokens
+        before = tokens.client_of(given) if tokens is not None else None
+        return lambda: tokens is not None and tokens.client_of(given) == before
 
     def _refused(self, connection: HTTPConnection, changes: bool) -> Response | None:
         """The response to a refused request; None if it is accepted."""
@@ -138,7 +147,7 @@ class Guard:
         by_link = connection.query_params.get("token") if not changes else None
         if by_link is not None and self._tokens.client_of(by_link) is not None:
             return _signed_in(connection, by_link)
-        given = _bearer(connection.headers) or connection.cookies.get(cookie_name(connection))
+        given = _given(connection)
         client = self._tokens.client_of(given)
         if client is None:
             wrong, address = by_link or given, connection.client.host if connection.client else ""
@@ -175,6 +184,11 @@ def _display_may(scope: Scope) -> bool:
     if (scope["method"], path) in _LABEL_ROLES:
         return False
     return scope["method"] in _READING or (scope["method"], path) in _DISPLAY_MAY
+
+
+def _given(connection: HTTPConnection) -> str | None:
+    """The token that a client sends, as a program or in its cookie."""
+    return _bearer(connection.headers) or connection.cookies.get(cookie_name(connection))
 
 
 def _bearer(headers: Headers) -> str | None:

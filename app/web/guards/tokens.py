@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import ipaddress
 import os
 import secrets
 import time
@@ -20,6 +21,8 @@ from pipeline.common.errors import BadInput
 
 _BYTES = 24
 _MOST_ADDRESSES = 10_000
+_HOST_BITS = 64
+"""Of an IPv6 address: the part that a host in a network chooses by itself (RFC 4291)."""
 SHORTEST = 16
 """Minimum length of a user-defined token; 16 random characters cannot be guessed over a network."""
 FEWEST_DIFFERENT = 8
@@ -83,8 +86,9 @@ def _repeats(token: str) -> bool:
 
 
 class Guesses:
-    """Wrong tokens by address. A client that tries more than ``allowed`` different ones in ``per_s`` must wait for each
-    response; a correct token is never delayed, so that nobody can lock others out."""
+    """Wrong tokens by network, since everybody may choose among the 2^64 IPv6 addresses of a network. A client that
+    tries more than ``allowed`` different ones in ``per_s`` must wait for each response; a correct token is never
+    delayed, so that nobody can lock others out."""
 
     def __init__(self, allowed: int = 10, per_s: float = 60.0, clock: Callable[[], float] = time.monotonic) -> None:
         self._allowed, self._per_s, self._clock = allowed, per_s, clock
@@ -93,6 +97,7 @@ class Guesses:
     def wrong(self, address: str, token: str) -> bool:
         """Count an attempt; returns whether it exceeds the limit. Repeating the same token, as by a page with an old
         cookie, does not count."""
+        address = network_of(address)
         if len(self._wrong) >= _MOST_ADDRESSES:
             self._wrong.clear()  # so many at once come from one attacker who controls all addresses
         now_s = self._clock()
@@ -101,6 +106,17 @@ class Guesses:
             recent.setdefault(_digest(token), now_s)
         self._wrong[address] = recent
         return len(recent) > self._allowed
+
+
+def network_of(address: str) -> str:
+    """An IPv4 address, or the /64 network of an IPv6 address; anything else unchanged."""
+    try:
+        parsed = ipaddress.ip_address(address)
+    except ValueError:
+        return address
+    if parsed.version == 4 or parsed.ipv4_mapped is not None:
+        return str(parsed if parsed.version == 4 else parsed.ipv4_mapped)
+    return str(ipaddress.ip_network((int(parsed) >> _HOST_BITS << _HOST_BITS, 128 - _HOST_BITS)))
 
 
 def _digest(token: str) -> bytes:

@@ -12,7 +12,7 @@ from app.web.routes.shapes.common import ApiModel
 from app.web.routes.shapes.state import RecordingJson
 
 if TYPE_CHECKING:
-    from pipeline.recording.recorder import RecordingState
+    from pipeline.recording.recording_state import RecordingState
 
 
 class RecordingChoice(ApiModel):

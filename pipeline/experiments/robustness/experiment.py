@@ -54,6 +54,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "wide camera gate": {"vision_tracking.gate_sigmas": 10.0},
     "no road edges": {"path.use_edges": False},
     "no corners": {"path.use_corners": False},
+    "path errors of one normal distribution": {"cipv.road_goes_on": 0.0},
     "flanks taken for rears": {"cipv.use_flank": False},
     "tall boxes treated like others": {"vision_tracking.use_aspect": False},
     "boxes placed by height alone": {"fusion.use_ground_contact": False},

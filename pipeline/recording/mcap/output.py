@@ -16,6 +16,7 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from pipeline.common.errors import BadInput
 from pipeline.common.files.signing import configured_signer
 from pipeline.recording.mcap.chain import ChainWriter
+from pipeline.recording.mcap.disk_time import DiskTime
 from pipeline.recording.topics import PROFILE, Channel
 
 CHUNK_BYTES = 1280 * 1024
@@ -31,15 +32,17 @@ _COMPRESSION = {"lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}
 class _Stream:
     """Output of ``mcap.writer``: written directly to the system and chained by hash."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, disk: DiskTime) -> None:
         signer = configured_signer()  # if this fails, no file has been created yet
         self.file = path.open("xb", buffering=0)
+        self._disk = disk
         self.chain = ChainWriter(self.file, signer=signer)
 
     def write(self, data: bytes) -> int:
         rest = memoryview(data)
-        while rest:
-            rest = rest[self.file.write(rest) :]
+        with self._disk.waiting():
+            while rest:
+                rest = rest[self.file.write(rest) :]
         self.chain.wrote(data)
         return len(data)
 
@@ -49,21 +52,32 @@ class _Stream:
     def flush(self) -> None:
         """Nothing is buffered."""
 
+    def sync(self) -> None:
+        """Wait until what was written survives a crash of the machine."""
+        with self._disk.waiting():
+            os.fsync(self.file.fileno())
+
 
 class Output:
     """A new MCAP file. ``add`` messages, ``flush`` periodically, finally ``close``.
 
     Only the current chunk is buffered: when it is closed, by size or by ``flush``, its bytes have been passed to the
     system and survive a crash of this process. ``flush(to_disk=True)`` waits until they also survive a crash of the
-    machine.
+    machine. disk: counts the time that this takes.
 
     If nothing more can be written, ``add``, ``flush`` and ``close`` raise OSError with the file's name, after
     truncating the file to its last complete chunk and ending it there: any reader can still open it.
     """
 
-    def __init__(self, path: Path, compression: Compression = "zstd", profile: str = PROFILE) -> None:
+    def __init__(
+        self,
+        path: Path,
+        compression: Compression = "zstd",
+        profile: str = PROFILE,
+        disk: DiskTime | None = None,
+    ) -> None:
         try:
-            self._stream = _Stream(path)
+            self._stream = _Stream(path, disk or DiskTime())
         except FileExistsError:
             raise BadInput(f"{path}: file already exists; choose another name or remove it") from None
         self.path = path
@@ -125,7 +139,7 @@ class Output:
             self._stream.chain.link()
             self._pending_bytes = 0
             if to_disk:
-                os.fsync(self._stream.file.fileno())
+                self._stream.sync()
 
     def close(self) -> None:
         """Write the summary and close the file. Safe to call twice."""
@@ -135,7 +149,7 @@ class Output:
             self._writer.flush()
             self._stream.chain.link(is_last=True)
             self._writer.finish()
-            os.fsync(self._stream.file.fileno())
+            self._stream.sync()
         self._is_open = False
         self._stream.file.close()
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from pipeline.params import Params
 from pipeline.recording import topics
+from pipeline.recording.mcap.disk_time import DiskTime
 from pipeline.recording.mcap.output import Compression, Output
 from pipeline.recording.mcap.written_index import WrittenIndex
 from pipeline.recording.session.detections import given_of
@@ -63,9 +64,10 @@ class SessionWriter:
         compression: Compression = "zstd",
         clock: SessionClock | None = None,
         raw_lidar: RawLidar | None = None,
+        disk: DiskTime | None = None,
     ) -> None:
         self._raw_lidar = raw_lidar
-        self._output = Output(path, compression)
+        self._output = Output(path, compression, disk=disk)
         self._output.add_metadata(topics.METADATA, about.to_metadata())
         self._clock = clock or SessionClock()
         self._frames = FrameList()

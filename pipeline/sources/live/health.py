@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from typing import Literal
@@ -16,6 +18,8 @@ _SILENT_NS, _STALE_NS, _MISSED = 1_000_000_000, 250_000_000, 3
 _WINDOW_NS = 3_000_000_000
 _FEWEST = 3
 _KEPT = 1024
+_SAID_S = 60.0
+"""How long a restart is reported, as that of other workers."""
 
 Sensor = Literal["lidar", "camera", "gnss", "ego"]
 
@@ -23,14 +27,17 @@ Sensor = Literal["lidar", "camera", "gnss", "ego"]
 class StreamStats:
     """Counts one sensor's messages. Times are on the host's timeline. note: message of its reader (why a device cannot
     be opened, source of its times). hung: how often its driver or decoder hung and was restarted. refused: packets by
-    reason. remarks: functions that return additional messages, or an empty text."""
+    reason. remarks: functions that return additional messages, or an empty text. warnings: those about what is wrong at
+    present although the sensor delivers."""
 
     def __init__(self, sensor: Sensor) -> None:
         self.sensor: Sensor = sensor
         self.note = ""
         self.lost = self.hung = 0
+        self._hung_s = -math.inf
         self.refused: Counter[str] = Counter()
         self.remarks: tuple[Callable[[], str], ...] = ()
+        self.warnings: tuple[Callable[[], str], ...] = ()
         self._arrived: deque[int] = deque(maxlen=_KEPT)
         self._newest_ns: int | None = None
 
@@ -38,6 +45,17 @@ class StreamStats:
         """A message arrived now, measured at ``t_ns``."""
         self._arrived.append(now_ns)
         self._newest_ns = t_ns
+
+    def was_restarted(self, times: int) -> None:
+        """Its readers have been restarted this often after a hang."""
+        if times > self.hung:
+            self.hung, self._hung_s = times, time.monotonic()
+
+    def warning(self) -> str:
+        """A sentence for every page, that stays the same as long as nothing changes; empty if all is well."""
+        hung = "hung and was restarted" if time.monotonic() - self._hung_s < _SAID_S else ""
+        text = "; ".join(text for text in (hung, *(ask() for ask in self.warnings)) if text)
+        return f"{self.sensor}: {text}" if text else ""
 
     def since_ns(self, now_ns: int) -> int | None:
         """Time since the last message; None before the first."""

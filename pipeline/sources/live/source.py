@@ -121,6 +121,7 @@ class LiveSensors:
 
     def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
         """The newest tick not returned yet; None if none arrives in time."""
+        self._look()
         together = self._wait(timeout_s, params or SyncParams())
         return self._frame(together) if together is not None else None
 
@@ -129,18 +130,21 @@ class LiveSensors:
         return self._clock.now_ns()
 
     def health(self) -> tuple[StreamHealth, ...]:
-        """Current health of each configured sensor. A sensor whose driver or decoder hangs is restarted."""
-        for each in self.inputs.values():
-            for reader in each.readers:
-                reader.look(time.monotonic())
-                if reader.hung:
-                    each.stats.hung = reader.hung
+        """Current health of each configured sensor."""
+        self._look()
         now_ns = self._clock.now_ns()
         stats = [each.stats for each in self.inputs.values()]
         if self._ego_stats is not None:
             stats.append(self._ego_stats)
         with self._came:
             return tuple(each.health(now_ns, self._streams[each.sensor].implausible) for each in stats)
+
+    def _look(self) -> None:
+        """Restarts readers that hang."""
+        for each in self.inputs.values():
+            for reader in each.readers:
+                reader.look(time.monotonic())
+            each.stats.was_restarted(sum(reader.hung for reader in each.readers))
 
     def _wait(self, timeout_s: float, params: SyncParams) -> Together[Shot] | None:
         end_s = time.monotonic() + timeout_s
@@ -195,6 +199,7 @@ class LiveSensors:
         streams = self.health()
         missing = not_delivering(streams)
         notes += [missing] if missing else []
+        notes += [text for each in self.inputs.values() if (text := each.stats.warning())]
         return Frame(
             self._index,
             f"{self._index:06d}",

@@ -135,6 +135,7 @@
  * @property {number} bytes
  * @property {number} dropped
  * @property {string|null} error
+ * @property {string|null} dropped_because
  *
  * @typedef {object} DriveState
  * @property {number} revision

@@ -75,7 +75,11 @@ export function showGate(row, gate) {
   const limit = sign && gate.limit !== null ? ` ${sign} ${quantity(gate.limit, { ...kind, unit: "" })}` : "";
   text(
     number,
-    kind.test === "flag" && !kind.unit ? (gate.passed ? "yes" : "no") : `${quantity(gate.value, kind)}${limit}`,
+    kind.test === "flag" && (!kind.unit || gate.value === null)
+      ? gate.passed
+        ? "yes"
+        : "no"
+      : `${quantity(gate.value, kind)}${limit}`,
   );
   row.setAttribute("aria-label", `${kind.label}: ${number.textContent}, ${gate.passed ? "passed" : "failed"}`);
   const isMeasured = sign !== "" && gate.value !== null && gate.limit !== null;

@@ -11,11 +11,17 @@ import { ACC_WORDS, urgencyOf } from "../core/urgency.js";
 
 const source = el("span", { class: "pill" }),
   name = el("span"),
+  provisional = el("span", {
+    class: "tag",
+    textContent: "provisional",
+    title: "The whole drive is still being computed: CIPV, ACC and object IDs of this frame may change",
+    hidden: true,
+  }),
   reason = el("p", { class: "reason" });
 const lead = el(
   "div",
   { class: "card lead" },
-  el("div", { class: "title", aria: { live: "polite" } }, source, name),
+  el("div", { class: "title", aria: { live: "polite" } }, source, name, provisional),
   reason,
 );
 const distance = figure("distance", "Distance", "m"),
@@ -45,6 +51,7 @@ const acc = el(
 export function setUp() {
   $("#banner").append(lead, distance.card, closing.card, ttc.card, acc);
   on(["frame"], update);
+  on(["state"], () => (provisional.hidden = !get("state")?.provisional));
 }
 
 /** @param {string} key @param {string} label @param {string} unit */

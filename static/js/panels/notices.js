@@ -32,7 +32,8 @@ export function refused(error) {
 function update() {
   const link = get("link");
   document.documentElement.dataset.link = link?.status ?? "connecting";
-  text($("#link"), { live: "live", lost: "connection lost", connecting: "connecting" }[link?.status ?? "connecting"]);
+  const words = { live: "connected", lost: "connection lost", connecting: "connecting" };
+  text($("#link"), words[link?.status ?? "connecting"]);
   const busy = get("state")?.busy;
   $("#busy").hidden = !busy;
   document.documentElement.toggleAttribute("data-busy", Boolean(busy)); // other panes show outdated content

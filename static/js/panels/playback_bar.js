@@ -18,12 +18,6 @@ const next = button("Step forward", "Next frame (→)", () => playback({ step: 1
 const name = el("span", { class: "name", title: "Frame name in the recording" });
 const count = el("span", { class: "dim" });
 const time = el("span");
-const provisional = el("span", {
-  class: "tag",
-  textContent: "provisional",
-  title: "The whole drive is still being computed; object IDs may change",
-  hidden: true,
-});
 const live = el("span", { class: "tag live", textContent: "LIVE", title: NO_DRIVE, hidden: true });
 const speed = el(
   "select",
@@ -41,7 +35,7 @@ const loop = el("button", {
 export function setUp() {
   play.classList.add("play");
   speed.addEventListener("change", () => playback({ speed: Number(speed.value) }));
-  const where = el("span", { class: "where" }, live, name, count, time, provisional);
+  const where = el("span", { class: "where" }, live, name, count, time);
   $("#transport").append(back, play, next, where, el("span", { class: "spacer" }), recordButton(), speed, loop);
   on(["state", "frame"], update);
 }
@@ -79,7 +73,6 @@ function update() {
   text(name, at.frame ?? "");
   text(count, has && !state.live ? `${at.index + 1}/${state.count}` : "");
   text(time, state.live ? clock(at.time_s) : `${clock(at.time_s)} / ${clock(state.duration_s)}`);
-  provisional.hidden = !state.provisional;
   live.hidden = !state.live;
   if (document.activeElement !== speed) speed.value = String(state.speed);
   press(loop, state.loop);

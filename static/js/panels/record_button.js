@@ -26,6 +26,9 @@ function toggle() {
   request("api/recording", "POST", { on: !isOn() }).catch((error) => (problem = error.message));
 }
 
+/** @param {import("../core/types.js").RecordingState} recording */
+const why = ({ dropped, dropped_because }) => (dropped ? `. ${dropped} items were lost: ${dropped_because}` : "");
+
 /** @param {HTMLElement} button @param {HTMLElement} words */
 function show(button, words) {
   const recording = get("state")?.recording;
@@ -34,6 +37,6 @@ function show(button, words) {
   text(words, isOn() && recording ? `${clock(recording.seconds)}${lost}` : "Record");
   button.title =
     recording?.error ??
-    (problem || (recording ? `Recording into ${recording.file}; click to stop` : "Record a session"));
+    (problem || (recording ? `Recording into ${recording.file}; click to stop${why(recording)}` : "Record a session"));
   button.setAttribute("aria-label", isOn() ? "Stop recording" : "Record");
 }

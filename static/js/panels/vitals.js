@@ -8,9 +8,9 @@ import { get, on } from "../core/store.js";
 
 const ITEMS = [
   ["fps", "fps", "Frames drawn in the last second", ""],
-  ["age", "age", "Latency from result to screen, in milliseconds", ""],
-  ["line", "pipeline", "Pipeline time per frame without the detector, in milliseconds", "optional"],
-  ["net", "detector", "Detector time per frame in milliseconds; 0 if cached", "optional"],
+  ["age", "age", "Latency from result to screen", ""],
+  ["line", "pipeline", "Pipeline time per frame without the detector", "optional"],
+  ["net", "detector", "Detector time per frame; 0 if cached", "optional"],
   [
     "skipped",
     "skipped",
@@ -44,9 +44,9 @@ function afterPaint() {
   const frame = get("frame");
   if (!frame) return;
   painted.push(performance.now());
-  text(values.age, frame.isLate ? "–" : num(Math.max(0, serverNow() - frame.madeUnixMs), 0));
-  text(values.line, num(frame.result.timing_ms.total, 1));
-  text(values.net, num(frame.detectMs, 0));
+  text(values.age, frame.isLate ? "–" : `${num(Math.max(0, serverNow() - frame.madeUnixMs), 0)} ms`);
+  text(values.line, `${num(frame.result.timing_ms.total, 1)} ms`);
+  text(values.net, `${num(frame.detectMs, 0)} ms`);
   const { timing_ms: stages } = frame.result;
   $("#vitals").title = Object.entries(stages)
     .map(([stage, ms]) => `${stage} ${num(ms, 2)} ms`)

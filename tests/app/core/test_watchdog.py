@@ -54,6 +54,20 @@ def test_a_call_may_take_its_worst_time_and_the_patience_more(monkeypatch: pytes
     assert stuck.thread_id == threading.get_ident()
 
 
+def test_what_took_long_on_a_busy_machine_is_not_extended_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Six times more programs than processors, before and after; then twice as many, and none."""
+    load = [12.0]
+    monkeypatch.setattr("app.core.watchdog.os.getloadavg", lambda: (load[-1], 0.0, 0.0))
+    watchdog = Watchdog(patience_s=1.0, first_s=30.0)
+    with watchdog.watching("a worker", lambda stuck: None):
+        worked(watchdog, "the network", [1.5] * 20, monkeypatch)
+        assert watchdog.allowed_s("the network") == pytest.approx(1.5 + 6.0)
+        load.append(24.0)
+        assert watchdog.allowed_s("the network") == pytest.approx(3.0 + 12.0)
+        load.append(0.0)
+        assert watchdog.allowed_s("the network") == pytest.approx(1.5 + 1.0)
+
+
 def test_time_in_which_the_machine_did_not_let_it_run_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
     watchdog, waited_s = Watchdog(first_s=1.0), [5.0]
     monkeypatch.setattr("app.core.watchdog.waited_s", lambda native_id: waited_s[-1])

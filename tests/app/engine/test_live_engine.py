@@ -20,7 +20,7 @@ from pipeline.common.progress import Progress
 from pipeline.detection import Detectors
 from pipeline.params import Params, SyncParams, with_changes
 from pipeline.recording.session.source import SessionSource
-from pipeline.types import U8, CameraCalibration, Frame, GnssFix, RawLanes, StreamHealth
+from pipeline.types import U8, CameraCalibration, Frame, GnssFix, RawBoxes, RawLanes, StreamHealth
 from pipeline.types.camera_shot import Shot
 from pipeline.types.source import AnySource, SourceError, Tap
 from tests.app.engine.recording_helpers import CountingDetector, Recording
@@ -187,6 +187,27 @@ def test_how_sensors_do_is_told_while_none_ticks(start: Start) -> None:
     sensors.state = "ok"
     shown_after(engine, sensors, 0)
     engine.wait_for(lambda s: all(notice.text != said for notice in s.notices), WAIT_S)
+
+
+def test_nobody_waits_for_sensors_while_a_tick_takes_long_or_after_its_line_was_replaced(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The notice stood for good where the engine had hung, and came and went on a busy machine."""
+    clock_s = [0.0]
+    monkeypatch.setattr("app.engine.live_pipeline.monotonic", lambda: clock_s[0])
+
+    class Slow(CountingDetector):
+        def detect(self, bgr: U8) -> RawBoxes:
+            clock_s[0] += 5.0
+            return super().detect(bgr)
+
+    line = LivePipeline(Sensors(), Detectors(Slow()), "both")
+    line.run(Recording().frame(0), Params())
+    assert line.with_silence(()) == ()
+    clock_s[0] += 2.0
+    notices = line.with_silence(())
+    assert [each.text for each in notices] == ["Waiting for sensors: no data yet"]
+    assert line.successor(Detectors()).with_silence(notices) == ()
 
 
 def test_what_the_line_left_out_is_counted(start: Start) -> None:

@@ -31,7 +31,7 @@ from app.web.server import Server
 from pipeline.common.geometry import Cuboid
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
-from pipeline.recording.recorder import RecordingState
+from pipeline.recording.recording_state import RecordingState
 from pipeline.types import CameraImage
 from tests.app.engine.recording_helpers import CountingDetector, Recording
 

@@ -251,5 +251,5 @@ def test_https_with_a_token_on_this_machine(tmp_path: Path, monkeypatch: pytest.
     assert (entry["role"], entry["method"], entry["path"], entry["status"]) == ("person", "POST", "/api/playback", 202)
     assert json.loads(entry["body"]) == {"playing": False}
     assert (tmp_path / "audit.jsonl").stat().st_mode & 0o077 == 0
-    with pytest.raises(BadInput, match="cannot be used for TLS"):
+    with pytest.raises(BadInput, match="swapped"):
         serve(Engine(opener(Recording()), None, Params()), port=0, tls=(key, cert))

@@ -11,7 +11,8 @@ import pytest
 from pipeline.common.geometry import Cuboid
 from pipeline.decision import path_position
 from pipeline.decision.object_motion import describe
-from pipeline.decision.path_position import Place, place
+from pipeline.decision.path_position import place
+from pipeline.decision.place import Place
 from pipeline.params import CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
 from pipeline.path.estimates import arc, corner_m, samples
@@ -91,8 +92,41 @@ def test_a_wrong_distance_matters_where_the_path_turns_away_from_the_line_of_sig
 def test_a_path_known_less_says_less() -> None:
     sure = dataclasses.replace(STRAIGHT, profile_m=np.full(101, 0.05))
     vague = dataclasses.replace(STRAIGHT, profile_m=np.full(101, 3.0))
-    assert placed(fused(1, 30.0), sure)[0].log_odds(0.0, 0.0) == 4.0
-    assert 0.0 < placed(fused(1, 30.0), vague)[0].log_odds(0.0, 0.0) < 0.3
+    stands = fused(1, 30.0, velocity=(-EGO.speed_mps, 0.0))
+    assert placed(stands, sure)[0].log_odds(0.0, 0.0) == 4.0
+    assert 0.0 < placed(stands, vague)[0].log_odds(0.0, 0.0) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("y", "low", "high"),
+    [
+        pytest.param(0.0, 0.7, 0.8, id="in our lane, unless the road bends"),
+        pytest.param(3.5, 0.02, 0.1, id="in the next lane, unless the road bends"),
+    ],
+)
+def test_what_drives_ahead_shows_where_the_road_goes(y: float, low: float, high: float) -> None:
+    """Where the course of the road is guessed, most roads go on as they begin: a car that drives ahead is where it
+    seems to be. What stands may be parked where the road bends away from it, and oncoming traffic likewise."""
+    guessed = dataclasses.replace(STRAIGHT, profile_m=np.full(101, 3.0))
+    along, standing, oncoming = (
+        placed(fused(1, 30.0, y, velocity=(over_ground - EGO.speed_mps, 0.0)), guessed)[0]
+        for over_ground in (15.0, 0.0, -15.0)
+    )
+    assert low < along.probability() < high
+    assert standing.probability() == oncoming.probability()
+    assert 0.2 < standing.probability() < 0.4
+    assert abs(along.log_odds(0.0, 0.0)) > 3.0 * abs(standing.log_odds(0.0, 0.0))
+    assert along.sigma_m == pytest.approx(standing.sigma_m, rel=0.01)
+    alike, *_ = place(describe([fused(1, 30.0, y)], EGO, MotionParams()), guessed, EGO, CipvParams(road_goes_on=0.0))
+    assert alike is not None
+    assert alike[0].probability() == pytest.approx(standing.probability(), abs=0.01)
+
+
+def test_an_error_beyond_all_sigmas_is_as_sure_as_can_be() -> None:
+    """The density of such an error is zero in floating point."""
+    sure = dataclasses.replace(STRAIGHT, profile_m=np.full(101, 0.05))
+    assert placed(fused(1, 30.0, 25.0), sure)[0].log_odds(0.0, 0.0) == -4.0
+    assert placed(fused(1, 30.0, 25.0), sure)[0].probability() == 0.0
 
 
 @pytest.mark.parametrize(
@@ -256,4 +290,5 @@ def test_in_a_bend_a_flank_is_as_wide_as_a_rear() -> None:
 
 def test_what_the_lidar_ranges_is_where_its_points_are() -> None:
     item = fused(1, 20.0, 3.5)
-    assert placed(item)[0] == place([item], STRAIGHT, EGO, CipvParams(use_flank=False))[0][0]  # type: ignore[index]
+    (seen,) = describe([item], EGO, MotionParams())
+    assert placed(item)[0] == place([seen], STRAIGHT, EGO, CipvParams(use_flank=False))[0][0]  # type: ignore[index]

@@ -67,6 +67,13 @@ def test_the_farther_the_less_sure_until_it_says_nothing() -> None:
     assert contact(seen(box_of(110.0), 110.0)).contact_m is None
 
 
+def test_the_taller_the_vehicle_the_less_sure() -> None:
+    """The edge is off by a share of the box's height: for a lorry, three times as far down the road as for a car."""
+    low, tall = (contact(seen(box_of(20.0, height_m), 20.0)).contact_share for height_m in (1.2, 3.6))
+    assert 0.07 <= low < 0.12
+    assert 0.2 < tall < 0.25
+
+
 @pytest.mark.parametrize("slope", [-0.04, 0.04])
 def test_a_road_that_rises_or_falls_is_followed(slope: float) -> None:
     range_m = 30.0

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -21,12 +22,14 @@ from mcap.reader import NonSeekingReader
 from pipeline.common.errors import BadInput
 from pipeline.params import Params, with_changes
 from pipeline.recording import recorder as recorder_module
-from pipeline.recording.recorder import Recorder, RecordingState
+from pipeline.recording.recorder import Recorder
+from pipeline.recording.recording_state import RecordingState
 from pipeline.recording.rewrite import recover
 from pipeline.recording.segments import FileRotation, Segments
 from pipeline.recording.session.source import Mark, SessionSource
 from pipeline.recording.session.velodyne_scan import RawLidar
 from pipeline.types.camera_shot import Shot
+from tests.app.waiting import wait_until
 from tests.conftest import ROOT
 from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, image, same, sweep
 
@@ -68,7 +71,8 @@ def slow_disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     write = Segments.write
 
     def wait_and_write(self: Segments, *arguments: Any, **named: Any) -> None:
-        assert may_write.wait(20.0)
+        with self.disk.waiting():
+            assert may_write.wait(20.0)
         write(self, *arguments, **named)
 
     monkeypatch.setattr(Segments, "write", wait_and_write)
@@ -86,16 +90,73 @@ def test_a_slow_disk_holds_nobody_up_and_what_is_dropped_is_counted_and_noted(
         assert taken.count(False) >= 7
         assert recorder.state.dropped == taken.count(False)
         recorder.mark("marks are never dropped")
+        dropped = 0
+        while recorder.state.dropped_because != "the disk was too slow":  # it is told from the share of the time
+            dropped += not recorder.put(full(0))
         may_write.set()
         state = recorder.stop()
     assert state.frames == taken.count(True)
-    assert "too slow" in caplog.text
+    assert state.dropped == taken.count(False) + dropped
+    assert "frames were dropped" in caplog.text
     session = SessionSource("a", str(tmp_path / "a.mcap"))
     names = [session.frame(index).name for index in range(len(session))]
     assert names == [f"{index:06d}" for index, was_taken in enumerate(taken) if was_taken]
     notes = b"".join(stored.data for stored in session.file.messages(("/notes",)))
-    assert f"{state.dropped} frames were dropped here".encode() in notes
+    assert f"{state.dropped} frames were dropped here: the disk was too slow".encode() in notes
     assert len(session.marks()) == 1
+
+
+def test_what_there_is_no_time_left_to_write_is_dropped_and_noted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As when a system ends the program while its queue is full; a mark that waits is written."""
+    may_go_on, write = threading.Event(), Segments.write
+
+    def wait_and_write(self: Segments, *arguments: Any, **named: Any) -> None:
+        assert may_go_on.wait(20.0)
+        write(self, *arguments, **named)
+
+    monkeypatch.setattr(Segments, "write", wait_and_write)
+    recorder = Recorder(tmp_path / "a.mcap", ABOUT)
+    recorder.put(full(0))
+    assert wait_until(lambda: not recorder._waiting["frames"]), "it is being written"
+    for index in range(1, 6):
+        recorder.put(full(index))
+    recorder.mark("a mark")
+    stopping = threading.Thread(target=recorder.stop, args=(0.0,))
+    stopping.start()
+    assert wait_until(lambda: recorder._ends_by_s <= time.monotonic())
+    may_go_on.set()
+    stopping.join(20.0)
+    state = recorder.state
+    assert (state.frames, state.dropped, state.error) == (1, 5, None)
+    session = SessionSource("a", str(tmp_path / "a.mcap"))
+    notes = [stored.data for stored in session.file.messages(("/notes",))]
+    assert sum(b"5 frames were dropped here: there was no time left to write them" in each for each in notes) == 1
+    assert len(session.marks()) == 1
+
+
+def test_a_busy_machine_is_not_taken_for_a_slow_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What takes the time is what comes before a write: encoding and compressing."""
+    may_go_on, write_image = threading.Event(), Segments.write_image
+
+    def wait_and_write(self: Segments, *arguments: Any) -> None:
+        assert may_go_on.wait(20.0)
+        write_image(self, *arguments)
+
+    monkeypatch.setattr(Segments, "write_image", wait_and_write)
+    monkeypatch.setattr(recorder_module, "_QUEUED_BYTES", 10_000_000)
+    recorder = Recorder(tmp_path / "a.mcap", ABOUT)
+    recorder.put(full(0))
+    shot = Shot(pixels=np.zeros((72, 128, 3), np.uint8))
+    while recorder.state.dropped < 3:
+        recorder.image(shot, 0, 0)
+    may_go_on.set()
+    state = recorder.stop()
+    assert state.dropped_because == "the machine was too busy"
+    session = SessionSource("a", str(tmp_path / "a.mcap"))
+    notes = b"".join(stored.data for stored in session.file.messages(("/notes",)))
+    assert b"images were dropped here: the machine was too busy" in notes
 
 
 def test_what_comes_between_frames_is_recorded_when_it_came(tmp_path: Path) -> None:

@@ -50,9 +50,11 @@ class RecordingJson(Exact):
     bytes: int
     """Written so far."""
     dropped: int
-    """Frames that the disk was too slow for; show it whenever it is not 0."""
+    """Frames and messages that the disk or the machine was too slow for; show it whenever it is not 0."""
     error: str | None
     """Why the recording ended by itself (a full disk); what came before is kept. Null while all is well."""
+    dropped_because: str | None
+    """What was too slow when data was last dropped, the disk or the machine. Null if nothing was dropped."""
 
 
 class LabelTaskJson(Exact):

@@ -21,7 +21,8 @@ class CameraInput:
         self._clock, self._deliver = clock, deliver
         self._offset_ns = round(config.time_offset_ms * 1e6)
         self._own = FollowedClock()
-        self.readers: tuple[Reader, ...] = (Reader("camera", self._read(config), self._say),)
+        worst_s = video_stream.WORST_DEVICE_S if config.device is not None else video_stream.WORST_OPEN_S
+        self.readers: tuple[Reader, ...] = (Reader("camera", self._read(config), self._say, worst_s),)
 
     def clock_offset_ms(self) -> float | None:
         return self._own.offset_ms

@@ -20,6 +20,8 @@ from pipeline.sources.live.health import StreamStats
 from pipeline.types import EgoState
 from pipeline.types.source import SourceError
 
+_WORST_S = 2.5
+"""Opening a serial adapter takes python-can 2 s, and reading polls twice."""
 _YAW_RATE_KEPT_NS = 500_000_000
 _LIMITS = (
     (re.compile(r"^\s*BO_\s+\d+\s+\w+\s*:\s*(\d+)", re.MULTILINE), 64),
@@ -41,7 +43,7 @@ class CanInput:
         self._offset_ns = round(time_offset_ms * 1e6)
         self._messages = _messages(config)
         self._yaw_rate: tuple[int, float] | None = None
-        self.readers: tuple[Reader, ...] = (Reader("can", self._read, self._say),)
+        self.readers: tuple[Reader, ...] = (Reader("can", self._read, self._say, _WORST_S),)
 
     def clock_offset_ms(self) -> float | None:
         return None

@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from typing import Protocol
 
 logger = logging.getLogger("cipv.live")
 
@@ -14,12 +15,23 @@ RETRY_S = 0.2
 POLL_S = 0.2
 """Longest wait inside a read before it checks whether it should stop."""
 CONNECT_S = 0.5
+NAME_S = 2.0
+"""Longest time to look up a host's name on a network that works; sensors usually have numeric addresses."""
 SILENCE_S = 1.5
 """A connection without data for this long is reopened: the other end may have been unplugged."""
 _PATIENCE_S = 2.0
-HANGS_S = 11.0
-"""If a reader has not checked for this long whether it should stop, it hangs in a driver or a decoder: the longest wait
-in normal operation is OpenCV's for a camera, 10 s, plus a second."""
+HANGS_S = 1.0
+"""A reader hangs in a driver or a decoder if this long after its usual longest wait it has still not checked whether it
+should stop."""
+_LOOK_COUNTS_S = 0.6
+"""What one look can add to the time without a check, just more than the interval of looks: while the program itself
+stood still, or waited for a processor, no reader is blamed."""
+
+
+class Closable(Protocol):
+    """Something that can be closed, from any thread."""
+
+    def close(self) -> object: ...
 
 
 class DeviceLost(Exception):
@@ -27,11 +39,13 @@ class DeviceLost(Exception):
 
 
 class ReaderStop:
-    """Polled by the reader; set to stop it. asked_s: time of the last poll."""
+    """Polled by the reader; set to stop it. asked_s: time of the last poll. device: what the reader holds that another
+    one needs, such as a socket bound to a port; it is closed if the reader hangs."""
 
     def __init__(self) -> None:
         self._event = threading.Event()
         self.asked_s = time.monotonic()
+        self.device: Closable | None = None
 
     def __bool__(self) -> bool:
         self.asked_s = time.monotonic()
@@ -50,29 +64,37 @@ ReadDevice = Callable[[ReaderStop], None]
 
 
 class Reader:
-    """Runs ``read`` in a thread, repeatedly. ``say`` receives the reason of a failure, and an empty text on success."""
+    """Runs ``read`` in a thread, repeatedly. ``say`` receives the reason of a failure, and an empty text on success.
+    worst_s: the longest that ``read`` usually takes from one check of whether it should stop to the next."""
 
-    def __init__(self, name: str, read: ReadDevice, say: Callable[[str], None]) -> None:
-        self._read, self._say = read, say
+    def __init__(self, name: str, read: ReadDevice, say: Callable[[str], None], worst_s: float) -> None:
+        self._read, self._say, self._hangs_s = read, say, worst_s + HANGS_S
         self._stop = ReaderStop()
         self._logged = ""
         self._name = f"cipv-{name}"
         self.hung = 0
         """Number of restarts after a hang."""
+        self._looked_s = self._asked_s = self._silent_s = 0.0
         self._thread = self._fresh()
 
     def start(self) -> None:
-        self._stop.asked_s = time.monotonic()
+        self._stop.asked_s = self._looked_s = time.monotonic()
         self._thread.start()
 
     def look(self, now_s: float) -> None:
-        """Restart the reader if it hangs. The hung thread cannot be terminated; if it ever continues, it ends without
-        reporting anything."""
-        hangs_s = now_s - self._stop.asked_s
-        if not self._thread.is_alive() or hangs_s <= HANGS_S or self._stop:
+        """Restart the reader if it hangs; called twice a second. The hung thread cannot be terminated; if it ever
+        continues, it ends without reporting anything."""
+        asked_s = self._stop.asked_s
+        passed_s, self._looked_s = now_s - max(self._looked_s, asked_s), now_s
+        self._silent_s = max(0.0, min(passed_s, _LOOK_COUNTS_S)) + (self._silent_s if asked_s == self._asked_s else 0.0)
+        self._asked_s = asked_s
+        if not self._thread.is_alive() or self._silent_s <= self._hangs_s or self._stop:
             return
-        logger.error("%s has not responded for %.0f s; restarting it", self._name, hangs_s)
+        logger.error("%s has not responded for %.1f s; restarting it", self._name, now_s - asked_s)
         self._stop.set()
+        device = self._stop.device
+        if device is not None:
+            device.close()
         self.hung, self._stop = self.hung + 1, ReaderStop()
         self._thread = self._fresh()
         self._thread.start()

@@ -13,7 +13,16 @@ import serial
 from pipeline.formats.nmea import BadSentence, NmeaReader, parse_sentence
 from pipeline.sources.live.clock import FollowedClock, HostClock
 from pipeline.sources.live.config import GnssConfig
-from pipeline.sources.live.devices.device_reader import CONNECT_S, POLL_S, DeviceLost, ReadDevice, Reader, ReaderStop
+from pipeline.sources.live.devices.device_reader import (
+    CONNECT_S,
+    NAME_S,
+    POLL_S,
+    DeviceLost,
+    ReadDevice,
+    Reader,
+    ReaderStop,
+)
+from pipeline.sources.live.devices.rate_limit import RateLimit
 from pipeline.sources.live.devices.sender_pin import SenderPin
 from pipeline.sources.live.devices.sensor_input import Deliver
 from pipeline.sources.live.devices.udp import read_datagrams
@@ -24,6 +33,9 @@ _SILENT_POLLS = 10
 """Polls of a TCP connection without data, two seconds, before it is reopened; receivers send once a second."""
 _LONGEST = 4096
 _MOST_LINES = 8
+_MOST_BYTES_S = 100_000
+"""More than a serial line at 921,600 baud carries; a receiver that sends ten sentences 20 times a second sends a sixth
+of it."""
 _SILENT_S = 3.0
 """Three periods of a receiver that sends once a second, as in the stream's health."""
 
@@ -48,11 +60,13 @@ class GnssInput:
         self._sentences = NmeaReader()
         self._has_fix: bool | None = None
         self._rest = b""
+        self._limit = RateLimit(_MOST_BYTES_S)
         self._pin = SenderPin(
             "receiver", config.sender, _is_nmea, self.stats.refused, by_port=False, silent_s=_SILENT_S
         )
         self.stats.remarks = (self._pin.said, self._about_clock)
-        self.readers: tuple[Reader, ...] = (Reader("gnss", self._read(config), self._say),)
+        self.stats.warnings = (self._pin.others,)
+        self.readers: tuple[Reader, ...] = (Reader("gnss", self._read(config), self._say, _worst_s(config)),)
 
     def clock_offset_ms(self) -> float | None:
         return self._own.offset_ms
@@ -69,13 +83,21 @@ class GnssInput:
 
     def receive(self, data: bytes, wall_ns: int) -> None:
         """Take a datagram of complete sentences, received at ``wall_ns`` of the system's clock."""
+        self._check_rate(data)
         self._lines(data.splitlines(), self._clock.of_wall_ns(wall_ns))
 
     def _bytes(self, data: bytes) -> None:
         """Part of a stream: complete lines are processed, the rest is buffered; if it grows too long, it is garbage."""
+        self._check_rate(data)
         *lines, rest = (self._rest + data).split(b"\n")
         self._rest = rest if len(rest) < _LONGEST else b""
         self._lines(lines, self._clock.now_ns())
+
+    def _check_rate(self, data: bytes) -> None:
+        """DeviceLost if no receiver sends that much."""
+        if not self._limit.allows(len(data)):
+            self._rest = b""
+            raise DeviceLost(f"sends more than {_MOST_BYTES_S // 1000} kB a second: not a GNSS receiver")
 
     def _lines(self, lines: list[bytes], arrived_ns: int) -> None:
         before = self._sentences.no_fix
@@ -109,6 +131,11 @@ class GnssInput:
 
     def _say(self, text: str) -> None:
         self.stats.note = text
+
+
+def _worst_s(config: GnssConfig) -> float:
+    """How long its reader may go without a check: a poll, or until a connection is there."""
+    return NAME_S + CONNECT_S if config.tcp is not None else POLL_S
 
 
 def _is_nmea(data: bytes) -> bool:

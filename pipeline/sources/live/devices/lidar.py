@@ -8,7 +8,7 @@ from functools import partial
 from pipeline.formats.velodyne import OUT_OF_ORDER, BadPacket, VelodyneDecoder, read_packet, read_position
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import LidarConfig
-from pipeline.sources.live.devices.device_reader import ReadDevice, Reader
+from pipeline.sources.live.devices.device_reader import POLL_S, ReadDevice, Reader
 from pipeline.sources.live.devices.sender_pin import BesidePin, SenderPin
 from pipeline.sources.live.devices.sensor_input import Deliver, whole_hours_off
 from pipeline.sources.live.devices.udp import read_datagrams
@@ -40,7 +40,8 @@ class LidarInput:
         self.stats.refused = self._decoder.counts.refused  # counts of the decoder; those of the position port are added
         self._pin = SenderPin("LiDAR", config.sender, _is_data, self.stats.refused, by_port=True, silent_s=_SILENT_S)
         self._looked, self._misfits, self._mixed = 0, 0, False
-        self.stats.remarks = (self._pin.said, self._about_clock)
+        self.stats.remarks = (self._pin.said, self._about_mixture, self._about_clock)
+        self.stats.warnings = (self._pin.others, self._about_mixture)
         listen = partial(read_datagrams, interface=config.interface, group=config.multicast_group)
         listeners = [("lidar", partial(listen, config.data_port, receive=self.receive, pin=self._pin))]
         if config.position_port is not None:
@@ -48,7 +49,7 @@ class LidarInput:
             positions = partial(listen, config.position_port, receive=self.receive_position, pin=beside)
             listeners.append(("lidar-position", positions))
         self.readers: tuple[Reader, ...] = tuple(
-            Reader(name, _until_stopped(read), self._say) for name, read in listeners
+            Reader(name, _until_stopped(read), self._say, POLL_S) for name, read in listeners
         )
 
     def clock_offset_ms(self) -> float | None:
@@ -93,10 +94,13 @@ class LidarInput:
             return
         self.pps, self.follows_gps = position.pps, position.locked
 
+    def _about_mixture(self) -> str:
+        return "many packets do not match the others: does a second LiDAR have the same address?" if self._mixed else ""
+
     def _about_clock(self) -> str:
         """Problems with the timestamps of its packets."""
         if self._mixed:
-            return "many packets do not match the others: does a second LiDAR have the same address?"
+            return ""
         jumps, last_s = self._decoder.counts.jumps, self._decoder.counts.jump_s
         often = "once" if jumps == 1 else f"{jumps} times, last"
         return f"its clock jumped {often} by {last_s:+.3f} s" if jumps else ""

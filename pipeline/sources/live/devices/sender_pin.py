@@ -77,7 +77,13 @@ class SenderPin:
     def said(self) -> str:
         """A message about other senders on the port, and about a change of the sender; empty if there is nothing to
         report."""
-        now_s, sender = self._now_s(), self.sender
+        sender = self.sender
+        changed = f"now comes from {sender[0]}, previously from {self._before}" if self._before and sender else ""
+        return "; ".join(text for text in (self.others(), changed) if text)
+
+    def others(self) -> str:
+        """A message about who else sends to the port at present; empty if nobody does."""
+        now_s = self._now_s()
         lately = {host: valid for host, (at_s, valid) in tuple(self._others.items()) if now_s - at_s <= _NAMED_S}
         second = [host for host, valid in lately.items() if valid]
         noise = [host for host, valid in lately.items() if not valid]
@@ -86,7 +92,6 @@ class SenderPin:
             for text in (
                 f"a second {self._what} on this port is ignored: {_named(second)}" if second else "",
                 f"datagrams of {_named(noise)} are ignored" if noise else "",
-                f"now comes from {sender[0]}, previously from {self._before}" if self._before and sender else "",
             )
             if text
         )

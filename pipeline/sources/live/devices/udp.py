@@ -17,6 +17,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from pipeline.sources.live.devices.device_reader import POLL_S, DeviceLost, ReaderStop
+from pipeline.sources.live.devices.rate_limit import RateLimit
 from pipeline.sources.live.devices.sender_pin import SocketAddress
 
 _SO_TIMESTAMPNS = 35
@@ -27,6 +28,9 @@ _TIMESPEC = struct.Struct("qq")
 _BUFFER_BYTES = 4 << 20
 """Buffer size: about four seconds of a VLP-16."""
 _LARGEST = 65_535
+_MOST_HZ, _PAUSE_S = 8_000, 0.02
+"""Datagrams read in a second: five VLP-16 and the accepted part of a flood. Of a faster sender, who gives the sensor's
+own address or comes before it, the system drops the rest while reading pauses."""
 _ONE_OF = 32
 """Of other senders' datagrams, one in this many is accepted for inspection; a power of two. A second LiDAR sends 754 a
 second and is noticed at once; a flood of 100,000 a second costs as much as four LiDARs."""
@@ -51,11 +55,16 @@ def read_datagrams(
 ) -> None:
     """Listen until ``stop``. DeviceLost names the port if it cannot be opened."""
     let_in: SocketAddress | None = None
+    limit = RateLimit(_MOST_HZ)
     with _listening(port, interface, group) as bound:
+        stop.device = bound  # a reader that hangs must not keep the port
         while not stop:
             if pin.sender != let_in:
                 let_in = pin.sender
                 _let_in(bound, let_in)
+            if not limit.allows(1):
+                stop.wait(_PAUSE_S)
+                continue
             try:
                 data, ancillary, _, sender = bound.recvmsg(_LARGEST, socket.CMSG_SPACE(_TIMESPEC.size))
             except TimeoutError:

@@ -14,10 +14,14 @@ import cv2
 import numpy as np
 
 from pipeline.formats.video_file import open_video, within_budget
-from pipeline.sources.live.devices.device_reader import SILENCE_S, DeviceLost, ReaderStop
+from pipeline.sources.live.devices.device_reader import NAME_S, SILENCE_S, DeviceLost, ReaderStop
 from pipeline.types.camera_shot import Shot
 
 _OPEN_S = 2.0
+WORST_DEVICE_S = 10.0
+"""How long OpenCV waits for an image of a local camera."""
+WORST_OPEN_S = NAME_S + 2 * _OPEN_S + SILENCE_S
+"""How long it takes to give up on an address: FFmpeg's limit holds for opening and for finding its streams, each."""
 _RTSP = {"rtsp_transport": "tcp", "fflags": "nobuffer", "flags": "low_delay"}
 _SLOWEST_HZ, _FASTEST_HZ, _USUAL_HZ = 1.0, 240.0, 30.0
 
@@ -30,10 +34,10 @@ def read_stream(url: str, receive: ReceiveShot, stop: ReaderStop) -> None:
     try:
         with av.open(url, timeout=(_OPEN_S, SILENCE_S), options=options) as container:
             within_budget(container)
-            for shot, _ in _shots(container):
+            for shot, _ in _shots(container, stop):
                 receive(shot)
-                if stop:
-                    return
+            if stop:
+                return
     except (av.FFmpegError, OSError, ValueError) as error:
         raise DeviceLost(f"{url}: {_reason(error)}") from None
     raise DeviceLost(f"{url}: the camera closed the connection")
@@ -45,7 +49,7 @@ def play_file(path: Path, receive: ReceiveShot, stop: ReaderStop) -> None:
         begun, shown = time.monotonic(), 0
         try:
             with open_video(path) as container:
-                for shot, at_s in _shots(container):
+                for shot, at_s in _shots(container, stop):
                     stop.wait(max(0.0, begun + at_s - time.monotonic()))
                     if stop:
                         return
@@ -86,8 +90,9 @@ def device_number(device: int | str) -> int:
     return int(found[1])
 
 
-def _shots(container: av.container.InputContainer) -> Iterator[tuple[Shot, float]]:
-    """Each image with its time in the video, seconds. JPEGs are passed on unchanged."""
+def _shots(container: av.container.InputContainer, stop: ReaderStop) -> Iterator[tuple[Shot, float]]:
+    """Each image with its time in the video, seconds, until ``stop``, which is checked between packets: a damaged video
+    may have no images. JPEGs are passed on unchanged."""
     if not container.streams.video:
         raise ValueError("no video stream")
     stream = container.streams.video[0]
@@ -95,6 +100,8 @@ def _shots(container: av.container.InputContainer) -> Iterator[tuple[Shot, float
     rate = rate if _SLOWEST_HZ <= rate <= _FASTEST_HZ else _USUAL_HZ
     keeps_jpeg = stream.codec_context.name == "mjpeg"
     for count, packet in enumerate(container.demux(stream)):
+        if stop:
+            return
         if keeps_jpeg and packet.size:
             yield Shot(encoded=bytes(packet)), _time_s(packet, count / rate)
         elif not keeps_jpeg:
@@ -109,4 +116,6 @@ def _time_s(packet: av.Packet, otherwise: float) -> float:
 
 
 def _reason(error: Exception) -> str:
+    if isinstance(error, av.error.ExitError):  # FFmpeg's word for a time limit
+        return "no response"
     return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import stat
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
 from app.core.client_role import ACCOUNT_ROLES, Account
 from app.web.guards.accounts import Accounts, add_account, read_accounts, remove_account
@@ -71,6 +74,30 @@ def people(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, httpx
         yield clients
         for client in clients.values():
             client.close()
+
+
+def test_an_open_stream_ends_when_its_account_is_removed_or_changed(tmp_path: Path) -> None:
+    """It was checked only when it was opened, and lives for days. The others stay."""
+    file = tmp_path / "accounts.json"
+    tokens = Tokens("person-0123456789abcdef", "display-0123456789abcde", accounts=Accounts(file))
+    ada, bob = add_account("Ada", "labeler", file), add_account("Bob", "labeler", file)
+    with running() as engine, serving(create_app(engine, tokens=tokens)) as address, ExitStack() as opened:
+        url = f"{address.replace('http', 'ws')}/api/stream"
+        streams = {
+            name: opened.enter_context(connect(url, additional_headers={"authorization": f"Bearer {token}"}))
+            for name, token in {"Ada": ada, "Bob": bob, "person": tokens.person, "display": tokens.display}.items()
+        }
+        remove_account("Ada", file)
+        add_account("Bob", "admin", file)
+        for gone in ("Ada", "Bob"):
+            with suppress(ConnectionClosed):
+                while True:
+                    streams[gone].recv(WAIT_S)
+            assert streams[gone].close_code == 1008
+        for name in ("person", "display"):
+            streams[name].send('{"ping": 7}')
+            while '"pong"' not in str(streams[name].recv(WAIT_S)):
+                pass
 
 
 def drive(client: httpx.Client) -> str:

@@ -16,7 +16,8 @@ from fastapi import FastAPI
 from fastapi.responses import Response
 
 from app.web.guards import connections
-from app.web.server import TlsFiles, create_app
+from app.web.server import create_app
+from app.web.tls_files import TlsFiles
 from tests.app.web.serving import WAIT_S, certificate, running, serving
 
 

@@ -6,7 +6,7 @@ import hmac
 
 import pytest
 
-from app.web.guards.tokens import Guesses, Tokens
+from app.web.guards.tokens import Guesses, Tokens, network_of
 from pipeline.common.errors import BadInput
 
 PERSON, DISPLAY = "person-0123456789abcdef", "display-0123456789abcde"
@@ -83,3 +83,26 @@ def test_a_guesser_is_told_and_a_page_with_an_old_cookie_is_none():
     assert not guesses.wrong("b", "guess 0")
     now_s = 61.0
     assert not guesses.wrong("a", "guess 99")
+
+
+@pytest.mark.parametrize(
+    ("address", "network"),
+    [
+        ("192.0.2.7", "192.0.2.7"),
+        ("::ffff:192.0.2.7", "192.0.2.7"),
+        ("2001:db8:1:2:aaaa::1", "2001:db8:1:2::/64"),
+        ("2001:db8:1:2:bbbb::9", "2001:db8:1:2::/64"),
+        ("2001:db8:1:3::1", "2001:db8:1:3::/64"),
+        ("", ""),
+        ("testclient", "testclient"),
+    ],
+)
+def test_the_network_by_which_guesses_are_counted(address: str, network: str) -> None:
+    assert network_of(address) == network
+
+
+def test_a_guesser_who_changes_its_address_within_a_network_is_slowed_down() -> None:
+    guesses = Guesses(allowed=10, clock=lambda: 0.0)
+    slowed = [guesses.wrong(f"2001:db8:1:2::{number:x}", f"guess {number}") for number in range(20)]
+    assert slowed == [False] * 10 + [True] * 10
+    assert not guesses.wrong("2001:db8:1:3::1", "guess 0"), "others are not"

@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
+from pipeline.sources.live.devices import mjpeg
 from pipeline.sources.live.devices.device_reader import DeviceLost, ReaderStop
 from pipeline.sources.live.devices.mjpeg import NotMjpeg, read_mjpeg
 from tests.pipeline.sources.live.bench import small_jpeg
@@ -17,8 +18,8 @@ MULTIPART = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace;boundar
 
 
 @contextmanager
-def answering(answer: bytes) -> Iterator[str]:
-    """A server that sends ``answer`` to every client, and closes."""
+def answering(answer: bytes | Callable[[socket.socket], None]) -> Iterator[str]:
+    """A server that sends ``answer`` to its client, or does that with it, and closes."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
 
         def serve() -> None:
@@ -26,7 +27,10 @@ def answering(answer: bytes) -> Iterator[str]:
             with client, suppress(ConnectionError):  # whoever asked may have heard enough
                 client.settimeout(60.0)
                 client.recv(65536)
-                client.sendall(answer)
+                if isinstance(answer, bytes):
+                    client.sendall(answer)
+                else:
+                    answer(client)
 
         thread = threading.Thread(target=serve)
         thread.start()
@@ -34,23 +38,11 @@ def answering(answer: bytes) -> Iterator[str]:
         thread.join(60.0)
 
 
-class StopAtLook(ReaderStop):
-    """An event that is set when it is read for the n-th time."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__()
-        self._looks_left = number
-
-    def __bool__(self) -> bool:
-        self._looks_left -= 1
-        return self._looks_left <= 0
-
-
-def received(answer: bytes, stop: ReaderStop | None = None) -> tuple[list[tuple[bytes, int | None]], Exception | None]:
+def received(answer: bytes) -> tuple[list[tuple[bytes, int | None]], Exception | None]:
     found: list[tuple[bytes, int | None]] = []
     with answering(answer) as url:
         try:
-            read_mjpeg(url, lambda data, stamp: found.append((data, stamp)), ReaderStop() if stop is None else stop)
+            read_mjpeg(url, lambda data, stamp: found.append((data, stamp)), ReaderStop())
         except (DeviceLost, NotMjpeg) as error:
             return found, error
     return found, None
@@ -96,9 +88,70 @@ def test_what_is_no_camera_is_said(case: str, answer: bytes, complaint: str) -> 
     assert complaint in str(error)
 
 
-@pytest.mark.parametrize("look", [2, 3, 6], ids=["before the headers", "among the headers", "in the image"])
-def test_it_ends_when_asked_in_the_middle_of_a_part(look: int) -> None:
-    assert received(MULTIPART + part(small_jpeg()), StopAtLook(look)) == ([], None)
+@pytest.mark.parametrize("sent", [0, 20, 300], ids=["before the headers", "among the headers", "in the image"])
+def test_it_ends_when_asked_in_the_middle_of_a_part(sent: int) -> None:
+    """The rest of the part does not come before it is asked to end."""
+    stop, ended = ReaderStop(), threading.Event()
+    cut = len(MULTIPART) + sent
+    answer = MULTIPART + part(small_jpeg(), "Content-Length: 100000")
+
+    def in_two(client: socket.socket) -> None:
+        client.sendall(answer[:cut])
+        stop.set()
+        client.sendall(answer[cut:])
+        ended.wait(60.0)
+
+    with answering(in_two) as url:
+        try:
+            read_mjpeg(url, lambda data, stamp: pytest.fail("no whole image came"), stop)
+        finally:
+            ended.set()
+
+
+@pytest.mark.parametrize(
+    ("case", "begins", "drop"),
+    [
+        ("an image with a length", part(b"", "Content-Length: 30000000"), b"x"),
+        ("an image without one", part(b""), b"x"),
+        ("headers", b"--x\r\n", b"A: b\r\n"),
+        ("a line", b"--x\r\n", b"x"),
+    ],
+)
+def test_a_part_that_never_ends_is_given_up(
+    case: str, begins: bytes, drop: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A byte now and then is no silence. By a clock that the drops move."""
+    clock_s, ended = [0.0], threading.Event()
+    monkeypatch.setattr(mjpeg.time, "monotonic", lambda: clock_s[0])
+
+    def drip(client: socket.socket) -> None:
+        client.sendall(MULTIPART + part(small_jpeg()) + begins)
+        while not ended.wait(0.01):
+            clock_s[0] += 0.5
+            client.sendall(drop)
+
+    with answering(drip) as url:
+        try:
+            with pytest.raises(DeviceLost, match="an image takes longer than 3 s"):
+                read_mjpeg(url, lambda data, stamp: None, ReaderStop())
+        finally:
+            ended.set()
+
+
+def test_a_reader_that_waits_for_its_camera_ends_when_what_it_holds_is_closed() -> None:
+    stop, ended = ReaderStop(), threading.Event()
+
+    def close(client: socket.socket) -> None:
+        assert stop.device is not None
+        stop.device.close()
+        ended.wait(60.0)
+
+    with answering(close) as url:
+        try:
+            with pytest.raises(DeviceLost, match="unexpected response"):
+                read_mjpeg(url, lambda data, stamp: None, stop)
+        finally:
+            ended.set()
 
 
 def test_an_address_that_gives_something_else_is_left_to_the_video_reader() -> None:

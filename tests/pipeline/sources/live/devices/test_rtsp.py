@@ -20,7 +20,9 @@ import pytest
 from pipeline.sources.live.devices.device_reader import DeviceLost, ReaderStop
 from pipeline.sources.live.devices.video_stream import read_stream
 from pipeline.sources.live.source import LiveSensors
-from tests.pipeline.sources.live.rig import frames_until, free_port, loopback_config
+from tests.app.waiting import wait_until
+from tests.pipeline.sources.live.h264_camera import BAR_PX, HEIGHT, WIDTH, Behaviour, h264_camera
+from tests.pipeline.sources.live.rig import frames_until, free_port, loopback_config, opened
 
 CAMERA = Path(__file__).parents[1] / "rtsp_camera.py"
 PYTHON = shutil.which("python3", path=os.defpath)
@@ -63,6 +65,32 @@ def test_a_camera_that_speaks_rtsp(codec: str) -> None:
                 assert (health.sensor, health.note != "") == ("camera", True), "its images have no times of their own"
     finally:
         source.close()
+
+
+@pytest.mark.parametrize("fault", ["stalls", "noise", "damaged", "without end", "closes", "another size"])
+def test_a_camera_that_fails_in_any_way_is_back_when_it_is_well_again(
+    fault: Behaviour, sensors: list[LiveSensors]
+) -> None:
+    """Whatever it sends meanwhile: the reader neither hangs nor holds on to it, and its size may change."""
+    port = free_port(socket.SOCK_STREAM)
+    config = loopback_config(lidar=None, gnss=None, ego=None, camera={"url": f"rtsp://127.0.0.1:{port}/front"})
+    with h264_camera(port) as camera:
+        source = opened(config, sensors)
+        frame = frames_until(source, lambda frame: frame.image is not None)
+        assert frame.image is not None
+        assert frame.image.bgr.shape == (HEIGHT, WIDTH, 3)
+        assert np.median(frame.image.bgr[:, : BAR_PX - 10]) > 220
+        camera.does = fault
+        if fault == "another size":
+            frames_until(source, lambda frame: frame.image is not None and frame.image.bgr.shape[0] == HEIGHT // 2)
+        else:
+            assert wait_until(lambda: source.next(0.05) is None and source.health()[0].state == "silent")
+            assert wait_until(lambda: source.next(0.05) is None and camera.clients > 1), "it is opened anew"
+        camera.does = "well"
+        frames_until(source, lambda frame: frame.image is not None and frame.image.bgr.shape[0] == HEIGHT)
+        (health,) = source.health()
+        assert "hung" not in health.note
+        assert "Errno" not in health.note
 
 
 _OK = b"RTSP/1.0 200 OK\r\nCSeq: 1\r\n"

@@ -1,0 +1,34 @@
+"""How long a thread has waited for the disk, to tell a slow disk from a machine without a processor to spare."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+class DiskTime:
+    """Counts the time that one thread spends in writes and syncs; any thread may ask."""
+
+    def __init__(self) -> None:
+        self._ended_s = 0.0
+        self._since_s: float | None = None
+
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """The thread waits for the disk during the block."""
+        begun_s = self._since_s = time.monotonic()
+        try:
+            yield
+        finally:
+            self._since_s = None
+            self._ended_s += time.monotonic() - begun_s
+
+    @property
+    def is_waiting(self) -> bool:
+        return self._since_s is not None
+
+    def total_s(self) -> float:
+        """So far, with the wait under way, however long that lasts already."""
+        since_s = self._since_s
+        return self._ended_s + (time.monotonic() - since_s if since_s is not None else 0.0)
