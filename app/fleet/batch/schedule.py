@@ -38,6 +38,8 @@ _SETTINGS = {
     # the same number of threads as in `cipv run`: another order of summation would give other bytes
     "distributed.nanny.pre-spawn-environ": {"MALLOC_TRIM_THRESHOLD_": 65536},
     "distributed.scheduler.worker-saturation": 1.0,
+    # Dask samples the stacks of its workers and keeps an hour of them: 0.2 MB a second, 0.7 GB
+    "distributed.worker.profile.enabled": False,
     "distributed.comm.timeouts.connect": "60s",
     "distributed.scheduler.work-stealing": True,
     "distributed.admin.large-graph-warning-threshold": "100MB",

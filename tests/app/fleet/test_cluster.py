@@ -6,6 +6,7 @@ import os
 import signal
 from pathlib import Path
 
+import dask
 import fsspec
 import pytest
 from distributed import Future
@@ -33,6 +34,8 @@ def test_two_workers_give_the_bytes_of_none(fleet: Path, tmp_path: Path, expecte
     said: list[int] = []
     with client_of(None, 2, MEMORY) as client:
         assert client.dashboard_link.startswith("http")
+        # an hour of stack samples would take 0.7 GB of each worker
+        assert set(client.run(dask.config.get, "distributed.worker.profile.enabled").values()) == {False}
         run_batch(client, work.jobs, tally, lambda now: said.append(now.left))
     assert (tally.done, tally.left, list(tally.failed)) == (SESSIONS, 0, [])
     assert [Path(address).name for address in tally.aside] == [BAD]
