@@ -83,8 +83,9 @@ def fleet_router(fleet: FleetDesk | None) -> APIRouter:
 
         with refusing():
             about = fleet.about()
-        kinds = list(event_kinds())
-        return FleetJson(address=fleet.store.address, runs=list(about), about=about, kinds=kinds, named=NAMED)
+        return FleetJson(
+            address=fleet.store.address, runs=list(about), about=about, kinds=list(event_kinds()), named=NAMED
+        )
 
     @router.get("/rows")
     def rows(
