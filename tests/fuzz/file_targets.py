@@ -11,7 +11,7 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
-from itertools import islice
+from itertools import count, islice
 from pathlib import Path
 from unittest.mock import patch
 
@@ -40,6 +40,7 @@ from pipeline.params import Params, from_yaml, to_yaml
 from pipeline.replay import faults
 from pipeline.run import run
 from pipeline.sources import open_source
+from pipeline.sources.live.devices.device_reader import ReaderStop
 from pipeline.sources.live.devices.mjpeg import read_mjpeg
 from pipeline.types.detections import DistanceLaw
 from pipeline.types.result_json import to_line
@@ -48,14 +49,14 @@ from tests.pipeline.calibration.alignment.made_drive import CAMERA
 from tests.pipeline.labels.formats.sets import IMPORT, drive
 from tests.pipeline.labels.formats.test_round_trip import full_set
 from tests.pipeline.sources.conftest import object_calibration, write_kitti
-from tests.pipeline.sources.live.devices.test_mjpeg import MULTIPART, StopAtLook, part
+from tests.pipeline.sources.live.devices.test_mjpeg import MULTIPART, part
 from tests.pipeline.sources.made.captures import RIG, lidar, pcapng, write_video
 from tests.pipeline.vision.networks import yolox
 
 _PART_OF_MANY = 0.25
 """Weight of one of many files of a format."""
-_LOOKS = 30
-"""Maximum number of reads from a camera; each line is one."""
+_PARTS = 6
+"""Number of images that a camera sends, after which it is not read any more."""
 
 
 def by_file(folder: Path, name: str, read: Callable[[str], object]) -> Callable[[bytes], None]:
@@ -229,7 +230,7 @@ def _kitti_sequence(folder: Path) -> Path:
 def _mjpeg() -> bytes:
     jpeg = cv2.imencode(".jpg", np.full((24, 40, 3), 90, np.uint8))[1].tobytes()
     parts = (part(jpeg, f"Content-Length: {len(jpeg)}", "X-Timestamp: 1700000000.5"), part(jpeg))
-    return MULTIPART + b"".join(parts) * _LOOKS
+    return MULTIPART + b"".join(parts) * (_PARTS // len(parts))
 
 
 class _Wire:
@@ -249,7 +250,14 @@ class _Wire:
 
 
 def _camera(data: bytes) -> None:
+    stop, taken = ReaderStop(), count(1)
+
+    def take(jpeg: bytes, stamp_us: int | None) -> None:
+        check_budget(jpeg)
+        if next(taken) == _PARTS:
+            stop.set()
+
     connection = http.client.HTTPConnection("camera")
     connection.connect = lambda: setattr(connection, "sock", _Wire(data))  # type: ignore[method-assign]
     with patch("pipeline.sources.live.devices.mjpeg._connection", lambda url: connection):
-        read_mjpeg("http://camera/", lambda jpeg, stamp: check_budget(jpeg), StopAtLook(_LOOKS))
+        read_mjpeg("http://camera/", take, stop)
