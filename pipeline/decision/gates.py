@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from math import copysign, exp, sqrt
+from math import exp
 from typing import NamedTuple
 
 from pipeline.decision.place import Place
@@ -63,8 +63,7 @@ class Candidate(NamedTuple):
         margin_m = self.place.margin_m(self.widening_m)
         if (margin_m >= 0.0) == (self.odds > 0.0):
             return abs(self.place.middle_m)
-        so_far_m = copysign(self.place.sigma_m * sqrt(2.0 * abs(self.odds)), self.odds)
-        return self.place.limit_m + self.widening_m - so_far_m
+        return self.place.limit_m + self.widening_m - self.place.margin_of(self.odds)
 
 
 Answer = tuple[bool, float | None, float]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import erf, exp, log, sqrt
+from math import copysign, erf, exp, log, sqrt
 from typing import NamedTuple
 
 _SUREST_M = 0.01
@@ -72,6 +72,11 @@ class Place(NamedTuple):
         margin = min(self.left_m + extra_m - middle, self.right_m + extra_m + middle)
         surety = min(self._surety(margin), SURE)
         return surety if margin >= 0.0 else -surety
+
+    def margin_of(self, odds: float) -> float:
+        """How far inside the path an object of these log-odds is; of one that drives ahead, if the road goes on."""
+        sigma_m = self.usual_m if self.goes_on else self.sigma_m
+        return copysign(sigma_m * sqrt(2.0 * abs(odds)), odds)
 
     def _spreads(self) -> tuple[tuple[float, float], ...]:
         """Weight and standard deviation of each part of the distribution of its lateral position."""

@@ -28,7 +28,7 @@ from pipeline.sources import open_source
 from pipeline.vision.far_view import WINDOW_PX
 from tests.app.fleet.fleets import begun, plan_of
 from tests.app.fleet.s3 import BUCKET, s3_server
-from tests.browser.conftest import Site
+from tests.browser.conftest import Site, serving
 from tests.browser.labels.hands import begin
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "img"
@@ -170,16 +170,10 @@ def dashboard(uri: str = SOURCE, moment: int = MOMENT) -> Iterator[Site]:
             desk=SessionRecorder(Path(folder)),
             labels=LabelDesk(Database.in_file(Path(folder) / "labels.db")),
         )
-        engine.start()
-        engine.control.change(target=moment)
-        engine.wait_for(lambda shown: shown.processed is not None and shown.index == moment, WAIT_MS / 1e3)
-        site = Site(engine, 0)
-        site.start()
-        try:
+        with serving(engine) as site:
+            engine.control.change(target=moment)
+            engine.wait_for(lambda shown: shown.processed is not None and shown.index == moment, WAIT_MS / 1e3)
             yield site
-        finally:
-            site.stop()
-            engine.stop()
 
 
 def opened(browser: Browser, site: Site) -> Page:

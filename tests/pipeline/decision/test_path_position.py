@@ -117,6 +117,8 @@ def test_what_drives_ahead_shows_where_the_road_goes(y: float, low: float, high:
     assert 0.2 < standing.probability() < 0.4
     assert abs(along.log_odds(0.0, 0.0)) > 3.0 * abs(standing.log_odds(0.0, 0.0))
     assert along.sigma_m == pytest.approx(standing.sigma_m, rel=0.01)
+    assert standing.margin_of(0.5) == pytest.approx(standing.sigma_m)
+    assert along.margin_of(-0.5) == pytest.approx(-along.usual_m), "as far outside as the usual error says"
     alike, *_ = place(describe([fused(1, 30.0, y)], EGO, MotionParams()), guessed, EGO, CipvParams(road_goes_on=0.0))
     assert alike is not None
     assert alike[0].probability() == pytest.approx(standing.probability(), abs=0.01)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import socket
 import threading
 import time
@@ -18,7 +17,7 @@ from pipeline.sources.live.devices.sender_pin import SenderPin
 from pipeline.sources.live.source import LiveSensors
 from tests.app.waiting import wait_until
 from tests.pipeline.sources.live.bench import fix_at
-from tests.pipeline.sources.live.rig import free_port, loopback_config, opened
+from tests.pipeline.sources.live.rig import free_port, loopback_config, opened, tcp_device
 
 BYTES_S, LINE = 100_000, b"$GPRMC,1*00\r\n"
 
@@ -38,22 +37,13 @@ def test_a_receiver_that_sends_lines_without_end_is_given_up_until_it_is_well(se
     """Its lines took the program's time: three results a second instead of ten, and gaps in the recording."""
     is_well, ended = threading.Event(), threading.Event()
 
-    def serve(client: socket.socket) -> None:
-        with client, contextlib.suppress(OSError):
-            client.settimeout(30.0)
-            while not ended.wait(0.1 if is_well.is_set() else 0.0):
-                client.sendall(sentences(fix_at(0), time.time_ns()) if is_well.is_set() else LINE * 5000)
+    def talk(client: socket.socket) -> None:
+        while not ended.wait(0.1 if is_well.is_set() else 0.0):
+            client.sendall(sentences(fix_at(0), time.time_ns()) if is_well.is_set() else LINE * 5000)
 
-    def accept(listener: socket.socket) -> None:
-        with contextlib.suppress(OSError):
-            while True:
-                threading.Thread(target=serve, args=(listener.accept()[0],), daemon=True).start()
-
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        threading.Thread(target=accept, args=(listener,), daemon=True).start()
-        gnss = {"tcp": f"127.0.0.1:{listener.getsockname()[1]}"}
+    with tcp_device(talk) as port:
         began_s = time.monotonic()
-        source = opened(loopback_config(camera=None, ego=None, gnss=gnss), sensors)
+        source = opened(loopback_config(camera=None, ego=None, gnss={"tcp": f"127.0.0.1:{port}"}), sensors)
         try:
             assert wait_until(lambda: "not a GNSS receiver" in source.health()[1].note)
             assert wait_until(lambda: time.monotonic() - began_s > 2.0)
@@ -63,7 +53,6 @@ def test_a_receiver_that_sends_lines_without_end_is_given_up_until_it_is_well(se
             assert wait_until(lambda: source.health()[1].state == "ok")
         finally:
             ended.set()
-            listener.shutdown(socket.SHUT_RDWR)
 
 
 def test_a_flood_by_the_sensors_own_address_is_read_at_the_permitted_rate(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import resource
 import shutil
@@ -22,7 +21,7 @@ from pipeline.sources.live.devices.video_stream import read_stream
 from pipeline.sources.live.source import LiveSensors
 from tests.app.waiting import wait_until
 from tests.pipeline.sources.live.h264_camera import BAR_PX, HEIGHT, WIDTH, Behaviour, h264_camera
-from tests.pipeline.sources.live.rig import frames_until, free_port, loopback_config, opened
+from tests.pipeline.sources.live.rig import frames_until, free_port, loopback_config, opened, tcp_device
 
 CAMERA = Path(__file__).parents[1] / "rtsp_camera.py"
 PYTHON = shutil.which("python3", path=os.defpath)
@@ -108,26 +107,17 @@ def test_a_camera_that_floods_instead_of_answering_is_given_up_and_takes_no_memo
     ended = threading.Event()
 
     def pour(client: socket.socket) -> None:
-        with client, contextlib.suppress(OSError):
-            client.settimeout(1.0)
-            client.recv(4096)
-            client.sendall(first)
-            while not ended.is_set():
-                client.sendall(rest)
+        client.recv(4096)
+        client.sendall(first)
+        while not ended.is_set():
+            client.sendall(rest)
 
-    def accept(listener: socket.socket) -> None:
-        with contextlib.suppress(OSError):
-            while True:
-                threading.Thread(target=pour, args=(listener.accept()[0],), daemon=True).start()
-
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        threading.Thread(target=accept, args=(listener,), daemon=True).start()
+    with tcp_device(pour) as port:
         before, began_s = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.monotonic()
         try:
             with pytest.raises(DeviceLost):
-                read_stream(f"rtsp://127.0.0.1:{listener.getsockname()[1]}/", lambda shot: None, ReaderStop())
+                read_stream(f"rtsp://127.0.0.1:{port}/", lambda shot: None, ReaderStop())
         finally:
             ended.set()
-            listener.shutdown(socket.SHUT_RDWR)
         assert time.monotonic() - began_s < 15.0
         assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50_000, "kilobytes"
