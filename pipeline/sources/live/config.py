@@ -177,6 +177,9 @@ class GnssConfig(ConfigPart):
     @model_validator(mode="after")
     def _check(self) -> GnssConfig:
         _exactly_one(self, "serial", "tcp", "udp_port")
+        # a resolver would take the remainder of a larger number, another port
+        if self.tcp is not None and not 0 < int(self.tcp.rpartition(":")[2]) < 1 << 16:
+            raise ValueError(f"tcp: {self.tcp}: ports are 1 to 65535")
         return self
 
 

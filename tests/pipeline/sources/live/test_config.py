@@ -54,6 +54,7 @@ def test_defaults_of_the_written_file_are_the_programs() -> None:
         ("port out of range", "lidar: {data_port: 70000}", "lidar.data_port"),
         ("another model", "lidar: {model: HDL-32E}", "lidar.model"),
         ("two cameras in one", "camera: {device: 0, file: a.mp4}", "exactly one of device, url, file"),
+        ("a port that does not exist", "gnss: {tcp: 'host:99999'}", "host:99999: ports are 1 to 65535"),
         ("no camera in it", "camera: {}", "exactly one of device, url, file"),
         ("not an address", "camera: {url: 'ftp://x'}", "camera.url"),
         ("speed from no receiver", "lidar: {}\nego: {source: gnss}", "there is no gnss"),
