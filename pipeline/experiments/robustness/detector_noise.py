@@ -19,6 +19,8 @@ DOUBLE = 0.25
 RANGES_M = (0.0, 15.0, 25.0, 35.0, 45.0, 60.0, 80.0)
 VISIBLE = (1.0, 0.8, 0.4, 0.1)
 _LARGE = ("truck", "bus")
+_WIDE_STRIP = 0.1
+"""Narrower hidden strips, as a share of the height, disappear in the errors of single edges."""
 _STEP_S = 0.15
 """Only frames at most this far apart show which errors persist from frame to frame."""
 
@@ -41,6 +43,8 @@ class JudgedVehicle:
     """Distance of its nearest face."""
     visible: float
     """Visible share, 0–1."""
+    hidden: F64
+    """(4,) by how much of the height each edge of the visible part lies inside its true box, signed as ``offs``."""
     found: Detection | None
     """The box that was found for it; None if it was missed."""
     offs: F64 | None
@@ -86,6 +90,7 @@ def summed_up(counted: Counted, measured_on: Sequence[str]) -> MeasuredNoise:
         up_share=round(float(lasting[[1, 3]].mean()), 4),
         frame_share=round(float(white.mean()), 4),
         frame_px=round(_white_px(clear), 2),
+        hidden_cut=_hidden_cut(counted.seen, np.median(offs, axis=0)),
         score=tuple(_quantiles([s.found.score for s in each if s.found is not None]) for each in bins),
         car_called=_called([seen for seen in clear if seen.label not in (*_LARGE, "motorcycle")], "car"),
         large_called=_called([seen for seen in clear if seen.label in _LARGE], "truck"),
@@ -132,6 +137,19 @@ def _white_px(seen: Sequence[JudgedVehicle]) -> float:
     low = low[: max(len(low) // 3, 1)]
     steps = [(b.offs - a.offs) * a.height_px for a, b in low if a.offs is not None and b.offs is not None]
     return float(_spread(np.array(steps)).mean() / np.sqrt(2.0)) if len(steps) > 20 else 0.7
+
+
+def _hidden_cut(seen: Sequence[JudgedVehicle], usual: F64) -> float:
+    """By which share of a hidden strip boxes are smaller, the median over edges. usual: error of each edge of a vehicle
+    that is not hidden."""
+    cuts = [
+        (each.offs - usual)[edge] / each.hidden[edge]
+        for each in seen
+        if each.offs is not None and each.visible > VISIBLE[2]
+        for edge in range(4)
+        if abs(each.hidden[edge]) > _WIDE_STRIP
+    ]
+    return round(float(np.clip(np.median(cuts), 0.0, 1.0)), 3) if cuts else 0.0
 
 
 def _missed_again(seen: Sequence[JudgedVehicle]) -> float:

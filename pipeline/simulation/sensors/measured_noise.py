@@ -54,6 +54,9 @@ class MeasuredNoise(ScenarioPart):
     """Of each edge, share of the height, new in each frame."""
     frame_px: float = Field(ge=0.0)
     """The minimum of that, at a focal length of 907 px."""
+    hidden_cut: float = Field(ge=0.0, le=1.0)
+    """By which share of a strip that nearer vehicles hide a box is smaller: 0 where boxes show the whole vehicle, 1
+    where they show the visible part. Nearer vehicles do not fill their boxes, so even the latter gives less than 1."""
     score: tuple[tuple[float, ...], ...]
     """Quantiles of the scores of detected vehicles, by range."""
     car_called: dict[str, float]

@@ -128,8 +128,9 @@ class RealDetector:
 
     def _drawn(self, seen: VisibleVehicle, series: F64, fresh: F64, camera: CameraCalibration) -> F64:
         noise = self._noise
-        box = np.array(seen.bbox)
-        height = box[3] - box[1]
+        whole = np.array(seen.bbox)
+        height = whole[3] - whole[1]
+        box = whole + noise.hidden_cut * (np.array(seen.shown) - whole)
         scale = float(camera.K[0, 0]) / LAW.focal_px
         new = np.hypot(noise.frame_share * height, noise.frame_px * scale) * fresh
         lasts = np.array([noise.across_share, noise.up_share, noise.across_share, noise.up_share]) * height
