@@ -19,10 +19,10 @@ const FORMATS = [
   ["rig", "Rig file", "For captures, PCD folders and ROS bags, with the mounts as positions and angles"],
 ];
 
-const chosen = el("input", { type: "file", multiple: true, aria: { label: "Calibration files" } });
+const chosen = el("input", { type: "file", multiple: true, aria: { label: "Files to import" } });
 chosen.addEventListener("change", read);
 const heading = el("b", {}),
-  values = el("dl", {}),
+  values = el("dl", { class: "pairs" }),
   said = el("p", {}),
   warnings = el("ul", { class: "warnings" });
 const apply = el("button", { type: "button", class: "primary", textContent: "Apply" });
@@ -31,20 +31,25 @@ const found = el(
   { aria: { label: "Imported calibration", role: "status" }, hidden: true },
   heading,
   values,
+  el("div", { class: "row" }, apply, el("button", { type: "button", textContent: "Dismiss", onclick: dismiss })),
   said,
   warnings,
-  el("div", { class: "row" }, apply, el("button", { type: "button", textContent: "Dismiss", onclick: dismiss })),
+);
+const choices = el(
+  "div",
+  {},
+  el("b", { textContent: "Import" }),
+  el("p", { textContent: "KITTI, ROS (both files), OpenCV or Kalibr. The format is recognised." }),
+  chosen,
+  el("b", { class: "next", textContent: "Export with the current alignment" }),
+  el("div", { class: "row" }, ...FORMATS.map(([name, words, title]) => exportLink(name, words, title))),
 );
 /** Import and export, below the bar. */
 export const filesPanel = el(
   "section",
   { class: "fit-result", aria: { label: "Calibration files" }, hidden: true },
-  el("b", { textContent: "Import" }),
-  el("p", { textContent: "KITTI, ROS (both files), OpenCV or Kalibr. The format is recognised." }),
-  chosen,
+  choices,
   found,
-  el("b", { class: "next", textContent: "Export with the current alignment" }),
-  el("div", { class: "row" }, ...FORMATS.map(([name, words, title]) => exportLink(name, words, title))),
 );
 /** Shows and hides them. */
 export const filesButton = el("button", {
@@ -87,6 +92,7 @@ function show({ format, changes, text: sentence, warnings: doubts }, files) {
   warnings.replaceChildren(...doubts.map((textContent) => el("li", { textContent })));
   warnings.hidden = !doubts.length;
   apply.hidden = found.hidden = false;
+  choices.hidden = true; // so that Apply is in sight in a small window
   apply.onclick = async () => {
     change(/** @type {any} */ (changes), true);
     await saveVersion(`Imported from ${names}`.slice(0, 200));
@@ -101,9 +107,11 @@ function fail(problem) {
   text(said, problem.message);
   warnings.hidden = apply.hidden = true;
   found.hidden = false;
+  choices.hidden = true;
 }
 
 function dismiss() {
   found.hidden = true;
+  choices.hidden = false;
   chosen.value = ""; // so that the same file can be chosen again
 }
