@@ -47,9 +47,11 @@ class MeasuredNoise(ScenarioPart):
     """Correlation between frames 0.1 s apart of the variable that decides whether a vehicle is missed: misses come in
     bursts."""
     across_share: float = Field(ge=0.0)
-    """Standard deviation of the left and right edge, share of the box's height: the constant part."""
+    """Standard deviation of the left and right edge, share of the box's height: the part that lasts."""
     up_share: float = Field(ge=0.0)
     """The same of the upper and lower edge."""
+    wanders: float = Field(ge=0.0, le=1.0)
+    """Share of the variance of these two that changes within seconds; the rest is constant for a vehicle."""
     frame_share: float = Field(ge=0.0)
     """Of each edge, share of the height, new in each frame."""
     frame_px: float = Field(ge=0.0)
