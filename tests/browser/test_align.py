@@ -159,10 +159,10 @@ def test_a_calibration_goes_out_and_comes_back_as_one_step(page: Page, knocked: 
 
 
 def test_the_position_is_fitted_where_the_switch_says_so(page: Page):
-    position = page.get_by_label("Position", exact=True)
-    page.get_by_role("button", name="angular", exact=True).click()
+    position, bar = page.get_by_label("Position", exact=True), page.locator("#align-bar")
+    bar.get_by_role("button", name="angular", exact=True).click()
     expect(position).to_be_disabled()
-    page.get_by_role("button", name="pinhole", exact=True).click()
+    bar.get_by_role("button", name="pinhole", exact=True).click()
     position.check()
     page.get_by_role("button", name="Fit", exact=True).click()
     result = page.get_by_label("Fitted alignment")
