@@ -14,7 +14,7 @@ from typing import NamedTuple
 from pipeline.common.files.user_file_errors import reason_of
 from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.formats.calibration_files import kalibr, kitti, opencv, rig, ros
-from pipeline.formats.calibration_files.contents import Files
+from pipeline.formats.calibration_files.contents import CalibrationFiles
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
@@ -24,7 +24,7 @@ class Format(NamedTuple):
 
     title: str
     """For people."""
-    parse: Callable[[Files, tuple[int, int] | None], CameraCalibration] | None
+    parse: Callable[[CalibrationFiles, tuple[int, int] | None], CameraCalibration] | None
     """From the file, or the files of ``names``. The size (width, height) is needed where the file does not say; None:
     cannot be read."""
     write: Callable[[Path, CameraCalibration], object]

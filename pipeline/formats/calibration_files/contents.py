@@ -8,17 +8,17 @@ from typing import Any
 from pipeline.common.files.user_file_errors import parse_yaml
 from pipeline.types.source import SourceError
 
-Files = Mapping[str, bytes]
+CalibrationFiles = Mapping[str, bytes]
 """Contents by file name."""
 
 
-def the_file(files: Files) -> tuple[str, bytes]:
+def the_file(files: CalibrationFiles) -> tuple[str, bytes]:
     """Name and content of a calibration of one file."""
     ((name, data),) = files.items()
     return name, data
 
 
-def yaml_mapping(files: Files, name: str) -> dict[str, Any]:
+def yaml_mapping(files: CalibrationFiles, name: str) -> dict[str, Any]:
     """The values of one of the files. SourceError if it is missing, or not YAML with names."""
     if name not in files:
         raise SourceError(f"{name}: no such file")

@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 
 from pipeline.common.geometry import inverse
-from pipeline.formats.calibration_files.contents import Files, yaml_mapping
+from pipeline.formats.calibration_files.contents import CalibrationFiles, yaml_mapping
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
@@ -22,7 +22,7 @@ _CAMERA = "cam0"
 _FORWARD, _BACKWARD = ("T_cam_lidar", "T_camera_lidar"), ("T_lidar_cam", "T_lidar_camera")
 
 
-def parse(files: Files, size: tuple[int, int] | None) -> CameraCalibration:
+def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibration:
     chain = yaml_mapping(files, CHAIN)
     camera = chain.get(_CAMERA)
     if not isinstance(camera, dict):
@@ -72,7 +72,7 @@ def write(path: Path, camera: CameraCalibration) -> None:
         (path / name).write_text(text, encoding="utf-8")
 
 
-def _transform(files: Files, camera: Mapping[str, Any]) -> F64:
+def _transform(files: CalibrationFiles, camera: Mapping[str, Any]) -> F64:
     """T_camera_lidar of the chain, else of the file beside it."""
     places = [(CHAIN, camera)]
     if TRANSFORM in files:

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.formats.calibration_files.contents import Files, the_file
+from pipeline.formats.calibration_files.contents import CalibrationFiles, the_file
 from pipeline.formats.kitti_calibration import parse_object_calibration
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
 
-def parse(files: Files, size: tuple[int, int] | None) -> CameraCalibration:
+def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibration:
     name, data = the_file(files)
     if size is None:
         raise SourceError(f"{name}: KITTI's calibration does not store the image size; specify it")

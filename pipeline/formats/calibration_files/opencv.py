@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from pipeline.common.files.user_file_errors import parse_yaml
-from pipeline.formats.calibration_files.contents import Files, the_file
+from pipeline.formats.calibration_files.contents import CalibrationFiles, the_file
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
@@ -25,7 +25,7 @@ _VERSION = "%YAML:1.0"
 _MOST_NUMBERS = 1000
 
 
-def parse(files: Files, size: tuple[int, int] | None) -> CameraCalibration:
+def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibration:
     name, data = the_file(files)
     text = data.decode("utf-8", "replace").strip().removeprefix(_VERSION)
     loaded = parse_yaml(text.replace(_TAG, ""), name, SourceError)

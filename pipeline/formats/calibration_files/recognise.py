@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.formats.calibration_files import FORMATS, Format, kalibr, ros
-from pipeline.formats.calibration_files.contents import Files
+from pipeline.formats.calibration_files.contents import CalibrationFiles
 from pipeline.types import CameraCalibration
 from pipeline.types.source import SourceError
 
@@ -25,7 +25,7 @@ _PARTS = {
 }
 
 
-def parse_any(files: Files, size: tuple[int, int] | None) -> tuple[Format, CameraCalibration]:
+def parse_any(files: CalibrationFiles, size: tuple[int, int] | None) -> tuple[Format, CameraCalibration]:
     """The format and the calibration. size: width and height of the images, for formats that do not store them.
     SourceError names what is missing, mixed up or cannot be meant."""
     kinds: dict[str, dict[str, bytes]] = {}

@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from pipeline.common.geometry import inverse, rotation
-from pipeline.formats.calibration_files.contents import Files, yaml_mapping
+from pipeline.formats.calibration_files.contents import CalibrationFiles, yaml_mapping
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
@@ -22,7 +22,7 @@ _MODELS = {"plumb_bob": (4, 5), "rational_polynomial": (8,)}
 _ANGLES = ("roll", "pitch", "yaw")
 
 
-def parse(files: Files, size: tuple[int, int] | None) -> CameraCalibration:
+def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibration:
     info, transform = (yaml_mapping(files, name) for name in (INFO, TRANSFORM))
     try:
         K = camera_matrix(np.reshape(info["camera_matrix"]["data"], (3, 3)), f"{INFO}: camera_matrix")
