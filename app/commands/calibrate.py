@@ -130,7 +130,7 @@ class Calibrate:
         for warning in fit.warnings:
             print(f"cipv: {warning}", file=sys.stderr)
         if self.out is not None:
-            section = {"model": fit.model, **fit.values}
+            section = fit.section
             self.out.write_text(yaml.safe_dump({"alignment": section}, sort_keys=False), encoding="utf-8")
         if self.images is not None:
             write_residual_images(self.images, frame_of, len(source), fit, params)

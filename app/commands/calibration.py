@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
 import tyro
 import yaml
 from rich.console import Console
@@ -15,11 +14,12 @@ from rich.table import Table
 from app.commands.support.arguments import option
 from app.commands.support.open_with_progress import opened_recording
 from app.commands.support.options import PipelineOptions
-from pipeline.alignment.convert import angular_of, costs, pinhole_of
-from pipeline.alignment.projection import Alignment, Angular, Pinhole, corrected, resolve
+from pipeline.alignment.convert import angular_of, angular_values, calibration_in_use, costs
+from pipeline.alignment.projection import Alignment, Pinhole, resolve
 from pipeline.common.errors import BadInput
-from pipeline.formats.calibration_files import FORMATS
-from pipeline.types import CameraCalibration
+from pipeline.formats.calibration_files import FORMATS, write_calibration
+from pipeline.types import F64, CameraCalibration
+from pipeline.types.source import Mounted
 
 
 @dataclass(frozen=True)
@@ -45,21 +45,18 @@ class ConvertCalibration:
 
     def __call__(self) -> int:
         params = self.pipeline.parameters().alignment
+        given, size, T_ego_lidar = self._read()
+        camera = calibration_in_use(params, given, size)
         if params.model == "angular":
-            camera, size = self._camera_and_size()
-            aligned = resolve(params, camera)
-            if not isinstance(aligned, Angular):
-                raise BadInput("the angular alignment is incomplete: set h_res_deg, v_res_deg, cx_px and cy_px")
-            camera = pinhole_of(aligned, *size)
+            aligned = resolve(params, given)
+            assert aligned is not None
             self._say_cost(aligned, _pinhole(camera), camera)
-        else:
-            camera = corrected(params, self._read())
         if self.to == "angular":
             found = angular_of(_pinhole(camera), camera)
             self._say_cost(_pinhole(camera), found, camera)
-            self.out.write_text(yaml.safe_dump({"alignment": _values(found)}, sort_keys=False), encoding="utf-8")
+            self.out.write_text(yaml.safe_dump({"alignment": angular_values(found)}, sort_keys=False), encoding="utf-8")
         else:
-            FORMATS[self.to].write(self.out, camera)
+            write_calibration(self.out, self.to, camera, T_ego_lidar)
         print(f"{self.out}: {self.to}, {camera.width}×{camera.height}, f = {camera.K[0, 0]:.1f} px")
         return 0
 
@@ -69,39 +66,21 @@ class ConvertCalibration:
             table.add_row(f"{each.from_deg:.0f}–{each.to_deg:.0f}°", f"{each.mean_px:.1f} px", f"{each.mean_m:.2f} m")
         Console().print(table)
 
-    def _read(self) -> CameraCalibration:
-        camera, _ = self._camera_and_size()
-        if camera is None:
-            raise BadInput(f"{self.origin}: the recording has no camera calibration")
-        return camera
-
-    def _camera_and_size(self) -> tuple[CameraCalibration | None, tuple[int, int]]:
-        """The calibration, and width and height of the images."""
+    def _read(self) -> tuple[CameraCalibration | None, tuple[int, int], F64 | None]:
+        """The calibration, width and height of the images, and the LiDAR's mount."""
         if self.format is not None:
-            read = FORMATS[self.format].read
-            assert read is not None
-            camera = read(Path(self.origin), self.size)
-            return camera, (camera.width, camera.height)
-        frame = opened_recording(self.origin).frame(0)
+            camera = FORMATS[self.format].read(Path(self.origin), self.size)
+            return camera, (camera.width, camera.height), None
+        source = opened_recording(self.origin)
+        frame = source.frame(0)
+        mount = source.T_ego_lidar if isinstance(source, Mounted) else None
         if frame.camera is not None:
-            return frame.camera, (frame.camera.width, frame.camera.height)
+            return frame.camera, (frame.camera.width, frame.camera.height), mount
         size = self.size or frame.image_size
         if size is None:
             raise BadInput(f"{self.origin}: the recording has neither a camera calibration nor images")
-        return None, size
+        return None, size, mount
 
 
 def _pinhole(camera: CameraCalibration) -> Pinhole:
     return Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
-
-
-def _values(angular: Angular) -> dict[str, float | str]:
-    """As alignment parameters."""
-    h_res_deg, v_res_deg = np.degrees([angular.h_res_rad, angular.v_res_rad]).tolist()
-    return {
-        "model": "angular",
-        "h_res_deg": round(h_res_deg, 5),
-        "v_res_deg": round(v_res_deg, 5),
-        "cx_px": round(angular.cx, 1),
-        "cy_px": round(angular.cy, 1),
-    }

@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.alignment.projection import Alignment, Angular
+from pipeline.alignment.projection import Alignment, Angular, corrected, resolve
+from pipeline.common.errors import BadInput
+from pipeline.params import AlignmentParams
 from pipeline.types import F64, CameraCalibration
 
 NEAREST_M, FARTHEST_M = 10.0, 60.0
@@ -23,6 +25,10 @@ BEARINGS_DEG = (0.0, 5.0, 10.0, 20.0, 30.0, 45.0)
 _EGO_HEIGHT_M = 1.7
 """Height of the ego origin above the road, if a calibration does not say."""
 _RANGES, _HEIGHTS, _BEARINGS = 8, 4, 91
+
+
+class Incomplete(BadInput):
+    """An alignment without all of its values; the text names them."""
 
 
 class Cost(NamedTuple):
@@ -36,6 +42,33 @@ class Cost(NamedTuple):
     """Mean distance in the image."""
     mean_m: float
     """Mean distance in the plan, of a box at its correct range."""
+
+
+def calibration_in_use(
+    params: AlignmentParams, camera: CameraCalibration | None, size: tuple[int, int]
+) -> CameraCalibration:
+    """The recording's calibration with its correction; with the angular model, the pinhole camera that comes nearest.
+    size: width and height of the images. Incomplete if there is neither."""
+    if params.model == "pinhole" and camera is not None:
+        return corrected(params, camera)
+    aligned = resolve(params, camera)
+    if isinstance(aligned, Angular):
+        return pinhole_of(aligned, *size)
+    if params.model == "pinhole":
+        raise Incomplete("the recording has no camera calibration")
+    raise Incomplete("the angular alignment is incomplete: set h_res_deg, v_res_deg, cx_px and cy_px")
+
+
+def angular_values(angular: Angular) -> dict[str, float | str]:
+    """As alignment parameters."""
+    h_res_deg, v_res_deg = np.degrees([angular.h_res_rad, angular.v_res_rad]).tolist()
+    return {
+        "model": "angular",
+        "h_res_deg": round(h_res_deg, 5),
+        "v_res_deg": round(v_res_deg, 5),
+        "cx_px": round(angular.cx, 1),
+        "cy_px": round(angular.cy, 1),
+    }
 
 
 def angular_of(aligned: Alignment, camera: CameraCalibration) -> Angular:

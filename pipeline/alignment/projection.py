@@ -179,7 +179,8 @@ def _correction(params: AlignmentParams, camera: CameraCalibration) -> F64:
     turn = rotation(*(np.radians(angle) for angle in (params.roll_deg, params.pitch_deg, params.yaw_deg)))
     place = inverse(camera.T_camera_ego)[:3, 3]
     correction = np.eye(4)
-    correction[:3, :3], correction[:3, 3] = turn, place - turn @ place + [0.0, params.left_m, params.up_m]
+    correction[:3, :3] = turn
+    correction[:3, 3] = place - turn @ place + [params.forward_m, params.left_m, params.up_m]
     return correction
 
 

@@ -130,6 +130,7 @@ class AlignmentParams(Section):
     yaw_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: turns the mount to the left")
     pitch_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: turns the mount downwards")
     roll_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: turns the mount clockwise")
+    forward_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: shifts the camera forwards")
     left_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: shifts the camera to the left")
     up_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: shifts the camera upwards")
 

@@ -6,13 +6,17 @@ import re
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 from app.engine.engine import Engine
-from pipeline.params import Params, with_changes
+from pipeline.alignment.projection import corrected
+from pipeline.common.geometry import inverse
+from pipeline.formats.calibration_files import opencv
+from pipeline.params import AlignmentParams, Params, with_changes
 from pipeline.sources import open_source
 from pipeline.types import Frame
 from tests.browser.conftest import WAIT_MS, CountedDetector, OpenPage, Pages, Site, opening
@@ -59,7 +63,7 @@ def page(pages, knocked: Site) -> Iterator[Page]:
         lambda s: s.params == Params() and s.drive.done == s.drive.total > 0, WAIT_S
     )
     with opening(pages, knocked) as begin:
-        page = begin()
+        page = begin(expects=("status of 409",))  # of a file that is refused
         page.keyboard.press("a")
         yield page
 
@@ -112,13 +116,68 @@ def test_a_fit_is_cancelled_and_changes_nothing(page: Page, knocked: Site):
     assert alignment(knocked) == Params()
 
 
+def exported(page: Page, panel: Locator) -> Path:
+    """The calibration with the current alignment."""
+    with page.expect_download() as download:
+        panel.get_by_role("link", name="OpenCV").click()
+    return download.value.path()
+
+
+def test_a_calibration_goes_out_and_comes_back_as_one_step(page: Page, knocked: Site, tmp_path: Path):
+    page.get_by_role("button", name="Files", exact=True).click()
+    panel = page.get_by_label("Calibration files")
+    camera = opencv.parse({"out.yaml": exported(page, panel).read_bytes()}, None)
+    moved = AlignmentParams(yaw_deg=2.0, pitch_deg=-1.5, forward_m=0.1)
+    opencv.write(tmp_path / "in.yaml", corrected(moved, camera))
+    opencv.write(tmp_path / "wrong.yaml", replace(camera, T_camera_ego=inverse(camera.T_camera_ego)))
+
+    page.get_by_label("Files to import").set_input_files(tmp_path / "wrong.yaml")
+    result = page.get_by_label("Imported calibration")
+    expect(result).to_contain_text("is its extrinsic inverted?")
+    expect(result.get_by_role("button", name="Apply")).to_be_hidden()
+    result.get_by_role("button", name="Dismiss").click()
+
+    page.set_viewport_size({"width": 800, "height": 480})
+    page.get_by_label("Files to import").set_input_files(tmp_path / "in.yaml")
+    expect(result).to_contain_text(re.compile(r"OpenCV: in\.yaml.*yaw2\.00°.*pitch-1\.50°.*forward0\.10 m"))
+    assert alignment(knocked) == Params(), "nothing changes before Apply"
+    apply = result.get_by_role("button", name="Apply")
+    expect(apply).to_be_in_viewport(ratio=1.0)
+    apply.click()
+    found = knocked.engine.wait_for(lambda s: s.params != Params(), WAIT_S).params
+    assert found.alignment.forward_m == pytest.approx(0.1, abs=1e-3)
+    expect(result).to_be_hidden()
+    page.set_viewport_size({"width": 1440, "height": 900})
+    page.get_by_role("button", name="Versions").click()
+    versions = page.get_by_label("Saved alignments")
+    expect(versions).to_contain_text("Imported from in.yaml")
+    page.locator("#camera").click(position={"x": 5, "y": 5})
+    page.keyboard.press("Control+z")
+    knocked.engine.wait_for(lambda s: s.params == Params(), WAIT_S)
+    versions.get_by_role("button", name=re.compile("Delete alignment")).click()
+    expect(versions.locator("li")).to_have_count(0)
+
+
+def test_the_position_is_fitted_where_the_switch_says_so(page: Page):
+    position, bar = page.get_by_label("Position", exact=True), page.locator("#align-bar")
+    bar.get_by_role("button", name="angular", exact=True).click()
+    expect(position).to_be_disabled()
+    bar.get_by_role("button", name="pinhole", exact=True).click()
+    position.check()
+    page.get_by_role("button", name="Fit", exact=True).click()
+    result = page.get_by_label("Fitted alignment")
+    expect(result).to_contain_text(re.compile(r"left-?\d\.\d\d m ± .*up-?\d\.\d\d m ±"))
+    result.get_by_role("button", name="Dismiss").click()
+    expect(result).to_be_hidden()
+
+
 def test_in_a_small_window_nothing_covers_the_image_and_every_button_is_in_sight(page: Page):
     page.keyboard.press("a")
     page.set_viewport_size({"width": 800, "height": 480})
     page.keyboard.press("a")
     expect(page.locator("html")).to_have_attribute("data-inspect", "closed")
     bar = page.locator("#align-bar")
-    for name in ("pinhole", "Fit", "Time", "Versions", "Edges", "Regions"):
+    for name in ("pinhole", "Fit", "Time", "Versions", "Files", "Edges", "Regions"):
         button = bar.get_by_role("button", name=name, exact=True)
         expect(button).to_be_in_viewport(ratio=1.0)
         button.click(trial=True)

@@ -118,14 +118,13 @@ def _unpacked(out: Path, path: str) -> None:
 def _calibrations(folder: Path) -> dict[str, Target]:
     found, size = {}, (CAMERA.width, CAMERA.height)
     for name, kind in CALIBRATIONS.items():
-        read = kind.read
-        if read is None:
+        if kind.parse is None:
             continue
         path = folder / name / "a.yaml"
         path.parent.mkdir(parents=True)
         kind.write(path, CAMERA)
         for file in [path] if path.is_file() else sorted(path.iterdir()):
-            reading = by_file(file.parent, file.name, lambda _, path=path, read=read: read(path, size))
+            reading = by_file(file.parent, file.name, lambda _, path=path, kind=kind: kind.read(path, size))
             found[f"calibration {name}"] = Target((file.read_bytes(),), reading)
     return found
 

@@ -25,7 +25,7 @@ from pipeline.calibration.alignment.doubts import Found, looks_like_radians, war
 from pipeline.calibration.alignment.edge_fit import STEPS as EDGE_STEPS
 from pipeline.calibration.alignment.edge_fit import fit_edges
 from pipeline.calibration.alignment.edges import ROLL_STEPS, EdgeView, RollScores, roll_scores
-from pipeline.calibration.alignment.models import FitModel, ModelName
+from pipeline.calibration.alignment.models import PLACE, FitModel, ModelName
 from pipeline.calibration.alignment.overlaps import Overlaps, most_overlap, overlaps_of
 from pipeline.calibration.alignment.pairs import PairTable
 from pipeline.calibration.alignment.scenes import FitScene
@@ -89,11 +89,18 @@ class AlignmentFit:
     """Whether the overlaps are from held-out frames; a very short drive has too few."""
     warnings: tuple[str, ...] = field(default=())
     """What the drive does not determine, as sentences."""
+    place_m: Mapping[str, float] = field(default_factory=dict)
+    """The camera's shift as it was, as far as it was not fitted and is not zero."""
+
+    @property
+    def section(self) -> dict[str, float | str]:
+        """The alignment parameters to use with the fit."""
+        return {"model": self.model, **self.place_m, **self.values}
 
     @property
     def changes(self) -> dict[str, float | str]:
-        """By dotted name, as a change of parameters."""
-        return {"alignment.model": self.model, **{f"alignment.{name}": value for name, value in self.values.items()}}
+        """``section`` by dotted name, as a change of parameters."""
+        return {f"alignment.{name}": value for name, value in self.section.items()}
 
 
 def overlap_sentence(fit: AlignmentFit) -> str:
@@ -114,12 +121,14 @@ def fit_alignment(
     """The model's parameters from frames of one camera.
 
     edges: of frames of the same camera; they determine the roll of a pinhole model. present: scored for comparison, not
-    a start. offset: of a pinhole model, also fit the camera's position. NothingToFit if too little is visible.
+    a start; a pinhole model keeps its position. offset: of a pinhole model, also fit the position, laterally and in
+    height. NothingToFit if too little is visible.
     """
     scenes = _of_one_camera(scenes)
     if name == "pinhole" and scenes[0].camera is None:
         raise NothingToFit("the pinhole model needs the camera's calibration; fit the angular model instead")
-    model = FitModel(name, scenes[0].camera, scenes[0].size, offset)
+    place_m = {each: value for each in PLACE if name == "pinhole" and (value := getattr(present, each))}
+    model = FitModel(name, scenes[0].camera, scenes[0].size, offset, place_m=place_m)
     train, held = _split(scenes)
     table = PairTable.of([scenes[k] for k in train])
     found = search(table, model, progress, STEPS)
@@ -162,6 +171,7 @@ def fit_alignment(
         after=after,
         held_out=bool(held),
         warnings=warnings,
+        place_m={each: value for each, value in place_m.items() if each not in model.unknowns},
     )
 
 
@@ -190,7 +200,7 @@ def _boxes_off(table: PairTable, model: FitModel, vector: F64) -> F64:
     hardly determine these, and where they are wrong, so are the boxes' yaw and pitch."""
     assert model.camera is not None
     camera = corrected(model.params(vector), model.camera)
-    near = replace(model, camera=camera, offset=False, roll_deg=(0.0, _EXACT_DEG))
+    near = replace(model, camera=camera, offset=False, roll_deg=(0.0, _EXACT_DEG), place_m={})
     return refine(table, near, np.zeros(3), GATES[-3:]).vector[:2]
 
 

@@ -7,7 +7,7 @@ yaw and pitch, and its two resolutions for the lens.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -22,6 +22,8 @@ REACH_DEG = 10.0
 """Search range of the mount around the recording's calibration, in all directions."""
 FARTHEST_OFF_M = 1.0
 """Maximum distance of the camera's position from that in the calibration."""
+PLACE = ("forward_m", "left_m", "up_m")
+"""The parameters of the camera's position."""
 ROLL_SIGMA_DEG = 5.0
 """Prior standard deviation of the roll, if neither boxes nor edges determine it."""
 STEP_DEG = 1.0
@@ -50,6 +52,8 @@ class FitModel:
     the optical axis."""
     roll_deg: tuple[float, float] = (0.0, ROLL_SIGMA_DEG)
     """Pinhole: what is known of the roll besides the boxes, and its standard deviation."""
+    place_m: Mapping[str, float] = field(default_factory=dict)
+    """Pinhole: shift of the camera's position by parameter, as far as it is not fitted."""
 
     @property
     def unknowns(self) -> tuple[str, ...]:
@@ -84,7 +88,7 @@ class FitModel:
     def params(self, vector: F64) -> AlignmentParams:
         """As parameters, not rounded or clipped, for use during the search."""
         return AlignmentParams.model_construct(
-            **{**AlignmentParams().model_dump(), "model": self.name, **self.values(vector)}
+            **{**AlignmentParams().model_dump(), **self.place_m, "model": self.name, **self.values(vector)}
         )
 
     def aligned(self, vector: F64, camera: CameraCalibration | None = None) -> Alignment:

@@ -28,7 +28,9 @@ def residual_image(frame: Frame, fit: AlignmentFit, params: Params) -> U8 | None
     scene = fit_scene(frame, params)
     if scene is None or frame.image is None:
         return None
-    model, table = FitModel(fit.model, scene.camera, scene.size, offset=True), PairTable.of([scene])
+    place_m = {"forward_m": params.alignment.forward_m}  # no fit changes it
+    model = FitModel(fit.model, scene.camera, scene.size, offset=True, place_m=place_m)
+    table = PairTable.of([scene])
     fitted = AlignmentParams.model_construct(**{**params.alignment.model_dump(), "model": fit.model, **fit.values})
     found, present = model.vector(fitted), model.vector(params.alignment)
     if found is None:

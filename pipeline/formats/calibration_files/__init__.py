@@ -7,26 +7,61 @@ sentence, for values that cannot be valid.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from pipeline.common.files.user_file_errors import reason_of
+from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.formats.calibration_files import kalibr, kitti, opencv, rig, ros
-from pipeline.types import CameraCalibration
+from pipeline.formats.calibration_files.contents import CalibrationFiles
+from pipeline.types import F64, CameraCalibration
+from pipeline.types.source import SourceError
 
 
 class Format(NamedTuple):
     """One kind of file."""
 
-    read: Callable[[Path, tuple[int, int] | None], CameraCalibration] | None
-    """From a file or folder. The size (width, height) is needed where the file does not say; None: cannot be read."""
+    title: str
+    """For people."""
+    parse: Callable[[CalibrationFiles, tuple[int, int] | None], CameraCalibration] | None
+    """From the file, or the files of ``names``. The size (width, height) is needed where the file does not say; None:
+    cannot be read."""
     write: Callable[[Path, CameraCalibration], object]
     """To a file or folder."""
+    names: tuple[str, ...] = ()
+    """Files of a folder; empty for a single file."""
+
+    def read(self, path: Path, size: tuple[int, int] | None) -> CameraCalibration:
+        """From a file or folder."""
+        if self.parse is None:
+            raise SourceError(f"{path.name}: {self.title} cannot be read here")
+        files = [path / name for name in self.names if (path / name).exists()] if self.names else [path]
+        return self.parse({each.name: _content(each) for each in files}, size)
 
 
 FORMATS: Mapping[str, Format] = {
-    "kitti": Format(kitti.read, kitti.write),
-    "ros": Format(ros.read, ros.write),
-    "opencv": Format(opencv.read, opencv.write),
-    "kalibr": Format(kalibr.read, kalibr.write),
-    "rig": Format(None, rig.write),
+    "kitti": Format("KITTI", kitti.parse, kitti.write),
+    "ros": Format("ROS", ros.parse, ros.write, (ros.INFO, ros.TRANSFORM)),
+    "opencv": Format("OpenCV", opencv.parse, opencv.write),
+    "kalibr": Format("Kalibr", kalibr.parse, kalibr.write, (kalibr.CHAIN, kalibr.TRANSFORM)),
+    "rig": Format("a rig file", None, rig.write),
 }
+
+
+def write_calibration(path: Path, name: str, camera: CameraCalibration, T_ego_lidar: F64 | None) -> None:
+    """Write a recording's calibration in a format of ``FORMATS``. T_ego_lidar: (4, 4), the LiDAR's mount; None where
+    the ego frame is its own. SourceError if the format cannot represent it."""
+    if T_ego_lidar is None:
+        FORMATS[name].write(path, camera)
+    elif name == "rig":
+        rig.write_rig(path, camera, T_ego_lidar)
+    else:
+        FORMATS[name].write(path, replace(camera, T_camera_ego=camera.T_camera_ego @ T_ego_lidar))
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return read_regular(path, LARGEST_TEXT_BYTES)
+    except (OSError, ValueError) as error:
+        raise SourceError(f"{path.name}: cannot be read: {reason_of(error)}") from None

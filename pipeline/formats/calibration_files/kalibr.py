@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from pipeline.common.files.user_file_errors import read_yaml
 from pipeline.common.geometry import inverse
+from pipeline.formats.calibration_files.contents import CalibrationFiles, yaml_mapping
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
@@ -22,8 +22,8 @@ _CAMERA = "cam0"
 _FORWARD, _BACKWARD = ("T_cam_lidar", "T_camera_lidar"), ("T_lidar_cam", "T_lidar_camera")
 
 
-def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
-    chain = _mapping(path / CHAIN)
+def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibration:
+    chain = yaml_mapping(files, CHAIN)
     camera = chain.get(_CAMERA)
     if not isinstance(camera, dict):
         raise SourceError(f"{CHAIN}: no {_CAMERA}")
@@ -44,8 +44,8 @@ def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
         raise SourceError(f"{CHAIN}: invalid distortion_coeffs or resolution")
     K = camera_matrix([[fu, 0.0, pu], [0.0, fv, pv], [0.0, 0.0, 1.0]], f"{CHAIN}: intrinsics")
     lens = distortion if np.any(distortion) else np.zeros(0)
-    found = CameraCalibration(K, lens, _transform(path, camera), width, height)
-    check_looks_ahead(found, str(path.name))
+    found = CameraCalibration(K, lens, _transform(files, camera), width, height)
+    check_looks_ahead(found, TRANSFORM if TRANSFORM in files else CHAIN)
     return found
 
 
@@ -72,21 +72,14 @@ def write(path: Path, camera: CameraCalibration) -> None:
         (path / name).write_text(text, encoding="utf-8")
 
 
-def _transform(path: Path, camera: Mapping[str, Any]) -> F64:
+def _transform(files: CalibrationFiles, camera: Mapping[str, Any]) -> F64:
     """T_camera_lidar of the chain, else of the file beside it."""
     places = [(CHAIN, camera)]
-    if (path / TRANSFORM).is_file():
-        places.append((TRANSFORM, _mapping(path / TRANSFORM)))
+    if TRANSFORM in files:
+        places.append((TRANSFORM, yaml_mapping(files, TRANSFORM)))
     for file, given in places:
         for name in (*_FORWARD, *_BACKWARD):
             if name in given:
                 T = rigid_transform(given[name], f"{file}: {name}")
                 return T if name in _FORWARD else inverse(T)
-    raise SourceError(f"{path.name}: no {_FORWARD[0]} in {CHAIN} or {TRANSFORM}")
-
-
-def _mapping(path: Path) -> dict[str, Any]:
-    loaded = read_yaml(path, path.name, SourceError)
-    if not isinstance(loaded, dict):
-        raise SourceError(f"{path.name}: expected names with values")
-    return loaded
+    raise SourceError(f"no {_FORWARD[0]} in {CHAIN} or {TRANSFORM}")

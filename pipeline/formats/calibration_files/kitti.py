@@ -7,16 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.formats.file_reading import read_bytes
+from pipeline.formats.calibration_files.contents import CalibrationFiles, the_file
 from pipeline.formats.kitti_calibration import parse_object_calibration
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
 
-def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
+def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibration:
+    name, data = the_file(files)
     if size is None:
-        raise SourceError(f"{path.name}: KITTI's calibration does not store the image size; specify it")
-    return parse_object_calibration(read_bytes(path), path.name, size).camera
+        raise SourceError(f"{name}: KITTI's calibration does not store the image size; specify it")
+    return parse_object_calibration(data, name, size).camera
 
 
 def write(path: Path, camera: CameraCalibration) -> None:

@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 
 from pipeline.common.files.user_file_errors import parse_yaml
-from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, read_bytes, rigid_transform
+from pipeline.formats.calibration_files.contents import CalibrationFiles, the_file
+from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
@@ -24,24 +25,25 @@ _VERSION = "%YAML:1.0"
 _MOST_NUMBERS = 1000
 
 
-def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
-    text = read_bytes(path).decode("utf-8", "replace").strip().removeprefix(_VERSION)
-    loaded = parse_yaml(text.replace(_TAG, ""), path.name, SourceError)
+def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibration:
+    name, data = the_file(files)
+    text = data.decode("utf-8", "replace").strip().removeprefix(_VERSION)
+    loaded = parse_yaml(text.replace(_TAG, ""), name, SourceError)
     if not isinstance(loaded, dict):
-        raise SourceError(f"{path.name}: not an OpenCV FileStorage file")
-    K = camera_matrix(_matrix(loaded, "camera_matrix", path), f"{path.name}: camera_matrix")
-    T = rigid_transform(_matrix(loaded, "T_camera_lidar", path), f"{path.name}: T_camera_lidar")
+        raise SourceError(f"{name}: not an OpenCV FileStorage file")
+    K = camera_matrix(_matrix(loaded, "camera_matrix", name), f"{name}: camera_matrix")
+    T = rigid_transform(_matrix(loaded, "T_camera_lidar", name), f"{name}: T_camera_lidar")
     lens = "distortion_coefficients"
-    distortion = _matrix(loaded, lens, path).ravel() if loaded.get(lens) is not None else np.zeros(0)
+    distortion = _matrix(loaded, lens, name).ravel() if loaded.get(lens) is not None else np.zeros(0)
     if len(distortion) not in _LENGTHS or not np.all(np.isfinite(distortion)):
-        raise SourceError(f"{path.name}: {len(distortion)} distortion coefficients; 4, 5 or 8 are supported")
+        raise SourceError(f"{name}: {len(distortion)} distortion coefficients; 4, 5 or 8 are supported")
     width, height = (_pixels(loaded.get(f"image_{side}")) for side in ("width", "height"))
     if (width, height) == (0, 0) and size is not None:
         width, height = size
     if min(width, height) < 16:
-        raise SourceError(f"{path.name}: no image_width and image_height")
+        raise SourceError(f"{name}: no image_width and image_height")
     camera = CameraCalibration(K, distortion if np.any(distortion) else np.zeros(0), T, width, height)
-    check_looks_ahead(camera, path.name)
+    check_looks_ahead(camera, name)
     return camera
 
 
@@ -57,18 +59,18 @@ def write(path: Path, camera: CameraCalibration) -> None:
     path.write_text(storage.releaseAndGetString(), encoding="utf-8")
 
 
-def _matrix(loaded: dict[Any, Any], name: str, path: Path) -> F64:
+def _matrix(loaded: dict[Any, Any], name: str, file: str) -> F64:
     """As OpenCV writes one: ``rows``, ``cols`` and ``data``."""
     node = loaded.get(name)
     if node is None:
-        raise SourceError(f"{path.name}: no {name}")
+        raise SourceError(f"{file}: no {name}")
     try:
         rows, columns = int(node["rows"]), int(node["cols"])
         if min(rows, columns) < 1 or rows * columns > _MOST_NUMBERS:
             raise ValueError
         return np.asarray(node["data"], dtype=np.float64).reshape(rows, columns)
     except (KeyError, TypeError, ValueError, OverflowError):
-        raise SourceError(f"{path.name}: {name} is not a matrix of OpenCV") from None
+        raise SourceError(f"{file}: {name} is not a matrix of OpenCV") from None
 
 
 def _pixels(value: Any) -> int:

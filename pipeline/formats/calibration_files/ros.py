@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from pipeline.common.files.user_file_errors import read_yaml
 from pipeline.common.geometry import inverse, rotation
+from pipeline.formats.calibration_files.contents import CalibrationFiles, yaml_mapping
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
@@ -22,8 +22,8 @@ _MODELS = {"plumb_bob": (4, 5), "rational_polynomial": (8,)}
 _ANGLES = ("roll", "pitch", "yaw")
 
 
-def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
-    info, transform = (_mapping(path / name) for name in (INFO, TRANSFORM))
+def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibration:
+    info, transform = (yaml_mapping(files, name) for name in (INFO, TRANSFORM))
     try:
         K = camera_matrix(np.reshape(info["camera_matrix"]["data"], (3, 3)), f"{INFO}: camera_matrix")
         distortion = np.asarray(info.get("distortion_coefficients", {}).get("data", []), dtype=np.float64)
@@ -34,7 +34,7 @@ def read(path: Path, size: tuple[int, int] | None) -> CameraCalibration:
         child = str(transform["child_frame_id"]).lstrip("/")
         T_parent_child = _transform(transform["transform"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise SourceError(f"{path.name}: incomplete camera info or transform: {error}") from None
+        raise SourceError(f"{INFO}, {TRANSFORM}: incomplete camera info or transform: {error}") from None
     if np.any(distortion) and len(distortion) not in _MODELS.get(model, ()):
         raise SourceError(f"{INFO}: {model} with {len(distortion)} numbers is not supported")
     if own not in (parent, child):
@@ -69,13 +69,6 @@ def write(path: Path, camera: CameraCalibration) -> None:
     }
     for name, content in ((INFO, info), (TRANSFORM, transform)):
         (path / name).write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
-
-
-def _mapping(path: Path) -> dict[str, Any]:
-    loaded = read_yaml(path, path.name, SourceError)
-    if not isinstance(loaded, dict):
-        raise SourceError(f"{path.name}: expected names with values")
-    return loaded
 
 
 def _transform(given: dict[str, Any]) -> F64:

@@ -1,7 +1,8 @@
 /** The two fits to the whole recording: the alignment of LiDAR and camera, and the time offsets of the sensors. */
 import { el } from "../core/dom.js";
-import { get } from "../core/store.js";
+import { get, on } from "../core/store.js";
 import { fitJob } from "./fit_job.js";
+import { labelOf } from "./parameter_values.js";
 import { save as saveVersion } from "./versions.js";
 
 const yaml = el("a", {
@@ -12,6 +13,21 @@ const yaml = el("a", {
 });
 yaml.setAttribute("download", "cipv-alignment.yaml");
 
+const model = () => get("params")?.values["alignment.model"] ?? "pinhole";
+
+const position = el("input", { type: "checkbox" });
+/** Whether a fit moves the camera, too. */
+export const positionSwitch = el(
+  "label",
+  { class: "check", title: "Also fit the camera's lateral and vertical position; makes the angles less certain" },
+  position,
+  "Position",
+);
+on(["params"], () => {
+  position.disabled = model() !== "pinhole"; // the angular model has no position
+  positionSwitch.classList.toggle("is-off", position.disabled);
+});
+
 /** The button with its progress, and the panel with the result. */
 export const alignmentFit = fitJob(
   /** @type {import("./fit_job.js").FitKind<import("../core/types.js").AlignmentFitResult>} */ ({
@@ -20,10 +36,10 @@ export const alignmentFit = fitJob(
     running: "Fitting the alignment",
     panel: "Fitted alignment",
     address: "api/alignment/fit",
-    asked: () => ({ model: get("params")?.values["alignment.model"] ?? "pinhole" }),
+    asked: () => ({ model: model(), offset: model() === "pinhole" && position.checked }),
     heading: ({ pairs, frames }) => `Fitted to ${pairs} vehicles in ${frames} frames`,
     said: (found) => found.text,
-    label: (name) => name.replace("alignment.", "").replace(/_(deg|px|m)$/, ""),
+    label: labelOf,
     more: yaml,
     applied: () => saveVersion("Fit"), // its score belongs to the fit that the server still has
   }),

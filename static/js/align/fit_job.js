@@ -6,16 +6,9 @@ import { request } from "../core/api.js";
 import { el, text } from "../core/dom.js";
 import { get, on } from "../core/store.js";
 import { change } from "../panels/params.js";
+import { withUnit } from "./parameter_values.js";
 
 const POLL_MS = 300;
-const UNITS = [
-  ["res_deg", " °/px", 5],
-  ["_deg", "°", 2],
-  ["_px", " px", 1],
-  ["_ms", " ms", 1],
-  ["_m", " m", 2],
-];
-
 /**
  * @typedef {object} Found
  * @property {Record<string, number|string>} changes
@@ -109,8 +102,8 @@ export function fitJob(kind) {
         el("dt", { textContent: kind.label(name) }),
         el(
           "dd",
-          { textContent: number(name, Number(changes[name])) },
-          el("small", { textContent: ` ± ${number(name, sigma)}` }),
+          { textContent: withUnit(name, Number(changes[name])) },
+          el("small", { textContent: ` ± ${withUnit(name, sigma)}` }),
         ),
       ]),
     );
@@ -151,10 +144,4 @@ export function fitJob(kind) {
   }
 
   return { control: el("span", { class: "fit-control" }, button, running), panel };
-}
-
-/** @param {string} name @param {number} value */
-function number(name, value) {
-  const [, unit, digits] = UNITS.find(([end]) => name.endsWith(String(end))) ?? ["", "", 3];
-  return `${value.toFixed(Number(digits))}${unit}`;
 }

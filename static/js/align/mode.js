@@ -6,7 +6,8 @@ import { newestOnly, request } from "../core/api.js";
 import { $, el, press, text } from "../core/dom.js";
 import { get, on, set } from "../core/store.js";
 import { change, reveal } from "../panels/params.js";
-import { alignmentFit, timeFit } from "./fit.js";
+import { filesButton, filesPanel } from "./files.js";
+import { alignmentFit, positionSwitch, timeFit } from "./fit.js";
 import { drawRegions, rangesRow, regionsButton, showRegions } from "./regions.js";
 import { versionsButton, versionsPanel } from "./versions.js";
 import { followHand } from "./pointer.js";
@@ -47,8 +48,10 @@ export function setUp() {
     el("span", { class: "facts match", textContent: "Match" }),
     score,
     alignmentFit.control,
+    positionSwitch,
     timeFit.control,
     versionsButton,
+    filesButton,
     el("span", { class: "spacer" }),
     how,
     blendSlider(),
@@ -58,7 +61,7 @@ export function setUp() {
   bar.after(rangesRow, el(
       "div",
       { class: "fit-place" },
-      el("div", { class: "fits" }, alignmentFit.panel, timeFit.panel),
+      el("div", { class: "fits" }, alignmentFit.panel, timeFit.panel, filesPanel),
       versionsPanel,
     ),
   );

@@ -264,6 +264,12 @@
  * @property {string} text
  * @property {string[]} warnings
  *
+ * @typedef {object} AlignmentImport
+ * @property {string} format
+ * @property {Record<string, number|string>} changes
+ * @property {string} text
+ * @property {string[]} warnings
+ *
  * @typedef {object} TimeFitResult
  * @property {Record<string, number>} changes
  * @property {Record<string, number>} sigmas

@@ -21,6 +21,7 @@ const MODEL_OF = {
   "alignment.yaw_deg": "pinhole",
   "alignment.pitch_deg": "pinhole",
   "alignment.roll_deg": "pinhole",
+  "alignment.forward_m": "pinhole",
   "alignment.left_m": "pinhole",
   "alignment.up_m": "pinhole",
 };

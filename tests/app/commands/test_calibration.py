@@ -40,7 +40,8 @@ def test_a_recordings_calibration_goes_through_every_format_with_its_correction(
 
 
 def test_a_format_that_lacks_something_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(str(tmp_path / "none.txt"), "--format", "kitti", "--out", str(tmp_path / "out.yaml")) == 2
+    (tmp_path / "calib.txt").write_text("P2: 1")
+    assert run(str(tmp_path / "calib.txt"), "--format", "kitti", "--out", str(tmp_path / "out.yaml")) == 2
     assert "image size" in capsys.readouterr().err
 
 

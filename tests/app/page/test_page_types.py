@@ -16,6 +16,7 @@ from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
+from app.web.routes.alignment.files import ImportJson
 from app.web.routes.alignment.fit import FitResult
 from app.web.routes.alignment.progress import FitProgress
 from app.web.routes.alignment.time import TimeFitResult
@@ -107,6 +108,7 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "FitProgress": dict.fromkeys(FitProgress.model_fields),
         "AlignmentVersion": client.post("/api/alignment/versions", json={"note": ""}).json(),
         "AlignmentFitResult": dict.fromkeys(FitResult.model_fields),
+        "AlignmentImport": dict.fromkeys(ImportJson.model_fields),
         "TimeFitResult": dict.fromkeys(TimeFitResult.model_fields),
         **labelled(engine, client),
     }

@@ -86,7 +86,7 @@ def alignment_fit_router(engine: Engine, fitting: AlignmentFitting) -> APIRouter
         job = fitting.job
         if job is None or job.result is None:
             raise HTTPException(404, "there is no fit")
-        section = {"alignment": {"model": job.result.model, **job.result.values}}
+        section = {"alignment": job.result.section}
         headers = {"content-disposition": 'attachment; filename="cipv-alignment.yaml"'}
         return Response(yaml.safe_dump(section, sort_keys=False), media_type="application/yaml", headers=headers)
 

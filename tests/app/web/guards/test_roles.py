@@ -49,7 +49,7 @@ GET /api/labels/formats · GET /api/labels/export · GET /api/labels/export/note
 GET /api/labels/versions/{name} · GET /api/labels/agreement ·
 GET /api/jobs · GET /api/jobs/{number} · GET /api/jobs/{number}/file ·
 GET /api/alignment/score · GET /api/alignment/fit · GET /api/alignment/fit.yaml · GET /api/alignment/versions ·
-GET /api/alignment/time ·
+GET /api/alignment/time · GET /api/alignment/export ·
 GET /api/rerun/open · GET /api/rerun.rrd · GET /openapi.json · HEAD /openapi.json ·
 WEBSOCKET /api/stream · GET /rerun/re_viewer.js · GET /rerun/re_viewer_bg.wasm · GET /rerun/ · GET /help ·
 GET /help/{address:path} · GET /palette.css · GET / · HEAD /
@@ -60,7 +60,8 @@ POST /api/params/redo · POST /api/params/preset · DELETE /api/marks/{number} �
 POST /api/runs/{number}/base · POST /api/runs/{number}/use · DELETE /api/runs/{number} · POST /api/labels/act ·
 POST /api/labels/queue · POST /api/labels/undo · POST /api/labels/redo · POST /api/clip ·
 DELETE /api/jobs/{number} · POST /api/alignment/fit · POST /api/alignment/time · DELETE /api/alignment/time ·
-DELETE /api/alignment/fit · POST /api/alignment/versions · DELETE /api/alignment/versions/{number} ·
+DELETE /api/alignment/fit · POST /api/alignment/import ·
+POST /api/alignment/versions · DELETE /api/alignment/versions/{number} ·
 POST /api/project · POST /api/project/ray · WEBSOCKET /viser · WEBSOCKET /viser/ · GET /api/fleet ·
 GET /api/fleet/rows · GET /api/fleet/histogram · GET /api/fleet/counts · WEBSOCKET /viser/of/{name} ·
 GET /viser/of/{name}/{path:path} · GET /viser · GET /viser/{path:path}

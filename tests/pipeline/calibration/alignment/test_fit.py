@@ -49,6 +49,15 @@ def test_a_camera_that_sits_elsewhere_is_found():
     assert fit.values["yaw_deg"] == pytest.approx(1.3, abs=0.3)
 
 
+def test_angles_alone_are_fitted_to_the_position_that_the_camera_has():
+    place = {"forward_m": -0.3, "left_m": 0.4, "up_m": -0.3}
+    fit = fit_alignment(made(yaw_deg=1.3, pitch_deg=0.6, **place), "pinhole", AlignmentParams(**place))
+    assert fit.values["yaw_deg"] == pytest.approx(1.3, abs=0.15)
+    assert fit.values["pitch_deg"] == pytest.approx(0.6, abs=0.15)
+    assert fit.after.mean_iou > 0.8
+    assert {name: fit.changes[f"alignment.{name}"] for name in place} == place, "a file of the fit has them, too"
+
+
 ANGULAR = {"model": "angular", "h_res_deg": 0.062, "v_res_deg": 0.063, "cx_px": 690.0, "cy_px": 230.0}
 
 

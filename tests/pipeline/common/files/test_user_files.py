@@ -16,7 +16,7 @@ from pipeline.common.errors import BadInput
 from pipeline.common.files import user_files
 from pipeline.common.files.user_files import FOLDERS_VARIABLE, Overloaded, open_regular, read_regular
 from pipeline.evaluation.scores.results_file import read_results
-from pipeline.formats.calibration_files import opencv
+from pipeline.formats.calibration_files import FORMATS
 from pipeline.labels.classes import read_classes
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.params import Params, from_yaml
@@ -48,7 +48,7 @@ OPENERS: dict[str, tuple[str, Opens]] = {
     "signals": (".dbc", lambda path: load_dbc(Path(path))),
     "classes": (".yaml", lambda path: read_classes(Path(path))),
     "results": (".jsonl", lambda path: read_results(Path(path))),
-    "calibration": (".yaml", lambda path: opencv.read(Path(path), None)),
+    "calibration": (".yaml", lambda path: FORMATS["opencv"].read(Path(path), None)),
     "track beside images": (".gpx", lambda path: _with_a_track(Path(path))),
 }
 

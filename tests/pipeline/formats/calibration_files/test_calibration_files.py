@@ -49,7 +49,6 @@ def test_what_is_written_is_read(name: str, camera: CameraCalibration, tmp_path:
             written(name, camera, tmp_path)
         return
     read = FORMATS[name].read
-    assert read is not None
     same(read(written(name, camera, tmp_path), (camera.width, camera.height)), camera)
 
 
@@ -59,7 +58,7 @@ def test_a_rig_file_is_that_of_captures(tmp_path: Path):
 
 def test_kitti_needs_the_size(tmp_path: Path):
     with pytest.raises(SourceError, match="image size"):
-        FORMATS["kitti"].read(written("kitti", STRAIGHT, tmp_path), None)  # type: ignore[misc]
+        FORMATS["kitti"].read(written("kitti", STRAIGHT, tmp_path), None)
 
 
 TO_BODY = np.linalg.inv(T_OPTICAL_BODY)
@@ -80,7 +79,6 @@ LEFT[:3, :3] = rotation(0.0, 0.0, np.pi / 2)
 @pytest.mark.parametrize("name", ["kitti", "ros", "opencv", "kalibr"])
 def test_a_wrong_extrinsic_is_named_in_every_format(name: str, T_camera_ego: F64, named: str, tmp_path: Path):
     path, read = written(name, replace(STRAIGHT, T_camera_ego=T_camera_ego), tmp_path), FORMATS[name].read
-    assert read is not None
     with pytest.raises(SourceError, match=named):
         read(path, (STRAIGHT.width, STRAIGHT.height))
 
@@ -105,7 +103,6 @@ def changed(path: Path, **values: object) -> Path:
 def test_frames_say_which_way_a_transform_of_ros_goes(tmp_path: Path):
     folder = written("ros", replace(STRAIGHT, T_camera_ego=inverse(STRAIGHT.T_camera_ego)), tmp_path)
     read = FORMATS["ros"].read
-    assert read is not None
     with pytest.raises(SourceError, match="is its extrinsic inverted"):
         read(folder, None)
     turned = changed(folder, header={"frame_id": "lidar"}, child_frame_id="camera_optical")
@@ -126,7 +123,7 @@ def test_rotations_that_are_none_are_refused(rotation_: dict[str, float], named:
     folder = written("ros", STRAIGHT, tmp_path)
     changed(folder, transform={"translation": {"x": 0.0, "y": 0.0, "z": 0.0}, "rotation": rotation_})
     with pytest.raises(SourceError, match=named):
-        FORMATS["ros"].read(folder, None)  # type: ignore[misc]
+        FORMATS["ros"].read(folder, None)
 
 
 FOUR = replace(STRAIGHT, distortion=BENT.distortion[:4])
@@ -142,17 +139,17 @@ def chain(folder: Path, **values: object) -> Path:
 
 
 def test_kalibr_takes_the_transform_from_either_place_and_either_way(tmp_path: Path):
-    same(kalibr.read(written("kalibr", FOUR, tmp_path), None), FOUR)
+    same(FORMATS["kalibr"].read(written("kalibr", FOUR, tmp_path), None), FOUR)
     inside = chain(tmp_path / "a", T_lidar_cam=inverse(FOUR.T_camera_ego).tolist())
     (inside / kalibr.TRANSFORM).unlink()
-    same(kalibr.read(inside, None), FOUR)
+    same(FORMATS["kalibr"].read(inside, None), FOUR)
     beside = written("kalibr", FOUR, tmp_path / "b")
     (beside / kalibr.TRANSFORM).write_text(yaml.safe_dump({"T_cam_lidar": inverse(FOUR.T_camera_ego).tolist()}))
     with pytest.raises(SourceError, match="is its extrinsic inverted"):
-        kalibr.read(beside, None)
+        FORMATS["kalibr"].read(beside, None)
     (beside / kalibr.TRANSFORM).unlink()
     with pytest.raises(SourceError, match="no T_cam_lidar"):
-        kalibr.read(beside, None)
+        FORMATS["kalibr"].read(beside, None)
 
 
 @pytest.mark.parametrize(
@@ -168,14 +165,14 @@ def test_kalibr_takes_the_transform_from_either_place_and_either_way(tmp_path: P
 )
 def test_what_kalibr_says_and_cannot_be_meant_is_named(values: dict[str, object], named: str, tmp_path: Path):
     with pytest.raises(SourceError, match=named):
-        kalibr.read(chain(tmp_path, **values), None)
+        FORMATS["kalibr"].read(chain(tmp_path, **values), None)
 
 
 def test_a_file_of_something_else_is_refused(tmp_path: Path):
     file = tmp_path / "other.yaml"
     file.write_text("%YAML:1.0\n---\nimage_width: 640\n")
     with pytest.raises(SourceError, match="no camera_matrix"):
-        FORMATS["opencv"].read(file, None)  # type: ignore[misc]
+        FORMATS["opencv"].read(file, None)
 
 
 @pytest.mark.parametrize(
@@ -193,7 +190,7 @@ def test_a_damaged_file_of_opencv_is_said_in_a_sentence(text: str, said: str, tm
     file = tmp_path / "a.yaml"
     file.write_text("%YAML:1.0\n---\n" + text)
     with pytest.raises(SourceError, match=said):
-        FORMATS["opencv"].read(file, None)  # type: ignore[misc]
+        FORMATS["opencv"].read(file, None)
 
 
 def test_no_file_is_given_to_opencvs_own_parser(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -206,5 +203,4 @@ def test_no_file_is_given_to_opencvs_own_parser(tmp_path: Path, monkeypatch: pyt
 
     monkeypatch.setattr(cv2, "FileStorage", only_written)
     read = FORMATS["opencv"].read
-    assert read is not None
     same(read(path, None), BENT)
