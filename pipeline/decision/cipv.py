@@ -24,6 +24,8 @@ from pipeline.params import CipvParams
 from pipeline.types import Cipv, FusedObject, Moment, Path, Rejection, sensors_in_words
 
 AGREEMENT_SIGMAS = 3.0
+_APPROACH_M = 4.0
+"""By so much a distance may change between two frames: 40 m/s for a tenth of a second."""
 _BLUR_M = 0.2
 """Sightings of an object that moves sideways are averaged over at most the time in which it moves this far."""
 _HOVERS_MPS = 1.0
@@ -34,6 +36,17 @@ _HALF_WAY = 0.7
 predicted position at that time."""
 
 
+class LastPlace(NamedTuple):
+    """What an object's position was based on in the previous frame."""
+
+    camera_ranges: int
+    """Number of distances that the camera's position was based on."""
+    distance_m: float | None
+    """Its distance."""
+    sigma_m: float | None
+    """Standard deviation of that; None if a ranging sensor measured it."""
+
+
 @dataclass(frozen=True)
 class CipvState:
     """State from one frame to the next."""
@@ -42,8 +55,8 @@ class CipvState:
     """The CIPV."""
     odds: dict[int, float] = field(default_factory=dict)
     """By object id, running mean of the log-odds that the object is in the path."""
-    camera_ranges: dict[int, int] = field(default_factory=dict)
-    """By object id, number of distances that the camera's position was based on."""
+    places: dict[int, LastPlace] = field(default_factory=dict)
+    """By object id."""
     driving_s: dict[int, float] = field(default_factory=dict)
     """By object id, time for which it was seen to drive."""
 
@@ -96,9 +109,9 @@ def choose(
         rejected=tuple(_rejections(judged, lead)),
     )
     odds = {each.item.id: each.odds for each in judged if each.odds is not None}
-    ranges = {each.item.id: each.item.camera_ranges for each in judged}
+    at = {each.item.id: _placed(each.item) for each in judged}
     driving_s = {each.item.id: each.driving_s for each in judged if each.driving_s > 0.0}
-    return CipvState(lead.id if lead is not None else None, odds, ranges, driving_s), choice
+    return CipvState(lead.id if lead is not None else None, odds, at, driving_s), choice
 
 
 def _judge(
@@ -111,7 +124,7 @@ def _judge(
 ) -> _Judged:
     """Judge one object. placed: its position relative to the path, and when it will cross the edge."""
     where, crossing_s = placed if placed is not None else (None, None)
-    is_elsewhere = item.is_placed_anew(state.camera_ranges.get(item.id, 0))
+    is_elsewhere = _is_elsewhere(item, state.places.get(item.id))
     leads, widening_m, odds = item.id == state.lead_id and not is_elsewhere, 0.0, None
     clears_s = clears_path_s(where, item, moment.speed_mps, params)
     if where is not None:
@@ -145,6 +158,21 @@ def _judge(
         clears_path_s=clears_s,
     )
     return _Judged(item, odds, driving_s, verdict.why_not)
+
+
+def _placed(item: FusedObject) -> LastPlace:
+    return LastPlace(item.camera_ranges, item.distance_m, None if item.ranged else item.distance_sigma_m)
+
+
+def _is_elsewhere(item: FusedObject, before: LastPlace | None) -> bool:
+    """Whether nothing found out about its last position holds for this one: the camera starts anew, or a ranging sensor
+    finds it at a distance that contradicts the camera's."""
+    if before is None:
+        return False
+    if not item.ranged or before.sigma_m is None or before.distance_m is None or item.distance_m is None:
+        return item.is_placed_anew(before.camera_ranges)
+    spread_m = AGREEMENT_SIGMAS * hypot(before.sigma_m, item.distance_sigma_m or 0.0)
+    return abs(item.distance_m - before.distance_m) > spread_m + _APPROACH_M
 
 
 def _rejections(judged: list[_Judged], lead: FusedObject | None) -> Iterator[Rejection]:

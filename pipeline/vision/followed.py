@@ -148,11 +148,19 @@ def take_place(
             filtered = None
         elif not _is_plausible(filtered, ego_speed_mps):
             filtered = None
+        if filtered is None:
+            return take_place(_forgotten(followed), seen, guess, ego_speed_mps, params, slip_m)
     if filtered is None:
         filtered, placed = place_filter.start(sighting, guess.along_mps, guess.sigma_mps), 1
     height_from = _height_from(followed)
     track = with_place(followed.track, filtered, placed, share, returns=seen.returns, height_from=height_from)
     return evolve(followed, track=track, place_filter=filtered, placed=placed, unplaced_s=0.0, refused=0)
+
+
+def _forgotten(followed: Followed) -> Followed:
+    """The object without a place, and without the height on which that rested: its boxes show something else now, such
+    as a whole vehicle instead of half of one."""
+    return evolve(followed, place_filter=None, height=Height(), shape=BoxShape(), contact=RoadContact())
 
 
 def learned(followed: Followed, range_m: float, sigma_m: float, params: VisionTrackingParams) -> Followed:
@@ -168,7 +176,8 @@ def learned(followed: Followed, range_m: float, sigma_m: float, params: VisionTr
     ):
         return followed
     by_class_m = seen.distance_as(followed.track.label) or seen.distance_m
-    height = learn(followed.height, by_class_m, seen.noise_share, seen.size_share, range_m, sigma_m)
+    factor = _class_factor(followed.track.label, seen)
+    height = learn(followed.height, by_class_m, seen.noise_share, seen.size_share, range_m, sigma_m, factor)
     place = followed.place_filter
     if place is not None and height != followed.height:
         due = range_m / math.hypot(*place_filter.position(place))
@@ -190,13 +199,18 @@ def _hinted(followed: Followed, seen: VisionMeasurement, params: VisionTrackingP
     if followed.height.is_ranged:
         return evolve(followed, seen=seen, shape=shape, contact=contact)
     label = followed.track.label
-    factor = max(seen.class_factors.get(label, 1.0), 1.0)
+    factor = _class_factor(label, seen)
     height = hinted(shape if label == "car" else BoxShape(), contact, seen.size_share or 0.0, factor)
     height = height._replace(contradictions=followed.height.contradictions)
     place = followed.place_filter
     if place is not None and height.mean != followed.height.mean:
         place = place_filter.scaled(place, height.factor / followed.height.factor)
     return evolve(followed, seen=seen, shape=shape, contact=contact, height=height, place_filter=place)
+
+
+def _class_factor(label: str, seen: VisionMeasurement) -> float:
+    """By how much vehicles of that name may be lower than the name says: a lorry may be a car, a car is no lorry."""
+    return max(seen.class_factors.get(label, 1.0), 1.0)
 
 
 def _height_from(followed: Followed) -> HeightFrom:

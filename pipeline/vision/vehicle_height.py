@@ -49,7 +49,8 @@ _LOWEST, _TALLEST = -0.25, 0.45
 """ln(height / usual height of the class): of a sports car (1.2 m) among cars, and of a high van (2.4 m) among cars or a
 lorry (4 m) among trucks."""
 _MAX_SIGMAS = 2.0
-"""A contact that implies a height more standard deviations beyond these limits than this is rejected."""
+"""A contact that implies a height more standard deviations beyond these limits than this is rejected; so is a range
+that implies a lower one."""
 
 
 class BoxShape(NamedTuple):
@@ -146,9 +147,16 @@ def hinted(shape: BoxShape, contact: RoadContact, size_share: float, class_facto
 
 
 def learn(
-    height: Height, law_m: float, noise_share: float, size_share: float, range_m: float, range_sigma_m: float
+    height: Height,
+    law_m: float,
+    noise_share: float,
+    size_share: float,
+    range_m: float,
+    range_sigma_m: float,
+    class_factor: float = 1.0,
 ) -> Height:
-    """The height with one measured range taken in.
+    """The height with one measured range taken in. A range at which the box would be lower than any vehicle is not this
+    vehicle's, however often it is measured, or the box shows only a part of the vehicle: nothing is learned from it.
 
     Args:
         height: what was known.
@@ -156,12 +164,16 @@ def learn(
         noise_share: standard deviation of ln(law_m) from image to image.
         size_share: the same for the heights within the class: the prior.
         range_m, range_sigma_m: the measured distance.
+        class_factor: as for ``hinted``.
     """
     prior = (height.sigma if height.sigma is not None and height.is_ranged else size_share) ** 2
     if range_m < NEAREST_M:
         return height
     noise = noise_share**2 + (math.hypot(range_sigma_m, _SETBACK_M) / range_m) ** 2
-    surprise = math.log(range_m / law_m) - height.mean
+    implied = math.log(range_m / law_m)
+    if implied < _LOWEST - math.log(class_factor) - _MAX_SIGMAS * math.hypot(math.sqrt(noise), FLOOR_SHARE):
+        return height
+    surprise = implied - height.mean
     if surprise**2 > _MAX_SURPRISE * (prior + noise):
         if height.contradictions + 1 < _INSISTS:
             return height._replace(contradictions=height.contradictions + 1)

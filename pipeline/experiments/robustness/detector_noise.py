@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import combinations, pairwise
 from math import log
 
 import numpy as np
@@ -19,6 +19,12 @@ DOUBLE = 0.25
 RANGES_M = (0.0, 15.0, 25.0, 35.0, 45.0, 60.0, 80.0)
 VISIBLE = (1.0, 0.8, 0.4, 0.1)
 _LARGE = ("truck", "bus")
+_WIDE_STRIP = 0.1
+"""Narrower hidden strips, as a share of the height, disappear in the errors of single edges."""
+_BOXED_WELL_M = 12.0
+"""Nearer, boxes end at shadows and show more of a flank as one passes."""
+_LATER_S = 1.0, 3.0
+"""After this time, errors that change slowly are new; vehicles are rarely seen for longer."""
 _STEP_S = 0.15
 """Only frames at most this far apart show which errors persist from frame to frame."""
 
@@ -41,6 +47,8 @@ class JudgedVehicle:
     """Distance of its nearest face."""
     visible: float
     """Visible share, 0–1."""
+    hidden: F64
+    """(4,) by how much of the height each edge of the visible part lies inside its true box, signed as ``offs``."""
     found: Detection | None
     """The box that was found for it; None if it was missed."""
     offs: F64 | None
@@ -84,8 +92,10 @@ def summed_up(counted: Counted, measured_on: Sequence[str]) -> MeasuredNoise:
         missed_again=_missed_again(counted.seen),
         across_share=round(float(lasting[[0, 2]].mean()), 4),
         up_share=round(float(lasting[[1, 3]].mean()), 4),
+        wanders=_wanders([seen for seen in clear if seen.range_m > _BOXED_WELL_M]),
         frame_share=round(float(white.mean()), 4),
         frame_px=round(_white_px(clear), 2),
+        hidden_cut=_hidden_cut(counted.seen, np.median(offs, axis=0)),
         score=tuple(_quantiles([s.found.score for s in each if s.found is not None]) for each in bins),
         car_called=_called([seen for seen in clear if seen.label not in (*_LARGE, "motorcycle")], "car"),
         large_called=_called([seen for seen in clear if seen.label in _LARGE], "truck"),
@@ -126,12 +136,50 @@ def _white(seen: Sequence[JudgedVehicle]) -> F64:
     return _spread(np.array(steps)) / np.sqrt(2.0) if len(steps) > 20 else np.full(4, 0.03)
 
 
+def _wanders(seen: Sequence[JudgedVehicle]) -> float:
+    """Share of the lasting variance of edges by which the errors of one vehicle differ after seconds."""
+    steps = [
+        (b.offs - a.offs) / np.sqrt(2.0)
+        for track in _tracks(seen)
+        for a, b in combinations(track, 2)
+        if a.offs is not None and b.offs is not None and _LATER_S[0] < b.t_s - a.t_s < _LATER_S[1]
+    ]
+    if len(steps) <= 20:
+        return 1.0
+    white = _white(seen) ** 2
+    lasting = _spread(np.array([each.offs for each in seen])) ** 2 - white
+    changed = np.maximum(_spread(np.array(steps)) ** 2 - white, 0.0)
+    return round(float(np.clip(np.mean(changed / lasting), 0.0, 1.0)), 3)
+
+
+def _tracks(seen: Sequence[JudgedVehicle]) -> list[list[JudgedVehicle]]:
+    """The sightings of each vehicle that has a track, in order of time."""
+    tracks: dict[tuple[int, int], list[JudgedVehicle]] = {}
+    for each in sorted(seen, key=lambda each: each.t_s):
+        if each.track is not None:
+            tracks.setdefault((each.recording, each.track), []).append(each)
+    return list(tracks.values())
+
+
 def _white_px(seen: Sequence[JudgedVehicle]) -> float:
     """White noise in pixels, of the vehicles with the smallest boxes, for which pixels matter instead of shares."""
     low = sorted(_followed(seen), key=lambda pair: pair[0].height_px)
     low = low[: max(len(low) // 3, 1)]
     steps = [(b.offs - a.offs) * a.height_px for a, b in low if a.offs is not None and b.offs is not None]
     return float(_spread(np.array(steps)).mean() / np.sqrt(2.0)) if len(steps) > 20 else 0.7
+
+
+def _hidden_cut(seen: Sequence[JudgedVehicle], usual: F64) -> float:
+    """By which share of a hidden strip boxes are smaller, the median over edges. usual: error of each edge of a vehicle
+    that is not hidden."""
+    cuts = [
+        (each.offs - usual)[edge] / each.hidden[edge]
+        for each in seen
+        if each.offs is not None and each.visible > VISIBLE[2]
+        for edge in range(4)
+        if abs(each.hidden[edge]) > _WIDE_STRIP
+    ]
+    return round(float(np.clip(np.median(cuts), 0.0, 1.0)), 3) if cuts else 0.0
 
 
 def _missed_again(seen: Sequence[JudgedVehicle]) -> float:

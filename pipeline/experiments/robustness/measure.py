@@ -25,7 +25,7 @@ from pipeline.labels.formats.kitti.files import read_tracking
 from pipeline.labels.model import Origin
 from pipeline.params import DetectionParams
 from pipeline.simulation.sensors.measured_noise import FILE
-from pipeline.simulation.sensors.truth_boxes import visible_share
+from pipeline.simulation.sensors.truth_boxes import visible_part
 from pipeline.sources import open_source
 from pipeline.types import VEHICLES, Box, CameraCalibration, Detection
 from pipeline.types.source import Source, TruthObject
@@ -113,10 +113,22 @@ def _compare(
         doubled = any(int(overlap[:, k].argmax()) == n and overlap[:, k].max() < _SAME for k in others)
         offs = (np.array(box.bbox) - place) / height if box is not None else None
         away_m = hypot(*item.cuboid.center[:2]) - item.cuboid.size[0] / 2
-        share = visible_share(place, [other for _, other in known[:n]])
+        shown, share = visible_part(place, [other for _, other in known[:n]])
+        hidden = (np.array(shown) - place) / height
         into.seen.append(
             JudgedVehicle(
-                recording, index, t_s, item.id, item.label, away_m, share, box, offs, height, is_found and doubled
+                recording,
+                index,
+                t_s,
+                item.id,
+                item.label,
+                away_m,
+                share,
+                hidden,
+                box,
+                offs,
+                height,
+                is_found and doubled,
             )
         )
     scale = _FOCAL_PX / float(camera.K[0, 0])

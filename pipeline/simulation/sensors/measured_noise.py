@@ -47,13 +47,18 @@ class MeasuredNoise(ScenarioPart):
     """Correlation between frames 0.1 s apart of the variable that decides whether a vehicle is missed: misses come in
     bursts."""
     across_share: float = Field(ge=0.0)
-    """Standard deviation of the left and right edge, share of the box's height: the constant part."""
+    """Standard deviation of the left and right edge, share of the box's height: the part that lasts."""
     up_share: float = Field(ge=0.0)
     """The same of the upper and lower edge."""
+    wanders: float = Field(ge=0.0, le=1.0)
+    """Share of the variance of these two that changes within seconds; the rest is constant for a vehicle."""
     frame_share: float = Field(ge=0.0)
     """Of each edge, share of the height, new in each frame."""
     frame_px: float = Field(ge=0.0)
     """The minimum of that, at a focal length of 907 px."""
+    hidden_cut: float = Field(ge=0.0, le=1.0)
+    """By which share of a strip that nearer vehicles hide a box is smaller: 0 where boxes show the whole vehicle, 1
+    where they show the visible part. Nearer vehicles do not fill their boxes, so even the latter gives less than 1."""
     score: tuple[tuple[float, ...], ...]
     """Quantiles of the scores of detected vehicles, by range."""
     car_called: dict[str, float]

@@ -5,6 +5,7 @@ are missed more often, and hidden ones are not detected. There are no false posi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +29,8 @@ LAW = DistanceLaw(
 )
 """The distance law of true boxes: a pinhole camera's, for vehicles of the simulator's usual height."""
 _SCORE = 0.9
-_SAMPLES = 12
+_SAMPLES = 24
+"""Along each side of a box."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class VisibleVehicle:
     """Whose box it is."""
     bbox: Box
     """In pixels, without errors."""
+    shown: Box
+    """The smallest box around the part that no nearer vehicle covers; ``bbox`` if all is covered."""
     visible: float
     """Share of the box not covered by nearer vehicles."""
 
@@ -78,17 +82,25 @@ def in_image(now: World, camera: CameraCalibration) -> tuple[VisibleVehicle, ...
     for n, bbox in zip(ahead.tolist(), boxes, strict=True):
         state = now.actors[-1 - n]
         if bbox is not None:
-            seen.append(VisibleVehicle(state, bbox, visible_share(bbox, nearer)))
+            seen.append(VisibleVehicle(state, bbox, *visible_part(bbox, nearer)))
             nearer.append(bbox)
     return tuple(seen)
 
 
-def visible_share(bbox: Box, nearer: list[Box]) -> float:
-    """The share of a box that none of the nearer boxes covers, by sampling."""
+def visible_part(bbox: Box, nearer: Sequence[Box]) -> tuple[Box, float]:
+    """The smallest box around what none of the nearer boxes covers, and its share of ``bbox``, by sampling. Where all
+    is covered: ``bbox`` and 0."""
     if not nearer:
-        return 1.0
-    steps = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
-    u: F64 = (bbox[0] + steps * (bbox[2] - bbox[0]))[:, None, None]
-    v: F64 = (bbox[1] + steps * (bbox[3] - bbox[1]))[None, :, None]
+        return bbox, 1.0
+    edges = np.linspace(0.0, 1.0, _SAMPLES + 1)
+    u_edges, v_edges = bbox[0] + edges * (bbox[2] - bbox[0]), bbox[1] + edges * (bbox[3] - bbox[1])
+    u: F64 = ((u_edges[:-1] + u_edges[1:]) / 2)[:, None, None]
+    v: F64 = ((v_edges[:-1] + v_edges[1:]) / 2)[None, :, None]
     x1, y1, x2, y2 = np.array(nearer).T
-    return 1.0 - float(((u > x1) & (u < x2) & (v > y1) & (v < y2)).any(axis=2).mean())
+    visible = ~((u > x1) & (u < x2) & (v > y1) & (v < y2)).any(axis=2)
+    columns, rows = np.flatnonzero(visible.any(axis=1)), np.flatnonzero(visible.any(axis=0))
+    if not len(columns):
+        return bbox, 0.0
+    left, right = u_edges[columns[0]], u_edges[columns[-1] + 1]
+    top, bottom = v_edges[rows[0]], v_edges[rows[-1] + 1]
+    return (float(left), float(top), float(right), float(bottom)), float(visible.mean())
