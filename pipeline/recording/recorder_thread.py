@@ -5,7 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 
@@ -44,7 +44,7 @@ class RecorderThread:
         self._lock = threading.Lock()
         self._is_working, self._is_closing, self._is_replaced = False, False, False
         self._job: Job | None = None
-        self._again: tuple[Do, ...] | None = None
+        self._again: deque[Do] | None = None
         self._unsaved: list[Do] = []
         self._noted: Counter[JobKind] = Counter()
         self._busy_since: tuple[float, float] | None = None
@@ -75,7 +75,7 @@ class RecorderThread:
                 self._jobs.drop(self._job.kind, _HUNG)
                 self._jobs.done += 1
             fresh = RecorderThread(self.segments, self._jobs, self._on_failed)
-            fresh._again, fresh._noted = tuple(self._unsaved), self._noted
+            fresh._again, fresh._noted = deque((*self._unsaved, *(self._again or ()))), self._noted
             return fresh
 
     def what_is_slow(self) -> str:
@@ -93,8 +93,8 @@ class RecorderThread:
             if self._again is not None:
                 with self._working("opening a file"):
                     self.segments = self.segments.continued()
-                for do in self._again:
-                    self._write(do, "recording again")
+                while self._again:
+                    self._write(self._again.popleft(), "recording again")
             self._write_all()
             self._is_closing = True
             with self._working("closing the file"):
