@@ -22,7 +22,9 @@ class Job(NamedTuple):
     """Something to write."""
 
     do: Do
+    """Writes it."""
     kind: JobKind
+    """What is counted if it is dropped."""
     bytes: int
     """Size of a message between frames; 0 for what is counted by number."""
 
