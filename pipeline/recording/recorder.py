@@ -22,7 +22,7 @@ from pipeline.recording.recording_state import RecordingState
 from pipeline.recording.segments import NEVER, FileRotation, Segments
 from pipeline.recording.session.provenance import About
 from pipeline.recording.session.velodyne_scan import RawLidar
-from pipeline.recording.write_queue import Do, Job, JobKind, WriteQueue
+from pipeline.recording.write_queue import Do, JobKind, WriteJob, WriteQueue
 from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep
 from pipeline.types.camera_shot import Shot
 
@@ -184,7 +184,7 @@ class Recorder:
         """Queue it, if there is room for one more of its kind, or for this many bytes of messages between frames."""
         if self._error is not None:
             return False
-        is_queued = self._jobs.put(Job(do, kind, size), self._thread.what_is_slow)
+        is_queued = self._jobs.put(WriteJob(do, kind, size), self._thread.what_is_slow)
         if not is_queued and self._jobs.dropped().total() == 1:
             logger.warning("%s: %s, %s were dropped", self._file(), self._jobs.because, kind)
         return is_queued

@@ -11,7 +11,7 @@ from contextlib import contextmanager, nullcontext, suppress
 
 from pipeline.common.watchdog import Stuck, Watchdog, at_work
 from pipeline.recording.segments import Segments
-from pipeline.recording.write_queue import Do, Job, JobKind, WriteQueue
+from pipeline.recording.write_queue import Do, JobKind, WriteJob, WriteQueue
 
 FLUSH_S, SYNC_S = 1.0, 5.0
 
@@ -43,7 +43,7 @@ class RecorderThread:
         self._jobs, self._on_failed = jobs, on_failed
         self._lock = threading.Lock()
         self._is_working, self._is_closing, self._is_replaced = False, False, False
-        self._job: Job | None = None
+        self._job: WriteJob | None = None
         self._again: deque[Do] | None = None
         self._unsaved: list[Do] = []
         self._noted: Counter[JobKind] = Counter()
@@ -137,14 +137,14 @@ class RecorderThread:
         self._write_marks()
         self._note_dropped()
 
-    def _do(self, job: Job) -> None:
+    def _do(self, job: WriteJob) -> None:
         if time.monotonic() > self._jobs.ends_by_s:
             self._jobs.drop(job.kind, ENDED)
         else:
             self._write(job.do, f"recording {job.kind}", job)
         self._jobs.done += 1
 
-    def _write(self, do: Do, doing: str, job: Job | None = None) -> None:
+    def _write(self, do: Do, doing: str, job: WriteJob | None = None) -> None:
         before = self.segments.bytes_written
         with self._working(doing, job):
             do(self.segments)
@@ -154,7 +154,7 @@ class RecorderThread:
             self._unsaved.append(do)
 
     @contextmanager
-    def _working(self, doing: str, job: Job | None = None) -> Iterator[None]:
+    def _working(self, doing: str, job: WriteJob | None = None) -> Iterator[None]:
         """An operation that may hang. Raises _Replaced if it took so long that another thread has taken over."""
         with self._lock:
             self._is_working, self._job = True, job

@@ -18,7 +18,7 @@ Do = Callable[[Segments], None]
 JobKind = Literal["frames", "packets", "sweeps", "images", "samples"]
 
 
-class Job(NamedTuple):
+class WriteJob(NamedTuple):
     """Something to write."""
 
     do: Do
@@ -35,7 +35,7 @@ class WriteQueue:
 
     def __init__(self, most: int) -> None:
         self._most = most
-        self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
+        self._jobs: queue.SimpleQueue[WriteJob | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self.waiting: Counter[JobKind] = Counter()
         """Jobs by kind."""
@@ -54,7 +54,7 @@ class WriteQueue:
     def is_empty(self) -> bool:
         return self._jobs.empty()
 
-    def put(self, job: Job, why: Callable[[], str]) -> bool:
+    def put(self, job: WriteJob, why: Callable[[], str]) -> bool:
         """Queue it, if there is room for one more of its kind, or for its bytes; else count it as dropped. why: asked
         for the cause."""
         with self._lock:
@@ -76,7 +76,7 @@ class WriteQueue:
         """No more jobs follow."""
         self._jobs.put(None)
 
-    def take(self, within_s: float) -> Job | None:
+    def take(self, within_s: float) -> WriteJob | None:
         """The next job; None after the last one. queue.Empty if there is none in time."""
         job = self._jobs.get(timeout=within_s)
         if job is not None:
