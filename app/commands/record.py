@@ -20,6 +20,7 @@ from app.core.session_folder import SESSIONS
 from app.core.stop_signals import asked_to_stop
 from app.engine.session_recording import new_session
 from pipeline.common.errors import BadInput
+from pipeline.common.watchdog import Watchdog
 from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.recording.recorder import Recorder
@@ -78,8 +79,9 @@ class Record:
     def _live(self, source: LiveSource, params: Params, asked: Event) -> int:
         """Record from live sensors, which do not wait: what the disk or the machine is too slow for is
         dropped and counted."""
-        detectors, waiting = self.pipeline.open_detectors(source), Waiting(source)
-        recorder = self._recorder(source, detectors)
+        detectors, waiting, watchdog = self.pipeline.open_detectors(source), Waiting(source), Watchdog()
+        recorder = self._recorder(source, detectors, watchdog)
+        watchdog.start()
 
         def on_silence() -> None:
             _end_if(asked)
@@ -99,6 +101,7 @@ class Record:
         finally:
             source.tap(None)
             state = recorder.stop()
+            watchdog.stop()
         if state.frames == 0 and state.error is None:
             state.file.unlink(missing_ok=True)
             print("cipv: no data received; nothing saved", file=sys.stderr)
@@ -115,14 +118,15 @@ class Record:
             print(f"cipv: {state.error}", file=sys.stderr)
         return 0 if state.error is None else 1
 
-    def _recorder(self, source: LiveSource, detectors: Detectors) -> Recorder:
+    def _recorder(self, source: LiveSource, detectors: Detectors, watchdog: Watchdog) -> Recorder:
         """A recorder of point clouds, or with --packets of raw packets."""
         path, mount = new_session(self.out, source.title), source.lidar_mount
         if not self.packets:
-            return Recorder(path, about(source, detectors), self._rotation)
+            return Recorder(path, about(source, detectors), self._rotation, watchdog=watchdog)
         if mount is None:
             raise BadInput(f"--packets: {source.uri} has no LiDAR")
-        return Recorder(path, about(source, detectors), self._rotation, raw_lidar=RawLidar(*mount))
+        raw = RawLidar(*mount)
+        return Recorder(path, about(source, detectors), self._rotation, raw_lidar=raw, watchdog=watchdog)
 
     @property
     def _rotation(self) -> FileRotation:

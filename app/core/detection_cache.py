@@ -8,7 +8,7 @@ from typing import Protocol, cast
 
 from app.core.kept_detections import KeptDetections, seen_mark
 from app.core.lru import BoundedCache
-from app.core.watchdog import NETWORK, at_work
+from pipeline.common.watchdog import NETWORK, at_work
 from pipeline.detection import Detects, Seen
 from pipeline.sources.fingerprint import fingerprint
 from pipeline.types import U8, CameraImage, Frame, RawBoxes, RawLanes

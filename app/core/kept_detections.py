@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import queue
 import sqlite3
 import threading
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -29,6 +31,11 @@ _LOOK_EVERY = 500
 """The size is checked after this many new detections."""
 _BUSY_S = 0.2
 """Another server may be writing; a network is not much slower than a longer wait."""
+_ANSWER_S = 0.5
+"""A network takes about 0.1 to 0.5 s: it is not worth waiting longer for its earlier answer."""
+_MOST_WAITING = 256
+"""Detections, of some 5 kB each, that may wait for the disk."""
+_CLOSING_S = 1.0
 _LEVEL = 1
 _CODE = ("vision", "lanes", "inference")
 """Packages whose code decides what a network's detections are."""
@@ -109,18 +116,35 @@ def seen_mark(frame: Frame) -> bytes | None:
 
 class KeptDetections:
     """Detections in a file, by image and detector. Any thread; several processes may use the same file. A disk that
-    cannot be read or written only costs time: networks run again."""
+    cannot be read or written only costs time: networks run again. One that hangs holds nobody up: a thread of its own
+    uses the file, and an answer is waited for only briefly."""
 
     def __init__(self, file: Path, most_bytes: int = _MOST_BYTES) -> None:
         self._file, self._most_bytes = file, most_bytes
-        self._lock = threading.Lock()
         self._database: sqlite3.Connection | None = None
         self._is_off = False
         self._added = 0
+        self._late: Future[list[tuple[Any, ...]]] | None = None
+        self._waiting = threading.BoundedSemaphore(_MOST_WAITING)
+        self._tasks: queue.SimpleQueue[Callable[[], object] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._work, name="cipv-detections", daemon=True)
+        self._thread.start()
 
     def get(self, mark: bytes, detector: str) -> RawBoxes | RawLanes | None:
-        """The detections in the image with this ``seen_mark``; None if they are not kept."""
-        held = self._execute("SELECT answer FROM detections WHERE mark = ?", (_key(mark, detector),))
+        """The detections in the image with this ``seen_mark``; None if they are not kept, or not found in time."""
+        late = self._late
+        if self._is_off or (late is not None and not late.done()):
+            return None
+        sought: Future[list[tuple[Any, ...]]] = Future()
+        key = _key(mark, detector)
+        self._tasks.put(
+            lambda: sought.set_result(self._execute("SELECT answer FROM detections WHERE mark = ?", (key,)))
+        )
+        try:
+            held = sought.result(_ANSWER_S)
+        except TimeoutError:
+            self._late = sought
+            return None
         if not held:
             return None
         try:
@@ -130,15 +154,40 @@ class KeptDetections:
             return None
 
     def put(self, mark: bytes, detector: str, answer: RawBoxes | RawLanes) -> None:
-        """Keep the detections in an image."""
+        """Keep the detections in an image, later on; or not, if too many wait for the disk."""
+        if self._is_off or not self._waiting.acquire(blocking=False):
+            return
         packed = zlib.compress(msgspec.msgpack.encode(row_of(0, detector, answer)), _LEVEL)
-        self._execute("INSERT OR REPLACE INTO detections (mark, answer) VALUES (?, ?)", (_key(mark, detector), packed))
-        self._added += 1
-        if self._added % _LOOK_EVERY == 0:
-            self.drop_oldest()
+        key = _key(mark, detector)
+        self._tasks.put(lambda: self._store(key, packed))
 
     def drop_oldest(self) -> None:
-        """Drop the oldest detections if all of them take more space than permitted."""
+        """Drop the oldest detections if all of them take more space than permitted, after what waits is written."""
+        self._tasks.put(self._drop_oldest)
+
+    def close(self) -> None:
+        """Write what waits, and close the file; later calls find nothing. A disk that hangs is not waited for."""
+        self._tasks.put(None)
+        self._thread.join(_CLOSING_S)
+        self._is_off = True
+
+    # ------------------------------------------------------------ on its thread
+
+    def _work(self) -> None:
+        while (task := self._tasks.get()) is not None:
+            task()
+        self._is_off = True
+        if self._database is not None:
+            self._database.close()
+
+    def _store(self, key: bytes, packed: bytes) -> None:
+        self._waiting.release()
+        self._execute("INSERT OR REPLACE INTO detections (mark, answer) VALUES (?, ?)", (key, packed))
+        self._added += 1
+        if self._added % _LOOK_EVERY == 0:
+            self._drop_oldest()
+
+    def _drop_oldest(self) -> None:
         taken = self._execute("SELECT coalesce(sum(length(answer)), 0), count(*) FROM detections")
         if taken and taken[0][0] > self._most_bytes:
             over = 1.0 - (1.0 - _DROPPED_SHARE) * self._most_bytes / taken[0][0]
@@ -147,29 +196,20 @@ class KeptDetections:
                 (max(1, int(over * taken[0][1])),),
             )
 
-    def close(self) -> None:
-        """Close the file; later calls find nothing."""
-        with self._lock:
-            self._is_off = True
-            if self._database is not None:
-                self._database.close()
-                self._database = None
-
     def _execute(self, sql: str, values: Iterable[object] = ()) -> list[tuple[Any, ...]]:
-        with self._lock:
-            if self._is_off:
-                return []
-            try:
-                if self._database is None:
-                    self._database = self._open()
-                with self._database:
-                    return self._database.execute(sql, tuple(values)).fetchall()
-            except sqlite3.OperationalError as error:  # busy, full or read-only: may pass
-                logger.debug("%s: %s", self._file, error)
-            except (sqlite3.Error, OSError) as error:
-                logger.warning("%s: detections are not cached: %s", self._file, error)
-                self._is_off = True
+        if self._is_off:
             return []
+        try:
+            if self._database is None:
+                self._database = self._open()
+            with self._database:
+                return self._database.execute(sql, tuple(values)).fetchall()
+        except sqlite3.OperationalError as error:  # busy, full or read-only: may pass
+            logger.debug("%s: %s", self._file, error)
+        except (sqlite3.Error, OSError) as error:
+            logger.warning("%s: detections are not cached: %s", self._file, error)
+            self._is_off = True
+        return []
 
     def _open(self) -> sqlite3.Connection:
         self._file.parent.mkdir(parents=True, exist_ok=True)

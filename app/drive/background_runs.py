@@ -11,13 +11,13 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from app.core.detection_cache import DetectionCache
-from app.core.watchdog import Stuck, Watchdog
 from app.drive.compute_scheduler import ComputeScheduler
 from app.drive.full_run import DriveRun
 from app.drive.look_ahead.worker import LookAhead
 from app.drive.open_recording import OpenRecording, RunSetup
 from pipeline.common.errors import BadInput
 from pipeline.common.files.user_files import Overloaded
+from pipeline.common.watchdog import Stuck, Watchdog
 from pipeline.inference.cancellation import Stopped
 from pipeline.params import Params
 from pipeline.step import State
@@ -68,10 +68,12 @@ class BackgroundRuns:
         self.turn = ComputeScheduler()
         self.on_change: Callable[[], object] = lambda: None
         self.on_stuck: Callable[[Stuck], object] = lambda stuck: None
+        self.on_trouble: Callable[[str], object] = lambda text: None
+        """Called on any thread with a sentence about the process for networks."""
         self.watchdog = Watchdog()
         self._detections = detections
         self._condition = threading.Condition(threading.RLock())
-        self._ahead = LookAhead(self.turn, self._wake)
+        self._ahead = LookAhead(self.turn, self._wake, lambda text: self.on_trouble(text))
         self._recording: OpenRecording | None = None
         self._ended = False
         self._revision = 0

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.core.detection_cache import DetectionCache
-from app.core.watchdog import at_work
 from app.drive.frame_inputs import InputStore
 from app.drive.full_run import DriveRun, KnownState, calibration_digest, digest
 from app.drive.run_registry import RunRegistry
 from pipeline.common.progress import Progress
+from pipeline.common.watchdog import at_work
 from pipeline.detection import Detectors, Look
 from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.params import Params

@@ -16,7 +16,6 @@ from app.core.control import Control, Wish
 from app.core.detection_cache import DetectionCache
 from app.core.jobs import BackgroundJob, JobStatus
 from app.core.stop_signals import SAVE_S
-from app.core.watchdog import Stuck, Watchdog, at_work
 from app.drive.background_runs import BackgroundRuns
 from app.drive.open_recording import RunSetup
 from app.engine.detector_pool import ABLATION_NOTICES, DetectorPool, OpenDetector, OpenLanes
@@ -28,10 +27,11 @@ from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Notice, Snapshot
 from app.engine.snapshot_publisher import SnapshotPublisher
-from app.engine.takeovers import Takeovers, stuck_notice
+from app.engine.takeovers import Takeovers, stuck_notice, trouble_notice
 from app.labels.service.desk import LabelDesk
 from pipeline.common.errors import first_line
 from pipeline.common.progress import Progress
+from pipeline.common.watchdog import Stuck, Watchdog, at_work
 from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.run import Sensors
@@ -90,12 +90,12 @@ class Engine:
         self._player: Player | None = None
         self.detectors = Detectors()
         """Detectors of the open source."""
-        self.watchdog = self.drives.watchdog = watchdog or Watchdog()
+        self.watchdog = self.drives.watchdog = self.desk.watchdog = watchdog or Watchdog()
         self.takeovers = Takeovers(self.watchdog, self._work, self._say_stuck, self.control.change, self.drives.turn)
 
     def start(self) -> None:
-        self.drives.on_change = self.control.change
-        self.drives.on_stuck = self._say_stuck
+        self.drives.on_change = self.desk.on_change = self.control.change
+        self.drives.on_stuck, self.drives.on_trouble = self._say_stuck, self._say_trouble
         self.drives.start()
         self.labels.start(self.control)
         self.takeovers.begin()
@@ -187,6 +187,11 @@ class Engine:
         others = tuple(notice for notice in self.snapshot.notices if f"({stuck.doing})" not in notice.text)
         said = stuck_notice(stuck, more, is_recording=self.desk.state is not None)
         self._publisher.publish(replace(self.snapshot, notices=(*others, said)))
+
+    def _say_trouble(self, text: str) -> None:
+        """The same for what needs no restart of this worker."""
+        others = tuple(notice for notice in self.snapshot.notices if notice.text != text)
+        self._publisher.publish(replace(self.snapshot, notices=(*others, trouble_notice(text))))
 
     # ------------------------------------------------------------ opening
 

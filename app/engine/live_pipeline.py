@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from time import monotonic, perf_counter
 
-from app.core.watchdog import NETWORK, at_work
 from app.engine.processed_frame import ProcessedFrame
 from app.engine.snapshot import Notice
+from pipeline.common.watchdog import NETWORK, at_work
 from pipeline.detection import Detectors, Detects, LiveDetectors, Seen
 from pipeline.params import Params
 from pipeline.run import Sensors, advance

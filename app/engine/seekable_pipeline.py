@@ -12,8 +12,8 @@ from dataclasses import replace
 from app.core.detection_cache import DetectionCache
 from app.core.lru import BoundedCache
 from app.core.playback_clock import timeline_s
-from app.core.watchdog import at_work
 from app.engine.processed_frame import ProcessedFrame
+from pipeline.common.watchdog import at_work
 from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.run import Sensors, advance, sensed

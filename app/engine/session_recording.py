@@ -6,6 +6,7 @@ import math
 import re
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ from pipeline.common.errors import BadInput
 from pipeline.types.source import AnySource, LiveSource, is_live_source
 
 if TYPE_CHECKING:
+    from pipeline.common.watchdog import Watchdog
     from pipeline.detection import Detectors
     from pipeline.recording.recorder import Recorder
     from pipeline.recording.recording_state import RecordingState
@@ -34,6 +36,10 @@ class SessionRecorder:
 
     def __init__(self, folder: Path = SESSIONS) -> None:
         self._folder = folder
+        self.watchdog: Watchdog | None = None
+        """Notices if a recording hangs."""
+        self.on_change: Callable[[], object] = lambda: None
+        """Called on any thread when a recording hangs, or ends by itself."""
         self._lock = threading.Lock()
         self._recorder: Recorder | None = None
         self._live: LiveSource | None = None
@@ -66,7 +72,12 @@ class SessionRecorder:
             from pipeline.recording.save import about
 
             try:
-                recorder = Recorder(new_session(self._folder, source.title), about(source, detectors))
+                recorder = Recorder(
+                    new_session(self._folder, source.title),
+                    about(source, detectors),
+                    watchdog=self.watchdog,
+                    on_change=lambda: self.on_change(),
+                )
             except OSError as error:
                 raise BadInput(f"{self._folder}: cannot record here: {error.strerror}") from None
             with self._feeding:

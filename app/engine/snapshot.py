@@ -175,8 +175,13 @@ class Snapshot:
             "live": self.live,
             "streams": streams_json(self.streams),
             "recording": self.recording.to_json() if self.recording is not None else None,
-            "notices": [{"level": n.level, "text": n.text} for n in (*self.notices, *self._of_labels())],
+            "notices": [{"level": n.level, "text": n.text} for n in (*self.notices, *self._of_parts())],
         }
 
-    def _of_labels(self) -> tuple[Notice, ...]:
-        return (Notice("warning", self.labels.trouble),) if self.labels.trouble else ()
+    def _of_parts(self) -> list[Notice]:
+        """What the labels and the recording report for as long as it holds."""
+        found = [Notice("warning", self.labels.trouble)] if self.labels.trouble else []
+        recording = self.recording
+        if recording is not None and (text := recording.error or recording.trouble):
+            found.append(Notice("error", text[0].upper() + text[1:]))
+        return found

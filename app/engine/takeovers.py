@@ -11,9 +11,9 @@ from contextlib import AbstractContextManager
 from functools import partial
 from typing import Protocol
 
-from app.core.watchdog import NETWORK, Stuck, Watchdog
 from app.drive.compute_scheduler import ComputeScheduler
 from app.engine.snapshot import Notice
+from pipeline.common.watchdog import NETWORK, Stuck, Watchdog
 
 _MOST_HANGS = 3
 """After this many hangs with one source, it is not tried again."""
@@ -27,8 +27,12 @@ def stuck_notice(stuck: Stuck, more: str, *, is_recording: bool) -> Notice:
     """The notice about a hung worker, for a minute; with ``more``, about what is disabled from now on, permanently."""
     goes_on = "; recording continues" if is_recording else ""
     text = f"{stuck.worker} hung for {stuck.seconds:.1f} s ({stuck.doing}) and was restarted{goes_on}"
-    until_s = math.inf if more else time.monotonic() + _SAID_S
-    return Notice("error", text[0].upper() + text[1:] + more, until_s)
+    return trouble_notice(text + more, math.inf if more else _SAID_S)
+
+
+def trouble_notice(text: str, for_s: float = _SAID_S) -> Notice:
+    """An error that is shown for a minute, though frames follow it."""
+    return Notice("error", text[0].upper() + text[1:], time.monotonic() + for_s)
 
 
 class Say(Protocol):
@@ -44,7 +48,7 @@ class Takeovers:
     worker check ``asked``.
 
     Recording continues meanwhile: the threads of the sensors and of the recorder are independent. If the hung thread
-    continues later, it does nothing more (``app.core.watchdog``).
+    continues later, it does nothing more (``pipeline.common.watchdog``).
     """
 
     def __init__(

@@ -6,8 +6,10 @@ name as the first column. They are rebuilt from the parts whenever these change.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -70,9 +72,25 @@ def _write(store: Store, run: str, fresh: Pack) -> None:
     with TemporaryDirectory(prefix="cipv-pack-") as folder, ThreadPoolExecutor(_READERS) as readers:
         for shape in EQUAL_TABLES:
             file = Path(folder) / f"{shape.name}.parquet"
-            parts = readers.map(lambda drive, name=shape.name: (drive, _part(store, name, run, drive)), fresh.marks)
-            write_pack(file, shape, parts)
+
+            def read(drive: str, name: str = shape.name) -> tuple[str, pa.Table]:
+                return drive, _part(store, name, run, drive)
+
+            write_pack(file, shape, _read_ahead(readers, read, fresh.marks))
             store.put(packed_file(shape.name, run, fresh.number), file)
+
+
+def _read_ahead(
+    readers: ThreadPoolExecutor, read: Callable[[str], tuple[str, pa.Table]], drives: Iterable[str]
+) -> Iterator[tuple[str, pa.Table]]:
+    """What is read of each drive, in order. Only ``_READERS`` parts are held at once: a pack of long drives would not
+    fit in memory."""
+    rest = iter(drives)
+    held = deque(readers.submit(read, drive) for drive in islice(rest, _READERS))
+    while held:
+        part = held.popleft().result()
+        held.extend(readers.submit(read, drive) for drive in islice(rest, 1))
+        yield part
 
 
 def write_pack(file: Path, shape: TableShape, parts: Iterable[tuple[str, pa.Table]]) -> None:

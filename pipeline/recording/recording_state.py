@@ -27,6 +27,9 @@ class RecordingState:
     """Why it ended by itself; None without an error."""
     dropped_because: str | None = None
     """What was too slow when data was last dropped; None if nothing was."""
+    trouble: str | None = None
+    """What is wrong while recording goes on: the disk does not respond, or, for a minute, that writing hung and was
+    restarted; None otherwise."""
 
     def to_json(self) -> dict[str, Any]:
         """In the format of the page and ``/api/recording``."""
@@ -38,4 +41,5 @@ class RecordingState:
             "dropped": self.dropped,
             "error": self.error,
             "dropped_because": self.dropped_because,
+            "trouble": self.trouble,
         }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,6 +75,11 @@ class Segments:
         return self._earlier_bytes + self._writer.bytes_written
 
     @property
+    def is_pending(self) -> bool:
+        """See ``Output.is_pending``."""
+        return self._writer.is_pending
+
+    @property
     def seconds(self) -> float:
         """Time span of the frames in all files."""
         return self._earlier_s + self._writer.span_s
@@ -129,6 +135,22 @@ class Segments:
         """Safe to call twice."""
         self._writer.close()
 
+    def continued(self) -> Segments:
+        """The same recording from the next file on, for another thread, while the one that uses this hangs. Frames that
+        are in no complete chunk here do not count."""
+        fresh = copy.copy(self)
+        fresh._clock = copy.copy(self._clock)
+        fresh._recent_packets = self._recent_packets.copy()
+        fresh.files = self.files.copy()
+        fresh._earlier_frames = self.kept_frames
+        fresh._earlier_bytes, fresh._earlier_s = self.bytes_written, self.seconds
+        fresh._begin_file()
+        return fresh
+
+    def abandon(self) -> None:
+        """End the last file after its last complete chunk, for the thread that was replaced."""
+        self._writer.abandon()
+
     def _is_full(self) -> bool:
         limit = self._rotation
         too_large = limit.max_bytes is not None and self._writer.bytes_written >= limit.max_bytes
@@ -138,11 +160,14 @@ class Segments:
 
     def _rotate(self) -> None:
         self._writer.close()
+        earlier = self.frames, self.bytes_written, self.seconds
+        self._begin_file()
+        self._earlier_frames, self._earlier_bytes, self._earlier_s = earlier
+
+    def _begin_file(self) -> None:
         first = self.files[0]
         path = first.with_name(f"{first.stem}_{len(self.files):03d}{first.suffix}")
-        writer = self._open(path)
-        self._earlier_frames, self._earlier_bytes, self._earlier_s = self.frames, self.bytes_written, self.seconds
-        self._writer = writer
+        self._writer = self._open(path)
         self.files.append(path)
         for packets in self._recent_packets:  # packets of the sweep in the first frame of the new file
             self._writer.write_packets(packets)

@@ -75,6 +75,6 @@ function show() {
     isOn() && recording ? `${clock(recording.seconds)}${recording.dropped ? ` −${recording.dropped}` : ""}` : "Record",
   );
   record.setAttribute("aria-label", isOn() ? "Stop recording" : "Record");
-  if (recording?.error && recording.error !== toldError) say(`Recording ended: ${recording.error}`, "refused");
+  if (recording?.error && recording.error !== toldError) say(recording.error, "refused");
   toldError = recording?.error ?? "";
 }

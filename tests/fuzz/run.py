@@ -32,7 +32,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.core.watchdog import waited_s
+from pipeline.common.watchdog import waited_s
 from tests.fuzz.target import Refused, Target
 from tests.fuzz.targets import all_targets
 

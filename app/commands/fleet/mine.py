@@ -70,7 +70,7 @@ class Mine:
             database = open_database(self.database)
             try:
                 queue = MiningQueue(database)
-                chosen = choose(seconds, self.count, self.per_drive, queue.is_known)
+                chosen = choose(seconds, self.count, self.per_drive, queue.is_known, queue.is_queued)
                 recordings = queue.put(chosen, self.person)
             finally:
                 database.close()

@@ -44,6 +44,8 @@ class SyncSessions:
     """Lowest severity of events that get a clip; marks always get one"""
     around: Annotated[float, tyro.conf.arg(metavar="S")] = 5.0
     """Length of a clip before and after its event, in seconds"""
+    verify: bool = False
+    """Read back the sessions that are already there, and send those again that are damaged"""
     json: bool = False
     """Print what was done as JSON"""
 
@@ -57,7 +59,7 @@ class SyncSessions:
         if not 0.0 <= self.around <= 3600.0:
             raise BadInput(f"--around {self.around:g}: expected 0 to 3600")
         limit_bytes = self.limit * 1e6 if self.limit is not None else None
-        options = SyncOptions(self.clips, self.events, self.around, limit_bytes)
+        options = SyncOptions(self.clips, self.events, self.around, limit_bytes, self.verify)
         start, stopped = time.monotonic(), ""
         with bytes_progress() as bar:
 
@@ -81,6 +83,7 @@ class SyncSessions:
                 "clips": tally.clips,
                 "bytes": tally.bytes,
                 "sessions_before": tally.before,
+                "damaged": tally.damaged,
                 "unfinished": tally.unfinished,
                 "without_clips": tally.notes,
                 "failed": tally.failed,
@@ -93,6 +96,8 @@ class SyncSessions:
                 f"cipv: {one_line(name)}: still being recorded, or cut off (`cipv recover`); not copied",
                 file=sys.stderr,
             )
+        for name in tally.damaged:
+            print(f"cipv: {one_line(name)}: its copy was damaged", file=sys.stderr)
         for name, reason in (*tally.notes.items(), *tally.failed.items()):
             print(f"cipv: {one_line(f'{name}: {reason}')}", file=sys.stderr)
         if stopped:

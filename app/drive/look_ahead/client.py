@@ -11,9 +11,9 @@ from typing import IO, Any, cast
 import numpy as np
 
 from app.core.kept_detections import answer_of
-from app.core.watchdog import at_work
 from app.drive.look_ahead.messages import ImageHeader, NetworkFile, NetworkReply, Networks, PipeClosed, receive, send
 from pipeline.common.errors import BadInput
+from pipeline.common.watchdog import at_work
 from pipeline.detection import Detectors
 from pipeline.inference.model_registry import EMBEDDED_FILE
 from pipeline.lanes.network import LaneNetwork

@@ -12,13 +12,13 @@ import threading
 import time
 from collections.abc import Callable
 
-from app.core.watchdog import Stuck, Watchdog
 from app.drive.compute_scheduler import ComputeScheduler
 from app.drive.frame_inputs import without_pixels
 from app.drive.look_ahead.client import NetworkProcess, ProcessEnded, is_worth_a_process
 from app.drive.open_recording import OpenRecording
 from pipeline.common.errors import first_line
 from pipeline.common.files.user_files import Overloaded
+from pipeline.common.watchdog import Stuck, Watchdog
 from pipeline.detection import Detectors
 from pipeline.types import Frame
 
@@ -38,10 +38,16 @@ _MOST_ENDS = 3
 
 class LookAhead:
     """``begin`` for a recording; ``worth_waiting_s`` says whether the run should wait. on_progress: called on any
-    thread after each frame. Any thread."""
+    thread after each frame. on_trouble: called on any thread with a sentence for users, without a full stop, when the
+    process hangs or ends unasked. Any thread."""
 
-    def __init__(self, turn: ComputeScheduler, on_progress: Callable[[], object]) -> None:
-        self._turn, self._on_progress = turn, on_progress
+    def __init__(
+        self,
+        turn: ComputeScheduler,
+        on_progress: Callable[[], object],
+        on_trouble: Callable[[str], object] = lambda text: None,
+    ) -> None:
+        self._turn, self._on_progress, self._on_trouble = turn, on_progress, on_trouble
         self._lock = threading.Lock()
         self._work: _Work | None = None
         self._ends: tuple[OpenRecording | None, int] = (None, 0)
@@ -83,25 +89,32 @@ class LookAhead:
         try:
             with watchdog.watching("the process for networks", lambda stuck: self._on_stuck(work, stuck)):
                 work.do()
-        except (ProcessEnded, Overloaded) as error:
-            self._failed(work, first_line(error))
-        except Exception as error:  # the run reports what is wrong with a recording or a network
-            self._failed(work, first_line(error), is_final=True)
+        except ProcessEnded:
+            self._failed(work, "the process for networks ended unexpectedly")
+        except Overloaded as error:
+            self._failed(work, first_line(error), is_said=False)
+        except Exception as error:
+            self._failed(work, first_line(error), is_final=True, is_said=False)
         finally:
             work.close()
             self._on_progress()
 
     def _on_stuck(self, work: _Work, stuck: Stuck) -> None:
         work.end()
-        self._failed(work, f"{stuck.doing} hangs")
+        self._failed(work, f"{stuck.worker} hung for {stuck.seconds:.1f} s ({stuck.doing})")
 
-    def _failed(self, work: _Work, why: str, *, is_final: bool = False) -> None:
-        """The work ended before its time; it may begin again unless that was so often enough."""
+    def _failed(self, work: _Work, why: str, *, is_final: bool = False, is_said: bool = True) -> None:
+        """The work ended before its time; it may begin again unless that was so often enough. is_said: false for what
+        is wrong with a recording or a network, which the run meets and reports itself."""
         with self._lock:
-            if self._work is work:
-                self._work = None
-                self._ends = work.recording, _MOST_ENDS if is_final else self._ends[1] + 1
-                logger.warning("looking ahead in %s ended: %s", work.recording.setup.uri, why)
+            if self._work is not work:
+                return
+            self._work = None
+            self._ends = work.recording, _MOST_ENDS if is_final else self._ends[1] + 1
+            is_last = self._ends[1] >= _MOST_ENDS
+        logger.warning("looking ahead in %s ended: %s", work.recording.setup.uri, why)
+        if is_said:
+            self._on_trouble(why + ("; the server runs the networks itself" if is_last else " and was restarted"))
 
 
 class _Work:

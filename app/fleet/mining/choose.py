@@ -45,8 +45,16 @@ class ChosenSecond:
         return TEXTS[self.reason].format(self.value)
 
 
+def _never(address: str, first: int, last: int) -> bool:
+    return False
+
+
 def choose(
-    seconds: Seconds, count: int, per_drive: int, is_known: Callable[[str, int, int], bool] = lambda *_: False
+    seconds: Seconds,
+    count: int,
+    per_drive: int,
+    is_known: Callable[[str, int, int], bool] = _never,
+    is_queued: Callable[[str, int, int], bool] = _never,
 ) -> list[ChosenSecond]:
     """At most so many seconds, in order of choice.
 
@@ -55,6 +63,8 @@ def choose(
         count: how many. per_drive: how many of one drive.
         is_known: asked with the address, first and last frame: seconds that need no label, for example because they
             have one.
+        is_queued: asked in the same way whether any of the frames has been chosen before: seconds within ``APART_S``
+            of those are left out, too.
     """
     orders = {}
     for reason, least in LEAST.items():
@@ -66,8 +76,9 @@ def choose(
     used: Counter[int] = Counter()
     while orders and len(chosen) < count:
         for reason in tuple(orders):
-            free = (each for each in orders[reason] if _is_free(seconds, each, taken, used, per_drive, is_known))
-            place = next(free, None)
+            free = (each for each in orders[reason] if _is_free(seconds, each, taken, used, per_drive))
+            new = (each for each in free if not _is_near_queued(seconds, each, is_queued))
+            place = next((each for each in new if not _is_known(seconds, each, is_known)), None)
             if place is None:
                 del orders[reason]
                 continue
@@ -89,15 +100,19 @@ def choose(
     return chosen
 
 
-def _is_free(
-    seconds: Seconds,
-    place: int,
-    taken: dict[int, list[int]],
-    used: Counter[int],
-    per_drive: int,
-    is_known: Callable[[str, int, int], bool],
-) -> bool:
+def _is_free(seconds: Seconds, place: int, taken: dict[int, list[int]], used: Counter[int], per_drive: int) -> bool:
     drive, second = int(seconds.drive[place]), int(seconds.second[place])
-    if used[drive] >= per_drive or any(abs(second - other) < APART_S for other in taken.get(drive, ())):
-        return False
-    return not is_known(seconds.addresses[drive], int(seconds.first[place]), int(seconds.last[place]))
+    return used[drive] < per_drive and all(abs(second - other) >= APART_S for other in taken.get(drive, ()))
+
+
+def _is_near_queued(seconds: Seconds, place: int, is_queued: Callable[[str, int, int], bool]) -> bool:
+    drive, second = seconds.drive[place], seconds.second[place]
+    near = slice(max(0, place - APART_S + 1), place + APART_S)  # seconds are in order, but some may be missing
+    is_near = (seconds.drive[near] == drive) & (np.abs(seconds.second[near] - second) < APART_S)
+    first, last = int(seconds.first[near][is_near].min()), int(seconds.last[near][is_near].max())
+    return is_queued(seconds.addresses[drive], first, last)
+
+
+def _is_known(seconds: Seconds, place: int, is_known: Callable[[str, int, int], bool]) -> bool:
+    address = seconds.addresses[int(seconds.drive[place])]
+    return is_known(address, int(seconds.first[place]), int(seconds.last[place]))

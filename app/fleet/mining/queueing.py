@@ -26,15 +26,17 @@ class MiningQueue:
         self._opened: dict[str, DriveLabels] = {}
 
     def is_known(self, address: str, first: int, last: int) -> bool:
-        """Whether a person has labelled the lead in all of these frames, or they are in the queue. Raises SourceError
-        if the recording cannot be opened."""
-        labels, asked = self._of(address), set(range(first, last + 1))
-        leads = [cast("LeadRange", item.value) for item in labels.items("lead").values()]
+        """Whether a person has labelled the lead in all of these frames. Raises SourceError if the recording cannot be
+        opened."""
+        leads = [cast("LeadRange", item.value) for item in self._of(address).items("lead").values()]
         sure = [each for each in leads if each.state in ("accepted", "corrected")]
         said = {n for lead in sure for n in range(lead.first, lead.last + 1)}
-        tags = [cast("FrameTag", item.value) for item in labels.items("tag").values()]
-        queued = {n for tag in tags if tag.tag == NEXT_TAG for n in range(tag.first, tag.last + 1)}
-        return asked <= said or bool(asked & queued)
+        return set(range(first, last + 1)) <= said
+
+    def is_queued(self, address: str, first: int, last: int) -> bool:
+        """Whether any of these frames is in the queue. Raises SourceError if the recording cannot be opened."""
+        tags = [cast("FrameTag", item.value) for item in self._of(address).items("tag").values()]
+        return any(tag.tag == NEXT_TAG and tag.first <= last and first <= tag.last for tag in tags)
 
     def put(self, chosen: Iterable[ChosenSecond], person: str) -> int:
         """Tag the frames, one act per recording, which the person can undo. Returns how many recordings it were."""

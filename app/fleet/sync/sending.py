@@ -17,7 +17,7 @@ from app.fleet.sync.s3_parts import PartedUpload, part_bytes
 from pipeline.common.errors import BadInput
 from pipeline.common.files.remote_files import patiently
 from pipeline.common.files.user_files import open_regular
-from pipeline.common.progress import Progress
+from pipeline.common.progress import Progress, silent
 
 BLOCK_BYTES = 1 << 20
 _READ_ONLY = ("http://", "https://")
@@ -132,12 +132,8 @@ class _ToStore:
                     progress(done, size)
             return digest.hexdigest()
 
-        def read_back() -> str:
-            with self._store.system.open(path, "rb") as there:
-                return _sha256(iter(lambda: there.read(BLOCK_BYTES), b""))
-
         sha256 = patiently(write, address)
-        if patiently(read_back, address) != sha256:
+        if sha256_there(self._store, name, size) != sha256:
             raise NotSent(f"{address}: what was written differs from {file}")
         return sha256
 
@@ -153,6 +149,27 @@ def blocks_of(file: Path, count: int) -> Iterator[bytes]:
                 yield block
     except OSError as error:
         raise NotSent(f"{file}: {error.strerror or error}") from None
+
+
+def sha256_of(file: Path) -> str:
+    """The checksum of a file here. Raises NotSent if it cannot be read."""
+    return _sha256(blocks_of(file, BLOCK_BYTES))
+
+
+def sha256_there(store: Store, name: str, size: int, progress: Progress = silent) -> str:
+    """The checksum of a file in a store, which is read back. size: in bytes; progress: of these. Raises what
+    ``patiently`` raises."""
+    path = store.path(name)
+
+    def blocks() -> Iterator[bytes]:
+        done = 0
+        with store.system.open(path, "rb") as there:
+            while block := there.read(BLOCK_BYTES):
+                yield block
+                done += len(block)
+                progress(done, size)
+
+    return patiently(lambda: _sha256(blocks()), f"{store.address}/{name}")
 
 
 def _sha256(blocks: Iterator[bytes]) -> str:

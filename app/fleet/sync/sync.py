@@ -18,7 +18,7 @@ from app.fleet.store import Store
 from app.fleet.sync.event_clips import clips_around, recorded_events, write_clip
 from app.fleet.sync.local_sessions import LocalSession, LocalSessions, SessionFolder
 from app.fleet.sync.pace import Pace
-from app.fleet.sync.sending import NotSent, sender
+from app.fleet.sync.sending import NotSent, sender, sha256_of, sha256_there
 from pipeline.common.progress import Progress
 from pipeline.params import Params
 from pipeline.recording.session.source import SessionSource
@@ -40,6 +40,8 @@ class SyncOptions:
     """Seconds before and after an event."""
     bytes_per_s: float | None = None
     """The most that is sent; None for no limit."""
+    verify: bool = False
+    """Whether the copies of sessions that are there already are read back and compared with their checksums."""
 
 
 @dataclass
@@ -60,6 +62,8 @@ class SyncTally:
     """Session → why it has no clips."""
     failed: dict[str, str] = field(default_factory=dict)
     """Session → why it was not copied."""
+    damaged: list[str] = field(default_factory=list)
+    """Sessions whose copy was damaged, and is sent again."""
 
 
 class Sync:
@@ -80,12 +84,14 @@ class Sync:
         self.tally = tally
         self._folder = SessionFolder(folder, except_in=store.folder)
         self._store, self._options, self._begin = store, options, begin
-        self._send, self._pace = sender(store).send, Pace(options.bytes_per_s)
+        self._sender, self._pace = sender(store), Pace(options.bytes_per_s)
         self._there = store.sizes("")
 
     def run(self) -> None:
         """Copy until nothing is left. Raises StoreFailed, NotReachable and Overloaded: another run continues there."""
         local = self._folder.look()
+        if self._options.verify:
+            self._verify(local)
         self.tally.before = len(local.finished) - len(self._missing(local))
         while (act := self._next(local)) is not None:
             session, do = act
@@ -112,6 +118,24 @@ class Sync:
             if _mark_file(each) not in self._there or self._there.get(_session_file(each)) != each.bytes
         ]
 
+    def _verify(self, local: LocalSessions) -> None:
+        """Read back the copies that seem complete. A damaged one counts as missing if the session here is what was
+        sent; else neither can be trusted."""
+        missing = self._missing(local)
+        for each in (each for each in local.finished if each not in missing):
+            marked = (self._store.read(_mark_file(each)) or b"").split(b" ")[0].decode(errors="replace")
+            told = self._begin(f"checking {each.name}", each.bytes)
+            there = sha256_there(self._store, _session_file(each), each.bytes, told)
+            if there == marked:
+                continue
+            if sha256_of(each.file) == marked:
+                del self._there[_mark_file(each)]
+                self.tally.damaged.append(each.name)
+            else:
+                self.tally.failed[each.name] = (
+                    f"{self._store.address}/{_session_file(each)} is damaged, and {each.file} is not what was sent"
+                )
+
     def _is_refused(self, session: LocalSession) -> bool:
         """Whether a session cannot be copied. One of its name in the store is not replaced: it is another car's."""
         if session.name not in self.tally.failed and _mark_file(session) in self._there:
@@ -121,7 +145,7 @@ class Sync:
 
     def _send_session(self, session: LocalSession) -> None:
         name = _session_file(session)
-        sha256 = self._send(name, session.file, self._pace, self._begin(session.name, session.bytes))
+        sha256 = self._sender.send(name, session.file, self._pace, self._begin(session.name, session.bytes))
         self._put(_mark_file(session), f"{sha256}  {Path(name).name}\n".encode())
         self._there[name] = session.bytes
         self.tally.sessions, self.tally.bytes = self.tally.sessions + 1, self.tally.bytes + session.bytes
@@ -149,7 +173,7 @@ class Sync:
                 file = folder / "clip.mcap"
                 write_clip(source, wanted, file)
                 size = file.stat().st_size
-                sha256 = self._send(name, file, self._pace, self._begin(Path(name).stem, size))
+                sha256 = self._sender.send(name, file, self._pace, self._begin(Path(name).stem, size))
                 file.unlink()
                 self._there[name] = size
                 self.tally.clips, self.tally.bytes = self.tally.clips + 1, self.tally.bytes + size

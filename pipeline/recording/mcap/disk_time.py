@@ -6,6 +6,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from pipeline.common.watchdog import at_work
+
 
 class DiskTime:
     """Counts the time that one thread spends in writes and syncs; any thread may ask."""
@@ -15,11 +17,12 @@ class DiskTime:
         self._since_s: float | None = None
 
     @contextmanager
-    def waiting(self) -> Iterator[None]:
-        """The thread waits for the disk during the block."""
+    def waiting(self, doing: str = "writing to the disk") -> Iterator[None]:
+        """The thread waits for the disk during the block. doing: for the watchdog."""
         begun_s = self._since_s = time.monotonic()
         try:
-            yield
+            with at_work(doing):
+                yield
         finally:
             self._since_s = None
             self._ended_s += time.monotonic() - begun_s

@@ -34,7 +34,8 @@ class _Stream:
 
     def __init__(self, path: Path, disk: DiskTime) -> None:
         signer = configured_signer()  # if this fails, no file has been created yet
-        self.file = path.open("xb", buffering=0)
+        with disk.waiting("opening a file"):
+            self.file = path.open("xb", buffering=0)
         self._disk = disk
         self.chain = ChainWriter(self.file, signer=signer)
 
@@ -54,7 +55,7 @@ class _Stream:
 
     def sync(self) -> None:
         """Wait until what was written survives a crash of the machine."""
-        with self._disk.waiting():
+        with self._disk.waiting("syncing the disk"):
             os.fsync(self.file.fileno())
 
 
@@ -152,6 +153,12 @@ class Output:
             self._stream.sync()
         self._is_open = False
         self._stream.file.close()
+
+    def abandon(self) -> None:
+        """End the file after its last complete chunk: what would follow is written elsewhere."""
+        if self._is_open:
+            self._is_open = False
+            self._cut_back()
 
     def discard(self) -> None:
         """Close the file and remove it, because its content could not be produced."""

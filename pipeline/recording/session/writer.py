@@ -100,6 +100,11 @@ class SessionWriter:
         return self._kept_frames
 
     @property
+    def is_pending(self) -> bool:
+        """See ``Output.is_pending``."""
+        return self._output.is_pending
+
+    @property
     def span_s(self) -> float:
         """Log time from the first frame to the last."""
         return self._frames.span_s
@@ -203,6 +208,10 @@ class SessionWriter:
             self._frames.attach(self._output)
             self._output.close()
             self._kept_frames = len(self._frames)
+
+    def abandon(self) -> None:
+        """See ``Output.abandon``."""
+        self._output.abandon()
 
     def discard(self) -> None:
         """Remove the file, because its content could not be produced."""

@@ -136,6 +136,7 @@
  * @property {number} dropped
  * @property {string|null} error
  * @property {string|null} dropped_because
+ * @property {string|null} trouble
  *
  * @typedef {object} DriveState
  * @property {number} revision

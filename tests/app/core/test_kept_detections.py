@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 from app.core.detection_cache import DetectionCache
 from app.core.kept_detections import KeptDetections, seen_mark
 from pipeline.types import CameraImage, DistanceLaw, EgoState, Frame, RawBoxes, RawLanes
+from tests.app.waiting import wait_until
 
 LAW = DistanceLaw(1000.0, -1.1, 900.0, 1.5, 2.0, 0.7)
 BOXES = RawBoxes(
@@ -96,3 +98,23 @@ def test_the_oldest_are_dropped(tmp_path: Path) -> None:
 
 def test_without_an_image_there_is_nothing_to_keep() -> None:
     assert seen_mark(Frame(0, "0", 0)) is None
+
+
+def test_a_disk_that_hangs_holds_nobody_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    gate, execute = threading.Event(), KeptDetections._execute
+
+    def when_it_responds(self: KeptDetections, *arguments: Any) -> list[tuple[Any, ...]]:
+        assert gate.wait(60.0)
+        return execute(self, *arguments)
+
+    monkeypatch.setattr(KeptDetections, "_execute", when_it_responds)
+    kept = KeptDetections(tmp_path / "kept.db")
+    marks = [seen_mark(frame(shade)) or b"" for shade in range(200)]
+    for mark in marks * 3:  # more than may wait
+        kept.put(mark, "made", BOXES)
+    assert kept.get(marks[0], "made") is None
+    monkeypatch.setattr("app.core.kept_detections._ANSWER_S", 60.0)
+    assert kept.get(marks[0], "made") is None, "while one answer is late, none is waited for"
+    gate.set()
+    assert wait_until(lambda: kept.get(marks[0], "made") is not None), "it is used again once it responds"
+    kept.close()

@@ -10,13 +10,13 @@ import pytest
 
 from app.core.detection_cache import DetectionCache
 from app.core.playback_clock import timeline_s
-from app.core.watchdog import Stuck, Watchdog
 from app.drive.background_runs import BackgroundRuns
 from app.drive.frame_inputs import InputStore, without_pixels
 from app.drive.full_run import DriveRun, digest
 from app.drive.open_recording import OpenRecording, RunSetup
 from app.drive.run_registry import MOST_KEPT, MOST_UNKEPT, NoSuchRun, RunRefused, RunRegistry
 from pipeline.common.files.user_files import Overloaded
+from pipeline.common.watchdog import Stuck, Watchdog
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
 from pipeline.run import Sensors, run

@@ -142,7 +142,7 @@ def test_the_state_tells_how_it_goes(client: Client, engine: Engine) -> None:
     show(engine, 3)
     engine.wait_for(lambda shown: shown.recording is not None, WAIT_S)
     state = client.get("/api/state").json()["recording"]
-    assert state.keys() == {"file", "frames", "seconds", "bytes", "dropped", "error", "dropped_because"}
+    assert state.keys() == {"file", "frames", "seconds", "bytes", "dropped", "error", "dropped_because", "trouble"}
     client.post("/api/recording", json={"on": False})
     engine.wait_for(lambda shown: shown.recording is None, WAIT_S)
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from app.core.watchdog import Watchdog
 from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder
 from pipeline.common.progress import Progress
+from pipeline.common.watchdog import Watchdog
 from pipeline.params import Params
 from pipeline.recording.session.source import SessionSource
 from pipeline.types import U8, RawBoxes

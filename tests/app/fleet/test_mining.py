@@ -105,6 +105,19 @@ def test_reasons_take_turns_and_neighbours_are_left_out():
     assert APART_S == 3
 
 
+def test_neighbours_of_what_is_queued_already_are_left_out():
+    seconds = seconds_with(disagreement=[9, 8, 7, 6, 5, 4, 3.5, 3.4, 3.3, 3.2] + [0.0] * 10)
+    queued: list[tuple[str, int, int]] = []
+
+    def is_queued(address: str, first: int, last: int) -> bool:
+        return any(address == of and first <= end and begin <= last for of, begin, end in queued)
+
+    for expected in ([0, 3], [6, 9], []):
+        chosen = choose(seconds, 2, 10, is_queued=is_queued)
+        assert [each.second for each in chosen] == expected
+        queued += [(each.address, each.first, each.last) for each in chosen]
+
+
 def test_values_that_are_too_small_are_no_reason():
     assert choose(seconds_with(disagreement=[2.9] * 20, margin=[0.4] * 20, novelty=[0.9] * 20), 10, 10) == []
 

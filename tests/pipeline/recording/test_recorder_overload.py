@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from pipeline.recording import recorder as recorder_module
+from pipeline.recording import write_queue
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.recording_state import RecordingState
 from pipeline.recording.segments import Segments
@@ -71,7 +72,7 @@ def test_what_a_slow_disk_leaves_no_room_for_is_counted_by_kind(
 ) -> None:
     shot = Shot(encoded=image(0).encoded)
     assert shot.encoded is not None
-    monkeypatch.setattr(recorder_module, "_QUEUED_BYTES", 3 * len(shot.encoded))
+    monkeypatch.setattr(write_queue, "QUEUED_BYTES", 3 * len(shot.encoded))
     with slow_disk(monkeypatch) as may_write:
         recorder = Recorder(tmp_path / "a.mcap", ABOUT, queued=2)
         while recorder.put(full(0)):  # until there is no room for frames
@@ -96,7 +97,7 @@ def test_a_busy_machine_is_not_taken_for_a_slow_disk(tmp_path: Path, monkeypatch
         write_image(self, *arguments)
 
     monkeypatch.setattr(Segments, "write_image", wait_and_write)
-    monkeypatch.setattr(recorder_module, "_QUEUED_BYTES", 10_000_000)
+    monkeypatch.setattr(write_queue, "QUEUED_BYTES", 10_000_000)
     recorder = Recorder(tmp_path / "a.mcap", ABOUT)
     recorder.put(full(0))
     shot = Shot(pixels=np.zeros((72, 128, 3), np.uint8))
@@ -135,13 +136,13 @@ def test_what_there_is_no_time_left_to_write_is_dropped_and_noted(
     monkeypatch.setattr(Segments, "write", wait_and_write)
     recorder = Recorder(tmp_path / "a.mcap", ABOUT)
     recorder.put(full(0))
-    assert wait_until(lambda: not recorder._waiting["frames"]), "it is being written"
+    assert wait_until(lambda: not recorder._jobs.waiting["frames"]), "it is being written"
     for index in range(1, 6):
         recorder.put(full(index))
     recorder.mark("a mark")
     stopping = threading.Thread(target=recorder.stop, args=(0.0,))
     stopping.start()
-    assert wait_until(lambda: recorder._ends_by_s <= time.monotonic())
+    assert wait_until(lambda: recorder._jobs.ends_by_s <= time.monotonic())
     may_go_on.set()
     stopping.join(20.0)
     state = recorder.state
@@ -166,8 +167,7 @@ def test_a_disk_that_hangs_is_not_waited_for_for_ever(tmp_path: Path, monkeypatc
         assert stopped[0].error == "recording stopped: the disk does not respond; the 0 frames before are saved"
         assert recorder.stop() == stopped[0]
         may_write.set()
-        recorder._thread.join(WAIT_S)
-    assert not recorder._thread.is_alive(), "it ends once the disk answers"
+        assert recorder._thread.has_ended.wait(WAIT_S), "it ends once the disk answers"
     assert len(SessionSource("a", str(tmp_path / "a.mcap"))) == recorder.state.frames >= 2
 
 
@@ -184,16 +184,15 @@ def test_a_writer_that_is_slow_and_goes_on_is_waited_for(tmp_path: Path, monkeyp
     recorder = Recorder(tmp_path / "a.mcap", ABOUT)
     for index in range(6):
         assert recorder.put(full(index))
-    thread, rounds = recorder._thread, []
+    has_ended, rounds = recorder._thread.has_ended, []
 
-    def one_more(patience_s: float) -> None:
+    def one_more(patience_s: float) -> bool:
         rounds.append(patience_s)
         allowed.release()
-        done = recorder._done
-        while thread.is_alive() and recorder._done == done:
-            threading.Thread.join(thread, 0.001)
+        done = recorder._jobs.done
+        return wait_until(lambda: has_ended.is_set() or recorder._jobs.done != done)
 
-    monkeypatch.setattr(thread, "join", one_more)
+    monkeypatch.setattr(has_ended, "wait", one_more)
     state = recorder.stop()
     assert (state.error, state.frames) == (None, 6)
     assert len(rounds) >= 6

@@ -55,6 +55,9 @@ class RecordingJson(Exact):
     """Why the recording ended by itself (a full disk); what came before is kept. Null while all is well."""
     dropped_because: str | None
     """What was too slow when data was last dropped, the disk or the machine. Null if nothing was dropped."""
+    trouble: str | None
+    """What is wrong while recording goes on: a disk that does not respond, or, for a minute, a restart after writing
+    hung. Null otherwise."""
 
 
 class LabelTaskJson(Exact):

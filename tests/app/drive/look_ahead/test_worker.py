@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import threading
 import time
@@ -22,6 +23,7 @@ from pipeline.detection import Detectors
 from pipeline.params import Params
 from tests.app.drive.look_ahead.networks import COMMAND, FRAMES, both_views, opened, setup
 from tests.app.engine.recording_helpers import Recording
+from tests.app.waiting import wait_until
 
 WAIT_S = 180.0
 
@@ -168,6 +170,36 @@ def test_a_process_that_hangs_is_ended_by_the_watchdog(
     assert work._process._process is not None
     assert work._process._process.returncode is not None
     assert ahead._work is None
+
+
+def test_a_process_that_is_stopped_is_said_and_replaced(detectors: Detectors, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A network that takes its usual time at idle priority has half a minute; a process that was stopped has a
+    second."""
+    monkeypatch.setattr(client, "_COMMAND", (sys.executable, "-c", "import sys; sys.stdin.read()"))
+    said, ended = list[str](), threading.Event()
+    drives = BackgroundRuns(DetectionCache())
+    ahead, recording = LookAhead(ComputeScheduler(), ended.set, said.append), opened(detectors)
+    drives.watchdog.start()
+    try:
+        for number in (1, 2, 3):
+            ended.clear()
+            ahead.begin(recording, 0, drives.watchdog)
+            work = ahead._work
+            assert work is not None
+            assert wait_until(lambda work=work: work._process._process is not None)
+            assert work._process._process is not None
+            work._process._process.send_signal(signal.SIGSTOP)
+            assert ended.wait(WAIT_S)
+            assert wait_until(lambda number=number: len(said) == number)
+    finally:
+        drives.watchdog.stop()
+        ahead.end()
+    assert all("the process for networks hung for" in text for text in said)
+    assert [text.rpartition(")")[2] for text in said] == [
+        " and was restarted",
+        " and was restarted",
+        "; the server runs the networks itself",
+    ]
 
 
 def test_few_frames_the_lidar_alone_and_what_is_kept_start_no_process(detectors: Detectors) -> None:

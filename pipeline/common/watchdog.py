@@ -3,8 +3,8 @@
 Each worker marks the start and end of a piece of work (``at_work``). Work counts as hung when it takes ``PATIENCE_S``
 longer than it ever has; time in which the machine did not run the thread does not count. A thread that hangs in native
 code cannot be killed. It is retired, that is left alone, and ends with ``Retired`` if it ever returns; the owner of the
-worker starts a new one. Code that hangs while it holds the GIL stops the watchdog too; a supervisor that polls
-``/healthz`` notices that.
+worker starts a new one. Where a thread waits for a process, that process is also checked for being stopped or dead.
+Code that hangs while it holds the GIL stops the watchdog too; a supervisor that polls ``/healthz`` notices that.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ NETWORK = "the network "
 """Prefix of operations that are network runs."""
 _FEWEST, _KEPT = 20, 2000
 _LOOK_EVERY_S = 0.1
+_STOPPED = ("T", "t", "Z", "X")
+"""States of a process that does nothing until somebody else acts, in ``/proc/PID/stat``."""
 _LATE_S = 0.5
 """If the watchdog itself is late by this much, the machine is busy or was suspended, and no worker is blamed."""
 
@@ -70,6 +72,12 @@ class _Heart:
     system does not report it."""
     starved_s: float = 0.0
     """How much of the time since ``since_s`` that was."""
+    stopped_s: float | None = None
+    """When the process was first seen stopped or dead; None while it runs."""
+    retires: bool = True
+    """Whether it is retired once it is stuck."""
+    is_told: bool = False
+    """Whether it was reported that the current operation does not end."""
 
 
 def waited_s(native_id: int) -> float | None:
@@ -89,6 +97,16 @@ def process_waited_s(process: int) -> float | None:
         return sum(int(file.read_text(encoding="ascii").split()[1]) for file in files) / 1e9 if files else None
     except (OSError, ValueError, IndexError):
         return None
+
+
+def is_stopped(process: int) -> bool:
+    """Whether a process of this user is stopped by a signal or a debugger, or has ended (Linux); false if the system
+    does not report it. A process that waits for a processor is not stopped."""
+    try:
+        text = Path(f"/proc/{process}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return False
+    return text.rpartition(")")[2].split()[0] in _STOPPED
 
 
 def busy_share() -> float:
@@ -156,10 +174,11 @@ class Watchdog:
         self._ended.set()
 
     @contextmanager
-    def watching(self, name: str, on_stuck: Callable[[Stuck], object]) -> Iterator[None]:
+    def watching(self, name: str, on_stuck: Callable[[Stuck], object], *, retires: bool = True) -> Iterator[None]:
         """Registers this thread as a worker during the block. on_stuck: called once, on another thread, when the worker
-        is stuck; from then on it is retired."""
-        heart = _Heart(name, on_stuck)
+        is stuck; from then on it is retired. retires: false for a worker that is only reported, once per operation, and
+        goes on when the operation ends."""
+        heart = _Heart(name, on_stuck, retires=retires)
         _of_thread.heart, _of_thread.watchdog = heart, self
         with self._lock:
             self._hearts.add(heart)
@@ -179,9 +198,9 @@ class Watchdog:
             if heart.doing is not None:
                 took = now_s - heart.since_s, self._load
                 self._took.setdefault(heart.doing, deque(maxlen=_KEPT)).append(took)
-            heart.doing, heart.since_s, heart.starved_s = doing, now_s, 0.0
+            heart.doing, heart.since_s, heart.starved_s, heart.is_told = doing, now_s, 0.0, False
             if process != heart.process:
-                heart.process, heart.delayed_s = process, None
+                heart.process, heart.delayed_s, heart.stopped_s = process, None, None
 
     def allowed_s(self, doing: str, process: int | None = None) -> float:
         """Time limit of an operation. What it took is extended only as far as the machine is busier now than it was
@@ -201,11 +220,13 @@ class Watchdog:
                 if late_s > _LATE_S:
                     heart.since_s += late_s
                 _count_starved(heart)
-                if heart.doing is None or heart.retired:
+                if heart.doing is None or heart.is_told or heart.retired:
                     continue
-                if now_s - heart.since_s - heart.starved_s <= self.allowed_s(heart.doing, heart.process):
+                is_late = now_s - heart.since_s - heart.starved_s > self.allowed_s(heart.doing, heart.process)
+                if not is_late and not self._has_stopped(heart, now_s, late_s):
                     continue
-                heart.retired = True
+                heart.is_told = True
+                heart.retired = heart.retires
                 found.append((heart, Stuck(heart.name, heart.doing, now_s - heart.since_s, heart.thread_id)))
         for heart, stuck in found:
             logger.error("%s hangs (%s), for %.1f s so far\n%s", *_told(stuck), _stack(heart.thread_id))
@@ -214,6 +235,16 @@ class Watchdog:
             except Exception:  # the watchdog continues if one callback fails
                 logger.exception("%s could not be restarted", heart.name)
         return [stuck for _, stuck in found]
+
+    def _has_stopped(self, heart: _Heart, now_s: float, late_s: float) -> bool:
+        """Whether the process that a worker waits for has been stopped for ``patience_s``. Where this program was
+        stopped with it, as by Ctrl-Z, it has that time again once both continue."""
+        if heart.process is None or not is_stopped(heart.process):
+            heart.stopped_s = None
+            return False
+        if heart.stopped_s is None or late_s > _LATE_S:
+            heart.stopped_s = now_s
+        return now_s - heart.stopped_s > self._patience_s
 
     def _watch(self) -> None:
         looked_s = time.monotonic()

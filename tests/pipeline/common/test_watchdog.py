@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from app.core.watchdog import Retired, Stuck, Watchdog, at_work, process_waited_s, waited_s
+from pipeline.common.watchdog import Retired, Stuck, Watchdog, at_work, is_stopped, process_waited_s, waited_s
+from tests.app.waiting import wait_until
 
 
 @pytest.fixture(autouse=True)
 def _idle_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.core.watchdog.os.getloadavg", lambda: (0.0, 0.0, 0.0))
-    monkeypatch.setattr("app.core.watchdog.os.cpu_count", lambda: 2)
+    monkeypatch.setattr("pipeline.common.watchdog.os.getloadavg", lambda: (0.0, 0.0, 0.0))
+    monkeypatch.setattr("pipeline.common.watchdog.os.cpu_count", lambda: 2)
 
 
 def test_on_a_busy_machine_everything_may_take_longer(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.core.watchdog.os.getloadavg", lambda: (10.0, 4.0, 1.0))
+    monkeypatch.setattr("pipeline.common.watchdog.os.getloadavg", lambda: (10.0, 4.0, 1.0))
     assert Watchdog(first_s=30.0).allowed_s("the network") == pytest.approx(150.0)
 
 
@@ -28,7 +33,7 @@ def worked(watchdog: Watchdog, doing: str, took_s: list[float], monkeypatch: pyt
     for took in took_s:
         with monkeypatch.context() as patch:
             times = iter([0.0, took])
-            patch.setattr("app.core.watchdog.time.monotonic", lambda times=times: next(times))
+            patch.setattr("pipeline.common.watchdog.time.monotonic", lambda times=times: next(times))
             with at_work(doing):
                 pass
 
@@ -57,7 +62,7 @@ def test_a_call_may_take_its_worst_time_and_the_patience_more(monkeypatch: pytes
 def test_what_took_long_on_a_busy_machine_is_not_extended_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """Six times more programs than processors, before and after; then twice as many, and none."""
     load = [12.0]
-    monkeypatch.setattr("app.core.watchdog.os.getloadavg", lambda: (load[-1], 0.0, 0.0))
+    monkeypatch.setattr("pipeline.common.watchdog.os.getloadavg", lambda: (load[-1], 0.0, 0.0))
     watchdog = Watchdog(patience_s=1.0, first_s=30.0)
     with watchdog.watching("a worker", lambda stuck: None):
         worked(watchdog, "the network", [1.5] * 20, monkeypatch)
@@ -70,7 +75,7 @@ def test_what_took_long_on_a_busy_machine_is_not_extended_again(monkeypatch: pyt
 
 def test_time_in_which_the_machine_did_not_let_it_run_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
     watchdog, waited_s = Watchdog(first_s=1.0), [5.0]
-    monkeypatch.setattr("app.core.watchdog.waited_s", lambda native_id: waited_s[-1])
+    monkeypatch.setattr("pipeline.common.watchdog.waited_s", lambda native_id: waited_s[-1])
     with watchdog.watching("a worker", lambda stuck: None):
         assert watchdog.look(time.monotonic()) == []
         with pytest.raises(Retired):
@@ -121,9 +126,9 @@ def test_who_waits_for_a_process_is_given_the_time_of_a_first_run_and_the_proces
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     waits_s = iter((3.0, 3.0, 11.0, 11.0))
-    monkeypatch.setattr("app.core.watchdog.process_waited_s", lambda process: next(waits_s))
+    monkeypatch.setattr("pipeline.common.watchdog.process_waited_s", lambda process: next(waits_s))
     watchdog = Watchdog(first_s=30.0)
-    monkeypatch.setattr("app.core.watchdog.busy_share", lambda: 0.0)
+    monkeypatch.setattr("pipeline.common.watchdog.busy_share", lambda: 0.0)
     with watchdog.watching("a worker", lambda stuck: None):
         for _ in range(30):
             with at_work("looking"):
@@ -148,3 +153,67 @@ def test_the_system_tells_how_long_a_process_waited_for_a_processor() -> None:
     assert waited is not None
     assert waited >= 0.0
     assert process_waited_s(2**30) is None
+
+
+@pytest.fixture
+def process() -> Iterator[subprocess.Popen[bytes]]:
+    """A process that waits."""
+    with subprocess.Popen((sys.executable, "-c", "input()"), stdin=subprocess.PIPE) as process:
+        yield process
+        process.kill()
+
+
+def test_a_process_that_is_stopped_is_noticed_after_the_patience(process: subprocess.Popen[bytes]) -> None:
+    if not Path("/proc/self/stat").exists():
+        pytest.skip("only Linux tells")
+    watchdog = Watchdog(patience_s=1.0, first_s=1e6)
+    with watchdog.watching("a worker", lambda stuck: None), pytest.raises(Retired):
+        _waits_for_one_that_is_stopped(watchdog, process)
+
+
+def _waits_for_one_that_is_stopped(watchdog: Watchdog, process: subprocess.Popen[bytes]) -> None:
+    with at_work("looking", process.pid):
+        now_s = time.monotonic()
+        assert watchdog.look(now_s + 100.0) == [], "it runs"
+        process.send_signal(signal.SIGSTOP)
+        assert wait_until(lambda: is_stopped(process.pid))
+        assert watchdog.look(now_s + 200.0) == []
+        assert watchdog.look(now_s + 200.9) == []
+        assert watchdog.look(now_s + 300.0, late_s=99.0) == [], "this program was stopped with it"
+        assert watchdog.look(now_s + 300.9) == []
+        assert [each.doing for each in watchdog.look(now_s + 301.1)] == ["looking"]
+
+
+def test_a_process_that_goes_on_in_time_is_not_stuck(process: subprocess.Popen[bytes]) -> None:
+    if not Path("/proc/self/stat").exists():
+        pytest.skip("only Linux tells")
+    watchdog = Watchdog(patience_s=1.0, first_s=1e6)
+    with watchdog.watching("a worker", lambda stuck: None), at_work("looking", process.pid):
+        now_s = time.monotonic()
+        process.send_signal(signal.SIGSTOP)
+        assert wait_until(lambda: is_stopped(process.pid))
+        assert watchdog.look(now_s) == []
+        process.send_signal(signal.SIGCONT)
+        assert wait_until(lambda: not is_stopped(process.pid))
+        assert watchdog.look(now_s + 5.0) == []
+
+
+def test_a_process_that_ended_counts_as_stopped_and_one_that_never_was_does_not(
+    process: subprocess.Popen[bytes],
+) -> None:
+    if not Path("/proc/self/stat").exists():
+        pytest.skip("only Linux tells")
+    process.kill()
+    assert wait_until(lambda: is_stopped(process.pid)), "its parent has not asked for its status yet"
+    assert not is_stopped(2**30)
+
+
+def test_a_worker_that_is_not_retired_is_told_once_per_operation_and_goes_on() -> None:
+    watchdog, told = Watchdog(first_s=1.0), list[Stuck]()
+    with watchdog.watching("the recorder", told.append, retires=False):
+        for _ in range(2):
+            with at_work("writing"):
+                later_s = time.monotonic() + 5.0
+                watchdog.look(later_s)
+                watchdog.look(later_s + 1.0)
+    assert [each.doing for each in told] == ["writing", "writing"]
