@@ -13,6 +13,7 @@ OF_THE_PROGRAM = frozenset(
         "pipeline/inference/distance_laws.py",  # what is kept beside installed networks
         "pipeline/inference/model_registry.py",
         "pipeline/inference/tuning.py",
+        "pipeline/common/watchdog.py",  # what the system says of processes and threads
         "pipeline/simulation/sensors/measured_noise.py",  # comes with the program
     }
 )
