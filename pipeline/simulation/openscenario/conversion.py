@@ -15,7 +15,7 @@ from pipeline.simulation.openscenario.parameters import ParameterScope
 from pipeline.simulation.openscenario.positions import RoadPlace, place_at
 from pipeline.simulation.openscenario.stage import Stage
 from pipeline.simulation.openscenario.storyboard import STEP_S, Storyboard
-from pipeline.simulation.openscenario.variants import chosen_values
+from pipeline.simulation.openscenario.variants import Variants
 from pipeline.simulation.openscenario.xml_files import XmlElement, read_xml, shown
 
 _LONGEST_S = 120.0
@@ -28,9 +28,10 @@ def convert(path: Path, variant: int | None, given: Mapping[str, str]) -> dict[s
     it. variant: which of its variants, from 1; given: values of parameters by name. OpenScenarioError says in one
     sentence what is wrong, or what cannot be simulated."""
     root, values, title = read_xml(path, "OpenSCENARIO"), dict(given), path.stem
-    distribution = root.find("ParameterValueDistribution")
+    variants, distribution = None, root.find("ParameterValueDistribution")
     if distribution is not None:
-        values = chosen_values(distribution, variant, given)
+        variants = Variants(distribution, given)
+        values = variants.values(1 if variant is None else variant)
         title = f"{title} · variant {variant}" if variant is not None else title
         file = distribution.one("ScenarioFile").attributes.get("filepath", "")
         path = path.parent / file.replace("\\", "/")
@@ -39,7 +40,10 @@ def convert(path: Path, variant: int | None, given: Mapping[str, str]) -> dict[s
         raise root.refusal("it has no variants: it is a scenario, not a ParameterValueDistribution")
     if root.find("Storyboard") is None:
         raise root.refusal("no Storyboard: it is not a scenario")
-    return _Conversion(root, path.parent, values).scenario(title)
+    made = _Conversion(root, path.parent, values).scenario(title)
+    if variants is not None and variant is None:
+        variants.check_single()  # last: what cannot be simulated at all need not be chosen from
+    return made
 
 
 class _Conversion:
@@ -51,12 +55,20 @@ class _Conversion:
         self._catalogs = CatalogFiles(root, self._scope, folder)
         self._bodies = read_entities(root, self._scope, self._catalogs)
         ego = ego_name(root, self._bodies)
+        self._refuse_routes()
         logic = root.one("RoadNetwork", "LogicFile")
         file = folder / self._scope.text(logic, "filepath").replace("\\", "/")
         self._stage = Stage(self._road(file), ego=ego)
         declared = root.find("VariableDeclarations")
         for each in declared.all("VariableDeclaration") if declared is not None else []:
             self._stage.variables[self._scope.text(each, "name")] = self._scope.text(each, "value")
+
+    def _refuse_routes(self) -> None:
+        """Before positions are missed that a route would give."""
+        for private in self._root.one("Storyboard", "Init").below():
+            if private.tag == "RoutingAction" and private.children:
+                what = shown(private.children[0].tag)
+                raise private.refusal(f"{what} is not supported: vehicles keep to the lanes of one road")
 
     def _road(self, file: Path) -> DrivenRoad:
         """The one road that positions name."""
@@ -94,7 +106,7 @@ class _Conversion:
     def _actor(self, number: int, mover: Mover, nose_m: float) -> dict[str, Any]:
         """``ahead_m`` is to the face that is nearer to the ego vehicle's nose."""
         half, middle = mover.body.size_m[0] / 2, mover.start_s_m - nose_m
-        alongside = abs(middle) < half
+        alongside = -half <= middle < half
         ahead = middle + half if alongside or middle < 0.0 else middle - half
         return {
             **mover.script.model_dump(),

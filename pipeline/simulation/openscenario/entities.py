@@ -71,9 +71,9 @@ class CatalogFiles:
                 check_allowed(folder)
                 names = sorted(name for name in os.listdir(folder) if name.lower().endswith(".xosc"))
             except (OSError, ValueError) as error:
-                raise at.refusal(f"the catalogs in {shown(str(folder))} cannot be read: {reason_of(error)}") from None
+                raise at.refusal(f"the catalogs in {shown(folder.name)} cannot be read: {reason_of(error)}") from None
             if len(names) > _MOST_CATALOG_FILES:
-                raise at.refusal(f"more than {_MOST_CATALOG_FILES} files in {shown(str(folder))}")
+                raise at.refusal(f"more than {_MOST_CATALOG_FILES} files in {shown(folder.name)}")
             for name in names:
                 catalog = read_xml(folder / name, "OpenSCENARIO").find("Catalog")
                 if catalog is not None:

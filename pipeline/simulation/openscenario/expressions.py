@@ -44,8 +44,6 @@ def evaluate(text: str, value_of: Mapping[str, str]) -> float:
     reader = _ExpressionReader(_tokens(text), value_of)
     try:
         value = float(reader.whole())
-    except ZeroDivisionError:
-        raise ValueError("division by zero") from None
     except OverflowError:
         raise ValueError("the result is too large") from None
     if not math.isfinite(value):
@@ -103,7 +101,12 @@ class _ExpressionReader:
         value = self._signed()
         while self._next() in ("*", "/", "%"):
             operator, right = self._take(), self._signed()
-            value = value * right if operator == "*" else value / right if operator == "/" else math.fmod(value, right)
+            if operator == "*":
+                value *= right
+            elif right == 0.0:
+                raise ValueError("division by zero")
+            else:
+                value = value / right if operator == "/" else math.fmod(value, right)
         return value
 
     def _signed(self) -> float:

@@ -16,33 +16,37 @@ _Axis = list[dict[str, str]]
 """Alternatives, each a set of parameter values."""
 
 
-def chosen_values(distribution: XmlElement, variant: int | None, given: Mapping[str, str]) -> dict[str, str]:
-    """The parameter values of one variant, from 1; the last distribution of the file varies fastest. given: values that
-    the user set, which take the place of those in the file. OpenScenarioError if there are several and none is
-    chosen."""
-    if distribution.find("Stochastic") is not None:
-        raise distribution.refusal("Stochastic is not supported; only Deterministic distributions are")
-    axes = [_axis(each) for each in distribution.one("Deterministic").children]
-    axes = [axis for axis in axes if not all(name in given for values in axis for name in values)]
-    count = prod(len(axis) for axis in axes)
-    _check_choice(distribution.file, variant, count, axes)
-    left = (variant or 1) - 1
-    chosen: dict[str, str] = {}
-    for axis in reversed(axes):
-        left, index = divmod(left, len(axis))
-        chosen = {**axis[index], **chosen}
-    return {**chosen, **given}
+class Variants:
+    """All combinations of the values in a file."""
 
+    def __init__(self, distribution: XmlElement, given: Mapping[str, str]) -> None:
+        """given: values that the user set, which take the place of those in the file."""
+        if distribution.find("Stochastic") is not None:
+            raise distribution.refusal("Stochastic is not supported; only Deterministic distributions are")
+        axes = [_axis(each) for each in distribution.one("Deterministic").children]
+        self._axes = [axis for axis in axes if not all(name in given for values in axis for name in values)]
+        self._file, self._given = distribution.file, given
+        self._count = prod(len(axis) for axis in self._axes)
 
-def _check_choice(file: str, variant: int | None, count: int, axes: list[_Axis]) -> None:
-    if variant is None and count > 1:
-        names = sorted({name for axis in axes if len(axis) > 1 for values in axis for name in values})
+    def values(self, variant: int) -> dict[str, str]:
+        """The parameter values of one variant, from 1; the last distribution of the file varies fastest."""
+        if not 1 <= variant <= self._count:
+            raise OpenScenarioError(f"{self._file}: no variant {variant}: there are 1 to {self._count}")
+        left, chosen = variant - 1, dict[str, str]()
+        for axis in reversed(self._axes):
+            left, index = divmod(left, len(axis))
+            chosen = {**axis[index], **chosen}
+        return {**chosen, **self._given}
+
+    def check_single(self) -> None:
+        """OpenScenarioError if there are several to choose from."""
+        if self._count == 1:
+            return
+        names = sorted({name for axis in self._axes if len(axis) > 1 for values in axis for name in values})
         raise OpenScenarioError(
-            f"{file}: {count} variants of {shown(', '.join(names))}; choose one with {file}?variant=1 "
-            f"(1 to {count}), or set the parameters with ?NAME=VALUE&NAME=VALUE"
+            f"{self._file}: {self._count} variants of {', '.join(map(shown, names[:6]))}; choose one with "
+            f"{self._file}?variant=1 (1 to {self._count}), or set parameters with ?NAME=VALUE&NAME=VALUE"
         )
-    if variant is not None and not 1 <= variant <= count:
-        raise OpenScenarioError(f"{file}: no variant {variant}: there are 1 to {count}")
 
 
 def _axis(at: XmlElement) -> _Axis:

@@ -91,7 +91,7 @@ def read_xml(path: Path, root: str) -> XmlElement:
     try:
         data = read_regular(path, LARGEST_TEXT_BYTES)
     except (OSError, ValueError) as error:
-        raise OpenScenarioError(f"{shown(str(path))}: cannot be read: {reason_of(error)}") from None
+        raise OpenScenarioError(f"{shown(path.name)}: cannot be read: {reason_of(error)}") from None
     found = _parsed(data, path.name)
     if found.tag != root:
         raise OpenScenarioError(f"{path.name}: not {root}: its outermost element is {shown(found.tag)}")
