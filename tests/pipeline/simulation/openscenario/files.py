@@ -31,6 +31,13 @@ def xodr(plan: str = STRAIGHT, lanes: str = LEFT + RIGHT, inside: str = "", more
     )
 
 
+BEND = xodr(
+    '<geometry s="0" x="0" y="0" hdg="0" length="400"><line/></geometry>'
+    '<geometry s="400" x="400" y="0" hdg="0" length="100"><spiral curvStart="0" curvEnd="0.002"/></geometry>'
+)
+"""A road that begins to bend."""
+
+
 def vehicle(kind: str = "car", length: float = 4.0, width: float = 2.0, centre: float = 1.5) -> str:
     return (
         f'<Vehicle name="v" vehicleCategory="{kind}"><BoundingBox><Center x="{centre}" y="0" z="0.7"/>'
