@@ -148,11 +148,19 @@ def take_place(
             filtered = None
         elif not _is_plausible(filtered, ego_speed_mps):
             filtered = None
+        if filtered is None:
+            return take_place(_forgotten(followed), seen, guess, ego_speed_mps, params, slip_m)
     if filtered is None:
         filtered, placed = place_filter.start(sighting, guess.along_mps, guess.sigma_mps), 1
     height_from = _height_from(followed)
     track = with_place(followed.track, filtered, placed, share, returns=seen.returns, height_from=height_from)
     return evolve(followed, track=track, place_filter=filtered, placed=placed, unplaced_s=0.0, refused=0)
+
+
+def _forgotten(followed: Followed) -> Followed:
+    """The object without a place, and without the height on which that rested: its boxes show something else now, such
+    as a whole vehicle instead of half of one."""
+    return evolve(followed, place_filter=None, height=Height(), shape=BoxShape(), contact=RoadContact())
 
 
 def learned(followed: Followed, range_m: float, sigma_m: float, params: VisionTrackingParams) -> Followed:

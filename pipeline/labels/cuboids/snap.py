@@ -8,7 +8,7 @@ the points. The best one is used only if its sides explain the points, if it fit
 around it clearly better than the original, and if both place it alike. Otherwise, too, the cuboid is left unchanged: a
 dozen points beyond 35 m are no better than a person's judgement of the image. A vehicle is never seen completely, so
 the size only grows to contain its points; where both of its ends were seen, in one sweep or over several, the measured
-size is used. The cuboid stands on the ground.
+size is used. A cuboid that floats or is below the ground is put on it.
 
 The yaw comes from the closeness fit of the pipeline (``pipeline.lidar.boxes``). Open3D's minimal oriented box, which
 fits all three axes or, on flattened points, the smallest area, is less accurate on every real recording available: the
@@ -63,6 +63,10 @@ _WIDER_M = 0.3
 _SAME_YAW_RAD = 1e-6
 _GROWN_M = 0.1
 """Points must extend this far beyond a side to lengthen it."""
+_ON_GROUND_M = 0.3
+"""A bottom this close to the ground is left there: the bottoms of 656 labelled vehicles up to 50 m away are 0.06 m from
+the measured ground (median), 98 % of them closer than this. With 0.1 m, a third of Astyx's labelled vehicles were moved
+up or down by the error of the ground alone."""
 _RAISED_M = 0.1
 """Smaller changes of height are not applied."""
 _MOST_MOVED_M, _MOST_RESIZED_M, _MOST_TURN_RAD = 1.2, 1.0, math.radians(25.0)
@@ -111,7 +115,7 @@ def refit(sweep: F32 | Clustered, cuboid: Cuboid, around: Aggregate | None = Non
     every = around if around is not None else own
     found = _best(own, every, known.ground, cuboid) if len(points) >= _ENOUGH_POINTS else None
     flat, is_better = found or cuboid, found is not None
-    upright = _stood(flat, points, known.ground)
+    upright = _stood(flat, points, known.ground, _ON_GROUND_M)
     if not is_better and abs(upright.center[2] - cuboid.center[2]) < _RAISED_M:
         return Refitted(cuboid, len(points), False, max(len(every.placed), 1), is_better=False)
     turned = found is not None and abs(_wrapped(flat.yaw_rad - cuboid.yaw_rad)) > _SAME_YAW_RAD
@@ -197,13 +201,16 @@ def onto_points(points: F32, ground: Ground, cuboid: Cuboid) -> Refitted:
     return Refitted(_stood(flat, points, ground), len(points), bool(turn_rad))
 
 
-def _stood(cuboid: Cuboid, points: F32, ground: Ground) -> Cuboid:
-    """Placed on the ground, and at least as high as its points."""
+def _stood(cuboid: Cuboid, points: F32, ground: Ground, close_m: float = 0.0) -> Cuboid:
+    """Placed on the ground unless it is this close to it, and at least as high as its points."""
     x, y = cuboid.center[:2]
     bottom = float(ground.height(np.array([[x, y]]))[0])
     lowest, top = float(points[:, 2].min()), float(points[:, 2].max())
     if not math.isfinite(bottom) or abs(lowest - bottom) > _GROUND_GAP_M + cuboid.size[2] / 2:
         bottom = lowest
+    stands = cuboid.center[2] - cuboid.size[2] / 2
+    if abs(stands - bottom) < close_m:
+        bottom = stands
     height = max(cuboid.size[2], top - bottom)
     return Cuboid((x, y, bottom + height / 2), (cuboid.size[0], cuboid.size[1], height), cuboid.yaw_rad)
 

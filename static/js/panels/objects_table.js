@@ -140,6 +140,7 @@ function sortBy(key) {
   if (sort.key !== key) sort = { key, down: false };
   else sort = sort.down ? { key: null, down: false } : { key, down: true };
   reflectSort();
+  list.settle();
   update();
 }
 

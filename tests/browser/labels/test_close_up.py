@@ -109,6 +109,8 @@ def test_review_shows_a_track_as_a_filmstrip_and_a_press_goes_there(hand: Hand, 
     assert frames == sorted(frames)
     assert {START - 4, START + 4} < set(frames), "its ends, and frames between them that fit worst"
     expect(page.locator(".filmstrip [data-why='fits worst']").first).to_be_visible()
+    detail = page.locator(".track-detail")
+    assert detail.evaluate("(pane) => pane.scrollWidth <= pane.clientWidth"), "both columns of the strip are seen"
     page.locator(f".filmstrip [data-frame='{START + 4}']").click()
     is_at(page, START + 4)
     expect(page.locator(f".filmstrip [data-frame='{START + 4}']")).to_have_class("is-here")

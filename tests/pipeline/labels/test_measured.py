@@ -74,6 +74,16 @@ def test_a_cuboid_that_contains_its_points_is_left_although_they_are_away_from_i
     assert (found.is_better, found.cuboid) == (False, drawn)
 
 
+def test_a_cuboid_near_the_ground_is_left_at_its_height_and_one_that_floats_is_put_on_it() -> None:
+    """The ground is measured to a decimetre or two, too."""
+    car = standing(15.0, 4.0, 0.1)
+    x, y, z = car.center
+    near = refit(sweep_of(car), car._replace(center=(x, y, z + 0.15)))
+    assert (near.is_better, near.cuboid.center[2]) == (False, z + 0.15)
+    floating = refit(sweep_of(car), car._replace(center=(x, y, z + 0.5)))
+    assert floating.cuboid.center[2] == pytest.approx(z, abs=0.05)
+
+
 def test_a_heading_that_is_far_off_is_left_to_the_person() -> None:
     car = standing(15.0, 4.0, 0.1)
     found = refit(sweep_of(car), standing(15.3, 4.2, 0.1 - math.radians(18)))

@@ -53,6 +53,17 @@ def test_a_range_that_insists_is_right_and_the_class_is_wrong() -> None:
     assert placed[10:] == pytest.approx([55.0, 55.0], rel=0.1)
 
 
+def test_the_height_of_a_part_of_a_car_is_forgotten_when_the_whole_car_is_boxed() -> None:
+    """A car at 40 m, whose first box leaves out its roof, in which a LiDAR return ranges it."""
+    x1, y1, x2, y2 = seen(40.0).detection.bbox
+    part = Detection((x1, y1 + (y2 - y1) / 3, x2, y2), "car", 0.8)
+    ranged = replace(seen(60.0), detection=part, ranged_m=40.0, ranged_sigma_m=0.3, returns=2, noise_share=0.1)
+    state, _ = track(VisionTrackerState(), (ranged,), None, PARAMS, 20.0)
+    for _ in range(6):
+        state, (one,) = track(state, (seen(40.0),), 0.1, PARAMS, 20.0)
+    assert one.distance_m == pytest.approx(40.0, rel=0.1)
+
+
 def test_no_number_of_ranges_makes_a_car_lower_than_cars_are() -> None:
     """The box of a car at 45 m, paired with what the LiDAR sees at 16 m: a post, or another car in front."""
     height = Height()

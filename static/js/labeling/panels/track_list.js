@@ -72,9 +72,11 @@ export function setUp(parent) {
   new ResizeObserver(bringIntoView).observe(body);
   body.addEventListener("click", (event) => pick(within(event, ".track-row")));
   const reflect = paintAfter(["labels", "labelFrames", "frame", "track", "labeling", "draft", "threshold"], show);
+  body.addEventListener("settle", reflect);
   /** @param {Which} key */
   function choose(key) {
     listThe(key);
+    list.settle();
     reflect();
   }
   /** Redraw the list. */
@@ -108,8 +110,8 @@ function markSelected(row) {
 /** The threshold and what it leaves, while there are proposals it applies to. */
 function showSureness() {
   const { shown: left, hidden } = parted();
-  sureness.hidden = !left.length && !hidden.length;
-  reject.hidden = !hidden.length;
+  if (!list.isHeld) sureness.hidden = !left.length && !hidden.length; // it would move the rows
+  reject.disabled = !hidden.length; // without it, the bar would be lower
   slider.value = String(threshold());
   text(above, `≥ ${percent(threshold())}: ${left.length} proposed, ${hidden.length} hidden`);
 }
@@ -132,9 +134,10 @@ function create() {
   );
 }
 
-/** @param {HTMLElement} row @param {LabelTrack} track */
-function update(row, track) {
-  const { id, label, state, first, last, keyframes, origin, comment, reviewer, confidence } = track;
+/** @param {HTMLElement} row @param {LabelTrack} item outdated if it has left the list */
+function update(row, item) {
+  const track = trackOf(item.id) ?? item,
+    { id, label, state, first, last, keyframes, origin, comment, reviewer, confidence } = track;
   markSelected(row);
   row.dataset.state = isSentBack(track) ? "sent-back" : state;
   const [mark, name, what, frames, who] = [...row.children];

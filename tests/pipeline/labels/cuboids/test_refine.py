@@ -129,7 +129,7 @@ def test_without_own_motion_nothing_is_known_of_the_road() -> None:
 def test_a_side_seen_to_its_end_says_how_long_a_small_car_is() -> None:
     """Of one whose rear alone is seen, the usual length is assumed; of a hidden part of a side as well."""
     small = (3.3, 1.6, 1.5)
-    cars = {at: standing(14.0 - 1.0 * at, 4.0, size=small) for at in range(8)}
+    cars = {at: standing(10.0 - 1.0 * at, 4.0, size=small) for at in range(8)}
     boxes = {at: replace_size(car, (4.5, 1.8, 1.5), 0.3) for at, car in cars.items()}
 
     def fitted(faces: str) -> tuple[float, float]:
@@ -140,6 +140,16 @@ def test_a_side_seen_to_its_end_says_how_long_a_small_car_is() -> None:
 
     assert fitted("both") == pytest.approx((3.6, 1.7), abs=0.15)
     assert fitted("rear")[0] == pytest.approx(4.1)
+
+
+def test_points_of_a_car_and_its_neighbour_do_not_say_how_large_it_is() -> None:
+    """Together they are wider than any car."""
+    pair = {at: standing(14.0 - 1.0 * at, 4.0, size=(4.4, 3.2, 1.5)) for at in range(8)}
+    boxes = {at: replace_size(car, (4.5, 1.8, 1.5), 0.0) for at, car in pair.items()}
+    seen = {at: clustered(sweep_of(car)) for at, car in pair.items()}
+    (after,) = refined([track_of(boxes)], seen.get, driving(1.0, 8))
+    assert after.sightings[0].cuboid is not None
+    assert after.sightings[0].cuboid.size[1] == pytest.approx(1.8)
 
 
 def test_a_track_that_went_on_to_the_next_parked_car_ends_before_it() -> None:
