@@ -114,8 +114,9 @@ KINDS: tuple[SourceKind, ...] = (
     ),
     SourceKind(
         "sim",
-        "sim:<scenario or my.yaml>",
+        "sim:<scenario, my.yaml or my.xosc>",
         "pipeline.sources.simulated:open_recording",
+        bare_suffixes=(".xosc",),
         built_in="pipeline.simulation.built_in:offers",
     ),
     SourceKind("live", "live:<config.yaml>", "pipeline.sources.live.source:open_sensors", is_live=True),

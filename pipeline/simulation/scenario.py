@@ -1,5 +1,5 @@
-"""Scenarios: YAML files that describe the road, the actors and their scripts. Errors in a file are reported in one
-sentence."""
+"""Scenarios: YAML files that describe the road, the actors and their scripts, or OpenSCENARIO files. Errors in a file
+are reported in one sentence."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import cached_property
 from math import ceil, pi
 from pathlib import Path
 from typing import Any, Literal
+from urllib.parse import parse_qsl
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
@@ -78,6 +79,8 @@ class Scenario(ScenarioPart):
     """Simulated detections in the images; None to run the detectors."""
     faults: Faults = NONE
     """Faults of the sensors."""
+    notes: tuple[str, ...] = ()
+    """Sentences that are shown with the drive, such as what its source had that is not simulated."""
     driven: tuple[DrivenMoment, ...] = ()
     """The ego vehicle's motion from a closed-loop drive, one entry per tick; if given, it replaces the script."""
 
@@ -169,15 +172,32 @@ def _gap_m(scenario: Scenario, actor: Actor, t_s: float) -> float:
 
 
 def load(name_or_path: str) -> Scenario:
-    """A built-in scenario by name, or any file that ends in .yaml. ScenarioError says what is wrong."""
+    """A built-in scenario by name, any file that ends in .yaml, or an OpenSCENARIO file that ends in .xosc; options may
+    follow the latter: ``?variant=2`` or values of its parameters. ScenarioError says what is wrong."""
+    file, _, options = name_or_path.partition("?")
+    if file.lower().endswith(".xosc"):
+        return _from_openscenario(given_path(file, ScenarioError), options)
     path = given_path(name_or_path, ScenarioError) if name_or_path.endswith((".yaml", ".yml")) else None
     if path is None:
         if Path(name_or_path).suffix or Path(name_or_path).name != name_or_path:
-            raise ScenarioError(f"{name_or_path}: not a scenario file: its name must end in .yaml")
+            raise ScenarioError(f"{name_or_path}: not a scenario file: its name must end in .yaml or .xosc")
         if name_or_path not in names():
             raise ScenarioError(f"no scenario named {name_or_path!r}; there are {', '.join(names())}")
         path = FOLDER / f"{name_or_path}.yaml"
     return _checked(read_yaml(path, path.name, ScenarioError), path.name)
+
+
+def _from_openscenario(path: Path, options: str) -> Scenario:
+    from pipeline.simulation.openscenario import OpenScenarioError, convert  # needed for these files only
+
+    given = dict(parse_qsl(options, keep_blank_values=True))
+    number = given.pop("variant", None)
+    if number is not None and not (number.isascii() and number.isdecimal() and len(number) < 10):
+        raise ScenarioError(f"{path.name}: variant={number!r}: expected a number from 1")
+    try:
+        return _checked(convert(path, None if number is None else int(number), given), path.name)
+    except OpenScenarioError as error:
+        raise ScenarioError(str(error)) from None
 
 
 def parse(text: str, file: str) -> Scenario:

@@ -65,7 +65,7 @@ def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
     """The source kind of a URI, and the part after its scheme. live: whether error texts mention live sensors, too."""
     if is_remote(uri):
         in_store = kind_of_bare(uri)
-        if in_store is None:
+        if in_store is None or in_store.scheme != "mcap":
             raise SourceError(f"{uri}: only sessions can be opened in a store: {_IN_STORE}")
         return in_store, uri
     scheme, colon, rest = uri.partition(":")

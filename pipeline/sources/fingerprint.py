@@ -16,9 +16,9 @@ from pipeline.types import Frame
 
 def fingerprint(uri: str) -> str:
     """Sixteen characters that change if a file of the recording is edited or replaced. Based on the name, size and
-    modification time of the file and of files with the same stem (video, NMEA), of all files of a folder, and of files
-    named in options; for a file in a store, on its size and version. A URI without a file, such as a built-in scenario,
-    is returned unchanged."""
+    modification time of the file and of files with the same stem (video, NMEA), of all files of a folder, of files
+    named in options, and of those that an OpenSCENARIO file refers to; for a file in a store, on its size and version.
+    A URI without a file, such as a built-in scenario, is returned unchanged."""
     _, _, rest = uri.partition(":")
     digest = hashlib.sha256(uri.encode(errors="replace"))
     if is_remote(uri):
@@ -65,6 +65,10 @@ def _files(rest: str) -> Iterator[Path]:
             yield from _below(main)
         elif main.is_file():
             yield from sorted(each for each in main.parent.iterdir() if each.name.startswith(main.stem))
+            if main.suffix.lower() == ".xosc":
+                from pipeline.simulation.openscenario import referenced_files  # needed for these files only
+
+                yield from referenced_files(main)
         for _, value in parse_qsl(query):
             yield main.parent / Path(value).expanduser()
             yield main / Path(value).expanduser()

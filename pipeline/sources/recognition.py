@@ -41,7 +41,7 @@ _FILES: tuple[tuple[tuple[str, ...], str], ...] = (
     ((".osf",), "an Ouster recording; convert it to a ROS bag of PointCloud2 or to PCD files"),
     ((".rrd",), "an export for the rerun viewer; open the recording that it was made from"),
     ((".blf", ".asc", ".mf4", ".dbc"), "a log or definition of a vehicle bus, without LiDAR and images"),
-    ((".xosc", ".xodr"), "an unsupported OpenSCENARIO or OpenDRIVE file; scenarios are YAML files, opened as sim:FILE"),
+    ((".xodr",), "an OpenDRIVE road network; open the OpenSCENARIO file (.xosc) that uses it"),
 )
 """Common other files, by suffix: what they are, and what to do."""
 _FOLDERS: tuple[tuple[str, str], ...] = (

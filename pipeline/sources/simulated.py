@@ -76,6 +76,7 @@ class SimulatedSource:
 
 
 def _notes(scene: scenario.Scenario) -> Iterator[str]:
+    yield from scene.notes
     if scene.sensors == "lidar":
         yield "This drive uses the LiDAR alone; its images are shown but not analysed."
         return

@@ -53,7 +53,8 @@ def paint_ground(canvas: Canvas, road: Road, world: World, horizon: int) -> None
     )
     for crossing, line in crossings:
         _add(canvas, world, line, _crossing(crossing, road))
-    _add(canvas, world, road.line, [*_edge_lines(road, far, open_m), *_lane_lines(road, world, open_m)])
+    if road.painted:
+        _add(canvas, world, road.line, [*_edge_lines(road, far, open_m), *_lane_lines(road, world, open_m)])
 
 
 def _add(canvas: Canvas, world: World, line: RoadLine, strips: list[_Strip]) -> None:

@@ -24,8 +24,9 @@ def lane_points(now: World, road: Road, camera: CameraCalibration, noise: LineNo
     alignment = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
     right, left = road.edges_m()[0]
     along = now.s_m + np.arange(_FROM_M, noise.reach_m * 1.2, _STEP_M)
-    found, lines = [], []
-    for number, d_m in enumerate(np.arange(right, left + 0.1, road.lane_width_m).tolist()):
+    found, lines = [np.zeros((0, 2))], [np.zeros(0, int)]
+    painted_m = np.arange(right, left + 0.1, road.lane_width_m).tolist() if road.painted else []
+    for number, d_m in enumerate(painted_m):
         places = now.to_ego(road.to_world(along, d_m))
         near = (
             (places[:, 0] > _FROM_M) & (np.hypot(*places.T) < noise.reach_m) & (rng.random(len(places)) > noise.missed)

@@ -98,6 +98,8 @@ class LaneChange(ScenarioPart):
     """From lane centre to lane centre."""
     lane: int
     """Target lane; numbered as in OpenDRIVE."""
+    offset_m: float | None = Field(default=None, ge=-20.0, le=20.0)
+    """Offset to the road's left from the target lane's centre, afterwards; None keeps the script's."""
 
 
 class Script(Speeds):
@@ -144,6 +146,8 @@ class Actor(Vehicle, Script):
 
     ahead_m: float = Field(ge=-1000.0, le=5000.0)
     """From the ego origin to its nearest face along the road at time 0; negative when its nearest face is behind."""
+    alongside: bool = False
+    """Whether the ego origin lies between its faces at time 0; ``ahead_m`` is then its front face along the road."""
 
     def direction(self) -> float:
         """+1 along the road, −1 against it."""
@@ -151,7 +155,7 @@ class Actor(Vehicle, Script):
 
     def place_m(self, road: Road, ego_start_m: float, travelled_m: float) -> float:
         """s of its centre after a driven distance."""
-        half = self.size()[0] / 2 if self.ahead_m >= 0.0 else -self.size()[0] / 2
+        half = self.size()[0] / 2 if self.ahead_m >= 0.0 and not self.alongside else -self.size()[0] / 2
         d_m = road.lane_offset_m(self.lane) + self.offset_m
         return road.line.advance(ego_start_m + self.ahead_m + half, self.direction() * travelled_m, d_m)
 
@@ -216,7 +220,7 @@ def _offset(script: Script, road: Road, t_s: float) -> tuple[float, float, float
     """d in metres, its rate and its acceleration."""
     here = road.lane_offset_m(script.lane) + script.offset_m
     for change in script.lane_changes:
-        there = road.lane_offset_m(change.lane) + script.offset_m
+        there = road.lane_offset_m(change.lane) + (script.offset_m if change.offset_m is None else change.offset_m)
         p = (t_s - change.start_s) / change.duration_s
         if p <= 0.0:
             break

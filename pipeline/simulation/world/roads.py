@@ -132,8 +132,8 @@ class Road(ScenarioPart):
     """One after another from s = 0."""
     crossings: tuple[Crossing, ...] = ()
     """Other roads across this one."""
-    lane_width_m: float = Field(default=3.6, ge=2.0, le=6.0)
-    """Of every lane."""
+    lane_width_m: float = Field(default=3.6, ge=2.0, le=30.0)
+    """Of every lane; proving grounds have lanes as wide as an airfield."""
     lanes_forward: int = Field(default=3, ge=1, le=6)
     """Lanes of the ego vehicle's direction."""
     lanes_oncoming: int = Field(default=2, ge=0, le=6)
@@ -142,6 +142,8 @@ class Road(ScenarioPart):
     """Between the directions, without lanes."""
     shoulder_m: float = Field(default=2.5, ge=0.0, le=10.0)
     """Beside the outermost lanes."""
+    painted: bool = True
+    """Whether it has lane lines and edge lines."""
     crest_radius_m: float | None = Field(default=None, ge=300.0)
     """Minimum vertical radius of its crests and sags; None: it is level."""
     crests_every_m: float = Field(default=400.0, ge=50.0)

@@ -24,8 +24,12 @@ from pipeline.sources import SourceError, open_any, open_source
         ("astyx:bad\0name", "no such folder"),
         ("astyx:~no_such_user_here/x", "~no_such_user_here/x: unknown home directory"),
         ("sim:", "no scenario named ''; there are"),
-        ("sim:drive.xosc", "drive.xosc: not a scenario file: its name must end in .yaml"),
-        ("sim:folder/nosuch", "folder/nosuch: not a scenario file"),
+        ("sim:drive.xosc", "drive.xosc: cannot be read: No such file"),
+        ("drive.xosc", "drive.xosc: cannot be read: No such file"),
+        ("sim:drive.xosc?variant=x", "drive.xosc: variant='x': expected a number from 1"),
+        ("sim:~no_such_user_here/x.xosc", "~no_such_user_here/x.xosc: unknown home directory"),
+        ("s3://bucket/drive.xosc", "only sessions can be opened in a store"),
+        ("sim:folder/nosuch", "folder/nosuch: not a scenario file: its name must end in .yaml or .xosc"),
         ("sim:nosuch", "no scenario named 'nosuch'; there are"),
         ("sim:nosuch.yaml", "nosuch.yaml: cannot be read"),
         ("sim:~no_such_user_here/x.yaml", "~no_such_user_here/x.yaml: unknown home directory"),
@@ -40,7 +44,7 @@ def test_a_wrong_uri_gives_one_sentence(uri: str, says: str) -> None:
 
 @pytest.mark.parametrize("uri", ["foo", "nosuch:thing"])
 def test_live_sensors_are_named_where_they_are_taken_and_only_there(uri: str) -> None:
-    with pytest.raises(SourceError, match=r"sim:<scenario or my.yaml>, live:<config.yaml>$"):
+    with pytest.raises(SourceError, match=r"sim:<scenario, my.yaml or my.xosc>, live:<config.yaml>$"):
         open_any(uri)
     with pytest.raises(SourceError) as error:
         open_source(uri)

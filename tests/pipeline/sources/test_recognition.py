@@ -194,10 +194,11 @@ OTHERS: dict[str, tuple[Write, str]] = {
     "one point cloud": (some_file("a.pcd", b"# .PCD v.7"), "one point cloud; open its folder"),
     "one sweep of KITTI": (some_file("000000.bin", b"\1\2\3\4"), "raw points or packets; open the folder"),
     "a GNSS track": (some_file("a.gpx", b"<gpx>"), "a GNSS track; open the video"),
-    "an OpenSCENARIO file": (
+    "an OpenSCENARIO file that is cut off": (
         some_file("a.xosc", b"<?xml"),
-        "an unsupported OpenSCENARIO or OpenDRIVE file; .* sim:FILE$",
+        "a.xosc, line 1: not XML: ",
     ),
+    "an OpenDRIVE file": (some_file("a.xodr", b"<?xml"), r"an OpenDRIVE road network; open the OpenSCENARIO file"),
     "settings": (some_file("car.yaml", b"lidar:"), r"a settings file; use live:.*car\.yaml for sensors, sim:"),
     "an archive": (some_file("a.zip", b"PK\3\4"), "an archive; unpack it"),
     "an archive of no suffix": (some_file("a", b"PK\3\4"), "an archive; unpack it"),

@@ -1,0 +1,127 @@
+"""The vehicles of a scenario, written inline or in catalogs, and which of them is the ego vehicle."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+from pipeline.common.files.user_file_errors import reason_of
+from pipeline.common.files.user_files import check_allowed
+from pipeline.simulation.openscenario.parameters import ParameterScope
+from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, read_xml, shown
+from pipeline.simulation.world.actors import VehicleKind
+
+_KINDS: dict[str, str] = {"car": "car", "van": "van", "truck": "truck", "bus": "bus", "motorbike": "motorcycle"}
+"""``vehicleCategory`` → kind in the simulator."""
+_MOST_ENTITIES = 100
+_MOST_CATALOG_FILES = 200
+_EGO_NAMES = ("ego", "hero")
+
+
+@dataclass(frozen=True)
+class VehicleBody:
+    """Shape of an entity."""
+
+    name: str
+    """Of the entity."""
+    kind: VehicleKind
+    """As simulated."""
+    size_m: tuple[float, float, float]
+    """Length, width, height."""
+    centre_m: float
+    """Middle of the vehicle ahead of its reference point, which is the middle of its rear axle."""
+
+
+class CatalogFiles:
+    """The catalogs that a scenario names, read when they are needed."""
+
+    def __init__(self, scenario: XmlElement, scope: ParameterScope, folder: Path) -> None:
+        self._folders: list[tuple[XmlElement, Path]] = []
+        locations = scenario.find("CatalogLocations")
+        for kind in locations.children if locations is not None else []:
+            for each in kind.all("Directory"):
+                self._folders.append((each, folder / scope.text(each, "path").replace("\\", "/")))
+        self._catalogs: dict[str, XmlElement] | None = None
+
+    def entry(self, reference: XmlElement, scope: ParameterScope) -> tuple[XmlElement, ParameterScope]:
+        """The element that a ``CatalogReference`` names, and the scope of its own parameters."""
+        catalog, name = scope.text(reference, "catalogName"), scope.text(reference, "entryName")
+        if self._catalogs is None:
+            self._catalogs = self._read()
+        if catalog not in self._catalogs:
+            raise reference.refusal(f"no catalog {shown(catalog)!r} in the folders of CatalogLocations")
+        for each in self._catalogs[catalog].children:
+            if each.attributes.get("name") == name:
+                assigned = reference.find("ParameterAssignments")
+                given = {
+                    scope.text(one, "parameterRef"): scope.text(one, "value")
+                    for one in (assigned.all("ParameterAssignment") if assigned is not None else [])
+                }
+                inner = ParameterScope()
+                inner.declare(each, given)
+                return each, inner
+        raise reference.refusal(f"no entry {shown(name)!r} in catalog {shown(catalog)!r}")
+
+    def _read(self) -> dict[str, XmlElement]:
+        found: dict[str, XmlElement] = {}
+        for at, folder in self._folders:
+            try:
+                check_allowed(folder)
+                names = sorted(name for name in os.listdir(folder) if name.lower().endswith(".xosc"))
+            except (OSError, ValueError) as error:
+                raise at.refusal(f"the catalogs in {shown(folder.name)} cannot be read: {reason_of(error)}") from None
+            if len(names) > _MOST_CATALOG_FILES:
+                raise at.refusal(f"more than {_MOST_CATALOG_FILES} files in {shown(folder.name)}")
+            for name in names:
+                catalog = read_xml(folder / name, "OpenSCENARIO").find("Catalog")
+                if catalog is not None:
+                    found.setdefault(catalog.attributes.get("name", ""), catalog)
+        return found
+
+
+def read_entities(scenario: XmlElement, scope: ParameterScope, catalogs: CatalogFiles) -> dict[str, VehicleBody]:
+    """Name → body of every entity. OpenScenarioError for one that is not a motor vehicle."""
+    entities = scenario.one("Entities")
+    found: dict[str, VehicleBody] = {}
+    for each in entities.all("ScenarioObject"):
+        name = scope.text(each, "name")
+        if name in found or len(found) >= _MOST_ENTITIES:
+            raise each.refusal(f"two entities are called {shown(name)!r}, or more than {_MOST_ENTITIES} entities")
+        found[name] = _body(each, name, scope, catalogs)
+    return found
+
+
+def ego_name(scenario: XmlElement, bodies: dict[str, VehicleBody]) -> str:
+    """The entity called Ego or Hero, else the only one, else the only one that a controller drives."""
+    named = [name for name in bodies if name.lower() in _EGO_NAMES]
+    controlled = [
+        each.attributes.get("name", "")
+        for each in scenario.one("Entities").all("ScenarioObject")
+        if each.find("ObjectController") is not None
+    ]
+    for found in (named, list(bodies), [name for name in controlled if name in bodies]):
+        if len(found) == 1:
+            return found[0]
+    raise OpenScenarioError(
+        f"{scenario.file}: which entity is the ego vehicle? Name it Ego; there are {shown(', '.join(bodies)) or 'none'}"
+    )
+
+
+def _body(at: XmlElement, name: str, scope: ParameterScope, catalogs: CatalogFiles) -> VehicleBody:
+    reference = at.find("CatalogReference")
+    shape, inner = catalogs.entry(reference, scope) if reference is not None else (None, scope)
+    if shape is None:
+        shape = next((each for each in at.children if each.tag != "ObjectController"), at)
+    supported = f"the simulator has {', '.join(_KINDS)}"
+    if shape.tag != "Vehicle":
+        raise at.refusal(f"entity {shown(name)} is a {shown(shape.tag)}, which is not supported: {supported}")
+    category = inner.text(shape, "vehicleCategory")
+    if category not in _KINDS:
+        raise at.refusal(f"entity {shown(name)} is a {shown(category)}, which is not supported: {supported}")
+    box, centre = shape.one("BoundingBox", "Dimensions"), shape.one("BoundingBox", "Center")
+    length, width, height = (inner.number(box, key) for key in ("length", "width", "height"))
+    return VehicleBody(
+        name, cast("VehicleKind", _KINDS[category]), (length, width, height), inner.number(centre, "x", 0.0)
+    )

@@ -1,0 +1,182 @@
+"""Triggers: each kind of condition fires when it should, with its edge and delay."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.simulation.scenario import ScenarioError
+from tests.pipeline.simulation.openscenario.files import (
+    Parts,
+    at_time,
+    by_entity,
+    by_value,
+    condition,
+    event,
+    init,
+    on_lane,
+    speed_action,
+    story,
+)
+
+STEP_S = 0.02
+
+
+def drive(trigger: str, lead_mps: str = "10", variables: str = "", before: str = "") -> Parts:
+    """The ego vehicle approaches at 20 m/s from 50 m between reference points, 46 m between faces; when the trigger
+    fires, the lead's speed jumps to 5 m/s. before: further events."""
+    return Parts(
+        variables=variables,
+        init=init("Ego", on_lane(-1, 100.0), "20") + init("Lead", on_lane(-1, 150.0), lead_mps),
+        stories=story(before, event("jump", speed_action("5"), trigger)),
+        stop=condition(at_time(8.0)),
+    )
+
+
+def fired_at(folder: Path, parts: Parts) -> float | None:
+    """When the lead's speed jumped."""
+    (actor,) = parts.load(folder).actors
+    return min((time_s for time_s, speed_mps in actor.speed_mps.items() if speed_mps == 5.0), default=None)
+
+
+GAP = (
+    '<RelativeDistanceCondition entityRef="Lead" relativeDistanceType="{}" freespace="{}" rule="lessThan" value="{}"/>'
+)
+HEADWAY = '<TimeHeadwayCondition entityRef="Lead" freespace="{}" {} rule="lessThan" value="{}"/>'
+TTC = (
+    '<TimeToCollisionCondition freespace="true" rule="lessThan" value="2">'
+    '<TimeToCollisionConditionTarget><EntityRef entityRef="Lead"/></TimeToCollisionConditionTarget>'
+    "</TimeToCollisionCondition>"
+)
+REACHED = '<ReachPositionCondition tolerance="1"><Position>{}</Position></ReachPositionCondition>'
+DISTANCE = '<DistanceCondition value="30" rule="lessThan" freespace="false"><Position>{}</Position></DistanceCondition>'
+
+
+@pytest.mark.parametrize(
+    ("trigger", "expected_s"),
+    [
+        pytest.param(condition(at_time(2.0)), 2.0, id="time"),
+        pytest.param(condition(at_time(2.0), delay=1.5), 3.5, id="delay"),
+        pytest.param(condition(at_time(0.0)), 0.0, id="at once"),
+        pytest.param(condition(at_time(0.0), edge="rising"), None, id="no edge without a change"),
+        pytest.param(condition(at_time(2.0), edge="rising"), 2.0, id="rising edge"),
+        pytest.param(
+            condition(by_value('<SimulationTimeCondition value="2" rule="lessThan"/>'), edge="falling"),
+            2.0,
+            id="falling",
+        ),
+        pytest.param(condition(at_time(2.0), delay=1.0, edge="risingOrFalling"), 3.0, id="edge with delay"),
+        pytest.param(condition(at_time(3.0)) + condition(at_time(1.0)), 1.0, id="any group"),
+        pytest.param(
+            condition(at_time(1.0)).replace("</ConditionGroup>", "")
+            + condition(at_time(3.0)).replace("<ConditionGroup>", ""),
+            3.0,
+            id="all of a group",
+        ),
+        pytest.param(condition(by_entity(GAP.format("longitudinal", "true", 26))), 2.0, id="gap between faces"),
+        pytest.param(condition(by_entity(GAP.format("longitudinal", "false", 30))), 2.0, id="gap between points"),
+        pytest.param(condition(by_entity(GAP.format("lateral", "true", 1))), 0.0, id="lateral gap"),
+        pytest.param(condition(by_entity(GAP.format("euclidianDistance", "true", 26))), 2.0, id="gap in the plane"),
+        pytest.param(condition(by_entity(HEADWAY.format("true", 'alongRoute="true"', 1.3))), 2.0, id="headway"),
+        pytest.param(
+            condition(by_entity(HEADWAY.format("false", 'relativeDistanceType="longitudinal"', 1.5))), 2.0, id="1.2"
+        ),
+        pytest.param(condition(by_entity(TTC)), 2.6, id="time to collision"),
+        pytest.param(
+            condition(by_entity(TTC, "Lead").replace('entityRef="Lead"/></TimeTo', 'entityRef="Ego"/></TimeTo')),
+            2.6,
+            id="time to collision from the front",
+        ),
+        pytest.param(condition(by_entity(REACHED.format(on_lane(-1, 141.0)))), 2.0, id="position reached"),
+        pytest.param(condition(by_entity(DISTANCE.format(on_lane(-1, 170.0)))), 2.0, id="distance to a position"),
+        pytest.param(condition(by_entity('<TraveledDistanceCondition value="40"/>')), 2.0, id="distance travelled"),
+        pytest.param(condition(by_entity('<SpeedCondition value="15" rule="greaterThan"/>')), 0.0, id="speed"),
+        pytest.param(
+            condition(by_entity('<SpeedCondition value="15" rule="greaterThan"/>', "Ego", "Lead", rule="all")),
+            None,
+            id="speed of all",
+        ),
+        pytest.param(
+            condition(by_entity('<RelativeSpeedCondition entityRef="Lead" value="9" rule="greaterThan"/>')),
+            0.0,
+            id="relative speed",
+        ),
+        pytest.param(
+            condition(by_entity('<CollisionCondition><EntityRef entityRef="Lead"/></CollisionCondition>')),
+            4.6,
+            id="collision",
+        ),
+    ],
+)
+def test_each_condition(trigger: str, expected_s: float | None, tmp_path: Path) -> None:
+    found = fired_at(tmp_path, drive(trigger))
+    assert found == (None if expected_s is None else pytest.approx(expected_s, abs=STEP_S + 0.002))
+
+
+def test_a_standstill_lasts(tmp_path: Path) -> None:
+    trigger = condition(by_entity('<StandStillCondition duration="1.5"/>', "Lead"))
+    brake = event("brake", speed_action("0", "linear", 2.0))
+    assert fired_at(tmp_path, drive(trigger, before=brake)) == pytest.approx(3.5, abs=2 * STEP_S)
+
+
+STATE = '<StoryboardElementStateCondition storyboardElementType="{}" storyboardElementRef="{}" state="{}"/>'
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "state", "expected_s"),
+    [
+        ("event", "brake", "completeState", 3.0),
+        ("event", "brake", "runningState", 1.0),
+        ("event", "brake", "startTransition", 1.0),
+        ("event", "brake", "endTransition", 3.0),
+        ("event", "brake", "standbyState", 0.0),
+        ("action", "s::act::a_brake", "completeState", 3.0),
+        ("act", "act", "runningState", 0.0),
+        ("maneuver", "m", "completeState", None),
+    ],
+)
+def test_states_of_the_storyboard(kind: str, name: str, state: str, expected_s: float | None, tmp_path: Path) -> None:
+    trigger = condition(by_value(STATE.format(kind, name, state)))
+    brake = event("brake", speed_action("8", "linear", 2.0), condition(at_time(1.0)))
+    found = fired_at(tmp_path, drive(trigger, before=brake))
+    assert found == (None if expected_s is None else pytest.approx(expected_s, abs=2 * STEP_S))
+
+
+def test_a_variable_that_an_action_sets(tmp_path: Path) -> None:
+    trigger = condition(by_value('<VariableCondition variableRef="go" rule="greaterOrEqual" value="3"/>'), delay=1.0)
+    action = '<GlobalAction><VariableAction variableRef="go">{}</VariableAction></GlobalAction>'
+    put = event("put", action.format('<SetAction value="1"/>'), condition(at_time(1.0)))
+    add = event(
+        "add",
+        action.format('<ModifyAction><Rule><AddValue value="2"/></Rule></ModifyAction>'),
+        condition(at_time(2.0)),
+    )
+    variable = '<VariableDeclaration name="go" variableType="double" value="0"/>'
+    parts = drive(trigger, variables=variable, before=put + add)
+    assert fired_at(tmp_path, parts) == pytest.approx(3.0, abs=2 * STEP_S)
+
+
+@pytest.mark.parametrize(
+    ("trigger", "says"),
+    [
+        (condition(by_value("<TimeOfDayCondition/>")), "TimeOfDayCondition is not supported; SimulationTime"),
+        (condition(by_entity("<OffroadCondition/>")), "OffroadCondition is not supported; TimeHeadway"),
+        (condition(by_entity(TTC, "Nobody")), "no entity 'Nobody' with a position"),
+        (condition(at_time(1.0), edge="sideways"), "unknown conditionEdge 'sideways'"),
+        (condition(at_time(1.0), delay=-1.0), "a negative delay"),
+        (condition(by_value('<SimulationTimeCondition value="1" rule="near"/>')), "unknown rule 'near'"),
+        (condition(by_value('<SimulationTimeCondition value="soon"/>')), "'soon' is not a number in range"),
+        (condition(by_value('<VariableCondition variableRef="x" rule="equalTo" value="1"/>')), "no variable 'x'"),
+        (condition(by_value('<ParameterCondition parameterRef="x" rule="equalTo" value="1"/>')), "no parameter 'x'"),
+        (condition(by_value(STATE.format("event", "nothing", "completeState"))), "no event 'nothing'"),
+        (condition(by_entity(GAP.format("around", "true", 1))), "distance type 'around' is not supported"),
+        (condition(by_entity('<CollisionCondition><ByType type="vehicle"/></CollisionCondition>')), "with a ByType"),
+        (condition(by_entity(REACHED.format("<RoutePosition/>"))), "ReachPositionCondition needs a LanePosition"),
+        (condition(""), "has neither ByValueCondition nor ByEntityCondition"),
+    ],
+)
+def test_conditions_that_are_refused(trigger: str, says: str, tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=says) as error:
+        drive(trigger).load(tmp_path)
+    assert str(error.value).startswith("drive.xosc, line 1: ")

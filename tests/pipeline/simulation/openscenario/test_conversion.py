@@ -1,0 +1,95 @@
+"""A whole file as a source: frames, truth, notes, a closed loop's start, and references between files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.simulation import scenario
+from pipeline.simulation.drive_as_scenario import to_yaml
+from pipeline.simulation.scenario import ScenarioError
+from pipeline.sources import SourceError, open_source
+from tests.pipeline.simulation.openscenario.files import (
+    Parts,
+    at_time,
+    condition,
+    event,
+    lane,
+    lane_action,
+    speed_action,
+    story,
+    xodr,
+)
+
+PARTS = Parts(
+    stories=story(
+        event("brake", speed_action("5", "linear", 3.0, "rate"), condition(at_time(1.0))),
+        event("right", lane_action('<AbsoluteTargetLane value="-2"/>'), condition(at_time(2.0))),
+    )
+)
+
+
+@pytest.mark.parametrize("scheme", ["", "sim:"])
+def test_it_opens_as_a_source_with_sensors_and_truth(scheme: str, tmp_path: Path) -> None:
+    source = open_source(f"{scheme}{PARTS.write(tmp_path)}")
+    frame = source.frame(0)
+    assert frame.image is not None
+    assert frame.sweep is not None
+    (truth,) = source.truth(0)
+    assert (truth.label, truth.cuboid.center[0], truth.cuboid.size) == ("car", 48.0, (4.0, 2.0, 1.5))
+    assert (len(source), source.title) == (100, "drive")
+
+
+def test_a_folder_with_a_single_scenario_stands_for_it(tmp_path: Path) -> None:
+    PARTS.write(tmp_path)
+    assert len(open_source(str(tmp_path))) == 100
+
+
+def test_options_of_a_bare_path(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="it has no variants"):
+        open_source(f"{PARTS.write(tmp_path)}?variant=2")
+
+
+def test_it_can_be_kept_as_an_ordinary_scenario(tmp_path: Path) -> None:
+    made = PARTS.load(tmp_path)
+    assert scenario.parse(to_yaml(made), "a.yaml") == made
+
+
+def test_a_road_without_paint_has_no_lines_in_its_image(tmp_path: Path) -> None:
+    """White pixels below the horizon and the posts, where the road is."""
+    lanes = f"<left>{lane(1, mark='{}')}</left><right>{lane(-1, mark='{}')}{lane(-2, mark='{}')}</right>"
+    white = []
+    for mark in ("solid", "none"):
+        PARTS.road = xodr(lanes=lanes.replace("{}", mark))
+        image = open_source(str(PARTS.write(tmp_path))).frame(0).image
+        assert image is not None
+        road = image.bgr[image.bgr.shape[0] * 5 // 9 :]
+        white.append(int(np.count_nonzero(road.min(axis=2) > 180)))
+    assert white[0] > 500
+    assert white[1] < 50
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("road.xodr", "missing.xodr"), "missing.xodr: cannot be read: No such file"),
+        (("road.xodr", "."), "cannot be read: Is a directory"),
+        (("road.xodr", "drive.xosc"), "drive.xosc: not OpenDRIVE: its outermost element is OpenSCENARIO"),
+        (("road.xodr", "a\\\\road.xodr"), "road.xodr: cannot be read"),
+        (("<RoadNetwork>", "<Network>"), "drive.xosc, line 1: not XML: mismatched tag"),
+        (('<LogicFile filepath="road.xodr"/>', ""), "RoadNetwork has no LogicFile"),
+        (("<Init><Actions>", "<Init><Others>"), "not XML"),
+        (('entityRef="Ego"', 'entityRef="Nobody"'), "no entity 'Nobody'"),
+        (("TeleportAction", "Teleported"), "Teleported is not supported|has no TeleportAction in Init"),
+    ],
+)
+def test_what_is_missing_is_named(change: tuple[str, str], says: str, tmp_path: Path) -> None:
+    path = Parts().write(tmp_path)
+    text = path.read_text()
+    assert change[0] in text
+    path.write_text(text.replace(*change))
+    with pytest.raises(ScenarioError, match=says) as error:
+        scenario.load(str(path))
+    assert "\n" not in str(error.value)
