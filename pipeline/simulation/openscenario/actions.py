@@ -8,7 +8,7 @@ from math import sqrt
 from pipeline.simulation.openscenario.movers import SHAPES, Mover, seconds_for
 from pipeline.simulation.openscenario.parameters import ParameterScope
 from pipeline.simulation.openscenario.positions import RoadPlace, lane_at, lane_beside, middle_of, place_at
-from pipeline.simulation.openscenario.stage import Stage
+from pipeline.simulation.openscenario.stage import PlayedScenario
 from pipeline.simulation.openscenario.xml_files import XmlElement, number_in, shown
 
 _LIGHT = "Weather, light and friction of the scenario are left out: the simulator has one sky and a dry road."
@@ -48,7 +48,9 @@ class RunningAction:
         self.mover.change_speed(t_s, self.mover.now(t_s)[1].speed_mps, "step", 0.0, at)
 
 
-def start_action(at: XmlElement, actors: list[str], scope: ParameterScope, stage: Stage) -> list[RunningAction]:
+def start_action(
+    at: XmlElement, actors: list[str], scope: ParameterScope, stage: PlayedScenario
+) -> list[RunningAction]:
     """Start a ``PrivateAction`` or ``GlobalAction`` for all actors. OpenScenarioError if the simulator cannot play
     it."""
     if at.tag == "GlobalAction":
@@ -62,7 +64,7 @@ def start_action(at: XmlElement, actors: list[str], scope: ParameterScope, stage
     return [each for each in running if each is not None]
 
 
-def _global(at: XmlElement, scope: ParameterScope, stage: Stage) -> None:
+def _global(at: XmlElement, scope: ParameterScope, stage: PlayedScenario) -> None:
     if at.tag == "EnvironmentAction":
         stage.note(_LIGHT)
         return
@@ -79,7 +81,7 @@ def _global(at: XmlElement, scope: ParameterScope, stage: Stage) -> None:
     stage.variables[name] = repr(before + value if rule.tag == "AddValue" else before * value)
 
 
-def _private(at: XmlElement, name: str, scope: ParameterScope, stage: Stage) -> RunningAction | None:
+def _private(at: XmlElement, name: str, scope: ParameterScope, stage: PlayedScenario) -> RunningAction | None:
     if at.tag == "AppearanceAction":
         stage.note(_APPEARANCE)
         return None
@@ -107,12 +109,12 @@ def _private(at: XmlElement, name: str, scope: ParameterScope, stage: Stage) -> 
     return RunningAction(mover, inner.tag == "SpeedAction", ends_s, mover.speed_version)
 
 
-def _at_start(at: XmlElement, stage: Stage) -> None:
+def _at_start(at: XmlElement, stage: PlayedScenario) -> None:
     if stage.t_s > 0.0:
         raise at.refusal(f"{at.tag} is supported at the start only: nothing can jump during a drive")
 
 
-def _at_distance(at: XmlElement, mover: Mover, scope: ParameterScope, stage: Stage) -> RoadPlace:
+def _at_distance(at: XmlElement, mover: Mover, scope: ParameterScope, stage: PlayedScenario) -> RoadPlace:
     """The place that has the demanded distance from another entity, in its lane's direction."""
     _at_start(at, stage)
     if scope.truth(at, "continuous", False) or at.find("DynamicConstraints") is not None:
@@ -131,7 +133,7 @@ def _at_distance(at: XmlElement, mover: Mover, scope: ParameterScope, stage: Sta
     return here._replace(s_m=there.s_m + sign * gap_m)
 
 
-def _speed(at: XmlElement, mover: Mover, scope: ParameterScope, stage: Stage) -> float:
+def _speed(at: XmlElement, mover: Mover, scope: ParameterScope, stage: PlayedScenario) -> float:
     target, dynamics = at.one("SpeedActionTarget").only(), at.one("SpeedActionDynamics")
     to_mps = scope.number(target, "value")
     if target.tag == "RelativeTargetSpeed":
@@ -153,7 +155,7 @@ def _speed(at: XmlElement, mover: Mover, scope: ParameterScope, stage: Stage) ->
     return mover.change_speed(stage.t_s, to_mps, shape, duration_s, at)
 
 
-def _lane_change(at: XmlElement, mover: Mover, scope: ParameterScope, stage: Stage) -> float:
+def _lane_change(at: XmlElement, mover: Mover, scope: ParameterScope, stage: PlayedScenario) -> float:
     """A relative target counts lanes to the left of the other entity, as that entity faces."""
     target, dynamics = at.one("LaneChangeTarget").only(), at.one("LaneChangeActionDynamics")
     if target.tag == "AbsoluteTargetLane":
@@ -178,7 +180,7 @@ def _lane_change(at: XmlElement, mover: Mover, scope: ParameterScope, stage: Sta
     return mover.change_lane(stage.t_s, d_m, duration_s, at) if duration_s > 0.0 else stage.t_s
 
 
-def _lane_offset(at: XmlElement, mover: Mover, scope: ParameterScope, stage: Stage) -> float:
+def _lane_offset(at: XmlElement, mover: Mover, scope: ParameterScope, stage: PlayedScenario) -> float:
     """Its duration follows from the highest lateral acceleration, which the file must give."""
     target, dynamics = at.one("LaneOffsetTarget").only(), at.one("LaneOffsetActionDynamics")
     if scope.truth(at, "continuous", False):

@@ -8,10 +8,10 @@ from math import hypot, inf
 
 from pipeline.simulation.openscenario.parameters import RULES, ParameterScope, compare
 from pipeline.simulation.openscenario.positions import RoadPlace, place_at
-from pipeline.simulation.openscenario.stage import Stage
+from pipeline.simulation.openscenario.stage import PlayedScenario
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
 
-Test = Callable[[Stage], bool]
+Test = Callable[[PlayedScenario], bool]
 """Whether a condition holds now, before its edge and delay."""
 
 _BY_VALUE = "SimulationTimeCondition, ParameterCondition, VariableCondition and StoryboardElementStateCondition are"
@@ -32,7 +32,7 @@ class Trigger:
             for group in at.all("ConditionGroup")
         ]
 
-    def fires(self, stage: Stage) -> bool:
+    def fires(self, stage: PlayedScenario) -> bool:
         """Call once per step. Every condition is asked every time, as edges and delays need its past."""
         held = [[condition.holds(stage) for condition in group] for group in self._groups]
         return any(group and all(group) for group in held)
@@ -52,7 +52,7 @@ class _TimedCondition:
         self._delay, self._past = round(delay / step_s), deque[bool]()
         self._before: bool | None = None
 
-    def holds(self, stage: Stage) -> bool:
+    def holds(self, stage: PlayedScenario) -> bool:
         """Whether it held with its edge, its delay ago."""
         now = self._test(stage)
         rose, fell = self._before is False and now, self._before is True and not now
@@ -88,7 +88,7 @@ def _by_value(at: XmlElement, scope: ParameterScope) -> Test:
     if at.tag == "VariableCondition":
         name, rule, value = (scope.text(at, key) for key in ("variableRef", "rule", "value"))
 
-        def of_variable(stage: Stage) -> bool:
+        def of_variable(stage: PlayedScenario) -> bool:
             if name not in stage.variables:
                 raise at.refusal(f"no variable {shown(name)!r} is declared")
             return compare(stage.variables[name], rule, value, at)
@@ -100,7 +100,7 @@ def _by_value(at: XmlElement, scope: ParameterScope) -> Test:
     raise at.refusal(f"{shown(at.tag)} is not supported; {_BY_VALUE}")
 
 
-def _in_state(stage: Stage, at: XmlElement, key: tuple[str, str], state: str) -> bool:
+def _in_state(stage: PlayedScenario, at: XmlElement, key: tuple[str, str], state: str) -> bool:
     """Whether a storyboard element is in a state, or made a transition in this step."""
     key = (key[0], key[1].split("::")[-1])
     if key in stage.ambiguous:
@@ -112,7 +112,7 @@ def _in_state(stage: Stage, at: XmlElement, key: tuple[str, str], state: str) ->
     return stage.changed.get(key) == (state.removesuffix("Transition"), stage.t_s)
 
 
-def _by_entity(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], bool]:
+def _by_entity(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
     reader = _ENTITY_CONDITIONS.get(at.tag)
     if reader is None:
         raise at.refusal(f"{shown(at.tag)} is not supported; {_BY_ENTITY}")
@@ -127,26 +127,26 @@ def _limit(at: XmlElement, scope: ParameterScope) -> Callable[[float], bool]:
     return lambda number: RULES[rule](number, value)
 
 
-def _headway(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], bool]:
+def _headway(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
     """Distance divided by the entity's speed."""
     limit, other = _limit(at, scope), scope.text(at, "entityRef")
     kind, freespace = _distance_type(at, scope), scope.truth(at, "freespace", False)
 
-    def test(stage: Stage, name: str) -> bool:
+    def test(stage: PlayedScenario, name: str) -> bool:
         speed, gap = stage.speed(name, at), stage.gap_m(name, other, kind, freespace, at)
         return limit(gap / speed if speed > 0.0 else inf)
 
     return test
 
 
-def _time_to_collision(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], bool]:
+def _time_to_collision(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
     """Distance along the road divided by the closing speed; never while the gap grows."""
     limit, target = _limit(at, scope), at.one("TimeToCollisionConditionTarget").only()
     if target.tag != "EntityRef":
         raise target.refusal(f"time to collision with a {shown(target.tag)} is not supported; an EntityRef is")
     other, freespace = scope.text(target, "entityRef"), scope.truth(at, "freespace", False)
 
-    def test(stage: Stage, name: str) -> bool:
+    def test(stage: PlayedScenario, name: str) -> bool:
         closing = stage.closing_mps(name, other, at)
         gap = stage.gap_m(name, other, "longitudinal", freespace, at)
         return limit(gap / closing if closing > 0.0 else inf)
@@ -154,7 +154,7 @@ def _time_to_collision(at: XmlElement, scope: ParameterScope) -> Callable[[Stage
     return test
 
 
-def _relative_distance(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], bool]:
+def _relative_distance(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
     limit, other = _limit(at, scope), scope.text(at, "entityRef")
     kind, freespace = scope.text(at, "relativeDistanceType"), scope.truth(at, "freespace", False)
     return lambda stage, name: limit(stage.gap_m(name, other, kind, freespace, at))
@@ -166,14 +166,14 @@ def _distance_type(at: XmlElement, scope: ParameterScope) -> str:
     return scope.text(at, "relativeDistanceType", usual)
 
 
-def _to_position(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], float]:
+def _to_position(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], float]:
     """Distance of an entity's reference point from a fixed position."""
     position, kind = at.one("Position"), _distance_type(at, scope)
     if position.only().tag not in ("LanePosition", "RoadPosition", "WorldPosition"):
         raise position.refusal(f"{at.tag} needs a LanePosition, RoadPosition or WorldPosition")
     known: list[RoadPlace] = []
 
-    def distance(stage: Stage, name: str) -> float:
+    def distance(stage: PlayedScenario, name: str) -> float:
         if not known:
             known.append(place_at(position, scope, stage.road, stage.place_of))
         place, there = stage.place_of(name, at), known[0]
@@ -183,33 +183,33 @@ def _to_position(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str]
     return distance
 
 
-def _distance(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], bool]:
+def _distance(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
     if scope.truth(at, "freespace", False):
         raise at.refusal("DistanceCondition with freespace=true is not supported")
     limit, distance = _limit(at, scope), _to_position(at, scope)
     return lambda stage, name: limit(distance(stage, name))
 
 
-def _reach_position(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], bool]:
+def _reach_position(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
     tolerance, distance = scope.number(at, "tolerance"), _to_position(at, scope)
     return lambda stage, name: distance(stage, name) <= tolerance
 
 
-def _speed(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], bool]:
+def _speed(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
     limit = _limit(at, scope)
     return lambda stage, name: limit(stage.speed(name, at))
 
 
-def _relative_speed(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], bool]:
+def _relative_speed(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
     limit, other = _limit(at, scope), scope.text(at, "entityRef")
     return lambda stage, name: limit(stage.speed(name, at) - stage.speed(other, at))
 
 
-def _standstill(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], bool]:
+def _standstill(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
     duration = scope.number(at, "duration")
     since: dict[str, float] = {}
 
-    def test(stage: Stage, name: str) -> bool:
+    def test(stage: PlayedScenario, name: str) -> bool:
         if stage.speed(name, at) > _STANDSTILL_MPS:
             since.pop(name, None)
             return False
@@ -218,12 +218,12 @@ def _standstill(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str],
     return test
 
 
-def _travelled(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], bool]:
+def _travelled(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
     value = scope.number(at, "value")
     return lambda stage, name: stage.mover(name, at).now(stage.t_s)[1].travelled_m >= value
 
 
-def _collision(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], bool]:
+def _collision(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
     target = at.only()
     if target.tag != "EntityRef":
         raise target.refusal(f"collision with a {shown(target.tag)} is not supported; an EntityRef is")
@@ -231,7 +231,7 @@ def _collision(at: XmlElement, scope: ParameterScope) -> Callable[[Stage, str], 
     return lambda stage, name: stage.touch(name, other, at)
 
 
-_ENTITY_CONDITIONS: dict[str, Callable[[XmlElement, ParameterScope], Callable[[Stage, str], bool]]] = {
+_ENTITY_CONDITIONS: dict[str, Callable[[XmlElement, ParameterScope], Callable[[PlayedScenario, str], bool]]] = {
     "TimeHeadwayCondition": _headway,
     "TimeToCollisionCondition": _time_to_collision,
     "RelativeDistanceCondition": _relative_distance,

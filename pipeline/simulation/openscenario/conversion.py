@@ -13,7 +13,7 @@ from pipeline.simulation.openscenario.movers import Mover
 from pipeline.simulation.openscenario.opendrive import DrivenRoad, road_of
 from pipeline.simulation.openscenario.parameters import ParameterScope
 from pipeline.simulation.openscenario.positions import RoadPlace, place_at
-from pipeline.simulation.openscenario.stage import Stage
+from pipeline.simulation.openscenario.stage import PlayedScenario
 from pipeline.simulation.openscenario.storyboard import STEP_S, Storyboard
 from pipeline.simulation.openscenario.variants import Variants
 from pipeline.simulation.openscenario.xml_files import XmlElement, read_xml, shown
@@ -58,7 +58,7 @@ class _Conversion:
         self._refuse_routes()
         logic = root.one("RoadNetwork", "LogicFile")
         file = folder / self._scope.text(logic, "filepath").replace("\\", "/")
-        self._stage = Stage(self._road(file), ego=ego)
+        self._stage = PlayedScenario(self._road(file), ego=ego)
         declared = root.find("VariableDeclarations")
         for each in declared.all("VariableDeclaration") if declared is not None else []:
             self._stage.variables[self._scope.text(each, "name")] = self._scope.text(each, "value")

@@ -11,7 +11,7 @@ from pipeline.simulation.openscenario.xml_files import XmlElement, shown
 
 
 @dataclass
-class Stage:
+class PlayedScenario:
     """The state of a scenario that is being played."""
 
     road: DrivenRoad

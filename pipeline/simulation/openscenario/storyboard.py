@@ -8,7 +8,7 @@ from pipeline.simulation.openscenario.actions import RunningAction, start_action
 from pipeline.simulation.openscenario.conditions import Trigger
 from pipeline.simulation.openscenario.entities import CatalogFiles
 from pipeline.simulation.openscenario.parameters import ParameterScope
-from pipeline.simulation.openscenario.stage import Stage
+from pipeline.simulation.openscenario.stage import PlayedScenario
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
 
 STEP_S = 0.02
@@ -22,7 +22,7 @@ _REPLACES = ("override", "overwrite")
 class Storyboard:
     """The acts of a storyboard and its StopTrigger."""
 
-    def __init__(self, at: XmlElement, scope: ParameterScope, catalogs: CatalogFiles, stage: Stage) -> None:
+    def __init__(self, at: XmlElement, scope: ParameterScope, catalogs: CatalogFiles, stage: PlayedScenario) -> None:
         self._acts: list[_Act] = []
         for story in at.all("Story"):
             inner = ParameterScope(scope.values)
@@ -34,7 +34,7 @@ class Storyboard:
         if events > _MOST_EVENTS or sum(1 for each in at.below() if each.tag == "Condition") > _MOST_CONDITIONS:
             raise at.refusal(f"more than {_MOST_EVENTS} events or {_MOST_CONDITIONS} conditions")
 
-    def step(self, stage: Stage) -> bool:
+    def step(self, stage: PlayedScenario) -> bool:
         """One step at the stage's time; whether the StopTrigger ends the scenario."""
         for act in self._acts:
             act.step(stage)
@@ -47,7 +47,7 @@ def _trigger(at: XmlElement | None, scope: ParameterScope) -> Trigger | None:
 
 
 class _Act:
-    def __init__(self, at: XmlElement, scope: ParameterScope, catalogs: CatalogFiles, stage: Stage) -> None:
+    def __init__(self, at: XmlElement, scope: ParameterScope, catalogs: CatalogFiles, stage: PlayedScenario) -> None:
         self._name = scope.text(at, "name")
         stage.register("act", self._name)
         self._groups = [_ManeuverGroup(each, scope, catalogs, stage) for each in at.all("ManeuverGroup")]
@@ -58,7 +58,7 @@ class _Act:
         for group in self._groups:
             yield from group.events()
 
-    def step(self, stage: Stage) -> None:
+    def step(self, stage: PlayedScenario) -> None:
         if self._state == "standby" and (self._start is None or self._start.fires(stage)):
             self._enter(stage, "running", "start")
         if self._state != "running":
@@ -73,13 +73,13 @@ class _Act:
         if all(group.is_complete for group in self._groups):
             self._enter(stage, "complete", "end")
 
-    def _enter(self, stage: Stage, state: str, transition: str) -> None:
+    def _enter(self, stage: PlayedScenario, state: str, transition: str) -> None:
         self._state = state
         stage.enter("act", self._name, state, transition)
 
 
 class _ManeuverGroup:
-    def __init__(self, at: XmlElement, scope: ParameterScope, catalogs: CatalogFiles, stage: Stage) -> None:
+    def __init__(self, at: XmlElement, scope: ParameterScope, catalogs: CatalogFiles, stage: PlayedScenario) -> None:
         self._at, self._name = at, scope.text(at, "name")
         self._times = scope.number(at, "maximumExecutionCount", 1.0)
         stage.register("maneuverGroup", self._name)
@@ -104,7 +104,7 @@ class _ManeuverGroup:
         for maneuver in self._maneuvers:
             yield from maneuver.events
 
-    def step(self, stage: Stage) -> None:
+    def step(self, stage: PlayedScenario) -> None:
         if self.is_complete:
             return
         if stage.states["maneuverGroup", self._name] == "standby":
@@ -119,13 +119,13 @@ class _ManeuverGroup:
 
 
 class _Maneuver:
-    def __init__(self, at: XmlElement, actors: list[str], scope: ParameterScope, stage: Stage) -> None:
+    def __init__(self, at: XmlElement, actors: list[str], scope: ParameterScope, stage: PlayedScenario) -> None:
         self._name = scope.text(at, "name")
         stage.register("maneuver", self._name)
         self.events = [_Event(each, actors, scope, stage) for each in at.all("Event")]
         self.is_complete = self._is_running = False
 
-    def step(self, stage: Stage) -> None:
+    def step(self, stage: PlayedScenario) -> None:
         if self.is_complete:
             return
         if not self._is_running:
@@ -139,7 +139,7 @@ class _Maneuver:
 
 
 class _Event:
-    def __init__(self, at: XmlElement, actors: list[str], scope: ParameterScope, stage: Stage) -> None:
+    def __init__(self, at: XmlElement, actors: list[str], scope: ParameterScope, stage: PlayedScenario) -> None:
         self._at, self._actors, self._scope, self._name = at, actors, scope, scope.text(at, "name")
         self._priority = scope.text(at, "priority", "override")
         self._left = round(scope.number(at, "maximumExecutionCount", 1.0))
@@ -151,7 +151,7 @@ class _Event:
         self._running: list[tuple[str, list[RunningAction]]] | None = None
         self.is_complete = False
 
-    def step(self, stage: Stage, others: list[_Event]) -> None:
+    def step(self, stage: PlayedScenario, others: list[_Event]) -> None:
         fires = not self.is_complete and (self._start is None or self._start.fires(stage))
         if self._running is None and fires:
             self._begin(stage, others)
@@ -164,7 +164,7 @@ class _Event:
         if not self._running:
             self._finish(stage, "end")
 
-    def _begin(self, stage: Stage, others: list[_Event]) -> None:
+    def _begin(self, stage: PlayedScenario, others: list[_Event]) -> None:
         busy = [each for each in others if each is not self and each._running is not None]
         if self._priority == "skip" and busy:
             self._left -= 1
@@ -179,7 +179,7 @@ class _Event:
             stage.enter("action", name, "running", "start")
             self._running.append((name, start_action(action, self._actors, self._scope, stage)))
 
-    def stop(self, stage: Stage) -> None:
+    def stop(self, stage: PlayedScenario) -> None:
         """End it before it is complete."""
         for name, actions in self._running or []:
             for each in actions:
@@ -189,7 +189,7 @@ class _Event:
         if not self.is_complete:
             self._finish(stage, "stop")
 
-    def _finish(self, stage: Stage, transition: str) -> None:
+    def _finish(self, stage: PlayedScenario, transition: str) -> None:
         self._running = None
         self._left -= 1
         self.is_complete = self._left <= 0
