@@ -99,7 +99,7 @@ function reasonOf(kind) {
 /** Says so if a frame takes longer to compute than it may be old. */
 function slowness() {
   const state = get("state"),
-    tookMs = frame?.result.timing_ms.total ?? 0;
+    tookMs = frame ? (frame.result.timing_ms.total ?? 0) + frame.detectMs : 0;
   if (!state || tookMs <= mayBeMs(state)) return "";
   return `results are late: this computer is too slow, ${num(tookMs / 1000)} s per frame`;
 }

@@ -125,7 +125,8 @@ def _calibrations(folder: Path) -> dict[str, Target]:
         kind.write(path, CAMERA)
         for file in [path] if path.is_file() else sorted(path.iterdir()):
             reading = by_file(file.parent, file.name, lambda _, path=path, kind=kind: kind.read(path, size))
-            found[f"calibration {name}"] = Target((file.read_bytes(),), reading)
+            inside = f" {file.name}" if path.is_dir() else ""
+            found[f"calibration {name}{inside}"] = Target((file.read_bytes(),), reading)
     return found
 
 
