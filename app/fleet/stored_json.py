@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
@@ -18,8 +19,10 @@ def read_json(store: Store, name: str, expected: TypeAdapter[Content]) -> Conten
     if data is None:
         return None
     try:
-        return expected.validate_json(data)
+        return expected.validate_python(json.loads(data))  # a file's name, as text, need not be valid Unicode
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
         raise BadInput(f"{store.address}/{name}: damaged: {f'{place}: ' if place else ''}{first['msg']}") from None
+    except (ValueError, RecursionError):
+        raise BadInput(f"{store.address}/{name}: damaged: not valid JSON") from None

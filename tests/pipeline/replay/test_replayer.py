@@ -89,7 +89,7 @@ def test_no_thread_prepares_messages_any_more_once_it_is_interrupted() -> None:
     is_within, may_go_on = threading.Event(), threading.Event()
 
     def endless() -> Iterator[Message]:
-        yield from images(1)
+        yield from images(100)
         is_within.set()
         may_go_on.wait()
         yield from images(1)
