@@ -80,8 +80,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFil
 
 
 class _Together(LoadFileScheduling):
-    """One process has browser files from the beginning, so that it waits while the others compute; those come to them
-    last. A process that has had a browser file gets no other, since a browser keeps an event loop in its process."""
+    """Half of the processes have browser files from the beginning, so that they wait while the others compute; those
+    come to them last. A process that has had a browser file gets no other, since a browser keeps an event loop in its
+    process."""
 
     def _split_scope(self, nodeid: str) -> str:
         file = super()._split_scope(nodeid)
@@ -102,8 +103,8 @@ class _Together(LoadFileScheduling):
     def _next_for(self, node: WorkerController) -> str | None:
         """The scope that a process runs next; None if it may run none of those left."""
         has_browser = any(map(_needs_browser, self.assigned_work[node]))
-        is_first = len(self.nodes) > 1 and node is self.nodes[0]
-        for wants_browser in (True,) if has_browser else (is_first, not is_first):
+        begins_with_browser = node in self.nodes[: len(self.nodes) // 2]
+        for wants_browser in (True,) if has_browser else (begins_with_browser, not begins_with_browser):
             if found := next((scope for scope in self.workqueue if _needs_browser(scope) == wants_browser), None):
                 return found
         return None
