@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import tempfile
+from collections.abc import Generator
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
@@ -59,6 +61,18 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     for file in files[len(files) * number // count : len(files) * (number + 1) // count]:
         with suppress(Exception, pytest.skip.Exception):  # collecting the file says it again
             import_module(".".join(file.relative_to(ROOT).with_suffix("").parts))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Collect no garbage while test files are imported, and none of what they brought later: the 670,000 objects of
+    modules and tests live as long as the process, and looking at them takes 0.4 s, whatever a test left behind."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
