@@ -94,9 +94,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFil
 
 
 class _Together(LoadFileScheduling):
-    """Half of the processes have browser files from the beginning, so that they wait while the others compute; those
-    come to them last. A process that has had a browser file gets no other, since a browser keeps an event loop in its
-    process."""
+    """Half of the processes, rounded down, have browser files from the beginning, so that they wait while the others
+    compute; those come to them last. A process that has had a browser file gets no other, since a browser keeps an
+    event loop in its process."""
 
     def _split_scope(self, nodeid: str) -> str:
         file = super()._split_scope(nodeid)
