@@ -143,7 +143,7 @@ def coarse_scores(table: PairTable, model: FitModel, grid: F64, widen: float, sl
 
 
 def angular_extents(table: PairTable) -> Callable[[Alignment], F64]:
-    """``table.extents`` of many angular models, the same to the last bit in a tenth of the time: directions do not
+    """``table.extents`` of many angular models, the same to the last bit without projecting again: directions do not
     depend on the model, and pixels only grow with angles, so that the outermost points are those of any model."""
     directions = table.extents(Angular(1.0, 1.0, 0.0, 0.0))
 
