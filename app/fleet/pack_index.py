@@ -6,7 +6,12 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from pydantic import TypeAdapter
+
 from app.fleet.store import Store
+from app.fleet.stored_json import read_json
+
+_PACKS = TypeAdapter(list[dict[str, str]])
 
 
 @dataclass(frozen=True)
@@ -26,8 +31,7 @@ def packed_file(table: str, run: str, number: int) -> str:
 
 def packs_of(store: Store, run: str) -> list[Pack]:
     """Every pack of a run, by number."""
-    data = store.read(_index(run))
-    rows = json.loads(data) if data is not None else []
+    rows = read_json(store, _index(run), _PACKS) or []
     return [Pack(number, marks) for number, marks in enumerate(rows)]
 
 

@@ -6,7 +6,11 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from pydantic import TypeAdapter
+from typing_extensions import TypedDict
+
 from app.fleet.store import Store
+from app.fleet.stored_json import read_json
 from pipeline.common.errors import BadInput
 from pipeline.params import Params
 
@@ -14,6 +18,26 @@ LATEST = "latest.json"
 _PARTS = ("code", "networks", "sensors", "rings")
 _RINGS = 16
 """Usual number of LiDAR channels that are kept."""
+
+
+class _Latest(TypedDict):
+    run: str
+
+
+class _Run(TypedDict, total=False):
+    code: Any
+    networks: Any
+    sensors: Any
+    rings: Any
+    params: dict[str, dict[str, Any]]
+
+
+class _Aside(TypedDict):
+    address: str
+    reason: str
+
+
+_LATEST, _RUN, _ASIDE = TypeAdapter(_Latest), TypeAdapter(_Run), TypeAdapter(_Aside)
 
 
 def runs_of(store: Store) -> list[str]:
@@ -28,19 +52,18 @@ def make_latest(store: Store, run: str) -> None:
 
 def latest_run(store: Store) -> str:
     """The run of the last batch. Raises BadInput if there was none."""
-    data = store.read(LATEST)
-    if data is None:
+    said = read_json(store, LATEST, _LATEST)
+    if said is None:
         raise BadInput(f"{store.address}: no tables of `cipv batch` here")
-    return str(json.loads(data)["run"])
+    return said["run"]
 
 
 def about_run(store: Store, run: str) -> dict[str, Any]:
     """What a run is made from, by name: code, networks, sensors, rings, and every parameter, such as
     ``cluster.tolerance_m``. Raises BadInput if there is no such run."""
-    data = store.read(f"runs/{run}.json")
-    if data is None:
+    said = read_json(store, f"runs/{run}.json", _RUN)
+    if said is None:
         raise BadInput(f"{store.address}: no run {run!r}; there are {', '.join(runs_of(store)) or 'none'}")
-    said: dict[str, Any] = json.loads(data)
     return {name: said.get(name) for name in _PARTS} | _flat(said.get("params", {}))
 
 
@@ -78,8 +101,9 @@ def set_aside(store: Store, run: str) -> dict[str, str]:
     for name in store.names(f"aside/run={run}"):
         if _drive(name) in done:
             continue
-        said = json.loads(store.read(name) or b"{}")
-        found[str(said["address"])] = str(said["reason"])
+        said = read_json(store, name, _ASIDE)
+        if said is not None:  # else it has just been processed
+            found[said["address"]] = said["reason"]
     return found
 
 

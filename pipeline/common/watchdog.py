@@ -67,6 +67,8 @@ class _Heart:
     native_id: int = field(default_factory=threading.get_native_id)
     process: int | None = None
     """The process that the current operation waits for; None if the thread does it itself."""
+    first_s: float | None = None
+    """Time limit of the current operation while its usual time is not known; None for the watchdog's own."""
     delayed_s: float | None = None
     """Time that whoever does the operation had waited for a processor at the last check; None before that, or if the
     system does not report it."""
@@ -132,16 +134,17 @@ _of_thread = _OfThread()
 
 
 @contextmanager
-def at_work(doing: str, process: int | None = None) -> Iterator[None]:
+def at_work(doing: str, process: int | None = None, first_s: float | None = None) -> Iterator[None]:
     """Names this thread's current operation during the block; a nested block overrides the outer one. No effect on a
     thread that is not watched. Raises Retired if it took too long. process: the child process that does the operation,
-    if the thread only waits for it."""
+    if the thread only waits for it. first_s: how long it may take until its usual time is known, if that is less than
+    ``FIRST_S``."""
     heart, watchdog = _of_thread.heart, _of_thread.watchdog
     if heart is None or watchdog is None:
         yield
         return
-    outer = heart.doing, heart.process
-    watchdog.begins(heart, doing, process)
+    outer = heart.doing, heart.process, heart.first_s
+    watchdog.begins(heart, doing, process, first_s)
     try:
         yield
     finally:
@@ -191,24 +194,27 @@ class Watchdog:
             with self._lock:
                 self._hearts.discard(heart)
 
-    def begins(self, heart: _Heart, doing: str | None, process: int | None = None) -> None:
-        """A worker begins an operation and has thereby ended the previous one. process: see ``at_work``."""
+    def begins(
+        self, heart: _Heart, doing: str | None, process: int | None = None, first_s: float | None = None
+    ) -> None:
+        """A worker begins an operation and has thereby ended the previous one. process, first_s: see ``at_work``."""
         now_s = time.monotonic()
         with self._lock:
             if heart.doing is not None:
                 took = now_s - heart.since_s, self._load
                 self._took.setdefault(heart.doing, deque(maxlen=_KEPT)).append(took)
             heart.doing, heart.since_s, heart.starved_s, heart.is_told = doing, now_s, 0.0, False
+            heart.first_s = first_s
             if process != heart.process:
                 heart.process, heart.delayed_s, heart.stopped_s = process, None, None
 
-    def allowed_s(self, doing: str, process: int | None = None) -> float:
+    def allowed_s(self, doing: str, process: int | None = None, first_s: float | None = None) -> float:
         """Time limit of an operation. What it took is extended only as far as the machine is busier now than it was
         then. A process at idle priority may not run for a while, and nobody waits for it, so it always has the time of
         a first run."""
         load, took = _load(), self._took.get(doing, ())
         if len(took) < _FEWEST or process is not None:
-            return self._first_s * load
+            return (self._first_s if first_s is None else min(first_s, self._first_s)) * load
         return max(took_s * max(1.0, load / load_then) for took_s, load_then in took) + self._patience_s * load
 
     def look(self, now_s: float, late_s: float = 0.0) -> list[Stuck]:
@@ -222,7 +228,8 @@ class Watchdog:
                 _count_starved(heart)
                 if heart.doing is None or heart.is_told or heart.retired:
                     continue
-                is_late = now_s - heart.since_s - heart.starved_s > self.allowed_s(heart.doing, heart.process)
+                allowed_s = self.allowed_s(heart.doing, heart.process, heart.first_s)
+                is_late = now_s - heart.since_s - heart.starved_s > allowed_s
                 if not is_late and not self._has_stopped(heart, now_s, late_s):
                     continue
                 heart.is_told = True

@@ -6,7 +6,8 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -20,6 +21,8 @@ from pipeline.types import F64
 _AHEAD = 400
 """Number of events prepared ahead: half a second of a VLP-16."""
 _START_IN_NS = 300_000_000
+_END_S = 3.0
+"""How long the thread that prepares messages may take for the one it is at; a camera's frame takes a tenth of that."""
 _LATE_NS, _TOO_LATE_NS = 20_000_000, 200_000_000
 
 
@@ -57,18 +60,19 @@ def replay(
     sent = ReplayCounts()
     plugged = dict.fromkeys(senders, True)
     slipped_ns = 0
-    for planned in _made_ahead(disturb(events, faults, start_ns), stopped):
-        event = _later(planned, slipped_ns)
-        if not _wait_until(event.send_ns, senders, faults, start_ns + slipped_ns, plugged, stopped):
-            break
-        late_ns = time.time_ns() - event.send_ns
-        sent.late += late_ns > _LATE_NS
-        if late_ns > _TOO_LATE_NS:
-            sent.slips += 1
-            slipped_ns += late_ns
-            event = _later(event, late_ns)
-        senders[event.sensor].send(event.payload, event.stamp_ns)
-        sent.events[event.sensor] = sent.events.get(event.sensor, 0) + 1
+    with closing(_made_ahead(disturb(events, faults, start_ns), stopped)) as made:
+        for planned in made:
+            event = _later(planned, slipped_ns)
+            if not _wait_until(event.send_ns, senders, faults, start_ns + slipped_ns, plugged, stopped):
+                break
+            late_ns = time.time_ns() - event.send_ns
+            sent.late += late_ns > _LATE_NS
+            if late_ns > _TOO_LATE_NS:
+                sent.slips += 1
+                slipped_ns += late_ns
+                event = _later(event, late_ns)
+            senders[event.sensor].send(event.payload, event.stamp_ns)
+            sent.events[event.sensor] = sent.events.get(event.sensor, 0) + 1
     return sent
 
 
@@ -99,8 +103,10 @@ def _wait_until(
     return False
 
 
-def _made_ahead(events: Iterator[WireEvent], stopped: Callable[[], bool]) -> Iterator[WireEvent]:
-    """The events, prepared by a thread up to ``_AHEAD`` events early. Errors of that thread are raised here."""
+def _made_ahead(events: Iterator[WireEvent], stopped: Callable[[], bool]) -> Generator[WireEvent, None, None]:
+    """The events, prepared by a thread up to ``_AHEAD`` events early. Errors of that thread are raised here. To be
+    closed, however it ends: Python ends a thread that is still in a library's C++ at the program's end by unwinding it,
+    which aborts the program ("terminate called without an active exception")."""
     made: queue.Queue[WireEvent | BaseException | None] = queue.Queue(_AHEAD)
     done = threading.Event()
 
@@ -121,7 +127,8 @@ def _made_ahead(events: Iterator[WireEvent], stopped: Callable[[], bool]) -> Ite
         except Exception as error:  # passed on to the consumer of the events
             put(error)
 
-    threading.Thread(target=make, name="cipv-replay-maker", daemon=True).start()
+    maker = threading.Thread(target=make, name="cipv-replay-maker", daemon=True)
+    maker.start()
     try:
         while not stopped():
             try:
@@ -135,3 +142,4 @@ def _made_ahead(events: Iterator[WireEvent], stopped: Callable[[], bool]) -> Ite
             yield item
     finally:
         done.set()
+        maker.join(_END_S)

@@ -93,5 +93,13 @@ function reasonOf(kind) {
   const since = age === null ? "" : `last frame ${num(age / 1000)} s ago`;
   if (kind === "lost") return `reconnecting · ${since}`;
   const problems = state?.notices.filter(({ level }) => level !== "info").map((notice) => notice.text) ?? [];
-  return [since, ...problems].join(" · ");
+  return [since, slowness(), ...problems].filter(Boolean).join(" · ");
+}
+
+/** Says so if a frame takes longer to compute than it may be old. */
+function slowness() {
+  const state = get("state"),
+    tookMs = frame ? (frame.result.timing_ms.total ?? 0) + frame.detectMs : 0;
+  if (!state || tookMs <= mayBeMs(state)) return "";
+  return `results are late: this computer is too slow, ${num(tookMs / 1000)} s per frame`;
 }

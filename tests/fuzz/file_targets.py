@@ -28,7 +28,7 @@ from pipeline.common.files.image_decoding import check_budget
 from pipeline.detection import Detectors
 from pipeline.evaluation.scores.results_file import read_results
 from pipeline.formats.calibration_files import FORMATS as CALIBRATIONS
-from pipeline.inference import model_registry
+from pipeline.inference import model_registry, used_files
 from pipeline.inference.distance_laws import find_law, law_file
 from pipeline.inference.runtime import open_session, read_graph
 from pipeline.inference.tuning import _key, kept_way, untuned
@@ -125,7 +125,8 @@ def _calibrations(folder: Path) -> dict[str, Target]:
         kind.write(path, CAMERA)
         for file in [path] if path.is_file() else sorted(path.iterdir()):
             reading = by_file(file.parent, file.name, lambda _, path=path, kind=kind: kind.read(path, size))
-            found[f"calibration {name}"] = Target((file.read_bytes(),), reading)
+            inside = f" {file.name}" if path.is_dir() else ""
+            found[f"calibration {name}{inside}"] = Target((file.read_bytes(),), reading)
     return found
 
 
@@ -137,6 +138,7 @@ def _own_files(folder: Path) -> dict[str, Target]:
     with patch.dict(os.environ, CIPV_HOME=str(store.parent)):
         registry = _json({"defaults": {"detector": "a"}, "models": {"a": {"task": "detector", "sha256": "b"}}})
         tuned = _json({_key(network): asdict(untuned(2))})
+    used = _json({"/a.onnx": dict.fromkeys(("sha256", "since", "until", "before"), "a")})
     law = _json({"law": asdict(DistanceLaw(1000.0, -1.0, 700.0, 1.5, 1.6, 0.8)), "network_sha256": "a"})
     marks = _json({"marks": [{"id": 1, "index": 2, "text": "a", "t_ns": 5, "in_session": True}]})
     rest = {"saved_at": "a", "drive": "b", "note": "", "match": 0.5, "iou": None}
@@ -165,6 +167,7 @@ def _own_files(folder: Path) -> dict[str, Target]:
         "network": Target((network.read_bytes(),), of_file("b.onnx", _network)),
         "law of a network": Target((law,), of_file(law_file(network).name, lambda _: find_law(network))),
         "registry of networks": Target((registry,), of_store("registry.json", model_registry.list_models)),
+        "used networks": Target((used,), of_store("used.json", used_files._read)),
         "tuning of networks": Target((tuned,), of_store("tuning.json", lambda: kept_way(network, 2))),
         "marks": Target((marks,), of_file(marked.name, lambda path: Marks(path.parent).of("a"))),
         "alignments": Target((alignments,), of_file("alignments.json", AlignmentVersions)),

@@ -1,5 +1,6 @@
 """Every parser of external data, each with valid inputs. Those of third-party files and of the program's own files are
-in ``file_targets.py``, those of OpenSCENARIO files in ``scenario_targets.py``."""
+in ``file_targets.py``, those of OpenSCENARIO files in ``scenario_targets.py``, those of batches, projects and accounts
+in ``store_targets.py``."""
 
 from __future__ import annotations
 
@@ -37,6 +38,7 @@ from pipeline.sources.live.devices.can import load_dbc
 from pipeline.sources.route_files import load_route
 from tests.fuzz.file_targets import by_file, file_targets
 from tests.fuzz.scenario_targets import scenario_targets
+from tests.fuzz.store_targets import store_targets
 from tests.fuzz.target import Target
 from tests.pipeline.formats.velodyne.streams import drive
 from tests.pipeline.formats.velodyne.test_models import stream
@@ -161,7 +163,7 @@ def targets(folder: Path) -> dict[str, Target]:
             _ABOVE_ALL,
         ),
     }
-    found |= file_targets(folder / "files") | scenario_targets(folder / "scenarios")
+    found |= file_targets(folder / "files") | scenario_targets(folder / "scenarios") | store_targets(folder / "stores")
     for name, (make, uri, inside) in FILES.items():
         (folder / name).mkdir()
         recording = make(folder / name / "recording")

@@ -17,6 +17,8 @@ from pipeline.types import U8, Frame, RawBoxes, RawLanes
 PIECE_FRAMES = 600
 """Number of frames whose detections are stored in one file: a minute at 10 Hz."""
 _LEVEL = 3
+_LARGEST_BYTES = 256 << 20
+"""Unpacked size of one file: 50 times that of a minute at 10 Hz, of some 5 kB per image and two networks."""
 Answers = dict[tuple[int, str], RawBoxes | RawLanes]
 """By frame and detector."""
 
@@ -74,6 +76,8 @@ def packed(answers: Answers) -> bytes:
 def unpacked(data: bytes) -> Answers:
     """What ``packed`` wrote; empty if it cannot be read, so that networks run again."""
     try:
+        if zstandard.frame_content_size(data) > _LARGEST_BYTES:  # memory for it would be allocated
+            return {}
         rows = msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(data), type=list[DetectionRow])
         return {(row.index, row.detector): answer_of(row) for row in rows}
     except (msgspec.DecodeError, zstandard.ZstdError, ValueError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -12,6 +13,8 @@ from time import perf_counter
 import numpy as np
 import zstandard
 from distributed import get_worker
+from pydantic import TypeAdapter
+from typing_extensions import TypedDict
 
 from app.drive.events import find_events
 from app.drive.events.event import event_fields
@@ -24,6 +27,7 @@ from app.fleet.batch.keys import code_digest, networks_digest
 from app.fleet.batch.tables import DRIVES, EVENTS, FRAMES, OBJECTS, SCORES, TIMINGS, file_of
 from app.fleet.batch.unused_memory import return_unused
 from app.fleet.batch.worker_detectors import detectors_for
+from app.fleet.stored_json import read_json
 from pipeline.common.errors import BadInput
 from pipeline.detection import Detectors, detect
 from pipeline.evaluation.label_free.history import History
@@ -34,6 +38,13 @@ from pipeline.types import Frame, Result
 from pipeline.types.result_json import to_line
 from pipeline.types.source import Source, SourceError
 
+
+class _Said(TypedDict, total=False):
+    frames: int
+    reason: str
+
+
+_SAID = TypeAdapter(_Said)
 MOST_LABELLED = 6000
 """Results of labelled frames are held until the drive's end, some 75 KB each with 16 objects: no drive is scored
 against more."""
@@ -128,10 +139,10 @@ def _write(job: Job, name: str, what: dict[str, object]) -> None:
 def _before(job: Job) -> Outcome | None:
     """What became of it before; None where nothing has."""
     for name in (job.done_file, aside_file(job.key.name, job.recording)):
-        data = job.store.read(name)
-        if data is not None:
-            said = json.loads(data)
-            return Outcome(job.recording.drive, int(said.get("frames", 0)), 0, 0.0, str(said.get("reason", "")))
+        with suppress(BadInput):  # one whose file is damaged is processed again
+            said = read_json(job.store, name, _SAID)
+            if said is not None:
+                return Outcome(job.recording.drive, said.get("frames", 0), 0, 0.0, said.get("reason", ""))
     return None
 
 

@@ -1,4 +1,4 @@
-"""Frozen versions chained by hash: each holds the SHA-256 of its content and of the version before it.
+"""Frozen versions chained by hash: each holds the SHA-256 of its content, its recording, and the version before it.
 
 A version that was changed in the database, or whose predecessor was removed, is rejected when it is read. Anyone who
 can write the database can build the chain again, but not sign it again: see ``pipeline.common.files.signing``.
@@ -14,7 +14,7 @@ from typing import Any
 from sqlalchemy import Connection, select
 
 from app.labels.errors import ActRefused
-from app.labels.store.tables import VersionRow
+from app.labels.store.tables import DriveRow, VersionRow
 from pipeline.common.files.signing import Signature, check_signature, configured_signer, expected_key
 
 _SAID = ("name", "person", "t_unix_ms", "tracks", "frames")
@@ -28,7 +28,7 @@ def chained(connection: Connection, values: Mapping[str, Any]) -> dict[str, Any]
     ).all()
     followed = {row.previous for row in rows}
     previous = max((row.sha256 for row in rows if row.sha256 not in followed), default="")
-    sha256, signer = _sha256(values, previous), configured_signer()
+    sha256, signer = _sha256(values, previous, _recording(connection, values["drive_id"])), configured_signer()
     signature = signer.sign(_signed(sha256)) if signer is not None else Signature("", "")
     return {**values, "previous": previous, "sha256": sha256, "signed_by": signature.key, "signature": signature.value}
 
@@ -43,8 +43,13 @@ def check(connection: Connection, row: VersionRow | Any) -> None:
         raise ActRefused(f"version {row.name!r}: {found}")
     if not row.sha256:
         return
-    if row.sha256 != _sha256({name: getattr(row, name) for name in (*_SAID, "labels")}, row.previous):
-        raise ActRefused(f"version {row.name!r} was changed in the database since it was frozen")
+    values = {name: getattr(row, name) for name in (*_SAID, "labels")}
+    # versions were chained without their recording before
+    recordings = _recording(connection, row.drive_id), None
+    if not any(row.sha256 == _sha256(values, row.previous, recording) for recording in recordings):
+        raise ActRefused(
+            f"version {row.name!r} was changed in the database since it was frozen, or is of another recording"
+        )
     before = select(VersionRow.name).where(VersionRow.drive_id == row.drive_id, VersionRow.sha256 == row.previous)
     if row.previous and connection.execute(before).first() is None:
         raise ActRefused(f"the version before {row.name!r} was changed or removed from the database")
@@ -55,6 +60,13 @@ def _signed(sha256: str) -> bytes:
     return f"cipv-studio label version\0{sha256}".encode()
 
 
-def _sha256(values: Mapping[str, Any], previous: str) -> str:
-    said = json.dumps([previous, *(values[name] for name in _SAID)], ensure_ascii=False)
+def _recording(connection: Connection, drive_id: int) -> str:
+    """Key of the recording, which does not change when it is moved."""
+    return connection.scalars(select(DriveRow.key).where(DriveRow.id == drive_id)).one()
+
+
+def _sha256(values: Mapping[str, Any], previous: str, recording: str | None) -> str:
+    """recording: its key; None for a version from before that was a part of it."""
+    of_recording = [] if recording is None else [recording]
+    said = json.dumps([previous, *(values[name] for name in _SAID), *of_recording], ensure_ascii=False)
     return hashlib.sha256(said.encode() + b"\0" + values["labels"]).hexdigest()

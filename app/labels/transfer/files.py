@@ -27,6 +27,7 @@ from pipeline.labels.selection import Selection, selected
 
 _LARGEST_UNPACKED = 512 << 20
 _MOST_PARTS = 100_000
+_PIECE_BYTES = 1 << 20
 _ENCRYPTED = 1
 """Flag of an encrypted file in a .zip (PKWARE's APPNOTE, 4.4.4)."""
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
@@ -131,11 +132,12 @@ def _unzipped(file: Path, folder: Path) -> Path:
 
 
 def _copied(source: IO[bytes], out: IO[bytes], size: int) -> None:
-    """Copies at most the size declared in the .zip."""
-    data = source.read(size + 1)
-    if len(data) > size:
-        raise ValueError("a file in it is longer than declared")
-    out.write(data)
+    """Copies at most the size declared in the .zip, a piece at a time."""
+    while data := source.read(min(size + 1, _PIECE_BYTES)):
+        size -= len(data)
+        if size < 0:
+            raise ValueError("a file in it is longer than declared")
+        out.write(data)
 
 
 @contextmanager

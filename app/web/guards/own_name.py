@@ -34,6 +34,6 @@ async def _in_body(request: Request) -> Any:
     """The name in a JSON body; None if there is none. An invalid body is refused by the route."""
     try:
         body = json.loads(await request.body())
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return body.get(_NAME) if isinstance(body, dict) else None

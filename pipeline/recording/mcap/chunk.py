@@ -20,6 +20,11 @@ from pipeline.recording.mcap.index import RECORD_HEAD
 
 LARGEST_CHUNK_BYTES = 256 << 20
 """Uncompressed size. Recorders start a new chunk after one to a few dozen MB."""
+_MOST_RECORDS = 1_000_000
+"""Number of records in a chunk: 64 bytes each in a chunk of 64 MB. A quarter of a gigabyte of empty ones takes a
+minute to walk through, and compresses to a few kilobytes."""
+_NO_OPCODE = 0
+"""Not a valid opcode by MCAP's specification. Zeros are read as records of it without content."""
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
@@ -65,13 +70,18 @@ def unpack(content: bytes) -> UnpackedChunk:
     length = len(data)
     messages: list[MessagePlace] = []
     named: list[Schema | Channel] = []
-    offset = 0
+    offset = records = 0
     while offset < length:
         opcode, size = RECORD_HEAD.unpack_from(data, offset)
         start, offset = offset + RECORD_HEAD.size, offset + RECORD_HEAD.size + size
+        records += 1
         if offset > length:
             raise Damaged("a chunk that ends within a message")
+        if opcode == _NO_OPCODE or records > _MOST_RECORDS:
+            raise Damaged("a chunk of invalid records, or too many")
         if opcode == Opcode.MESSAGE:
+            if size < _MESSAGE_HEAD.size:
+                raise Damaged("a message that ends within its header")
             channel_id, _, log_time_ns, publish_time_ns = _MESSAGE_HEAD.unpack_from(data, start)
             messages.append(MessagePlace(channel_id, log_time_ns, publish_time_ns, start + _MESSAGE_HEAD.size, offset))
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):

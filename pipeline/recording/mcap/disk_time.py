@@ -8,6 +8,10 @@ from contextlib import contextmanager
 
 from pipeline.common.watchdog import at_work
 
+RESPONDS_WITHIN_S = 5.0
+"""Time limit of the first writes and syncs. What is synced was collected within this time (``SYNC_S`` of the recorder),
+so a disk that needs longer cannot keep up, and loses data soon."""
+
 
 class DiskTime:
     """Counts the time that one thread spends in writes and syncs; any thread may ask."""
@@ -21,7 +25,7 @@ class DiskTime:
         """The thread waits for the disk during the block. doing: for the watchdog."""
         begun_s = self._since_s = time.monotonic()
         try:
-            with at_work(doing):
+            with at_work(doing, first_s=RESPONDS_WITHIN_S):
                 yield
         finally:
             self._since_s = None

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from app.fleet.runs import about_run, differences, latest_run, make_latest, summary
+from app.fleet.pack_index import packs_of
+from app.fleet.runs import about_run, differences, latest_run, make_latest, set_aside, summary
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
 from pipeline.params import Params, with_changes
@@ -55,3 +56,20 @@ def test_an_unknown_run_is_refused_and_the_known_ones_are_named(runs: tuple[Stor
         about_run(store, "typo")
     assert usual in str(refused.value)
     assert other in str(refused.value)
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b"{}", b'{"run": 5}', b"[" * 100_000, b"\xff"])
+def test_a_damaged_file_is_named_in_one_line(tmp_path: Path, content: bytes):
+    store = Store(str(tmp_path))
+    for name, read in {
+        "latest.json": lambda: latest_run(store),
+        "runs/a.json": lambda: about_run(store, "a"),
+        "packed/run=a.json": lambda: packs_of(store, "a"),
+        "aside/run=a/b.json": lambda: set_aside(store, "a"),
+    }.items():
+        if content in (b"[]", b"{}", b'{"run": 5}') and name in ("runs/a.json", "packed/run=a.json"):
+            continue  # nothing is said, or what is said is ignored
+        store.write(name, content)
+        with pytest.raises(BadInput, match=f"{name}: damaged: ") as caught:
+            read()
+        assert "\n" not in str(caught.value)

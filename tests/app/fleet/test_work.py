@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import zstandard
 
 from app.cli import main
 from app.drive.events import event_kinds
+from app.fleet.batch.answers import unpacked
 from app.fleet.batch.job import Outcome, TooLong
 from app.fleet.batch.plan import Plan, work_of
 from app.fleet.batch.tables import EVENTS, FRAMES, OBJECTS, SCORES, TABLES, file_of
@@ -121,6 +123,23 @@ def test_damaged_answers_are_asked_anew(fleet: Path, ran: Path, tmp_path: Path):
     outcome = run_drive(job)
     assert isinstance(outcome, Outcome)
     assert outcome.looked_at == 8
+
+
+def test_answers_that_declare_gigabytes_are_asked_anew() -> None:
+    """Memory of the declared size would be allocated before anything is unpacked."""
+    data = bytearray(zstandard.ZstdCompressor().compress(bytes(1 << 24)))
+    size = (1 << 24).to_bytes(4, "little")
+    assert bytes(data).count(size, 0, 12) == 1
+    at = data.index(size)
+    data[at : at + 4] = (1 << 31).to_bytes(4, "little")
+    assert zstandard.frame_content_size(bytes(data)) == 1 << 31
+    tracemalloc.start()
+    try:
+        assert unpacked(bytes(data)) == {}
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most < 1 << 20
 
 
 def test_a_bad_recording_is_set_aside_with_the_reason(fleet: Path, tmp_path: Path):

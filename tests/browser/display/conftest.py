@@ -49,12 +49,18 @@ def open_display(browser: Browser, request: pytest.FixtureRequest) -> Iterator[O
 
 
 @pytest.fixture
-def own(tmp_path: Path) -> Iterator[tuple[Site, Recording]]:
+def detector() -> CountingDetector:
+    """The network of ``own``."""
+    return CountingDetector()
+
+
+@pytest.fixture
+def own(tmp_path: Path, detector: CountingDetector) -> Iterator[tuple[Site, Recording]]:
     """A playing dashboard for this test alone."""
     recording = Recording()
     engine = Engine(
         opener(recording),
-        lambda _: CountingDetector(),
+        lambda _: detector,
         Params(),
         uri=recording.uri,
         playing=True,

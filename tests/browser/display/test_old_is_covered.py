@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 from playwright.sync_api import Browser, WebSocketRoute, expect
 
-from tests.app.engine.recording_helpers import Recording
+from pipeline.types import U8, RawBoxes
+from tests.app.engine.recording_helpers import CountingDetector, Recording
 from tests.browser.conftest import Site
 from tests.browser.display.conftest import OpenDisplay, is_now, keep
 
@@ -60,6 +63,21 @@ def test_what_is_too_old_is_covered_at_once_and_comes_back(
         site.start()
     is_now(page, "fresh")
     expect(page.locator("#distance")).to_be_visible()
+
+
+class SlowNetwork(CountingDetector):
+    """Takes longer for an image than the display lets a frame grow old."""
+
+    def detect(self, bgr: U8) -> RawBoxes:
+        threading.Event().wait(0.6)
+        return super().detect(bgr)
+
+
+@pytest.mark.parametrize("detector", [SlowNetwork()])
+def test_a_computer_that_is_too_slow_is_said_to_be(open_display: OpenDisplay, own: tuple[Site, Recording]):
+    page = open_display(own[0].address)
+    expect(page.locator("#cover-why")).to_contain_text("results are late: this computer is too slow")
+    keep(page, "drive_too_slow")
 
 
 def test_a_paused_recording_is_not_old_but_says_so(open_display: OpenDisplay, own: tuple[Site, Recording]):

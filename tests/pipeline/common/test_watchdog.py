@@ -59,6 +59,19 @@ def test_a_call_may_take_its_worst_time_and_the_patience_more(monkeypatch: pytes
     assert stuck.thread_id == threading.get_ident()
 
 
+def test_what_is_known_to_be_fast_is_not_given_the_time_of_a_first_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Until its usual time is known, and not for what it is a part of."""
+    watchdog, told = Watchdog(first_s=30.0), list[Stuck]()
+    with watchdog.watching("the recorder", told.append, retires=False), at_work("saving a chunk"):
+        now_s = time.monotonic()
+        with at_work("syncing to the disk", first_s=5.0):
+            assert watchdog.look(now_s + 4.9) == []
+            assert [stuck.doing for stuck in watchdog.look(now_s + 6.0)] == ["syncing to the disk"]
+        assert watchdog.look(time.monotonic() + 29.0) == []
+        worked(watchdog, "syncing to the disk", [8.0] * 20, monkeypatch)
+        assert watchdog.allowed_s("syncing to the disk", first_s=5.0) == pytest.approx(9.0)
+
+
 def test_what_took_long_on_a_busy_machine_is_not_extended_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """Six times more programs than processors, before and after; then twice as many, and none."""
     load = [12.0]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -80,3 +82,25 @@ def test_what_goes_wrong_while_making_messages_is_raised() -> None:
     camera = Notebook()
     with pytest.raises(ValueError, match="no more frames"):
         replay(broken(), {"camera": camera})
+
+
+def test_no_thread_prepares_messages_any_more_once_it_is_interrupted() -> None:
+    """A thread that is within a library when Python ends aborts the program."""
+    is_within, may_go_on = threading.Event(), threading.Event()
+
+    def endless() -> Iterator[Message]:
+        yield from images(100)
+        is_within.set()
+        may_go_on.wait()
+        yield from images(1)
+
+    class Interrupted(Notebook):
+        def send(self, payload: Any, stamp_ns: int) -> None:
+            is_within.wait()
+            threading.Timer(0.2, may_go_on.set).start()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        replay(endless(), {"camera": Interrupted()})
+    assert may_go_on.is_set(), "it was waited for"
+    assert "cipv-replay-maker" not in {thread.name for thread in threading.enumerate()}

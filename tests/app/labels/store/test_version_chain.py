@@ -12,6 +12,7 @@ from app.labels.store.drive_labels import DriveLabels
 from app.labels.store.tables import VersionRow
 from app.labels.store.version_chain import _sha256
 from pipeline.common.files.signing import PUBLIC_VARIABLE, SIGNING_VARIABLE, new_keys
+from tests.app.labels.conftest import fresh
 from tests.app.labels.doing import add
 
 
@@ -46,6 +47,28 @@ def test_one_whose_predecessor_was_taken_out_is_refused(frozen: DriveLabels) -> 
     assert len(frozen.label_set("first").tracks) == 1
 
 
+def test_one_of_another_recording_is_refused_and_one_chained_without_its_recording_is_not(
+    frozen: DriveLabels, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first version of each has none before it that would show it."""
+    new_keys(tmp_path / "key")
+    monkeypatch.setenv(SIGNING_VARIABLE, str(tmp_path / "key"))
+    other = DriveLabels(frozen._database, fresh(), station="here")
+    add(other)
+    other.freeze("theirs", "Ada")
+    theirs = VersionRow.drive_id == other._id
+    with frozen._database.writing() as connection:
+        row = connection.execute(select(VersionRow.__table__).where(theirs)).mappings().one()
+        connection.execute(update(VersionRow).where(theirs).values(drive_id=frozen._id))
+    with pytest.raises(ActRefused, match="or is of another recording"):
+        frozen.label_set("theirs")
+    with frozen._database.writing() as connection:
+        mine = VersionRow.drive_id == frozen._id, VersionRow.name == "theirs"
+        older = {"sha256": _sha256(row, "", None), "signature": "", "signed_by": ""}
+        connection.execute(update(VersionRow).where(*mine).values(older))
+    assert len(frozen.label_set("theirs").tracks) == 1
+
+
 def test_those_from_before_there_was_a_chain_are_taken_as_they_are(frozen: DriveLabels) -> None:
     mine = VersionRow.drive_id == frozen._id
     with frozen._database.writing() as connection:
@@ -68,7 +91,7 @@ def test_a_signed_version_is_refused_once_it_was_changed_and_its_chain_built_aga
     with labels._database.writing() as connection:
         row = connection.execute(select(VersionRow.__table__).where(mine)).mappings().one()
         forged = {**row, "person": "Bob"}
-        again = {"person": "Bob", "sha256": _sha256(forged, row["previous"])}
+        again = {"person": "Bob", "sha256": _sha256(forged, row["previous"], labels.info.key)}
         connection.execute(update(VersionRow).where(mine).values(again))
     with pytest.raises(ActRefused, match="the signature does not match"):
         labels.label_set("first")

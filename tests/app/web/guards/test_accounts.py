@@ -76,6 +76,13 @@ def people(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, httpx
             client.close()
 
 
+def test_a_body_that_is_nested_too_deeply_is_refused(people: dict[str, httpx.Client]) -> None:
+    """To find the name in it, it is parsed before the route sees it."""
+    headers = {"content-type": "application/json"}
+    answer = people["labeler"].post("/api/labels/act", content=b"[" * 100_000, headers=headers)
+    assert 400 <= answer.status_code < 500
+
+
 def test_an_open_stream_ends_when_its_account_is_removed_or_changed(tmp_path: Path) -> None:
     """It was checked only when it was opened, and lives for days. The others stay."""
     file = tmp_path / "accounts.json"

@@ -13,6 +13,7 @@ import pytest
 import zstandard
 
 from pipeline.recording import topics
+from pipeline.recording.errors import Damaged
 from pipeline.recording.mcap import output as mcap_output
 from pipeline.recording.mcap.chunk import unpack
 from pipeline.recording.mcap.reader import McapFile
@@ -58,6 +59,38 @@ def test_a_chunk_never_unpacks_to_more_than_it_says(compression: str) -> None:
         struct.pack("<QQQII", 0, 0, 1000, 0, len(compression)) + compression.encode() + struct.pack("<Q", len(packed))
     )
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    with pytest.raises(Exception, match=r"larger than declared|ends within|requires a buffer"):
+    with pytest.raises(Exception, match=r"larger than declared|invalid records|requires a buffer"):
         unpack(head + packed)
     assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < 40_000_000
+
+
+RECORD = struct.Struct("<BQ")
+HEAD = struct.Struct("<HIQQ")
+
+
+def chunk_of(data: bytes) -> bytes:
+    """Content of a chunk's record."""
+    packed = zstandard.compress(data)
+    return struct.pack("<QQQII", 0, 0, len(data), 0, 4) + b"zstd" + struct.pack("<Q", len(packed)) + packed
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (bytes(9 * 1_000), "invalid records"),
+        (RECORD.pack(0x80, 0) * 1_000_001, "too many"),
+        ((RECORD.pack(5, HEAD.size) + HEAD.pack(1, 0, 0, 0)) * 1_000_001, "too many"),
+        (RECORD.pack(5, HEAD.size - 1) + bytes(HEAD.size), "within its header"),
+    ],
+    ids=["zeros", "unknown", "empty messages", "short message"],
+)
+def test_a_chunk_of_nothing_is_refused_before_it_takes_a_minute(data: bytes, says: str) -> None:
+    """Zeros compress to nothing, and are 28 million records of 9 bytes in the largest chunk."""
+    with pytest.raises(Damaged, match=says):
+        unpack(chunk_of(data))
+
+
+def test_unknown_records_in_a_chunk_are_skipped() -> None:
+    data = RECORD.pack(0x80, 3) + b"abc" + RECORD.pack(5, HEAD.size + 1) + HEAD.pack(1, 0, 7, 8) + b"x"
+    (message,) = unpack(chunk_of(data)).messages
+    assert (message.log_time_ns, data[message.start : message.end]) == (7, b"x")
