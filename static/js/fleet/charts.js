@@ -86,7 +86,7 @@ export function histogram(chart, chosen, onRange) {
       bars.replaceChildren(...barsOf(chart, found, chosen()));
       if (!found.counts.length) bars.append(el("span", { class: "facts", textContent: "no values" }));
       fields.forEach((field, place) => {
-        field.placeholder = edges.length ? number(edges[place ? edges.length - 1 : 0]) : "";
+        field.placeholder = edges.length ? number(edges[place ? edges.length - 1 : 0], edges) : "";
       });
     },
   };
@@ -140,5 +140,11 @@ function dragging(plot, edgesNow, onRange) {
 
 /** @param {number} value */
 const rounded = (value) => Number(value.toPrecision(4));
-/** @param {number} value */
-const number = (value) => String(Number(value.toPrecision(3)));
+/**
+ * A value in words, no finer than a thousandth of the range: 0.00000757 of 0–9.35 is 0.
+ * @param {number} value @param {number[]} edges
+ */
+function number(value, edges) {
+  const range = edges[edges.length - 1] - edges[0];
+  return String(Math.abs(value) < range / 1000 ? 0 : Number(value.toPrecision(3)));
+}
