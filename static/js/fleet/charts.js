@@ -97,11 +97,12 @@ export function histogram(chart, chosen, onRange) {
  */
 function barsOf(chart, { edges, counts }, [low, high]) {
   const highest = Math.max(...counts, 1);
+  const words = edges.map((edge) => number(edge, edges));
   return counts.map((count, n) =>
     el("i", {
       style: { "--part": `${(100 * count) / highest}%` },
       data: { inside: String((low === null || edges[n + 1] > low) && (high === null || edges[n] < high)) },
-      title: `${number(edges[n])} – ${number(edges[n + 1])} ${chart.unit}: ${count.toLocaleString("en")}`,
+      title: `${words[n]} – ${words[n + 1]} ${chart.unit}: ${count.toLocaleString("en")}`,
     }),
   );
 }

@@ -231,7 +231,7 @@ function openMoment({ address, index }) {
   goTo(address, index);
 }
 
-/** @param {Moment|typeof ROWS|undefined} place undefined: not one of this view */
+/** @param {Moment|"rows"|undefined} place undefined: not one of this view */
 function followHistory(place) {
   if (place === ROWS) return void (dialog.open || open());
   if (place) openMoment(place);
