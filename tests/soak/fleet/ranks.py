@@ -107,7 +107,7 @@ def _save_street(folder: Path, out: Path) -> None:
     """KITTI's drive 0009 with the labels of the tracking benchmark as its own."""
     source = open_source(f"kitti:{folder}/2011_09_26/2011_09_26_drive_0009_sync")
     labels = import_labels(
-        folder / "label_02.txt", drive_of(source), "kitti-tracking", Origin("file", "test", 0)
+        folder / "label_02.txt", drive_of(source), "kitti-tracking", Origin("import", "test", 0)
     ).labels
     truth = of_labels(labels, LeadRule()).frames
     writer = SessionWriter(out, about(source))
