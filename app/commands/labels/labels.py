@@ -53,6 +53,7 @@ class ProposeLabels:
         from pipeline.labels.propose import Seen, propose
         from pipeline.path.yaw_rate import usable_rate
         from pipeline.run import run
+        from pipeline.types.source import InParts
 
         params, source = self.pipeline.parameters(), self.source.open()
         detectors = self.pipeline.open_detectors(source)
@@ -79,7 +80,7 @@ class ProposeLabels:
 
         @lru_cache(64)
         def sweeps(index: int) -> Clustered | None:
-            sweep = source.frame(index).sweep
+            sweep = source.sweep(index) if isinstance(source, InParts) else source.frame(index).sweep
             return clustered(sweep.points) if sweep is not None else None
 
         with frames_progress() as bar:

@@ -93,6 +93,9 @@ class FitModel:
 
     def aligned(self, vector: F64, camera: CameraCalibration | None = None) -> Alignment:
         """The projection. camera: of the frame, if frames differ."""
+        if self.name == "angular":  # as ``resolve``, but 15,000 times in a search
+            h, v, cx, cy = self.values(vector).values()
+            return Angular(float(np.radians(h)), float(np.radians(v)), cx, cy)
         found = resolve(self.params(vector), camera or self.camera)
         assert found is not None
         return found

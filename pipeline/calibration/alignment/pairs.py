@@ -6,13 +6,13 @@ no error as long as the box also ends between them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
 
-from pipeline.alignment.projection import Alignment
+from pipeline.alignment.projection import Alignment, Angular
 from pipeline.calibration.alignment.models import FitModel
 from pipeline.calibration.alignment.scenes import ENDS, FitScene
 from pipeline.types import F64, I64
@@ -133,12 +133,28 @@ def coarse_scores(table: PairTable, model: FitModel, grid: F64, widen: float, sl
     corners = replace(table, outline=np.ascontiguousarray(table.outline[:, :ENDS]))
     across, down = table.deviations(widen, slack_px)
     boxes, whole = table.boxes[table.box], table.whole[table.box]
+    extents = angular_extents(corners) if model.name == "angular" else corners.extents
     return np.array(
         [
-            _covered(corners.extents(model.aligned(vector)), table.box, table.cluster, boxes, whole, across, down)
+            _covered(extents(model.aligned(vector)), table.box, table.cluster, boxes, whole, across, down)
             for vector in grid
         ]
     )
+
+
+def angular_extents(table: PairTable) -> Callable[[Alignment], F64]:
+    """``table.extents`` of many angular models, the same to the last bit without projecting again: directions do not
+    depend on the model, and pixels only grow with angles, so that the outermost points are those of any model."""
+    directions = table.extents(Angular(1.0, 1.0, 0.0, 0.0))
+
+    def extents(aligned: Alignment) -> F64:
+        assert isinstance(aligned, Angular)
+        pixels = np.empty_like(directions)
+        pixels[:, :2] = aligned.cx + directions[:, :2] / aligned.h_res_rad
+        pixels[:, 2:] = aligned.cy + directions[:, 2:] / aligned.v_res_rad
+        return pixels
+
+    return extents
 
 
 @numba.njit(cache=True, nogil=True)

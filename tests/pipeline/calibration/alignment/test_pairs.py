@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.alignment.projection import resolve
+from pipeline.alignment.projection import Angular, resolve
 from pipeline.calibration.alignment.models import FitModel
-from pipeline.calibration.alignment.pairs import PairTable, coarse_scores
+from pipeline.calibration.alignment.pairs import PairTable, angular_extents, coarse_scores
 from pipeline.params import AlignmentParams
 from tests.pipeline.calibration.alignment.made_drive import CAMERA, SIZE, drive
 
@@ -54,6 +54,22 @@ def test_the_coarse_score_is_highest_at_the_right_mount():
     scores = coarse_scores(table(), model, turns, 2.0, 5.0)
     assert scores.argmax() == 0
     assert scores[0] > 1.5 * scores[3]
+
+
+@pytest.mark.parametrize("behind", [False, True])
+def test_the_extents_of_many_angular_models_are_those_of_each(behind: bool):
+    found = table()
+    if behind:
+        found = replace(found, outline=found.outline * [[[-1.0, 1.0, 1.0]]])
+    fast = angular_extents(found)
+    for aligned in (Angular(0.001, 0.0012, 610.3, 180.7), Angular(0.0007, 0.0007, -40.0, 900.0)):
+        np.testing.assert_array_equal(fast(aligned), found.extents(aligned))
+    assert np.isnan(fast(Angular(0.001, 0.001, 0.0, 0.0))).any() == behind
+
+
+def test_an_angular_model_is_the_one_of_its_parameters():
+    model, vector = FitModel("angular", CAMERA, SIZE), np.array([-2.8, -2.7, 1.5, -0.5])
+    assert model.aligned(vector) == resolve(model.params(vector), CAMERA)
 
 
 def test_frames_drawn_twice_count_twice():
