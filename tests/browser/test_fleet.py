@@ -184,6 +184,52 @@ def test_a_press_opens_the_moment(open_fleet: OpenPage, fleet_site: Site, tables
     expect(page.locator("#transport .where .dim")).to_have_text("6/8")
 
 
+def test_back_leads_to_the_rows_and_forward_to_the_moment(open_fleet: OpenPage, fleet_site: Site, tables: FleetTables):
+    page = open_fleet()
+    page.get_by_role("tab", name="frames").click()
+    page.get_by_label("Condition").fill('"index" = 5')
+    page.keyboard.press("Enter")
+    expect(page.locator("#fleet-facts")).to_contain_text("3 frames")
+    settled(page)
+    row = tables.find('"index" = 5', "frames")
+    first, second = (dict(zip(row.columns, each, strict=True))["address"] for each in row.rows[:2])
+    page.locator("#fleet-rows tbody tr").nth(0).click()
+    fleet_site.engine.wait_for(lambda s: s.uri == first and s.index == 5, WAIT_MS / 1e3)
+    page.go_back()
+    expect(page.locator("#fleet-facts")).to_contain_text("3 frames")
+    settled(page)
+    page.locator("#fleet-rows tbody tr").nth(1).click()
+    fleet_site.engine.wait_for(lambda s: s.uri == second and s.index == 5, WAIT_MS / 1e3)
+    page.get_by_role("button", name="Fleet", exact=True).click()
+    settled(page)
+    page.get_by_role("button", name="Close", exact=True).click()
+    fleet_site.engine.control.change(uri=first, playing=False, target=0)
+    fleet_site.engine.wait_for(lambda s: s.uri == first, WAIT_MS / 1e3)
+    page.go_back()
+    expect(page.locator("#fleet-dialog")).to_be_visible()
+    settled(page)
+    page.go_forward()
+    expect(page.locator("#fleet-dialog")).to_be_hidden()
+    fleet_site.engine.wait_for(lambda s: s.uri == second and s.index == 5, WAIT_MS / 1e3)
+
+
+def test_long_names_leave_room_for_the_figures(open_fleet: OpenPage):
+    page = open_fleet()
+
+    def lengthened(route: Route) -> None:
+        found = route.fetch()
+        said = found.json()
+        place = said["columns"].index("title")
+        said["rows"][0][place] = "Without_a_space_" * 30
+        route.fulfill(response=found, json=said)
+
+    page.route("**/api/fleet/rows*", lengthened)
+    page.get_by_role("tab", name="drives").click()
+    expect(page.locator("#fleet-rows")).to_contain_text("Without_a_space_")
+    settled(page)
+    assert page.locator(".fleet-rows").evaluate("box => box.scrollWidth <= box.clientWidth")
+
+
 def test_the_page_says_that_it_is_searching(open_fleet: OpenPage):
     page, asked = open_fleet(), list[Route]()
     page.route("**/api/fleet/rows*", lambda route: asked.append(route))  # playwright wants no bound method

@@ -86,7 +86,7 @@ export function histogram(chart, chosen, onRange) {
       bars.replaceChildren(...barsOf(chart, found, chosen()));
       if (!found.counts.length) bars.append(el("span", { class: "facts", textContent: "no values" }));
       fields.forEach((field, place) => {
-        field.placeholder = edges.length ? number(edges[place ? edges.length - 1 : 0]) : "";
+        field.placeholder = edges.length ? number(edges[place ? edges.length - 1 : 0], edges) : "";
       });
     },
   };
@@ -97,11 +97,12 @@ export function histogram(chart, chosen, onRange) {
  */
 function barsOf(chart, { edges, counts }, [low, high]) {
   const highest = Math.max(...counts, 1);
+  const words = edges.map((edge) => number(edge, edges));
   return counts.map((count, n) =>
     el("i", {
       style: { "--part": `${(100 * count) / highest}%` },
       data: { inside: String((low === null || edges[n + 1] > low) && (high === null || edges[n] < high)) },
-      title: `${number(edges[n])} – ${number(edges[n + 1])} ${chart.unit}: ${count.toLocaleString("en")}`,
+      title: `${words[n]} – ${words[n + 1]} ${chart.unit}: ${count.toLocaleString("en")}`,
     }),
   );
 }
@@ -140,5 +141,11 @@ function dragging(plot, edgesNow, onRange) {
 
 /** @param {number} value */
 const rounded = (value) => Number(value.toPrecision(4));
-/** @param {number} value */
-const number = (value) => String(Number(value.toPrecision(3)));
+/**
+ * A value in words, no finer than a thousandth of the range: 0.00000757 of 0–9.35 is 0.
+ * @param {number} value @param {number[]} edges
+ */
+function number(value, edges) {
+  const range = edges[edges.length - 1] - edges[0];
+  return String(Math.abs(value) < range / 1000 ? 0 : Number(value.toPrecision(3)));
+}

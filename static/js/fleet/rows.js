@@ -34,7 +34,9 @@ export function showRows(found, onOpen, onSort, sorted) {
   const rows = found.rows.map((values) => {
     const row = Object.fromEntries(found.columns.map((name, place) => [name, values[place]]));
     const cells = shown.map((name) => {
-      return el("td", { class: LEFT.has(name) ? "left" : "", textContent: cell(name, row[name]) });
+      const words = cell(name, row[name]);
+      if (!LEFT.has(name)) return el("td", { textContent: words });
+      return el("td", { class: "left", textContent: words, title: `${words}\n${row.address}` });
     });
     const line = el("tr", { tabIndex: 0, title: `Open ${row.address}` }, ...cells);
     line.addEventListener("click", () => onOpen(row));

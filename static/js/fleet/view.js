@@ -19,6 +19,10 @@ import { showRows } from "./rows.js";
  * @property {Record<string, string>} named
  */
 
+/** @typedef {{address: string, index: number}} Moment */
+
+/** The rows, in the browser's history. */
+const ROWS = "rows";
 const TABLES = /** @type {const} */ (["events", "frames", "objects", "drives"]);
 const dialog = $("#fleet-dialog", HTMLDialogElement);
 /** @type {Fleet|null} */
@@ -28,6 +32,7 @@ let charts = [];
 
 export function setUp() {
   $("#fleet-button").addEventListener("click", open);
+  addEventListener("popstate", ({ state }) => followHistory(state?.fleet));
 }
 
 async function open() {
@@ -209,10 +214,27 @@ function sort(column) {
   filters.order = column;
 }
 
-/** Open a row's moment. @param {Record<string, any>} row */
+/**
+ * Open a row's moment. The browser's Back leads to the rows again, and Forward to the moment.
+ * @param {Record<string, any>} row
+ */
 function show(row) {
+  const moment = { address: row.address, index: row.index ?? 0 };
+  history.replaceState({ fleet: ROWS }, "");
+  history.pushState({ fleet: moment }, "");
+  openMoment(moment);
+}
+
+/** @param {Moment} moment */
+function openMoment({ address, index }) {
   dialog.close();
-  goTo(row.address, row.index ?? 0);
+  goTo(address, index);
+}
+
+/** @param {Moment|"rows"|undefined} place undefined: not one of this view */
+function followHistory(place) {
+  if (place === ROWS) return void (dialog.open || open());
+  if (place) openMoment(place);
 }
 
 /** @param {string} words empty: none */
