@@ -151,6 +151,7 @@ def _judge(
         gates=(*item.gates, *verdict.gates),
         eligibility=verdict.eligibility,
         path_offset_m=where.offset_m if where is not None else None,
+        path_margin_m=where.margin_m() if where is not None else None,
         in_path=is_in,
         in_path_probability=probability if where is not None else None,
         lateral_mps=where.sideways_mps if where is not None else None,

@@ -173,6 +173,8 @@ class FusedObject:
     """What its sightings so far say together, the fresh ones most; None where its place is not known."""
     path_offset_m: float | None = None
     """From the path's centre to the middle of its nearest face, positive to the left."""
+    path_margin_m: float | None = None
+    """How far inside the path this sighting alone places it, negative outside; None where its place is not known."""
     measured: bool = True
     """Whether its distance was measured in this frame; otherwise it is a prediction."""
     lateral_mps: float | None = None
