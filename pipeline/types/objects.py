@@ -240,12 +240,6 @@ class FusedObject:
         """A sensor that measures range saw it in this frame."""
         return is_ranging_in(self.seen_by)
 
-    def is_placed_anew(self, ranges_before: int) -> bool:
-        """The camera's position of it was reset because its distances no longer fitted. Its boxes may now be those of
-        another vehicle, so nothing found out about the earlier position holds for it. ranges_before: its
-        ``camera_ranges`` of the frame before."""
-        return not self.ranged and self.camera_ranges < ranges_before
-
     @property
     def imaged(self) -> bool:
         """The camera follows it, so that its class is known."""
