@@ -20,12 +20,10 @@ from pipeline.decision.gates import Candidate, judge, may_cut_in
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.decision.path_position import place
 from pipeline.decision.place import SURE, Place
+from pipeline.fusion.last_place import AGREEMENT_SIGMAS, LastPlace, is_elsewhere, last_place
 from pipeline.params import CipvParams
 from pipeline.types import Cipv, FusedObject, Moment, Path, Rejection, sensors_in_words
 
-AGREEMENT_SIGMAS = 3.0
-_APPROACH_M = 4.0
-"""By so much a distance may change between two frames: 40 m/s for a tenth of a second."""
 _BLUR_M = 0.2
 """Sightings of an object that moves sideways are averaged over at most the time in which it moves this far."""
 _HOVERS_MPS = 1.0
@@ -34,17 +32,6 @@ _DRIVES_S = 1.0
 _HALF_WAY = 0.7
 """A running mean reaches half of a step after 0.7 of its time constant: an object that moves sideways is judged at its
 predicted position at that time."""
-
-
-class LastPlace(NamedTuple):
-    """What an object's position was based on in the previous frame."""
-
-    camera_ranges: int
-    """Number of distances that the camera's position was based on."""
-    distance_m: float | None
-    """Its distance."""
-    sigma_m: float | None
-    """Standard deviation of that; None if a ranging sensor measured it."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +96,7 @@ def choose(
         rejected=tuple(_rejections(judged, lead)),
     )
     odds = {each.item.id: each.odds for each in judged if each.odds is not None}
-    at = {each.item.id: _placed(each.item) for each in judged}
+    at = {each.item.id: last_place(each.item) for each in judged}
     driving_s = {each.item.id: each.driving_s for each in judged if each.driving_s > 0.0}
     return CipvState(lead.id if lead is not None else None, odds, at, driving_s), choice
 
@@ -124,17 +111,17 @@ def _judge(
 ) -> _Judged:
     """Judge one object. placed: its position relative to the path, and when it will cross the edge."""
     where, crossing_s = placed if placed is not None else (None, None)
-    is_elsewhere = _is_elsewhere(item, state.places.get(item.id))
-    leads, widening_m, odds = item.id == state.lead_id and not is_elsewhere, 0.0, None
+    moved = is_elsewhere(item, state.places.get(item.id))
+    leads, widening_m, odds = item.id == state.lead_id and not moved, 0.0, None
     clears_s = clears_path_s(where, item, moment.speed_mps, params)
     if where is not None:
         moving_mps = where.believed_mps
         decide_s = min(params.decide_s, _BLUR_M / max(abs(moving_mps), 1e-3))
         widening_m = _widening_m(leads, moving_mps, params)
         now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY) if clears_s is None else -SURE
-        before = now if is_elsewhere else state.odds.get(item.id, now)
+        before = now if moved else state.odds.get(item.id, now)
         odds = before + _fresh(moment.dt_s, decide_s) * (now - before)
-    driving_s = 0.0 if is_elsewhere else state.driving_s.get(item.id, 0.0)
+    driving_s = 0.0 if moved else state.driving_s.get(item.id, 0.0)
     if item.surely_moving:
         driving_s += moment.dt_s or 0.0
     has_driven = driving_s >= _DRIVES_S
@@ -151,6 +138,7 @@ def _judge(
         gates=(*item.gates, *verdict.gates),
         eligibility=verdict.eligibility,
         path_offset_m=where.offset_m if where is not None else None,
+        path_margin_m=where.margin_m() if where is not None else None,
         in_path=is_in,
         in_path_probability=probability if where is not None else None,
         lateral_mps=where.sideways_mps if where is not None else None,
@@ -158,21 +146,6 @@ def _judge(
         clears_path_s=clears_s,
     )
     return _Judged(item, odds, driving_s, verdict.why_not)
-
-
-def _placed(item: FusedObject) -> LastPlace:
-    return LastPlace(item.camera_ranges, item.distance_m, None if item.ranged else item.distance_sigma_m)
-
-
-def _is_elsewhere(item: FusedObject, before: LastPlace | None) -> bool:
-    """Whether nothing found out about its last position holds for this one: the camera starts anew, or a ranging sensor
-    finds it at a distance that contradicts the camera's."""
-    if before is None:
-        return False
-    if not item.ranged or before.sigma_m is None or before.distance_m is None or item.distance_m is None:
-        return item.is_placed_anew(before.camera_ranges)
-    spread_m = AGREEMENT_SIGMAS * hypot(before.sigma_m, item.distance_sigma_m or 0.0)
-    return abs(item.distance_m - before.distance_m) > spread_m + _APPROACH_M
 
 
 def _rejections(judged: list[_Judged], lead: FusedObject | None) -> Iterator[Rejection]:

@@ -34,6 +34,8 @@ CAMERA_SIDEWAYS_PER_S = 0.02
 lateral position varies with the estimated distance."""
 _SLANTED = 0.64
 """Rotated by more than 20° from along or across the path, as |sin 2φ|."""
+_ALONG = 0.36
+"""tan 20°: what the LiDAR sees drive at less than this angle to the path is not turned by more."""
 _WIDEST_M = 3.2
 """Maximum extent across the path of a vehicle that drives along it, without its flank."""
 _LONGEST_M = 6.0
@@ -176,13 +178,15 @@ def _against(rows, center, left, right, half_width, sigmas, step, overlap, use_f
         cos, sin = np.cos(heading), np.sin(heading)
         has_sides = np.isfinite(rows[n, 14:18]).all()
         flank = rows[n, 19] * abs(near_y * cos - near_x * sin) / max(np.hypot(near_x, near_y), 0.1)
-        low, high = _reach(offsets, has_sides, beside[2 * n], beside[2 * n + 1], flank, rows[n, 8] - heading)
         vx, vy = rows[n, 9], rows[n, 10]
         # the path is fixed to the ground, so an object that follows its bend does not move sideways relative to it;
         # without own speed, relative to ego and its x axis
         along, across = vx + speed - yaw_rate * near_y, vy + yaw_rate * near_x
         sideways = across * cos - along * sin if ego_known else vy
         forward = along * cos + across * sin
+        if ego_known and not rows[n, 12] and abs(forward) > _SLOWEST_MPS and abs(sideways) < _ALONG * abs(forward):
+            has_sides = False  # a box wider than what drives along the path shows other vehicles as well
+        low, high = _reach(offsets, has_sides, beside[2 * n], beside[2 * n + 1], flank, rows[n, 8] - heading)
         if ego_known and forward > _SLOWEST_MPS:  # if it changes lanes, its nose is farther to the side than its rear
             doubt = SIDEWAYS_SIGMA_MPS + (CAMERA_SIDEWAYS_PER_S * ahead if rows[n, 12] else 0.0)
             nose = _CAR_LENGTH_M * min(max(abs(sideways) - doubt, 0.0) * rows[n, 18] / forward, _MOST_TURNED)

@@ -32,6 +32,9 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None) -> bool:
     If the path's uncertainty exceeds its width, no course counts as leading into it: in a bend, other traffic follows
     the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty. Oncoming
     or crossing objects behind the lead cannot be reached. What crosses and is gone before the car arrives is not met.
+
+    What is in the corridor must be seen there in this frame as well: ``in_path`` follows from all sightings so far, and
+    a first one of two vehicles in one cluster keeps it up for half a second.
     """
     if item.path_offset_m is None or item.velocity_mps is None or item.ttc_s is None or item.clears_path_s is not None:
         return False
@@ -42,7 +45,7 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None) -> bool:
         if is_hidden or sigma_m > path.half_width_m:
             return False
     if item.surely_moving is False or (item.in_path and not oncoming):
-        return item.in_path
+        return item.in_path and item.path_margin_m is not None and item.path_margin_m >= 0.0
     if item.closest_point is None or item.closest_point[0] < ABREAST_M:
         return False  # already beside the car: braking would not avoid it
     sideways = believed_mps(item.lateral_mps, item)

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from pipeline.common.fast_replace import evolve
 from pipeline.fusion.free_road import CLEAR_SHARE, MIN_RAYS, NEAR_M, Rays, SweepRays, rays_to
+from pipeline.fusion.last_place import LastPlace, is_elsewhere, last_place
 from pipeline.fusion.unseen import missing_boxes, never_boxed
 from pipeline.params import ExistenceParams
 from pipeline.types import Frame, FusedObject, Gate, Moment
@@ -75,8 +76,8 @@ class Existence(NamedTuple):
     """Running mean of its boxes' scores; None before the first box."""
     lidar: float
     """Log-odds of the LiDAR and of other ranging sensors."""
-    camera_ranges: int = 0
-    """Number of consecutive distances that the camera's position is based on."""
+    last: LastPlace | None = None
+    """Where it was."""
     age_s: float = 0.0
     """Time since it was first seen."""
     from_m: float | None = None
@@ -163,13 +164,13 @@ def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bo
         score = item.score if score is None else score + _weight(dt_s, _MEAN_S) * (item.score - score)
     elif missed and score is not None:
         score -= _weight(dt_s, min(max(age_s, _MEAN_S), _LONGEST_MEAN_S)) * score
-    is_elsewhere = item.is_placed_anew(before.camera_ranges)
-    if is_elsewhere:
+    moved = is_elsewhere(item, before.last)
+    if moved:
         lidar = 0.0  # what the LiDAR saw at one place says nothing about another
     elif lidar < 0.0:
         lidar *= math.exp(-dt_s / _EMPTY_S)  # the object moves on
     from_m, travelled_m, judged_m, shrunk_m = before.from_m, before.travelled_m, before.judged_m, before.shrunk_m
-    if is_elsewhere or from_m is None or now.speed_mps is None:
+    if moved or from_m is None or now.speed_mps is None:
         from_m, travelled_m, judged_m, shrunk_m = item.distance_m, 0.0, 0.0, 0.0
     else:
         travelled_m += now.speed_mps * dt_s
@@ -180,7 +181,7 @@ def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bo
     cluster_s = before.cluster_s + (dt_s if item.seen_by_lidar else 0.0)
     lidar = _bounded(lidar + _said_by_lidar(item, rays, cluster_s >= _FOLLOWED_S) + _said_by_others(item))
     return Existence(
-        score, lidar, item.camera_ranges, age_s, from_m, travelled_m, judged_m, shrunk_m, cluster_s, before.unboxed
+        score, lidar, last_place(item), age_s, from_m, travelled_m, judged_m, shrunk_m, cluster_s, before.unboxed
     )
 
 

@@ -173,6 +173,8 @@ class FusedObject:
     """What its sightings so far say together, the fresh ones most; None where its place is not known."""
     path_offset_m: float | None = None
     """From the path's centre to the middle of its nearest face, positive to the left."""
+    path_margin_m: float | None = None
+    """How far inside the path this sighting alone places it, negative outside; None where its place is not known."""
     measured: bool = True
     """Whether its distance was measured in this frame; otherwise it is a prediction."""
     lateral_mps: float | None = None
@@ -237,12 +239,6 @@ class FusedObject:
     def ranged_now(self) -> bool:
         """A sensor that measures range saw it in this frame."""
         return is_ranging_in(self.seen_by)
-
-    def is_placed_anew(self, ranges_before: int) -> bool:
-        """The camera's position of it was reset because its distances no longer fitted. Its boxes may now be those of
-        another vehicle, so nothing found out about the earlier position holds for it. ranges_before: its
-        ``camera_ranges`` of the frame before."""
-        return not self.ranged and self.camera_ranges < ranges_before
 
     @property
     def imaged(self) -> bool:

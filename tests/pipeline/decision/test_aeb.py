@@ -15,7 +15,7 @@ from pipeline.decision.cipv import CipvState, choose
 from pipeline.decision.object_motion import describe, required_decel_mps2
 from pipeline.params import AccParams, AebParams, CipvParams, MotionParams, PathParams, preset
 from pipeline.path.corridor import corridor
-from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Situation
+from pipeline.types import AccCommand, Braking, Cipv, EgoState, FusedObject, Situation
 from tests.pipeline.build import fused, moment
 
 PARAMS = AebParams(margin_m=1.0, build_up_s=0.3, confirm_frames=2)
@@ -89,6 +89,17 @@ def test_each_stage_brakes_as_its_parameter_says_and_names_its_cause() -> None:
     assert (partial.accel_mps2, partial.brake) == (-4.0, 0.5)
     _, warn = decide(fused(7, 30.0, velocity=(-14.0, 0.0)), speed_mps=14.0)
     assert (warn.accel_mps2, warn.accelerator) == (CRUISE.accel_mps2, CRUISE.accelerator), "a warning moves no pedal"
+
+
+@pytest.mark.parametrize(
+    ("sigma_mps", "state"),
+    [pytest.param(1.0, "partial_brake", id="known well"), pytest.param(6.0, "warn", id="hardly known")],
+)
+def test_the_camera_brakes_for_a_speed_that_it_knows(sigma_mps: float, state: str) -> None:
+    boxed = replace(fused(1, 25.0, source="V", velocity=(-14.0, 0.0), hits=20), camera_ranges=20)
+    boxed = replace(boxed, camera_speed_sigma_mps=sigma_mps, existence=0.98, height_from="range")
+    _, command = decide(replace(boxed, justifies=Braking.FULL), speed_mps=14.0)
+    assert command.state == state
 
 
 def test_the_stronger_demand_wins() -> None:

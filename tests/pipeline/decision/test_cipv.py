@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.decision.cipv import Choice, CipvState, LastPlace, choose
+from pipeline.decision.cipv import Choice, CipvState, choose
 from pipeline.decision.object_motion import describe
+from pipeline.fusion.last_place import LastPlace
 from pipeline.params import CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
 from pipeline.types import Cipv, EgoState, FusedObject, Path
@@ -116,7 +117,7 @@ def test_a_camera_track_whose_place_was_reset_must_be_seen_again() -> None:
 def test_a_lead_whose_place_was_reset_has_no_privilege(ranges: int, source: Any, leads: bool) -> None:
     """At the edge of the path, where only the current lead may stay."""
     followed = dataclasses.replace(fused(1, 20.0, 1.7, source=source, hits=20), camera_ranges=20)
-    state = CipvState(1, places={1: LastPlace(20, 20.0, 2.0)})
+    state = CipvState(1, places={1: LastPlace(20, 20.0, 2.0, ranged=False)})
     lead = choose(state, (dataclasses.replace(followed, camera_ranges=ranges),), PATH, moment(), PARAMS)[1].lead
     assert (lead is not None) == leads
 
@@ -130,7 +131,7 @@ def test_a_lead_whose_place_was_reset_has_no_privilege(ranges: int, source: Any,
 )
 def test_what_was_decided_by_the_camera_ends_where_the_lidar_finds_it_elsewhere(camera_m: float, is_in: bool) -> None:
     seen = fused(1, 34.0, 3.0)
-    state = CipvState(None, odds={1: 4.0}, places={1: LastPlace(20, camera_m, 1.0)})
+    state = CipvState(None, odds={1: 4.0}, places={1: LastPlace(20, camera_m, 1.0, ranged=False)})
     (item,) = choose(state, (seen,), PATH, moment(None, 0.1), PARAMS)[1].objects
     assert ((item.in_path_probability or 0.0) > 0.5) == is_in
 

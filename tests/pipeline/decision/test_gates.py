@@ -10,8 +10,9 @@ import pytest
 from pipeline.decision import gates
 from pipeline.decision.acc import AccState, control
 from pipeline.decision.aeb import AebState, find_threats, guard
-from pipeline.decision.cipv import Choice, CipvState, LastPlace, choose
+from pipeline.decision.cipv import Choice, CipvState, choose
 from pipeline.decision.object_motion import describe
+from pipeline.fusion.last_place import LastPlace
 from pipeline.params import AccParams, AebParams, CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
 from pipeline.types import AccCommand, Conditions, EgoState, FusedObject, Gate, ObjectSource, Situation
@@ -203,7 +204,10 @@ def test_what_only_the_camera_sees_at_the_edge_must_surely_be_in_the_path(
     vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 1.5))
     item = fused(1, 30.0, aside_m, source=source, velocity=(9.0 - EGO.speed_mps, 0.0))
     (seen,) = describe((dataclasses.replace(item, existence=0.98),), EGO, MotionParams())
-    for state, expected in ((CipvState(), becomes), (CipvState(1, {1: 0.2}, {1: LastPlace(5, None, None)}), True)):
+    for state, expected in (
+        (CipvState(), becomes),
+        (CipvState(1, {1: 0.2}, {1: LastPlace(5, None, 0.0, ranged=False)}), True),
+    ):
         choice = choose(state, (seen,), vague, moment(EGO, 0.1), CipvParams())[1]
         assert 0.5 < (choice.objects[0].in_path_probability or 0.0) < (0.7 if aside_m else 0.98)
         assert (choice.lead is not None) is expected

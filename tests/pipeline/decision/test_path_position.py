@@ -186,7 +186,7 @@ def test_a_whole_car_is_placed_by_its_rear(x: float, y: float) -> None:
 
 def crossing_car(x: float, from_m: float, to_m: float) -> FusedObject:
     """A car perpendicular to the path; the LiDAR sees only the first 1.5 m of its side."""
-    item = fused(1, x, from_m + 0.75, length=0.1, width=1.5)
+    item = fused(1, x, from_m + 0.75, length=0.1, width=1.5, velocity=(-EGO.speed_mps, 0.0))
     return dataclasses.replace(item, box_sides=((x, to_m), (x, from_m)))
 
 
@@ -213,11 +213,29 @@ def test_the_flank_of_a_car_in_the_next_lane_does_not_widen_it() -> None:
 
 
 @pytest.mark.parametrize(("label", "reaches"), [("truck", False), ("bus", False), ("car", True)])
-def test_the_flank_of_an_oncoming_truck_does_not_widen_it(label: str, reaches: bool) -> None:
+def test_the_flank_of_a_truck_in_a_bend_does_not_widen_it(label: str, reaches: bool) -> None:
     """Seen from a bend, its box covers 7 m at the distance of its front: its flank is 12 m long. A car's is not."""
-    item = fused(1, 37.0, 8.0, length=4.5, width=2.5, label=label)
+    item = fused(1, 37.0, 8.0, length=4.5, width=2.5, label=label, velocity=(-EGO.speed_mps, 0.0))
     found, _ = placed(dataclasses.replace(item, box_sides=((37.0, 9.3), (37.0, 2.3))))
     assert (found.low_m < 3.0) == reaches
+
+
+@pytest.mark.parametrize(
+    ("over_ground", "reaches"),
+    [
+        pytest.param((9.0, 1.0), False, id="drives ahead"),
+        pytest.param((-9.0, -1.0), False, id="oncoming"),
+        pytest.param((4.0, -6.0), True, id="turns across"),
+        pytest.param((0.0, 0.0), True, id="stands, perhaps across"),
+    ],
+)
+def test_a_box_over_several_vehicles_does_not_widen_what_drives_along(
+    over_ground: tuple[float, float], reaches: bool
+) -> None:
+    vx, vy = over_ground
+    item = fused(1, 10.0, 3.5, length=4.5, velocity=(vx - EGO.speed_mps, vy))
+    found, _ = placed(dataclasses.replace(item, box_sides=((10.0, 5.2), (10.0, -1.6))))
+    assert (found.low_m < 0.0) == reaches
 
 
 @pytest.mark.parametrize(

@@ -79,6 +79,19 @@ def test_enters_corridor(item: FusedObject, ego_mps: float | None, enters: bool)
     assert enters_corridor(judged(item, ego_mps), PATH, None) is enters
 
 
+@pytest.mark.parametrize(
+    ("then_m", "enters"), [pytest.param(0.9, True, id="inside"), pytest.param(2.4, False, id="out")]
+)
+def test_where_it_is_seen_now_counts_as_well(then_m: float, enters: bool) -> None:
+    """Its first cluster was also that of the lead, so by the mean of both sightings it is in the path."""
+    ego, now = EgoState(0, 20.0), moment(EgoState(0, 20.0), 0.1)
+    first, then = (fused(1, x, y, source="L", velocity=(-20.0, 0.0)) for x, y in ((22.0, 0.2), (20.0, then_m)))
+    state, _ = choose(CipvState(), describe([first], ego, MotionParams()), PATH, now, CipvParams())
+    (item,) = choose(state, describe([then], ego, MotionParams()), PATH, now, CipvParams())[1].objects
+    assert item.in_path
+    assert enters_corridor(item, PATH, None) is enters
+
+
 OVER_THERE = fused(1, 30.0, -8.0, velocity=(-20.0, 6.0))
 """It crosses and will enter the corridor."""
 IN_OUR_LANE = fused(1, 30.0, 0.2, velocity=(-35.0, 0.0))

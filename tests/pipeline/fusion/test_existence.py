@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.fusion.existence import Existence, ExistenceState, weigh
+from pipeline.fusion.last_place import last_place
 from pipeline.params import CipvParams, ExistenceParams
 from pipeline.types import (
     F32,
@@ -223,7 +224,7 @@ def test_that_a_place_was_empty_says_nothing_of_another_place() -> None:
     car = camera_car(45.0, score=0.7)
     kept = seen_through()
     assert existence_after(kept, car) < 0.5
-    begun = ExistenceState({1: kept.known[1]._replace(camera_ranges=12)})
+    begun = ExistenceState({1: kept.known[1]._replace(last=last_place(replace(car, camera_ranges=12)))})
     assert existence_after(begun, replace(car, camera_ranges=1)) > 0.85
 
 
@@ -245,8 +246,15 @@ def test_a_box_that_gets_another_number_leaves_what_the_lidar_saw_to_the_old_one
 @pytest.mark.parametrize(("ranges", "kept"), [(21, True), (1, False)], ids=["followed on", "begun anew"])
 def test_that_a_place_was_taken_says_nothing_of_another_place(ranges: int, kept: bool) -> None:
     car = replace(camera_car(45.0, score=0.4), camera_ranges=ranges)
-    known = ExistenceState({1: Existence(0.4, 4.0, camera_ranges=20)})
+    known = ExistenceState({1: Existence(0.4, 4.0, last_place(replace(car, camera_ranges=20)))})
     assert (existence_after(known, car) > 0.9) == kept
+
+
+@pytest.mark.parametrize(("lidar_m", "kept"), [(50.0, True), (70.0, False)], ids=["about there", "far from there"])
+def test_what_the_lidar_saw_ends_where_the_camera_alone_places_it_elsewhere(lidar_m: float, kept: bool) -> None:
+    car = replace(camera_car(45.0, score=0.4), distance_sigma_m=3.0)
+    seen = replace(car, source="VL", seen_by="VL", distance_m=lidar_m, distance_sigma_m=0.2)
+    assert (existence_after(ExistenceState({1: Existence(0.4, 4.0, last_place(seen))}), car) > 0.9) == kept
 
 
 def test_an_empty_place_is_forgotten_where_the_lidar_cannot_tell_any_more() -> None:
