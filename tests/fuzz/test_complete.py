@@ -19,6 +19,7 @@ NOT_FROM_OUTSIDE = {
     "app/commands/support/options.py:PipelineOptions.parameters": "typed by the user, and read by the parser of YAML",
     "pipeline/recording/session/velodyne_scan.py:scan_message": "writes; turns bytes of a checked length into an array",
     "pipeline/simulation/built_in.py:_title": "a file of this program",
+    "pipeline/simulation/drawing/turned_view.py:_maps": "the key of a cache, from arrays",
     "pipeline/simulation/drawing/turned_view.py:_rays": "the key of a cache, from an array",
     "pipeline/sources/live/devices/udp.py:_received_at": "from the kernel",
     "pipeline/sources/live/devices/video_stream.py:read_stream": "a stream; the library decodes it as it does files",
