@@ -7,8 +7,9 @@ than any vehicle and leave a gap that no surface has.
 
 One track is enough if its vehicle is narrower than the cluster: a rigid body does not widen, so returns beside the
 lateral extent that it had over the last second belong to something that no track follows yet, as when the next parked
-car comes into view beside a bus. Nor does it grow towards us: returns before the rear of a vehicle that drives ahead are
-those of a parked car that it passes. Here too, the two must leave a gap, or else a side of the vehicle came into view.
+car comes into view beside a bus. Nor does it grow towards us: returns before the rear of a vehicle that drives ahead
+are those of a parked car that it passes. Here too, the two must leave a gap, or else a side of the vehicle came into
+view.
 
 Returns within an expected footprint are its seeds. Every other return of the cluster joins the seeds that it is linked
 with by the shortest steps (a minimum spanning forest, like a watershed): a side that comes into view joins its rear,
