@@ -2,7 +2,7 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
-PROCESSES ?= 5
+PROCESSES ?= 3
 
 # Where this is set, each process compiles every library anew: seconds per start, minutes per run of the tests.
 unexport PYTHONDONTWRITEBYTECODE
@@ -35,9 +35,9 @@ demo: install
 	@$(BIN)/cipv demo
 
 # A file's tests stay in one process: they share servers and browsers; those of tests/accuracy all do: they share what the
-# networks saw. Five processes on two cores too: many tests wait for a browser or a sensor's next packet, and three kept 1.5
-# cores busy. tests/conftest.py says who stays together, orders the files, the long ones first, and keeps half of the
-# processes, rounded down, for browsers.
+# networks saw. Three processes on two cores too: many tests wait for a browser or a sensor's next packet. Five took as
+# long, and 9.5 GB. tests/conftest.py says who stays together, orders the files, the long ones first, and keeps half of
+# the processes, rounded down, for browsers.
 test: .venv/.installed
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync .venv/.compiled check-types check-layers check-style
 	@$(BIN)/python -m pytest -q --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder $(TESTS)
