@@ -51,7 +51,9 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None) -> bool:
     sideways = believed_mps(item.lateral_mps, item)
     toward = -sideways if item.path_offset_m > 0 else sideways
     aside_m = abs(item.path_offset_m) - max(toward, 0.0) * item.ttc_s
-    return aside_m + (_SURE_SIGMAS * sigma_m if oncoming else 0.0) <= path.half_width_m
+    if oncoming:  # negative: on the other side by then
+        return abs(aside_m) + _SURE_SIGMAS * sigma_m <= path.half_width_m
+    return aside_m <= path.half_width_m
 
 
 def _sigma_m(path: Path, ahead_m: float) -> float:

@@ -14,13 +14,13 @@ AROUND_M = 0.3
 
 
 OUTSIDE = -2
-"""Owner of a point that is beside every track of its cluster."""
+"""Owner of a point that is beside or before every track of its cluster."""
 
 
 @numba.njit(cache=True, nogil=True)
-def reach_clusters(points: F32, labels: I32, footprints: F64, clusters: int) -> tuple[Mask, F64]:
+def reach_clusters(points: F32, labels: I32, footprints: F64, clusters: int) -> tuple[Mask, F64, F64]:
     """(T, C) bool: the clusters whose bounds along ego x and y are near each footprint's bounds, and (C,) the extent of
-    the clusters along ego y, m."""
+    the clusters along ego y and their lowest ego x, m."""
     low, high = np.full((clusters, 2), np.inf), np.full((clusters, 2), -np.inf)
     for i in range(len(points)):
         if labels[i] >= 0:
@@ -35,16 +35,16 @@ def reach_clusters(points: F32, labels: I32, footprints: F64, clusters: int) -> 
             outside_x = max(low[c, 0] - x, x - high[c, 0]) - along
             outside_y = max(low[c, 1] - y, y - high[c, 1]) - across
             reached[t, c] = max(outside_x, outside_y) <= AROUND_M
-    return reached, high[:, 1] - low[:, 1]
+    return reached, high[:, 1] - low[:, 1], low[:, 0]
 
 
 @numba.njit(cache=True, nogil=True)
-def find_owners(points: F32, labels: I32, footprints: F64, sides: F64, reached: Mask) -> I32:
+def find_owners(points: F32, labels: I32, footprints: F64, sides: F64, nearest: F64, reached: Mask) -> I32:
     """(N,) int32 the only footprint that contains a clustered point or is close to it, −1 for none or several, OUTSIDE
-    for a point beside all of them.
+    for a point beside or before all of them.
 
-    sides: (T, 2) steady lateral extent of each track, outside of which no point is surely its own. reached: (T, C)
-    bool, the footprints to test for each cluster.
+    sides: (T, 2) steady lateral extent of each track, outside of which no point is surely its own. nearest: (T,) ego x
+    below which none is. reached: (T, C) bool, the footprints to test for each cluster.
     """
     near = np.empty((reached.shape[1], len(footprints)), dtype=np.int32)
     count = np.zeros(reached.shape[1], dtype=np.int32)
@@ -63,7 +63,8 @@ def find_owners(points: F32, labels: I32, footprints: F64, sides: F64, reached: 
             x, y, length, width, cos, sin = footprints[t]
             dx, dy = points[i, 0] - x, points[i, 1] - y
             along, across = abs(dx * cos + dy * sin) - length, abs(dy * cos - dx * sin) - width
-            if max(sides[t, 0] - points[i, 1], points[i, 1] - sides[t, 1]) > AROUND_M:
+            is_beside = max(sides[t, 0] - points[i, 1], points[i, 1] - sides[t, 1]) > AROUND_M
+            if is_beside or points[i, 0] < nearest[t]:
                 beside += 1
                 continue
             if np.hypot(max(along, 0.0), max(across, 0.0)) <= AROUND_M:

@@ -7,7 +7,9 @@ than any vehicle and leave a gap that no surface has.
 
 One track is enough if its vehicle is narrower than the cluster: a rigid body does not widen, so returns beside the
 lateral extent that it had over the last second belong to something that no track follows yet, as when the next parked
-car comes into view beside a bus. Here too, the two must leave a gap, or else a side of the vehicle came into view.
+car comes into view beside a bus. Nor does it grow towards us: returns before the rear of a vehicle that drives ahead
+are those of a parked car that it passes. Here too, the two must leave a gap, or else a side of the vehicle came into
+view.
 
 Returns within an expected footprint are its seeds. Every other return of the cluster joins the seeds that it is linked
 with by the shortest steps (a minimum spanning forest, like a watershed): a side that comes into view joins its rear,
@@ -37,6 +39,10 @@ grows while we pass moves at up to 1–2 m/s."""
 _GAP_M = 0.3
 """Neighbouring returns of one surface are closer: along a ring of a VLP-16 0.1 m at 28 m, twice that where it is
 down-sampled."""
+_NEARER_M, _CLOSING_MPS = 0.5, 5.0
+"""A vehicle that drives ahead ends at its rear: what is nearer than that by the first, and not connected to it, is
+something else, such as the flank of the parked car that it passes. Two standard deviations of a cluster's position are
+0.3 m. Of a vehicle that comes nearer by more than the second, a new side may come into view."""
 _DIRECTIONS = np.radians(np.arange(0.0, 180.0, 5.0))
 _LEAST_SEEDS = 2
 """A single return may be an outlier."""
@@ -80,12 +86,14 @@ def divide(
     expected = _expect([tracks[n] for n in known], filters.cov[known], dt_s)
     sides = steady_sides(history[known], np.nanmax(history[:, :, 0]) + dt_s)
     # only clusters near two or more tracks, or wider than the one they are near, and what else is near these tracks
-    reached, width_m = kernels.reach_clusters(points, labels, expected.footprints, count)
-    widened = (width_m > WIDEST_M) & np.any(reached & (np.diff(sides) < WIDEST_M), axis=0)
+    reached, width_m, low_m = kernels.reach_clusters(points, labels, expected.footprints, count)
+    nearest = _nearest(expected)
+    grown = (width_m > WIDEST_M) | (low_m < nearest[:, None])
+    widened = np.any(reached & (np.diff(sides) < WIDEST_M) & grown, axis=0)
     involved = np.any(reached[:, (reached.sum(axis=0) >= 2) | widened], axis=1, keepdims=True)
     if not np.any(involved):
         return labels
-    owner = kernels.find_owners(points, labels, expected.footprints, sides, reached & involved)
+    owner = kernels.find_owners(points, labels, expected.footprints, sides, nearest, reached & involved)
     seeds = kernels.count_seeds(labels, owner, len(known), count)
     outside = np.bincount(labels[(labels >= 0) & (owner == kernels.OUTSIDE)], minlength=count) >= _LEAST_SEEDS
     sharing = (seeds >= _LEAST_SEEDS).sum(axis=0)
@@ -132,6 +140,7 @@ def warm_up(points: F32, labels: I32, tracks: Sequence[LidarTrack]) -> None:
         labels,
         expected.footprints,
         np.zeros((len(tracks), 2)),
+        np.zeros(len(tracks)),
         kernels.reach_clusters(points, labels, expected.footprints, 1)[0],
     )
     kernels.count_seeds(labels, owner, len(tracks), 1)
@@ -149,13 +158,21 @@ def _expect(tracks: Sequence[LidarTrack], cov: F64, dt_s: float) -> _Expected:
     return _Expected(np.column_stack([footprints, np.cos(yaw), np.sin(yaw)]), velocity, cov[:, 2, 2] + cov[:, 3, 3])
 
 
+def _nearest(expected: _Expected) -> F64:
+    """(T,) ego x below which no return belongs to a track; −∞ unless it drives ahead, seen from behind."""
+    x, _, length, width, cos, sin = expected.footprints.T
+    near = x - length * np.abs(cos) - width * np.abs(sin) - _NEARER_M
+    return np.where(expected.velocity[:, 0] > -_CLOSING_MPS, near, -np.inf)
+
+
 def _parts(
     points: F32, owner: I32, present: I64, widened: bool, expected: _Expected, params: ClusterParams
 ) -> I32 | None:
     """(M,) int32 the part of each point of a cluster, 0 first; None if it stays whole.
 
     owner: (M,) the track of each point that is a seed, else negative. present: tracks with enough seeds. widened: the
-    cluster is wider than any vehicle, so what is beside its tracks may be something else that no track follows yet.
+    cluster is wider than any vehicle, or nearer than a track, so what is beside or before its tracks may be something
+    else that no track follows yet.
     """
     groups = len(present) + 1  # the last for what is beside the tracks
     apart, wide = np.zeros((groups, groups), dtype=np.bool_), np.full((groups, groups), widened)

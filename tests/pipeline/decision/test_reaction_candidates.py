@@ -96,6 +96,8 @@ OVER_THERE = fused(1, 30.0, -8.0, velocity=(-20.0, 6.0))
 """It crosses and will enter the corridor."""
 IN_OUR_LANE = fused(1, 30.0, 0.2, velocity=(-35.0, 0.0))
 """It is oncoming."""
+CROSSES_OVER = fused(1, 29.0, -0.8, velocity=(-29.0, 2.5))
+"""It is oncoming, and in our lane only on its way from one side to the other, as before a bend."""
 STANDS = fused(1, 30.0, 0.2, velocity=(-20.0, 0.0))
 
 
@@ -110,6 +112,7 @@ STANDS = fused(1, 30.0, 0.2, velocity=(-20.0, 0.0))
         pytest.param(IN_OUR_LANE, 2.5, None, False, id="oncoming, before a bend"),
         pytest.param(IN_OUR_LANE, 1.0, None, False, id="oncoming, in our lane, more likely than not"),
         pytest.param(IN_OUR_LANE, 0.3, 12.0, False, id="oncoming, behind the lead"),
+        pytest.param(CROSSES_OVER, 0.3, None, False, id="oncoming, in our lane for a moment"),
         pytest.param(STANDS, 2.5, None, True, id="stands in the way, wherever that leads"),
         pytest.param(STANDS, 0.3, 12.0, True, id="stands before the lead, which may swerve"),
     ],
