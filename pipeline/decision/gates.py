@@ -114,6 +114,11 @@ def is_solid(item: FusedObject) -> bool:
     return found is not None and found.distance and found.confirmed and found.seen and found.size
 
 
+_WIDEST_ASKEW_M = 4.5
+"""Shorter side of a cluster's box: 2.6 m for the widest vehicles (Directive 96/53/EC), more if the box is askew by 20°
+to 6 m of their flank. A larger one holds several vehicles, such as a passing bus, the lead and a parked car."""
+
+
 def _vehicle(who: Candidate) -> Answer:
     """An object with a class must be a vehicle; one without is judged by its size."""
     label = who.item.label
@@ -166,6 +171,8 @@ def _size(who: Candidate) -> Answer:
         return False, across, params.min_width_m
     if height < params.min_height_m:
         return False, height, params.min_height_m
+    if min(length, width) > _WIDEST_ASKEW_M:
+        return False, min(length, width), _WIDEST_ASKEW_M
     return across <= params.max_size_m, across, params.max_size_m
 
 
@@ -176,7 +183,7 @@ def _wrong_size(who: Candidate) -> str:
         return f"only {across:.1f} m wide"
     if height < who.params.min_height_m:
         return f"only {height:.1f} m high"
-    return f"{across:.0f} m long: not a vehicle"
+    return f"{length:.0f} by {width:.0f} m: not a vehicle"
 
 
 def _ahead(who: Candidate) -> Answer:

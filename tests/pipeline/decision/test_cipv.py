@@ -60,7 +60,10 @@ def test_what_places_a_lead_without_a_cluster_is_said(ranged_by: dict[str, Any],
         pytest.param(fused(1, 20.0, source="L", hits=1), "seen 1 of 3 times", id="LiDAR alone, not confirmed"),
         pytest.param(fused(1, 20.0, source="L", width=0.3, length=0.2), "only 0.3 m wide", id="a post is not a rear"),
         pytest.param(fused(1, 20.0, source="L", height=0.2), "only 0.2 m high", id="a kerb is not a rear"),
-        pytest.param(fused(1, 20.0, source="L", length=40.0), "40 m long: not a vehicle", id="a wall"),
+        pytest.param(fused(1, 20.0, source="L", length=40.0), "40 by 2 m: not a vehicle", id="a wall"),
+        pytest.param(
+            fused(1, 2.0, source="L", length=11.0, width=7.8), "11 by 8 m: not a vehicle", id="several vehicles in one"
+        ),
         pytest.param(fused(1, 20.0, 3.0), "out of path by 1.5 m", id="next lane"),
         pytest.param(fused(1, -6.0, 0.0), "beside or behind the bumper", id="behind us"),
     ],
