@@ -27,7 +27,7 @@ def test_between_hedges_in_bends_of_50_m_the_lead_is_the_cipv_by_edges_and_vehic
     ("beside", "unaware", "right", "without"),
     [
         pytest.param(
-            "hedges", {"existence.use_missing_boxes": False, "cipv.become_standing": 0.5}, 0.99, 0.9, id="hedges"
+            "hedges", {"existence.use_missing_boxes": False, "cipv.become_standing": 0.5}, 0.99, 0.97, id="hedges"
         ),
         pytest.param("parked", {}, 0.85, 0.8, id="parked cars"),
     ],
