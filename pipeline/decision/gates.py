@@ -31,6 +31,9 @@ _CLEARLY_M = 0.5
 STAYS_UP_TO = 1.5
 """Factor on ``max_sigma_m`` for the current lead: hysteresis, so that a lead whose uncertainty is close to the limit
 does not come and go."""
+_WIDEST_ASKEW_M = 4.5
+"""Shorter side of a cluster's box: 2.6 m for the widest vehicles (Directive 96/53/EC), more if the box is askew by 20°
+to 6 m of their flank. A larger one holds several vehicles, such as a passing bus, the lead and a parked car."""
 
 
 class Candidate(NamedTuple):
@@ -112,11 +115,6 @@ def is_solid(item: FusedObject) -> bool:
     """Whether an object certainly exists now and is large enough to matter, whatever its class and position."""
     found = item.eligibility
     return found is not None and found.distance and found.confirmed and found.seen and found.size
-
-
-_WIDEST_ASKEW_M = 4.5
-"""Shorter side of a cluster's box: 2.6 m for the widest vehicles (Directive 96/53/EC), more if the box is askew by 20°
-to 6 m of their flank. A larger one holds several vehicles, such as a passing bus, the lead and a parked car."""
 
 
 def _vehicle(who: Candidate) -> Answer:
