@@ -22,6 +22,8 @@ CREEP_MPS = 3.0
 """Below this speed own motion shows no curvature, so a car that may not creep would never determine its path."""
 _SLOW_MPS, _FAST_MPS = 5.0, 20.0
 """Speeds between which ISO 15622's limits are interpolated."""
+_MEASURES_SPEED_HITS = 2
+"""A speed takes two sightings."""
 State = Literal["cruise", "follow", "stop", "warn"]
 
 
@@ -116,7 +118,9 @@ def _onset_mps2(state: AccState, ego: EgoState, dt_s: float | None, params: AccP
 
 
 def _required_mps2(object_id: int, item: FusedObject | None, situation: Situation, emergency: AebParams) -> float:
-    """The deceleration required to avoid the object. An object of unknown speed is assumed to stand still."""
+    """The deceleration required to avoid the object. One of unknown speed is assumed to stand still, but if it was seen
+    only once, nothing is required: it may be a false box on a stray cluster, and the second sighting measures its
+    speed."""
     lead, ego = situation.lead, situation.now.ego
     assert ego is not None
     distance: float | None = None
@@ -125,6 +129,8 @@ def _required_mps2(object_id: int, item: FusedObject | None, situation: Situatio
         distance, closing = lead.distance_m, lead.closing_speed_mps
     elif item is not None:
         distance, closing = item.distance_m, closing_speed_mps(item)
+    if closing is None and item is not None and item.hits < _MEASURES_SPEED_HITS:
+        return 0.0
     if distance is None:
         return math.inf
     return required_decel_mps2(distance, ego.speed_mps if closing is None else closing, emergency)

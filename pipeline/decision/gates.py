@@ -130,8 +130,8 @@ def _distance(who: Candidate) -> Answer:
 
 def _confirmed(who: Candidate) -> Answer:
     """Two sensors that both see it now confirm it at once; a single sensor must see it several times. The previous lead
-    counts as confirmed."""
-    at_once = who.item.seen_by_two_sensors or who.leads
+    counts as confirmed while it is seen: a false box on a stray cluster is gone in the next frame."""
+    at_once = who.item.seen_by_two_sensors or (who.leads and not who.item.carried)
     hits, needed = _sightings(who.item), 1 if at_once else who.params.confirm_hits
     return hits >= needed, hits, needed
 

@@ -13,7 +13,7 @@ from pipeline.decision.cipv import CipvState, choose
 from pipeline.decision.object_motion import describe, required_decel_mps2
 from pipeline.params import AccParams, AebParams, CipvParams, MotionParams, PathParams, preset
 from pipeline.path.corridor import corridor
-from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Situation
+from pipeline.types import AccCommand, Braking, Cipv, EgoState, FusedObject, Situation
 from tests.pipeline.build import fused, moment
 
 PARAMS = AccParams(
@@ -263,6 +263,21 @@ def test_acc_brakes_hard_only_where_that_avoids_a_collision(
     _, printed = control(AccState(), Situation(moment(ego, 0.1), PATH, (), lead), preset("paper").acc, EMERGENCY)
     assert printed is not None
     assert printed.accel_mps2 == -8.0, "the paper's law alone brakes fully inside the desired gap"
+
+
+@pytest.mark.parametrize(
+    ("hits", "braking_mps2"),
+    [
+        pytest.param(1, 0.25, id="seen once: it may be a false box on a stray cluster"),
+        pytest.param(2, 3.5, id="seen twice"),
+    ],
+)
+def test_an_object_of_unknown_speed_is_braked_for_from_its_second_sighting(hits: int, braking_mps2: float) -> None:
+    item = dataclasses.replace(fused(1, 20.0, hits=hits), velocity_mps=None, justifies=Braking.PARTIAL)
+    situation = Situation(moment(EgoState(0, 24.0), 0.1), PATH, (item,), Cipv(1, 20.0, None, None, ""))
+    command = control(AccState(), situation, PARAMS, EMERGENCY)[1]
+    assert command is not None
+    assert command.accel_mps2 == pytest.approx(-braking_mps2)
 
 
 def accelerations(ego: EgoState, lead: Cipv, frames: int, params: AccParams = PARAMS) -> list[float]:

@@ -110,6 +110,19 @@ def test_a_camera_track_whose_place_was_reset_must_be_seen_again() -> None:
 
 
 @pytest.mark.parametrize(
+    ("hits", "seen_by", "leads"),
+    [
+        pytest.param(1, "", False, id="a false box on a stray cluster"),
+        pytest.param(1, "V", True, id="one sensor sees it again"),
+        pytest.param(3, "", True, id="confirmed"),
+    ],
+)
+def test_what_both_sensors_saw_once_leads_only_while_it_is_seen(hits: int, seen_by: Any, leads: bool) -> None:
+    item = dataclasses.replace(fused(1, 20.0, hits=hits), seen_by=seen_by)
+    assert (decide(item, last=1)[0] is not None) == leads
+
+
+@pytest.mark.parametrize(
     ("ranges", "source", "leads"),
     [
         pytest.param(21, "V", True, id="followed on"),
