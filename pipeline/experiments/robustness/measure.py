@@ -18,7 +18,7 @@ import numpy as np
 
 from pipeline.alignment.projection import Pinhole, project_cuboids
 from pipeline.common.geometry import corners_of, iou_matrix
-from pipeline.detection import detector_for
+from pipeline.detection import Detectors, detect, detector_for, far_view_for
 from pipeline.experiments.robustness.detector_noise import DOUBLE, Counted, JudgedVehicle, summed_up
 from pipeline.labels.formats.base import drive_of
 from pipeline.labels.formats.kitti.files import read_tracking
@@ -72,15 +72,21 @@ def _is_left_out(box: Box, parts: Sequence[Box]) -> bool:
     )
 
 
-def count(recording: int, source: Source, labels: str, detector: str | None, into: Counted) -> None:
-    """Process every labelled frame of a recording."""
-    look, parts = detector_for(source, detector), left_out(labels)
+def count(
+    recording: int, source: Source, labels: str, detector: str | None, looks_far: bool, into: Counted
+) -> None:
+    """Process every labelled frame of a recording, with the far view or without."""
+    parts = left_out(labels)
+    network = detector_for(source, detector)
+    detectors = Detectors(network, far=far_view_for(source, network) if looks_far else None)
     for index, truth in enumerate(truths(source, labels)):
         frame = source.frame(index)
         if truth is None or frame.image is None or frame.camera is None:
             continue
         into.frames += 1
-        boxes = select(look.detect(frame.image.bgr), DetectionParams())
+        found = detect(frame, detectors).raw_boxes
+        assert found is not None
+        boxes = select(found, DetectionParams())
         ignored = parts.get(index, ())
         vehicles = tuple(box for box in boxes if box.label in VEHICLES and not _is_left_out(box.bbox, ignored))
         _compare(recording, index, frame.t_ns / 1e9, truth, vehicles, frame.camera, into)
@@ -143,16 +149,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="+", metavar="URI[=LABELS]")
     parser.add_argument("--detector", help="name or file; the default network without")
+    parser.add_argument("--whole", action="store_true", help="without the far view")
     parser.add_argument("--out", type=Path, default=FILE)
     asked: Any = parser.parse_args(arguments)
     counted, names = Counted(), []
     for n, each in enumerate(asked.recordings):
         uri, _, labels = each.partition("=")
         before = counted.frames
-        count(n, open_source(uri), labels, asked.detector, counted)
+        count(n, open_source(uri), labels, asked.detector, not asked.whole, counted)
         names.append(f"{Path(uri).name}: {counted.frames - before} labelled frames")
     detector = Path(asked.detector).stem if asked.detector else "default network"
-    noise = summed_up(counted, (*names, f"detector: {detector}"))
+    view = "whole images only" if asked.whole else "whole images and far view"
+    noise = summed_up(counted, (*names, f"detector: {detector}, {view}"))
     asked.out.write_text(json.dumps(noise.model_dump(mode="json"), indent=1) + "\n", encoding="utf-8")
 
 
