@@ -17,6 +17,7 @@ from scipy.optimize import linear_sum_assignment
 
 from pipeline.alignment.projection import Alignment, project_cuboids
 from pipeline.common.geometry import F64, corners_of, iou_matrix
+from pipeline.fusion.last_place import AGREEMENT_SIGMAS
 from pipeline.fusion.ranged_rows import TrackIndices, ranged_row, with_ranged
 from pipeline.fusion.rows import L, V, box_row, hit_row, lidar_sigma_m, quad, range_m
 from pipeline.fusion.vehicle_sizes import LONGEST_M
@@ -30,7 +31,10 @@ _KEPT_IOU = 0.2
 overlaps vary by as much from frame to frame."""
 NO_TRACKS: Tracks = {}
 _TAKES_OVER_HITS = 2
-"""Sightings of a cluster before it may replace one that still exists: a spurious cluster lasts for one sweep."""
+"""Sightings of a cluster before it may replace one that still exists, or contradict the camera: a spurious cluster
+lasts for one sweep."""
+_SETTLED_RANGES = 3
+"""Distances of a camera track, after which a single cluster does not contradict it."""
 
 
 @dataclass(frozen=True)
@@ -210,11 +214,13 @@ def _gates(
     for i, j, iou in zip(rows.tolist(), columns.tolist(), overlap[rows, columns].tolist(), strict=True):
         tests = [Gate("iou", iou, params.min_iou, iou >= params.min_iou)]
         distance, sigma, was_one = vision[i].distance_m, vision[i].sigma_m, bool(were_one[i, j])
-        # boxes of nearly the same place and size are one object: then the height law is wrong, not the LiDAR
-        doubtful = params.range_gate and iou + _KEPT_IOU * was_one < params.sure_iou
-        if doubtful and distance is not None and sigma is not None:
+        if params.range_gate and distance is not None and sigma is not None:
             gap = abs(distance - ranges_m[j]) / math.hypot(sigma, sigmas_m[j])
-            tests.append(Gate("range_sigmas", gap, params.range_gate_sigmas, gap <= params.range_gate_sigmas))
+            # boxes of nearly the same place and size are one object: then the height law is wrong, not the LiDAR
+            if iou + _KEPT_IOU * was_one < params.sure_iou:
+                tests.append(Gate("range_sigmas", gap, params.range_gate_sigmas, gap <= params.range_gate_sigmas))
+            elif lidar[j].hits < _TAKES_OVER_HITS and vision[i].ranges >= _SETTLED_RANGES:
+                tests.append(Gate("range_sigmas", gap, AGREEMENT_SIGMAS, gap <= AGREEMENT_SIGMAS))
         longest_m = LONGEST_M.get(vision[i].label) if params.size_gate else None
         if longest_m is not None:
             tests.append(Gate("class_size", lengths_m[j], longest_m, lengths_m[j] <= longest_m))

@@ -72,9 +72,7 @@ def _is_left_out(box: Box, parts: Sequence[Box]) -> bool:
     )
 
 
-def count(
-    recording: int, source: Source, labels: str, detector: str | None, looks_far: bool, into: Counted
-) -> None:
+def count(recording: int, source: Source, labels: str, detector: str | None, looks_far: bool, into: Counted) -> None:
     """Process every labelled frame of a recording, with the far view or without."""
     parts = left_out(labels)
     network = detector_for(source, detector)

@@ -124,6 +124,25 @@ def test_boxes_of_one_place_and_size_are_one_object_though_the_height_law_errs()
 
 
 @pytest.mark.parametrize(
+    ("hits", "ranges", "sources"),
+    [
+        pytest.param(1, 3, ["L", "V"], id="a stray cluster in front of a vehicle that the camera follows"),
+        pytest.param(2, 3, ["VL"], id="seen again: the height law errs"),
+        pytest.param(1, 2, ["VL"], id="the camera does not know it either"),
+    ],
+)
+def test_a_single_cluster_does_not_contradict_a_settled_camera_track(
+    hits: int, ranges: int, sources: list[str]
+) -> None:
+    cluster = lidar_track(1, 20.0)._replace(hits=hits)
+    followed = replace(vision_track(1, box_of(cluster), 40.0, sigma_m=3.0), ranges=ranges)
+    _, result = joined([cluster], [followed])
+    assert sorted(item.source for item in result.objects) == sources
+    agrees = replace(followed, distance_m=28.0)
+    assert [item.source for item in joined([cluster], [agrees])[1].objects] == ["VL"]
+
+
+@pytest.mark.parametrize(
     ("hits", "carried", "params", "ranged_m"),
     [
         pytest.param(1, False, OPTIMAL, 40.0, id="seen once"),
