@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pipeline import lidar_branch
 from pipeline.alignment import projection
 from pipeline.common.stopwatch import Stopwatch
-from pipeline.decision import acc, aeb, braking_evidence, cipv, object_motion
+from pipeline.decision import acc, aeb, braking_evidence, cipv, lead_motion, object_motion
 from pipeline.ego_motion import own_motion
 from pipeline.fusion import agreement, existence, ground_contact, merged_clusters, returns
 from pipeline.fusion import fuse as fusion
@@ -80,6 +80,8 @@ class State:
     """Smoothed path and position on the route."""
     cipv: cipv.CipvState = cipv.CipvState()
     """The lead, and the odds that each object is in the path."""
+    lead: lead_motion.LeadMotionState = lead_motion.LeadMotionState()
+    """Speed and acceleration of the lead."""
     acc: acc.AccState = acc.AccState()
     """State of the speed controller."""
     aeb: aeb.AebState = aeb.AebState()
@@ -166,7 +168,8 @@ def step(
     cipv_state, chosen = cipv.choose(state.cipv, objects, path, now, params.cipv)
     clock.lap("cipv")
     objects = braking_evidence.judge(chosen.objects, params.existence)
-    situation = Situation(now, path, objects, chosen.lead)
+    lead_state, lead = lead_motion.follow(state.lead, chosen.lead, objects, now)
+    situation = Situation(now, path, objects, lead)
     acc_state, command = acc.control(state.acc, situation, params.acc, params.aeb)
     clock.lap("acc")
     aeb_state, command = aeb.guard(state.aeb, command, situation, params.aeb, params.acc)
@@ -193,7 +196,7 @@ def step(
         own_motion=motion.own,
         objects=objects,
         path=path,
-        cipv=chosen.lead,
+        cipv=lead,
         next_cipv=chosen.next_lead,
         rejected=chosen.rejected,
         acc=command,
@@ -219,6 +222,7 @@ def step(
         traffic=traffic_state,
         path=path_state,
         cipv=cipv_state,
+        lead=lead_state,
         acc=acc_state,
         aeb=aeb_state,
     )

@@ -126,7 +126,10 @@ _JSON_NUMBERS: dict[str, dict[str, Any]] = {
     EGO: _numbers("speed_mps", "yaw_rate_radps"),
     RESULTS: {
         "ego": {"type": "object", "properties": _numbers("speed_mps", "yaw_rate_radps")},
-        "cipv": {"type": "object", "properties": _numbers("id", "distance_m", "closing_speed_mps", "ttc_s")},
+        "cipv": {
+            "type": "object",
+            "properties": _numbers("id", "distance_m", "closing_speed_mps", "ttc_s", "accel_mps2", "accel_sigma_mps2"),
+        },
         "acc": {
             "type": "object",
             "properties": _numbers("desired_speed_mps", "accel_mps2", "accelerator", "brake")

@@ -68,6 +68,11 @@ class Cipv:
     """Time to collision; None while the gap does not shrink."""
     reason: str
     """Why this object, in words."""
+    accel_mps2: float | None = None
+    """Its acceleration over ground along our line of sight, negative when it brakes; None until it can be told, and for
+    the next CIPV."""
+    accel_sigma_mps2: float | None = None
+    """Standard deviation of that."""
 
 
 @dataclass(frozen=True)

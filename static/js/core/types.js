@@ -47,6 +47,8 @@
  * @property {number|null} closing_speed_mps
  * @property {number|null} ttc_s
  * @property {string} reason
+ * @property {number|null} [accel_mps2]  over ground
+ * @property {number|null} [accel_sigma_mps2]
  *
  * @typedef {object} Path
  * @property {string} source

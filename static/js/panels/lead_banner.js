@@ -8,6 +8,7 @@ import { DASH, kmh, num, signed, ttc as ttcWords } from "../core/format.js";
 import { ACC_WORDS, urgencyOf } from "../core/urgency.js";
 
 /** @typedef {import("../core/types.js").Result} Result */
+/** @typedef {import("../core/types.js").Cipv} Cipv */
 
 const source = el("span", { class: "pill" }),
   name = el("span"),
@@ -84,12 +85,21 @@ function update() {
     text(source, item.source);
   }
   text(name, cipv ? `#${cipv.id} ${item?.type ?? "obstacle"}` : "No vehicle in path");
-  say(reason, cipv ? cipv.reason : whyNone(result));
+  const accel = accelWords(cipv);
+  say(reason, cipv ? [cipv.reason, accel].filter(Boolean).join("; ") : whyNone(result));
   text(distance.value, num(cipv?.distance_m));
   text(closing.value, cipv ? signed(kmh(cipv.closing_speed_mps)) : DASH);
   text(ttc.value, ttcWords(cipv?.ttc_s));
   mark(ttc.card, "alarm", urgencyOf(cipv?.ttc_s));
   updateAcc(result);
+}
+
+/** What the lead does to its speed, if that is certain.
+ * @param {Cipv|null} cipv */
+function accelWords(cipv) {
+  const [accel, sigma] = [cipv?.accel_mps2, cipv?.accel_sigma_mps2];
+  if (accel == null || sigma == null || Math.abs(accel) < 2 * sigma) return "";
+  return `${accel < 0 ? "brakes" : "accelerates"} by ${num(Math.abs(accel))} ± ${num(sigma)} m/s²`;
 }
 
 /** @param {Result} result */

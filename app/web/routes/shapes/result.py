@@ -118,6 +118,10 @@ class CipvJson(Exact):
     """Null when the gap does not shrink."""
     reason: str
     """Why it is this one, in words."""
+    accel_mps2: float | None = None
+    """Its acceleration over ground; null until it can be told, and for the next CIPV."""
+    accel_sigma_mps2: float | None = None
+    """Standard deviation of that."""
 
 
 class RejectedJson(Exact):
