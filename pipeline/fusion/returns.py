@@ -46,6 +46,9 @@ _EDGE_SHARE = 0.08
 """Margin at either side as a share of the box's width: boxes drawn too wide, and calibration errors of a pixel or
 two."""
 _BOTTOM_SHARE = 0.06
+_TOP_SHARE = 0.12
+"""Margin at the top: 47 of 50 points there passed over a labelled vehicle (15 of 17 on Astyx, 32 of 33 on KITTI 0009),
+but only 7 of 23 in the next 6 %."""
 LOW_M, HIGH_M = 0.25, 3.5
 """Heights above the road between which a vehicle returns rays."""
 _SIGMAS = 3.0
@@ -212,7 +215,7 @@ def _by_returns(seen: VisionMeasurement, points: _Points, in_front: F64) -> Visi
     assert seen.sigma_m is not None
     x1, y1, x2, y2 = seen.detection.bbox
     side, bottom, share = _EDGE_SHARE * (x2 - x1), _BOTTOM_SHARE * (y2 - y1), seen.sigma_m / seen.distance_m
-    inner = (x1 + side, y1, x2 - side, y2 - bottom)
+    inner = (x1 + side, y1 + _TOP_SHARE * (y2 - y1), x2 - side, y2 - bottom)
     rows = _inside(points.uv, points.range_m, inner, seen.distance_m, share)
     rows = rows[~_may_be_of(in_front, points.uv[rows], points.range_m[rows])]
     if not len(rows):

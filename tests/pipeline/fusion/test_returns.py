@@ -65,6 +65,8 @@ ON_IT = (46.0, 0.2, 0.0, LOOSE)
         ("nothing", [], None),
         ("the road", [(46.0, 0.0, -0.7, LOOSE)], None),
         ("a bridge", [(46.0, 0.0, 3.0, LOOSE)], None),
+        ("what is seen over its roof", [(46.0, 0.2, 0.6, LOOSE)], None),
+        ("below the roof", [(46.0, 0.2, 0.5, LOOSE)], 46.0),
         ("beside the box", [(46.0, 1.5, 0.0, LOOSE)], None),
         ("far nearer than any vehicle of that height", [(25.0, 0.1, 0.0, LOOSE)], None),
         ("far beyond it", [(95.0, 0.1, 0.0, LOOSE)], None),
