@@ -4,8 +4,8 @@
 
 Astyx frames of ``CIPV_DATA`` are processed one by one, KITTI 0009 (16 rings) in order. A labelled vehicle is found if
 an object's box overlaps the projection of its cuboid by more than ``SAME_IOU``; its error is relative to the distance
-of its nearest point. *LiDAR cut off*: KITTI 0009 without sweeps from frame ``CUT_AT`` on, and only the vehicles that
-the LiDAR had ranged before.
+of its nearest point. Vehicles of which labelled ones in front hide more than half are left out. *LiDAR cut off*: KITTI
+0009 without sweeps from frame ``CUT_AT`` on, and only the vehicles that the LiDAR had ranged before.
 """
 
 from __future__ import annotations
@@ -23,12 +23,13 @@ from pipeline.common.geometry import iou_matrix
 from pipeline.detection import Detectors, detect, detector_for, far_view_for
 from pipeline.experiments.robustness.measure import truths
 from pipeline.params import Params, with_changes
+from pipeline.simulation.sensors.truth_boxes import visible_part
 from pipeline.sources import open_source
 from pipeline.step import State, step
-from pipeline.types import VEHICLES, Frame, FusedObject, Result
+from pipeline.types import VEHICLES, Box, Frame, FusedObject, Result
 from pipeline.types.source import TruthObject
 
-SAME_IOU, CUT_AT = 0.4, 20
+SAME_IOU, CUT_AT, VISIBLE_SHARE = 0.4, 20, 0.5
 BINS_M = (0.0, 20.0, 40.0, 60.0, 100.0)
 PARTS: Mapping[str, str] = {
     "far view": "detection.far_view",
@@ -109,15 +110,24 @@ def _errors(
     height, width = frame.image.bgr.shape[:2]
     items = [item for item in result.objects if item.imaged and item.bbox is not None and item.distance_m is not None]
     boxes = np.array([item.bbox for item in items]).reshape(-1, 4)
-    for item in truth or ():
-        corners = item.cuboid.corners()
-        drawn = project_cuboid(aligned, corners, width, height) if item.label in VEHICLES else None
-        distance_m = float(np.hypot(corners[:, 0], corners[:, 1]).min())
-        if drawn is None or abs(item.cuboid.center[1]) > aside_m or distance_m >= BINS_M[-1]:
+    nearer: list[Box] = []
+    for item in sorted(truth or (), key=_distance_m):
+        drawn = project_cuboid(aligned, item.cuboid.corners(), width, height)
+        if drawn is None or item.label not in VEHICLES:
+            continue
+        _, visible = visible_part(drawn, nearer)
+        nearer.append(drawn)
+        distance_m = _distance_m(item)
+        if visible < VISIBLE_SHARE or abs(item.cuboid.center[1]) > aside_m or distance_m >= BINS_M[-1]:
             continue
         found = _best(items, boxes, drawn)
         if only is None or (found is not None and found.id in only):
             yield distance_m, abs((found.distance_m or 0.0) / distance_m - 1.0) if found is not None else np.nan
+
+
+def _distance_m(item: TruthObject) -> float:
+    corners = item.cuboid.corners()
+    return float(np.hypot(corners[:, 0], corners[:, 1]).min())
 
 
 def _best(items: Sequence[FusedObject], boxes: np.ndarray, drawn: Sequence[float]) -> FusedObject | None:
