@@ -112,7 +112,7 @@ def name_tag(scene: viser.SceneApi, name: str, text: str, position: Point3 | Non
         handle.text = text
         _stand_at(handle, position)
     else:
-        scene.add_label(name, text, position=position, anchor="bottom-center", font_screen_scale=0.8)
+        scene.add_label(name, text, position=position, anchor="bottom-center", font_screen_scale=1.25)
 
 
 def path(scene: viser.SceneApi, corridor: Path, floor_m: float) -> None:
