@@ -21,6 +21,8 @@ from pipeline.types import F64, Point3, Result
 LABELS = "/own"
 _LIFT_M = 0.3
 _WIDTH_PX = {False: 2.0, True: 4.0}
+_NAME_SCALE, _CHOSEN_SCALE = 1.1, 1.4
+"""Size of name tags, and of the selected label's; the pipeline's are smaller."""
 _BACK, _LEAST_BACK_M = 2.5, 9.0
 """Distance of the camera from a selected label, as a multiple of its longest side, and the minimum distance."""
 _UP = 0.5
@@ -97,7 +99,8 @@ class BrowserScene:
         for place in range(max(len(labels), self._names)):
             at = labels[place] if place < len(labels) else None
             text, top = ("", None) if at is None else (at.text, _top(at.cuboid))
-            viser_nodes.name_tag(self._scene, f"{LABELS}/names/{place}", text, top)
+            scale = _CHOSEN_SCALE if at is not None and at.track == chosen else _NAME_SCALE
+            viser_nodes.name_tag(self._scene, f"{LABELS}/names/{place}", text, top, scale)
         self._names = max(len(labels), self._names)
 
     def _follow(self, view: PageView) -> None:
