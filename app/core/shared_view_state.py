@@ -66,9 +66,9 @@ class FrameInView:
     """A frame with its result, as a view draws it."""
 
     frame: Frame
-    """The frame."""
+    """Points, image and calibration; ego frame as in all stages."""
     result: Result
-    """Its result."""
+    """What the pipeline found in it."""
 
 
 @dataclass(frozen=True)
