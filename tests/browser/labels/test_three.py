@@ -51,6 +51,9 @@ def test_the_camera_goes_to_the_selection_and_visers_own_panel_stays_away(pages:
         scene = page.frame_locator("#three-body iframe")
         expect(scene.get_by_text("CIPV Studio", exact=True)).to_be_visible()
         expect(scene.get_by_text("Parameters", exact=True), "the panel is folded up").to_be_hidden()
+        viser = next(frame for frame in page.frames if "/viser/of/" in frame.url)
+        assert page.evaluate("document.activeElement.tagName") != "IFRAME"
+        assert viser.evaluate("document.hasFocus()"), "without it, viser does not connect again after a loss"
         middle = labels.cuboid(made, START)["center"]
         labels.wait_for(lambda _: cameras != [])
         assert not is_on(cameras[-1], middle)
