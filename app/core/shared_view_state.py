@@ -1,5 +1,6 @@
-"""View state shared between pages and the views that the server draws: each page's selection, its labels and the cuboid
-that it edits, and what was picked in those views, with the page that it was picked for."""
+"""View state shared between pages and the views that the server draws: each page's selection, its labels, the cuboid
+that it edits and the frame of its own playhead, and what was picked in those views, with the page that it was picked
+for."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from pipeline.common.geometry import Cuboid
+from pipeline.types import Frame, Result
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,16 @@ class LabelsInView:
     """Whether the pipeline's objects are hidden."""
 
 
+@dataclass(frozen=True, eq=False)
+class FrameInView:
+    """A frame with its result, as a view draws it."""
+
+    frame: Frame
+    """Points, image and calibration; ego frame as in all stages."""
+    result: Result
+    """What the pipeline found in it."""
+
+
 @dataclass(frozen=True)
 class PageView:
     """What one page shows in its own 3D view."""
@@ -69,6 +81,8 @@ class PageView:
     """The cuboid with drag handles; None without one."""
     labels: LabelsInView | None = None
     """None if the page does not label."""
+    frame: FrameInView | None = None
+    """The frame of a page with its own playhead; None: the page shows the shared frame."""
 
 
 NOTHING = PageView()
@@ -138,6 +152,10 @@ class SharedViewState:
     def label(self, page: object, labels: LabelsInView | None) -> None:
         """Set the labels that this page draws."""
         self._change(page, labels=labels)
+
+    def show(self, page: object, shown: FrameInView | None) -> None:
+        """Set the frame of a page with its own playhead; None: it follows the shared one."""
+        self._change(page, frame=shown)
 
     def hide(self, page: object, hides: bool) -> None:
         """Set whether this page hides its 3D view."""

@@ -15,8 +15,8 @@ logger = logging.getLogger("cipv.stream")
 
 
 class OwnPlayhead:
-    """The playhead of one page. ``show`` and ``seen`` are called on the event loop; ``told`` gets each frame's message
-    on the thread that made it. index: the current frame."""
+    """The playhead of one page. ``show`` and ``seen`` are called on the event loop; ``told`` gets each frame and its
+    message on the thread that made it. index: the current frame."""
 
     def __init__(
         self,
@@ -24,7 +24,7 @@ class OwnPlayhead:
         frames: PageFrames,
         threads: Executor,
         newest: Callable[[], tuple[Snapshot | None, int]],
-        told: Callable[[bytes, int], None],
+        told: Callable[[PageFrame, bytes, int], None],
     ) -> None:
         self.index = index
         self._frames, self._threads, self._newest, self._told = frames, threads, newest, told
@@ -80,7 +80,7 @@ class OwnPlayhead:
                 self._frame = made
                 message = self._encoder.message(self.snapshot(shared), width_px)
                 if message is not None:
-                    self._told(message, shared.sequence)
+                    self._told(made, message, shared.sequence)
                 if made.processed.whole:
                     return
         except Exception:  # if a recording fails in any way, the page keeps the frame it has

@@ -56,11 +56,6 @@ class Slot:
             self._state_after_frame = message
         self._filled.set()
 
-    def put_own(self, message: bytes, order: int) -> None:
-        """A frame of the page's own playhead; ignored once it follows the shared playhead again."""
-        if self.own is not None:
-            self.put("frame", message, order)
-
     def painted(self) -> None:
         """The client has painted one of its frames."""
         self._under_way = max(0, self._under_way - 1)

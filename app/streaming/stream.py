@@ -32,8 +32,8 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.core.client_role import Role, is_display
-from app.core.shared_view_state import HeldCuboid, SharedViewState
-from app.engine.page_frames import PageFrames
+from app.core.shared_view_state import FrameInView, HeldCuboid, SharedViewState
+from app.engine.page_frames import PageFrame, PageFrames
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
 from app.streaming.own_playhead import OwnPlayhead
@@ -139,9 +139,10 @@ class Stream:
             pass  # the client disconnected during sending
         finally:
             self._slots.remove(slot)
-            self._looks.leave(slot)
             if slot.own is not None:
                 slot.own.leave()
+                slot.own = None
+            self._looks.leave(slot)
             self._fit_width()
 
     async def _receive(self, socket: WebSocket, slot: Slot) -> None:
@@ -170,6 +171,7 @@ class Stream:
             if slot.own is not None:
                 slot.own.leave()
                 slot.own = None
+                self._looks.show(slot, None)
                 if self._snapshot is not None:
                     await self._put_newest(slot, self._snapshot)
             return
@@ -192,11 +194,18 @@ class Stream:
         """The shared snapshot, and the width of sent images. Any thread."""
         return self._snapshot, self._width_px
 
-    def _tell_own(self, slot: Slot, message: bytes, order: int) -> None:
+    def _tell_own(self, slot: Slot, made: PageFrame, message: bytes, order: int) -> None:
         """Called on the thread that made a page's own frame."""
         if self._loop is not None:
             with suppress(RuntimeError):  # the server closed its loop
-                self._loop.call_soon_threadsafe(slot.put_own, message, order)
+                self._loop.call_soon_threadsafe(self._put_own, slot, made, message, order)
+
+    def _put_own(self, slot: Slot, made: PageFrame, message: bytes, order: int) -> None:
+        """Ignored if the page has left its own playhead or has closed."""
+        if slot.own is None:
+            return
+        slot.put("frame", message, order)
+        self._looks.show(slot, FrameInView(made.processed.frame, made.processed.result))
 
     def _tell_dragged(self, held: HeldCuboid, ended: bool) -> None:
         """Notify the page that edits the label. Called on a thread of the 3D view."""

@@ -1,5 +1,5 @@
-"""The parts of the 3D view that belong to one browser: its page's selection, its labels, and the cuboid being
-edited."""
+"""The parts of the 3D view that belong to one browser: its page's selection, its labels, the cuboid being edited, and
+the frame of a page with its own playhead."""
 
 from __future__ import annotations
 
@@ -8,20 +8,21 @@ import math
 import numpy as np
 import viser
 
-from app.core.shared_view_state import LabelInView, LabelsInView, OnDrag, PageView
+from app.core.shared_view_state import FrameInView, LabelInView, LabelsInView, OnDrag, PageView
 from app.views import scene
 from app.views.colors import rgb
 from app.views.viser import nodes as viser_nodes
+from app.views.viser.frame_scene import NAMES, OBJECTS, DisplayOptions, OwnFrameScene, cover, floor_of
 from app.views.viser.gizmo import CuboidGizmo
 from app.views.viser.nodes import Strokes
 from pipeline.common.geometry import Cuboid
 from pipeline.types import F64, Point3, Result
 
 LABELS = "/own"
-OBJECTS = ("/cuboids", "/footprints", "/rays", "/velocities", "/cipv", "/next_cipv", "/labels")
-"""Nodes of the pipeline's objects, shared by all browsers."""
 _LIFT_M = 0.3
 _WIDTH_PX = {False: 2.0, True: 4.0}
+_NAME_SCALE, _CHOSEN_SCALE = 1.1, 1.4
+"""Size of name tags, and of the selected label's; the pipeline's are smaller."""
 _BACK, _LEAST_BACK_M = 2.5, 9.0
 """Distance of the camera from a selected label, as a multiple of its longest side, and the minimum distance."""
 _UP = 0.5
@@ -38,18 +39,24 @@ class BrowserScene:
         self._covers: list[viser.FrameHandle] = []
         self._drawn: tuple[LabelsInView | None, int | None] = (None, None)
         self._followed: int | None = None
+        self._own: OwnFrameScene | None = None
+        self._own_drawn: tuple[FrameInView, DisplayOptions, bool] | None = None
 
     def leave(self) -> None:
         """The browser has disconnected."""
         self._gizmo.leave(self._client.client_id)
 
-    def draw(self, view: PageView, result: Result, floor_m: float) -> None:
-        """Draw the page's view state. During playback, its labels follow a moment after the frame."""
+    def draw(self, view: PageView, result: Result, options: DisplayOptions) -> None:
+        """Draw the page's view state. During playback, its labels follow a moment after the frame. result: of the frame
+        that the page shows."""
+        floor_m = floor_of(result)
         found = next((each for each in result.objects if each.id == view.selected), None)
         viser_nodes.filled(self._scene, "/selection", found, rgb("ego"), 0.2, floor_m)
         at = scene.top_of(found, floor_m) if found is not None and found.bev is not None else None
         viser_nodes.name_tag(self._scene, f"{LABELS}/selected", "" if found is None else scene.object_text(found), at)
-        self._hide_objects(view.labels is not None and view.labels.alone)
+        is_alone = view.labels is not None and view.labels.alone
+        self._hide_objects(is_alone and view.frame is None)
+        self._draw_frame(view.frame, options, has_objects=not is_alone)
         wanted = (view.labels, None if view.held is None else view.held.track)
         if wanted != self._drawn:
             self._draw_labels(() if view.labels is None else view.labels.labels, wanted[1])
@@ -58,13 +65,29 @@ class BrowserScene:
         self._follow(view)
 
     def _hide_objects(self, hides: bool) -> None:
-        """In a browser, its own node overrides the shared node of the same name: an empty one hides it."""
+        """Of the shared frame."""
         if hides and not self._covers:
-            self._covers = [self._scene.add_frame(name, show_axes=False, visible=False) for name in OBJECTS]
+            self._covers = cover(self._scene, (*OBJECTS, NAMES))
         elif not hides:
-            for cover in self._covers:
-                cover.remove()
+            for each in self._covers:
+                each.remove()
             self._covers = []
+
+    def _draw_frame(self, shown: FrameInView | None, options: DisplayOptions, *, has_objects: bool) -> None:
+        """The page's own frame; None: the shared one."""
+        wanted = None if shown is None else (shown, options, has_objects)
+        if wanted == self._own_drawn:
+            return
+        self._own_drawn = wanted
+        with self._client.atomic():
+            if shown is None:
+                if self._own is not None:
+                    self._own.clear()
+                self._own = None
+                return
+            if self._own is None:
+                self._own = OwnFrameScene(self._scene, f"{LABELS}/objects")
+            self._own.draw(shown.frame, shown.result, options, has_objects=has_objects)
 
     def _draw_labels(self, labels: tuple[LabelInView, ...], chosen: int | None) -> None:
         for is_chosen, width_px in _WIDTH_PX.items():
@@ -76,7 +99,8 @@ class BrowserScene:
         for place in range(max(len(labels), self._names)):
             at = labels[place] if place < len(labels) else None
             text, top = ("", None) if at is None else (at.text, _top(at.cuboid))
-            viser_nodes.name_tag(self._scene, f"{LABELS}/names/{place}", text, top)
+            scale = _CHOSEN_SCALE if at is not None and at.track == chosen else _NAME_SCALE
+            viser_nodes.name_tag(self._scene, f"{LABELS}/names/{place}", text, top, scale)
         self._names = max(len(labels), self._names)
 
     def _follow(self, view: PageView) -> None:

@@ -103,16 +103,16 @@ def lanes(scene: viser.SceneApi, found: Sequence[F64], floor_m: float) -> None:
     lines(scene, "/path/lanes", Strokes(parts, [rgb("lane")] * len(parts)), 4.0)
 
 
-def name_tag(scene: viser.SceneApi, name: str, text: str, position: Point3 | None) -> None:
-    """A text in the scene; hidden without a position."""
+def name_tag(scene: viser.SceneApi, name: str, text: str, position: Point3 | None, scale: float = 0.8) -> None:
+    """A text in the scene; hidden without a position. scale: of its size."""
     if position is None:
         return _hide(scene, name)
     handle = scene.get_handle_by_name(name)
     if isinstance(handle, viser.LabelHandle):
-        handle.text = text
+        handle.text, handle.font_screen_scale = text, scale
         _stand_at(handle, position)
     else:
-        scene.add_label(name, text, position=position, anchor="bottom-center", font_screen_scale=0.8)
+        scene.add_label(name, text, position=position, anchor="bottom-center", font_screen_scale=scale)
 
 
 def path(scene: viser.SceneApi, corridor: Path, floor_m: float) -> None:

@@ -1,7 +1,7 @@
 /**
  * This page's own playhead: other pages do not move it, and it does not move theirs. The server computes its frames,
- * but playback runs here, since the server plays for all pages. The 3D and rerun views are shared by all pages, so a
- * page that shows them follows the shared playhead and moves it to its own frame.
+ * but playback runs here, since the server plays for all pages. The rerun view is shared by all pages, so a page that
+ * shows it follows the shared playhead and moves it to its own frame.
  */
 import { handlePlayback, request } from "../core/api.js";
 import { patchState, tell } from "../core/connection.js";
@@ -19,12 +19,10 @@ import { get, on, set } from "../core/store.js";
 let own = null;
 let timer = 0;
 
-const SHARED_VIEWS = ["3d", "rerun"];
-
 export const isOwn = () => own !== null;
 
 /** Whether the active tab is shared by all pages. */
-export const isShared = () => SHARED_VIEWS.includes(get("layout")?.tab ?? "");
+export const isShared = () => get("layout")?.tab === "rerun";
 
 export function setUp() {
   handlePlayback(changed);

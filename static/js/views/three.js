@@ -30,8 +30,19 @@ export function open() {
   tell("page_3d", NAME);
   const note = el("p", { class: "busy", aria: { role: "status" }, textContent: "Opening the 3D view …" });
   const view = el("iframe", { src: `viser/of/${NAME}/`, title: "3D view" });
-  view.addEventListener("load", () => note.remove());
+  view.addEventListener("load", () => {
+    note.remove();
+    keepConnecting(view);
+  });
   body.append(note, view);
+}
+
+/**
+ * viser connects again after a lost connection only while its document has the focus, which is mostly in this page.
+ * @param {HTMLIFrameElement} view
+ */
+function keepConnecting({ contentDocument }) {
+  if (contentDocument) contentDocument.hasFocus = () => !document.hidden;
 }
 
 /** @param {HTMLElement} body @param {number} width @param {number} height */

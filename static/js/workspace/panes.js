@@ -47,7 +47,10 @@ export function setUp() {
     );
   }
   for (const button of plansTabs())
-    button.addEventListener("click", () => showTab(/** @type {Tab} */ (button.dataset.tab)));
+    button.addEventListener("click", (event) => {
+      showTab(/** @type {Tab} */ (button.dataset.tab));
+      if (event.detail) button.blur(); // after a press of the mouse, arrow keys are the page's, not the tabs'
+    });
   $(".bev-pane .tabs").addEventListener("keydown", onTabKey);
   $("#params-button").addEventListener("click", toggleInspector);
   on(["layout"], reflect);

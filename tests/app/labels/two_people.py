@@ -150,6 +150,18 @@ def at_once(hands: Sequence[Hand], count: int) -> None:
         raise raised[0]
 
 
+def label_together(addresses: tuple[str, str], count: int) -> dict[str, Counter[str]]:
+    """Let two people, each with one of these addresses, do this number of acts at once, and check the end. Returns what
+    each of them was told."""
+    hands = [Hand("Ada", addresses[0], 1), Hand("Bob", addresses[1], 2)]
+    at_once(hands, count)
+    check_the_end(hands)
+    told = hands[0].told + hands[1].told
+    assert told["done"] > count, "most of what they do is done"
+    assert told["conflict"], "they get in each other's way, and are told"
+    return {hand.name: hand.told for hand in hands}
+
+
 def check_the_end(hands: Sequence[Hand]) -> None:
     """Both pages show the content of the database; every confirmed act is in the log exactly once; and nobody changed a
     track without having seen the other's last change."""

@@ -352,6 +352,26 @@ def test_a_page_with_its_own_playhead_is_moved_by_nobody_and_moves_nobody(site: 
         assert index_of(header_where(own, lambda header: index_of(header) != 2)) == 5
 
 
+def test_the_3d_view_of_a_page_with_its_own_playhead_is_told_its_frame(site: Site):
+    def told() -> str | None:
+        shown = site.stream._looks.view_of_name(NAME).frame
+        return None if shown is None else shown.result.frame
+
+    with site.connected() as own:
+        own.send(json.dumps({"page_3d": NAME}))
+        go_to(own, 3)
+        third = told()
+        assert third not in (None, site.first.processed.result.frame)  # type: ignore[union-attr]
+        site.show(5)
+        _heard(own)
+        assert told() == third, "nobody moves it"
+        go_to(own, 2)
+        assert told() not in (None, third)
+        own.send(json.dumps({"own": None}))
+        _heard(own)
+        assert told() is None
+
+
 def test_playback_is_paused_when_no_page_follows_it(site: Site):
     with site.connected() as watching, site.connected() as labeling:
         next_header(watching)

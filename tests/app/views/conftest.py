@@ -201,7 +201,7 @@ class SceneClient:
         words: dict[str, str] = {}
         for each in self.messages:
             written = each.get("props", each.get("updates", {}))
-            if each.get("name", "").startswith(("/labels/", "/own/names/", "/own/selected")) and "text" in written:
+            if each.get("name", "").startswith(("/labels/", "/own/")) and "text" in written:
                 words[each["name"]] = written["text"]
         return [words[name] for name, shown in self.nodes().items() if shown and name in words]
 

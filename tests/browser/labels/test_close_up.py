@@ -152,6 +152,7 @@ def test_what_is_implausible_is_listed_as_one_labels_and_a_press_goes_there(hand
         made.append(labels.act("Bob", new)["changed"]["tracks"][0])
     row = listed.get_by_role("button", name="overlap")
     expect(row).to_contain_text(f"#{made[0]['id']} car and #{made[1]['id']} car overlap")
+    expect(row, "a longer sentence is not cut off").to_have_css("white-space", "normal")
     row.click()
     is_at(page, START + 5)
     hand.keys("Shift+Delete")

@@ -55,6 +55,9 @@ def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, hei
     page.screenshot(path=SCREENS / f"labeling_{width}_{theme}.png")
     assert page.evaluate(LOW_CONTRAST) == []
     assert nameless(page) == []
+    page.evaluate("document.querySelector('#vitals dd').textContent = '1234567890123'")
+    for button in page.locator(".topbar .icon-button:visible").all():
+        assert box_of(button)["width"] >= 24, "however long the figures beside it are"
     for part in ("#label-bar", "#label-pane", "#label-keys", "#timeline-front", "#bev", "#camera", EXPORT):
         box = box_of(page.locator(part))
         assert box["x"] >= 0, part
@@ -99,9 +102,9 @@ def test_name_tags_cover_no_vehicle_and_those_without_room_are_left_out(open_pag
         """async () => {
           const { Labels } = await import("/js/views/drawing/text_labels.js");
           const canvas = new OffscreenCanvas(300, 200), ctx = canvas.getContext("2d", { willReadFrequently: true });
-          const painted = (weight, vehicles, end) => {
+          const painted = (weight, vehicles, end, bottom) => {
             ctx.clearRect(0, 0, 300, 200);
-            const tags = new Labels(ctx, 300);
+            const tags = new Labels(ctx, 300, 0, bottom);
             for (const each of vehicles) tags.keepFree(...each);
             tags.put("#7", 120, 100, "#fff", weight, end);
             const { data } = ctx.getImageData(0, 0, 300, 200), xs = [], ys = [];
@@ -110,14 +113,15 @@ def test_name_tags_cover_no_vehicle_and_those_without_room_are_left_out(open_pag
           };
           const right = [110, 0, 190, 200], left = [0, 0, 100, 200];
           return [painted("weak", [], 90), painted("weak", [right], 90), painted("weak", [left, right], 90),
-            painted("must", [left, right], 90)];
+            painted("must", [left, right], 90), painted("strong", [[0, 0, 300, 400]], undefined, 200)];
         }"""
     )
-    free, moved, left_out, always = painted
+    free, moved, left_out, always, crowded = painted
     assert free[0] >= 120
     assert moved[2] <= 90, "to the other side"
     assert left_out is None
     assert always is not None
+    assert crowded is not None, "the lead's is in the image, and be it on a vehicle"
 
 
 def nameless(page: Page) -> list[str]:

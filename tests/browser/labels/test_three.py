@@ -51,6 +51,9 @@ def test_the_camera_goes_to_the_selection_and_visers_own_panel_stays_away(pages:
         scene = page.frame_locator("#three-body iframe")
         expect(scene.get_by_text("CIPV Studio", exact=True)).to_be_visible()
         expect(scene.get_by_text("Parameters", exact=True), "the panel is folded up").to_be_hidden()
+        viser = next(frame for frame in page.frames if "/viser/of/" in frame.url)
+        assert page.evaluate("document.activeElement.tagName") != "IFRAME"
+        assert viser.evaluate("document.hasFocus()"), "without it, viser does not connect again after a loss"
         middle = labels.cuboid(made, START)["center"]
         labels.wait_for(lambda _: cameras != [])
         assert not is_on(cameras[-1], middle)
@@ -59,17 +62,25 @@ def test_the_camera_goes_to_the_selection_and_visers_own_panel_stays_away(pages:
         assert math.dist(cameras[-1]["position"], middle) < 15.0, "near by"
 
 
-def test_the_recording_stops_at_the_frame_of_the_page_that_opens_the_3d_view(pages: Pages, three: Site) -> None:
+def test_a_page_in_the_3d_view_is_moved_by_nobody_and_moves_nobody(pages: Pages, three: Site) -> None:
     with opening(pages, three) as open_page:
-        page = open_page(address=three.address, expects=OF_VISER, locale="en")
-        begin(page)
-        page.evaluate("async () => (await import('/js/drive/seek.js')).seekTo(7)")
-        is_at(page, 7)
-        three.engine.control.change(playing=True)
-        three.engine.wait_for(lambda now: now.playing, 60)
-        page.get_by_role("tab", name="3D").click()
-        three.engine.wait_for(lambda now: not now.playing and now.index == 7, 60)
-        is_at(page, 7)
+        mine, other = (open_page(address=three.address, expects=OF_VISER, locale=each) for each in ("en", "en-GB"))
+        for page, person in ((mine, "Ada"), (other, "Bob")):
+            begin(page, person)
+            page.get_by_role("tab", name="3D").click()
+            is_at(page, START)
+        other.keyboard.press("Home")
+        is_at(other, 0)
+        other.keyboard.press("ArrowRight")
+        is_at(other, 1)
+        is_at(mine, START)
+        assert three.engine.snapshot.index == START, "nor those who watch"
+        assert three.looks is not None
+        three.engine.control.change(target=7)
+        three.engine.wait_for(lambda now: now.index == 7, 60)
+        mine.keyboard.press("ArrowRight")
+        is_at(mine, START + 1)
+        is_at(other, 1)
 
 
 def cameras_in(payload: str | bytes) -> list[dict[str, Any]]:

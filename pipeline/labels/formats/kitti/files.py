@@ -6,6 +6,7 @@ there (Geiger et al. 2012, "Are we ready for autonomous driving?", and the devel
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +28,8 @@ _OBJECT, _TRACKING, _CALIBRATION = "label_2", "label_02", "calib"
 _SEQUENCE = "0000"
 _USUAL_SIZE = (1242, 375)
 _LARGEST_ID = 2**63
+_MOST_TILT_RAD = math.radians(1.5)
+"""Tilt of the labels' frame from which on it is reported. KITTI's own is below 1°."""
 _NO_TRACK = "-1"
 """Track id of an ignored region."""
 
@@ -219,6 +222,12 @@ def _changes(labels: LabelSet, drive: LabeledDrive) -> tuple[str, ...]:
     cameras = [drive.shots[sighting.frame].camera for _, sighting in found if sighting.bbox is not None]
     if any(camera is not None and camera.distortion.size for camera in cameras):
         changes.append("boxes are moved to the undistorted image, as in KITTI")
+    tilts = [_tilt_rad(drive.shots[sighting.frame].T_rect_ego) for _, sighting in found if sighting.cuboid is not None]
+    if (most := max(tilts, default=0.0)) > _MOST_TILT_RAD:
+        changes.append(
+            f"the camera is tilted by {math.degrees(most):.1f}°, and so are the cuboids, which turn only about its "
+            "vertical axis in this format: projected, they differ from their boxes"
+        )
     hidden = sum(sighting.cuboid is not None and sighting.occlusion is None for _, sighting in found)
     if hidden:
         changes.append(f"occlusion of {hidden:,} objects is unknown: written as 3")
@@ -229,6 +238,11 @@ def _changes(labels: LabelSet, drive: LabeledDrive) -> tuple[str, ...]:
     if without:
         changes.append(f"{without:,} objects have no box in the image: written as -1")
     return tuple(changes)
+
+
+def _tilt_rad(T_rect_ego: F64 | None) -> float:
+    """Angle between the vertical axes of the labels' frame and the ego frame."""
+    return 0.0 if T_rect_ego is None else math.acos(min(1.0, max(-1.0, -float(T_rect_ego[1, 2]))))
 
 
 def _notes(rows: list[LabelRow]) -> tuple[str, ...]:

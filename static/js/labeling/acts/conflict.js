@@ -2,11 +2,16 @@
 import { request } from "../../core/api.js";
 import { el } from "../../core/dom.js";
 import { num } from "../../core/format.js";
-import { fromAbove, inImage, range } from "./conflict_image.js";
+import { isOwn } from "../../drive/own_playhead.js";
+import { seekTo } from "../../drive/seek.js";
+import { on } from "../../core/store.js";
+import { shown, trackOf } from "../state/labels.js";
+import { fromAbove, inImage, pathFromAbove, range } from "./conflict_image.js";
 import { open } from "../panels/dialogs.js";
 import { based } from "./revisions.js";
 
 /** @typedef {import("../state/types.js").Act} Act */
+/** @typedef {import("../../core/types.js").Point2} Point2 */
 
 /**
  * Returns the act rebased on the other person's change, or null to keep theirs.
@@ -18,9 +23,11 @@ import { based } from "./revisions.js";
  * @returns {Promise<Act|null>}
  */
 export async function choose(act, sentence, item, theirs, revision) {
-  const isPlaced = typeof act.track === "number" && typeof act.frame === "number",
-    place = isPlaced ? await placeOf(act.track, act.frame) : null,
-    [mine, other] = isPlaced ? await inPixels([act, place ?? {}]) : [{}, {}];
+  const label = typeof act.track === "number" ? trackOf(act.track)?.label : undefined;
+  const frame = act.frame ?? shown(),
+    place = typeof act.track === "number" && theirs ? await placeOf(act.track, frame) : null,
+    [mine, other] = await inPixels([ownShape(act, place), place ?? {}]);
+  await comeTo(frame);
   const body = el(
     "div",
     {},
@@ -28,25 +35,72 @@ export async function choose(act, sentence, item, theirs, revision) {
     el(
       "div",
       { class: "conflict" },
-      side("Yours", act, ...images(act, mine, other)),
+      side("Yours", { ...act, ...asSeen(act) }, ...images(act, theirs, mine, other)),
       theirs
-        ? side("Theirs", { ...theirs, cuboid: place?.cuboid, bbox: place?.bbox }, ...images(theirs, other, mine))
+        ? side("Theirs", { ...theirs, ...asSeen(place) }, ...images(theirs, act, other, mine))
         : el("div", {}, el("h3", { textContent: "Theirs: removed" })),
     ),
   );
+  const isShape = act.kind === "set_sighting" && label !== undefined,
+    keep = theirs || typeof act.seen === "number" ? rebasedOn : isShape ? asNew : null;
   return open("Two people changed the same label", body, null, [
-    ["Use theirs", null],
-    [
-      "Keep mine",
-      () => ({
-        ...based(act, (ref) =>
-          theirs && ref.kind === item.kind && ref.id === item.id ? theirs.revision : ref.revision,
-        ),
-        ...(typeof act.seen === "number" ? { seen: revision, over_reviewed: Boolean(theirs?.reviewer) } : {}),
-      }),
-    ],
+    [keep ? "Use theirs" : "OK", null],
+    ...(keep ? [/** @type {[string, () => Act]} */ (["Keep mine", keep])] : []),
   ]);
+
+  /** @returns {Act} */
+  function rebasedOn() {
+    return {
+      ...based(act, (ref) => (theirs && ref.kind === item.kind && ref.id === item.id ? theirs.revision : ref.revision)),
+      ...(typeof act.seen === "number" ? { seen: revision, over_reviewed: Boolean(theirs?.reviewer) } : {}),
+    };
+  }
+
+  /** Of a shape on a track that was removed, a new track. @returns {Act} */
+  function asNew() {
+    const { frame: at, cuboid, bbox } = act;
+    return { kind: "add_track", label, frame: at, cuboid, bbox };
+  }
 }
+
+/** Longest wait for the frame of a conflict. */
+const PATIENCE_MS = 3000;
+
+/** Called with each frame that is shown. */
+let arrived = () => {};
+on(["frame"], () => arrived());
+
+/**
+ * Go to the frame that the act was done in, unless the page follows others: the images show the current frame.
+ * @param {number} frame
+ * @returns {Promise<void>}
+ */
+async function comeTo(frame) {
+  if (frame === shown() || !isOwn()) return;
+  await new Promise((done) => {
+    arrived = () => shown() === frame && done(null);
+    setTimeout(done, PATIENCE_MS);
+    seekTo(frame);
+  });
+}
+
+/**
+ * Where the act puts its track.
+ * @param {Act} act
+ * @param {import("../state/types.js").LabelSighting|null} place theirs
+ * @returns {import("./conflict_image.js").Shape}
+ */
+function ownShape(act, place) {
+  if (act.kind !== "flip" || !place?.cuboid) return { cuboid: act.cuboid, bbox: act.bbox, box_set: act.box_set };
+  return { cuboid: { ...place.cuboid, yaw_rad: turned(place.cuboid.yaw_rad + Math.PI) } };
+}
+
+/** In −π … π. @param {number} yaw_rad */
+const turned = (yaw_rad) => Math.atan2(Math.sin(yaw_rad), Math.cos(yaw_rad));
+
+/** A box that follows its cuboid says nothing of its own. @param {any} shape */
+const asSeen = (shape) =>
+  shape ? { cuboid: shape.cuboid, bbox: shape.cuboid && !shape.box_set ? null : shape.bbox } : {};
 
 /**
  * The server's current version of a track in a frame.
@@ -73,24 +127,25 @@ async function inPixels(shapes) {
   const { pixels } = cuboids.length
     ? await request("api/project", "POST", { cuboids }).catch(() => ({ pixels: null }))
     : { pixels: null };
-  return shapes.map(({ cuboid, bbox }) => ({
-    cuboid,
-    bbox,
-    pixels: cuboid ? (pixels?.[cuboids.indexOf(cuboid)] ?? null) : null,
+  return shapes.map((shape) => ({
+    ...asSeen(shape),
+    pixels: shape.cuboid ? (pixels?.[cuboids.indexOf(shape.cuboid)] ?? null) : null,
   }));
 }
 
 /**
- * Images of one person's version beside the other's.
+ * Images of one person's version beside the other's. None of another frame than the current one.
  * @param {any} item
+ * @param {any} others the other's item
  * @param {import("./conflict_image.js").Shape} own
  * @param {import("./conflict_image.js").Shape} other
  * @returns {Node[]}
  */
-const images = (item, own, other) =>
+const images = (item, others, own, other) =>
   [
-    fromAbove(own.cuboid, other.cuboid),
-    inImage(own, other),
+    ...((item.frame ?? others?.frame ?? shown()) === shown()
+      ? [fromAbove(own.cuboid, other.cuboid), inImage(own, other), pathFromAbove(item, others)]
+      : []),
     typeof item.first === "number" && typeof item.last === "number" ? range(item.first, item.last) : null,
   ].filter((each) => each !== null);
 
@@ -111,10 +166,8 @@ const HIDDEN = [
   "over_reviewed",
   "confidence",
   "heading",
+  "box_set",
 ];
-
-/** Fields displayed counting from 1. */
-const FRAMES = ["frame", "first", "last"];
 
 /** Display names of acts. @type {Record<string, string>} */
 const ACTS = {
@@ -125,12 +178,17 @@ const ACTS = {
   refit: "fit to points",
   relabel: "class",
   trim_lead: "range end",
+  set_path: "path",
+  flip: "reverse",
 };
+
+/** Distances at which a line of a path is said, in metres. */
+const SAID_M = [5, 20, 40];
 
 /** @param {string} title @param {Record<string, any>} item @param {...Node} shown images */
 function side(title, item, ...shown) {
   const rows = Object.entries(item).filter(
-    ([key, value]) => !HIDDEN.includes(key) && value !== null && value !== undefined && value !== "",
+    ([key, value]) => !HIDDEN.includes(key) && value !== null && value !== undefined && words(value) !== "",
   );
   return el(
     "div",
@@ -142,18 +200,42 @@ function side(title, item, ...shown) {
       { class: "facts-list" },
       ...rows.flatMap(([key, value]) => [
         el("dt", { textContent: { bbox: "box" }[key] ?? key.replaceAll("_", " ") }),
-        el("dd", {
-          textContent: FRAMES.includes(key) ? words(value + 1) : key === "cuboid" ? cuboidWords(value) : words(value),
-        }),
+        el("dd", { textContent: WORDS[key]?.(value) ?? words(value) }),
       ]),
     ),
   );
 }
 
 /** In metres and degrees. @param {import("../state/types.js").Cuboid} cuboid */
-const cuboidWords = ({ center: [x, y, z], size, yaw_rad }) =>
-  `x ${num(x, 2)} y ${num(y, 2)} z ${num(z, 2)} m · ${size.map((side) => num(side, 2)).join(" × ")} m · ` +
-  `yaw ${num((yaw_rad * 180) / Math.PI, 1)}°`;
+function cuboidWords({ center: [x, y, z], size, yaw_rad }) {
+  const sides = size.map((side) => num(side, 2)).join(" × ");
+  return `x ${num(x, 2)} y ${num(y, 2)} z ${num(z, 2)} m · ${sides} m · yaw ${num((yaw_rad * 180) / Math.PI, 1)}°`;
+}
+
+/** Lateral offsets of a line of a path, in metres. @param {Point2[]} line */
+function lineWords(line) {
+  const said = SAID_M.flatMap((ahead) => {
+    const next = line.findIndex(([x]) => x >= ahead);
+    if (next < 1) return [];
+    const [x0, y0] = line[next - 1],
+      [x1, y1] = line[next];
+    return [`${num(y0 + ((y1 - y0) * (ahead - x0)) / (x1 - x0 || 1), 2)} m at ${ahead} m`];
+  });
+  return said.join(" · ") || `${line.length} points`;
+}
+
+const counted = (/** @type {number} */ frame) => words(frame + 1);
+
+/** Fields in words of their own; frames count from 1. @type {Record<string, (value: any) => string>} */
+const WORDS = {
+  frame: counted,
+  first: counted,
+  last: counted,
+  cuboid: cuboidWords,
+  bbox: (box) => `${box.map((/** @type {number} */ each) => Math.round(each)).join(", ")} px`,
+  left: lineWords,
+  right: lineWords,
+};
 
 /** @param {any} value @returns {string} */
 function words(value) {

@@ -10,7 +10,9 @@ import { shown } from "../state/labels.js";
 /** @typedef {import("../state/types.js").Cuboid} Cuboid */
 /** @typedef {import("../state/types.js").Box} Box */
 /** @typedef {import("../../core/types.js").Pixels} Pixels */
-/** @typedef {{cuboid?: Cuboid|null, bbox?: Box|null, pixels?: Pixels|null}} Shape */
+/** @typedef {import("../../core/types.js").Point2} Point2 */
+/** @typedef {{left?: Point2[]|null, right?: Point2[]|null}} Path */
+/** @typedef {{cuboid?: Cuboid|null, bbox?: Box|null, box_set?: boolean, pixels?: Pixels|null}} Shape */
 
 const WIDTH_PX = 230,
   HEIGHT_PX = 150,
@@ -42,8 +44,46 @@ function drawing(name, draw) {
 export function fromAbove(own, other) {
   const corners = [own, other].flatMap((cuboid) => (cuboid ? footprint(cuboid) : []));
   if (!own || !corners.length) return null;
-  const xs = corners.map(([x]) => x),
-    ys = corners.map(([, y]) => y),
+  return above(corners, own, other, (ctx, cuboid, u, v) => {
+    ctx.beginPath();
+    for (const [x, y] of footprint(cuboid)) ctx.lineTo(u(y), v(x));
+    ctx.closePath();
+    ctx.moveTo(u(cuboid.center[1]), v(cuboid.center[0]));
+    const [x, y] = nose(cuboid);
+    ctx.lineTo(u(y), v(x));
+    ctx.stroke();
+  });
+}
+
+/**
+ * One person's path from above, ahead is up; the other's is dashed.
+ * @param {Path|null} own
+ * @param {Path|null} other
+ */
+export function pathFromAbove(own, other) {
+  const lines = (/** @type {Path|null} */ path) => [path?.left, path?.right].flatMap((line) => (line ? [line] : []));
+  const points = [own, other].flatMap(lines).flat();
+  if (!own || !lines(own).length) return null;
+  return above(points, own, other, (ctx, path, u, v) => {
+    for (const line of lines(path)) {
+      ctx.beginPath();
+      for (const [x, y] of line) ctx.lineTo(u(y), v(x));
+      ctx.stroke();
+    }
+  });
+}
+
+/**
+ * One person's shape among the points; the other's is dashed.
+ * @template T
+ * @param {Point2[]} bounds points that the image contains, in metres
+ * @param {T} own
+ * @param {T|null|undefined} other
+ * @param {(ctx: CanvasRenderingContext2D, shape: T, u: (y: number) => number, v: (x: number) => number) => void} outline
+ */
+function above(bounds, own, other, outline) {
+  const xs = bounds.map(([x]) => x),
+    ys = bounds.map(([, y]) => y),
     [low, high] = [Math.min(...xs) - ROOM_M, Math.max(...xs) + ROOM_M],
     [right, left] = [Math.min(...ys) - ROOM_M, Math.max(...ys) + ROOM_M];
   const scale = Math.min(WIDTH_PX / (left - right), HEIGHT_PX / (high - low));
@@ -54,23 +94,14 @@ export function fromAbove(own, other) {
     ctx.fillStyle = ui("dim");
     for (let n = 0; frame && n < frame.count; n += 1)
       ctx.fillRect(u(frame.xyz[3 * n + 1] / CM) - 1, v(frame.xyz[3 * n] / CM) - 1, 2, 2);
-    const outline = (/** @type {Cuboid} */ cuboid) => {
-      ctx.beginPath();
-      for (const [x, y] of footprint(cuboid)) ctx.lineTo(u(y), v(x));
-      ctx.closePath();
-      ctx.moveTo(u(cuboid.center[1]), v(cuboid.center[0]));
-      const [x, y] = nose(cuboid);
-      ctx.lineTo(u(y), v(x));
-      ctx.stroke();
-    };
     ctx.lineWidth = 1;
     ctx.strokeStyle = ui("dim");
     ctx.setLineDash([3, 3]);
-    if (other) outline(other);
+    if (other) outline(ctx, other, u, v);
     ctx.setLineDash([]);
     ctx.lineWidth = 2;
     ctx.strokeStyle = ui("accent");
-    outline(own);
+    outline(ctx, own, u, v);
   });
 }
 

@@ -131,7 +131,7 @@ export function discard() {
 async function refused(waiting, refusal) {
   const { detail, item, theirs, revision } = refusal.answer ?? {};
   data.look(); // this page may be behind the server
-  if (item && (theirs || typeof waiting.act.seen === "number")) {
+  if (item) {
     const mine = await choose(waiting.act, detail, item, theirs, revision);
     if (mine) return queue.unshift({ ...waiting, act: mine, body: { ...waiting.body, act_id: newId() } });
   }

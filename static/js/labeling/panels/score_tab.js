@@ -16,6 +16,7 @@ export const look = newestOnly(async () => {
   const state = get("state"),
     key = `${state?.uri} ${state?.labels?.revision} ${state?.drive.run} ${state?.drive.done}`;
   if (!body || !isSeen() || !state?.labels || key === known) return;
+  if (!body.firstChild) body.append(el("p", { class: "facts pad", textContent: "Computing …" }));
   /** @type {Score|Error} */
   const score = await request("api/labels/score").catch((error) => error);
   known = score instanceof Error ? "" : key;

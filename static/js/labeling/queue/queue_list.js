@@ -79,7 +79,7 @@ function row(work) {
 function facts({ frames, labelled, reviewed, proposals, asked, worth, efforts }) {
   const people = efforts.map(
     ({ person, acts, active_s }) =>
-      `${person} ${acts} changes (${(acts / frames).toFixed(1)} a frame), ${Math.round(active_s / 60)} min`,
+      `${person} ${acts} ${acts === 1 ? "change" : "changes"} (${(acts / frames).toFixed(1)} a frame), ${Math.round(active_s / 60)} min`,
   );
   return [
     `${frames} frames, lead labelled in ${percent(labelled)}, ${percent(reviewed)} of tracks reviewed`,

@@ -63,6 +63,7 @@ export class Labels {
     for (let tries = 0; this.#overlaps(at); tries++) {
       if (tries === moves) return null;
       at.y = at.y - h - 1 > this.top ? at.y - h - 1 : at.y + (tries + 2) * (h + 1);
+      if (at.y + h > this.bottom) return null;
     }
     return at;
   }

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.core.shared_view_state import HeldCuboid, LabelInView, LabelsInView, PageView
+from app.core.shared_view_state import FrameInView, HeldCuboid, LabelInView, LabelsInView, PageView
 from app.views.viser.gui import ParamsGui
 from app.views.viser.view import POSES, ViserView
 from pipeline.common.geometry import Cuboid
@@ -111,6 +111,44 @@ def test_each_page_sees_its_own_selection_and_labels(frame: Frame, result: Resul
         assert mine.texts() == ["#7 car 19.9 m"]
         assert not mine.nodes()["/selection"]
         assert not mine.owned("/cuboids")
+    finally:
+        view.close()
+
+
+def test_a_page_with_its_own_playhead_sees_its_own_frame_and_the_others_the_shared_one(
+    frame: Frame, result: Result, open_scene: Any
+) -> None:
+    nearer = dataclasses.replace(result.objects[0], distance_m=11.0)
+    mine_only = FrameInView(
+        dataclasses.replace(frame, image=None), dataclasses.replace(result, objects=(nearer, *result.objects[1:]))
+    )
+    views = {"a1": PageView(frame=mine_only)}
+    view = ViserView(Params(), view_of=lambda page: views.get(page, PageView()))
+    try:
+        view.show(frame, result)
+        mine, other = open_scene(view.port, page="a1"), open_scene(view.port, page="b2")
+        other.read_present_state()
+        mine.look()
+        mine.read_until(lambda each: each.get("name") == "/ego" and each.get("owner"))
+        assert "#7 car 11.0 m" in mine.texts()
+        assert mine.owned("/points")
+        assert mine.owned("/labels"), "the shared frame's name tags are covered"
+        assert mine.owned("/camera/image")
+        assert not mine.nodes()["/camera/image"], "its frame has no image, and the shared one is covered"
+        assert other.texts() == ["#7 car 19.9 m"]
+        assert not [each for each in other.messages if each.get("owner")]
+
+        views["a1"] = PageView(frame=mine_only, labels=LabelsInView((), True))
+        view.look()
+        mine.read_until(lambda each: each["type"] == "SetSceneNodeVisibilityMessage" and each["name"] == "/cuboids")
+        assert not mine.nodes()["/cuboids"], "its labels are alone"
+        assert mine.owned("/cuboids"), "and the shared frame's objects stay covered"
+
+        views["a1"] = PageView()
+        view.look()
+        mine.read_until(lambda each: each["type"] == "RemoveSceneNodeMessage" and each["name"] == "/labels")
+        parts = (*PARTS, "/next_cipv", "/path/lanes", "/labels")
+        assert not [name for name in parts if mine.owned(name)], "the shared frame again"
     finally:
         view.close()
 

@@ -127,7 +127,7 @@ def test_without_own_motion_nothing_is_known_of_the_road() -> None:
 
 
 def test_a_side_seen_to_its_end_says_how_long_a_small_car_is() -> None:
-    """Of one whose rear alone is seen, the usual length is assumed; of a hidden part of a side as well."""
+    """Of one whose rear alone is seen, the usual length of cars as narrow is assumed."""
     small = (3.3, 1.6, 1.5)
     cars = {at: standing(10.0 - 1.0 * at, 4.0, size=small) for at in range(8)}
     boxes = {at: replace_size(car, (4.5, 1.8, 1.5), 0.3) for at, car in cars.items()}
@@ -139,7 +139,9 @@ def test_a_side_seen_to_its_end_says_how_long_a_small_car_is() -> None:
         return after.sightings[0].cuboid.size[:2]
 
     assert fitted("both") == pytest.approx((3.6, 1.7), abs=0.15)
-    assert fitted("rear")[0] == pytest.approx(4.1)
+    length, width = fitted("rear")
+    assert width < 1.75, "narrower than usual"
+    assert length == pytest.approx(4.1 - (1.8 - width), abs=0.01), "so it is shorter, too"
 
 
 def test_points_of_a_car_and_its_neighbour_do_not_say_how_large_it_is() -> None:

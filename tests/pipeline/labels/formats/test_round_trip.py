@@ -154,6 +154,12 @@ def test_what_cannot_be_held_is_said(name: FormatName, tmp_path: Path) -> None:
         assert not lost
 
 
+@pytest.mark.parametrize(("pitch_rad", "is_said"), [(0.04, True), (0.005, False)])
+def test_the_tilt_of_kittis_cuboids_is_said(pitch_rad: float, is_said: bool, tmp_path: Path) -> None:
+    lost = export_labels(full_set(), drive(camera(pitch_rad=pitch_rad)), "kitti", tmp_path / "out")
+    assert any("the camera is tilted by" in sentence for sentence in lost) is is_said
+
+
 def test_a_rejected_track_is_not_exported_as_true(tmp_path: Path) -> None:
     export_labels(full_set(), drive(), "kitti-tracking", tmp_path / "out")
     numbers = [line.split()[1] for line in (tmp_path / "out/label_02/0000.txt").read_text().splitlines()]
