@@ -5,29 +5,41 @@ from __future__ import annotations
 import contextlib
 import re
 import resource
+import subprocess
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
+_DESCRIPTORS = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
 JUMPS_S = (-86_400.0, -30.0, 30.0, 86_400.0)
 
 
+LimitName = Literal["nofile", "as", "fsize"]
+"""As ``prlimit`` of util-linux names them: descriptors, address space, size of a file."""
+
+
 @contextmanager
-def limited(processes: list[int], limit: int, most: int) -> Iterator[None]:
-    """Lower a resource limit of these processes, as far as they still exist."""
-    before: dict[int, tuple[int, int]] = {}
+def limited(processes: list[int], limit: LimitName, most: int) -> Iterator[None]:
+    """Lower a resource limit of these processes, as far as they still exist. As their own user: root is not allowed to
+    in a container."""
     for process in processes:
-        with contextlib.suppress(ProcessLookupError):
-            before[process] = resource.prlimit(process, limit)
-            resource.prlimit(process, limit, (most, before[process][1]))
+        _limit(process, limit, f"{most}:")
     try:
         yield
     finally:
-        for process, limits in before.items():
-            with contextlib.suppress(ProcessLookupError):
-                resource.prlimit(process, limit, limits)
+        for process in processes:
+            _limit(process, limit, "unlimited:" if limit != "nofile" else f"{_DESCRIPTORS}:")
+
+
+def _limit(process: int, limit: LimitName, value: str) -> None:
+    with contextlib.suppress(FileNotFoundError):
+        user = Path(f"/proc/{process}").stat().st_uid
+        command = ["prlimit", f"--pid={process}", f"--{limit}={value}"]
+        done = subprocess.run(command, user=user, capture_output=True, text=True)
+        assert done.returncode == 0 or not Path(f"/proc/{process}").exists(), done.stderr
 
 
 def resident_mb(process: int) -> float:

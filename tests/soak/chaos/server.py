@@ -134,7 +134,7 @@ class LabelledServer:
         """Let the server open no file descriptors for two seconds, while it computes its drive."""
         self.kill()
         pid = self.process.pid or 0
-        with limited([pid], resource.RLIMIT_NOFILE, len(os.listdir(f"/proc/{pid}/fd"))):
+        with limited([pid], "nofile", len(os.listdir(f"/proc/{pid}/fd"))):
             time.sleep(2.0)
 
     def use_up_memory(self) -> None:
@@ -142,7 +142,7 @@ class LabelledServer:
         self.kill()
         pid = self.process.pid or 0
         size = int(Path(f"/proc/{pid}/statm").read_text().split()[0]) * resource.getpagesize()
-        with limited([pid], resource.RLIMIT_AS, size):
+        with limited([pid], "as", size):
             time.sleep(2.0)
         if not self.process.is_alive():
             self.figures.befell["server ended without memory"] += 1
@@ -151,7 +151,7 @@ class LabelledServer:
     def fill_disk(self) -> None:
         """Let the database write nothing for two seconds: PostgreSQL's processes, or the server for SQLite."""
         children = self._database_processes()
-        with limited(children or [self.process.pid or 0], resource.RLIMIT_FSIZE, 1):
+        with limited(children or [self.process.pid or 0], "fsize", 1):
             time.sleep(2.0)
 
     def kill_database(self) -> None:
