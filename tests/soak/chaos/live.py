@@ -143,7 +143,9 @@ class LiveCar:
 
     def _health_of(self, name: str) -> str:
         source = self._engine.source
-        return str([each for each in source.health() if each.sensor == name] if is_live_source(source) else source)
+        if source is None or not is_live_source(source):
+            return "no sensors are open"
+        return str([each for each in source.health() if each.sensor == name])
 
     def end(self) -> None:
         """Close the recording and read it back: missing data must be reported, and nothing may be changed."""

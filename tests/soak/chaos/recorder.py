@@ -58,10 +58,10 @@ def record(folder: Path, chance: random.Random, figures: Figures) -> None:
             process.kill()
     figures.befell["disk full" if is_full else "recorder killed"] += 1
     figures.sessions += 1
-    figures.frames += _read_back(path, figures)
+    figures.frames += read_back(path, figures)
 
 
-def _read_back(path: Path, figures: Figures) -> int:
+def read_back(path: Path, figures: Figures) -> int:
     """Number of frames; checks that each is complete and that missing frames are reported."""
     out = path.with_name("b.mcap")
     out.unlink(missing_ok=True)
