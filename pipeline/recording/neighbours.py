@@ -52,7 +52,7 @@ def _problem_before(path: Path, name: str, sha256: str) -> Iterator[str]:
     before = _beside(path, name)
     if before is None:
         yield f"the file before it, {name}, is not beside it"
-    elif sha256 and sha256 not in hashes_of_links(before):
+    elif sha256 and sha256 not in _hashes(before):
         yield f"{name} is not the file that came before it, or was changed"
 
 
@@ -64,13 +64,24 @@ def _problem_after(path: Path, name: str) -> Iterator[str]:
     try:
         with McapFile(after) as file:
             said = file.metadata(FOLLOWS) or {}
-    except BadInput:
+    except (BadInput, OSError):
         said = {}
-    if said.get("file") != path.name or said.get("sha256") not in hashes_of_links(path):
+    if said.get("file") != path.name or said.get("sha256") not in _hashes(path):
         yield f"{name} is not the file in which the recording continues, or was changed"
+
+
+def _hashes(path: Path) -> frozenset[str]:
+    """Of its links; empty if it cannot be read."""
+    try:
+        return hashes_of_links(path)
+    except (BadInput, OSError):
+        return frozenset()
 
 
 def _beside(path: Path, name: str) -> Path | None:
     """A file of this name in the same folder; None if there is none, or if it is no name of a file there."""
     found = path.with_name(name) if name and name == Path(name).name else None
-    return found if found is not None and found.is_file() else None
+    try:
+        return found if found is not None and found.is_file() else None
+    except OSError:  # a name that is too long
+        return None

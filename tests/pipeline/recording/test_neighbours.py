@@ -75,7 +75,7 @@ def test_a_copy_of_a_part_belongs_to_no_others(files: list[Path], tmp_path: Path
     assert [problems(tmp_path / name) for name in ("clip.mcap", "recovered.mcap")] == [(), ()]
 
 
-@pytest.mark.parametrize("name", ["../drive/a.mcap", "", "/etc/passwd", ".."])
+@pytest.mark.parametrize("name", ["../drive/a.mcap", "", "/etc/passwd", "..", "a" * 300, "a\0", "\ud800"])
 def test_only_files_in_the_same_folder_are_looked_at(
     files: list[Path], name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
