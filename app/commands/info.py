@@ -78,6 +78,8 @@ def _print_info(found: Info) -> None:
     if found.chain is not None:
         print("; ".join((f"hash chain: {found.chain.state}", *found.chain.changed)))
         print(f"signature: {found.chain.signature}")
+    for line in found.missing_neighbours:
+        print(line)
     if found.problem is not None:
         print(f"{found.problem}; run `cipv recover {found.path}` to repair it")
     if found.damaged_chunks:

@@ -135,9 +135,9 @@ def ways_of(path: Path) -> Callable[[RunSettings], Callable[[], Sequence[F32]]]:
     model = with_empty_masks(with_unit_image(read_graph(path)))  # each leaves other graphs unchanged
     try:
         own = input_size(model)
+        graph = (model if own else with_input_size(model, _TUNED_SIZE)).SerializeToString()
     except ValueError as error:
         raise DetectorError(f"{path.name} cannot be tuned: {error}") from None
-    graph = (model if own else with_input_size(model, _TUNED_SIZE)).SerializeToString()
     noise = np.random.default_rng(0).random((1, 3, *(own or _TUNED_SIZE)), np.float32)
 
     def run(way: RunSettings) -> Callable[[], Sequence[F32]]:

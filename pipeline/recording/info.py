@@ -11,6 +11,7 @@ import numpy.typing as npt
 from pipeline.recording import topics
 from pipeline.recording.mcap.chain import Chain, verify
 from pipeline.recording.mcap.reader import McapFile
+from pipeline.recording.neighbours import missing_neighbours
 from pipeline.recording.session.provenance import About
 from pipeline.recording.session.source import SessionSource
 from pipeline.types.source import Source, SourceError
@@ -83,6 +84,8 @@ class Info:
     """What is missing in the file; None for a complete one."""
     chain: Chain | None
     """Result of the integrity check; None if it was not performed."""
+    missing_neighbours: tuple[str, ...]
+    """Which files of the same recording are missing or were replaced, in words."""
 
 
 def info(path: Path, *, is_quick: bool = False, key: str | None = None) -> Info:
@@ -110,6 +113,7 @@ def info(path: Path, *, is_quick: bool = False, key: str | None = None) -> Info:
             marks=marks,
             problem=file.directory.problem,
             chain=None if is_quick else verify(path, key=key),
+            missing_neighbours=missing_neighbours(path, file),
         )
 
 

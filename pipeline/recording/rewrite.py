@@ -14,6 +14,7 @@ from pipeline.recording.errors import Damaged
 from pipeline.recording.mcap import chain
 from pipeline.recording.mcap.output import Output
 from pipeline.recording.mcap.reader import McapFile, Stored
+from pipeline.recording.neighbours import NEIGHBOURS
 from pipeline.recording.session.frame_list import FrameList
 from pipeline.recording.session.frame_record import FrameRecord, frame_record_from, frame_record_message
 from pipeline.recording.session.source import SessionSource
@@ -136,7 +137,7 @@ def _copy(messages: Iterable[Stored], file: McapFile, out: Path) -> tuple[int, i
     """(messages, frames) written to a new file, with the metadata and, for a session, the list of its frames."""
     output, frames, copied = Output(out, profile=file.directory.profile), FrameList(), 0
     try:
-        for name in file.directory.metadata.keys() - {chain.NAME}:  # the new file has its own
+        for name in file.directory.metadata.keys() - {chain.NAME, *NEIGHBOURS}:  # the new file has its own chain
             output.add_metadata(name, file.metadata(name) or {})
         for stored in messages:
             output.add(stored.channel, stored.log_time_ns, stored.publish_time_ns, stored.data)

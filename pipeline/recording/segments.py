@@ -10,6 +10,7 @@ from pathlib import Path
 from pipeline.params import Params
 from pipeline.recording.mcap.disk_time import DiskTime
 from pipeline.recording.mcap.output import Compression
+from pipeline.recording.neighbours import EarlierFile
 from pipeline.recording.session.log_time import SessionClock
 from pipeline.recording.session.provenance import About
 from pipeline.recording.session.velodyne_scan import RawLidar
@@ -35,7 +36,8 @@ _PACKETS_CARRIED = 6
 
 
 class Segments:
-    """Writes to ``path`` and, after rotation, to ``<stem>_001.mcap`` and so on beside it. Not thread-safe.
+    """Writes to ``path`` and, after rotation, to ``<stem>_001.mcap`` and so on beside it. Not thread-safe. The files
+    name each other: see ``neighbours``.
 
     frames, seconds: over all files, seconds by log time. disk: time spent waiting for it. BadInput if a file exists;
     OSError if a file cannot be written any more: after that nothing can be written, and earlier data is complete.
@@ -144,7 +146,7 @@ class Segments:
         fresh.files = self.files.copy()
         fresh._earlier_frames = self.kept_frames
         fresh._earlier_bytes, fresh._earlier_s = self.bytes_written, self.seconds
-        fresh._begin_file()
+        fresh._begin_file(EarlierFile(self.files[-1].name, ""))  # where this file will end is not known yet
         return fresh
 
     def abandon(self) -> None:
@@ -159,20 +161,23 @@ class Segments:
         )
 
     def _rotate(self) -> None:
-        self._writer.close()
+        follows = self._writer.close(continues_in=self._next_path().name)
         earlier = self.frames, self.bytes_written, self.seconds
-        self._begin_file()
+        self._begin_file(follows)
         self._earlier_frames, self._earlier_bytes, self._earlier_s = earlier
 
-    def _begin_file(self) -> None:
+    def _next_path(self) -> Path:
         first = self.files[0]
-        path = first.with_name(f"{first.stem}_{len(self.files):03d}{first.suffix}")
-        self._writer = self._open(path)
+        return first.with_name(f"{first.stem}_{len(self.files):03d}{first.suffix}")
+
+    def _begin_file(self, follows: EarlierFile) -> None:
+        path = self._next_path()
+        self._writer = self._open(path, follows)
         self.files.append(path)
         for packets in self._recent_packets:  # packets of the sweep in the first frame of the new file
             self._writer.write_packets(packets)
 
-    def _open(self, path: Path) -> SessionWriter:
+    def _open(self, path: Path, follows: EarlierFile | None = None) -> SessionWriter:
         return SessionWriter(
             path,
             self._about,
@@ -180,4 +185,5 @@ class Segments:
             clock=self._clock,
             raw_lidar=self._raw_lidar,
             disk=self.disk,
+            follows=follows,
         )

@@ -25,6 +25,7 @@ from pipeline.formats.velodyne.models import HDL32E, VLP16, VLP32C, VelodyneMode
 from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import LabelSet
 from pipeline.recording.info import info
+from pipeline.recording.neighbours import EarlierFile
 from pipeline.recording.rewrite import recover
 from pipeline.recording.session.frame_record import frame_record_from
 from pipeline.recording.session.source import SessionSource
@@ -95,15 +96,15 @@ def _bag(folder: Path, kind: Kind) -> bytes:
 
 
 def _many_chunks(folder: Path) -> bytes:
-    """A session with one chunk per frame, a hash chain and labels."""
+    """A session with one chunk per frame, a hash chain, labels, and files before and after it."""
     path = folder / f"chunks{len(list(folder.iterdir()))}.mcap"
-    writer = SessionWriter(path, ABOUT, compression="lz4")
+    writer = SessionWriter(path, ABOUT, compression="lz4", follows=EarlierFile("whole.mcap", "0" * 64))
     for index in range(4):
         writer.write(full(index), truth=TRUTH)
         writer.flush()
     writer.write_labels(to_json(LabelSet("a", ("000000",), (100_000_000,))))
     writer.write_mark("here")
-    writer.close()
+    writer.close(continues_in="whole.mcap")
     return path.read_bytes()
 
 

@@ -26,7 +26,7 @@ from app.labels.store.items import (
 )
 from app.labels.store.tables import DriveRow, ItemRow, ProjectDriveRow, ProjectRow, SightingRow, VersionRow
 from app.labels.store.values import KINDS, LONGEST_ITEM, Item, ItemKind, sighting_of
-from app.labels.store.version_chain import chained, check
+from app.labels.store.version_chain import chained, check, note_newest, removed
 from app.labels.wording import WORKING
 from pipeline.labels.classes import ClassList, parse_classes
 from pipeline.labels.formats.native import from_json, to_json
@@ -213,6 +213,7 @@ class DriveLabels:
             row = chained(connection, values)
             if not self._database.insert_new(connection, VersionRow, row):
                 raise ActRefused(taken)  # somebody else used the name at the same moment
+            note_newest(connection, row)
         return Version(**{each.name: row[each.name] for each in fields(Version)})
 
     def version_json(self, name: str) -> bytes:
@@ -222,7 +223,8 @@ class DriveLabels:
                 select(VersionRow.__table__).where(VersionRow.drive_id == self._id, VersionRow.name == name)
             ).first()
             if row is None:
-                raise NoSuchLabel(f"there is no version {name!r} of these labels")
+                gone = "; the newest version was removed from the database" if removed(connection, self._id) else ""
+                raise NoSuchLabel(f"there is no version {name!r} of these labels{gone}")
             check(connection, row)
         return zlib.decompress(row.labels)
 

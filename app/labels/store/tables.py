@@ -127,6 +127,16 @@ class VersionRow(Base):
     signature: Mapped[str] = mapped_column(String(128), server_default="")
 
 
+class NewestVersionRow(Base):
+    """Digest of the version that was frozen last, so that its removal is noticed; signed as a version is."""
+
+    __tablename__ = "newest_version"
+    drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
+    sha256: Mapped[str] = mapped_column(String(64))
+    signed_by: Mapped[str] = mapped_column(String(64), server_default="")
+    signature: Mapped[str] = mapped_column(String(128), server_default="")
+
+
 class WorkRow(Base):
     """Who labels a recording (empty if unassigned), and its state; see ``work.State``. t_unix_ms: time of the last
     change."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import sys
 from datetime import UTC, datetime
 from functools import partial
 from io import BufferedWriter, FileIO, TextIOWrapper
@@ -21,6 +22,9 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.core.client_role import account_of, is_display
+from pipeline.common.files.user_file_errors import reason_of
+
+logger = logging.getLogger("cipv.audit")
 
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _WITH_CONTROLS = "/viser"
@@ -40,9 +44,19 @@ class _PrivateFile(RotatingFileHandler):
             self.stream.close()
             self.stream = None
 
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Say that entries are missing, in one line."""
+        error = sys.exc_info()[1]
+        if isinstance(error, Exception):
+            _say_unwritable(self.baseFilename, error)
+
     def _open(self) -> TextIOWrapper:
         file = FileIO(self.baseFilename, "ab", opener=partial(os.open, mode=0o600))
         return TextIOWrapper(BufferedWriter(file), encoding="utf-8")
+
+
+def _say_unwritable(file: str | Path, error: Exception) -> None:
+    logger.error("%s: cannot be written, so changes are not logged: %s", file, reason_of(error))
 
 
 class Audit:
@@ -51,7 +65,10 @@ class Audit:
     def __init__(self, app: ASGIApp, file: Path) -> None:
         self._app = app
         self._log = logging.Logger("cipv.audit")
-        file.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            _say_unwritable(file, error)
         handler = _PrivateFile(file, maxBytes=_LARGEST_BYTES, backupCount=_KEPT, delay=True)
         handler.setFormatter(logging.Formatter("%(message)s"))
         self._log.addHandler(handler)

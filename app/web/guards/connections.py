@@ -34,15 +34,24 @@ class _Client(Protocol):
     def waits_since_s(self) -> float | None:
         """Since when, by the loop's clock; None if it does not."""
 
+    @property
+    def is_between_requests(self) -> bool:
+        """Whether it waits for a client whose earlier requests were all complete and answered."""
+
     def drop(self) -> None:
         """Close the connection at once."""
 
 
 def make_room(connections: MutableSet[_Client]) -> None:
     """With too many connections, close the one whose client has kept the server waiting longest: for its handshake, for
-    a complete header, or to take more of a response. The new one is among them."""
+    a complete header, or to take more of a response. The new one is among them. Those between two requests come last:
+    a page keeps such a connection."""
     if len(connections) > MOST_CONNECTIONS:
-        waits = {each: since_s for each in connections if (since_s := getattr(each, "waits_since_s", None)) is not None}
+        waits = {
+            each: (each.is_between_requests, since_s)
+            for each in connections
+            if (since_s := getattr(each, "waits_since_s", None)) is not None
+        }
         min(waits, key=waits.__getitem__).drop()
 
 
@@ -51,6 +60,8 @@ class LimitedProtocol(H11Protocol):
 
     _began_s = 0.0
     """When the client started to send a header or a body, by the loop's clock."""
+    _answered_s: float | None = None
+    """When the last response was complete; None before."""
     _waits: asyncio.TimerHandle | None = None
     _for_body = False
     _stalled_s: float | None = None
@@ -65,7 +76,14 @@ class LimitedProtocol(H11Protocol):
     @property
     def waits_since_s(self) -> float | None:
         """Since when the client has sent no complete header, or received nothing of a response."""
-        return self._began_s if self._is_waiting else self._stalled_s
+        if self._stalled_s is not None or not self._is_waiting:
+            return self._stalled_s
+        return self._began_s if self._waits is not None else self._answered_s
+
+    @property
+    def is_between_requests(self) -> bool:
+        """Whether all that the client has sent is answered, and it took the answers."""
+        return self._is_waiting and self._answered_s is not None and self._stalled_s is None
 
     @property
     def _is_waiting(self) -> bool:
@@ -93,6 +111,10 @@ class LimitedProtocol(H11Protocol):
         self._end_wait()
         self._end_stall()
         super().connection_lost(exc)
+
+    def on_response_complete(self) -> None:
+        self._answered_s = self.loop.time()
+        super().on_response_complete()
 
     def pause_writing(self) -> None:
         super().pause_writing()
@@ -140,6 +162,8 @@ class TlsHandshake(asyncio.Protocol):
         self._shaking: asyncio.Task[None] | None = None
         self.waits_since_s = self._loop.time()
         """Since when it waits for the client, by the loop's clock."""
+        self.is_between_requests = False
+        """None was made yet."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         transport.pause_reading()  # whatever comes belongs to TLS, which is set up only by the task

@@ -93,6 +93,11 @@ class ChainWriter:
         self._hash = hashlib.sha256(previous.encode())
         self._has_more = False
 
+    @property
+    def last_sha256(self) -> str:
+        """The hash of the last link."""
+        return self._previous
+
     def wrote(self, data: bytes) -> None:
         """Add bytes that were written."""
         self._hash.update(data)
@@ -118,6 +123,18 @@ def verify(path: Path, progress: Progress = silent, key: str | None = None) -> C
         walk = _Walk(file, size, progress)
         chain = walk.chain()
     return replace(chain, signature=walk.signature(key))
+
+
+def hashes_of_links(path: Path) -> frozenset[str]:
+    """The hash in each link of a file, without checking them. OSError if it cannot be read."""
+    with open_regular(path) as file:
+        size = file.seek(0, io.SEEK_END)
+        walk, offset, found = _Walk(file, size, silent), len(MAGIC), set[str]()
+        while (head := walk.head(offset)) is not None:
+            link = link_at(file, offset)
+            found |= {link[0].sha256} if link is not None else set()
+            offset += head[1]
+    return frozenset(found)
 
 
 def link_at(file: BinaryIO, offset: int) -> tuple[Link, int] | None:
@@ -181,7 +198,7 @@ class _Walk:
         begin = offset = 0
         offset += self._hashed(0, len(MAGIC), part)
         has_more, is_last = False, False
-        while (found := self._head(offset)) is not None:
+        while (found := self.head(offset)) is not None:
             opcode, length = found
             link = link_at(self._file, offset)
             if opcode == Opcode.DATA_END:
@@ -216,7 +233,7 @@ class _Walk:
         self._hashed(begin, end - begin, part)
         return part
 
-    def _head(self, offset: int) -> tuple[int, int] | None:
+    def head(self, offset: int) -> tuple[int, int] | None:
         """Opcode and total length of a complete record."""
         self._file.seek(offset)
         head = self._file.read(RECORD_HEAD.size)

@@ -103,6 +103,11 @@ class Output:
         return self._sound_bytes
 
     @property
+    def last_sha256(self) -> str:
+        """The hash of the last link."""
+        return self._stream.chain.last_sha256
+
+    @property
     def is_pending(self) -> bool:
         """Whether there is a current chunk."""
         return self._pending_bytes > 0

@@ -11,6 +11,7 @@ from pipeline.recording import topics
 from pipeline.recording.mcap.disk_time import DiskTime
 from pipeline.recording.mcap.output import Compression, Output
 from pipeline.recording.mcap.written_index import WrittenIndex
+from pipeline.recording.neighbours import CONTINUES, FOLLOWS, EarlierFile
 from pipeline.recording.session.detections import given_of
 from pipeline.recording.session.frame_list import FrameList
 from pipeline.recording.session.frame_record import (
@@ -65,13 +66,18 @@ class SessionWriter:
         clock: SessionClock | None = None,
         raw_lidar: RawLidar | None = None,
         disk: DiskTime | None = None,
+        follows: EarlierFile | None = None,
     ) -> None:
+        """follows: the file before this one in the same recording."""
         self._raw_lidar = raw_lidar
         self._output = Output(path, compression, disk=disk)
         self._output.add_metadata(topics.METADATA, about.to_metadata())
+        if follows is not None:
+            self._output.add_metadata(FOLLOWS, follows.to_metadata())
         self._clock = clock or SessionClock()
         self._frames = FrameList()
         self._kept_frames = 0
+        self._sha256 = ""
         self._header_ns = 0
         self._tick: FrameRecord | None = None
         self._image: CameraImage | None = None
@@ -202,12 +208,18 @@ class SessionWriter:
         self._output.flush(to_disk=to_disk)
         self._kept_frames = len(self._frames)
 
-    def close(self) -> None:
-        """Write the list of frames and the summary. Safe to call twice."""
+    def close(self, continues_in: str | None = None) -> EarlierFile:
+        """Write the list of frames and the summary. Safe to call twice. continues_in: name of the next file of the same
+        recording. Returns what that file says about this one."""
         if self._output.is_open:
+            self._output.flush()
+            self._sha256 = self._output.last_sha256
             self._frames.attach(self._output)
+            if continues_in is not None:
+                self._output.add_metadata(CONTINUES, {"file": continues_in})
             self._output.close()
             self._kept_frames = len(self._frames)
+        return EarlierFile(self.path.name, self._sha256)
 
     def abandon(self) -> None:
         """See ``Output.abandon``."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
@@ -12,25 +12,28 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from app.core.server_address import listen_socket
 from app.engine.engine import Engine
 from app.labels.service.desk import LabelDesk
 from app.labels.store.database import Database
 from app.web.server import Server, create_app
 from pipeline.params import Params
+from pipeline.sources import open_any
 from tests.app.engine.recording_helpers import Recording, opener
 from tests.app.web.serving import WAIT_S
 
 
-def _serve(file: Path | str, tell: Connection, ahead_s: Any) -> None:
+def _serve(file: Path | str, tell: Connection, ahead_s: Any, session: Path | None) -> None:
     if ahead_s is not None:
-        _set_clock(ahead_s)
+        set_clock(pytest.MonkeyPatch(), lambda: ahead_s.value)
     recording = Recording()
     engine = Engine(
-        opener(recording),
+        opener(recording) if session is None else open_any,
         None,
         Params(),
-        uri=recording.uri,
+        uri=recording.uri if session is None else str(session),
         whole_drives=True,
         labels=LabelDesk(Database.in_file(file) if isinstance(file, Path) else Database(file)),
     )
@@ -49,18 +52,20 @@ def forking() -> Iterator[ForkServerContext]:
     yield context
 
 
-def _set_clock(ahead_s: Any) -> None:
-    """Let this process see the system clock ahead by a value that may change."""
+def set_clock(patch: pytest.MonkeyPatch, ahead_s: Callable[[], float]) -> None:
+    """Let this process see the system clock ahead by a number of seconds that may change."""
     seconds, nanoseconds = time.time, time.time_ns
-    time.time = lambda: seconds() + ahead_s.value
-    time.time_ns = lambda: nanoseconds() + round(ahead_s.value * 1e9)
+    patch.setattr(time, "time", lambda: seconds() + ahead_s())
+    patch.setattr(time, "time_ns", lambda: nanoseconds() + round(ahead_s() * 1e9))
 
 
-def started(context: ForkServerContext, file: Path | str, ahead_s: Any = None) -> tuple[BaseProcess, str]:
+def started(
+    context: ForkServerContext, file: Path | str, ahead_s: Any = None, session: Path | None = None
+) -> tuple[BaseProcess, str]:
     """The process and its address, as soon as it answers. file: of SQLite, or a database's address. ahead_s: shared
-    value, by which the process's clock is ahead."""
+    value, by which the process's clock is ahead. session: what it has opened; None for a recording in memory."""
     hear, tell = context.Pipe(duplex=False)
-    process = context.Process(target=_serve, args=(file, tell, ahead_s), daemon=True)
+    process = context.Process(target=_serve, args=(file, tell, ahead_s, session), daemon=True)
     process.start()
     assert hear.poll(WAIT_S), "the server does not start"
     address: str = hear.recv()

@@ -113,7 +113,7 @@ def test_every_operation_says_what_it_does_and_what_it_answers(app: FastAPI):
                 if kind in ("", "application/json") and not _is_typed(content.get("schema", {})):
                     wrong.append(f"{name}: {status} {kind or 'nothing'} {content}")
         for content in operation.get("requestBody", {}).get("content", {}).values():
-            if not _is_typed(content["schema"]) and content["schema"] != BYTES:
+            if not _is_typed(content["schema"]) and not BYTES.items() <= content["schema"].items():
                 wrong.append(f"{name}: takes {content}")
     assert wrong == []
 

@@ -1,4 +1,4 @@
 """The history of the database schema."""
 
-HEAD = "0008"
+HEAD = "0009"
 """The schema revision of this program."""

@@ -18,6 +18,7 @@ from app.labels.acts.request_fields import Person
 from app.labels.service.desk import LabelDesk
 from app.labels.store.values import LONGEST_ITEM, LONGEST_NAME
 from app.labels.wording import WORKING
+from app.web.guards.limits import LARGEST_FILE
 from app.web.refusals import refusing
 from app.web.routes.labels.act_shapes import TaskBegun
 from app.web.routes.labels.file_shapes import (
@@ -37,9 +38,8 @@ from pipeline.labels.selection import Selection, selected
 IMPORT = "/api/labels/import"
 _BYTES = "application/octet-stream"
 _FILE = file_of(_BYTES)
-_TAKES_A_FILE = {
-    "requestBody": {"required": True, "content": {_BYTES: {"schema": {"type": "string", "format": "binary"}}}}
-}
+_UPLOADED = {"type": "string", "format": "binary", "maxLength": LARGEST_FILE}
+_TAKES_A_FILE = {"requestBody": {"required": True, "content": {_BYTES: {"schema": _UPLOADED}}}}
 """OpenAPI description of the body, which the framework cannot infer because it is read in chunks."""
 VersionName = Annotated[str, Query(max_length=LONGEST_NAME, pattern=VERSION_NAME)]
 

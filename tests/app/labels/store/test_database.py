@@ -170,6 +170,25 @@ def test_a_database_of_an_older_program_goes_on(file: Path, monkeypatch: pytest.
     new.close()
 
 
+def test_the_newest_version_of_an_older_database_is_known(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.labels.store.database.HEAD", "0008")
+    old = Database.in_file(file)
+    with old.writing() as connection:
+        for drive in (1, 2):
+            connection.exec_driver_sql(f"INSERT INTO drive VALUES ({drive}, 'key {drive}', 'test:drive', 'x', 100, 1)")
+        for previous, sha256 in (("", "a"), ("a", "b"), ("b", "c")):
+            values = f"1, '{sha256}', 'Ada', 5, 0, 0, :labels, '{previous}', '{sha256}', '', ''"
+            connection.execute(text(f"INSERT INTO version VALUES ({values})"), {"labels": b""})
+    old.close()
+    monkeypatch.undo()
+    new = Database.in_file(file)
+    with new.reading() as connection:
+        assert connection.execute(text("SELECT drive_id, sha256, signature FROM newest_version")).all() == [
+            (1, "c", "")
+        ]
+    new.close()
+
+
 @pytest.fixture(params=["sqlite", "postgres"])
 def nowhere(request: pytest.FixtureRequest, file: Path) -> str:
     """The address of a database without tables."""

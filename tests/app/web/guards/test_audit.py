@@ -101,3 +101,18 @@ def test_nobody_else_reads_it_before_and_after_a_rotation(
     files = sorted(log.parent.glob("*.jsonl*"))
     assert len(files) >= 4
     assert {file.stat().st_mode & 0o777 for file in files} == {0o600}
+
+
+@pytest.mark.parametrize("unwritable", ["", "folder/audit.jsonl"])
+def test_a_log_that_cannot_be_written_is_said_in_a_line_and_work_goes_on(
+    unwritable: str, tmp_path: Path, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+):
+    """A folder is in its place, or a file in that of its folder."""
+    (tmp_path / "folder").write_text("")
+    with running() as engine, serving(create_app(engine, tokens=TOKENS, audit=tmp_path / unwritable)) as address:
+        with client(address, "person") as person:
+            assert person.post("/api/playback", json={"playing": False}).is_success
+        said = "cannot be written, so changes are not logged: "
+        assert wait_until(lambda: any(said in each for each in caplog.messages))
+    assert all("\n" not in each for each in caplog.messages)
+    assert "Traceback" not in capfd.readouterr().err

@@ -243,17 +243,6 @@ def test_no_name_in_an_address_becomes_a_path(app: FastAPI, address: str, visito
 # ------------------------------------------------------------ the endless upload
 
 
-def test_files_can_be_uploaded_in_one_place(app: FastAPI):
-    files = {
-        (path, kind)
-        for path, methods in app.openapi()["paths"].items()
-        for operation in methods.values()
-        for kind in operation.get("requestBody", {}).get("content", {})
-        if kind != "application/json"
-    }
-    assert files == {(IMPORT, "application/octet-stream")}
-
-
 def _resident_bytes() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 

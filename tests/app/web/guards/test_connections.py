@@ -73,6 +73,19 @@ def test_too_many_make_room_for_who_says_what_they_want(address: str, monkeypatc
             client.close()
 
 
+def test_who_is_between_two_requests_is_not_hung_up_on_for_those_who_end_none(
+    address: str, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(connections, "MOST_CONNECTIONS", 20)
+    with ExitStack() as stack:
+        page = stack.enter_context(half_open(address, b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"))
+        assert page.recv(100).startswith(b"HTTP/1.1 200")
+        clients = [stack.enter_context(half_open(address)) for _ in range(60)]
+        assert all(hangs_up(client) for client in clients[:41])
+        page.sendall(b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        assert any(b"HTTP/1.1 200" in data for data in iter(lambda: page.recv(1000), b""))
+
+
 LARGE = b"a" * (16 << 20)
 """More than the system keeps for a client that does not read."""
 

@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 
 from websockets.sync.client import connect
 
-from tests.soak.chaos import LabelledServer
+from tests.soak.chaos.server import LabelledServer
 
 
 def half_open(server: LabelledServer, stop: threading.Event) -> None:

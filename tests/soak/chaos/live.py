@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import random
 import re
 import socket
@@ -12,6 +13,7 @@ import threading
 import time
 from pathlib import Path
 
+import pytest
 import yaml
 
 from app.engine.engine import Engine
@@ -25,9 +27,11 @@ from pipeline.recording.session.source import SessionSource
 from pipeline.replay.faults import Fault
 from pipeline.sources import open_any
 from pipeline.sources.live.config import load
+from pipeline.sources.live.devices import udp
 from pipeline.types.source import is_live_source
+from tests.app.labels.server_process import set_clock
 from tests.conftest import ROOT
-from tests.soak.chaos import Figures
+from tests.soak.chaos.figures import JUMPS_S, Figures, resident_mb
 from tests.soak.live.run import KINDS, config_file
 
 _SENSORS = ("lidar", "camera", "gnss")
@@ -54,6 +58,7 @@ class LiveCar:
         self._drives_since_s: float | None = None
         self._seen_s = dict.fromkeys(_SENSORS, 0.0)
         self._ticks = 0
+        self._ahead_s = 0.0
         self._desk = SessionRecorder(folder)
         self._engine = Engine(open_any, None, Params(), uri=f"live:{self._config}", playing=True, desk=self._desk)
         self._engine.listen(self._shown)
@@ -91,6 +96,16 @@ class LiveCar:
 
     # ------------------------------------------------------------ faults
 
+    def lend_clock(self, patch: pytest.MonkeyPatch) -> None:
+        """Let ``set_clock`` decide what this process sees of the system's clock, with the times of datagrams."""
+        set_clock(patch, lambda: self._ahead_s)
+        received_at = udp._received_at
+        patch.setattr(udp, "_received_at", lambda said: received_at(said) + round(self._ahead_s * 1e9))
+
+    def set_clock(self) -> None:
+        """Set the clock of the computer that records."""
+        self._ahead_s = self._chance.choice(JUMPS_S)
+
     def switch_off(self) -> None:
         """Switch off all sensors at once, in the middle of a packet; they return half a minute later."""
         if self._car is not None:
@@ -120,6 +135,7 @@ class LiveCar:
                 self._figures.wrong += [f"the {name} did not come back: {self._health_of(name)}" for name in missing]
                 break
             time.sleep(0.1)
+        self._figures.live_resident_mb.append(resident_mb(os.getpid()))
         self._figures.slowest_return_s = round(max(self._figures.slowest_return_s, self._driven() - driven_s), 1)
         state = self._desk.state
         if not self._engine.alive or state is None or state.error is not None:
@@ -127,7 +143,9 @@ class LiveCar:
 
     def _health_of(self, name: str) -> str:
         source = self._engine.source
-        return str([each for each in source.health() if each.sensor == name] if is_live_source(source) else source)
+        if source is None or not is_live_source(source):
+            return "no sensors are open"
+        return str([each for each in source.health() if each.sensor == name])
 
     def end(self) -> None:
         """Close the recording and read it back: missing data must be reported, and nothing may be changed."""
