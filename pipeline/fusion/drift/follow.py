@@ -210,7 +210,7 @@ def _judged(state: DriftState, params: FusionParams) -> DriftState:
     seen, values = _sightings(state, axis)
     if not len(values):
         return state
-    verdict = judge(seen, values)
+    verdict = judge(seen, values, axis)
     found = _updated(state.found, axis, verdict, params)
     return state._replace(found=found, told=_told(state, found, axis, verdict))
 
