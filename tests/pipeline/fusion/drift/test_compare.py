@@ -49,7 +49,9 @@ def test_the_side_of_a_vehicle_that_the_lidar_does_not_hit_is_no_angle():
     assert [each.yaw_deg for each in found] == pytest.approx([0.0] * 3, abs=0.15)
 
 
-@pytest.mark.parametrize("what", ["carried", "new", "narrow", "passed", "cut", "not sure", "no vehicle", "too high"])
+@pytest.mark.parametrize(
+    "what", ["carried", "new", "narrow", "passed", "cut", "not sure", "no vehicle", "too high"]
+)
 def test_what_tells_nothing(what: str):
     hit, seen = track(1, 18.0, 0.5), box(18.0, 0.5, AlignmentParams())
     cuboid, detection = hit.obstacle.cuboid, seen.detection
@@ -66,3 +68,11 @@ def test_what_tells_nothing(what: str):
     }[what]
     assert told([hit], [seen]) == []
     assert len(told([track(1, 18.0, 0.5)], [box(18.0, 0.5, AlignmentParams())])) == 1
+
+
+@pytest.mark.parametrize(("width_m", "is_paired"), [(1.8, True), (2.15, False)])
+def test_a_cluster_wider_than_its_box_contains_something_else(width_m: float, is_paired: bool):
+    hit = track(1, 18.0, 4.0)
+    wide = hit.obstacle._replace(cuboid=hit.obstacle.cuboid._replace(size=(0.2, width_m, 1.5)))
+    found = told([hit._replace(obstacle=wide)], [box(18.0, 4.0, AlignmentParams())])
+    assert bool(found) is is_paired
