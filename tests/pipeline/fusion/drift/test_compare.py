@@ -49,9 +49,7 @@ def test_the_side_of_a_vehicle_that_the_lidar_does_not_hit_is_no_angle():
     assert [each.yaw_deg for each in found] == pytest.approx([0.0] * 3, abs=0.15)
 
 
-@pytest.mark.parametrize(
-    "what", ["carried", "new", "narrow", "passed", "cut", "not sure", "no vehicle", "too high"]
-)
+@pytest.mark.parametrize("what", ["carried", "new", "narrow", "passed", "cut", "not sure", "no vehicle", "too high"])
 def test_what_tells_nothing(what: str):
     hit, seen = track(1, 18.0, 0.5), box(18.0, 0.5, AlignmentParams())
     cuboid, detection = hit.obstacle.cuboid, seen.detection
