@@ -1,4 +1,4 @@
-"""How well a knocked camera is found in random traffic: drives of the robustness suite, the camera turned after a while.
+"""How well a knocked camera is found in random traffic: drives of the robustness suite, the camera turned once.
 
     python -m tests.soak.drift --km 30 --seed 900 --at 35
 
