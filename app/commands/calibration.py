@@ -19,7 +19,7 @@ from pipeline.alignment.projection import Alignment, Pinhole, resolve
 from pipeline.common.errors import BadInput
 from pipeline.formats.calibration_files import FORMATS, write_calibration
 from pipeline.types import F64, CameraCalibration
-from pipeline.types.source import Mounted
+from pipeline.types.source import lidar_frame
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class ConvertCalibration:
     """
 
     origin: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
-    """A recording, or with --format a file; for ROS, the folder with camera_info.yaml and static_transform.yaml;
-    for Kalibr, the folder with camchain.yaml and transform.yaml"""
+    """A recording, or with --format a file; for ROS, the folder with camera_info.yaml and static_transform.yaml; for
+    Kalibr, the folder with camchain.yaml and transform.yaml; for KITTI's raw data, the folder of a day"""
     out: Path
     """File to write; for ROS and Kalibr, a folder"""
     format: Annotated[Literal["kitti", "ros", "opencv", "kalibr"] | None, option("kitti|ros|opencv|kalibr")] = None
@@ -73,7 +73,7 @@ class ConvertCalibration:
             return camera, (camera.width, camera.height), None
         source = opened_recording(self.origin)
         frame = source.frame(0)
-        mount = source.T_ego_lidar if isinstance(source, Mounted) else None
+        mount = lidar_frame(source)
         if frame.camera is not None:
             return frame.camera, (frame.camera.width, frame.camera.height), mount
         size = self.size or frame.image_size

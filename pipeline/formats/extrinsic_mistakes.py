@@ -51,10 +51,11 @@ def is_upright(T_camera_ego: F64) -> bool:
     return bool(T_camera_ego[1, 2] < -_UPRIGHT)
 
 
-def likely_mistake(K: F64, T_camera_ego: F64, size: tuple[int, int]) -> str:
-    """The likely cause of an extrinsic that does not look ahead, as the end of a sentence."""
+def likely_mistake(K: F64, T_camera_lidar: F64, T_lidar_ego: F64, size: tuple[int, int]) -> str:
+    """The likely cause of an extrinsic that does not look ahead, as the end of a sentence. T_lidar_ego: (4, 4), the
+    identity where the extrinsic is from the ego frame."""
     for text, undo in _MISTAKES:
-        undone = undo(T_camera_ego)
+        undone = undo(T_camera_lidar) @ T_lidar_ego
         if looks_ahead(K, undone, size) and is_upright(undone):
             return text
     return _UNKNOWN

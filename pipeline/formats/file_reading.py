@@ -13,6 +13,7 @@ import numpy.typing as npt
 from pipeline.common.files.image_decoding import TooMuch, decode_within_budget
 from pipeline.common.files.user_file_errors import given_path, reason_of
 from pipeline.common.files.user_files import check_allowed, read_regular
+from pipeline.common.geometry import inverse
 from pipeline.formats.extrinsic_mistakes import likely_mistake, looks_ahead
 from pipeline.types import F64, U8, CameraCalibration, CameraImage
 from pipeline.types.source import SourceError
@@ -175,13 +176,15 @@ def camera_matrix(values: npt.ArrayLike, what: str) -> F64:
     raise SourceError(f"{what} is not a camera matrix")
 
 
-def check_looks_ahead(camera: CameraCalibration, what: str) -> None:
-    """SourceError unless ego +x falls inside the image widened by half its size on every side.
+def check_looks_ahead(camera: CameraCalibration, what: str, T_ego_lidar: F64 | None = None) -> None:
+    """SourceError unless ego +x falls inside the image widened by half its size on every side. T_ego_lidar: (4, 4), for
+    a calibration whose extrinsic takes points of the LiDAR's own frame, which is not the ego frame.
 
     A front camera sees where the car drives. With the usual mistake, an inverted extrinsic, ego +x is far to the side
     or behind; the text names the mistake if undoing it helps.
     """
     size = camera.width, camera.height
-    if not looks_ahead(camera.K, camera.T_camera_ego, size):
-        mistake = likely_mistake(camera.K, camera.T_camera_ego, size)
+    T_lidar_ego = np.eye(4) if T_ego_lidar is None else inverse(T_ego_lidar)
+    if not looks_ahead(camera.K, camera.T_camera_ego @ T_lidar_ego, size):
+        mistake = likely_mistake(camera.K, camera.T_camera_ego, T_lidar_ego, size)
         raise SourceError(f"{what}: the camera does not look ahead; {mistake}")

@@ -16,6 +16,7 @@ from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigi
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
+_LARGEST_PX = 100_000
 _VELODYNE_HEIGHT_M = 1.73
 """Above the road (Geiger et al. 2013, figure 3)."""
 
@@ -30,12 +31,16 @@ class KittiCalibration:
     """Camera 2, the left colour camera; of KITTI-360 camera 0, the left one."""
 
 
-def parse_object_calibration(data: bytes, file: str, size: tuple[int, int]) -> KittiCalibration:
-    """``calib/NNNNNN.txt`` with P2, R0_rect and Tr_velo_to_cam. SourceError names the file and what is wrong."""
+def parse_object_calibration(
+    data: bytes, file: str, size: tuple[int, int], T_ego_lidar: F64 | None = None
+) -> KittiCalibration:
+    """``calib/NNNNNN.txt`` with P2, R0_rect and Tr_velo_to_cam. T_ego_lidar: as for ``check_looks_ahead``. SourceError
+    names the file and what is wrong."""
     table = parse_key_values(data)
     projection = _values(table, "P2", (3, 4), file)
     rectify = _values(table, "R0_rect", (3, 3), file)
-    return _calibration(projection, rectify, _values(table, "Tr_velo_to_cam", (3, 4), file), file, size)
+    to_camera = _values(table, "Tr_velo_to_cam", (3, 4), file)
+    return _calibration(projection, rectify, to_camera, file, size, T_ego_lidar)
 
 
 def parse_odometry_calibration(data: bytes, file: str, size: tuple[int, int]) -> KittiCalibration:
@@ -47,15 +52,25 @@ def parse_odometry_calibration(data: bytes, file: str, size: tuple[int, int]) ->
 
 
 def parse_raw_calibration(
-    cam_to_cam: bytes, velo_to_cam: bytes, files: tuple[str, str], size: tuple[int, int]
+    cam_to_cam: bytes,
+    velo_to_cam: bytes,
+    files: tuple[str, str],
+    size: tuple[int, int] | None,
+    T_ego_lidar: F64 | None = None,
 ) -> KittiCalibration:
     """``calib_cam_to_cam.txt`` (P_rect_02, R_rect_00) and ``calib_velo_to_cam.txt`` (R, T); ``files`` are their names.
-    SourceError names the file and what is wrong."""
+    size: of the images; None takes that of the file, S_rect_02. T_ego_lidar: as for ``check_looks_ahead``. SourceError
+    names the file and what is wrong."""
     cameras, velodyne = parse_key_values(cam_to_cam), parse_key_values(velo_to_cam)
     projection = _values(cameras, "P_rect_02", (3, 4), files[0])
     rectify = _values(cameras, "R_rect_00", (3, 3), files[0])
     to_camera = np.hstack([_values(velodyne, "R", (3, 3), files[1]), _values(velodyne, "T", (3, 1), files[1])])
-    return _calibration(projection, rectify, to_camera, files[1], size)
+    if size is None:
+        width, height = _values(cameras, "S_rect_02", (2,), files[0]).tolist()
+        if not (16 <= width <= _LARGEST_PX and 16 <= height <= _LARGEST_PX):
+            raise SourceError(f"calibration {files[0]}: S_rect_02 is not an image size")
+        size = round(width), round(height)
+    return _calibration(projection, rectify, to_camera, files[1], size, T_ego_lidar)
 
 
 def parse_360_calibration(
@@ -100,14 +115,21 @@ def parse_number_lines(data: bytes, columns: int) -> F64:
     return np.array(rows, dtype=np.float64).reshape(-1, columns)
 
 
-def _values(table: dict[str, list[float]], name: str, shape: tuple[int, int], file: str) -> F64:
+def _values(table: dict[str, list[float]], name: str, shape: tuple[int, ...], file: str) -> F64:
     numbers = table.get(name)
-    if numbers is None or len(numbers) != shape[0] * shape[1]:
-        raise SourceError(f"calibration {file}: no {name} of {shape[0]}×{shape[1]} numbers")
+    if numbers is None or len(numbers) != int(np.prod(shape)):
+        raise SourceError(f"calibration {file}: no {name} of {'×'.join(map(str, shape))} numbers")
     return np.array(numbers, dtype=np.float64).reshape(shape)
 
 
-def _calibration(projection: F64, rectify: F64, velo_to_cam: F64, file: str, size: tuple[int, int]) -> KittiCalibration:
+def _calibration(
+    projection: F64,
+    rectify: F64,
+    velo_to_cam: F64,
+    file: str,
+    size: tuple[int, int],
+    T_ego_lidar: F64 | None = None,
+) -> KittiCalibration:
     K = camera_matrix(projection[:, :3], f"calibration {file}: the projection of the camera")
     T_rect_cam = rigid_transform(np.hstack([rectify, np.zeros((3, 1))]), f"calibration {file}: the rectification")
     T_cam_ego = rigid_transform(velo_to_cam, f"calibration {file}: Velodyne to camera")
@@ -115,5 +137,5 @@ def _calibration(projection: F64, rectify: F64, velo_to_cam: F64, file: str, siz
     T_camera2_rect = rigid_transform(baseline, f"calibration {file}: the baseline of the camera")
     T_rect_ego = T_rect_cam @ T_cam_ego
     camera = CameraCalibration(K, np.empty(0), T_camera2_rect @ T_rect_ego, *size, road_z_m=-_VELODYNE_HEIGHT_M)
-    check_looks_ahead(camera, f"calibration {file}")
+    check_looks_ahead(camera, f"calibration {file}", T_ego_lidar)
     return KittiCalibration(T_rect_ego, camera)

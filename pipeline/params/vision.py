@@ -206,7 +206,7 @@ class FusionParams(Section):
         True, "Do not join a box with a cluster longer than any vehicle of its class: hedges, walls, rails"
     )
     drift_s: float = slider(
-        30.0, 5.0, 120.0, 1.0, "s", "Time over which vehicles are compared to detect a turned mount"
+        60.0, 5.0, 120.0, 1.0, "s", "Time over which vehicles and lines are compared to detect a turned mount"
     )
     drift_sigmas: float = slider(
         4.0, 2.0, 10.0, 0.1, "σ", "A turned mount is reported when its angle is this many standard deviations from zero"

@@ -78,6 +78,10 @@ class AstyxSource:
     def __len__(self) -> int:
         return len(self._names)
 
+    @property
+    def T_ego_stored(self) -> F64:
+        return self._calibration[0]
+
     def t_ns(self, index: int) -> int:
         return self._stamps[_checked(index, len(self))]
 

@@ -71,7 +71,7 @@ class NuscenesSource:
         mount = _pose_of_sensor(sensors[self._lidar[0].calibrated_sensor_token][0])
         self._T_car_ego = np.eye(4)
         self._T_car_ego[:3, 3] = mount[:3, 3]
-        self._T_ego_lidar = inverse(self._T_car_ego) @ mount
+        self.T_ego_stored = inverse(self._T_car_ego) @ mount
         self._size = image_size(folder / row.filename for row in self._images[:3]) or _NOMINAL_SIZE
         self._camera = self._calibration(sensors) if self._images else None
         self._ticks = [row.timestamp * 1000 for row in self._lidar]
@@ -129,7 +129,7 @@ class NuscenesSource:
         except SourceError as error:
             notes.append(str(error))
             return None
-        points[:, :3] = points[:, :3] @ self._T_ego_lidar[:3, :3].T.astype(np.float32)
+        points[:, :3] = points[:, :3] @ self.T_ego_stored[:3, :3].T.astype(np.float32)
         return Sweep(self._ticks[index], points, ring, _CHANNELS)
 
     def _image(self, t_ns: int, notes: list[str]) -> CameraImage | None:

@@ -40,7 +40,7 @@ _K = np.array([[337.9191448899105, 0.0, 341.7366010946575], [0.0, 338.6957068549
 _DISTORTION = np.array([-0.183879883467351, 0.0308609205858947, 0.0, 0.0])
 _TURNS_DEG, _OFFSET_M = (-1.2787805, 0.530414, 0.000802), (0.26029, -0.05021277, -0.037881)
 """From the LiDAR to the left camera: differences of both rotations and translations in ``default-calib.yaml``."""
-_R_EGO_LIDAR = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+_T_EGO_LIDAR = np.array([[0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 _SLOWEST_COURSE_MPS = 0.5
 
 
@@ -82,6 +82,10 @@ class RadiateSource:
 
     def __len__(self) -> int:
         return len(self._ticks)
+
+    @property
+    def T_ego_stored(self) -> F64:
+        return _T_EGO_LIDAR
 
     def t_ns(self, index: int) -> int:
         if not 0 <= index < len(self):
@@ -160,7 +164,7 @@ def parse_sweep(data: bytes, file: str, notes: list[str]) -> tuple[F32, U8]:
     if bad + len(rows) - len(kept):
         notes.append(f"{file}: {bad + len(rows) - len(kept)} unreadable rows skipped")
     points = np.empty((len(kept), 4), dtype=np.float32)
-    points[:, :3] = kept[:, :3] @ _R_EGO_LIDAR.T
+    points[:, :3] = kept[:, :3] @ _T_EGO_LIDAR[:3, :3].T
     points[:, 3] = kept[:, 3]
     return points, kept[:, 4].astype(np.uint8)
 
@@ -194,10 +198,9 @@ def default_camera() -> CameraCalibration:
     Ry = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
     Rz = np.array([[np.cos(z), -np.sin(z), 0], [np.sin(z), np.cos(z), 0], [0, 0, 1]])
     to_lidar_axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    T_camera_lidar, T_ego_lidar = np.eye(4), np.eye(4)
+    T_camera_lidar = np.eye(4)
     T_camera_lidar[:3, :3], T_camera_lidar[:3, 3] = (to_lidar_axes @ Rx @ Ry @ Rz).T, _OFFSET_M
-    T_ego_lidar[:3, :3] = _R_EGO_LIDAR
-    T_camera_ego: F64 = T_camera_lidar @ inverse(T_ego_lidar)
+    T_camera_ego: F64 = T_camera_lidar @ inverse(_T_EGO_LIDAR)
     return CameraCalibration(_K, _DISTORTION, T_camera_ego, *_SIZE, road_z_m=_ROAD_Z_M)
 
 

@@ -211,6 +211,30 @@ class Mounted(Protocol):
 
 
 @runtime_checkable
+class StoresOtherLidarFrame(Protocol):
+    """A recording whose files hold LiDAR points in another frame than the ego frame, which it turns them to."""
+
+    @property
+    def T_ego_stored(self) -> F64:
+        """(4, 4), takes points as they are in the files to the ego frame."""
+        ...
+
+
+def lidar_frame(source: Source | LiveSource | None) -> F64 | None:
+    """(4, 4) T_ego_lidar, from the frame in which the sensor or the recording's files give points, to the ego frame;
+    None where the two are the same. Other tools' calibrations relate to the LiDAR's frame."""
+    if source is None:
+        return None
+    if isinstance(source, Mounted):
+        return source.T_ego_lidar
+    if isinstance(source, StoresOtherLidarFrame):
+        return source.T_ego_stored
+    if is_live_source(source) and source.lidar_mount is not None:
+        return source.lidar_mount[0]
+    return None
+
+
+@runtime_checkable
 class Simulated(Protocol):
     """A source that knows whether its images are from the simulator; detectors of real images perform worse on
     these."""

@@ -171,6 +171,22 @@ def test_the_position_is_fitted_where_the_switch_says_so(page: Page):
     expect(result).to_be_hidden()
 
 
+def test_the_bar_is_one_row_while_fitting_and_the_first_slider_is_in_sight(page: Page):
+    """A second row would move the image under the hand as soon as a fit begins."""
+    bar = page.locator("#align-bar")
+    expect(bar.locator(".score")).to_contain_text("better")
+    rows = """bar => new Set([...bar.children].filter((child) => child.offsetHeight).map(
+        (child) => Math.round((child.offsetTop + child.offsetHeight / 2) / 16))).size"""
+    bar.get_by_role("button", name="Fit", exact=True).click()
+    expect(page.get_by_label("Fitting the alignment")).to_be_visible()
+    assert bar.evaluate(rows) == 1
+    bar.get_by_role("button", name="Cancel", exact=True).click()
+    page.set_viewport_size({"width": 1280, "height": 720})
+    for name, first in (("angular", "h_res_deg"), ("pinhole", "yaw_deg")):
+        bar.get_by_role("button", name=name, exact=True).click()
+        expect(page.locator(f"[data-param='alignment.{first}'] input[type=range]")).to_be_in_viewport(ratio=1.0)
+
+
 def test_in_a_small_window_nothing_covers_the_image_and_every_button_is_in_sight(page: Page):
     page.keyboard.press("a")
     page.set_viewport_size({"width": 800, "height": 480})

@@ -48,7 +48,7 @@ from tests.fuzz.target import Target
 from tests.pipeline.calibration.alignment.made_drive import CAMERA
 from tests.pipeline.labels.formats.sets import IMPORT, drive
 from tests.pipeline.labels.formats.test_round_trip import full_set
-from tests.pipeline.sources.conftest import object_calibration, write_kitti
+from tests.pipeline.sources.conftest import object_calibration, write_kitti, write_kitti_raw
 from tests.pipeline.sources.live.devices.test_mjpeg import MULTIPART, part
 from tests.pipeline.sources.made.captures import RIG, lidar, pcapng, write_video
 from tests.pipeline.vision.networks import yolox
@@ -127,6 +127,11 @@ def _calibrations(folder: Path) -> dict[str, Target]:
             reading = by_file(file.parent, file.name, lambda _, path=path, kind=kind: kind.read(path, size))
             inside = f" {file.name}" if path.is_dir() else ""
             found[f"calibration {name}{inside}"] = Target((file.read_bytes(),), reading)
+    day, read = folder / "day", CALIBRATIONS["kitti"].read
+    write_kitti_raw(day)
+    for file in (day / name for name in CALIBRATIONS["kitti"].names):
+        reading = by_file(day, file.name, lambda _: read(day, None))
+        found[f"calibration kitti {file.name}"] = Target((file.read_bytes(),), reading)
     return found
 
 

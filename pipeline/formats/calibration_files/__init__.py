@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from pipeline.common.files.user_file_errors import reason_of
 from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
@@ -19,32 +19,48 @@ from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
 
+class Parser(Protocol):
+    """Reads one format."""
+
+    def __call__(
+        self, files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F64 | None = None, /
+    ) -> CameraCalibration:
+        """From the file, or the files of ``Format.names``. size: width and height, needed where the file does not say.
+        T_ego_lidar: (4, 4), the LiDAR's mount, for the check that the camera looks ahead; None where the LiDAR's own
+        frame has x ahead and y to the left."""
+        ...
+
+
 class Format(NamedTuple):
     """One kind of file."""
 
     title: str
     """For people."""
-    parse: Callable[[CalibrationFiles, tuple[int, int] | None], CameraCalibration] | None
-    """From the file, or the files of ``names``. The size (width, height) is needed where the file does not say; None:
-    cannot be read."""
+    parse: Parser | None
+    """None: cannot be read."""
     write: Callable[[Path, CameraCalibration], object]
     """To a file or folder."""
     names: tuple[str, ...] = ()
-    """Files of a folder; empty for a single file."""
+    """Files of a folder; empty for a single file. KITTI's may be either."""
+    needs_all: bool = True
+    """Whether all files of ``names`` are needed."""
 
     def read(self, path: Path, size: tuple[int, int] | None) -> CameraCalibration:
         """From a file or folder."""
         if self.parse is None:
             raise SourceError(f"{path.name}: {self.title} cannot be read here")
-        files = [path / name for name in self.names if (path / name).exists()] if self.names else [path]
+        is_folder = bool(self.names) and not path.is_file()
+        files = [path / name for name in self.names if (path / name).exists()] if is_folder else [path]
+        if not files and self.names:
+            raise SourceError(f"{path.name}: neither {' nor '.join(self.names)} in it")
         return self.parse({each.name: _content(each) for each in files}, size)
 
 
 FORMATS: Mapping[str, Format] = {
-    "kitti": Format("KITTI", kitti.parse, kitti.write),
+    "kitti": Format("KITTI", kitti.parse, kitti.write, (kitti.CAMERAS, kitti.VELODYNE)),
     "ros": Format("ROS", ros.parse, ros.write, (ros.INFO, ros.TRANSFORM)),
     "opencv": Format("OpenCV", opencv.parse, opencv.write),
-    "kalibr": Format("Kalibr", kalibr.parse, kalibr.write, (kalibr.CHAIN, kalibr.TRANSFORM)),
+    "kalibr": Format("Kalibr", kalibr.parse, kalibr.write, (kalibr.CHAIN, kalibr.TRANSFORM), False),
     "rig": Format("a rig file", None, rig.write),
 }
 

@@ -22,7 +22,7 @@ _CAMERA = "cam0"
 _FORWARD, _BACKWARD = ("T_cam_lidar", "T_camera_lidar"), ("T_lidar_cam", "T_lidar_camera")
 
 
-def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibration:
+def parse(files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F64 | None = None) -> CameraCalibration:
     chain = yaml_mapping(files, CHAIN)
     camera = chain.get(_CAMERA)
     if not isinstance(camera, dict):
@@ -45,7 +45,7 @@ def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibr
     K = camera_matrix([[fu, 0.0, pu], [0.0, fv, pv], [0.0, 0.0, 1.0]], f"{CHAIN}: intrinsics")
     lens = distortion if np.any(distortion) else np.zeros(0)
     found = CameraCalibration(K, lens, _transform(files, camera), width, height)
-    check_looks_ahead(found, TRANSFORM if TRANSFORM in files else CHAIN)
+    check_looks_ahead(found, TRANSFORM if TRANSFORM in files else CHAIN, T_ego_lidar)
     return found
 
 

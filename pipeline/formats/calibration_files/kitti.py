@@ -1,5 +1,5 @@
-"""KITTI's ``calib.txt`` of the object benchmark: P2, R0_rect, Tr_velo_to_cam. It is for undistorted images and does not
-store their size."""
+"""KITTI: ``calib.txt`` of the object benchmark (P2, R0_rect, Tr_velo_to_cam), which does not store the images' size, or
+the raw data's ``calib_cam_to_cam.txt`` with ``calib_velo_to_cam.txt``. Both are for undistorted images."""
 
 from __future__ import annotations
 
@@ -8,16 +8,25 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.formats.calibration_files.contents import CalibrationFiles, the_file
-from pipeline.formats.kitti_calibration import parse_object_calibration
+from pipeline.formats.kitti_calibration import parse_object_calibration, parse_raw_calibration
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
+CAMERAS, VELODYNE, IMU = "calib_cam_to_cam.txt", "calib_velo_to_cam.txt", "calib_imu_to_velo.txt"
+"""Of a day of raw data; the IMU's is not needed."""
 
-def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibration:
+
+def parse(files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F64 | None = None) -> CameraCalibration:
+    if CAMERAS in files or VELODYNE in files:
+        for name in (CAMERAS, VELODYNE):
+            if name not in files:
+                raise SourceError(f"{name}: no such file")
+        pair = CAMERAS, VELODYNE
+        return parse_raw_calibration(files[CAMERAS], files[VELODYNE], pair, None, T_ego_lidar).camera
     name, data = the_file(files)
     if size is None:
         raise SourceError(f"{name}: KITTI's calibration does not store the image size; specify it")
-    return parse_object_calibration(data, name, size).camera
+    return parse_object_calibration(data, name, size, T_ego_lidar).camera
 
 
 def write(path: Path, camera: CameraCalibration) -> None:

@@ -25,7 +25,7 @@ _VERSION = "%YAML:1.0"
 _MOST_NUMBERS = 1000
 
 
-def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibration:
+def parse(files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F64 | None = None) -> CameraCalibration:
     name, data = the_file(files)
     text = data.decode("utf-8", "replace").strip().removeprefix(_VERSION)
     loaded = parse_yaml(text.replace(_TAG, ""), name, SourceError)
@@ -43,7 +43,7 @@ def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibr
     if min(width, height) < 16:
         raise SourceError(f"{name}: no image_width and image_height")
     camera = CameraCalibration(K, distortion if np.any(distortion) else np.zeros(0), T, width, height)
-    check_looks_ahead(camera, name)
+    check_looks_ahead(camera, name, T_ego_lidar)
     return camera
 
 

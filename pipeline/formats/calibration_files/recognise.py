@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pipeline.formats.calibration_files import FORMATS, Format, kalibr, ros
+from pipeline.formats.calibration_files import FORMATS, Format, kalibr, kitti, ros
 from pipeline.formats.calibration_files.contents import CalibrationFiles
-from pipeline.types import CameraCalibration
+from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
 _SIGNS: tuple[tuple[tuple[bytes, ...], str, str | None], ...] = (
@@ -14,6 +14,9 @@ _SIGNS: tuple[tuple[tuple[bytes, ...], str, str | None], ...] = (
     ((b"child_frame_id",), "ros", ros.TRANSFORM),
     ((b"camera_matrix", b"distortion_model"), "ros", ros.INFO),
     ((b"Tr_velo_to_cam", b"P2:"), "kitti", None),
+    ((b"P_rect_02",), "kitti", kitti.CAMERAS),
+    ((b"delta_f:",), "kitti", kitti.VELODYNE),
+    ((b"calib_time:",), "kitti", kitti.IMU),
 )
 """Any of these words in a file says of which format it is, and which of its files; the first line that applies."""
 _RIG = b"fx_px"
@@ -22,12 +25,19 @@ _PARTS = {
     ros.TRANSFORM: "the static transform",
     kalibr.CHAIN: "the camera chain",
     kalibr.TRANSFORM: "the file with T_cam_lidar",
+    kitti.CAMERAS: "calib_cam_to_cam.txt",
+    kitti.VELODYNE: "calib_velo_to_cam.txt",
+    kitti.IMU: "calib_imu_to_velo.txt",
 }
+_UNUSED = (kitti.IMU,)
+"""Parts without camera and LiDAR, which people give because they are in the same folder."""
 
 
-def parse_any(files: CalibrationFiles, size: tuple[int, int] | None) -> tuple[Format, CameraCalibration]:
+def parse_any(
+    files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F64 | None = None
+) -> tuple[Format, CameraCalibration]:
     """The format and the calibration. size: width and height of the images, for formats that do not store them.
-    SourceError names what is missing, mixed up or cannot be meant."""
+    T_ego_lidar: as for ``Format.parse``. SourceError names what is missing, mixed up or cannot be meant."""
     kinds: dict[str, dict[str, bytes]] = {}
     for name, data in files.items():
         kind, part = _sign(name, data)
@@ -40,11 +50,14 @@ def parse_any(files: CalibrationFiles, size: tuple[int, int] | None) -> tuple[Fo
     ((kind, parts),) = kinds.items()
     chosen = FORMATS[kind]
     assert chosen.parse is not None
-    if not chosen.names and len(parts) > 1:
+    parts = {name: data for name, data in parts.items() if name not in _UNUSED}
+    whole = parts.keys() - set(chosen.names)
+    if whole and len(parts) > 1:
         raise SourceError(f"{len(parts)} files of {chosen.title}: give one")
-    if kind == "ros" and (missing := set(chosen.names) - set(parts)):
-        raise SourceError(f"{_PARTS[missing.pop()]} is missing: {chosen.title} needs two files, give both")
-    return chosen, chosen.parse(parts, size)
+    missing = [name for name in chosen.names if name not in parts]
+    if missing and chosen.needs_all and not whole:
+        raise SourceError(f"{_PARTS[missing[0]]} is missing: {chosen.title} needs two files, give both")
+    return chosen, chosen.parse(parts, size, T_ego_lidar)
 
 
 def _sign(name: str, data: bytes) -> tuple[str, str | None]:

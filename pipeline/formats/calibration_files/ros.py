@@ -22,7 +22,7 @@ _MODELS = {"plumb_bob": (4, 5), "rational_polynomial": (8,)}
 _ANGLES = ("roll", "pitch", "yaw")
 
 
-def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibration:
+def parse(files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F64 | None = None) -> CameraCalibration:
     info, transform = (yaml_mapping(files, name) for name in (INFO, TRANSFORM))
     try:
         K = camera_matrix(np.reshape(info["camera_matrix"]["data"], (3, 3)), f"{INFO}: camera_matrix")
@@ -42,7 +42,7 @@ def parse(files: CalibrationFiles, size: tuple[int, int] | None) -> CameraCalibr
     T_camera_lidar = T_parent_child if own == parent else inverse(T_parent_child)
     lens = distortion if np.any(distortion) else np.zeros(0)
     camera = CameraCalibration(K, lens, T_camera_lidar, width, height)
-    check_looks_ahead(camera, TRANSFORM)
+    check_looks_ahead(camera, TRANSFORM, T_ego_lidar)
     return camera
 
 

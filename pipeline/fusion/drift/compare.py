@@ -28,8 +28,10 @@ BORDER_PX = 3.0
 SAME_WIDTH, NARROWEST = 0.1, 0.4
 """If the widths of cluster and box differ by a smaller share than the first, both sensors see the same two edges. From
 the second share on, the cluster lacks the vehicle's side, and only its outer edge counts."""
-WIDEST = 1.35
-"""Clusters that are wider than this share of the box contain something else too."""
+WIDEST = 1.2
+"""Clusters that are wider than this share of the box contain something else too. Of 47 such pairs in simulated drives
+none was right, of those narrower than 1.1 three quarters; on KITTI 0052, where boxes are tight, the lead's is 1.05 to
+1.15 of its box."""
 HALF_BEAM_DEG = 0.1
 """A cluster ends on average half a step between two beams inside the vehicle's edge."""
 NARROWEST_M = 1.3

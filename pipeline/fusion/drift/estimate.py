@@ -22,6 +22,10 @@ FRAME_SHARE = 0.05
 """Error of a box that is new in each frame, as a share of its height."""
 SLOW_SHARE, SLOW_DEG = 0.06, 0.15
 """Error that is the same for half a second and then another: a vehicle turns, comes nearer, is partly hidden."""
+SIDE_ASPECT, SIDE_DEG = 1.4, 0.4
+"""A box that is wider than its height by more than the first number shows a vehicle's side too, of which the LiDAR hits
+little: its yaw then has this error, too (1 σ). In simulated drives without a turn (12 km, 14 drives), yaws are within
+0.6° in 92 % of the narrower boxes and in 74 % of the wider ones."""
 PASSING_S = 0.08
 """Both errors grow with the rate of the bearing: another side of the vehicle comes into sight, and the sweep sees it
 at another moment than its tick."""
@@ -77,12 +81,14 @@ class AngleChange(NamedTuple):
     """(T, V) error of each vehicle."""
 
 
-def box_errors(frames: F64, height_deg: F64, rate_degps: F64) -> tuple[F64, F64]:
+def box_errors(frames: F64, height_deg: F64, rate_degps: F64, has_side: Mask) -> tuple[F64, F64]:
     """(M,) and (M,) standard deviations of the new and the lasting error of a vehicle's angle in a piece of time.
-    frames: in which it was seen. height_deg: of its box. rate_degps: of its bearing."""
+    frames: in which it was seen. height_deg: of its box. rate_degps: of its bearing. has_side: whether its side is seen
+    too; False for elevations."""
     passing = (PASSING_S * rate_degps) ** 2
     new = (FRAME_SHARE * height_deg) ** 2 / frames + SLOW_DEG**2 + (SLOW_SHARE * height_deg) ** 2 + passing
-    return np.sqrt(new), np.sqrt(LASTING_DEG**2 + (LASTING_SHARE * height_deg) ** 2 + passing)
+    lasting = LASTING_DEG**2 + (LASTING_SHARE * height_deg) ** 2 + SIDE_DEG**2 * has_side + passing
+    return np.sqrt(new), np.sqrt(lasting)
 
 
 def changes(seen: AngleSightings, values: F64, moments: I64) -> AngleChange:

@@ -20,7 +20,7 @@ import numpy as np
 from pipeline.alignment.projection import Alignment
 from pipeline.fusion.drift import lines as lane_lines
 from pipeline.fusion.drift.compare import Offset, offsets
-from pipeline.fusion.drift.estimate import AngleSightings, box_errors
+from pipeline.fusion.drift.estimate import SIDE_ASPECT, AngleSightings, box_errors
 from pipeline.fusion.drift.judge import FEWEST_FRAMES, PIECE_S, SMALLEST_DEG, MountTurn, TurnEstimates, judge
 from pipeline.lidar.road_profile import RoadProfile
 from pipeline.params import AlignmentParams, FusionParams
@@ -38,7 +38,7 @@ HELD = 2
 CONTRADICTED_SIGMAS = 3.0
 """A reported turn is dropped once vehicles show less than half of it, this clearly."""
 _PIECE_NS = round(PIECE_S * 1e9)
-_PIECE, _VEHICLE, _FRAMES, _YAW, _PITCH, _RATE, _HEIGHT, _TRACK = range(8)
+_PIECE, _VEHICLE, _FRAMES, _YAW, _PITCH, _RATE, _HEIGHT, _ASPECT, _TRACK = range(9)
 _AXES = (_YAW, _PITCH)
 
 
@@ -112,8 +112,9 @@ class DriftState(NamedTuple):
     """The piece of time under way."""
     fresh: tuple[tuple[float, ...], ...] = ()
     """Rows of the piece under way, one for each vehicle and frame."""
-    rows: F64 = np.zeros((0, 8))
-    """(M, 8) means over earlier pieces: piece, vehicle, frames, yaw, pitch, rate, height, track."""
+    rows: F64 = np.zeros((0, 9))
+    """(M, 9) means over earlier pieces: piece, vehicle, frames, yaw, pitch, rate, height and width ÷ height of the box,
+    track."""
     lines: lane_lines.LineState = lane_lines.LineState()
     """What lane lines have shown."""
     names: tuple[tuple[int, str], ...] = ()
@@ -180,7 +181,8 @@ def _noted(state: DriftState, pairs: Sequence[Offset], t_ns: int) -> DriftState:
             means = tuple(old + (new - old) / frames for old, new in zip(before.sizes, sizes, strict=True))
             now = _Vehicle(before.number, before.track, t_ns, frames, means)
         known[pair.track] = now
-        rows.append((now.number, pair.yaw_deg, pair.pitch_deg, pair.rate_degps, pair.height_deg, now.track))
+        aspect = pair.sizes_m[1] / pair.sizes_m[0]
+        rows.append((now.number, pair.yaw_deg, pair.pitch_deg, pair.rate_degps, pair.height_deg, aspect, now.track))
     kept = tuple((track, each) for track, each in known.items() if t_ns - each.t_ns <= FORGOTTEN_S * 1e9)
     return state._replace(vehicles=kept, next_number=number, fresh=(*state.fresh, *rows))
 
@@ -196,7 +198,7 @@ def _closed(state: DriftState, piece: int, params: FusionParams) -> DriftState:
         fresh = np.array(state.fresh)
         numbers, at = np.unique(fresh[:, 0], return_inverse=True)
         frames = np.bincount(at)
-        means = [np.bincount(at, fresh[:, k]) / frames for k in range(1, 6)]
+        means = [np.bincount(at, fresh[:, k]) / frames for k in range(1, 7)]
         rows = np.vstack([rows, np.column_stack([np.full(len(numbers), state.piece), numbers, frames, *means])])
     oldest = piece - params.drift_s / PIECE_S
     names = tuple(each for each in state.names if each[0] > oldest)
@@ -210,7 +212,7 @@ def _judged(state: DriftState, params: FusionParams) -> DriftState:
     seen, values = _sightings(state, axis)
     if not len(values):
         return state
-    verdict = judge(seen, values)
+    verdict = judge(seen, values, axis)
     found = _updated(state.found, axis, verdict, params)
     return state._replace(found=found, told=_told(state, found, axis, verdict))
 
@@ -221,8 +223,9 @@ def _sightings(state: DriftState, axis: int) -> tuple[AngleSightings, F64]:
     often = np.bincount(at, state.rows[:, _FRAMES], len(numbers)) >= FEWEST_FRAMES
     rows, line = state.rows[often[at]], lane_lines.angles(state.lines, axis)
     count = len(line.values)
-    new, lasting = box_errors(rows[:, _FRAMES], rows[:, _HEIGHT], rows[:, _RATE] if axis == 0 else 0.0 * rows[:, _RATE])
-    rate = np.concatenate([rows[:, _RATE] * (axis == 0), np.zeros(count)])
+    own_rate, has_side = rows[:, _RATE] * (axis == 0), (rows[:, _ASPECT] > SIDE_ASPECT) & (axis == 0)
+    new, lasting = box_errors(rows[:, _FRAMES], rows[:, _HEIGHT], own_rate, has_side)
+    rate = np.concatenate([own_rate, np.zeros(count)])
     piece = np.concatenate([rows[:, _PIECE], line.piece])
     order = np.argsort(piece, kind="stable")
     seen = AngleSightings(

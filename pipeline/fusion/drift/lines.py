@@ -29,6 +29,8 @@ SLOWEST_MPS = 3.0
 """At lower speeds a line moves less than it is uncertain."""
 SHARPEST_PER_M = 0.002
 """Above this curvature of the way (R = 500 m), the side slip of a LiDAR 2 m ahead of the rear axle exceeds 0.2°."""
+STANDING_M = 0.1
+"""A car that drives less in a piece of time stands, and sees nothing new."""
 LONGEST_GAP_S = 0.35
 """Lines of images farther apart are not compared."""
 FEWEST_COMPARED = 4
@@ -36,13 +38,15 @@ FEWEST_COMPARED = 4
 PLACE_M = 0.02
 """Standard deviation of the lines' position at the beginning and end of a piece of time, which is the beginning of the
 next. In random traffic at 6 to 24 m/s, the yaw of a piece varies by 0.05° to 0.5°; this gives 0.2° to 0.5°."""
-YAW_SIGMA_DEG, PITCH_SIGMA_DEG = 0.15, 0.17
-"""Errors that last for a piece of time (1 σ): wheel tracks and cross wind, besides the lines' positions; a crest or dip
-(0.003 rad, as in ``pipeline.lanes.road_lines``)."""
+YAW_SIGMA_DEG = 0.15
+"""Error of yaw that lasts for a piece of time (1 σ), besides the lines' positions: wheel tracks and cross wind."""
+PITCH_SIGMA_DEG, HILL_M = 0.17, 50.0
+"""Error of pitch by crests and dips (1 σ; 0.003 rad, as in ``pipeline.lanes.road_lines``), which is another one after
+so many metres: the LiDAR's road is measured nearer than lines are seen."""
 LASTING_DEG = (0.5, 0.15)
 """Errors of yaw and pitch that last (1 σ): the LiDAR's yaw in the car, as mounts are that nobody has measured; the
 camber of the road."""
-_PIECE, _YAW, _YAW_SIGMA, _PITCH, _FRAMES = range(5)
+_PIECE, _YAW, _YAW_SIGMA, _PITCH, _PITCH_SIGMA, _FRAMES = range(6)
 
 
 class RoadLines(NamedTuple):
@@ -94,8 +98,11 @@ class LineState(NamedTuple):
     driven, number of compared lines."""
     pitches: tuple[float, ...] = ()
     """Pitches of the piece of time under way."""
-    rows: F64 = np.zeros((0, 5))
-    """(M, 5) of earlier pieces: piece, yaw, its standard deviation, pitch, frames; NaN where there is none."""
+    pitch_way_m: float = 0.0
+    """Metres driven while they were seen."""
+    rows: F64 = np.zeros((0, 6))
+    """(M, 6) of earlier pieces: piece, yaw and its standard deviation, pitch and its standard deviation, frames; NaN
+    where there is none."""
 
 
 class LineAngles(NamedTuple):
@@ -141,28 +148,32 @@ def noted(state: LineState, lines: RoadLines, t_ns: int) -> LineState:
             count = int(same.sum())
             moved += float(np.sum(now[same, 0] - before[:, 0] - by_slope))
             along, way, compared = along + count * driven, way + min(count, 1) * driven, compared + count
-    pitches = state.pitches if lines.pitch_deg is None else (*state.pitches, lines.pitch_deg)
-    return state._replace(t_ns=t_ns, last=now, sums=(moved, along, way, compared), pitches=pitches)
+    pitches, pitch_way_m = state.pitches, state.pitch_way_m
+    if lines.pitch_deg is not None:
+        pitches = (*pitches, lines.pitch_deg)
+        pitch_way_m += speed * dt_s if speed is not None and 0.0 < dt_s < LONGEST_GAP_S else 0.0
+    return LineState(t_ns, now, (moved, along, way, compared), pitches, pitch_way_m, state.rows)
 
 
 def closed(state: LineState, piece: int, oldest: float) -> LineState:
     """With the means over the piece of time that has ended, and without those up to ``oldest``."""
     moved, along, way, compared = state.sums
     rows = state.rows[state.rows[:, _PIECE] > oldest]
-    yaw, yaw_sigma, pitch = np.nan, np.nan, np.nan
+    yaw, yaw_sigma, pitch, pitch_sigma = np.nan, np.nan, np.nan, np.nan
     if compared >= FEWEST_COMPARED:
         yaw = float(np.degrees(moved / along))
         yaw_sigma = float(np.hypot(YAW_SIGMA_DEG, np.degrees(np.sqrt(2.0) * PLACE_M / way)))
-    if state.pitches:
+    if state.pitches and state.pitch_way_m > STANDING_M:
         pitch = float(np.mean(state.pitches))
+        # a standing car sees the same stretch of road again and again, and a slow one hardly another
+        pitch_sigma = PITCH_SIGMA_DEG * float(np.sqrt(max(HILL_M / state.pitch_way_m, 1.0)))
     if np.isfinite(yaw) or np.isfinite(pitch):
-        rows = np.vstack([rows, [piece, yaw, yaw_sigma, pitch, max(len(state.pitches), 1)]])
-    return state._replace(sums=(0.0, 0.0, 0.0, 0), pitches=(), rows=rows)
+        rows = np.vstack([rows, [piece, yaw, yaw_sigma, pitch, pitch_sigma, max(len(state.pitches), 1)]])
+    return LineState(state.t_ns, state.last, rows=rows)
 
 
 def angles(state: LineState, axis: int) -> LineAngles:
     """axis: 0 for yaw, 1 for pitch."""
-    values = state.rows[:, (_YAW, _PITCH)[axis]]
-    rows, values = state.rows[np.isfinite(values)], values[np.isfinite(values)]
-    sigma = rows[:, _YAW_SIGMA] if axis == 0 else np.full(len(rows), PITCH_SIGMA_DEG)
-    return LineAngles(rows[:, _PIECE], values, sigma, rows[:, _FRAMES])
+    value, sigma = ((_YAW, _YAW_SIGMA), (_PITCH, _PITCH_SIGMA))[axis]
+    rows = state.rows[np.isfinite(state.rows[:, value])]
+    return LineAngles(rows[:, _PIECE], rows[:, value], rows[:, sigma], rows[:, _FRAMES])

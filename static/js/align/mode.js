@@ -26,7 +26,9 @@ const score = el("b", {
   title: "How well LiDAR depth edges match image edges",
   textContent: "computing …",
 });
-const how = el("span", { class: "facts" });
+const how = el("span", { class: "how" });
+/** The score by distance and what dragging does: in a row of their own, so that the bar fits into one. */
+const below = el("div", { class: "facts match-row", hidden: true }, rangesRow, how);
 
 const fetchScore = newestOnly(async () => {
   const found = /** @type {import("../core/types.js").AlignmentScore|Error} */ (
@@ -53,12 +55,11 @@ export function setUp() {
     versionsButton,
     filesButton,
     el("span", { class: "spacer" }),
-    how,
     blendSlider(),
     edgesButton(),
     regionsButton,
   );
-  bar.after(rangesRow, el(
+  bar.after(below, el(
       "div",
       { class: "fit-place" },
       el("div", { class: "fits" }, alignmentFit.panel, timeFit.panel, filesPanel),
@@ -73,25 +74,30 @@ export function setUp() {
 }
 
 const isOn = () => get("align")?.on === true;
+const isAngular = () => get("params")?.values["alignment.model"] === "angular";
 
 export function toggleAlign() {
   set("align", { ...(get("align") ?? OFF), on: !isOn() });
   if (isOn() !== (get("layout")?.grown === "camera")) grow("camera");
   if (!isOn()) return;
-  reveal("alignment.model");
+  revealSliders(get("params")?.values["alignment.model"]);
   resetInspector(); // in a narrow window, the sliders would cover the image that is being aligned
   fetchScore(undefined);
 }
 
+/** The first slider of a model. @param {unknown} model */
+function revealSliders(model) {
+  reveal(model === "angular" ? "alignment.h_res_deg" : "alignment.yaw_deg");
+}
+
 function reflect() {
-  bar.hidden = rangesRow.hidden = !isOn();
+  bar.hidden = below.hidden = !isOn();
   $(".fit-place").hidden = !isOn();
   press(button, isOn());
   document.body.classList.toggle("is-aligning", isOn());
-  const isAngular = get("params")?.values["alignment.model"] === "angular";
   text(
     how,
-    isAngular ? "Drag: origin · scroll: h_res and v_res · Shift + scroll: v_res" : "Drag: yaw, pitch · scroll: roll",
+    isAngular() ? "Drag: origin · scroll: h_res and v_res · Shift + scroll: v_res" : "Drag: yaw, pitch · scroll: roll",
   );
   for (const choice of bar.querySelectorAll("[data-model]"))
     press(choice, /** @type {HTMLElement} */ (choice).dataset.model === get("params")?.values["alignment.model"]);
@@ -99,7 +105,10 @@ function reflect() {
 
 /** @param {string} name */
 function model(name) {
-  const choose = () => change({ "alignment.model": name }, true);
+  const choose = () => {
+    change({ "alignment.model": name }, true);
+    revealSliders(name);
+  };
   return el("button", { type: "button", textContent: name, data: { model: name }, onclick: choose });
 }
 

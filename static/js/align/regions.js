@@ -27,8 +27,8 @@ export const regionsButton = el("button", {
     if (align) set("align", { ...align, regions: !align.regions });
   },
 });
-/** The score by distance, below the bar. */
-export const rangesRow = el("div", { class: "facts ranges", hidden: true });
+/** The score by distance. */
+export const rangesRow = el("span", { class: "ranges" });
 
 on(["align"], () => press(regionsButton, get("align")?.regions === true));
 

@@ -187,7 +187,7 @@ export function reveal(name) {
     node = controls.get(name)?.node;
   if (!section || !node) return null;
   section.node.open = true;
-  node.scrollIntoView({ block: "center" });
+  node.scrollIntoView({ block: "start" }); // the pane gets shorter when more is said above it
   return $("input, .choices button", HTMLElement, node);
 }
 

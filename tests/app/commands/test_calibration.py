@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from app.cli import main
-from pipeline.alignment.projection import resolve
+from pipeline.alignment.projection import Pinhole, resolve
+from pipeline.formats.calibration_files import FORMATS
 from pipeline.params import Params, with_changes
 from pipeline.sources import open_source
 from pipeline.sources.rig import load_rig
@@ -37,6 +38,32 @@ def test_a_recordings_calibration_goes_through_every_format_with_its_correction(
     assert right is not None
     assert found is not None
     np.testing.assert_allclose(found.project(ahead), right.project(ahead), atol=1e-3)
+
+
+def test_a_recordings_export_relates_to_the_lidar_of_its_files(data_dir: Path, tmp_path: Path) -> None:
+    """As other tools use it: points of the LiDAR's files, projected with nothing but the exported file."""
+    out = tmp_path / "astyx.yaml"
+    assert run(f"astyx:{data_dir}/astyx", "--to", "opencv", "--out", str(out)) == 0
+    camera = FORMATS["opencv"].read(out, None)
+    file = min((data_dir / "astyx/lidar_vlp16").glob("*.txt"))
+    own = np.loadtxt(file, skiprows=2)[:, :3]
+    ahead = own[(own[:, 0] > 5.0) & (np.abs(own[:, 1]) < own[:, 0] / 4.0)]
+    frame = open_source(f"astyx:{data_dir}/astyx").frame(0)
+    aligned = resolve(Params().alignment, frame.camera)
+    lidar = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
+    assert frame.sweep is not None
+    assert aligned is not None
+    shown = aligned.project(frame.sweep.points[:, :3].astype(np.float64))
+    shown = shown[np.isfinite(shown).all(axis=1)]
+    off_px = [np.abs(shown - each).max(axis=1).min() for each in lidar.project(ahead[::50])]
+    assert max(off_px) < 0.5
+
+
+def test_kittis_raw_calibration_is_read_from_the_folder_of_a_day(data_dir: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.yaml"
+    day = data_dir / "kitti_0009/2011_09_26"
+    assert run(str(day), "--format", "kitti", "--to", "opencv", "--out", str(out)) == 0
+    assert (FORMATS["opencv"].read(out, None).width, FORMATS["opencv"].read(out, None).height) == (1242, 375)
 
 
 def test_a_format_that_lacks_something_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -117,7 +117,7 @@ def write_kitti_raw(date: Path) -> Path:
         record[23], record[27] = 0.04, 5.0 if i else 2.0
         (drive / "oxts" / "data" / f"{i:010d}.txt").write_text(" ".join(map(str, record)))
     head = "calib_time: 09-Jan-2012 13:57:47\n"
-    cameras = f"{head}R_rect_00: {_numbers(np.eye(3))}\nP_rect_02: {_numbers(projection())}\n"
+    cameras = f"{head}S_rect_02: 120 40\nR_rect_00: {_numbers(np.eye(3))}\nP_rect_02: {_numbers(projection())}\n"
     (date / "calib_cam_to_cam.txt").write_text(cameras)
     tr = velo_to_cam()
     (date / "calib_velo_to_cam.txt").write_text(f"{head}R: {_numbers(tr[:, :3])}\nT: {_numbers(tr[:, 3])}\n")

@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.common.geometry import transform
 from pipeline.sources import SourceError, open_source
+from pipeline.types.source import lidar_frame
 from tests.pipeline.sources.made.nuscenes_on_disk import (
     BOX_AT,
     BOX_SIZE,
@@ -57,6 +58,20 @@ def test_points_fall_into_the_image_where_the_camera_sees_them(mini: Path) -> No
     assert (frame.camera.K @ in_camera[bright].T)[0].max() < 80.0 * in_camera[0, 2], "left of the middle"
     level = frame.sweep.points[frame.sweep.ring == 16, 2][0]
     assert in_camera[frame.sweep.ring == 16, 1] == pytest.approx(-(level + 1.84 - 1.5), abs=1e-4)
+
+
+def test_calibrations_of_other_tools_relate_to_the_lidar_of_the_files(mini: Path) -> None:
+    """nuScenes' LIDAR_TOP has x to the right; the ego frame has the car's axes."""
+    source = open_source(f"nuscenes:{mini}")
+    mount = lidar_frame(source)
+    assert mount is not None
+    sweep = source.frame(0).sweep
+    assert sweep is not None
+    file = min((mini / "samples" / "LIDAR_TOP").iterdir())
+    own = np.fromfile(file, np.float32).reshape(-1, 5)[:, :3]
+    turned = own @ mount[:3, :3].T
+    nearest = [np.abs(sweep.points[:, :3] - each).max(axis=1).min() for each in turned[::40]]
+    assert max(nearest) < 1e-3
 
 
 def test_times_and_own_motion_are_those_of_the_tables(mini: Path) -> None:

@@ -13,6 +13,7 @@ import pytest
 from pipeline.common.geometry import transform
 from pipeline.sources import SourceError, open_source
 from pipeline.sources.radiate import parse_state
+from pipeline.types.source import lidar_frame
 
 START_NS = 1_574_859_771_700_975_000
 COUNT = 6
@@ -89,6 +90,12 @@ def test_points_are_in_the_axes_of_the_car(sequence: Path) -> None:
     assert sweep.points[sweep.points[:, 3] > 100.0, 1].min() > 0.0, "the bright half is left"
     assert (sweep.channels, len(sweep.points)) == (32, 640)
     assert sweep.points[sweep.ring == 23, 2] == pytest.approx(0.0)
+
+
+def test_calibrations_of_other_tools_relate_to_the_lidar_of_the_files(sequence: Path) -> None:
+    mount = lidar_frame(open_source(f"radiate:{sequence}"))
+    assert mount is not None
+    np.testing.assert_allclose(mount[:3, :3] @ [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], err_msg="its y axis points ahead")
 
 
 def test_points_fall_into_the_image_where_the_sdk_draws_them(sequence: Path) -> None:

@@ -21,7 +21,7 @@ from pipeline.common.files.user_files import LARGEST_TEXT_BYTES
 from pipeline.formats.calibration_files import write_calibration
 from pipeline.formats.calibration_files.recognise import parse_any
 from pipeline.types import F64, Frame
-from pipeline.types.source import Mounted, is_live_source
+from pipeline.types.source import lidar_frame
 
 MOST_FILES = 4
 FormatName = Literal["kitti", "ros", "opencv", "kalibr", "rig"]
@@ -44,8 +44,8 @@ class GivenCalibration(ApiModel):
     model_config = ConfigDict(extra="forbid")
 
     files: list[CalibrationText] = Field(min_length=1, max_length=MOST_FILES)
-    """KITTI and OpenCV: one; ROS: camera info and static transform; Kalibr: camera chain, and the file with
-    T_cam_lidar unless the chain contains it."""
+    """KITTI: one, or calib_cam_to_cam.txt and calib_velo_to_cam.txt; OpenCV: one; ROS: camera info and static
+    transform; Kalibr: camera chain, and the file with T_cam_lidar unless the chain contains it."""
 
 
 class ImportJson(ApiModel):
@@ -74,7 +74,7 @@ def alignment_files_router(engine: Engine) -> APIRouter:
         for each in body.files:
             given[PurePath(each.name).name or each.name] = each.text.encode()
         with refusing():
-            chosen, camera = parse_any(given, size)
+            chosen, camera = parse_any(given, size, mount)
             found = imported(camera, engine.control.peek().params.alignment, frame.camera, size, mount)
         return ImportJson(
             format=chosen.title,
@@ -110,12 +110,7 @@ def _shown(engine: Engine) -> tuple[Frame, tuple[int, int], F64 | None]:
         size = (frame.camera.width, frame.camera.height) if frame.camera is not None else frame.image_size
     if frame is None or size is None:
         raise HTTPException(404, "nothing with a camera is shown")
-    mount = None
-    if isinstance(source, Mounted):
-        mount = source.T_ego_lidar
-    elif source is not None and is_live_source(source) and source.lidar_mount is not None:
-        mount, _ = source.lidar_mount
-    return frame, size, mount
+    return frame, size, lidar_frame(source)
 
 
 def _zipped(folder: Path) -> bytes:

@@ -2,34 +2,81 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from pipeline.common.geometry import inverse, rotation
 from pipeline.formats.calibration_files import FORMATS
 from pipeline.formats.calibration_files.recognise import parse_any
+from pipeline.sources import open_source
+from pipeline.types import CameraCalibration
 from pipeline.types.source import SourceError
 from tests.pipeline.formats.calibration_files.test_calibration_files import STRAIGHT, same, written
 
 SIZE = STRAIGHT.width, STRAIGHT.height
 
 
-def contents(name: str, folder: Path) -> dict[str, bytes]:
+def contents(name: str, camera: CameraCalibration, folder: Path) -> dict[str, bytes]:
     """The files of a format, under names that say nothing."""
-    path = written(name, STRAIGHT, folder / name)
+    path = written(name, camera, folder / name)
     files = [path] if path.is_file() else sorted(path.iterdir())
     return {f"{name} {number}": file.read_bytes() for number, file in enumerate(files)}
 
 
 @pytest.mark.parametrize("name", ["kitti", "ros", "opencv", "kalibr"])
 def test_every_format_is_recognised(name: str, tmp_path: Path):
-    found, camera = parse_any(contents(name, tmp_path), SIZE)
+    found, camera = parse_any(contents(name, STRAIGHT, tmp_path), SIZE)
     assert found is FORMATS[name]
     same(camera, STRAIGHT)
 
 
+def day(data_dir: Path) -> dict[str, bytes]:
+    """The calibration of a day of KITTI's raw data, under names that say nothing."""
+    folder = data_dir / "kitti_0009/2011_09_26"
+    names = ("calib_velo_to_cam.txt", "calib_imu_to_velo.txt", "calib_cam_to_cam.txt")
+    return {f"{number}.txt": (folder / name).read_bytes() for number, name in enumerate(names)}
+
+
+def test_a_day_of_kittis_raw_data_is_recognised_with_and_without_the_imus_file(data_dir: Path):
+    raw = open_source(f"kitti:{data_dir}/kitti_0009/2011_09_26/2011_09_26_drive_0009_sync").frame(0).camera
+    assert raw is not None
+    found, camera = parse_any(day(data_dir), None)
+    assert found is FORMATS["kitti"]
+    same(camera, raw)
+    velo, imu, cameras = day(data_dir).items()
+    same(parse_any(dict([velo, cameras]), (1, 1))[1], raw)
+    same(FORMATS["kitti"].read(data_dir / "kitti_0009/2011_09_26", None), raw)
+    for files, named in (
+        (dict([velo, imu]), "calib_cam_to_cam.txt is missing: KITTI needs two files"),
+        (dict([cameras, imu]), "calib_velo_to_cam.txt is missing"),
+        (dict([imu]), "calib_cam_to_cam.txt is missing"),
+        ({**dict([velo, cameras]), "again": velo[1]}, "again: calib_velo_to_cam.txt is given twice"),
+        (dict([velo, ("c", cameras[1].replace(b"S_rect_02: ", b"S_rect_02: -"))]), "S_rect_02 is not an image size"),
+        (dict([velo, ("c", cameras[1].replace(b"S_rect_02", b"S_rect"))]), "no S_rect_02 of 2 numbers"),
+    ):
+        with pytest.raises(SourceError, match=named):
+            parse_any(files, None)
+
+
+@pytest.mark.parametrize("name", ["kitti", "ros", "opencv", "kalibr"])
+def test_a_lidar_whose_own_x_axis_does_not_point_ahead_is_read_with_its_mount(name: str, tmp_path: Path):
+    mount = np.eye(4)
+    mount[:3, :3] = rotation(0.0, 0.0, -np.pi / 2)
+    own = replace(STRAIGHT, T_camera_ego=STRAIGHT.T_camera_ego @ mount)
+    files = contents(name, own, tmp_path)
+    same(parse_any(files, SIZE, mount)[1], own)
+    with pytest.raises(SourceError, match="axes are swapped"):
+        parse_any(files, SIZE)
+    inverted = replace(own, T_camera_ego=inverse(own.T_camera_ego))
+    with pytest.raises(SourceError, match="inverted"):
+        parse_any(contents(name, inverted, tmp_path), SIZE, mount)
+
+
 def test_what_is_missing_or_mixed_up_is_named(tmp_path: Path):
-    kitti, ros, rig = (contents(name, tmp_path) for name in ("kitti", "ros", "rig"))
+    kitti, ros, rig = (contents(name, STRAIGHT, tmp_path) for name in ("kitti", "ros", "rig"))
     info, transform = ({name: data} for name, data in ros.items())
     for files, named in (
         (info, "the static transform is missing: ROS needs two files"),

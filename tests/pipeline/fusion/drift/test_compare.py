@@ -66,3 +66,11 @@ def test_what_tells_nothing(what: str):
     }[what]
     assert told([hit], [seen]) == []
     assert len(told([track(1, 18.0, 0.5)], [box(18.0, 0.5, AlignmentParams())])) == 1
+
+
+@pytest.mark.parametrize(("width_m", "is_paired"), [(1.8, True), (2.15, False)])
+def test_a_cluster_wider_than_its_box_contains_something_else(width_m: float, is_paired: bool):
+    hit = track(1, 18.0, 4.0)
+    wide = hit.obstacle._replace(cuboid=hit.obstacle.cuboid._replace(size=(0.2, width_m, 1.5)))
+    found = told([hit._replace(obstacle=wide)], [box(18.0, 4.0, AlignmentParams())])
+    assert bool(found) is is_paired

@@ -104,11 +104,11 @@ def test_vehicles_that_change_their_size_are_other_vehicles():
 
 
 def test_the_state_stays_small():
-    state, sizes = DriftState(), []
+    state, sizes, short = DriftState(), [], FusionParams(drift_s=30.0)
     for k in range(700):
-        state, _ = follow(state, seen(k, RIGHT), resolve(RIGHT, CAMERA), RIGHT, PARAMS)
+        state, _ = follow(state, seen(k, RIGHT), resolve(RIGHT, CAMERA), RIGHT, short)
         sizes.append(len(state.rows) + len(state.names) + len(state.vehicles))
     assert max(sizes[350:]) <= max(sizes[:350]) + 10
-    assert np.ptp(state.rows[:, 0]) * 0.5 <= PARAMS.drift_s
-    assert PARAMS.drift_s * 1e9 * 2 < FRAME_NS * 700, "twice as long as is remembered"
+    assert np.ptp(state.rows[:, 0]) * 0.5 <= short.drift_s
+    assert short.drift_s * 1e9 * 2 < FRAME_NS * 700, "twice as long as is remembered"
     assert SIZE[0] > 0

@@ -12,7 +12,10 @@ SIGMAS = 4.0
 
 
 def turn(
-    angles_deg: list[list[float]], tracks: tuple[int, ...] | None = None, lines_deg: list[float] | None = None
+    angles_deg: list[list[float]],
+    tracks: tuple[int, ...] | None = None,
+    lines_deg: list[float] | None = None,
+    axis: int = 0,
 ) -> MountTurn | None:
     """angles_deg: of each vehicle in each time interval. tracks: of each vehicle; without it each has its own.
     lines_deg: shown by lane lines in each time interval."""
@@ -21,11 +24,11 @@ def turn(
     piece, vehicle = (each.ravel() for each in np.meshgrid(np.arange(pieces), np.arange(vehicles), indexing="ij"))
     count, track = len(piece), vehicle if tracks is None else np.array(tracks)[vehicle]
     frames, rate = np.full(count, 5.0), np.zeros(count)
-    new, lasting = box_errors(frames, np.full(count, 3.0), rate)
+    new, lasting = box_errors(frames, np.full(count, 3.0), rate, np.zeros(count, bool))
     is_line = vehicle == (vehicles - 1 if lines_deg is not None else vehicles)
     new, lasting = np.where(is_line, 0.2, new), np.where(is_line, 0.5, lasting)
     seen = AngleSightings(piece, vehicle, track, frames, rate, new, lasting, is_line)
-    return judge(seen, values.ravel()).turn(SIGMAS)
+    return judge(seen, values.ravel(), axis).turn(SIGMAS)
 
 
 @pytest.mark.parametrize(
@@ -74,8 +77,21 @@ def test_lines_show_a_turn_without_any_vehicle():
     assert turn([], lines_deg=[1.0] * 40) is None
 
 
+@pytest.mark.parametrize("axis", [0, 1], ids=["yaw", "pitch"])
+def test_half_a_degree_is_shown_by_its_step_but_not_by_its_level(axis: int):
+    """Errors that all vehicles share are in a level, but cancel in a step."""
+    stepping = [[0.0] * 40 + [0.5] * 40] * 3
+    found = turn(stepping, axis=axis)
+    assert found is not None
+    assert found.since == 40
+    assert turn([[0.5] * 80] * 3, axis=axis) is None
+    lines = turn([], lines_deg=[0.7] * 40 + [1.2] * 40, axis=axis)
+    assert lines is not None
+    assert lines.angle_deg == pytest.approx(0.5, abs=0.35)
+
+
 def test_lines_confirm_small_turns_and_contradict_vehicles_that_err():
-    quiet, shifted = [0.0] * 16 + [0.5] * 16, [0.0] * 16 + [0.9] * 16
+    quiet, shifted = [0.0] * 16 + [0.35] * 16, [0.0] * 16 + [0.9] * 16
     assert turn([quiet, quiet]) is None
     confirmed = turn([quiet, quiet], lines_deg=quiet)
     assert confirmed is not None

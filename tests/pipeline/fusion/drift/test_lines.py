@@ -76,6 +76,15 @@ def test_the_pitch_is_the_mean_of_the_images_with_two_lines():
     assert not len(angles(driven(5), 1).values)
 
 
+def test_the_pitch_is_worth_what_the_car_drives_because_hills_are_long():
+    sigmas = [angles(driven(6, pitch_deg=1.0, speed_mps=speed), 1).sigma_deg[0] for speed in (2.0, 8.0)]
+    assert sigmas[0] == pytest.approx(2.0 * sigmas[1])
+    assert not len(angles(driven(6, pitch_deg=1.0, speed_mps=0.0), 1).values), "a standing car sees nothing new"
+    unknown = noted(LineState(), RoadLines(np.zeros((2, 4)), 1.0, None, None), 0)
+    unknown = noted(unknown, RoadLines(np.zeros((2, 4)), 1.0, None, None), FRAME_NS)
+    assert not len(angles(closed(unknown, 0, -1.0), 1).values), "nor is it known whether it stands without a speed"
+
+
 def test_what_is_old_is_forgotten():
     state = driven(6, 1.0)
     assert len(closed(state, 8, 6.0).rows) == 1
