@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from pipeline.decision.object_motion import closing_speed_mps, required_decel_mps2, surely_closing_mps
+from pipeline.decision.object_motion import closing_speed_mps, required_decel_mps2
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
 from pipeline.params import AccParams, AebParams
 from pipeline.types import AccCommand, Braking, Cipv, EgoState, FusedObject, Path, Situation
@@ -118,7 +118,7 @@ def _onset_mps2(state: AccState, ego: EgoState, dt_s: float | None, params: AccP
 
 
 def _required_mps2(object_id: int, item: FusedObject | None, situation: Situation, emergency: AebParams) -> float:
-    """The deceleration that is surely required to avoid the object. One of unknown speed is assumed to stand still, but
+    """The deceleration required to avoid the object. One of unknown speed is assumed to stand still, but
     if it was seen only once, nothing is required: it may be a false box on a stray cluster, and the second sighting
     measures its speed."""
     lead, ego = situation.lead, situation.now.ego
@@ -133,11 +133,7 @@ def _required_mps2(object_id: int, item: FusedObject | None, situation: Situatio
         return 0.0
     if distance is None:
         return math.inf
-    if closing is None:
-        closing = ego.speed_mps
-    elif item is not None:
-        closing = surely_closing_mps(item, closing)
-    return required_decel_mps2(distance, closing, emergency)
+    return required_decel_mps2(distance, ego.speed_mps if closing is None else closing, emergency)
 
 
 def _error_m(situation: Situation, params: AccParams) -> float:

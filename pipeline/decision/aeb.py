@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 from pipeline.common.fast_replace import evolve
 from pipeline.decision.acc import STANDSTILL_MPS
 from pipeline.decision.braking_evidence import FRICTION_MPS2, has_known_height
-from pipeline.decision.object_motion import closing_speed_mps, required_decel_mps2, surely_closing_mps
+from pipeline.decision.object_motion import closing_speed_mps, required_decel_mps2
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
 from pipeline.params import AccParams, AebParams
 from pipeline.types import AccCommand, Braking, EgoState, FusedObject, Situation
@@ -103,9 +103,15 @@ def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
         ):
             sigma_m = item.distance_sigma_m or 0.0
             justified = _justified(item, required_decel_mps2(item.distance_m, closing, params))
-            required = required_decel_mps2(item.distance_m, surely_closing_mps(item, closing), params)
+            required = required_decel_mps2(item.distance_m, _surely_closing_mps(item, closing), params)
             found.append(Threat(item.id, item.distance_m, sigma_m, closing, item.ttc_s, required, justified))
     return tuple(found)
+
+
+def _surely_closing_mps(item: FusedObject, closing_mps: float) -> float:
+    """Its closing speed as far as it is known: that of boxes, one standard deviation lower. Eight sightings at 55 m,
+    the first of which were half a vehicle's, make a car that drives ahead at our speed approach at 26 ± 9 m/s."""
+    return closing_mps - (item.camera_speed_sigma_mps or 0.0 if not item.ranged else 0.0)
 
 
 def _justified(item: FusedObject, required_mps2: float) -> Braking:

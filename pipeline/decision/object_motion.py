@@ -42,12 +42,6 @@ def closing_speed_mps(item: FusedObject) -> float | None:
     return -(x * item.velocity_mps[0] + y * item.velocity_mps[1]) / item.distance_m
 
 
-def surely_closing_mps(item: FusedObject, closing_mps: float) -> float:
-    """Its closing speed as far as it is known: that of boxes, one standard deviation lower. Eight sightings at 55 m,
-    the first of which were half a vehicle's, make a car that drives ahead at our speed approach at 26 ± 9 m/s."""
-    return closing_mps - (item.camera_speed_sigma_mps or 0.0 if not item.ranged else 0.0)
-
-
 def required_decel_mps2(distance_m: float, closing_mps: float, params: AebParams) -> float:
     """The constant deceleration that ends the approach ``margin_m`` before contact: Δv² / (2·d), where d is the
     distance left after brake build-up. Δv is the *relative* speed: a moving lead needs less than a standing one.

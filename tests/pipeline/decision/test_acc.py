@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -279,26 +278,6 @@ def test_an_object_of_unknown_speed_is_braked_for_from_its_second_sighting(hits:
     command = control(AccState(), situation, PARAMS, EMERGENCY)[1]
     assert command is not None
     assert command.accel_mps2 == pytest.approx(-braking_mps2)
-
-
-@pytest.mark.parametrize(
-    ("source", "sigma_mps", "braking_mps2"),
-    [
-        pytest.param("V", 8.0, 0.92, id="the camera's first boxes"),
-        pytest.param("V", 0.3, 3.5, id="the camera knows"),
-        pytest.param("VL", 8.0, 3.5, id="the LiDAR measures it"),
-    ],
-)
-def test_acc_brakes_as_hard_as_is_surely_required(source: Any, sigma_mps: float, braking_mps2: float) -> None:
-    item = dataclasses.replace(
-        fused(1, 40.0, source=source, velocity=(-16.0, 0.0)),
-        camera_speed_sigma_mps=sigma_mps,
-        justifies=Braking.PARTIAL,
-    )
-    situation = Situation(moment(EgoState(0, 26.0), 0.1), PATH, (item,), Cipv(1, 40.0, 16.0, 2.5, ""))
-    command = control(AccState(), situation, PARAMS, EMERGENCY)[1]
-    assert command is not None
-    assert -command.accel_mps2 == pytest.approx(braking_mps2, abs=0.05)
 
 
 def accelerations(ego: EgoState, lead: Cipv, frames: int, params: AccParams = PARAMS) -> list[float]:
