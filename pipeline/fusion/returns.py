@@ -47,8 +47,8 @@ _EDGE_SHARE = 0.08
 two."""
 _BOTTOM_SHARE = 0.06
 _TOP_SHARE = 0.12
-"""In this uppermost part of a box, what is farther away than the camera says is beyond the vehicle: 42 of 50 points there
-had passed over a labelled one (15 of 17 on Astyx, 27 of 33 on KITTI 0009), but only 7 of 23 in the next 6 %."""
+"""In this uppermost part of a box, what is farther away than the camera says is beyond the vehicle: 42 of 50 points
+there had passed over a labelled one (15 of 17 on Astyx, 27 of 33 on KITTI 0009), but only 7 of 23 in the next 6 %."""
 LOW_M, HIGH_M = 0.25, 3.5
 """Heights above the road between which a vehicle returns rays."""
 _SIGMAS = 3.0

@@ -41,7 +41,7 @@ _FEWEST_PX = 10.0
 """Vehicles of smaller height are ignored: some labelled cars are 5 px high, which no network finds."""
 
 
-class Networks(NamedTuple):
+class MeasuredNetworks(NamedTuple):
     """The networks that are measured and compared."""
 
     detector: str | None
@@ -88,7 +88,7 @@ def _is_left_out(box: Box, parts: Sequence[Box]) -> bool:
     )
 
 
-def count(recording: int, source: Source, labels: str, networks: Networks, into: Counted) -> None:
+def count(recording: int, source: Source, labels: str, networks: MeasuredNetworks, into: Counted) -> None:
     """Process every labelled frame of a recording."""
     parts = left_out(labels)
     detectors = _opened(networks.detector, source, networks.looks_far)
@@ -181,7 +181,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--second", help="another network; boxes that it confirms are not counted as false")
     parser.add_argument("--out", type=Path, default=FILE)
     asked: Any = parser.parse_args(arguments)
-    networks = Networks(asked.detector, not asked.whole, asked.second)
+    networks = MeasuredNetworks(asked.detector, not asked.whole, asked.second)
     counted, names = Counted(), []
     for n, each in enumerate(asked.recordings):
         uri, _, labels = each.partition("=")

@@ -39,7 +39,9 @@ const choices = el(
   "div",
   {},
   el("b", { textContent: "Import" }),
-  el("p", { textContent: "KITTI (of raw data both files), ROS (both files), OpenCV or Kalibr. The format is recognised." }),
+  el("p", {
+    textContent: "KITTI (of raw data both files), ROS (both files), OpenCV or Kalibr. The format is recognised.",
+  }),
   chosen,
   el("b", { class: "next", textContent: "Export with the current alignment" }),
   el("div", { class: "row" }, ...FORMATS.map(([name, words, title]) => exportLink(name, words, title))),

@@ -7,6 +7,7 @@ import { footprint, nose } from "../views/cuboid.js";
 import { boundsOf } from "../views/image_drawing.js";
 import { shown } from "../state/labels.js";
 
+/** @typedef {(metres: number) => number} ToPixel */
 /** @typedef {import("../state/types.js").Cuboid} Cuboid */
 /** @typedef {import("../state/types.js").Box} Box */
 /** @typedef {import("../../core/types.js").Pixels} Pixels */
@@ -79,7 +80,7 @@ export function pathFromAbove(own, other) {
  * @param {Point2[]} bounds points that the image contains, in metres
  * @param {T} own
  * @param {T|null|undefined} other
- * @param {(ctx: CanvasRenderingContext2D, shape: T, u: (y: number) => number, v: (x: number) => number) => void} outline
+ * @param {(ctx: CanvasRenderingContext2D, shape: T, u: ToPixel, v: ToPixel) => void} outline
  */
 function above(bounds, own, other, outline) {
   const xs = bounds.map(([x]) => x),

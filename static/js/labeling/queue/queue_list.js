@@ -77,10 +77,10 @@ function row(work) {
 
 /** @param {Work} work */
 function facts({ frames, labelled, reviewed, proposals, asked, worth, efforts }) {
-  const people = efforts.map(
-    ({ person, acts, active_s }) =>
-      `${person} ${acts} ${acts === 1 ? "change" : "changes"} (${(acts / frames).toFixed(1)} a frame), ${Math.round(active_s / 60)} min`,
-  );
+  const people = efforts.map(({ person, acts, active_s }) => {
+    const changes = `${acts} ${acts === 1 ? "change" : "changes"}`;
+    return `${person} ${changes} (${(acts / frames).toFixed(1)} a frame), ${Math.round(active_s / 60)} min`;
+  });
   return [
     `${frames} frames, lead labelled in ${percent(labelled)}, ${percent(reviewed)} of tracks reviewed`,
     `${proposals} proposals, ${asked} queued frames, priority ${worth.toFixed(2)}`,
