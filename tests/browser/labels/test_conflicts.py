@@ -81,9 +81,8 @@ def test_a_shape_of_a_track_that_was_removed_is_not_lost(hand: Hand, labels: Lab
 def test_two_paths_of_a_frame_are_drawn_and_said_in_metres(hand: Hand, labels: Labels, line: Line) -> None:
     page = hand.page
     line.deaf = True
-    labels.act(
-        "Bob", {"kind": "set_path", "frame": START, "left": [[0, 2], [40, 4]], "right": [[0, -2], [40, 0]], "seen": 0}
-    )
+    left, right, seen = [[0, 2], [40, 4]], [[0, -2], [40, 0]], labels.everything["revision"]
+    labels.act("Bob", {"kind": "set_path", "frame": START, "left": left, "right": right, "seen": seen})
     hand.keys("Shift+P", "ArrowLeft", "Enter")
     dialog = dialog_of(page)
     expect(dialog).to_contain_text("2.25 m at 5 m · 3.00 m at 20 m · 4.00 m at 40 m")
@@ -91,5 +90,5 @@ def test_two_paths_of_a_frame_are_drawn_and_said_in_metres(hand: Hand, labels: L
     line.deaf = False
     dialog.get_by_role("button", name="Use theirs").click()
     is_saved(page)
-    assert labels.everything["paths"][0]["left"] == [[0, 2], [40, 4]]
+    assert labels.everything["paths"][0]["left"] == left
     hand.keys("Escape")

@@ -48,7 +48,7 @@ FIELDS = {
     "objects.0.cuboid": "center size yaw_rad",
     "objects.0.gates.0": "name value limit passed",
     "path": "source center left right sigma_m weights carried_by reach_m usable confidence",
-    "cipv": "id distance_m closing_speed_mps ttc_s reason",
+    "cipv": "id distance_m closing_speed_mps ttc_s reason accel_mps2 accel_sigma_mps2",
     "rejected.0": "id reason",
     "acc": "state desired_speed_mps accel_mps2 accelerator brake reason object_id",
 }
@@ -111,7 +111,7 @@ def whole_result() -> Result:
         own_motion=OwnMotion(LIDAR, LIDAR, (LIDAR,), (1.0, 2.0, 0.1)),
         objects=(lead, unknown),
         path=Path("straight", line, line + side, line - side, 1.5, {"10": 0.1}, {"straight": 1.0}),
-        cipv=Cipv(7, 16.0, 2.0, 8.0, "nearest in path: 16.0 m"),
+        cipv=Cipv(7, 16.0, 2.0, 8.0, "nearest in path: 16.0 m", -1.5, 0.5),
         rejected=(Rejection(9, "its distance is unknown"),),
         acc=AccCommand("follow", 12.0, -1.0, 0.0, 0.2, "gap below the desired one"),
         notes=("Jalousie offen – prüfen",),
@@ -143,6 +143,8 @@ def test_values_arrive_under_their_names() -> None:
         "closing_speed_mps": 2.0,
         "ttc_s": 8.0,
         "reason": "nearest in path: 16.0 m",
+        "accel_mps2": -1.5,
+        "accel_sigma_mps2": 0.5,
     }
     assert data["path"]["center"] == [[0.0, 0.0], [10.0, 0.1235]]
     assert data["acc"]["reason"] == "gap below the desired one"
