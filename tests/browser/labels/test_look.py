@@ -88,7 +88,7 @@ def test_a_name_is_no_longer_than_the_server_takes_and_leaves_the_bar_its_room(o
     expect(shown).to_have_text("your name")  # the labels are there: nothing else makes the bar paint again
     page.get_by_role("textbox", name="Name", exact=True).press_sequentially("A" * (LONGEST_NAME + 9))
     page.keyboard.press("Enter")
-    page.wait_for_function("localStorage.getItem('cipv.person')")
+    page.wait_for_function("() => localStorage.getItem('cipv.person')")
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
     assert shown.inner_text() == "A" * LONGEST_NAME, "it is shown at once"
     assert box_of(page.locator(".annotator"))["width"] <= 150
