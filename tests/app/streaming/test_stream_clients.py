@@ -3,116 +3,28 @@
 from __future__ import annotations
 
 import json
-import socket
 import struct
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
 import pytest
-from starlette.applications import Starlette
-from starlette.routing import WebSocketRoute
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection
 
-from app.core.detection_cache import DetectionCache
-from app.core.server_address import listen_socket
-from app.engine.page_frames import PageFrames
-from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.snapshot import Snapshot
 from app.streaming.sent_image import MAX_WIDTH_PX
 from app.streaming.slot import FRAMES_UNDER_WAY
-from app.streaming.stream import Stream
-from app.web.server import Server
-from pipeline.common.geometry import Cuboid
-from pipeline.detection import Detectors
-from pipeline.params import Params, with_changes
-from pipeline.recording.recording_state import RecordingState
-from pipeline.types import CameraImage
-from tests.app.engine.recording_helpers import CountingDetector, Recording
+from tests.app.streaming.stream_site import (
+    WAIT_S,
+    Site,
+    header_where,
+    heard,
+    next_header,
+    sequence_of,
+)
 
-WAIT_S = 180.0
-RECORDING = RecordingState(Path("a.mcap"), (Path("a.mcap"),), 1, 0.1, 9, 0, None)
 FAST_FRAMES = 40
 """More than the system's buffers hold between a server and a client that does not read."""
-
-
-@dataclass
-class Site:
-    """A server with only the stream; ``show(n)`` publishes frame n, as an engine's thread does."""
-
-    stream: Stream
-    port: int
-    first: Snapshot
-    pauses: list[bool] = field(default_factory=list)
-    """One entry for each time that the stream paused playback."""
-
-    def show(self, sequence: int, **changes: Any) -> None:
-        self.stream.publish(replace(self.first, sequence=sequence, index=sequence, **changes))
-
-    def connected(self, query: str = "") -> AbstractContextManager[ClientConnection]:
-        """A client with a small receive buffer and a short closing timeout."""
-        end = socket.socket()
-        end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 16)
-        end.connect(("127.0.0.1", self.port))
-        url = f"ws://127.0.0.1:{self.port}/{query}"
-        patience = {"open_timeout": WAIT_S, "close_timeout": 0.5}
-        return connect(url, sock=end, max_size=None, compression=None, max_queue=1, **patience)
-
-
-@pytest.fixture
-def site() -> Iterator[Site]:
-    frames = PageFrames(nullcontext)
-    frames.open(_pipeline())
-    pauses: list[bool] = []
-    stream = Stream(frames=frames, pause=lambda: pauses.append(True))
-    bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
-    app = Starlette(routes=[WebSocketRoute("/", stream.serve)])
-    server = Server(app, "http://ready", lambda _: is_ready.set())  # type: ignore[arg-type]
-    thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
-    thread.start()
-    assert is_ready.wait(WAIT_S)
-    site = Site(stream, bound.getsockname()[1], _first(), pauses)
-    site.show(0)
-    yield site
-    server.should_exit = True
-    thread.join()
-
-
-def _first() -> Snapshot:
-    """A frame with a noise image wider than any page needs, whose JPEG is large."""
-    pipeline = _pipeline()
-    tick = pipeline.seek(0, Params())
-    assert tick is not None
-    noise = np.random.default_rng(0).integers(0, 255, (900, 2560, 3), np.uint8)
-    tick = replace(tick, frame=replace(tick.frame, image=CameraImage(0, noise)))
-    return Snapshot(Params(), uri=pipeline.source.uri, count=1, processed=tick)
-
-
-def _pipeline() -> SeekablePipeline:
-    return SeekablePipeline(Recording(), Detectors(CountingDetector(), None), DetectionCache(), "both")
-
-
-def next_header(client: ClientConnection) -> dict[str, Any]:
-    while True:
-        message = client.recv(WAIT_S)
-        if isinstance(message, bytes):
-            (length,) = struct.unpack_from("<I", message)
-            return json.loads(message[4 : 4 + length])
-
-
-def header_where(client: ClientConnection, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    while not wanted(header := next_header(client)):
-        pass
-    return header
-
-
-def sequence_of(header: dict[str, Any]) -> int:
-    return int(header["state"]["sequence"])
 
 
 def test_a_client_that_does_not_read_hurts_nobody_and_gets_the_newest_afterwards(site: Site):
@@ -175,7 +87,7 @@ def test_the_image_is_as_wide_as_the_widest_page_shows_it(site: Site):
     with site.connected() as narrow:
         assert width(next_header(narrow)) == MAX_WIDTH_PX, "until it says what it needs"
         narrow.send(json.dumps({"picture_px": 500}))
-        _heard(narrow)
+        heard(narrow)
         site.show(1)
         assert width(next_header(narrow)) == 640
         with site.connected() as wide:
@@ -240,7 +152,7 @@ def test_a_nonsense_width_changes_nothing(site: Site, said: str):
     with site.connected() as client:
         next_header(client)
         client.send(f'{{"picture_px": {said}}}')
-        _heard(client)
+        heard(client)
         site.show(1)
         width = next_header(client)["picture"]["width"]
     assert width == MAX_WIDTH_PX
@@ -250,160 +162,3 @@ def test_a_nonsense_width_changes_nothing(site: Site, said: str):
 def test_a_nonsense_width_in_the_address_changes_nothing(site: Site, said: str):
     with site.connected(f"?picture_px={quote(said)}") as client:
         assert next_header(client)["picture"]["width"] == MAX_WIDTH_PX
-
-
-CUBOID = {"center": [20, 0, 1], "size": [4, 2, 1.5], "yaw_rad": 0.5}
-NAME, OTHER = "a" * 32, "b" * 32
-
-
-def test_what_a_page_looks_at_is_heard_until_it_leaves(site: Site):
-    looks = site.stream._looks
-    label = {"track": 7, "cuboid": CUBOID, "text": "#7 car, accepted", "role": "fused", "facing": True}
-    labels = {"labels": [label], "alone": True}
-    with site.connected() as page:
-        page.send(json.dumps({"page_3d": NAME, "selected": 7, "hides_3d": True, "labels_3d": labels}))
-        _heard(page)
-        view = looks.view_of_name(NAME)
-        assert (view.selected, looks.hiding) == (7, 1)
-        assert view.labels is not None
-        assert [each.text for each in view.labels.labels] == ["#7 car, accepted"]
-        for nonsense in ('{"selected": "7"}', '{"selected": -1}', '{"selected": 1e400}', '{"hides_3d": 2}'):
-            page.send(nonsense)
-        _heard(page)
-        assert (looks.view_of_name(NAME).selected, looks.hiding) == (7, 1)
-        page.send(json.dumps({"selected": None, "labels_3d": {**labels, "alone": 5}, "hides_3d": False}))
-        _heard(page)
-        assert (looks.view_of_name(NAME).selected, looks.view_of_name(NAME).labels) == (None, None)
-        page.send(json.dumps({"labels_3d": labels}))
-        _heard(page)
-        assert looks.view_of_name(NAME).labels is not None
-    with site.connected() as other:
-        next_header(other)
-        for _ in range(100):
-            _heard(other)
-            if looks.view_of_name(NAME).labels is None:
-                break
-    assert looks.view_of_name(NAME).labels is None
-
-
-def test_a_label_that_is_held_in_3d_is_followed_by_its_page_alone(site: Site):
-    looks = site.stream._looks
-    with site.connected() as page, site.connected() as other:
-        page.send(json.dumps({"page_3d": NAME, "held": {"track": 7, "frame": 3, "cuboid": CUBOID}}))
-        _heard(page)
-        held = looks.view_of_name(NAME).held
-        assert held is not None
-        assert (held.track, held.frame, held.cuboid) == (7, 3, Cuboid((20.0, 0.0, 1.0), (4.0, 2.0, 1.5), 0.5))
-        other.send(json.dumps({"page_3d": OTHER, "held": {"track": 9, "frame": 3, "cuboid": CUBOID}}))
-        _heard(other)
-        looks.drag(replace(held, cuboid=held.cuboid._replace(yaw_rad=1.0)), True)
-        said = {"type": "held", "track": 7, "frame": 3, "cuboid": CUBOID | {"yaw_rad": 1.0}, "ended": True}
-        assert next(message for message in _texts(page) if message["type"] == "held") == said
-        others = looks.view_of_name(OTHER).held
-        assert (others and others.track) == 9, "the other's stays where it is"
-        other.send(json.dumps({"held": None}))
-        _heard(other)
-        assert looks.view_of_name(OTHER).held is None
-        assert looks.view_of_name(NAME).held is not None, "another page holds nothing of this one's"
-        looks.pick(NAME, 4)
-        assert next(message for message in _texts(page) if message["type"] == "selected")["id"] == 4
-        assert looks.view_of_name(OTHER).selected is None
-        for nonsense in ({"track": "7", "cuboid": 3}, {"track": 7, "cuboid": CUBOID}, 5):
-            page.send(json.dumps({"held": nonsense}))
-            _heard(page)
-            assert looks.view_of_name(NAME).held is None
-            page.send(json.dumps({"held": {"track": 7, "frame": 3, "cuboid": CUBOID}}))
-        _heard(page)
-        assert looks.view_of_name(NAME).held is not None
-
-
-def _texts(client: ClientConnection) -> Iterator[dict[str, Any]]:
-    while True:
-        if isinstance(message := client.recv(WAIT_S), str):
-            yield json.loads(message)
-
-
-def _heard(client: ClientConnection) -> None:
-    """Wait until the server has read everything sent so far."""
-    client.send(json.dumps({"ping": 1}))
-    while isinstance(message := client.recv(WAIT_S), bytes) or json.loads(message)["type"] != "pong":
-        pass
-
-
-def index_of(header: dict[str, Any]) -> int:
-    return int(header["state"]["index"])
-
-
-def test_a_page_with_its_own_playhead_is_moved_by_nobody_and_moves_nobody(site: Site):
-    with site.connected() as own, site.connected() as other:
-        next_header(own)
-        own.send(json.dumps({"own": 3}))
-        mine = header_where(own, lambda header: index_of(header) == 3)
-        assert mine["result"]["frame"] != site.first.processed.result.frame  # type: ignore[union-attr]
-        site.show(5, playing=True)
-        assert index_of(header_where(other, lambda header: sequence_of(header) == 5)) == 5
-        own.send(json.dumps({"own": 2}))
-        came = [next_header(own)]
-        while index_of(came[-1]) == 3:  # its own frame again, since the state of the others has changed
-            came.append(next_header(own))
-        assert index_of(came[-1]) == 2, "what all are shown did not come in between"
-        assert not any(each["state"]["playing"] for each in came)
-        own.send(json.dumps({"own": None}))
-        assert index_of(header_where(own, lambda header: index_of(header) != 2)) == 5
-
-
-def test_the_3d_view_of_a_page_with_its_own_playhead_is_told_its_frame(site: Site):
-    def told() -> str | None:
-        shown = site.stream._looks.view_of_name(NAME).frame
-        return None if shown is None else shown.result.frame
-
-    with site.connected() as own:
-        own.send(json.dumps({"page_3d": NAME}))
-        go_to(own, 3)
-        third = told()
-        assert third not in (None, site.first.processed.result.frame)  # type: ignore[union-attr]
-        site.show(5)
-        _heard(own)
-        assert told() == third, "nobody moves it"
-        go_to(own, 2)
-        assert told() not in (None, third)
-        own.send(json.dumps({"own": None}))
-        _heard(own)
-        assert told() is None
-
-
-def test_playback_is_paused_when_no_page_follows_it(site: Site):
-    with site.connected() as watching, site.connected() as labeling:
-        next_header(watching)
-        next_header(labeling)
-        site.show(1, playing=True)
-        go_to(labeling, 3)
-        assert site.pauses == [], "somebody watches"
-        watching.send(json.dumps({"own": 2}))
-        header_where(watching, lambda header: index_of(header) == 2)
-        assert len(site.pauses) == 1
-        site.show(2, playing=True, recording=RECORDING)
-        go_to(labeling, 1)
-        assert len(site.pauses) == 1, "what is recorded goes on"
-        site.show(3, playing=True, live=True)
-        go_to(labeling, 2)
-        assert len(site.pauses) == 1, "sensors go on"
-    with site.connected("?own=1") as reloaded:
-        header_where(reloaded, lambda header: index_of(header) == 1)  # it has come
-        site.show(4, playing=True)
-        go_to(reloaded, 2)
-        assert len(site.pauses) == 2, "who watched has gone"
-
-
-def go_to(client: ClientConnection, index: int) -> None:
-    client.send(json.dumps({"own": index}))
-    header_where(client, lambda header: index_of(header) == index)
-
-
-def test_a_page_with_its_own_playhead_gets_its_frame_again_with_other_parameters_and_after_a_loss(site: Site):
-    with site.connected("?own=3") as own:
-        assert index_of(next_header(own)) == 3
-        other = with_changes(Params(), {"cluster.min_points": 7})
-        site.show(6, params=other)
-        again = header_where(own, lambda header: sequence_of(header) == 6)  # its own exact frame may come before
-        assert index_of(again) == 3
