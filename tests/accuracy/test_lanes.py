@@ -208,7 +208,6 @@ def test_both_lines_are_found_in_wide_images(data_dir: Path, kind: str, least: i
     clips = RECORDED_CLIPS if kind == "astyx" else (range(10**6),)
     detectors = Detectors(None, lanes_for(source, str(data_dir / "models" / "twinlitenet.onnx")))
     lanes = [result.layers.lanes for clip in clips for _, result in run(_Part(source, clip), Params(), detectors)]
-    both = sum(lane is not None and None not in (lane.left, lane.right) for lane in lanes)
     assert sum(lane is not None and None not in (lane.left, lane.right) for lane in lanes) >= least
 
 
