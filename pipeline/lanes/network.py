@@ -37,8 +37,8 @@ _PADDING = 114
 _MIN_SCORE = 0.3
 _GREY = 0.45
 _ROW_STEP, _FEWEST_ROWS = 8, 64
-"""The rows of a smaller input are a multiple of the network's coarsest stride. With fewer than 88, the number for Astyx,
-nothing was measured, and 64 leave 50 below the horizon."""
+"""The rows of a smaller input are a multiple of the network's coarsest stride. With fewer than 88, the number for
+Astyx, nothing was measured."""
 _MOST_SKY = 0.6
 """At most this share of an image is cut off as sky, whatever its calibration says."""
 
@@ -82,8 +82,8 @@ class LaneNetwork:
         return RawLanes(self.name, uv[inside].astype(np.float32), found.score[keep][inside], found.line[keep][inside])
 
     def of_camera(self, camera: CameraCalibration | None) -> LaneNetwork:
-        """The same network for images of another camera; None if it is not known. It is loaded again only if the size of
-        its input depends on the camera."""
+        """The same network for images of another camera; None if it is not known. It is loaded again only if the size
+        of its input depends on the camera."""
         outline = image_outline(camera)
         if self.head.keeps_aspect and outline != self.outline:
             return load_lane_network(self.path, self.threads, outline)
