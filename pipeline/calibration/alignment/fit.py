@@ -25,7 +25,7 @@ from pipeline.calibration.alignment.doubts import Found, looks_like_radians, war
 from pipeline.calibration.alignment.edge_fit import STEPS as EDGE_STEPS
 from pipeline.calibration.alignment.edge_fit import fit_edges
 from pipeline.calibration.alignment.edges import ROLL_STEPS, EdgeView, RollScores, roll_scores
-from pipeline.calibration.alignment.models import PLACE, FitModel, ModelName
+from pipeline.calibration.alignment.models import PLACE, FitModel, ModelName, rounded
 from pipeline.calibration.alignment.overlaps import Overlaps, most_overlap, overlaps_of
 from pipeline.calibration.alignment.pairs import PairTable
 from pipeline.calibration.alignment.scenes import FitScene
@@ -163,7 +163,7 @@ def fit_alignment(
     after, *before = overlaps_of(judged, model, [vector, *([start] if start is not None else [])])
     return AlignmentFit(
         model=name,
-        values=_rounded(model.values(vector)),
+        values=rounded(model.values(vector)),
         sigmas={key: round(value, 5) for key, value in sigmas.items()},
         frames=len(train),
         pairs=len(rows),
@@ -284,8 +284,3 @@ def _too_few(pairs: int, boxes: int) -> str:
         f"only {pairs} of {boxes} detected vehicles can be paired with LiDAR clusters at once; "
         "choose a drive with more traffic within 40 m"
     )
-
-
-def _rounded(values: Mapping[str, float]) -> dict[str, float]:
-    digits = {"h_res_deg": 5, "v_res_deg": 5, "cx_px": 1, "cy_px": 1}
-    return {name: round(value, digits.get(name, 3)) for name, value in values.items()}
