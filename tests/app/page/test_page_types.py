@@ -18,6 +18,7 @@ from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
 from app.web.routes.alignment.files import ImportJson
 from app.web.routes.alignment.fit import FitResult
+from app.web.routes.alignment.pairs import PairFitJson, PairsJson
 from app.web.routes.alignment.progress import FitProgress
 from app.web.routes.alignment.time import TimeFitResult
 from app.web.server import create_app
@@ -109,6 +110,8 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "AlignmentVersion": client.post("/api/alignment/versions", json={"note": ""}).json(),
         "AlignmentFitResult": dict.fromkeys(FitResult.model_fields),
         "AlignmentImport": dict.fromkeys(ImportJson.model_fields),
+        "PairsAnswer": dict.fromkeys(PairsJson.model_fields),
+        "PairFit": dict.fromkeys(PairFitJson.model_fields),
         "TimeFitResult": dict.fromkeys(TimeFitResult.model_fields),
         **labelled(engine, client),
     }
