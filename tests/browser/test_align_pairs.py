@@ -176,7 +176,7 @@ def test_a_finger_picks_points_and_clusters_and_zooms_no_roll(pages: Pages, knoc
         pane.get_by_role("button", name="Cluster").tap()
         expect(step).to_have_text("Press an object's LiDAR points for another pair.")
         hand.pick_cluster()
-        expect(step).to_have_text(re.compile(r"Middle of \d{2,} points at \d+\.\d m\. Now press"))
+        expect(step).to_have_text(re.compile(r"Object at \d+\.\d m\. Now press the middle of its lower edge"))
         apply = pane.get_by_role("button", name="Apply")
         expect(apply).to_be_in_viewport(ratio=1.0)
         page.mouse.move(400, 350)

@@ -55,7 +55,7 @@ BLOCK_NS = 1_000_000_000
 """Frames within a second show the same cars and are resampled together."""
 HELD_OUT = 5
 """Every fifth block is held out for the score."""
-SHARED_DEG = {"yaw_deg": 0.1, "pitch_deg": 0.15}
+SHARED_DEG = {"yaw_deg": 0.1, "pitch_deg": 0.15, "roll_deg": 0.1}
 """Standard deviation of errors that all frames share and resampling cannot show: a detector draws the lower edge of
 every car a few pixels too high or too low, and the LiDAR misses the sides of every car. Root mean square of the median
 errors on KITTI 0009, KITTI 0052 and Astyx; those of any two of them cover the third within two standard deviations."""
@@ -182,7 +182,7 @@ def _by_edges(
     edges = fit_edges(views, model, boxes.vector, lambda done: progress(_EDGES_FROM + done, STEPS))
     if edges is None:
         return boxes, None
-    shared = np.array(list(SHARED_DEG.values()))
+    shared = np.array([SHARED_DEG["yaw_deg"], SHARED_DEG["pitch_deg"]])
     off = np.abs(_boxes_off(table, model, edges.vector)) / np.hypot(np.hypot(edges.sigmas[:2], shared), shared)
     if off.max() > AGREED_SIGMAS or explained(table, model, edges.vector) < AGREED * boxes.explained:
         return boxes, None

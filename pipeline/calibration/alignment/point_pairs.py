@@ -32,8 +32,9 @@ from pipeline.types import F64, I64, CameraCalibration
 PICK_DEG = 0.2
 """Standard deviation of a picked pixel, per axis: the distance between a LiDAR's points, and a steady hand."""
 CLUSTER_M = 0.25
-"""Standard deviation of the middle of a cluster against the middle of its vehicle in the image: rings miss the roof and
-the bumper by up to half their gap."""
+"""Standard deviation of where the vehicle of a cluster stands on the road, in the middle of its width: beams miss its
+sides, and the road below it is hidden. With detected boxes in place of the hand, errors on KITTI 0009 and Astyx are
+within two deviations of the fit in 77 to 100 % of the cases."""
 FEWEST = 2
 """Minimum number of pairs, each of two equations, for three angles or for the four values of the angular model; the
 position needs one more."""

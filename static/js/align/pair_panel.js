@@ -10,7 +10,7 @@ import { apply, clear, hasHistory, isPairing, pairs, remove, setKind, undo } fro
 
 const kinds = [
   kindButton("point", "Point", "Pick single LiDAR points"),
-  kindButton("cluster", "Cluster", "Pick the middle of an object's LiDAR points; less exact, counts less"),
+  kindButton("cluster", "Cluster", "Pick a vehicle by any of its LiDAR points, and the middle of its lower edge; counts less"),
 ];
 const step = el("p", { class: "pair-step", aria: { role: "status" } });
 const list = el("ol", { class: "pair-list" });
@@ -52,8 +52,9 @@ export function nextStep() {
   const { picked, kind, said, list: all } = pairs();
   if (said) return said;
   if (picked) {
-    const what = picked.kind === "cluster" ? `Middle of ${picked.dots.length} points` : "Point";
-    return `${what} at ${distance(picked)} m. Now press where it belongs in the image. Esc: release.`;
+    return picked.kind === "cluster"
+      ? `Object at ${distance(picked)} m. Now press the middle of its lower edge in the image. Esc: release.`
+      : `Point at ${distance(picked)} m. Now press where it belongs in the image. Esc: release.`;
   }
   const what = kind === "cluster" ? "an object's LiDAR points" : "a LiDAR point";
   return all.length ? `Press ${what} for another pair.` : `Press ${what}, then the pixel where it belongs.`;

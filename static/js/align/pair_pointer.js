@@ -3,6 +3,7 @@
  * its pixel. A drag moves the zoomed image.
  */
 import { get, set } from "../core/store.js";
+import { groundAt } from "../labeling/views/cuboid.js";
 import { place as imagePlace } from "../views/camera.js";
 import { pointAt } from "../views/drawing/hit_test.js";
 import { pan } from "../views/image_zoom.js";
@@ -87,7 +88,7 @@ function hover(event) {
 function pickedAt(x, y, reach) {
   const frame = get("frame"),
     { kind } = pairs();
-  if (!frame?.image) return null;
+  if (!frame?.image || (kind === "cluster" && !frame.display.ground?.planes.length)) return null;
   const [u, v] = sentPixel(x, y),
     counts = kind === "cluster" ? (/** @type {number} */ i) => frame.owner[i] > 0 : undefined;
   const nearest = pointAt(frame, u, v, reach / imagePlace().scale, counts);
@@ -96,7 +97,7 @@ function pickedAt(x, y, reach) {
   const scale = frame.image.scale ?? 1;
   return {
     kind,
-    point: kind === "cluster" ? middle(frame, chosen) : placeOf(frame, nearest),
+    point: kind === "cluster" ? foot(frame, chosen) : placeOf(frame, nearest),
     dots: chosen.map((i) => [frame.uv[2 * i] / scale, frame.uv[2 * i + 1] / scale]),
     name: frame.result.frame,
     frame: frameKey(),
@@ -132,17 +133,18 @@ function sameOwner({ count, owner }, of) {
 }
 
 /**
- * The middle between the outermost directions of a cluster's points, at their median distance.
+ * Where the vehicle of a cluster stands on the road: in the middle of its width, at its nearest point. Rings miss its
+ * roof and its lower edge, so that the middle of its height is not known.
  * @param {Frame} frame @param {number[]} indices
  * @returns {[number, number, number]} metres
  */
-function middle(frame, indices) {
+function foot(frame, indices) {
   const places = indices.map((i) => placeOf(frame, i));
-  const ranges = places.map(([x, y]) => Math.hypot(x, y)).sort((a, b) => a - b),
-    range = ranges[Math.floor(ranges.length / 2)];
-  const bearing = halfway(places.map(([x, y]) => Math.atan2(y, x))),
-    slope = halfway(places.map(([x, y, z]) => z / Math.hypot(x, y)));
-  return [range * Math.cos(bearing), range * Math.sin(bearing), range * slope];
+  const range = Math.min(...places.map(([x, y]) => Math.hypot(x, y))),
+    bearing = halfway(places.map(([x, y]) => Math.atan2(y, x)));
+  const x = range * Math.cos(bearing),
+    y = range * Math.sin(bearing);
+  return [x, y, groundAt(frame.display.ground, { x, y })];
 }
 
 /** @param {number[]} values */

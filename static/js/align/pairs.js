@@ -11,7 +11,7 @@ import { save as saveVersion } from "./versions.js";
 /** @typedef {import("../core/types.js").PairsAnswer} PairsAnswer */
 /** @typedef {"point"|"cluster"} PairKind */
 /**
- * @typedef {object} Picked a LiDAR point, or the middle of a cluster
+ * @typedef {object} Picked a LiDAR point, or where the vehicle of a cluster stands on the road
  * @property {PairKind} kind
  * @property {[number, number, number]} point ego frame, metres
  * @property {[number, number][]} dots its points, pixels of the original image

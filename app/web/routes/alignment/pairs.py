@@ -34,7 +34,7 @@ class GivenPair(ApiModel):
     pixel: tuple[Finite, Finite]
     """Column and row of the original image."""
     kind: Literal["point", "cluster"] = "point"
-    """``cluster``: the middle of a cluster, which counts less."""
+    """``cluster``: where the vehicle of a cluster stands on the road, which counts less."""
 
     def value(self) -> PointPair:
         return PointPair(np.array(self.point), np.array(self.pixel), CLUSTER_M if self.kind == "cluster" else 0.0)
