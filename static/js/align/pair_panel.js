@@ -6,11 +6,11 @@ import { apply, clear, hasHistory, isPairing, pairs, remove, setKind, undo } fro
 
 /** @typedef {import("./pairs.js").Pair} Pair */
 /** @typedef {import("./pairs.js").PairKind} PairKind */
-/** @typedef {import("../core/types.js").PairsAnswer} PairsAnswer */
+/** @typedef {import("./types.js").PairsAnswer} PairsAnswer */
 
 const kinds = [
   kindButton("point", "Point", "Pick single LiDAR points"),
-  kindButton("cluster", "Cluster", "Pick a vehicle by any of its LiDAR points, and the middle of its lower edge; counts less"),
+  kindButton("cluster", "Cluster", "Pick a vehicle by its points, and the middle of its lower edge; counts less"),
 ];
 const step = el("p", { class: "pair-step", aria: { role: "status" } });
 const list = el("ol", { class: "pair-list" });
@@ -97,7 +97,11 @@ function row(pair, k, answer) {
     el("b", { textContent: String(k + 1) }),
     el("span", { textContent: `${distance(pair)} m${pair.kind === "cluster" ? " · cluster" : ""}` }),
     el("span", { class: "facts", textContent: isHere ? "" : pair.name, title: `Picked in frame ${pair.name}` }),
-    el("span", { class: "off", textContent: offText(pair, k, answer), title: "Distance from its pixel, now and fitted" }),
+    el("span", {
+      class: "off",
+      textContent: offText(pair, k, answer),
+      title: "Distance from its pixel, now and fitted",
+    }),
     el("button", {
       type: "button",
       class: "quiet",

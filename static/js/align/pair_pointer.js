@@ -1,6 +1,6 @@
 /**
- * Picking pairs in the camera image, with mouse or finger: the first press picks a LiDAR point or cluster, the second one
- * its pixel. A drag moves the zoomed image.
+ * Picking pairs in the camera image, with mouse or finger: the first press picks a LiDAR point or cluster, the second
+ * one its pixel. A drag moves the zoomed image.
  */
 import { get, set } from "../core/store.js";
 import { groundAt } from "../labeling/views/cuboid.js";

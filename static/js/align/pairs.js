@@ -1,6 +1,6 @@
 /**
- * Pairs of a LiDAR point and the pixel where it belongs, picked by hand, and the alignment that the server fits to them.
- * Pairs of several frames count together. They stay in this page, and change nothing until their fit is applied.
+ * Pairs of a LiDAR point and the pixel where it belongs, picked by hand, and the alignment that the server fits to
+ * them. Pairs of several frames count together. They stay in this page, and change nothing until their fit is applied.
  */
 import { newestOnly, playback, request } from "../core/api.js";
 import { get, on, set } from "../core/store.js";
@@ -8,7 +8,7 @@ import { change, settled } from "../panels/params.js";
 import { fitsPosition, model, positionSwitch } from "./fit.js";
 import { save as saveVersion } from "./versions.js";
 
-/** @typedef {import("../core/types.js").PairsAnswer} PairsAnswer */
+/** @typedef {import("./types.js").PairsAnswer} PairsAnswer */
 /** @typedef {"point"|"cluster"} PairKind */
 /**
  * @typedef {object} Picked a LiDAR point, or where the vehicle of a cluster stands on the road

@@ -273,19 +273,6 @@
  * @property {string} text
  * @property {string[]} warnings
  *
- * @typedef {object} PairsAnswer
- * @property {([number, number]|null)[]} present
- * @property {PairFit|null} fit
- * @property {string} text
- *
- * @typedef {object} PairFit
- * @property {Record<string, number|string>} changes
- * @property {Record<string, number>} sigmas
- * @property {([number, number]|null)[]} fitted
- * @property {number} rms_px
- * @property {number[]} outliers
- * @property {string[]} warnings
- *
  * @typedef {object} TimeFitResult
  * @property {Record<string, number>} changes
  * @property {Record<string, number>} sigmas

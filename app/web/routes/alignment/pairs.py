@@ -13,7 +13,7 @@ from pydantic import ConfigDict, Field
 from app.core.request_shapes import Finite
 from app.engine.engine import Engine
 from app.web.routes.alignment.shown import shown_frame
-from app.web.routes.shapes.common import ApiModel
+from app.web.routes.shapes.common import ApiModel, Point
 from pipeline.alignment.projection import resolve
 from pipeline.calibration.alignment.models import ModelName
 from pipeline.calibration.alignment.point_pair_doubts import PairsRefused
@@ -21,7 +21,6 @@ from pipeline.calibration.alignment.point_pairs import CLUSTER_M, PointPair, Poi
 from pipeline.types import F64
 
 MOST_PAIRS = 100
-Pixel = tuple[float, float]
 
 
 class GivenPair(ApiModel):
@@ -48,6 +47,7 @@ class GivenPairs(ApiModel):
     model: Annotated[ModelName, Field(description="angular needs no calibration")] = "pinhole"
     offset: bool = Field(False, description="pinhole: also fit the camera's lateral and vertical position")
     pairs: list[GivenPair] = Field(max_length=MOST_PAIRS)
+    """In the order in which warnings number them, from 1."""
 
 
 class PairFitJson(ApiModel):
@@ -57,7 +57,7 @@ class PairFitJson(ApiModel):
     """Parameters by dotted name, as PATCH /api/params takes them."""
     sigmas: dict[str, float]
     """Standard deviation of each value."""
-    fitted: list[Pixel | None]
+    fitted: list[Point | None]
     """Pixels of the points with the fit; null for one that the camera cannot see."""
     rms_px: float
     """Root mean square distance of these from the picked pixels, without outliers."""
@@ -70,7 +70,7 @@ class PairFitJson(ApiModel):
 class PairsJson(ApiModel):
     """Pairs with the present parameters, and their fit."""
 
-    present: list[Pixel | None]
+    present: list[Point | None]
     """Pixels of the points with the present parameters; null for one that the camera cannot see, or without any
     alignment."""
     fit: PairFitJson | None
@@ -121,5 +121,5 @@ def _sentence(pairs: Sequence[PointPair], present: F64, found: PointPairFit) -> 
     return f"Points are {before}{found.rms_px:.1f} px from their pixels (root mean square of {len(used)} pairs)"
 
 
-def _pixels(uv: F64) -> list[Pixel | None]:
+def _pixels(uv: F64) -> list[Point | None]:
     return [(u, v) if np.isfinite((u, v)).all() else None for u, v in np.round(uv, 2).tolist()]
