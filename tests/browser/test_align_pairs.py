@@ -110,16 +110,19 @@ def begun(page: Page) -> Locator:
 
 def test_pairs_are_picked_checked_undone_and_their_fit_applied(pages: Pages, knocked: Site):
     with opening(pages, knocked) as begin:
-        page = begin()
+        page = begin(1280, 720)
         pane, hand = begun(page), Hand(page, knocked)
+        expect(page.locator(".ranges")).not_to_be_empty()
         step, rows, apply = pane.get_by_role("status"), pane.locator("li[data-wrong]"), pane.get_by_text("Apply")
         expect(step).to_have_text("Press a LiDAR point, then the pixel where it belongs.")
         hand.sky()
         expect(step).to_have_text("No LiDAR point here: press nearer to one.")
         first, *others, last = hand.spread(6)
 
+        canvas, at_first = page.locator("#camera"), page.locator("#camera").bounding_box()
         hand.pick(first)
         expect(step).to_have_text(re.compile(r"Point at \d+\.\d m\. Now press where it belongs"))
+        assert canvas.bounding_box() == at_first, "the image stays where it is between two presses"
         page.keyboard.press("Escape")
         expect(step).to_have_text("Press a LiDAR point, then the pixel where it belongs.")
         hand.pick(first)
@@ -174,7 +177,7 @@ def test_a_finger_picks_points_and_clusters_and_zooms_no_roll(pages: Pages, knoc
             expect(rows).to_have_count(number)
         expect(pane).to_contain_text(re.compile(r"yaw[12]\.\d\d° ±"))
         pane.get_by_role("button", name="Cluster").tap()
-        expect(step).to_have_text("Press an object's LiDAR points for another pair.")
+        expect(step).to_have_text("Press a vehicle's LiDAR points for another pair.")
         hand.pick_cluster()
         expect(step).to_have_text(re.compile(r"Object at \d+\.\d m\. Now press the middle of its lower edge"))
         apply = pane.get_by_role("button", name="Apply")

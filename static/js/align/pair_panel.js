@@ -56,8 +56,10 @@ export function nextStep() {
       ? `Object at ${distance(picked)} m. Now press the middle of its lower edge in the image. Esc: release.`
       : `Point at ${distance(picked)} m. Now press where it belongs in the image. Esc: release.`;
   }
-  const what = kind === "cluster" ? "an object's LiDAR points" : "a LiDAR point";
-  return all.length ? `Press ${what} for another pair.` : `Press ${what}, then the pixel where it belongs.`;
+  if (all.length) return `Press ${kind === "cluster" ? "a vehicle's LiDAR points" : "a LiDAR point"} for another pair.`;
+  return kind === "cluster"
+    ? "Press a vehicle's LiDAR points, then the middle of its lower edge."
+    : "Press a LiDAR point, then the pixel where it belongs.";
 }
 
 function show() {

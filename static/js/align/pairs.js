@@ -56,8 +56,8 @@ export function setUp() {
     const { values } = get("params") ?? { values: {} };
     const alignment = JSON.stringify(Object.entries(values).filter(([name]) => name.startsWith("alignment.")));
     if (alignment === knownValues) return;
+    if (knownValues) isLast = false; // the parameters were changed after the pairs; the first ones are no change
     knownValues = alignment;
-    isLast = false;
     refit();
   });
   on(["state"], () => {
