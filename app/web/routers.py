@@ -23,6 +23,7 @@ from app.web.metrics import Metrics
 from app.web.routes.account import account_router
 from app.web.routes.alignment.files import alignment_files_router
 from app.web.routes.alignment.fit import alignment_fit_router
+from app.web.routes.alignment.pairs import alignment_pairs_router
 from app.web.routes.alignment.score import alignment_router
 from app.web.routes.alignment.time import time_fit_router
 from app.web.routes.alignment.versions import alignment_versions_router
@@ -91,6 +92,7 @@ ROUTERS: list[Callable[[Services], APIRouter]] = [
     lambda on: time_fit_router(on.engine, on.time_fitting),
     lambda on: alignment_versions_router(on.engine, on.alignments, on.scenes, on.fitting),
     lambda on: alignment_files_router(on.engine),
+    lambda on: alignment_pairs_router(on.engine),
     lambda on: project_router(on.engine),
     lambda on: fleet_router(on.fleet),
     lambda on: rerun_router(on.engine, on.viewer),

@@ -193,7 +193,7 @@ def test_in_a_small_window_nothing_covers_the_image_and_every_button_is_in_sight
     page.keyboard.press("a")
     expect(page.locator("html")).to_have_attribute("data-inspect", "closed")
     bar = page.locator("#align-bar")
-    for name in ("pinhole", "Fit", "Time", "Versions", "Files", "Edges", "Regions"):
+    for name in ("pinhole", "Fit", "Time", "Pairs", "Versions", "Files", "Edges", "Regions"):
         button = bar.get_by_role("button", name=name, exact=True)
         expect(button).to_be_in_viewport(ratio=1.0)
         button.click(trial=True)

@@ -25,7 +25,7 @@ from pipeline.calibration.alignment.doubts import Found, looks_like_radians, war
 from pipeline.calibration.alignment.edge_fit import STEPS as EDGE_STEPS
 from pipeline.calibration.alignment.edge_fit import fit_edges
 from pipeline.calibration.alignment.edges import ROLL_STEPS, EdgeView, RollScores, roll_scores
-from pipeline.calibration.alignment.models import PLACE, FitModel, ModelName
+from pipeline.calibration.alignment.models import PLACE, FitModel, ModelName, rounded
 from pipeline.calibration.alignment.overlaps import Overlaps, most_overlap, overlaps_of
 from pipeline.calibration.alignment.pairs import PairTable
 from pipeline.calibration.alignment.scenes import FitScene
@@ -55,7 +55,7 @@ BLOCK_NS = 1_000_000_000
 """Frames within a second show the same cars and are resampled together."""
 HELD_OUT = 5
 """Every fifth block is held out for the score."""
-SHARED_DEG = {"yaw_deg": 0.1, "pitch_deg": 0.15}
+SHARED_DEG = {"yaw_deg": 0.1, "pitch_deg": 0.15, "roll_deg": 0.1}
 """Standard deviation of errors that all frames share and resampling cannot show: a detector draws the lower edge of
 every car a few pixels too high or too low, and the LiDAR misses the sides of every car. Root mean square of the median
 errors on KITTI 0009, KITTI 0052 and Astyx; those of any two of them cover the third within two standard deviations."""
@@ -163,7 +163,7 @@ def fit_alignment(
     after, *before = overlaps_of(judged, model, [vector, *([start] if start is not None else [])])
     return AlignmentFit(
         model=name,
-        values=_rounded(model.values(vector)),
+        values=rounded(model.values(vector)),
         sigmas={key: round(value, 5) for key, value in sigmas.items()},
         frames=len(train),
         pairs=len(rows),
@@ -182,7 +182,7 @@ def _by_edges(
     edges = fit_edges(views, model, boxes.vector, lambda done: progress(_EDGES_FROM + done, STEPS))
     if edges is None:
         return boxes, None
-    shared = np.array(list(SHARED_DEG.values()))
+    shared = np.array([SHARED_DEG["yaw_deg"], SHARED_DEG["pitch_deg"]])
     off = np.abs(_boxes_off(table, model, edges.vector)) / np.hypot(np.hypot(edges.sigmas[:2], shared), shared)
     if off.max() > AGREED_SIGMAS or explained(table, model, edges.vector) < AGREED * boxes.explained:
         return boxes, None
@@ -284,8 +284,3 @@ def _too_few(pairs: int, boxes: int) -> str:
         f"only {pairs} of {boxes} detected vehicles can be paired with LiDAR clusters at once; "
         "choose a drive with more traffic within 40 m"
     )
-
-
-def _rounded(values: Mapping[str, float]) -> dict[str, float]:
-    digits = {"h_res_deg": 5, "v_res_deg": 5, "cx_px": 1, "cy_px": 1}
-    return {name: round(value, digits.get(name, 3)) for name, value in values.items()}

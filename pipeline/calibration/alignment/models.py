@@ -139,5 +139,11 @@ class FitModel:
         return np.array([low, low, -60.0, -45.0]), np.array([high, high, 60.0, 45.0])
 
 
+def rounded(values: Mapping[str, float]) -> dict[str, float]:
+    """Parameter values with as many digits as mean something."""
+    digits = {"h_res_deg": 5, "v_res_deg": 5, "cx_px": 1, "cy_px": 1}
+    return {name: round(value, digits.get(name, 3)) for name, value in values.items()}
+
+
 def _product(axes: Sequence[Sequence[float] | F64]) -> F64:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))

@@ -13,16 +13,19 @@ const yaml = el("a", {
 });
 yaml.setAttribute("download", "cipv-alignment.yaml");
 
-const model = () => get("params")?.values["alignment.model"] ?? "pinhole";
+/** The alignment model in use. */
+export const model = () => get("params")?.values["alignment.model"] ?? "pinhole";
 
 const position = el("input", { type: "checkbox" });
-/** Whether a fit moves the camera, too. */
+/** The switch for `fitsPosition`. */
 export const positionSwitch = el(
   "label",
   { class: "check", title: "Also fit the camera's lateral and vertical position; makes the angles less certain" },
   position,
   "Position",
 );
+/** Whether a fit is to move the camera, too. */
+export const fitsPosition = () => model() === "pinhole" && position.checked;
 on(["params"], () => {
   position.disabled = model() !== "pinhole"; // the angular model has no position
   positionSwitch.classList.toggle("is-off", position.disabled);
@@ -36,7 +39,7 @@ export const alignmentFit = fitJob(
     running: "Fitting the alignment",
     panel: "Fitted alignment",
     address: "api/alignment/fit",
-    asked: () => ({ model: model(), offset: model() === "pinhole" && position.checked }),
+    asked: () => ({ model: model(), offset: fitsPosition() }),
     heading: ({ pairs, frames }) => `Fitted to ${pairs} vehicles in ${frames} frames`,
     said: (found) => found.text,
     label: labelOf,

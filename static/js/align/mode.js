@@ -9,6 +9,10 @@ import { change, reveal } from "../panels/params.js";
 import { filesButton, filesPanel } from "./files.js";
 import { alignmentFit, positionSwitch, timeFit } from "./fit.js";
 import { drawRegions, rangesRow, regionsButton, showRegions } from "./regions.js";
+import { drawPairs } from "./pair_drawing.js";
+import { fill as fillPairs, nextStep } from "./pair_panel.js";
+import { followPresses } from "./pair_pointer.js";
+import { isPairing, setUp as setUpPairs, toggle as togglePairs } from "./pairs.js";
 import { versionsButton, versionsPanel } from "./versions.js";
 import { followHand } from "./pointer.js";
 import { drawEdges } from "./image_edges.js";
@@ -52,6 +56,7 @@ export function setUp() {
     alignmentFit.control,
     positionSwitch,
     timeFit.control,
+    pairsButton(),
     versionsButton,
     filesButton,
     el("span", { class: "spacer" }),
@@ -66,11 +71,15 @@ export function setUp() {
       versionsPanel,
     ),
   );
-  followHand($("#camera", HTMLCanvasElement), isOn);
+  fillPairs($("#pair-pane"));
+  setUpPairs();
+  followHand($("#camera", HTMLCanvasElement), () => isOn() && !isPairing());
+  followPresses($("#camera", HTMLCanvasElement));
   addLayer((ctx, frame, place) => isOn() && get("align")?.edges && drawEdges(ctx, frame, place));
   addLayer((ctx, frame, place) => isOn() && get("align")?.regions && drawRegions(ctx, frame, place), "over");
+  addLayer(drawPairs, "over");
   on(["frame"], () => isOn() && fetchScore(undefined));
-  on(["align", "params"], reflect);
+  on(["align", "params", "pairs"], reflect);
 }
 
 const isOn = () => get("align")?.on === true;
@@ -79,7 +88,7 @@ const isAngular = () => get("params")?.values["alignment.model"] === "angular";
 export function toggleAlign() {
   set("align", { ...(get("align") ?? OFF), on: !isOn() });
   if (isOn() !== (get("layout")?.grown === "camera")) grow("camera");
-  if (!isOn()) return;
+  if (!isOn()) return pairUp(false);
   revealSliders(get("params")?.values["alignment.model"]);
   resetInspector(); // in a narrow window, the sliders would cover the image that is being aligned
   fetchScore(undefined);
@@ -95,12 +104,32 @@ function reflect() {
   $(".fit-place").hidden = !isOn();
   press(button, isOn());
   document.body.classList.toggle("is-aligning", isOn());
-  text(
-    how,
-    isAngular() ? "Drag: origin · scroll: h_res and v_res · Shift + scroll: v_res" : "Drag: yaw, pitch · scroll: roll",
-  );
+  text(how, isPairing() ? nextStep() : drag());
   for (const choice of bar.querySelectorAll("[data-model]"))
     press(choice, /** @type {HTMLElement} */ (choice).dataset.model === get("params")?.values["alignment.model"]);
+}
+
+const drag = () =>
+  isAngular() ? "Drag: origin · scroll: h_res and v_res · Shift + scroll: v_res" : "Drag: yaw, pitch · scroll: roll";
+
+/** Pick pairs, or drag again. @param {boolean} isOn */
+function pairUp(isOn) {
+  if (isOn === isPairing()) return;
+  const shown = { edges: !isOn, regions: !isOn }; // they would cover what is picked
+  set("align", { ...(get("align") ?? OFF), ...shown });
+  togglePairs(isOn);
+  if (!isOn) revealSliders(get("params")?.values["alignment.model"]); // the pane of pairs was in their place
+}
+
+function pairsButton() {
+  const pairs = el("button", {
+    type: "button",
+    textContent: "Pairs",
+    title: "Pick LiDAR points and the pixels where they belong, and fit the alignment to them",
+    onclick: () => pairUp(!isPairing()),
+  });
+  on(["pairs"], () => press(pairs, isPairing()));
+  return pairs;
 }
 
 /** @param {string} name */

@@ -19,6 +19,8 @@
  * @property {{first: number, last: number}} clip what is marked for export
  * @property {import("../workspace/panes.js").Layout} layout
  * @property {{on: boolean, blend: number, edges: boolean, regions: boolean}} align alignment mode
+ * @property {import("../align/pairs.js").Pairs} pairs of LiDAR points and pixels, picked by hand
+ * @property {import("../align/pairs.js").Picked} pairHover what a press would pick
  * @property {number} lanes how many lanes the timeline has
  * @property {Labeling} labeling state of the labeling mode
  * @property {import("../labeling/state/labels.js").Labels} labels

@@ -1,5 +1,6 @@
 /** All keyboard shortcuts: their actions and their help texts. */
 import { toggleAlign } from "../align/mode.js";
+import * as pairs from "../align/pairs.js";
 import { playback } from "../core/api.js";
 import { toDifference, toEvent } from "../drive/jumps.js";
 import { seekTo } from "../drive/seek.js";
@@ -48,6 +49,14 @@ export const keymap = () => withOwn(defaults());
 /** @returns {Group[]} */
 const defaults = () => [
   ...labelKeys(),
+  {
+    title: "Aligning by pairs",
+    mode: "pairs",
+    bindings: [
+      { ...key("Ctrl+z", "Ctrl Z", "undo the last pair added or removed", pairs.undo), isOn: pairs.isUndoNext },
+      { ...key("Escape", "Esc", "release the picked LiDAR point", pairs.release), isOn: pairs.isPicked },
+    ],
+  },
   {
     title: "Playback",
     bindings: [

@@ -7,7 +7,7 @@ import { num } from "../core/format.js";
 import { followHover } from "./hover.js";
 import { Labels } from "./drawing/text_labels.js";
 import { drawBox, drawObjects, drawPath, drawWindow } from "./drawing/image.js";
-import { nearestPoint, ownerOf } from "./drawing/hit_test.js";
+import { ownerOf, pointAt } from "./drawing/hit_test.js";
 import { GROUND, tints } from "./drawing/point_colors.js";
 import { DotRaster } from "./drawing/dot_raster.js";
 import { get, on, paint, select, set } from "../core/store.js";
@@ -19,7 +19,6 @@ import { drawTape, measure } from "./measuring_tape.js";
 /** @typedef {{x: number, y: number, scale: number}} Place */
 /** @typedef {(ctx: CanvasRenderingContext2D, frame: Frame, place: Place) => void} Layer */
 
-const UNSEEN = -32768;
 const NBSP = "\u00a0";
 /** From this zoom on, single pixels are shown. */
 const SINGLE_PX = 3;
@@ -64,6 +63,8 @@ export function setUp() {
       "track",
       "draft",
       "projected",
+      "pairs",
+      "pairHover",
       "threshold",
     ],
     draw,
@@ -174,8 +175,9 @@ function drawPoints(ctx, frame) {
   const right = Math.min(surface.width, laid.x + width * scale),
     bottom = Math.min(surface.height, laid.y + height * scale);
   raster.begin(right - left, bottom - top);
+  const more = get("pairs")?.isOn ? 1 : 0; // points to be pressed are larger
   for (const isGround of [true, false]) {
-    const size = isGround ? 1 : 2;
+    const size = (isGround ? 1 : 2) + more;
     for (let i = 0; i < count; i++) {
       const u = uv[2 * i],
         v = uv[2 * i + 1];
@@ -230,27 +232,8 @@ function objectAt(px, py) {
     hit?.id ??
     ownerOf(
       frame,
-      pointAt(frame, u, v, PICK_PX, (i) => frame.owner[i] > 0),
+      pointAt(frame, u, v, PICK_PX / laid.scale, (i) => frame.owner[i] > 0),
     )
-  );
-}
-
-/**
- * @param {Frame} frame
- * @param {number} u
- * @param {number} v
- * @param {number} reach pixels of the canvas
- * @param {(i: number) => boolean} [counts]
- */
-function pointAt({ count, uv }, u, v, reach, counts = () => true) {
-  return nearestPoint(
-    count,
-    (i) => uv[2 * i] !== UNSEEN && counts(i),
-    (i) => uv[2 * i],
-    (i) => uv[2 * i + 1],
-    u,
-    v,
-    reach / laid.scale,
   );
 }
 
@@ -275,7 +258,7 @@ function followTape() {
 function spotAt({ offsetX, offsetY }) {
   const frame = get("frame");
   if (!frame) return null;
-  const i = pointAt(frame, (offsetX - laid.x) / laid.scale, (offsetY - laid.y) / laid.scale, HOLD_PX);
+  const i = pointAt(frame, (offsetX - laid.x) / laid.scale, (offsetY - laid.y) / laid.scale, HOLD_PX / laid.scale);
   if (i < 0) return null;
   const { xyz, uv } = frame;
   return { x: xyz[3 * i] / 100, y: xyz[3 * i + 1] / 100, z: xyz[3 * i + 2] / 100, u: uv[2 * i], v: uv[2 * i + 1] };

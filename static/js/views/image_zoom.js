@@ -17,6 +17,9 @@ let changed = () => {};
 /** Size of the pane. @type {() => {width: number, height: number}} */
 let pane = () => ({ width: 0, height: 0 });
 
+/** Whether a drag and the wheel align LiDAR and camera. */
+const isTurning = () => get("align")?.on && !get("pairs")?.isOn;
+
 export const isZoomed = () => view.factor > 1;
 
 /**
@@ -56,7 +59,7 @@ export function setUp(canvas, size, redraw) {
   canvas.addEventListener(
     "wheel",
     (event) => {
-      if (get("align")?.on || !imageSize()) return;
+      if (isTurning() || !imageSize()) return;
       event.preventDefault();
       zoomAt(event.offsetX, event.offsetY, Math.exp(-event.deltaY * (event.ctrlKey ? PINCH : WHEEL)));
     },
@@ -94,7 +97,7 @@ function pinch(canvas) {
     if (!fingers.has(event.pointerId)) return;
     const before = fingers.size === 2 ? grip() : null;
     put(event);
-    if (!before || get("align")?.on || !imageSize()) return;
+    if (!before || isTurning() || !imageSize()) return;
     const after = grip();
     pan(after.x - before.x, after.y - before.y);
     zoomAt(after.x, after.y, after.apart / before.apart);

@@ -1,4 +1,4 @@
-"""What types.js, drive/types.js and labeling/types.js say of a message is what is sent: no key more, no key less."""
+"""What types.js of core, drive, labeling and align say of a message is what is sent: no key more, no key less."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
 from app.web.routes.alignment.files import ImportJson
 from app.web.routes.alignment.fit import FitResult
+from app.web.routes.alignment.pairs import PairFitJson, PairsJson
 from app.web.routes.alignment.progress import FitProgress
 from app.web.routes.alignment.time import TimeFitResult
 from app.web.server import create_app
@@ -109,6 +110,8 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "AlignmentVersion": client.post("/api/alignment/versions", json={"note": ""}).json(),
         "AlignmentFitResult": dict.fromkeys(FitResult.model_fields),
         "AlignmentImport": dict.fromkeys(ImportJson.model_fields),
+        "PairsAnswer": dict.fromkeys(PairsJson.model_fields),
+        "PairFit": dict.fromkeys(PairFitJson.model_fields),
         "TimeFitResult": dict.fromkeys(TimeFitResult.model_fields),
         **labelled(engine, client),
     }
@@ -174,13 +177,20 @@ def labelled(engine: Engine, client: httpx.Client) -> dict[str, Any]:
 MADE_BY_THE_PAGE = {"Frame", "Series", "Drive"}
 """Types that the page builds from messages."""
 
-ALL_TYPES = (JS / "core" / "types.js", JS / "drive" / "types.js", JS / "labeling" / "state" / "types.js")
+ALL_TYPES = (
+    JS / "core" / "types.js",
+    JS / "drive" / "types.js",
+    JS / "labeling" / "state" / "types.js",
+    JS / "align" / "types.js",
+)
 KNOWN = {name: keys for file in ALL_TYPES for name, keys in typedefs(file.read_text(encoding="utf-8")).items()}
 
 
 @pytest.mark.parametrize("name", sorted(KNOWN.keys() - MADE_BY_THE_PAGE))
 def test_the_page_knows_every_key_and_no_other(sent: dict[str, Any], name: str):
-    assert KNOWN[name] == set(sent[name]), "say it in static/js/core/types.js, or its neighbour of drive/ or labeling/"
+    assert KNOWN[name] == set(sent[name]), (
+        "say it in static/js/core/types.js, or its neighbour of drive/, labeling/ or align/"
+    )
 
 
 def test_every_kind_of_message_is_looked_at(sent: dict[str, Any]):

@@ -9,18 +9,18 @@ import zipfile
 from pathlib import Path, PurePath
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, HTTPException, Query, Response
+from fastapi import APIRouter, Query, Response
 from pydantic import ConfigDict, Field
 
 from app.engine.engine import Engine
 from app.web.refusals import refusing
+from app.web.routes.alignment.shown import shown_frame
 from app.web.routes.shapes.common import ApiModel, file_of
 from pipeline.alignment.convert import calibration_in_use
 from pipeline.calibration.imported import imported
 from pipeline.common.files.user_files import LARGEST_TEXT_BYTES
 from pipeline.formats.calibration_files import write_calibration
 from pipeline.formats.calibration_files.recognise import parse_any
-from pipeline.types import F64, Frame
 from pipeline.types.source import lidar_frame
 
 MOST_FILES = 4
@@ -69,7 +69,7 @@ def alignment_files_router(engine: Engine) -> APIRouter:
     def read(body: GivenCalibration) -> ImportJson:
         """Read a calibration of KITTI, ROS, OpenCV or Kalibr as parameters of the current alignment model. 404 when
         nothing is shown, 409 with the likely mistake for a file that cannot be used."""
-        frame, size, mount = _shown(engine)
+        (frame, size), mount = shown_frame(engine), lidar_frame(engine.source)
         given: dict[str, bytes] = {}
         for each in body.files:
             given[PurePath(each.name).name or each.name] = each.text.encode()
@@ -87,7 +87,7 @@ def alignment_files_router(engine: Engine) -> APIRouter:
     def write(format: Annotated[FormatName, Query(description="Of the file to write")]) -> Response:
         """Download the calibration with the current alignment; a .zip for ROS and Kalibr, which have two files. 404
         when nothing is shown, 409 if the format cannot represent it."""
-        frame, size, mount = _shown(engine)
+        (frame, size), mount = shown_frame(engine), lidar_frame(engine.source)
         with refusing(), tempfile.TemporaryDirectory() as folder:
             camera = calibration_in_use(engine.control.peek().params.alignment, frame.camera, size)
             path = Path(folder) / "calibration"
@@ -98,19 +98,6 @@ def alignment_files_router(engine: Engine) -> APIRouter:
         return Response(data, media_type="application/octet-stream", headers=headers)
 
     return router
-
-
-def _shown(engine: Engine) -> tuple[Frame, tuple[int, int], F64 | None]:
-    """The shown frame, width and height of its images, and the LiDAR's mount if the ego frame is not its own; 404
-    without images or calibration."""
-    processed, source = engine.snapshot.processed, engine.source
-    frame = processed.frame if processed is not None else None
-    size = None
-    if frame is not None:
-        size = (frame.camera.width, frame.camera.height) if frame.camera is not None else frame.image_size
-    if frame is None or size is None:
-        raise HTTPException(404, "nothing with a camera is shown")
-    return frame, size, lidar_frame(source)
 
 
 def _zipped(folder: Path) -> bytes:

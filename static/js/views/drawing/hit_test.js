@@ -2,6 +2,9 @@
 
 /** @typedef {import("../../core/types.js").Frame} Frame */
 
+/** Pixel coordinate of points outside the camera's view. */
+const UNSEEN = -32768;
+
 /**
  * Index of the point nearest to a pixel; −1 if none is within reach.
  * @param {number} count @param {(i: number) => boolean} counts which points to consider
@@ -19,6 +22,26 @@ export function nearestPoint(count, counts, across, down, u, v, reach) {
     if (away < least) [best, least] = [i, away];
   }
   return best;
+}
+
+/**
+ * Index of the LiDAR point nearest to a pixel of the sent image; −1 if none is within reach.
+ * @param {Frame} frame
+ * @param {number} u
+ * @param {number} v
+ * @param {number} reach pixels of the sent image
+ * @param {(i: number) => boolean} [counts]
+ */
+export function pointAt({ count, uv }, u, v, reach, counts = () => true) {
+  return nearestPoint(
+    count,
+    (i) => uv[2 * i] !== UNSEEN && counts(i),
+    (i) => uv[2 * i],
+    (i) => uv[2 * i + 1],
+    u,
+    v,
+    reach,
+  );
 }
 
 /** Id of the object that a point belongs to, or null. @param {Frame} frame @param {number} i @returns {number|null} */

@@ -60,7 +60,7 @@ POST /api/params/redo · POST /api/params/preset · DELETE /api/marks/{number} �
 POST /api/runs/{number}/base · POST /api/runs/{number}/use · DELETE /api/runs/{number} · POST /api/labels/act ·
 POST /api/labels/queue · POST /api/labels/undo · POST /api/labels/redo · POST /api/clip ·
 DELETE /api/jobs/{number} · POST /api/alignment/fit · POST /api/alignment/time · DELETE /api/alignment/time ·
-DELETE /api/alignment/fit · POST /api/alignment/import ·
+DELETE /api/alignment/fit · POST /api/alignment/import · POST /api/alignment/pairs ·
 POST /api/alignment/versions · DELETE /api/alignment/versions/{number} ·
 POST /api/project · POST /api/project/ray · WEBSOCKET /viser · WEBSOCKET /viser/ · GET /api/fleet ·
 GET /api/fleet/rows · GET /api/fleet/histogram · GET /api/fleet/counts · WEBSOCKET /viser/of/{name} ·
