@@ -13,7 +13,9 @@ import tyro
 
 from app.commands.support.arguments import option
 from app.commands.support.cluster import ClusterOptions, run_with_bar, tally_of
+from app.commands.support.interruption import says_when_interrupted
 from app.commands.support.options import PipelineOptions
+from app.commands.support.output_files import ensure_writable
 from app.core.terminal import one_line
 from app.fleet.extra import need_extra
 from pipeline.common.errors import BadInput
@@ -75,12 +77,13 @@ class ParameterSweep:
         plan = Plan(tuple(map(absolute, self.addresses)), base, self.pipeline.choice(), self.sensors, self.rings)
         for file in (self.save, self.report):
             if file is not None:
-                file.parent.mkdir(parents=True, exist_ok=True)
-                file.open("a").close()  # report an unwritable file before the work, not after it
+                ensure_writable(file)
+        again = "run the same command again to continue"
         try:
-            tried, names = self._run(plan, propose, count, Store(self.out))
+            with says_when_interrupted(again):
+                tried, names = self._run(plan, propose, count, Store(self.out))
         except SchedulerLost as lost:
-            print(f"cipv: connection to Dask lost: {lost}; run the same command again to continue", file=sys.stderr)
+            print(f"cipv: connection to Dask lost: {lost}; {again}", file=sys.stderr)
             return 1
         best = best_of(tried)
         make_latest(Store(self.out), (best or tried[-1]).run)  # usually searched and compared next
