@@ -88,7 +88,10 @@ class ParameterSweep:
         best = best_of(tried)
         make_latest(Store(self.out), (best or tried[-1]).run)  # usually searched and compared next
         self._tell(tried, front(tried), best, names)
-        if self.save is not None and best is not None:
+        if best is None:
+            print(f"cipv: no set has both scores, {names[0]} and {names[1]}; none is the best", file=sys.stderr)
+            return 1
+        if self.save is not None:
             self.save.write_text(to_yaml(with_changes(base, best.changes)), encoding="utf-8")
             print(f"cipv: {self.save}: the set of run {best.run}", file=sys.stderr)
         return 0
@@ -147,6 +150,7 @@ class ParameterSweep:
         return tried, names
 
     def _tell(self, tried: list[Tried], best: list[Tried], one: Tried | None, names: tuple[str, str]) -> None:
+        from app.fleet.sweep import points_of
         from app.reports.html import html
         from app.reports.terminal_tables import show
 
@@ -166,15 +170,14 @@ class ParameterSweep:
             ),
             decimals=3,
         )
+        on_front = points_of(best)
         chart = Chart(
             "Each point is a set of parameters; the line is the Pareto front",
             names[1],
             names[0],
             (
-                Series.of_points("sets", [(each.phantoms or 0.0, each.missed or 0.0) for each in tried]),
-                Series(
-                    "front", tuple(each.phantoms or 0.0 for each in best), tuple(each.missed or 0.0 for each in best)
-                ),
+                Series.of_points("sets", points_of(tried)),
+                Series("front", tuple(x for x, _ in on_front), tuple(y for _, y in on_front)),
             ),
         )
         section = ReportSection("sweep", "Sweep", (), (table,), (chart,))
