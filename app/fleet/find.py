@@ -55,6 +55,8 @@ _TYPES: dict[ColumnType, str] = {
     "string": "VARCHAR",
 }
 """DuckDB's names of the tables' types."""
+_BEHIND_CONDITION = re.compile(r"syntax error at .*\n+LINE \d+: \)")
+"""DuckDB's message if the error is in what follows the typed condition, on a line of its own."""
 _UNKNOWN_COLUMN = re.compile(r'Referenced column "(.*)" not found')
 
 MOST_BYTES = 2 << 30
@@ -210,6 +212,8 @@ class FleetTables:
                 f"; a text needs single quotes: '{name}'; for the columns, see the reference page \"Tables of a fleet\""
             )
             return f'no column "{name}" in {of}{hint}'
+        if _BEHIND_CONDITION.search(str(error)):
+            return "condition: it is incomplete, or its parentheses do not match"
         _, _, said = first.partition(": ")
         return f"condition: {(said or first).rstrip()}"
 
