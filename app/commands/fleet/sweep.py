@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
 _MISSED = ("labelled.lead_missed", "late_leads")
 _PHANTOMS = ("labelled.cipv_false", "phantom_leads")
-"""Scores by which a set of parameters is judged: with labels if the fleet has some, else without."""
+"""Scores by which a set of parameters is judged: with labels if the fleet has some, else without. Of all scores without
+labels, these two rank parameters most like those with labels (docs/reference/fleet-scores.md)."""
 
 
 @dataclass(frozen=True)

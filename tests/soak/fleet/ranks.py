@@ -242,8 +242,9 @@ def main() -> None:
         report = {"drives": len(files), "sets": len(runs)} | measured(runs)
         asked.report.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
         print(name, "done", flush=True)
+    both = {name: rows for name, rows in runs.items() if sets()[name][1] == "both"}  # sweeps do not leave out sensors
     report["over_sets"] = {
-        score.name: {labelled: over_sets(runs, score.name, LABELLED + labelled) for labelled in JUDGED}
+        score.name: {name: over_sets(both, score.name, LABELLED + name) for name in {*JUDGED, score.counterpart}}
         for score in (*SCORES, DISAGREEMENT)
     }
     asked.report.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
