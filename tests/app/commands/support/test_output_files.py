@@ -21,5 +21,5 @@ def test_a_file_that_is_there_stays_as_it_is(tmp_path: Path):
 
 
 def test_what_cannot_be_written_is_an_error(tmp_path: Path):
-    with pytest.raises(OSError):
+    with pytest.raises(IsADirectoryError):
         ensure_writable(tmp_path)
