@@ -15,6 +15,7 @@ import tyro
 
 from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
+from app.commands.support.output_files import ensure_writable
 from app.commands.support.progress_bars import frames_progress
 from app.labels.project_classes import project_classes
 from app.reports.html import html
@@ -79,8 +80,7 @@ class Evaluate:
         params = self.pipeline.parameters()
         base = self._base_params()
         if self.report is not None:
-            self.report.parent.mkdir(parents=True, exist_ok=True)
-            self.report.open("a").close()  # report an unwritable file before the work, not after it
+            ensure_writable(self.report)
         run_scores, base_scores = [], []
         for n in range(len(self.sources)):
             scores = self._score(n, params, base)

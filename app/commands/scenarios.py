@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from app.commands.support.arguments import option
+from app.commands.support.output_files import ensure_writable
 from app.commands.support.progress_bars import frames_progress
 from app.reports.experiment_drives import ReplayFolder
 from app.reports.html import html
@@ -62,8 +63,7 @@ class Scenarios:
         if self.jobs < 0:
             raise BadInput(f"--jobs {self.jobs}: expected a number of processes, or 0 for one per core")
         if self.report is not None:
-            self.report.parent.mkdir(parents=True, exist_ok=True)
-            self.report.open("a").close()  # report an unwritable file before the work, not after it
+            ensure_writable(self.report)
         drives = self.drives or (_FAILED_DRIVES if self.suite == ROBUSTNESS else None)
         folder = ReplayFolder(drives) if drives is not None else None
         with frames_progress() as progress:

@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeVar
 import duckdb
 
 from app.drive.events import event_kinds
-from app.fleet.batch.tables import EQUAL_TABLES, TableShape
+from app.fleet.batch.tables import EQUAL_TABLES, ColumnType, TableShape
 from app.fleet.pack_index import packed_file, packs_of
 from app.fleet.runs import latest_run, runs_of
 from app.fleet.store import Store
@@ -46,6 +46,17 @@ NAMED = {
 """Conditions by name, beside the kinds of event: usable in events like a column."""
 
 
+_TYPES: dict[ColumnType, str] = {
+    "bool": "BOOLEAN",
+    "int32": "INTEGER",
+    "int64": "BIGINT",
+    "float32": "FLOAT",
+    "float64": "DOUBLE",
+    "string": "VARCHAR",
+}
+"""DuckDB's names of the tables' types."""
+_BEHIND_CONDITION = re.compile(r"syntax error at .*\n+LINE \d+: \)")
+"""DuckDB's message if the error is in what follows the typed condition, on a line of its own."""
 _UNKNOWN_COLUMN = re.compile(r'Referenced column "(.*)" not found')
 
 MOST_BYTES = 2 << 30
@@ -73,7 +84,7 @@ class FleetTables:
         most_s: a question that takes longer is stopped; None for no limit.
 
     Raises:
-        BadInput: there is no such run.
+        BadInput: there is no such run, or a file of its tables is missing or damaged.
     """
 
     def __init__(self, store: Store, run: str | None = None, most_s: float | None = None) -> None:
@@ -86,7 +97,13 @@ class FleetTables:
         self._duckdb = duckdb.connect()
         self._shut_in()
         for shape in EQUAL_TABLES:
-            self._make_view(shape)
+            try:
+                self._make_view(shape)
+            except duckdb.Error as error:
+                raise BadInput(
+                    f"{store.address}: table {shape.name} of run {self.run} cannot be read: {_first_line(error)}; "
+                    f"`cipv batch` packs it again once packed/run={self.run}.json is removed"
+                ) from None
 
     def find(
         self,
@@ -187,7 +204,7 @@ class FleetTables:
 
     def _reason(self, error: Exception, of: QueryTable) -> str:
         """DuckDB's message, without the position in the generated statement."""
-        first = str(error).strip().splitlines()[0]
+        first = _first_line(error)
         if unknown := _UNKNOWN_COLUMN.search(first):
             name = unknown[1]
             columns = [column[0] for column in self._duckdb.execute(f"SELECT * FROM {of} LIMIT 0").description or ()]
@@ -195,6 +212,8 @@ class FleetTables:
                 f"; a text needs single quotes: '{name}'; for the columns, see the reference page \"Tables of a fleet\""
             )
             return f'no column "{name}" in {of}{hint}'
+        if _BEHIND_CONDITION.search(str(error)):
+            return "condition: it is incomplete, or its parentheses do not match"
         _, _, said = first.partition(": ")
         return f"condition: {(said or first).rstrip()}"
 
@@ -231,7 +250,7 @@ class FleetTables:
 
     def _make_view(self, shape: TableShape) -> None:
         files = [self._path(packed_file(shape.name, self.run, number)) for number in self._numbers]
-        source = f"read_parquet([{', '.join(_text(file) for file in files)}])"
+        source = self._whole(f"read_parquet([{', '.join(_text(file) for file in files)}])", shape)
         if shape.name in ("drives", "scores"):
             self._duckdb.execute(f"CREATE VIEW {shape.name} AS SELECT * FROM {source}")
             return
@@ -246,6 +265,16 @@ class FleetTables:
             f"CREATE VIEW {shape.name} AS SELECT t.*, {about}{time}{named} FROM {source} t JOIN drives d USING (drive)"
         )
 
+    def _whole(self, source: str, shape: TableShape) -> str:
+        """The source with every column of the table. An earlier version may not have written some; they are null."""
+        written = {column[0] for column in self._duckdb.execute(f"SELECT * FROM {source} LIMIT 0").description or ()}
+        missing = [
+            f"NULL::{_TYPES[column.kind]} AS {_quoted(column.name)}"
+            for column in shape.columns
+            if column.name not in written
+        ]
+        return f"(SELECT {', '.join(['*', *missing])} FROM {source})" if missing else source
+
     def _path(self, name: str) -> str:
         if self.store.folder is not None:
             return str(self.store.folder / name)
@@ -258,6 +287,11 @@ def _quoted(name: str) -> str:
 
 def _text(value: str) -> str:
     return "'" + value.replace("'", "''") + "'"
+
+
+def _first_line(error: Exception) -> str:
+    """What DuckDB says, without the statement that it adds."""
+    return str(error).strip().splitlines()[0]
 
 
 def _plain(value: Any) -> Any:

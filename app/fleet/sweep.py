@@ -156,6 +156,11 @@ def front(tried: Sequence[Tried]) -> list[Tried]:
     return best
 
 
+def points_of(tried: Sequence[Tried]) -> list[tuple[float, float]]:
+    """Phantom leads and missed leads of each set that has both."""
+    return [(each.phantoms, each.missed) for each in tried if each.missed is not None and each.phantoms is not None]
+
+
 def best_of(tried: Sequence[Tried]) -> Tried | None:
     """The set of the front with the smallest sum of both scores; None if no set has both."""
     return min(front(tried), key=lambda one: (one.missed or 0.0) + (one.phantoms or 0.0), default=None)

@@ -81,14 +81,15 @@ def _grid(scale: _Scale, x_label: str, y_label: str) -> str:
 
 def _line(scale: _Scale, line: Series, index: int) -> str:
     points = [(scale.x(x), scale.y(y)) for x, y in zip(line.x, line.y, strict=True)]
-    if line.points_only:
-        return "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2" class="fill{index % 6}"/>' for x, y in points)
+    if line.points_only or len(points) == 1:  # a line with one point draws nothing
+        radius = 2 if line.points_only else 4
+        return "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" class="fill{index % 6}"/>' for x, y in points)
     return f'<polyline points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in points)}" {_stroke(index)}/>'
 
 
 def _sample(line: Series, index: int) -> str:
     """The legend's sample of a line."""
-    if line.points_only:
+    if line.points_only or len(line.x) == 1:
         return f'<circle cx="13" cy="4" r="2.5" class="fill{index % 6}"/>'
     return f'<line x1="0" y1="4" x2="26" y2="4" {_stroke(index)}/>'
 

@@ -249,6 +249,29 @@ def test_a_wrong_condition_is_said_in_words(open_fleet: OpenPage):
     expect(page.locator("#fleet-facts")).to_have_text("")
 
 
+def test_what_was_found_before_does_not_stay_below_a_wrong_condition(open_fleet: OpenPage):
+    page, rows = open_fleet(expects=("409",)), "#fleet-rows tbody tr"
+    bars, chips = page.locator("#fleet-charts .fleet-bars i"), page.get_by_role("group", name="Kinds of event")
+    acquired = chips.get_by_role("button", name="first acquisition")
+    acquired.click()
+    before = found(page)
+    expect(acquired).to_have_text(f"first acquisition {before}")
+    expect(page.locator(rows)).to_have_count(before)
+    assert bars.count() > 0
+    page.get_by_label("Condition").fill("no_such_column > 1")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("alert").filter(has_text="no_such_column")).to_be_visible()
+    settled(page)
+    assert (page.locator(rows).count(), bars.count()) == (0, 0)
+    expect(acquired).to_have_text("first acquisition")  # to be taken back; how many there are is unknown
+    expect(acquired).to_have_attribute("aria-pressed", "true")
+    page.get_by_label("Condition").fill("")
+    page.keyboard.press("Enter")
+    expect(page.locator(rows)).to_have_count(before)
+    settled(page)
+    assert bars.count() > 0
+
+
 def test_without_a_fleet_the_page_says_how_to_open_one(open_page: OpenPage):
     page = open_page()
     page.get_by_role("button", name="Fleet", exact=True).click()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from app.commands.support.cluster import ClusterOptions, run_with_bar, tally_of
+from app.commands.support.interruption import says_when_interrupted
 from app.commands.support.options import PipelineOptions
 from app.commands.support.progress_bars import share_progress, task_progress
 from app.core.terminal import one_line
@@ -62,21 +63,19 @@ class Batch:
         store = Store(self.out)
         plan = Plan.load(store) if self.resume else self._plan()
         work = work_of(plan, store)
+        how = f"`cipv batch --resume --out {self.out}` continues"
         with store.alone():
             begin(plan, work, store)
             tally = tally_of(work)
             start = time.monotonic()
             if work.jobs:
                 try:
-                    with self.cluster.client(len(work.jobs)) as client:
+                    with says_when_interrupted(how), self.cluster.client(len(work.jobs)) as client:
                         run_with_bar(client, work, tally)
                 except SchedulerLost as lost:
-                    print(
-                        f"cipv: connection to Dask lost: {lost}; `cipv batch --resume --out {self.out}` continues",
-                        file=sys.stderr,
-                    )
+                    print(f"cipv: connection to Dask lost: {lost}; {how}", file=sys.stderr)
                     return 1
-            with share_progress() as bar:
+            with says_when_interrupted(how), share_progress() as bar:
                 pack(store, work.key.name, task_progress(bar, "packing the tables"))
         self._tell(work.key.name, tally, time.monotonic() - start)
         return 1 if tally.failed else 0

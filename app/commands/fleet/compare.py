@@ -13,6 +13,7 @@ import tyro
 
 from app.commands.evaluate import DASHBOARD, dashboard_link
 from app.commands.support.arguments import option
+from app.commands.support.output_files import ensure_writable
 from app.fleet.extra import need_extra
 from pipeline.common.errors import BadInput
 
@@ -56,8 +57,7 @@ class Compare:
 
         rules = read_rules(self.gate) if self.gate is not None else None
         if self.report is not None:
-            self.report.parent.mkdir(parents=True, exist_ok=True)
-            self.report.open("a").close()  # report an unwritable file before the work, not after it
+            ensure_writable(self.report)
         run = FleetTables(Store(self.out), self.run)
         base = FleetTables(Store(self.base_out or self.out), self.base)
         if (base.store.address, base.run) == (run.store.address, run.run):

@@ -13,7 +13,9 @@ import tyro
 
 from app.commands.support.arguments import option
 from app.commands.support.cluster import ClusterOptions, run_with_bar, tally_of
+from app.commands.support.interruption import says_when_interrupted
 from app.commands.support.options import PipelineOptions
+from app.commands.support.output_files import ensure_writable
 from app.core.terminal import one_line
 from app.fleet.extra import need_extra
 from pipeline.common.errors import BadInput
@@ -27,7 +29,8 @@ if TYPE_CHECKING:
 
 _MISSED = ("labelled.lead_missed", "late_leads")
 _PHANTOMS = ("labelled.cipv_false", "phantom_leads")
-"""Scores by which a set of parameters is judged: with labels if the fleet has some, else without."""
+"""Scores by which a set of parameters is judged: with labels if the fleet has some, else without. Of all scores without
+labels, these two rank parameters most like those with labels (docs/reference/fleet-scores.md)."""
 
 
 @dataclass(frozen=True)
@@ -75,17 +78,21 @@ class ParameterSweep:
         plan = Plan(tuple(map(absolute, self.addresses)), base, self.pipeline.choice(), self.sensors, self.rings)
         for file in (self.save, self.report):
             if file is not None:
-                file.parent.mkdir(parents=True, exist_ok=True)
-                file.open("a").close()  # report an unwritable file before the work, not after it
+                ensure_writable(file)
+        again = "run the same command again to continue"
         try:
-            tried, names = self._run(plan, propose, count, Store(self.out))
+            with says_when_interrupted(again):
+                tried, names = self._run(plan, propose, count, Store(self.out))
         except SchedulerLost as lost:
-            print(f"cipv: connection to Dask lost: {lost}; run the same command again to continue", file=sys.stderr)
+            print(f"cipv: connection to Dask lost: {lost}; {again}", file=sys.stderr)
             return 1
         best = best_of(tried)
         make_latest(Store(self.out), (best or tried[-1]).run)  # usually searched and compared next
         self._tell(tried, front(tried), best, names)
-        if self.save is not None and best is not None:
+        if best is None:
+            print(f"cipv: no set has both scores, {names[0]} and {names[1]}; none is the best", file=sys.stderr)
+            return 1
+        if self.save is not None:
             self.save.write_text(to_yaml(with_changes(base, best.changes)), encoding="utf-8")
             print(f"cipv: {self.save}: the set of run {best.run}", file=sys.stderr)
         return 0
@@ -144,6 +151,7 @@ class ParameterSweep:
         return tried, names
 
     def _tell(self, tried: list[Tried], best: list[Tried], one: Tried | None, names: tuple[str, str]) -> None:
+        from app.fleet.sweep import points_of
         from app.reports.html import html
         from app.reports.terminal_tables import show
 
@@ -163,15 +171,14 @@ class ParameterSweep:
             ),
             decimals=3,
         )
+        on_front = points_of(best)
         chart = Chart(
             "Each point is a set of parameters; the line is the Pareto front",
             names[1],
             names[0],
             (
-                Series.of_points("sets", [(each.phantoms or 0.0, each.missed or 0.0) for each in tried]),
-                Series(
-                    "front", tuple(each.phantoms or 0.0 for each in best), tuple(each.missed or 0.0 for each in best)
-                ),
+                Series.of_points("sets", points_of(tried)),
+                Series("front", tuple(x for x, _ in on_front), tuple(y for _, y in on_front)),
             ),
         )
         section = ReportSection("sweep", "Sweep", (), (table,), (chart,))

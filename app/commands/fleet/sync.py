@@ -13,6 +13,7 @@ import tyro
 
 from app.commands.info import size_text
 from app.commands.support.arguments import option
+from app.commands.support.interruption import says_when_interrupted
 from app.commands.support.progress_bars import bytes_progress, task_progress
 from app.core.session_folder import SESSIONS
 from app.core.terminal import one_line
@@ -22,6 +23,8 @@ from pipeline.common.progress import Progress
 
 if TYPE_CHECKING:
     from app.fleet.sync.sync import SyncTally
+
+_CONTINUES = "the next `cipv sync` continues"
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ class SyncSessions:
         limit_bytes = self.limit * 1e6 if self.limit is not None else None
         options = SyncOptions(self.clips, self.events, self.around, limit_bytes, self.verify)
         start, stopped = time.monotonic(), ""
-        with bytes_progress() as bar:
+        with says_when_interrupted(_CONTINUES), bytes_progress() as bar:
 
             def begin(what: str, size: int) -> Progress:
                 for task in bar.tasks:
@@ -101,7 +104,7 @@ class SyncSessions:
         for name, reason in (*tally.notes.items(), *tally.failed.items()):
             print(f"cipv: {one_line(f'{name}: {reason}')}", file=sys.stderr)
         if stopped:
-            print(f"cipv: {stopped}; the next `cipv sync` continues", file=sys.stderr)
+            print(f"cipv: {stopped}; {_CONTINUES}", file=sys.stderr)
         print(
             f"cipv: {tally.sessions} sessions and {tally.clips} clips sent, {size_text(tally.bytes)} in "
             f"{seconds:.0f} s; {tally.before} sessions sent before",

@@ -7,16 +7,17 @@ import { el, press } from "../core/dom.js";
  * Kinds of event with their counts, and named conditions, as buttons.
  * @param {HTMLElement} parent
  * @param {{kinds: string[], named: Record<string, string>}} fleet
- * @param {{value: string|null, count: number}[]} counts of events; none: other tables have no kinds
+ * @param {{value: string|null, count: number}[]|null} counts of events; none: other tables have no kinds; null: unknown
  * @param {(kind: string) => void} onKind @param {(name: string) => void} onNamed
  * @param {{kinds: Set<string>, named: Set<string>}} chosen
  */
 export function showKinds(parent, fleet, counts, onKind, onNamed, chosen) {
-  const count = new Map(counts.map(({ value, count }) => [value, count]));
+  const count = new Map(counts?.map(({ value, count }) => [value, count]));
   const kinds = fleet.kinds.filter((kind) => count.has(kind) || chosen.kinds.has(kind));
   const buttons = kinds.map((kind) => {
-    const words = `${kind.replaceAll("_", " ")} ${(count.get(kind) ?? 0).toLocaleString("en")}`;
-    return chip(words, chosen.kinds.has(kind), "", () => onKind(kind));
+    const words = kind.replaceAll("_", " "),
+      known = counts ? ` ${(count.get(kind) ?? 0).toLocaleString("en")}` : "";
+    return chip(words + known, chosen.kinds.has(kind), "", () => onKind(kind));
   });
   const named = Object.entries(fleet.named).map(([name, sql]) =>
     chip(name, chosen.named.has(name), sql, () => onNamed(name)),
@@ -32,11 +33,12 @@ function chip(words, isOn, title, act) {
 }
 
 /**
- * A histogram of a column and the fields of its range. box: its element. fill: shows what was found. refresh: shows the
- * chosen range; not in a field that the user is typing in.
+ * A histogram of a column and the fields of its range. box: its element. fill: shows what was found. clear: removes the
+ * bars, while they are unknown. refresh: shows the chosen range; not in a field that the user is typing in.
  * @typedef {object} Histogram
  * @property {HTMLElement} box
  * @property {(found: {edges: number[], counts: number[]}) => void} fill
+ * @property {() => void} clear
  * @property {() => void} refresh
  */
 
@@ -70,6 +72,13 @@ export function histogram(chart, chosen, onRange) {
     });
   }
   refresh();
+  /** @param {number[]} found */
+  function setEdges(found) {
+    edges = found;
+    fields.forEach((field, place) => {
+      field.placeholder = edges.length ? number(edges[place ? edges.length - 1 : 0], edges) : "";
+    });
+  }
   const unit = chart.unit ? ` (${chart.unit})` : "";
   const box = el(
     "section",
@@ -82,12 +91,13 @@ export function histogram(chart, chosen, onRange) {
     box,
     refresh,
     fill(found) {
-      edges = found.edges;
+      setEdges(found.edges);
       bars.replaceChildren(...barsOf(chart, found, chosen()));
       if (!found.counts.length) bars.append(el("span", { class: "facts", textContent: "no values" }));
-      fields.forEach((field, place) => {
-        field.placeholder = edges.length ? number(edges[place ? edges.length - 1 : 0], edges) : "";
-      });
+    },
+    clear() {
+      setEdges([]);
+      bars.replaceChildren();
     },
   };
 }

@@ -49,6 +49,12 @@ export function showRows(found, onOpen, onSort, sorted) {
   $("#fleet-rows tbody").replaceChildren(...(rows.length ? rows : [el("tr", { class: "fleet-none" }, nothing)]));
 }
 
+/** No rows, while they are unknown. */
+export function clearRows() {
+  $("#fleet-rows thead").replaceChildren();
+  $("#fleet-rows tbody").replaceChildren();
+}
+
 /** @param {string} name @param {any} value */
 function cell(name, value) {
   if (value === null) return "–";

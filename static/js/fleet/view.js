@@ -8,7 +8,7 @@ import { refused } from "../panels/notices.js";
 import { goTo } from "../workspace/share_link.js";
 import { histogram, showKinds } from "./charts.js";
 import { CHARTS, condition, filters, setRange, toggleKind, toggleNamed, toggleTable } from "./filters.js";
-import { showRows } from "./rows.js";
+import { clearRows, showRows } from "./rows.js";
 
 /**
  * @typedef {object} Fleet
@@ -155,15 +155,22 @@ const load = newestOnly(async (/** @type {void} */ _) => {
   $("#fleet-facts").textContent = "Searching…";
   for (const tab of dialog.querySelectorAll("[role=tab]"))
     tab.setAttribute("aria-selected", String(/** @type {HTMLElement} */ (tab).dataset.of === of));
+  let hasRows = false;
   try {
     const found = await ask("rows", { order: filters.order, descending: String(filters.descending) });
     showRows(found, show, (column) => changed(() => sort(column)), filters);
+    hasRows = true;
     const more = found.total > found.rows.length ? `, the first ${found.rows.length} shown` : "";
     $("#fleet-facts").textContent = `${found.total.toLocaleString("en")} ${of}${more}`;
     await loadCharts();
     problem("");
   } catch (error) {
-    $("#fleet-facts").textContent = "";
+    // what an earlier condition found must not look like the result of this one
+    if (!hasRows) {
+      $("#fleet-facts").textContent = "";
+      clearRows();
+    }
+    clearCharts();
     problem(/** @type {Error} */ (error).message);
   }
   dialog.ariaBusy = "false";
@@ -171,20 +178,30 @@ const load = newestOnly(async (/** @type {void} */ _) => {
 
 async function loadCharts() {
   const { of } = filters;
-  const kinds = of === "events" ? await ask("counts", { column: "kind" }, { kinds: true }) : [];
-  showKinds(
-    $("#fleet-kinds"),
-    of === "events" ? /** @type {Fleet} */ (fleet) : { kinds: [], named: {} },
-    kinds,
-    (kind) => changed(() => toggleKind(kind)),
-    (name) => changed(() => toggleNamed(name)),
-    filters,
-  );
+  showChips(of === "events" ? await ask("counts", { column: "kind" }, { kinds: true }) : []);
   for (const [place, chart] of CHARTS[of].entries()) {
     const found = await ask("histogram", { column: chart.column }, { chart });
     if (filters.of !== of) return; // another table was chosen meanwhile: its charts are loaded next
     charts[place].fill(found);
   }
+}
+
+/** @param {{value: string|null, count: number}[]|null} counts by kind of event; null: unknown */
+function showChips(counts) {
+  showKinds(
+    $("#fleet-kinds"),
+    filters.of === "events" ? /** @type {Fleet} */ (fleet) : { kinds: [], named: {} },
+    counts,
+    (kind) => changed(() => toggleKind(kind)),
+    (name) => changed(() => toggleNamed(name)),
+    filters,
+  );
+}
+
+/** No bars and no counts, while they are unknown. Chosen filters stay, to be taken back. */
+function clearCharts() {
+  showChips(null);
+  for (const chart of charts) chart.clear();
 }
 
 /** The charts of the chosen table, still without bars. They stay until another is chosen. */

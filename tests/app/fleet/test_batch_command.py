@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from app.cli import main
+from app.commands.support.cluster import ClusterOptions
 from app.fleet import extra
 from app.fleet.batch.work import run_drive
 from app.fleet.store import Store
@@ -112,6 +113,21 @@ def test_a_batch_and_a_second_one_that_has_nothing_to_do(
     assert (second["run"], second["done"], second["done_before"]) == (first["run"], 0, drives)
     assert cipv("batch", "--resume", "--out", tmp_path / "out", "--json") == 0
     assert json.loads(capsys.readouterr().out)["run"] == first["run"]
+
+
+def test_an_interrupted_batch_says_how_it_is_continued(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    @contextmanager
+    def interrupted(*_: object) -> Iterator[None]:
+        raise KeyboardInterrupt
+        yield
+
+    monkeypatch.setattr(ClusterOptions, "client", interrupted)
+    assert cipv("batch", fleet / "near-0.mcap", "--out", tmp_path / "out", *LIDAR) == 130
+    assert capsys.readouterr().err == f"cipv: interrupted; `cipv batch --resume --out {tmp_path / 'out'}` continues\n"
+    assert cipv("sweep", fleet / "near-0.mcap", "--out", tmp_path / "b", "--over", "cluster.min_points=4,5") == 130
+    assert capsys.readouterr().err == "cipv: interrupted; run the same command again to continue\n"
 
 
 WRONG = {

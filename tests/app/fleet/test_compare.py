@@ -190,8 +190,11 @@ def test_rules_fail_where_nothing_can_be_said(tmp_path: Path):
     ]
 
 
-def test_cipv_compare_says_what_is_wrong_in_one_line(runs: tuple[Path, str, str], capsys: pytest.CaptureFixture[str]):
+def test_cipv_compare_says_what_is_wrong_in_one_line(
+    runs: tuple[Path, str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
     out, sane, blind = runs
     for typed in (("--base", "nothing"), ("--base", blind), ("--base", sane, "--gate", "none.yaml")):
-        assert _cipv("compare", "--out", out, *typed) == 2
+        assert _cipv("compare", "--out", out, "--report", tmp_path / "report.html", *typed) == 2
         assert len(capsys.readouterr().err.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []  # no empty report

@@ -119,7 +119,9 @@ def test_rows_come_in_the_order_that_is_asked_for(tables: FleetTables):
     [
         ("sped_mps > 20", 'no column "sped_mps" in events; did you mean speed_mps?'),
         ('severity = "hefty"', "a text needs single quotes: 'hefty'"),
-        ("speed_mps >", "condition: syntax error"),
+        ("speed_mps > > 20", 'condition: syntax error at or near ">"'),
+        ("speed_mps >", "condition: it is incomplete, or its parentheses do not match"),
+        ("(speed_mps > 20", "condition: it is incomplete, or its parentheses do not match"),
     ],
 )
 def test_what_is_wrong_with_a_condition_is_told_without_repeating_it(tables: FleetTables, typed: str, said: str):

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from app.cli import main
+from app.commands.fleet.sweep import ParameterSweep
 from app.fleet.runs import latest_run
 from app.fleet.store import Store
-from app.fleet.sweep import Axis, Tried, best_of, fixed, front, grid, latin, parse_axis, searching
+from app.fleet.sweep import Axis, Tried, best_of, fixed, front, grid, latin, parse_axis, points_of, searching
 from pipeline.common.errors import BadInput
 from pipeline.params import Params, from_yaml
 from tests.app.fleet.fleets import begun, plan_of
@@ -91,6 +92,7 @@ def test_the_front_is_what_no_other_one_beats():
     assert best is not None
     assert best.run == "b"
     assert best_of([tried[-1]]) is None
+    assert points_of(tried[-2:]) == [(2.0, 2.0)]  # what is unknown is not drawn as zero
 
 
 def test_a_sweep_saves_the_best_as_a_preset(fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
@@ -107,6 +109,20 @@ def test_a_sweep_saves_the_best_as_a_preset(fleet: Path, tmp_path: Path, capsys:
     assert from_yaml(tmp_path / "best.yaml", Params()).cluster.min_points == 4
     assert "<svg" in (tmp_path / "sweep.html").read_text(encoding="utf-8")
     assert latest_run(Store(str(tmp_path / "out"))) == sane["run"]
+
+
+def test_without_both_scores_no_set_is_the_best(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    tried = [Tried("0" * 12, {"cluster.min_points": 4}, None, 0.0)]
+    monkeypatch.setattr(ParameterSweep, "_run", lambda *_: (tried, ("late_leads", "phantom_leads")))
+    typed = ["--over", "cluster.min_points=4", "--save", str(tmp_path / "best.yaml"), "--json"]
+    assert _cipv("sweep", "sim:straight", "--out", str(tmp_path / "out"), *typed) == 1
+    said = capsys.readouterr()
+    assert json.loads(said.out)["best"] is None
+    assert len(said.err.strip().splitlines()) == 1
+    assert "no set has both scores" in said.err
+    assert not (tmp_path / "best.yaml").exists()
 
 
 def test_a_sweep_leaves_the_plan_of_a_batch_as_it_is(fleet: Path, tmp_path: Path):

@@ -61,6 +61,18 @@ def test_a_chart_draws_each_point_inside_its_frame() -> None:
     assert places[0][1] < places[1][1] < places[2][1], "a falling gap falls on the page"
 
 
+def test_a_line_of_one_point_is_drawn_as_a_point() -> None:
+    """Such as a Pareto front of one set. It is larger than the points of other series, which may lie below it."""
+    one, all_ = Series("front", (2.0,), (1.0,)), Series.of_points("sets", [(2.0, 1.0), (3.0, 4.0)])
+    drawn = chart_svg(Chart("Chart", "x", "y", (all_, one)))
+    assert "polyline" not in drawn
+    front = re.findall(r'<circle cx="([^"]+)" cy="([^"]+)" r="([^"]+)" class="fill1"/>', drawn)
+    sets = re.findall(r'<circle cx="([^"]+)" cy="([^"]+)" r="([^"]+)" class="fill0"/>', drawn)
+    assert front[0][:2] == sets[0][:2]
+    assert float(front[0][2]) > float(sets[0][2])
+    assert len(front) == 2, "one in the chart, one in the legend"
+
+
 def test_an_empty_chart_says_so() -> None:
     assert "no data" in chart_svg(Chart("Empty", "x", "y", (Series("none", (), ()),)))
 

@@ -15,17 +15,21 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from app.bench.fleet_sessions import make_sessions
 from app.fleet.batch.drive_scores import LABELLED
 from app.fleet.batch.work import run_drive
 from app.fleet.compare.paired import ScoreRow
-from app.fleet.compare.worth import Worth, values_of, worths
+from app.fleet.compare.worth import Worth, spearman, values_of, worths
 from app.fleet.find import FleetTables
 from app.fleet.pack import pack
 from app.fleet.store import Store
 from pipeline.common.files.data_dir import data_dir
 from pipeline.evaluation.label_free.score import SCORES, LabelFreeScore
 from pipeline.evaluation.lead_verdict import LeadRule
+from pipeline.evaluation.scores.figures import CONFIDENCE, RESAMPLES, SEED
 from pipeline.evaluation.scores.truth import of_labels
 from pipeline.labels.formats.base import drive_of
 from pipeline.labels.formats.registry import import_labels
@@ -63,6 +67,11 @@ def sets() -> dict[str, tuple[Params, str]]:
     }
     hasty = {"cipv.confirm_hits": 1, "cipv.hysteresis_m": 0.0, "cipv.decide_s": 0.0, "existence.enabled": False}
     plain = {"vision_tracking.learn_height": False, "vision_tracking.use_aspect": False}
+    held = {
+        "lidar_tracking.max_missed_s": 3.0,
+        "vision_tracking.max_missed_s": 4.0,
+        "cipv.carried_may_become_lead": True,
+    }
     return {
         "default": (default, "both"),
         "noise raised": (with_changes(default, raised), "both"),
@@ -71,7 +80,20 @@ def sets() -> dict[str, tuple[Params, str]]:
         "heights of classes": (with_changes(default, plain), "both"),
         "paper": (preset("paper"), "both"),
         "camera alone": (default, "camera"),
+        "LiDAR alone": (default, "lidar"),
+        "corridor of half width 1.1 m": (with_changes(default, {"path.half_width_m": 1.1}), "both"),
+        "no existence": (with_changes(default, {"existence.enabled": False}), "both"),
+        "8 sightings": (with_changes(default, {"cipv.confirm_hits": 8}), "both"),
+        "leads at 0.95": (with_changes(default, dict.fromkeys(_BECOME, 0.95)), "both"),
+        "leads at once": (with_changes(default, dict.fromkeys((*_BECOME, *_STAY), 0.0)), "both"),
+        "clusters of 20 points": (with_changes(default, {"cluster.min_points": 20}), "both"),
+        "clusters 1.8 m apart": (with_changes(default, {"cluster.tolerance_m": 1.8}), "both"),
+        "objects held for seconds": (with_changes(default, held), "both"),
     }
+
+
+_BECOME = tuple(f"cipv.become_{name}" for name in ("existence", "probability", "camera", "standing", "oncoming"))
+_STAY = ("cipv.stay_probability", "cipv.stay_standing")
 
 
 DISAGREEMENT = LabelFreeScore(
@@ -143,6 +165,39 @@ def _disagreement(tables: FleetTables) -> Iterator[ScoreRow]:
         yield drive, DISAGREEMENT.name, sum(values), float(len(values))
 
 
+JUDGED = ("lead_missed", "cipv_false", "lead_not_correct", "lead_distance")
+"""Figures against labels by which sets of parameters are chosen."""
+
+
+def over_sets(runs: Mapping[str, list[ScoreRow]], label_free: str, labelled: str) -> dict[str, Any] | None:
+    """Spearman's correlation of two scores of the whole fleet over the sets, and its 95 % interval, drives drawn with
+    replacement. None without both."""
+    sums = {name: {(drive, score): pair for drive, score, *pair in rows} for name, rows in runs.items()}
+    drives = sorted(
+        {drive for drive, score, _, under in next(iter(runs.values())) if score == labelled and under > 0.0}
+    )
+    if not drives:
+        return None
+    nothing = [0.0, 0.0]
+    known = np.array(
+        [
+            [[sums[name].get((drive, score), nothing) for drive in drives] for score in (label_free, labelled)]
+            for name in runs
+        ]
+    )  # (sets, 2 scores, drives, over and under)
+
+    def correlation(chosen: npt.NDArray[np.int64]) -> float | None:
+        over, under = np.moveaxis(known[:, :, chosen].sum(axis=2), -1, 0)
+        both = (under > 0.0).all(axis=1)
+        return spearman(over[both] / under[both]) if both.sum() > 3 else None
+
+    random = np.random.default_rng(SEED)
+    drawn = [correlation(random.integers(len(drives), size=len(drives))) for _ in range(RESAMPLES)]
+    values = [each for each in drawn if each is not None]
+    low, high = np.quantile(values, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2]) if values else (None, None)
+    return {"value": _two(correlation(np.arange(len(drives)))), "interval": [_two(low), _two(high)]}
+
+
 def _said(each: Worth) -> dict[str, Any]:
     low, high = (each.interval.low, each.interval.high) if each.interval is not None else (None, None)
     return {
@@ -157,7 +212,7 @@ def _said(each: Worth) -> dict[str, Any]:
 
 
 def _two(value: float | None) -> float | None:
-    return None if value is None else round(value, 2)
+    return None if value is None else round(float(value), 2)
 
 
 def measured(runs: Mapping[str, list[ScoreRow]]) -> dict[str, Any]:
@@ -187,6 +242,12 @@ def main() -> None:
         report = {"drives": len(files), "sets": len(runs)} | measured(runs)
         asked.report.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
         print(name, "done", flush=True)
+    both = {name: rows for name, rows in runs.items() if sets()[name][1] == "both"}  # sweeps do not leave out sensors
+    report["over_sets"] = {
+        score.name: {name: over_sets(both, score.name, LABELLED + name) for name in {*JUDGED, score.counterpart}}
+        for score in (*SCORES, DISAGREEMENT)
+    }
+    asked.report.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(report, indent=1))
 
 

@@ -134,6 +134,17 @@ def test_cipv_sync(car: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert (second["sessions"], second["sessions_before"]) == (0, 2)
 
 
+def test_an_interrupted_copy_says_that_the_next_one_continues(
+    car: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    def interrupted(_: Sync) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Sync, "run", interrupted)
+    assert cipv("sync", tmp_path / "nas", "--from", car) == 130
+    assert capsys.readouterr().err == "cipv: interrupted; the next `cipv sync` continues\n"
+
+
 def test_a_folder_that_cannot_be_written_ends_the_run(car: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     (tmp_path / "nas").write_text("a file")
     assert cipv("sync", tmp_path / "nas", "--from", car, "--no-clips") == 1
