@@ -80,16 +80,21 @@ def test_enters_corridor(item: FusedObject, ego_mps: float | None, enters: bool)
 
 
 @pytest.mark.parametrize(
-    ("then_m", "enters"), [pytest.param(0.9, True, id="inside"), pytest.param(2.4, False, id="out")]
+    ("then_m", "params", "enters"),
+    [
+        pytest.param(0.9, AebParams(), True, id="inside"),
+        pytest.param(2.4, AebParams(), False, id="out"),
+        pytest.param(2.4, AebParams(react_to_present=False), True, id="out, switched off"),
+    ],
 )
-def test_where_it_is_seen_now_counts_as_well(then_m: float, enters: bool) -> None:
+def test_where_it_is_seen_now_counts_as_well(then_m: float, params: AebParams, enters: bool) -> None:
     """Its first cluster was also that of the lead, so by the mean of both sightings it is in the path."""
     ego, now = EgoState(0, 20.0), moment(EgoState(0, 20.0), 0.1)
     first, then = (fused(1, x, y, source="L", velocity=(-20.0, 0.0)) for x, y in ((22.0, 0.2), (20.0, then_m)))
     state, _ = choose(CipvState(), describe([first], ego, MotionParams()), PATH, now, CipvParams())
     (item,) = choose(state, describe([then], ego, MotionParams()), PATH, now, CipvParams())[1].objects
     assert item.in_path
-    assert enters_corridor(item, PATH, None, AebParams()) is enters
+    assert enters_corridor(item, PATH, None, params) is enters
 
 
 OVER_THERE = fused(1, 30.0, -8.0, velocity=(-20.0, 6.0))
@@ -124,3 +129,5 @@ def test_where_a_course_says_nothing(
     lead = Cipv(9, lead_m, 0.0, None, "") if lead_m is not None else None
     known = judged(item, 20.0)
     assert enters_corridor(known, path, lead, AebParams()) is enters
+    also_before = enters_corridor(known, path, lead, AebParams(react_where_met=False))
+    assert also_before is (enters or item is CROSSES_OVER)
