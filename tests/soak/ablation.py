@@ -1,8 +1,8 @@
 """What each rule against false leads brings on the real recordings: each is switched off in turn.
 
-    CIPV_DATA=… python -m tests.soak.ablation [--only "no size gate,wide camera gate"]
+    CIPV_DATA=… python -m tests.soak.ablation [--only "no size gate,wide camera gate"] [--sensors camera]
 
-Both sensors, with YOLOX-nano, its far view and TwinLiteNet; KITTI reduced to 16 rings. The networks run once, the
+YOLOX-nano, its far view and TwinLiteNet; KITTI reduced to 16 rings. The networks run once, the
 pipeline once for each variant of the robustness suite (``cipv scenarios run --suite robustness --ablation`` counts the
 same variants in random traffic). Prints a row of a Markdown table for each.
 """
@@ -14,11 +14,12 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from pipeline.common.files.data_dir import data_dir
-from pipeline.detection import Detectors, detect, detector_for, far_view_for, lanes_for
+from pipeline.detection import Detectors, detector_for, far_view_for, lanes_for
 from pipeline.evaluation.lead_verdict import Judged, judge
 from pipeline.experiments.robustness.experiment import AS_IS, VARIANTS
 from pipeline.lanes.open_detector import usual_every
 from pipeline.params import Params, with_changes
+from pipeline.run import Sensors, sensed
 from pipeline.sources import open_source
 from pipeline.step import State, step
 from pipeline.types import Frame, Result
@@ -42,15 +43,17 @@ class Seen(NamedTuple):
     """Labels of each frame; None without any."""
 
 
-def opened(kind: str) -> Seen:
-    """A recording of the data folder after the networks."""
+def opened(kind: str, sensors: Sensors) -> Seen:
+    """A recording of the data folder after the networks, as a car with these sensors has it."""
     source = open_source(f"{SCHEMES[kind]}:{data_dir() / FOLDERS[kind]}")
     network = detector_for(source, str(data_dir() / "models/yolox_nano.onnx"))
     lanes = lanes_for(source, "twinlitenet")
     every = usual_every(lanes, source.rate_hz)
     detectors = Detectors(network, lanes, every, far_view_for(source, network))
     indices = range(len(source))
-    return Seen([detect(source.frame(index), detectors) for index in indices], [source.truth(i) for i in indices])
+    return Seen(
+        [sensed(source.frame(index), detectors, sensors) for index in indices], [source.truth(i) for i in indices]
+    )
 
 
 def results(seen: Seen, params: Params) -> list[Result]:
@@ -108,9 +111,11 @@ def _is_same(one: Result, other: Result) -> bool:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", default="")
-    only = [name for name in parser.parse_args().only.split(",") if name]
+    parser.add_argument("--sensors", default="both", choices=["both", "camera", "lidar"])
+    asked = parser.parse_args()
+    only = [name for name in asked.only.split(",") if name]
     warm_up()
-    recordings = {kind: opened(kind) for kind in ("street", "kitti", "astyx")}
+    recordings = {kind: opened(kind, asked.sensors) for kind in ("street", "kitti", "astyx")}
     before = {kind: results(seen, Params()) for kind, seen in recordings.items()}
     print(HEAD)
     print(f"| {AS_IS} | {row(recordings, before, before)} |", flush=True)
