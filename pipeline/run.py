@@ -6,9 +6,11 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import Literal, NamedTuple
 
 from pipeline import lidar_branch
+from pipeline.common.ahead import ahead
 from pipeline.common.files.user_files import Overloaded
 from pipeline.detection import Detectors, LiveDetectors, Look, detect, look
 from pipeline.params import Params
@@ -78,8 +80,8 @@ def run(
     source: Source, params: Params, detectors: Detectors, sensors: Sensors = "both", ask: Look = look
 ) -> Iterator[tuple[Frame, Result]]:
     """Each frame of a recording with its result. Without detectors only the LiDAR is used. ask: how a detector is
-    called: directly, or through a cache of earlier outputs."""
-    return through((patiently(source, index) for index in range(len(source))), params, detectors, sensors, ask)
+    called: directly, or through a cache of earlier outputs. Each frame is read while the one before it is processed."""
+    return through(ahead(partial(patiently, source), range(len(source))), params, detectors, sensors, ask)
 
 
 def run_live(

@@ -14,6 +14,7 @@ import numpy as np
 
 from app.bench.timing import figures
 from pipeline import lidar_branch
+from pipeline.common.ahead import ahead
 from pipeline.detection import Detectors, detect
 from pipeline.params import Params
 from pipeline.run import advance
@@ -73,8 +74,8 @@ def stages(
 
 
 def _read(source: Source, count: int) -> Iterator[Frame]:
-    """Reads each frame from the recording, as playback does."""
-    return (source.frame(index) for index in cycle(range(count)))
+    """Reads each frame from the recording while the one before it is processed, as ``pipeline.run`` does."""
+    return ahead(source.frame, cycle(range(count)))
 
 
 def _name(network: object) -> str | None:

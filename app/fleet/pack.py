@@ -6,10 +6,7 @@ name as the first column. They are rebuilt from the parts whenever these change.
 from __future__ import annotations
 
 import io
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from itertools import islice
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -19,6 +16,7 @@ import pyarrow.parquet as pq
 from app.fleet.batch.tables import EQUAL_TABLES, TableShape, file_of
 from app.fleet.pack_index import Pack, keep_index, packed_file, packs_of
 from app.fleet.store import Store
+from pipeline.common.ahead import ahead
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
 
@@ -69,28 +67,15 @@ def _planned(packs: Sequence[Pack], done: Mapping[str, str]) -> Iterator[Pack]:
 
 
 def _write(store: Store, run: str, fresh: Pack) -> None:
-    with TemporaryDirectory(prefix="cipv-pack-") as folder, ThreadPoolExecutor(_READERS) as readers:
+    with TemporaryDirectory(prefix="cipv-pack-") as folder:
         for shape in EQUAL_TABLES:
             file = Path(folder) / f"{shape.name}.parquet"
 
             def read(drive: str, name: str = shape.name) -> tuple[str, pa.Table]:
                 return drive, _part(store, name, run, drive)
 
-            write_pack(file, shape, _read_ahead(readers, read, fresh.marks))
+            write_pack(file, shape, ahead(read, fresh.marks, _READERS))
             store.put(packed_file(shape.name, run, fresh.number), file)
-
-
-def _read_ahead(
-    readers: ThreadPoolExecutor, read: Callable[[str], tuple[str, pa.Table]], drives: Iterable[str]
-) -> Iterator[tuple[str, pa.Table]]:
-    """What is read of each drive, in order. Only ``_READERS`` parts are held at once: a pack of long drives would not
-    fit in memory."""
-    rest = iter(drives)
-    held = deque(readers.submit(read, drive) for drive in islice(rest, _READERS))
-    while held:
-        part = held.popleft().result()
-        held.extend(readers.submit(read, drive) for drive in islice(rest, 1))
-        yield part
 
 
 def write_pack(file: Path, shape: TableShape, parts: Iterable[tuple[str, pa.Table]]) -> None:

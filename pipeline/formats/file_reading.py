@@ -54,7 +54,7 @@ def recording_file(path: str) -> Path:
         if not file.exists():
             raise SourceError(f"{path}: no such file")
         if not file.is_file():
-            raise SourceError(f"{path}: not a file")
+            raise SourceError(f"{path}: {'a folder, not a file' if file.is_dir() else 'not a file'}")
     except (OSError, RuntimeError, ValueError) as error:
         raise SourceError(f"{path}: cannot be opened: {reason_of(error)}") from None
     return file

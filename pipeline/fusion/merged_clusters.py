@@ -9,7 +9,7 @@ labelled vehicles within 30 m on Astyx and KITTI, 7 are in such a cluster.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -54,6 +54,15 @@ class SweepWithClusters(SweepReturns, Protocol):
         ...
 
 
+class _Merged(NamedTuple):
+    """Points of clusters that are longer than a vehicle."""
+
+    points: F64
+    """(N, 3), ego frame."""
+    uv: F64
+    """(N, 2) pixels; NaN behind the camera."""
+
+
 def range_boxes(
     boxes: tuple[VisionMeasurement, ...] | None,
     sweep: SweepWithClusters,
@@ -69,27 +78,37 @@ def range_boxes(
     longest = max(max(each.cuboid.size[:2]) for each in sweep.obstacles)
     if not any(asked) or longest <= largest_size_m("car")[0]:
         return boxes
-    return tuple(
-        _ranged(each, sweep, sweep.obstacles, alignment, params) if ask else each
-        for each, ask in zip(boxes, asked, strict=True)
-    )
+    merged: dict[float, _Merged] = {}
+    """Clusters by the length that they exceed: that of few classes."""
+    ranged = []
+    for each, ask in zip(boxes, asked, strict=True):
+        if ask:
+            longest_m = largest_size_m(each.detection.label)[0]
+            if longest_m not in merged:
+                merged[longest_m] = _longer_than(longest_m, sweep, sweep.obstacles, alignment)
+            each = _ranged(each, merged[longest_m], sweep.ground, params)
+        ranged.append(each)
+    return tuple(ranged)
 
 
-def _ranged(
-    seen: VisionMeasurement,
-    sweep: SweepWithClusters,
-    obstacles: Sequence[Obstacle],
-    alignment: Alignment,
-    params: FusionParams,
-) -> VisionMeasurement:
-    longest_m = largest_size_m(seen.detection.label)[0]
-    merged = [each.cluster for each in obstacles if max(each.cuboid.size[:2]) > longest_m]
-    points = sweep.points[np.isin(sweep.kind, merged), :3].astype(np.float64)
-    uv = alignment.project(points)
+def _longer_than(
+    longest_m: float, sweep: SweepWithClusters, obstacles: Sequence[Obstacle], alignment: Alignment
+) -> _Merged:
+    is_long = np.zeros(max(each.cluster for each in obstacles) + 1, dtype=np.bool_)
+    is_long[[each.cluster for each in obstacles if max(each.cuboid.size[:2]) > longest_m]] = True
+    rows = np.flatnonzero(sweep.kind >= 0)
+    kind = sweep.kind[rows]
+    known = kind < len(is_long)
+    rows = rows[known][is_long[kind[known]]]
+    points = sweep.points[rows, :3].astype(np.float64)
+    return _Merged(points, alignment.project(points))
+
+
+def _ranged(seen: VisionMeasurement, merged: _Merged, ground: Ground, params: FusionParams) -> VisionMeasurement:
+    points, uv = merged
     is_inside = _is_inside(uv, seen.detection.bbox)
     inside, across = points[is_inside], uv[is_inside, 0]
-    assert sweep.ground is not None
-    height_m = sweep.ground.above(inside)
+    height_m = ground.above(inside)
     on_body = (height_m > LOW_M) & (height_m < HIGH_M)
     inside, across = inside[on_body], across[on_body]
     range_m = np.hypot(inside[:, 0], inside[:, 1])
@@ -103,7 +122,7 @@ def _ranged(
         return seen
     nearest_m = float(range_m[rows[0]])
     if seen.distance_m is not None and seen.sigma_m is not None:
-        if _continues(points, uv[:, 0], sweep.ground, inside[rows], (x1, x2)):
+        if _continues(points, uv[:, 0], ground, inside[rows], (x1, x2)):
             return seen  # a fence or a hedge before the vehicle
         if abs(nearest_m - seen.distance_m) > params.range_gate_sigmas * seen.sigma_m:
             return seen  # a nearer vehicle of the same cluster

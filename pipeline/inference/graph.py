@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 import onnx
 import onnx.numpy_helper
 
@@ -20,6 +21,8 @@ MULTIPLE = 32
 """Coarsest stride of the YOLO family: input sides are multiples of it."""
 MIN_BUDGET = 640 * 384
 """Network pixels always allowed: a small square export (416×416) is otherwise too coarse for a car at 60 m."""
+_STRIDES = (1, 2, 4, 8, 16, 32)
+"""Of a network's maps, compared with its input."""
 
 
 def fitting_size(image_size: tuple[int, int], own: Size | None) -> Size:
@@ -108,6 +111,43 @@ def with_input_size(model: onnx.ModelProto, size: Size) -> onnx.ModelProto:
     except Exception as error:  # its error class has no common base with Python's own errors
         reason = (str(error).splitlines() or ["no reason given"])[0]
         raise ValueError(f"its shapes contradict each other: {reason}") from None
+
+
+def with_rows(model: onnx.ModelProto, rows: int) -> onnx.ModelProto:
+    """A copy of a fully convolutional network with a fixed input that takes ``rows`` rows instead, as many columns.
+
+    Attention layers of an export reshape their maps to (…, h·w) and back to (…, h, w); such constants, which are the
+    old input divided by a stride, are divided from the new one. ValueError if the input is free, or as for
+    ``with_input_size``.
+    """
+    own = input_size(model)
+    if own is None:
+        raise ValueError("its input has no fixed size")
+    changed = onnx.ModelProto()
+    changed.CopyFrom(model)
+    targets = {name for node in changed.graph.node if node.op_type == "Reshape" for name in node.input[1:]}
+    constants = [tensor for tensor in changed.graph.initializer if tensor.name in targets]
+    for node in changed.graph.node:
+        if node.op_type == "Constant" and node.output[0] in targets:
+            constants += [attribute.t for attribute in node.attribute if attribute.name == "value"]
+    for tensor in constants:
+        shape = onnx.numpy_helper.to_array(tensor)
+        tensor.CopyFrom(onnx.numpy_helper.from_array(_scaled(shape, own, rows), tensor.name))
+    return with_input_size(changed, (rows, own[1]))
+
+
+def _scaled(shape: npt.NDArray[np.int64], own: Size, rows: int) -> npt.NDArray[np.int64]:
+    """The target of a Reshape for an input of ``rows`` rows, if it ends in the size of a map of the ``own`` input."""
+    changed = shape.copy()
+    for stride in _STRIDES:
+        if own[0] % stride or own[1] % stride or rows % stride:
+            continue
+        height, width = own[0] // stride, own[1] // stride
+        if shape.size > 1 and tuple(shape[-2:]) == (height, width):
+            changed[-2] = rows // stride
+        elif shape.size and shape[-1] == height * width:
+            changed[-1] = rows // stride * width
+    return changed
 
 
 def _up(length: float) -> int:

@@ -5,15 +5,17 @@ The paper uses ENet-SAD; any network whose outputs ``pipeline.lanes.heads`` supp
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
+import onnx
 import onnxruntime as ort
 
 from pipeline.common.files.data_dir import file_sha256
-from pipeline.inference.graph import Size, input_size, with_empty_masks, with_input_size
+from pipeline.inference.graph import Size, input_size, with_empty_masks, with_input_size, with_rows
 from pipeline.inference.runtime import (
     DetectorError,
     DetectorMissing,
@@ -26,13 +28,17 @@ from pipeline.inference.runtime import (
 from pipeline.inference.tuning import USUAL_THREADS
 from pipeline.inference.used_files import file_notes
 from pipeline.lanes.heads import LaneHead, UnknownLaneHead, pick_head
-from pipeline.lanes.horizon import horizon_share
+from pipeline.lanes.horizon import ImageOutline, image_outline
 from pipeline.types import F32, U8, CameraCalibration, RawLanes
 
 _FREE_SIZE: Size = (360, 640)
 """Input (height, width) for a graph with free size: that of the BDD100K networks."""
 _PADDING = 114
 _MIN_SCORE = 0.3
+_GREY = 0.45
+_ROW_STEP, _FEWEST_ROWS = 8, 64
+"""The rows of a smaller input are a multiple of the network's coarsest stride. With fewer than 88, the number for
+Astyx, nothing was measured."""
 _MOST_SKY = 0.6
 """At most this share of an image is cut off as sky, whatever its calibration says."""
 
@@ -55,8 +61,8 @@ class LaneNetwork:
     """Notes for the user, added to every result."""
     threads: int
     """Number of threads per image."""
-    horizon: float
-    """Row of the horizon in the camera's image, as a share of its height."""
+    outline: ImageOutline
+    """Of the camera's images."""
     sha256: str
     """Of the file."""
     _session: ort.InferenceSession = field(repr=False, compare=False)
@@ -67,7 +73,7 @@ class LaneNetwork:
         DetectorError for an array that is not such an image, or if the network fails on it.
         """
         check_image(bgr)
-        placed = _placed((bgr.shape[0], bgr.shape[1]), self.input_size, self.head, self.horizon)
+        placed = _placed((bgr.shape[0], bgr.shape[1]), self.input_size, self.head, self.outline.horizon)
         found = self.head.points(run_session(self._session, self._blob(bgr, placed)))
         keep = found.score >= _MIN_SCORE
         uv = found.uv[keep] * (self.input_size[1], self.input_size[0])
@@ -76,9 +82,12 @@ class LaneNetwork:
         return RawLanes(self.name, uv[inside].astype(np.float32), found.score[keep][inside], found.line[keep][inside])
 
     def of_camera(self, camera: CameraCalibration | None) -> LaneNetwork:
-        """The same network, without loading it again, for images of another camera; None if it is not known."""
-        horizon = horizon_share(camera)
-        return replace(self, name=_name(self.path, self.sha256, self.head, horizon), horizon=horizon)
+        """The same network for images of another camera; None if it is not known. It is loaded again only if the size
+        of its input depends on the camera."""
+        outline = image_outline(camera)
+        if self.head.keeps_aspect and outline != self.outline:
+            return load_lane_network(self.path, self.threads, outline)
+        return replace(self, name=_name(self.path, self.sha256, self.head, outline), outline=outline)
 
     def _blob(self, bgr: U8, placed: _Placed) -> F32:
         """(1, 3, h, w) float32, the network's input."""
@@ -120,12 +129,12 @@ def open_lane_network(
             f"{what}: run `cipv models pull twinlitenet`, or give an ONNX file with `--lanes PATH`, "
             "or use `--lanes classical`, which needs none."
         )
-    return load_lane_network(path, threads, horizon_share(camera))
+    return load_lane_network(path, threads, image_outline(camera))
 
 
-def load_lane_network(path: Path, threads: int, horizon: float) -> LaneNetwork:
-    """The network in a file, tested by running it on a grey image. horizon: row of the horizon in the camera's image,
-    as a share of its height. DetectorError if it is not a lane network that can be run."""
+def load_lane_network(path: Path, threads: int, outline: ImageOutline) -> LaneNetwork:
+    """The network in a file, tested by running it on a grey image. outline: of the camera's images. DetectorError if it
+    is not a lane network that can be run."""
     model = with_empty_masks(read_graph(path))
     try:
         own = input_size(model)
@@ -133,26 +142,58 @@ def load_lane_network(path: Path, threads: int, horizon: float) -> LaneNetwork:
         raise DetectorError(f"{path.name} is not a lane network: {error}") from None
     size = own or _FREE_SIZE
     try:
-        graph = (model if own else with_input_size(model, size)).SerializeToString()
+        model = model if own else with_input_size(model, size)
     except ValueError as error:
         raise DetectorError(f"{path.name} cannot be run: {error}") from None
-    session = open_session(graph, path, threads)
-    probe = run_session(session, np.full((1, 3, *size), 0.45, np.float32))
+    session = open_session(model.SerializeToString(), path, threads)
     try:
-        head = pick_head(probe, [output.name for output in session.get_outputs()])
+        head = pick_head(_probe(session, size), [output.name for output in session.get_outputs()])
     except UnknownLaneHead as error:
         raise DetectorError(f"{path.name}: {error}") from None
+    if head.keeps_aspect:
+        rows = _rows(size, head, outline)
+        smaller = _with_rows(model, rows, head, path, threads)
+        head = head if smaller is not None else replace(head, horizon=None, keeps_aspect=False)
+        session, size = (smaller, (rows, size[1])) if smaller is not None else (session, size)
     sha256 = file_sha256(path)
-    name = _name(path, sha256, head, horizon)
+    name = _name(path, sha256, head, outline)
     notes = (f"Lane lines by the network {path.stem}", *file_notes(path, sha256))
     count = session.get_session_options().intra_op_num_threads
-    return LaneNetwork(path, name, tuple(session.get_providers()), size, head, notes, count, horizon, sha256, session)
+    return LaneNetwork(path, name, tuple(session.get_providers()), size, head, notes, count, outline, sha256, session)
 
 
-def _name(path: Path, sha256: str, head: LaneHead, horizon: float) -> str:
-    """Of a network. The horizon is part of it if the network's input depends on it."""
+def _probe(session: ort.InferenceSession, size: Size) -> Sequence[F32]:
+    """Outputs for a grey image of this size."""
+    return run_session(session, np.full((1, 3, *size), _GREY, np.float32))
+
+
+def _rows(size: Size, head: LaneHead, outline: ImageOutline) -> int:
+    """Rows of an input that shows the road in its own aspect: at most those of ``size``."""
+    rows = size[1] * outline.aspect * (1.0 - _sky(head, outline.horizon))
+    return min(size[0], max(_FEWEST_ROWS, round(rows / _ROW_STEP) * _ROW_STEP))
+
+
+def _with_rows(
+    model: onnx.ModelProto, rows: int, head: LaneHead, path: Path, threads: int
+) -> ort.InferenceSession | None:
+    """The network with as many rows; None if its graph cannot be changed so, for example because its attention has
+    windows of a fixed size."""
+    try:
+        session = open_session(with_rows(model, rows).SerializeToString(), path, threads)
+        columns = input_size(model)
+        mask = _probe(session, (rows, columns[1] if columns else rows))[head.output]
+    except (DetectorError, ValueError):
+        return None
+    return session if mask.shape[-2] == rows else None
+
+
+def _name(path: Path, sha256: str, head: LaneHead, outline: ImageOutline) -> str:
+    """Of a network. What its input depends on is part of it."""
     name = f"{path.stem}-{sha256[:12]}"
-    return name if head.horizon is None else f"{name}-{horizon:.3f}"
+    if head.horizon is None:
+        return name
+    aspect = f"-{outline.aspect:.3f}" if head.keeps_aspect else ""
+    return f"{name}-{outline.horizon:.3f}{aspect}"
 
 
 def _placed(image: Size, size: Size, head: LaneHead, horizon: float) -> _Placed:
@@ -164,6 +205,12 @@ def _placed(image: Size, size: Size, head: LaneHead, horizon: float) -> _Placed:
         return _Placed(0, fitted, (fitted[1] / width, fitted[0] / height), shift)
     top = max(0, height - round(width * rows / columns)) if head.fit == "lower" else 0
     if head.horizon is not None:
-        share = min(max((horizon - head.horizon) / (1.0 - head.horizon), 0.0), _MOST_SKY)
-        top = round(share * height)
+        top = round(_sky(head, horizon) * height)
     return _Placed(top, size, (columns / width, rows / (height - top)), (0.0, 0.0))
+
+
+def _sky(head: LaneHead, horizon: float) -> float:
+    """Share of an image's rows that is cut off, so that its horizon is where the network expects it."""
+    if head.horizon is None:
+        return 0.0
+    return min(max((horizon - head.horizon) / (1.0 - head.horizon), 0.0), _MOST_SKY)

@@ -79,7 +79,7 @@ def recording_at(uri: str) -> tuple[SourceKind, str] | None:
     and the video beside it. None if there is nothing of a known kind.
     """
     bare = kind_of_bare(uri)
-    if bare is not None:
+    if bare is not None and not os.path.isdir(os.path.expanduser(uri)):
         return _by_content(Path(uri)) or bare, uri
     path, mark, options = uri.partition("?")
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import islice
@@ -13,7 +14,7 @@ import pytest
 from pipeline.detection import Detectors, LiveDetectors, detect, detector_for, lanes_for
 from pipeline.inference.model_registry import EMBEDDED, find, register
 from pipeline.params import Params, SyncParams
-from pipeline.run import advance, run_live
+from pipeline.run import advance, run, run_live
 from pipeline.sources import open_source
 from pipeline.step import State
 from pipeline.types import U8, CameraImage, Frame, RawBoxes, RawLanes
@@ -155,3 +156,20 @@ def test_the_line_believes_the_simulators_lane_by_the_classical_detector() -> No
     assert lane is not None
     assert lane.width_m == pytest.approx(3.6, abs=0.2)
     assert lanes_for(source, "off") is None
+
+
+def test_the_next_frame_is_read_while_one_is_processed() -> None:
+    source = open_source("sim:straight")
+    read = source.frame
+    second = threading.Event()
+
+    def frame(index: int) -> Frame:
+        if index == 1:
+            second.set()
+        return replace(read(index), image=None)
+
+    source.frame = frame  # type: ignore[method-assign]
+    results = run(source, Params(), Detectors())
+    next(results)
+    assert second.wait(60.0)
+    results.close()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.app.labels.conftest import postgres_url  # noqa: F401
+from tests.app.labels.conftest import postgres_server, postgres_url  # noqa: F401
 from tests.app.labels.server_process import forking, started
 from tests.app.labels.two_people import label_together
 

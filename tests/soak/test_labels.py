@@ -31,7 +31,7 @@ from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sight
 from pipeline.recording.session.provenance import About
 from pipeline.recording.session.writer import SessionWriter
 from pipeline.sources import open_source
-from tests.app.labels.conftest import info, postgres_url  # noqa: F401
+from tests.app.labels.conftest import info, postgres_server, postgres_url  # noqa: F401
 from tests.app.labels.kills import kill_again_and_again
 
 pytestmark = pytest.mark.soak

@@ -140,8 +140,8 @@ def _networks(detectors: Detectors) -> list[Detector | LaneNetwork]:
 
 
 def _file_of(network: Detector | LaneNetwork) -> NetworkFile:
-    horizon = network.horizon if isinstance(network, LaneNetwork) else None
-    return NetworkFile(network.name, str(network.path.resolve()), network.threads, network.input_size, horizon)
+    outline = network.outline if isinstance(network, LaneNetwork) else None
+    return NetworkFile(network.name, str(network.path.resolve()), network.threads, network.input_size, outline)
 
 
 def _pipe(stream: IO[bytes] | None) -> IO[bytes]:

@@ -12,6 +12,7 @@ from typing import IO, TypeVar
 import msgspec
 
 from app.core.kept_detections import DetectionRow
+from pipeline.lanes.horizon import ImageOutline
 
 _LENGTH = struct.Struct("<I")
 M = TypeVar("M", bound=msgspec.Struct)
@@ -28,8 +29,8 @@ class NetworkFile(msgspec.Struct, frozen=True):
     """Threads of one run."""
     input_size: tuple[int, int]
     """(height, width)."""
-    horizon: float | None
-    """For a lane network, the row of the horizon as a share of the image's height; None for a vehicle detector."""
+    outline: ImageOutline | None
+    """For a lane network, of the camera's images; None for a vehicle detector."""
 
 
 class Networks(msgspec.Struct):

@@ -81,8 +81,8 @@ def _answer(network: Detector | LaneNetwork, bgr: np.ndarray) -> NetworkReply:
 def _opened(file: NetworkFile) -> Detector | LaneNetwork:
     """The network; BadInput if it differs from the server's, for example because the file has been replaced."""
     network: Detector | LaneNetwork
-    if file.horizon is not None:
-        network = load_lane_network(Path(file.path), file.threads, file.horizon)
+    if file.outline is not None:
+        network = load_lane_network(Path(file.path), file.threads, file.outline)
     else:
         network = open_detector(file.path, None, file.threads)
         if network.input_size != file.input_size:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable
 
 import numpy as np
 
@@ -13,6 +11,7 @@ from pipeline.calibration.alignment.fit import STEPS, AlignmentFit, fit_alignmen
 from pipeline.calibration.alignment.models import ModelName
 from pipeline.calibration.alignment.scenes import FitScene, fit_scene
 from pipeline.calibration.depth_edges import edge_scene
+from pipeline.common.ahead import ahead
 from pipeline.common.progress import Progress, silent
 from pipeline.params import Params
 from pipeline.types import Frame
@@ -39,7 +38,8 @@ def fit_drive(
     scenes: list[FitScene] = []
     edges: list[EdgeView] = []
     kept: set[int] | None = None
-    for number, frame in enumerate(_read_ahead(frame_of, indices)):
+    # Reading, or rendering, and detection take longer than all else.
+    for number, frame in enumerate(ahead(frame_of, indices)):
         progress(number, total)
         scene = fit_scene(frame, params)
         if scene is None:
@@ -56,16 +56,3 @@ def fit_drive(
     found = fit_alignment(scenes, name, params.alignment, offset, told, edges)
     progress(total, total)
     return found
-
-
-def _read_ahead(frame_of: Callable[[int], Frame], indices: Sequence[int]) -> Iterator[Frame]:
-    """The frames in this order, each read while the one before it is worked on: reading, or rendering, and detection
-    take longer than all else."""
-    with ThreadPoolExecutor(1, "cipv-fit-frames") as reader:
-        coming: deque[Future[Frame]] = deque()
-        for index in indices:
-            coming.append(reader.submit(frame_of, index))
-            if len(coming) > 1:
-                yield coming.popleft().result()
-        for last in coming:
-            yield last.result()

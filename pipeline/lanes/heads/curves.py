@@ -64,4 +64,4 @@ def recognise(answer: LaneOutputs) -> LaneHead | None:
     scores = next((i for i, shape in enumerate(answer.shapes) if tuple(shape) == pairs), None)
     if scores is None:
         return None
-    return CurveHead("LSTR", curves, from_curves, "stretch", None, *IMAGENET, _TUSIMPLE_HORIZON, scores)
+    return CurveHead("LSTR", curves, from_curves, "stretch", None, *IMAGENET, horizon=_TUSIMPLE_HORIZON, scores=scores)

@@ -70,8 +70,10 @@ class LaneHead:
     spread: PerChannel = (1.0, 1.0, 1.0)
     """Divisor of the difference."""
     horizon: float | None = None
-    """The horizon in its training images as a share of their height: the sky is cut off so that the input has the same
-    horizon. None: the horizon does not matter."""
+    """Row of the horizon in the input, as a share of its height: as much sky is cut off an image. None: none is."""
+    keeps_aspect: bool = False
+    """Whether the network is fully convolutional, and its input is given as many rows as the image without that sky has
+    at its number of columns. Otherwise, its input keeps its size."""
 
     def points(self, outputs: Sequence[F32]) -> Points:
         """Points on lines from the network's outputs."""

@@ -183,6 +183,12 @@ class KittiSource:
         if self._files.raw_calibration is not None:
             cameras, velodyne = self._files.raw_calibration
             names = (cameras.name, velodyne.name)
+            missing = next((file.name for file in (cameras, velodyne) if not file.exists()), None)
+            if missing is not None:
+                raise SourceError(
+                    f"{path}: no calibration: {missing} must be in this folder or in the one above it; it belongs to "
+                    "the calibration of the day, which is a download of its own"
+                )
             return parse_raw_calibration(read_bytes(cameras), read_bytes(velodyne), names, self._size)
         if self._files.calibration_360 is not None:
             velodyne, cameras = self._files.calibration_360

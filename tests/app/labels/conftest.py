@@ -32,7 +32,7 @@ def info(key: str, count: int = COUNT) -> DriveInfo:
 
 
 @pytest.fixture(scope="session")
-def postgres_url() -> Iterator[str]:
+def postgres_server() -> Iterator[str]:
     """URL of a server that runs only for these tests; skipped without PostgreSQL's programs, but never in CI."""
     found = postgres.binaries()
     if found is None:
@@ -40,6 +40,12 @@ def postgres_url() -> Iterator[str]:
         pytest.skip("no PostgreSQL here (apt-get install postgresql)")
     with postgres.running(found) as url:
         yield url
+
+
+@pytest.fixture
+def postgres_url(postgres_server: str) -> str:
+    """URL of a database without tables that no other test uses."""
+    return postgres.new_database(postgres_server, f"test_{next(_numbers)}")
 
 
 @pytest.fixture(scope="session")
@@ -50,8 +56,8 @@ def sqlite_database(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Databa
 
 
 @pytest.fixture(scope="session")
-def postgres_database(postgres_url: str) -> Iterator[Database]:
-    database = Database(postgres_url)
+def postgres_database(postgres_server: str) -> Iterator[Database]:
+    database = Database(postgres_server)
     yield database
     database.close()
 

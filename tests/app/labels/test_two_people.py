@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.labels.store.database import Database
 from tests.app.labels.server_process import forking, started
 from tests.app.labels.two_people import label_together
 
@@ -22,9 +21,7 @@ def test_two_people_on_one_server_lose_nothing_without_being_told(tmp_path: Path
             server.join()
 
 
-def test_two_people_on_two_servers_of_one_postgresql_lose_nothing_without_being_told(
-    postgres_url: str, postgres_database: Database
-) -> None:
+def test_two_people_on_two_servers_of_one_postgresql_lose_nothing_without_being_told(postgres_url: str) -> None:
     with forking() as context:
         servers = [started(context, postgres_url) for _ in range(2)]
         try:

@@ -35,11 +35,29 @@ def _linear(name: str, rows: list[tuple[float, float, float, float]]) -> tuple[o
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
-def twin(path: Path, size: Size = (72, 128)) -> Path:
-    """Two masks: nothing drivable, and a line where red (0–1) is above one half."""
+def twin(path: Path, size: Size = (72, 128), attention: bool = False, windows: bool = False) -> Path:
+    """Two masks: nothing drivable, and a line where red (0–1) is above one half.
+
+    attention: as in TwinLiteNet's export, a map is flattened to (1, channels, h·w) and restored, with its size as a
+    constant. windows: as in TwinLiteNetPlus, it is divided into windows of a fixed size.
+    """
     road, first = _linear("da", [_NOTHING, (0.0, 0.0, 0.0, -9.0)])
     line, second = _linear("ll", [_NOTHING, (40.0, 0.0, 0.0, -20.0)])
-    return _saved(path, [road, line], {**first, **second}, ["da", "ll"], size)
+    nodes = [road, line]
+    if attention or windows:
+        line.output[0] = "own"
+        height, width = int(size[0]), int(size[1])
+        parts = (1, -1, height * width) if attention else (1, 2, 2, height // 2, 2, width // 2)
+        for name, shape in (("parts", parts), ("map", (1, 2, height, width))):
+            value = numpy_helper.from_array(np.array(shape, np.int64))
+            nodes.append(helper.make_node("Constant", [], [name], value=value))
+        nodes += [
+            helper.make_node("Reshape", ["own", "parts"], ["divided"]),
+            helper.make_node("Neg", ["divided"], ["turned"]),  # otherwise the runtime makes one Reshape of both
+            helper.make_node("Reshape", ["turned", "map"], ["restored"]),
+            helper.make_node("Neg", ["restored"], ["ll"]),
+        ]
+    return _saved(path, nodes, {**first, **second}, ["da", "ll"], size)
 
 
 def yolop(path: Path, size: Size = (128, 128)) -> Path:

@@ -37,6 +37,13 @@ def image(**bars: tuple[int, int]) -> U8:
     return bgr
 
 
+def level_camera(horizon: float, width: int = WIDTH, height: int = HEIGHT) -> CameraCalibration:
+    """Looks straight ahead, with the horizon at this share of the image's height."""
+    K = np.array([[1000.0, 0.0, width / 2], [0.0, 1000.0, horizon * height], [0.0, 0.0, 1.0]])
+    level = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    return CameraCalibration(K, np.zeros(0), level, width, height)
+
+
 MASKS = {
     "two masks": (lane_networks.twin, (72, 128), "two masks"),
     "two masks of free size": (lane_networks.twin, ("h", "w"), "two masks"),
@@ -49,10 +56,7 @@ MASKS = {
 
 def test_curves_lie_in_the_image_whose_sky_was_cut_off_at_the_cameras_horizon(tmp_path: Path) -> None:
     """The curve begins in the middle of the input: 0.33 of it lie above the horizon, and 17 % down to that."""
-    K = np.array([[1000.0, 0.0, 640.0], [0.0, 1000.0, 0.57 * HEIGHT], [0.0, 0.0, 1.0]])
-    level = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-    camera = CameraCalibration(K, np.zeros(0), level, WIDTH, HEIGHT)
-    network = open_lane_network(str(lane_networks.lstr(tmp_path / "lstr.onnx")), camera=camera)
+    network = open_lane_network(str(lane_networks.lstr(tmp_path / "lstr.onnx")), camera=level_camera(0.57))
     assert network.head.name == "LSTR"
     raw = network.detect(image())
     assert set(raw.line.tolist()) == {0}
@@ -63,22 +67,42 @@ def test_curves_lie_in_the_image_whose_sky_was_cut_off_at_the_cameras_horizon(tm
 
 
 def test_a_network_for_another_camera_is_the_one_that_is_opened_for_it(tmp_path: Path) -> None:
-    level = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-    low, high = (
-        CameraCalibration(
-            np.array([[1000.0, 0.0, 640.0], [0.0, 1000.0, share * HEIGHT], [0.0, 0.0, 1.0]]),
-            np.zeros(0),
-            level,
-            WIDTH,
-            HEIGHT,
-        )
-        for share in (0.4, 0.57)
-    )
+    low, high = level_camera(0.4), level_camera(0.57)
     file = str(lane_networks.lstr(tmp_path / "lstr.onnx"))
     turned, opened = open_lane_network(file, camera=low).of_camera(high), open_lane_network(file, camera=high)
     assert turned == opened
     assert np.array_equal(turned.detect(image()).points, opened.detect(image()).points)
     assert turned.name != open_lane_network(file, camera=low).name
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "horizon", "rows"),
+    [(1280, 720, 0.57, 200), (1242, 375, 0.48, 128), (2048, 618, 0.63, 88), (1280, 720, 0.1, 360), (640, 96, 0.5, 64)],
+)
+def test_a_fully_convolutional_network_sees_the_road_in_its_own_aspect(
+    tmp_path: Path, width: int, height: int, horizon: float, rows: int
+) -> None:
+    """Its attention, which is exported for one size of map, is reduced with it."""
+    file = str(lane_networks.twin(tmp_path / "twin.onnx", (360, 640), attention=True))
+    network = open_lane_network(file, camera=level_camera(horizon, width, height))
+    assert network.input_size == (rows, 640)
+    bgr = np.zeros((height, width, 3), np.uint8)
+    bgr[:, width // 2 : width // 2 + 20] = RED
+    raw = network.detect(bgr)
+    assert raw.points[:, 0] == pytest.approx(width // 2 + 9.5, abs=3.0)
+    sky = min(max((horizon - 0.22) / 0.78, 0.0), 0.6)
+    assert raw.points[:, 1].min() == pytest.approx(sky * height, abs=height / rows + 1.0)
+    assert raw.points[:, 1].max() == pytest.approx(height, abs=2.0 * height / rows + 1.0)
+    assert open_lane_network(file).of_camera(level_camera(horizon, width, height)).input_size == (rows, 640)
+    assert open_lane_network(file, camera=level_camera(0.3)).name != network.name
+
+
+def test_a_network_whose_rows_cannot_be_reduced_sees_the_whole_image(tmp_path: Path) -> None:
+    network = open_lane_network(str(lane_networks.twin(tmp_path / "twin.onnx", (360, 640), windows=True)))
+    assert network.input_size == (360, 640)
+    raw = network.detect(image(red=(600, 640)))
+    assert raw.points[:, 1].min() == pytest.approx(0.0, abs=4.0)
+    assert raw.points[:, 1].max() == pytest.approx(HEIGHT, abs=6.0)
 
 
 @pytest.mark.parametrize("kind", MASKS)
@@ -89,7 +113,9 @@ def test_a_line_is_found_where_it_is_in_the_image(tmp_path: Path, kind: str) -> 
     raw = network.detect(image(red=(600, 640)))
     assert np.abs(raw.points[:, 0] - 619.5).max() < 6.0
     assert raw.points[:, 1].max() > 0.97 * HEIGHT
-    top = HEIGHT - WIDTH * 52 / 244 if "lower" in kind else 0.03 * HEIGHT
+    top = {"two masks": 0.45 * HEIGHT, "classes of the lower part": HEIGHT - WIDTH * 52 / 244}.get(
+        kind.removesuffix(" of free size"), 0.03 * HEIGHT
+    )
     assert raw.points[:, 1].min() == pytest.approx(top, abs=0.05 * HEIGHT)
     assert raw.scores.min() > 0.5
     assert raw.model == network.name

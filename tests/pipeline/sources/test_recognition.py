@@ -224,6 +224,7 @@ OTHERS: dict[str, tuple[Write, str]] = {
     ),
     "a link to itself": (link_to_itself, "a broken link|cannot be read"),
     "a folder in itself": (folder_in_itself, "it holds folder again"),
+    "a folder called like a session": (lambda folder: unrelated(folder / "x.mcap"), r"x\.mcap: not a source: it holds"),
     "a pipe": (pipe, "not a file or folder"),
     "a video's first bytes": (some_file("a", b"\0\0\0\x20ftypisom"), "a: not a readable video: cut off, or something"),
     "a capture's first bytes": (some_file("a", b"\xd4\xc3\xb2\xa1"), "a: no Velodyne packets .* the file is cut off"),

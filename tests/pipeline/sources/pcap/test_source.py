@@ -116,7 +116,7 @@ def test_bad_packets_are_told(tmp_path: Path) -> None:
 WRONG = {
     "no file": ("pcap:", "no file given"),
     "missing": ("pcap:{folder}/missing.pcap", "no such file"),
-    "folder": ("pcap:{folder}", "not a file"),
+    "folder": ("pcap:{folder}", "a folder, not a file"),
     "option": ("pcap:{file}?colour=red", "unknown option 'colour'; the options are port, video"),
     "twice": ("pcap:{file}?port=1&port=2", "given twice"),
     "no number": ("pcap:{file}?port=many", "port=many: not a number"),
