@@ -22,8 +22,6 @@ CREEP_MPS = 3.0
 """Below this speed own motion shows no curvature, so a car that may not creep would never determine its path."""
 _SLOW_MPS, _FAST_MPS = 5.0, 20.0
 """Speeds between which ISO 15622's limits are interpolated."""
-_MEASURES_SPEED_HITS = 2
-"""A speed takes two sightings."""
 State = Literal["cruise", "follow", "stop", "warn"]
 
 
@@ -61,11 +59,11 @@ def control(
     state: AccState, situation: Situation, params: AccParams, emergency: AebParams
 ) -> tuple[AccState, AccCommand | None]:
     """Pedals for this frame; None, with the state cleared, if own speed is unknown and was not known recently either.
-    emergency: parameters for the required deceleration."""
+    emergency: parameters for the required deceleration, and for what is on a collision course."""
     ego = situation.now.ego
     if ego is None:
         return AccState(), None
-    threats = _on_course(situation, params)
+    threats = _on_course(situation, params, emergency)
     on_course = {item.id: state.on_course.get(item.id, 0) + 1 for item in threats}
     confirmed = [item for item in threats if on_course[item.id] >= params.confirm_frames]
     # Each rule requests a speed, and the smallest one wins
@@ -102,7 +100,7 @@ def _hardest_mps2(
     required, strongest = 0.0, params.comfort_decel_mps2  # also applies when slowing to the set speed
     if object_id is not None:
         item = situation.object(object_id)
-        required = _required_mps2(object_id, item, situation, emergency)
+        required = _required_mps2(object_id, item, situation, params, emergency)
         if item is None or item.justifies is Braking.FULL:
             strongest = max(strongest, required)
     return min(strongest, max(_onset_mps2(state, situation.now.ego, situation.now.dt_s, params), required))
@@ -117,10 +115,12 @@ def _onset_mps2(state: AccState, ego: EgoState, dt_s: float | None, params: AccP
     return max(-state.accel_mps2, 0.0) + params.comfort_jerk_mps3 * (1.0 + slowness) * dt_s
 
 
-def _required_mps2(object_id: int, item: FusedObject | None, situation: Situation, emergency: AebParams) -> float:
-    """The deceleration required to avoid the object. One of unknown speed is assumed to stand still, but
-    if it was seen only once, nothing is required: it may be a false box on a stray cluster, and the second sighting
-    measures its speed."""
+def _required_mps2(
+    object_id: int, item: FusedObject | None, situation: Situation, params: AccParams, emergency: AebParams
+) -> float:
+    """The deceleration required to avoid the object. One of unknown speed is assumed to stand still, but if it was seen
+    only once, nothing is required: it may be a false box on a stray cluster, and the second sighting measures its
+    speed."""
     lead, ego = situation.lead, situation.now.ego
     assert ego is not None
     distance: float | None = None
@@ -129,7 +129,7 @@ def _required_mps2(object_id: int, item: FusedObject | None, situation: Situatio
         distance, closing = lead.distance_m, lead.closing_speed_mps
     elif item is not None:
         distance, closing = item.distance_m, closing_speed_mps(item)
-    if closing is None and item is not None and item.hits < _MEASURES_SPEED_HITS:
+    if closing is None and item is not None and item.hits < params.speed_hits:
         return 0.0
     if distance is None:
         return math.inf
@@ -205,7 +205,7 @@ def avoid(ego: EgoState, threats: Iterable[FusedObject], params: AccParams) -> l
     ]
 
 
-def _on_course(situation: Situation, params: AccParams) -> list[FusedObject]:
+def _on_course(situation: Situation, params: AccParams, emergency: AebParams) -> list[FusedObject]:
     """The objects other than the CIPV that would be hit before the TTC limit. Only objects whose course leads into the
     corridor by then: an oncoming car in its own lane also has a short TTC, but passes."""
     return [
@@ -216,7 +216,7 @@ def _on_course(situation: Situation, params: AccParams) -> list[FusedObject]:
         and item.ttc_s < params.ttc_limit_s
         and (closing_speed_mps(item) or 0.0) > STANDSTILL_MPS
         and is_dependable(item)
-        and enters_corridor(item, situation.path, situation.lead)
+        and enters_corridor(item, situation.path, situation.lead, emergency)
     ]
 
 

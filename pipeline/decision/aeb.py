@@ -99,19 +99,20 @@ def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
             continue
         is_lead = situation.lead is not None and item.id == situation.lead.id
         if (is_lead and not item.carried and not item.oncoming) or (
-            is_dependable(item) and enters_corridor(item, situation.path, situation.lead)
+            is_dependable(item) and enters_corridor(item, situation.path, situation.lead, params)
         ):
             sigma_m = item.distance_sigma_m or 0.0
             justified = _justified(item, required_decel_mps2(item.distance_m, closing, params))
-            required = required_decel_mps2(item.distance_m, _surely_closing_mps(item, closing), params)
+            required = required_decel_mps2(item.distance_m, _surely_closing_mps(item, closing, params), params)
             found.append(Threat(item.id, item.distance_m, sigma_m, closing, item.ttc_s, required, justified))
     return tuple(found)
 
 
-def _surely_closing_mps(item: FusedObject, closing_mps: float) -> float:
-    """Its closing speed as far as it is known: that of boxes, one standard deviation lower. Eight sightings at 55 m,
-    the first of which were half a vehicle's, make a car that drives ahead at our speed approach at 26 ± 9 m/s."""
-    return closing_mps - (item.camera_speed_sigma_mps or 0.0 if not item.ranged else 0.0)
+def _surely_closing_mps(item: FusedObject, closing_mps: float, params: AebParams) -> float:
+    """Its closing speed as far as it is known: that of boxes, ``closing_sigmas`` standard deviations lower. Eight
+    sightings at 55 m, the first of which were half a vehicle's, make a car that drives ahead at our speed approach at
+    26 ± 9 m/s."""
+    return closing_mps - (params.closing_sigmas * (item.camera_speed_sigma_mps or 0.0) if not item.ranged else 0.0)
 
 
 def _justified(item: FusedObject, required_mps2: float) -> Braking:

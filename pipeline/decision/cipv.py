@@ -111,7 +111,7 @@ def _judge(
 ) -> _Judged:
     """Judge one object. placed: its position relative to the path, and when it will cross the edge."""
     where, crossing_s = placed if placed is not None else (None, None)
-    moved = is_elsewhere(item, state.places.get(item.id))
+    moved = is_elsewhere(item, state.places.get(item.id), params.forget_at_takeover)
     leads, widening_m, odds = item.id == state.lead_id and not moved, 0.0, None
     clears_s = clears_path_s(where, item, moment.speed_mps, params)
     if where is not None:

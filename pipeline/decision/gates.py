@@ -31,9 +31,6 @@ _CLEARLY_M = 0.5
 STAYS_UP_TO = 1.5
 """Factor on ``max_sigma_m`` for the current lead: hysteresis, so that a lead whose uncertainty is close to the limit
 does not come and go."""
-_WIDEST_ASKEW_M = 4.5
-"""Shorter side of a cluster's box: 2.6 m for the widest vehicles (Directive 96/53/EC), more if the box is askew by 20°
-to 6 m of their flank. A larger one holds several vehicles, such as a passing bus, the lead and a parked car."""
 
 
 class Candidate(NamedTuple):
@@ -131,7 +128,8 @@ def _distance(who: Candidate) -> Answer:
 def _confirmed(who: Candidate) -> Answer:
     """Two sensors that both see it now confirm it at once; a single sensor must see it several times. The previous lead
     counts as confirmed while it is seen: a false box on a stray cluster is gone in the next frame."""
-    at_once = who.item.seen_by_two_sensors or (who.leads and not who.item.carried)
+    stays_lead = who.leads and not (who.item.carried and who.params.confirm_lead)
+    at_once = who.item.seen_by_two_sensors or stays_lead
     hits, needed = _sightings(who.item), 1 if at_once else who.params.confirm_hits
     return hits >= needed, hits, needed
 
@@ -159,7 +157,8 @@ def _not_seen(who: Candidate) -> str:
 
 def _size(who: Candidate) -> Answer:
     """An object not classified by a camera must be as large as a vehicle's rear or side: kerbs, posts and hedges are
-    not leads."""
+    not leads. The shorter side of a vehicle's box is at most 2.6 m (Directive 96/53/EC), or more if the box is askew by
+    20° to 6 m of its flank. A larger one holds several vehicles, such as a passing bus, the lead and a parked car."""
     item, params = who.item, who.params
     if item.imaged or item.cuboid is None:
         return True, None, params.min_width_m
@@ -169,8 +168,8 @@ def _size(who: Candidate) -> Answer:
         return False, across, params.min_width_m
     if height < params.min_height_m:
         return False, height, params.min_height_m
-    if min(length, width) > _WIDEST_ASKEW_M:
-        return False, min(length, width), _WIDEST_ASKEW_M
+    if min(length, width) > params.max_short_side_m:
+        return False, min(length, width), params.max_short_side_m
     return across <= params.max_size_m, across, params.max_size_m
 
 

@@ -89,6 +89,7 @@ def place(
         STEP_M,
         params.min_overlap_m,
         params.use_flank,
+        params.narrow_along,
         ego is not None,
         ego.speed_mps if ego is not None else 0.0,
         usable_rate(ego) or 0.0,
@@ -107,7 +108,7 @@ def place(
 def warm_up() -> None:
     """Compile the kernel before the first frame."""
     center = np.column_stack([np.arange(3.0), np.zeros(3)])
-    _against(np.zeros((1, 21)), center, center, center, 1.5, np.zeros((2, 3)), STEP_M, 0.9, True, True, 0.0, 0.0)
+    _against(np.zeros((1, 21)), center, center, center, 1.5, np.zeros((2, 3)), STEP_M, 0.9, True, True, True, 0.0, 0.0)
 
 
 def _numbers(item: FusedObject) -> tuple[float, ...]:
@@ -147,7 +148,9 @@ def _flank_m(item: FusedObject) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _against(rows, center, left, right, half_width, sigmas, step, overlap, use_flank, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]
+def _against(  # type: ignore[no-untyped-def]
+    rows, center, left, right, half_width, sigmas, step, overlap, use_flank, narrow_along, ego_known, speed, yaw_rate
+):
     """(N, 14) from (N, 21) rows of ``_numbers``: distances from the centre to the left and to the right edge at the
     object, speed to the left of the path and along it, then the fields of ``Place`` up to ``rare_m``. half_width: for
     a path without edges, else 0. sigmas: (2, K) ``profile_m`` and ``corner_m`` of the path."""
@@ -184,7 +187,8 @@ def _against(rows, center, left, right, half_width, sigmas, step, overlap, use_f
         along, across = vx + speed - yaw_rate * near_y, vy + yaw_rate * near_x
         sideways = across * cos - along * sin if ego_known else vy
         forward = along * cos + across * sin
-        if ego_known and not rows[n, 12] and abs(forward) > _SLOWEST_MPS and abs(sideways) < _ALONG * abs(forward):
+        drives_along = abs(forward) > _SLOWEST_MPS and abs(sideways) < _ALONG * abs(forward)
+        if narrow_along and ego_known and not rows[n, 12] and drives_along:
             has_sides = False  # a box wider than what drives along the path shows other vehicles as well
         low, high = _reach(offsets, has_sides, beside[2 * n], beside[2 * n + 1], flank, rows[n, 8] - heading)
         if ego_known and forward > _SLOWEST_MPS:  # if it changes lanes, its nose is farther to the side than its rear

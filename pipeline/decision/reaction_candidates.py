@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pipeline.decision.gates import ABREAST_M, is_solid
 from pipeline.decision.path_position import believed_mps
+from pipeline.params import AebParams
 from pipeline.path.estimates import STEP_M
 from pipeline.types import Cipv, FusedObject, Path
 
@@ -25,7 +26,7 @@ def is_dependable(item: FusedObject) -> bool:
     return has_velocity and not item.carried and is_solid(item)
 
 
-def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None) -> bool:
+def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: AebParams) -> bool:
     """Whether the object is in the corridor, or its lateral motion takes it there before the car reaches it. An object
     that stands or may stand beside the road stays there: its lateral speed is noise, and half of its points may vanish.
 
@@ -45,14 +46,17 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None) -> bool:
         if is_hidden or sigma_m > path.half_width_m:
             return False
     if item.surely_moving is False or (item.in_path and not oncoming):
-        return item.in_path and item.path_margin_m is not None and item.path_margin_m >= 0.0
+        is_there_now = item.path_margin_m is not None and item.path_margin_m >= 0.0
+        return item.in_path and (is_there_now or not params.react_to_present)
     if item.closest_point is None or item.closest_point[0] < ABREAST_M:
         return False  # already beside the car: braking would not avoid it
     sideways = believed_mps(item.lateral_mps, item)
     toward = -sideways if item.path_offset_m > 0 else sideways
     aside_m = abs(item.path_offset_m) - max(toward, 0.0) * item.ttc_s
-    if oncoming:  # negative: on the other side by then
-        return abs(aside_m) + _SURE_SIGMAS * sigma_m <= path.half_width_m
+    if oncoming:
+        if params.react_where_met:
+            aside_m = abs(aside_m)  # negative: on the other side by then
+        return aside_m + _SURE_SIGMAS * sigma_m <= path.half_width_m
     return aside_m <= path.half_width_m
 
 

@@ -136,7 +136,7 @@ def weigh(
     judged = []
     for item in objects:
         before = _before(state, item)
-        found = _updated(before, item, rays.get(item.id), item.id in missed, now)
+        found = _updated(before, item, rays.get(item.id), item.id in missed, now, params)
         if item.id in unboxed:
             found = found._replace(unboxed=min(found.unboxed + 1, _LOOKS))
         known[item.id] = found
@@ -157,14 +157,16 @@ def _before(state: ExistenceState, item: FusedObject) -> Existence:
     return known if known is not None else Existence(None, 0.0)
 
 
-def _updated(before: Existence, item: FusedObject, rays: Rays | None, missed: bool, now: Moment) -> Existence:
+def _updated(
+    before: Existence, item: FusedObject, rays: Rays | None, missed: bool, now: Moment, params: ExistenceParams
+) -> Existence:
     dt_s = now.dt_s or 0.0
     score, lidar, age_s = before.score, before.lidar, before.age_s + dt_s
     if item.seen_by_camera and item.score is not None:
         score = item.score if score is None else score + _weight(dt_s, _MEAN_S) * (item.score - score)
     elif missed and score is not None:
         score -= _weight(dt_s, min(max(age_s, _MEAN_S), _LONGEST_MEAN_S)) * score
-    moved = is_elsewhere(item, before.last)
+    moved = is_elsewhere(item, before.last, params.forget_at_takeover)
     if moved:
         lidar = 0.0  # what the LiDAR saw at one place says nothing about another
     elif lidar < 0.0:

@@ -219,7 +219,7 @@ def _gates(
             # boxes of nearly the same place and size are one object: then the height law is wrong, not the LiDAR
             if iou + _KEPT_IOU * was_one < params.sure_iou:
                 tests.append(Gate("range_sigmas", gap, params.range_gate_sigmas, gap <= params.range_gate_sigmas))
-            elif lidar[j].hits < _TAKES_OVER_HITS and vision[i].ranges >= _SETTLED_RANGES:
+            elif params.settled_boxes and lidar[j].hits < _TAKES_OVER_HITS and vision[i].ranges >= _SETTLED_RANGES:
                 tests.append(Gate("range_sigmas", gap, AGREEMENT_SIGMAS, gap <= AGREEMENT_SIGMAS))
         longest_m = LONGEST_M.get(vision[i].label) if params.size_gate else None
         if longest_m is not None:

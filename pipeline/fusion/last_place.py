@@ -31,15 +31,18 @@ def last_place(item: FusedObject) -> LastPlace:
     return LastPlace(item.camera_ranges, item.distance_m, item.distance_sigma_m or 0.0, item.ranged)
 
 
-def is_elsewhere(item: FusedObject, before: LastPlace | None) -> bool:
+def is_elsewhere(item: FusedObject, before: LastPlace | None, at_takeover: bool) -> bool:
     """Whether nothing found out about its last position holds for this one: the camera starts anew, because its
     distances no longer fitted; or one of a ranging sensor and the camera takes over from the other, and finds it at a
-    distance that contradicts the other's. Its boxes may be those of another vehicle now, or may have been."""
+    distance that contradicts the other's. Its boxes may be those of another vehicle now, or may have been.
+
+    at_takeover: whether such a distance counts.
+    """
     if before is None:
         return False
     if not item.ranged and item.camera_ranges < before.camera_ranges:
         return True
-    if item.ranged == before.ranged or before.distance_m is None or item.distance_m is None:
+    if not at_takeover or item.ranged == before.ranged or before.distance_m is None or item.distance_m is None:
         return False
     spread_m = AGREEMENT_SIGMAS * hypot(before.sigma_m, item.distance_sigma_m or 0.0)
     return abs(item.distance_m - before.distance_m) > spread_m + _APPROACH_M

@@ -87,7 +87,7 @@ def divide(
     sides = steady_sides(history[known], np.nanmax(history[:, :, 0]) + dt_s)
     # only clusters near two or more tracks, or wider than the one they are near, and what else is near these tracks
     reached, width_m, low_m = kernels.reach_clusters(points, labels, expected.footprints, count)
-    nearest = _nearest(expected)
+    nearest = _nearest(expected, params)
     grown = (width_m > WIDEST_M) | (low_m < nearest[:, None])
     widened = np.any(reached & (np.diff(sides) < WIDEST_M) & grown, axis=0)
     involved = np.any(reached[:, (reached.sum(axis=0) >= 2) | widened], axis=1, keepdims=True)
@@ -158,8 +158,10 @@ def _expect(tracks: Sequence[LidarTrack], cov: F64, dt_s: float) -> _Expected:
     return _Expected(np.column_stack([footprints, np.cos(yaw), np.sin(yaw)]), velocity, cov[:, 2, 2] + cov[:, 3, 3])
 
 
-def _nearest(expected: _Expected) -> F64:
+def _nearest(expected: _Expected, params: ClusterParams) -> F64:
     """(T,) ego x below which no return belongs to a track; −∞ unless it drives ahead, seen from behind."""
+    if not params.divide_nearer:
+        return np.full(len(expected.footprints), -np.inf)
     x, _, length, width, cos, sin = expected.footprints.T
     near = x - length * np.abs(cos) - width * np.abs(sin) - _NEARER_M
     return np.where(expected.velocity[:, 0] > -_CLOSING_MPS, near, -np.inf)

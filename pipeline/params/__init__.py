@@ -15,10 +15,9 @@ from pydantic import ValidationError
 
 from pipeline.common.errors import BadInput
 from pipeline.common.files.user_file_errors import did_you_mean, read_yaml
+from pipeline.params.control import AccParams, AebParams
 from pipeline.params.declare import Section
 from pipeline.params.driving import (
-    AccParams,
-    AebParams,
     CipvParams,
     LaneParams,
     MotionParams,
@@ -128,7 +127,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "default": {},
     "paper": {
         "motion": {"source": "can", "keep_over_ground": False},
-        "cluster": {"divide_m": 3.0, "divide_tracked": False},
+        "cluster": {"divide_m": 3.0, "divide_tracked": False, "divide_nearer": False},
         "box": {"method": "axis_aligned"},
         "lidar_tracking": {"filter": "trajectory", "rigid_sideways": False},
         "detection": {"far_view": False, "car_prior": 1.0},
@@ -150,13 +149,19 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "size_gate": False,
             "keep_partners": False,
             "single_returns": False,
+            "roof_share": 0.0,
+            "settled_boxes": False,
             "merged_clusters": False,
             "use_ground_contact": False,
         },
-        "existence": {"enabled": False},
+        "existence": {"enabled": False, "forget_at_takeover": False},
         "path": {"use_edges": False, "use_corners": False},
         "cipv": {
             "use_crossing": False,
+            "forget_at_takeover": False,
+            "confirm_lead": False,
+            "narrow_along": False,
+            "max_short_side_m": 40.0,
             "confirm_hits": 1,
             "carried_may_become_lead": True,
             "hysteresis_m": 0.0,
@@ -177,8 +182,9 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "approach_decel_mps2": 0.0,
             "gap_sigmas": 0.0,
             "confirm_frames": 1,
+            "speed_hits": 1,
         },
-        "aeb": {"enabled": False},
+        "aeb": {"enabled": False, "closing_sigmas": 0.0, "react_to_present": False, "react_where_met": False},
     },
 }
 """The values of each preset that differ from the declared defaults."""

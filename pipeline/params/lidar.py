@@ -58,6 +58,11 @@ class ClusterParams(Section):
         0.7, 0.1, 3.0, 0.05, "m", "Tolerance within a cluster that is wider than any vehicle; equal to tolerance_m: off"
     )
     divide_tracked: bool = choice(True, "Divide a cluster that covers two tracked objects that move apart")
+    divide_nearer: bool = choice(
+        True,
+        "Divide a cluster that reaches 0.5 m nearer than the rear of a tracked vehicle that drives ahead (only with "
+        "divide_tracked)",
+    )
     z_weight: float = slider(0.4, 0.05, 1.0, 0.05, "", "Weight on height: below 1 joins rings that are 2° apart")
     min_points: int = slider(4, 1, 50, 1, "points", "Clusters with fewer points are dropped")
     max_points: int = slider(20000, 100, 50000, 100, "points", "Clusters with more points are dropped")

@@ -142,6 +142,11 @@ class ExistenceParams(Section):
     use_missing_boxes: bool = choice(
         True, "Count against an object of the LiDAR alone that the camera looks at it and sees no vehicle"
     )
+    forget_at_takeover: bool = choice(
+        True,
+        "What the LiDAR said for and against an object ends where LiDAR and camera take over from each other at "
+        "contradicting distances",
+    )
     min_braking: float = slider(
         0.8,
         0.0,
@@ -195,12 +200,26 @@ class FusionParams(Section):
     single_returns: bool = choice(
         True, "Range far vehicles by single LiDAR returns inside their boxes, too few for a cluster"
     )
+    roof_share: float = slider(
+        0.12,
+        0.0,
+        0.5,
+        0.01,
+        "",
+        "In this uppermost part of a box, returns that are farther than the camera says were seen over the roof; 0: "
+        "they range the vehicle",
+    )
     use_ground_contact: bool = choice(
         True,
         "kalman: correct a box's distance by where the box meets the road that the LiDAR measures; off: by its height",
     )
     keep_partners: bool = choice(
         True, "A box stays with the cluster that it was joined with, unless another one fits clearly better"
+    )
+    settled_boxes: bool = choice(
+        True,
+        "A cluster seen once contradicts no vehicle that the camera has ranged three times: they are joined only if "
+        "their distances agree, however well they overlap (only with range_gate)",
     )
     size_gate: bool = choice(
         True, "Do not join a box with a cluster longer than any vehicle of its class: hedges, walls, rails"

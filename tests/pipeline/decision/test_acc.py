@@ -266,16 +266,20 @@ def test_acc_brakes_hard_only_where_that_avoids_a_collision(
 
 
 @pytest.mark.parametrize(
-    ("hits", "braking_mps2"),
+    ("hits", "speed_hits", "braking_mps2"),
     [
-        pytest.param(1, 0.25, id="seen once: it may be a false box on a stray cluster"),
-        pytest.param(2, 3.5, id="seen twice"),
+        pytest.param(1, 2, 0.25, id="seen once: it may be a false box on a stray cluster"),
+        pytest.param(1, 1, 3.5, id="seen once, switched off"),
+        pytest.param(2, 2, 3.5, id="seen twice"),
     ],
 )
-def test_an_object_of_unknown_speed_is_braked_for_from_its_second_sighting(hits: int, braking_mps2: float) -> None:
+def test_an_object_of_unknown_speed_is_braked_for_from_its_second_sighting(
+    hits: int, speed_hits: int, braking_mps2: float
+) -> None:
     item = dataclasses.replace(fused(1, 20.0, hits=hits), velocity_mps=None, justifies=Braking.PARTIAL)
     situation = Situation(moment(EgoState(0, 24.0), 0.1), PATH, (item,), Cipv(1, 20.0, None, None, ""))
-    command = control(AccState(), situation, PARAMS, EMERGENCY)[1]
+    params = PARAMS.model_copy(update={"speed_hits": speed_hits})
+    command = control(AccState(), situation, params, EMERGENCY)[1]
     assert command is not None
     assert command.accel_mps2 == pytest.approx(-braking_mps2)
 

@@ -92,13 +92,18 @@ def test_each_stage_brakes_as_its_parameter_says_and_names_its_cause() -> None:
 
 
 @pytest.mark.parametrize(
-    ("sigma_mps", "state"),
-    [pytest.param(1.0, "partial_brake", id="known well"), pytest.param(6.0, "warn", id="hardly known")],
+    ("sigma_mps", "sigmas", "state"),
+    [
+        pytest.param(1.0, 1.0, "partial_brake", id="known well"),
+        pytest.param(6.0, 1.0, "warn", id="hardly known"),
+        pytest.param(6.0, 0.0, "partial_brake", id="hardly known, switched off"),
+    ],
 )
-def test_the_camera_brakes_for_a_speed_that_it_knows(sigma_mps: float, state: str) -> None:
+def test_the_camera_brakes_for_a_speed_that_it_knows(sigma_mps: float, sigmas: float, state: str) -> None:
     boxed = replace(fused(1, 25.0, source="V", velocity=(-14.0, 0.0), hits=20), camera_ranges=20)
     boxed = replace(boxed, camera_speed_sigma_mps=sigma_mps, existence=0.98, height_from="range")
-    _, command = decide(replace(boxed, justifies=Braking.FULL), speed_mps=14.0)
+    params = PARAMS.model_copy(update={"closing_sigmas": sigmas})
+    _, command = decide(replace(boxed, justifies=Braking.FULL), speed_mps=14.0, params=params)
     assert command.state == state
 
 

@@ -110,16 +110,25 @@ def test_a_camera_track_whose_place_was_reset_must_be_seen_again() -> None:
 
 
 @pytest.mark.parametrize(
-    ("hits", "seen_by", "leads"),
+    ("hits", "seen_by", "params", "leads"),
     [
-        pytest.param(1, "", False, id="a false box on a stray cluster"),
-        pytest.param(1, "V", True, id="one sensor sees it again"),
-        pytest.param(3, "", True, id="confirmed"),
+        pytest.param(1, "", PARAMS, False, id="a false box on a stray cluster"),
+        pytest.param(1, "", CipvParams(confirm_lead=False), True, id="switched off"),
+        pytest.param(1, "V", PARAMS, True, id="one sensor sees it again"),
+        pytest.param(3, "", PARAMS, True, id="confirmed"),
     ],
 )
-def test_what_both_sensors_saw_once_leads_only_while_it_is_seen(hits: int, seen_by: Any, leads: bool) -> None:
+def test_what_both_sensors_saw_once_leads_only_while_it_is_seen(
+    hits: int, seen_by: Any, params: CipvParams, leads: bool
+) -> None:
     item = dataclasses.replace(fused(1, 20.0, hits=hits), seen_by=seen_by)
-    assert (decide(item, last=1)[0] is not None) == leads
+    assert (choose(CipvState(1), (item,), PATH, moment(), params)[1].lead is not None) == leads
+
+
+def test_how_large_a_cluster_may_be_across_is_a_parameter() -> None:
+    several = fused(1, 2.0, source="L", length=11.0, width=7.8)
+    assert decide(several)[0] is None
+    assert choose(CipvState(), (several,), PATH, moment(), CipvParams(max_short_side_m=15.0))[1].lead is not None
 
 
 @pytest.mark.parametrize(
@@ -139,16 +148,19 @@ def test_a_lead_whose_place_was_reset_has_no_privilege(ranges: int, source: Any,
 
 
 @pytest.mark.parametrize(
-    ("camera_m", "is_in"),
+    ("camera_m", "params", "is_in"),
     [
-        pytest.param(32.0, True, id="about there: what was found out before still counts"),
-        pytest.param(14.0, False, id="far from there: the camera looked at something else"),
+        pytest.param(32.0, PARAMS, True, id="about there: what was found out before still counts"),
+        pytest.param(14.0, PARAMS, False, id="far from there: the camera looked at something else"),
+        pytest.param(14.0, CipvParams(forget_at_takeover=False), True, id="switched off"),
     ],
 )
-def test_what_was_decided_by_the_camera_ends_where_the_lidar_finds_it_elsewhere(camera_m: float, is_in: bool) -> None:
+def test_what_was_decided_by_the_camera_ends_where_the_lidar_finds_it_elsewhere(
+    camera_m: float, params: CipvParams, is_in: bool
+) -> None:
     seen = fused(1, 34.0, 3.0)
     state = CipvState(None, odds={1: 4.0}, places={1: LastPlace(20, camera_m, 1.0, ranged=False)})
-    (item,) = choose(state, (seen,), PATH, moment(None, 0.1), PARAMS)[1].objects
+    (item,) = choose(state, (seen,), PATH, moment(None, 0.1), params)[1].objects
     assert ((item.in_path_probability or 0.0) > 0.5) == is_in
 
 

@@ -10,7 +10,7 @@ import pytest
 from pipeline.decision import cipv, reaction_candidates
 from pipeline.decision.cipv import Choice, CipvState
 from pipeline.decision.object_motion import describe
-from pipeline.params import CipvParams, MotionParams, Params, PathParams, with_changes
+from pipeline.params import AebParams, CipvParams, MotionParams, Params, PathParams, with_changes
 from pipeline.path.corridor import corridor
 from pipeline.run import only
 from pipeline.simulation.scenario import Scenario
@@ -60,7 +60,7 @@ def test_who_crosses_leads_only_if_it_is_met(item: FusedObject, ego_mps: float, 
     if not leads:
         assert found.rejected[0].reason.startswith("crossing: clears the path ")
         assert found.next_lead is None
-        assert not reaction_candidates.enters_corridor(judged, PATH, None)
+        assert not reaction_candidates.enters_corridor(judged, PATH, None, AebParams())
 
 
 def test_it_may_be_switched_off() -> None:

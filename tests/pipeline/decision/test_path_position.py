@@ -23,8 +23,10 @@ STRAIGHT = corridor(None, PathParams(half_width_m=1.5))
 EGO = EgoState(0, 20.0, 0.0)
 
 
-def placed(item: FusedObject, path: Path = STRAIGHT, ego: EgoState | None = EGO) -> tuple[Place, float | None]:
-    (found,) = place(describe([item], ego, MotionParams()), path, ego, CipvParams())
+def placed(
+    item: FusedObject, path: Path = STRAIGHT, ego: EgoState | None = EGO, params: CipvParams | None = None
+) -> tuple[Place, float | None]:
+    (found,) = place(describe([item], ego, MotionParams()), path, ego, params or CipvParams())
     assert found is not None
     return found
 
@@ -234,8 +236,9 @@ def test_a_box_over_several_vehicles_does_not_widen_what_drives_along(
 ) -> None:
     vx, vy = over_ground
     item = fused(1, 10.0, 3.5, length=4.5, velocity=(vx - EGO.speed_mps, vy))
-    found, _ = placed(dataclasses.replace(item, box_sides=((10.0, 5.2), (10.0, -1.6))))
-    assert (found.low_m < 0.0) == reaches
+    seen = dataclasses.replace(item, box_sides=((10.0, 5.2), (10.0, -1.6)))
+    assert (placed(seen)[0].low_m < 0.0) == reaches
+    assert placed(seen, params=CipvParams(narrow_along=False))[0].low_m < 0.0
 
 
 @pytest.mark.parametrize(

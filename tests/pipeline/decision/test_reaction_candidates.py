@@ -10,7 +10,7 @@ import pytest
 from pipeline.decision.cipv import CipvState, choose
 from pipeline.decision.object_motion import describe
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
-from pipeline.params import CipvParams, MotionParams, PathParams
+from pipeline.params import AebParams, CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
 from pipeline.types import Cipv, EgoState, FusedObject
 from tests.pipeline.build import fused, moment
@@ -76,20 +76,25 @@ def test_nothing_is_dependable_before_it_was_judged() -> None:
     ],
 )
 def test_enters_corridor(item: FusedObject, ego_mps: float | None, enters: bool) -> None:
-    assert enters_corridor(judged(item, ego_mps), PATH, None) is enters
+    assert enters_corridor(judged(item, ego_mps), PATH, None, AebParams()) is enters
 
 
 @pytest.mark.parametrize(
-    ("then_m", "enters"), [pytest.param(0.9, True, id="inside"), pytest.param(2.4, False, id="out")]
+    ("then_m", "params", "enters"),
+    [
+        pytest.param(0.9, AebParams(), True, id="inside"),
+        pytest.param(2.4, AebParams(), False, id="out"),
+        pytest.param(2.4, AebParams(react_to_present=False), True, id="out, switched off"),
+    ],
 )
-def test_where_it_is_seen_now_counts_as_well(then_m: float, enters: bool) -> None:
+def test_where_it_is_seen_now_counts_as_well(then_m: float, params: AebParams, enters: bool) -> None:
     """Its first cluster was also that of the lead, so by the mean of both sightings it is in the path."""
     ego, now = EgoState(0, 20.0), moment(EgoState(0, 20.0), 0.1)
     first, then = (fused(1, x, y, source="L", velocity=(-20.0, 0.0)) for x, y in ((22.0, 0.2), (20.0, then_m)))
     state, _ = choose(CipvState(), describe([first], ego, MotionParams()), PATH, now, CipvParams())
     (item,) = choose(state, describe([then], ego, MotionParams()), PATH, now, CipvParams())[1].objects
     assert item.in_path
-    assert enters_corridor(item, PATH, None) is enters
+    assert enters_corridor(item, PATH, None, params) is enters
 
 
 OVER_THERE = fused(1, 30.0, -8.0, velocity=(-20.0, 6.0))
@@ -123,4 +128,6 @@ def test_where_a_course_says_nothing(
     path = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), path_sigma_m))
     lead = Cipv(9, lead_m, 0.0, None, "") if lead_m is not None else None
     known = judged(item, 20.0)
-    assert enters_corridor(known, path, lead) is enters
+    assert enters_corridor(known, path, lead, AebParams()) is enters
+    also_before = enters_corridor(known, path, lead, AebParams(react_where_met=False))
+    assert also_before is (enters or item is CROSSES_OVER)

@@ -212,9 +212,11 @@ def seen_through(frames: int = 5) -> ExistenceState:
     return state
 
 
-def existence_after(state: ExistenceState, item: FusedObject, frames: int = 1) -> float:
+def existence_after(
+    state: ExistenceState, item: FusedObject, frames: int = 1, params: ExistenceParams = PARAMS
+) -> float:
     for _ in range(frames):
-        state, (found,) = weigh(state, (item,), Rays(NOTHING), FRAME, moment(None, 0.1), PARAMS)
+        state, (found,) = weigh(state, (item,), Rays(NOTHING), FRAME, moment(None, 0.1), params)
     assert found.existence is not None
     return found.existence
 
@@ -254,7 +256,9 @@ def test_that_a_place_was_taken_says_nothing_of_another_place(ranges: int, kept:
 def test_what_the_lidar_saw_ends_where_the_camera_alone_places_it_elsewhere(lidar_m: float, kept: bool) -> None:
     car = replace(camera_car(45.0, score=0.4), distance_sigma_m=3.0)
     seen = replace(car, source="VL", seen_by="VL", distance_m=lidar_m, distance_sigma_m=0.2)
-    assert (existence_after(ExistenceState({1: Existence(0.4, 4.0, last_place(seen))}), car) > 0.9) == kept
+    known = ExistenceState({1: Existence(0.4, 4.0, last_place(seen))})
+    assert (existence_after(known, car) > 0.9) == kept
+    assert existence_after(known, car, params=ExistenceParams(forget_at_takeover=False)) > 0.9
 
 
 def test_an_empty_place_is_forgotten_where_the_lidar_cannot_tell_any_more() -> None:

@@ -138,6 +138,8 @@ def test_a_single_cluster_does_not_contradict_a_settled_camera_track(
     followed = replace(vision_track(1, box_of(cluster), 40.0, sigma_m=3.0), ranges=ranges)
     _, result = joined([cluster], [followed])
     assert sorted(item.source for item in result.objects) == sources
+    off = FusionParams(settled_boxes=False)
+    assert [item.source for item in joined([cluster], [followed], off)[1].objects] == ["VL"]
     agrees = replace(followed, distance_m=28.0)
     assert [item.source for item in joined([cluster], [agrees])[1].objects] == ["VL"]
 

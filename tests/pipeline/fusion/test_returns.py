@@ -88,6 +88,15 @@ def test_which_returns_are_a_vehicles(
     assert expected_m is None or found.ranged_sigma_m == SIGMA_M
 
 
+def test_how_much_of_a_box_is_seen_over_the_roof_is_a_parameter() -> None:
+    sweep = Scene([(54.0, 0.2, 0.7, LOOSE)]).sweep()
+    ranged = [
+        range_boxes((box(),), sweep, aligned(), FusionParams(roof_share=share))[0].ranged_m  # type: ignore[index]
+        for share in (0.12, 0.0)
+    ]
+    assert ranged == [None, pytest.approx(54.0, abs=0.1)]
+
+
 @pytest.mark.parametrize(
     ("case", "other", "at_m", "expected_m"),
     [

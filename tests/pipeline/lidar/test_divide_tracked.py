@@ -118,14 +118,20 @@ def test_what_a_known_vehicle_cannot_have_grown_by_is_something_else(tracks: lis
 
 
 @pytest.mark.parametrize(
-    ("lead_velocity", "parts"),
-    [pytest.param(DRIVES, 2, id="a lead, which ends at its rear"), pytest.param(STANDS, 1, id="may show a new side")],
+    ("lead_velocity", "params", "parts"),
+    [
+        pytest.param(DRIVES, PARAMS, 2, id="a lead, which ends at its rear"),
+        pytest.param(DRIVES, ClusterParams(divide_nearer=False), 1, id="a lead, switched off"),
+        pytest.param(STANDS, PARAMS, 1, id="may show a new side"),
+    ],
 )
-def test_what_is_nearer_than_a_lead_is_something_else(lead_velocity: tuple[float, float], parts: int):
+def test_what_is_nearer_than_a_lead_is_something_else(
+    lead_velocity: tuple[float, float], params: ClusterParams, parts: int
+):
     """A parked car comes up beside it, and both together are no wider than a vehicle. Its flank was joined with the
     lead before, so that the lead's side is not known to be less far to the right."""
     lead, flank = wall((14.2, -1.2), (14.2, 0.4)), wall((12.0, -1.8), (14.0, -1.8), 0.4)
-    before, after = divided(np.vstack([lead, flank]), [track(1, (14.2, -0.7), (1.0, 2.2), lead_velocity)])
+    before, after = divided(np.vstack([lead, flank]), [track(1, (14.2, -0.7), (1.0, 2.2), lead_velocity)], params)
     assert set(before) == {0}, "the clusters touch"
     assert set(after[: len(lead)]) == {0}
     assert len(set(after)) == parts

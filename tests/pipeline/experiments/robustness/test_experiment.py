@@ -20,7 +20,7 @@ from pipeline.experiments.robustness.experiment import (
     suite,
 )
 from pipeline.experiments.robustness.judge import Failure
-from pipeline.params import Params, with_changes
+from pipeline.params import Params, flat, preset, with_changes
 from pipeline.simulation.drive_as_scenario import to_yaml
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.unseen import frames
@@ -94,6 +94,27 @@ def test_cases_are_numbered_kilometres_and_every_variant_is_a_parameter() -> Non
     assert suite(1, ablation=True).cases(False)[0].variants == tuple(VARIANTS)
     for name, changes in VARIANTS.items():
         assert (with_changes(Params(), changes) == Params()) == (name == AS_IS)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "clusters nearer than their track not split",
+        "wide clusters taken for vehicles",
+        "ACC acts on an unknown speed at once",
+        "unconfirmed leads kept unseen",
+        "kept where sensors contradict each other",
+        "boxes widen what drives along",
+        "returns over the roof range",
+        "first clusters contradict the camera",
+        "braking for what was in the path",
+        "braking for what crosses over",
+        "camera speeds without error",
+    ],
+)
+def test_a_rule_that_the_paper_does_not_have_is_off_in_its_preset(name: str) -> None:
+    paper = flat(preset("paper"))
+    assert {key: paper[key] for key in VARIANTS[name]} == VARIANTS[name]
 
 
 @pytest.mark.parametrize("number", range(12))
