@@ -11,10 +11,9 @@ import pytest
 
 from app.engine.engine import Engine
 from app.web.routes.alignment.pairs import MOST_PAIRS
-from app.web.server import create_app
 from pipeline.alignment.projection import resolve
 from pipeline.params import Params, with_changes
-from tests.app.web.serving import WAIT_S, running, serving
+from tests.app.web.serving import running
 
 TURNED = {"alignment.yaw_deg": 2.0, "alignment.pitch_deg": -1.0, "alignment.roll_deg": 0.5}
 PLACES = ((8.0, 2.0, -0.8), (12.0, -3.0, 0.2), (20.0, 5.0, 1.0), (30.0, -6.0, 0.0), (15.0, 0.5, -1.0))
@@ -24,12 +23,6 @@ PLACES = ((8.0, 2.0, -0.8), (12.0, -3.0, 0.2), (20.0, 5.0, 1.0), (30.0, -6.0, 0.
 def engine() -> Iterator[Engine]:
     with running() as engine:
         yield engine
-
-
-@pytest.fixture(scope="module")
-def client(engine: Engine) -> Iterator[httpx.Client]:
-    with serving(create_app(engine)) as address, httpx.Client(base_url=address, timeout=WAIT_S) as client:
-        yield client
 
 
 def pairs_of(engine: Engine, places: tuple[tuple[float, float, float], ...] = PLACES) -> list[dict[str, Any]]:
