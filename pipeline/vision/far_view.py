@@ -5,6 +5,7 @@ A detector receives a wide image scaled down: a car at 80 m, 40 px wide in an im
 input. In a window of native pixels, the same network detects it. The window is the smallest that contains the road
 ahead: a square around the car's heading, shifted sideways with the curve that ego motion implies. It depends on the
 frame alone, never on tracks, so boxes can be cached and computed ahead, and a wrong track cannot move the window away.
+It still contains the lead: see docs/reference/accuracy.md.
 """
 
 from __future__ import annotations
@@ -109,7 +110,7 @@ class FarLook:
         x1, y1, x2, y2 = window
         seen = self.view.detector.detect(np.ascontiguousarray(bgr[y1:y2, x1:x2]))
         boxes = seen.boxes + np.array([x1, y1, x1, y1], np.float32)
-        whole = _is_whole(boxes, window, (bgr.shape[1], bgr.shape[0]))
+        whole = is_whole(boxes, window, (bgr.shape[1], bgr.shape[0]))
         labels = tuple(label for label, kept in zip(seen.labels, whole, strict=True) if kept)
         return replace(
             seen,
@@ -162,7 +163,7 @@ def _bend_bearing(frame: Frame | None) -> float:
     return float(np.clip(ego.yaw_rate_radps / ego.speed_mps * LOOK_AHEAD_M / 2, -0.5, 0.5))
 
 
-def _is_whole(boxes: F32, window: PixelWindow, image_size: tuple[int, int]) -> Mask:
+def is_whole(boxes: F32, window: PixelWindow, image_size: tuple[int, int]) -> Mask:
     """(M,) whether each box lies completely in the window, apart from cuts by the image's own edges."""
     x1, y1, x2, y2 = window
     width, height = image_size
