@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from pipeline.decision.object_motion import closing_speed_mps, required_decel_mps2
-from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
+from pipeline.decision.reaction_candidates import enters_corridor, is_dependable, is_there_now
 from pipeline.params import AccParams, AebParams
 from pipeline.types import AccCommand, Braking, Cipv, EgoState, FusedObject, Path, Situation
 
@@ -94,14 +94,17 @@ def _hardest_mps2(
     state: AccState, object_id: int | None, situation: Situation, params: AccParams, emergency: AebParams
 ) -> float:
     """The hardest permitted braking: comfortable in strength and onset, unless avoiding a collision takes more and the
-    evidence for the object justifies it. A gap that is too short but does not shrink, as after a cut-in, is opened
-    gently, where the paper's law alone would brake fully. A lead of only a few frames hardly slows the car."""
+    evidence for the object justifies it, which for a lead includes that this frame shows it in the path. A gap that is
+    too short but does not shrink, as after a cut-in, is opened gently, where the paper's law alone would brake fully. A
+    lead of only a few frames hardly slows the car."""
     assert situation.now.ego is not None
     required, strongest = 0.0, params.comfort_decel_mps2  # also applies when slowing to the set speed
     if object_id is not None:
         item = situation.object(object_id)
         required = _required_mps2(object_id, item, situation, params, emergency)
-        if item is None or item.justifies is Braking.FULL:
+        is_lead = situation.lead is not None and situation.lead.id == object_id
+        is_beside = item is not None and is_lead and not is_there_now(item, emergency)
+        if item is None or (item.justifies is Braking.FULL and not is_beside):
             strongest = max(strongest, required)
     return min(strongest, max(_onset_mps2(state, situation.now.ego, situation.now.dt_s, params), required))
 

@@ -17,7 +17,7 @@ from pipeline.common.fast_replace import evolve
 from pipeline.decision.acc import STANDSTILL_MPS
 from pipeline.decision.braking_evidence import FRICTION_MPS2, has_known_height
 from pipeline.decision.object_motion import closing_speed_mps, required_decel_mps2
-from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
+from pipeline.decision.reaction_candidates import enters_corridor, is_dependable, is_there_now
 from pipeline.params import AccParams, AebParams
 from pipeline.types import AccCommand, Braking, EgoState, FusedObject, Situation
 
@@ -89,16 +89,17 @@ def guard(
 
 
 def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
-    """The CIPV, and any other reliable object that heads into the corridor, while the gap to them shrinks. An oncoming
-    CIPV counts only if it would do so as another object: in a bend that was not foreseen, it is in the path for a
-    moment before it passes."""
+    """The CIPV, and any other reliable object that heads into the corridor, while the gap to them shrinks. A CIPV that
+    is oncoming, or that this frame shows beside the path, counts only if it would do so as another object: in a bend
+    that was not foreseen, oncoming traffic is in the path for a moment before it passes, and a parked car seems to be
+    until the LiDAR places it."""
     found = []
     for item in situation.objects:
         closing = closing_speed_mps(item)
         if closing is None or closing <= STANDSTILL_MPS or not item.distance_m or item.ttc_s is None:
             continue
         is_lead = situation.lead is not None and item.id == situation.lead.id
-        if (is_lead and not item.carried and not item.oncoming) or (
+        if (is_lead and not item.carried and not item.oncoming and is_there_now(item, params)) or (
             is_dependable(item) and enters_corridor(item, situation.path, situation.lead, params)
         ):
             sigma_m = item.distance_sigma_m or 0.0

@@ -26,6 +26,13 @@ def is_dependable(item: FusedObject) -> bool:
     return has_velocity and not item.carried and is_solid(item)
 
 
+def is_there_now(item: FusedObject, params: AebParams) -> bool:
+    """Whether this frame shows the object in the path. ``in_path`` follows from all sightings so far: a first one of
+    two vehicles in one cluster keeps it up for half a second, and so does a place by the camera that the LiDAR
+    corrects."""
+    return not params.react_to_present or (item.path_margin_m is not None and item.path_margin_m >= 0.0)
+
+
 def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: AebParams) -> bool:
     """Whether the object is in the corridor, or its lateral motion takes it there before the car reaches it. An object
     that stands or may stand beside the road stays there: its lateral speed is noise, and half of its points may vanish.
@@ -34,8 +41,7 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: Ae
     the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty. Oncoming
     or crossing objects behind the lead cannot be reached. What crosses and is gone before the car arrives is not met.
 
-    What is in the corridor must be seen there in this frame as well: ``in_path`` follows from all sightings so far, and
-    a first one of two vehicles in one cluster keeps it up for half a second.
+    What is in the corridor must be seen there in this frame as well.
     """
     if item.path_offset_m is None or item.velocity_mps is None or item.ttc_s is None or item.clears_path_s is not None:
         return False
@@ -46,8 +52,7 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: Ae
         if is_hidden or sigma_m > path.half_width_m:
             return False
     if item.surely_moving is False or (item.in_path and not oncoming):
-        is_there_now = item.path_margin_m is not None and item.path_margin_m >= 0.0
-        return item.in_path and (is_there_now or not params.react_to_present)
+        return item.in_path and is_there_now(item, params)
     if item.closest_point is None or item.closest_point[0] < ABREAST_M:
         return False  # already beside the car: braking would not avoid it
     sideways = believed_mps(item.lateral_mps, item)

@@ -84,7 +84,7 @@ def divide(
     if not params.divide_tracked or dt_s is None or not known or count == 0:
         return labels
     expected = _expect([tracks[n] for n in known], filters.cov[known], dt_s)
-    sides = steady_sides(history[known], np.nanmax(history[:, :, 0]) + dt_s)
+    sides = steady_sides(history[known], np.nanmax(history[:, :, 0]) + dt_s, WIDEST_M)
     # only clusters near two or more tracks, or wider than the one they are near, and what else is near these tracks
     reached, width_m, low_m = kernels.reach_clusters(points, labels, expected.footprints, count)
     nearest = _nearest(expected, params)

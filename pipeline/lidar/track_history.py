@@ -10,6 +10,8 @@ from pipeline.types import F64, I64
 _SIDE_NOISE_M = 0.15
 """Minimum noise of a side: neighbouring rays of a VLP-16 are 0.1 m apart at 28 m, and a rounded corner adds as much."""
 _SURE_SIGMAS = 2.0
+_NARROW = 3
+"""Sightings that may be of one vehicle, out of ten, are enough for its extent: that of a few rays may be too narrow."""
 
 
 def recorded(history: F64, partner: I64, place: F64, clock_s: float, frames: int) -> F64:
@@ -47,20 +49,22 @@ def rigid_sideways(history: F64) -> F64:
     return np.asarray(_rigid_sideways(np.ascontiguousarray(history)))
 
 
-def steady_sides(history: F64, now_s: float) -> F64:
+def steady_sides(history: F64, now_s: float, widest_m: float) -> F64:
     """(T, 2) the lateral extent of each track now, right and left, ego y in metres: the median of the sightings in its
-    (T, H, 5) history, each moved by the speed common to both sides.
+    (T, H, 5) history, each moved by the speed common to both sides. Sightings wider than ``widest_m`` count only if
+    fewer than ``_NARROW`` others remain.
 
-    A rigid body does not widen from one sweep to the next; a cluster does, by returns from what stands beside it.
+    A rigid body does not widen from one sweep to the next; a cluster does, by returns from what stands beside it. Along
+    a row of parked cars it may do so in most sweeps of a second.
     """
-    return np.asarray(_steady_sides(np.ascontiguousarray(history), now_s))
+    return np.asarray(_steady_sides(np.ascontiguousarray(history), now_s, widest_m))
 
 
 def warm_up() -> None:
     """Compile the kernels, or load them from numba's cache."""
     slopes(np.zeros((1, 2, 3)))
     rigid_sideways(np.zeros((1, 2, 5)))
-    steady_sides(np.zeros((1, 2, 5)), 0.0)
+    steady_sides(np.zeros((1, 2, 5)), 0.0, 1.0)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -99,12 +103,15 @@ def _rigid_sideways(history):  # type: ignore[no-untyped-def]  # pragma: no cove
 
 
 @numba.njit(cache=True, nogil=True)
-def _steady_sides(history, now_s):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _steady_sides(history, now_s, widest_m):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Kernel of ``steady_sides``."""
     out, speed = np.empty((len(history), 2)), _rigid_sideways(history)
     for i in range(len(history)):
+        chosen = np.flatnonzero(history[i, :, 4] - history[i, :, 3] <= widest_m)
+        if len(chosen) < _NARROW:
+            chosen = np.arange(history.shape[1])
         for side in range(2):
-            out[i, side] = np.nanmedian(history[i, :, 3 + side] + speed[i] * (now_s - history[i, :, 0]))
+            out[i, side] = np.nanmedian(history[i, chosen, 3 + side] + speed[i] * (now_s - history[i, chosen, 0]))
     return out
 
 

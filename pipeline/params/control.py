@@ -101,8 +101,8 @@ class AebParams(Section):
     )
     react_to_present: bool = choice(
         True,
-        "ACC and emergency braking react to what is in the path, other than the lead, only if this frame too shows it "
-        "there; off: if all its detections together do",
+        "Emergency braking, and ACC when it brakes harder than is comfortable, react to what is in the path only if "
+        "this frame too shows it there; off: if all its detections together do",
     )
     react_where_met: bool = choice(
         True,

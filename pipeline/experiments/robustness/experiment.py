@@ -126,14 +126,16 @@ def run(case: Kilometre) -> DriveOutcome:
     params = [with_changes(Params(), VARIANTS[name]) for name in case.variants]
     states = [State() for _ in params]
     judges = [Judge(scene, 1.0 / scene.rate_hz) for _ in params]
-    first_m = last_m = 0.0
+    first_m = last_m = last_s = 0.0
     for now, frame in frames(scene):
-        first_m, last_m = (now.s_m, now.s_m) if frame.index == 0 else (first_m, now.s_m)
+        first_m, last_m, last_s = (now.s_m if frame.index == 0 else first_m), now.s_m, now.t_s
         for n, each in enumerate(params):
             states[n], result = step(states[n], frame, each)
             judges[n].take(now, frame.camera, result)
+        if judges[0].is_over:
+            break
     failures = {name: tuple(judge.failures) for name, judge in zip(case.variants, judges, strict=True)}
-    return DriveOutcome((last_m - first_m) / 1000.0, scene.duration_s, failures)
+    return DriveOutcome((last_m - first_m) / 1000.0, last_s, failures)
 
 
 def suite(km: int, seed: int = 0, ablation: bool = False) -> Experiment[Kilometre, DriveOutcome]:

@@ -16,6 +16,7 @@ from pipeline.common.geometry import closest_on_polygon
 from pipeline.decision.object_motion import required_decel_mps2
 from pipeline.experiments.robustness.true_vehicles import (
     how_misplaced,
+    is_hit,
     named,
     place,
     seen_by,
@@ -107,15 +108,19 @@ class Judge:
     """Failures that have ended so far."""
     reign: _Reign = field(default_factory=_Reign)
     """The current true lead, and since when it leads."""
+    is_over: bool = False
+    """Whether the ego vehicle has hit another."""
 
     def __post_init__(self) -> None:
         self._way = ScriptedWay.of(self.scenario)
         self._aeb, self._confirm_s = AebParams(), CipvParams().confirm_hits * self.step_s
 
     def take(self, now: World, camera: CameraCalibration | None, result: Result) -> None:
-        """Judge one tick."""
+        """Judge one tick. The script does not brake, so it may drive into a vehicle, as where roadworks make it change
+        lanes: from there on, nothing is judged."""
+        self.is_over = self.is_over or any(is_hit(state) for state in now.actors)
         path = self._way.ahead(now)
-        if path is None:
+        if path is None or self.is_over:
             return
         lead, doubtful = true_lead(now, path)
         chosen = result.chosen()

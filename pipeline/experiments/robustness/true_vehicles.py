@@ -56,13 +56,18 @@ def named(state: ActorState) -> str:
     return f"{state.actor.kind} {state.actor.id} at {range_m(state):.1f} m"
 
 
-def _inside(where: Point2, state: ActorState) -> bool:
-    """Whether a position is on a vehicle or within a metre of it. The nearest face alone would not do, since it is far
-    from the side of a long vehicle."""
+def is_hit(state: ActorState) -> bool:
+    """Whether the middle of the ego vehicle's bumper is inside a vehicle."""
+    return _inside((0.0, 0.0), state, 0.0)
+
+
+def _inside(where: Point2, state: ActorState, around_m: float = 1.0) -> bool:
+    """Whether a position is on a vehicle or within ``around_m`` of it. The nearest face alone would not do, since it is
+    far from the side of a long vehicle."""
     x, y = where[0] - state.cuboid.center[0], where[1] - state.cuboid.center[1]
     c, s = cos(state.cuboid.yaw_rad), sin(state.cuboid.yaw_rad)
     length, width, _ = state.cuboid.size
-    return abs(x * c + y * s) < length / 2 + 1.0 and abs(y * c - x * s) < width / 2 + 1.0
+    return abs(x * c + y * s) < length / 2 + around_m and abs(y * c - x * s) < width / 2 + around_m
 
 
 def what(met: Sequence[ActorState]) -> str:

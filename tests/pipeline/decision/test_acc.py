@@ -266,6 +266,27 @@ def test_acc_brakes_hard_only_where_that_avoids_a_collision(
 
 
 @pytest.mark.parametrize(
+    ("margin_m", "reacts", "braking_mps2"),
+    [
+        pytest.param(0.4, True, 8.0, id="in the path"),
+        pytest.param(-0.3, True, 3.5, id="beside it: comfortable"),
+        pytest.param(-0.3, False, 8.0, id="beside it, switched off"),
+    ],
+)
+def test_acc_brakes_hard_only_for_a_lead_that_this_frame_shows_in_the_path(
+    margin_m: float, reacts: bool, braking_mps2: float
+) -> None:
+    item = dataclasses.replace(fused(1, 20.0, velocity=(-20.0, 0.0)), path_margin_m=margin_m)
+    emergency = EMERGENCY.model_copy(update={"react_to_present": reacts})
+    situation = Situation(moment(EgoState(0, 20.0), 0.1), PATH, (item,), Cipv(1, 20.0, 20.0, 1.0, ""))
+    state, command = AccState(), None
+    for _ in range(20):
+        state, command = control(state, situation, PARAMS, emergency)
+    assert command is not None
+    assert command.accel_mps2 == pytest.approx(-braking_mps2, abs=0.05)
+
+
+@pytest.mark.parametrize(
     ("hits", "speed_hits", "braking_mps2"),
     [
         pytest.param(1, 2, 0.25, id="seen once: it may be a false box on a stray cluster"),

@@ -80,6 +80,31 @@ def test_an_oncoming_lead_is_braked_for_only_if_it_is_surely_in_the_path(path_si
     assert command.state == state
 
 
+@pytest.mark.parametrize(
+    ("aside_m", "reacts", "state"),
+    [
+        pytest.param(1.0, True, "full_brake", id="still in the path"),
+        pytest.param(2.2, True, "cruise", id="beside it"),
+        pytest.param(2.2, False, "full_brake", id="beside it, switched off"),
+    ],
+)
+def test_a_lead_that_this_frame_shows_beside_the_path_is_not_braked_for(
+    aside_m: float, reacts: bool, state: str
+) -> None:
+    """The camera had placed a parked car in the path, so it still leads when the LiDAR places it."""
+    ego, now = EgoState(0, 20.0), moment(EgoState(0, 20.0), 0.1)
+    params = PARAMS.model_copy(update={"react_to_present": reacts})
+    at_first, then = (fused(1, x, y, velocity=(-20.0, 0.0)) for x, y in ((30.0, 0.0), (28.0, aside_m)))
+    leads, _ = choose(CipvState(), describe([at_first], ego, MotionParams()), PATH, now, CipvParams())
+    judged, lead, _, _ = choose(leads, describe([then], ego, MotionParams()), PATH, now, CipvParams())[1]
+    assert lead is not None
+    situation, aeb, command = Situation(now, PATH, judged, lead), AebState(), None
+    for _ in range(2):
+        aeb, command = guard(aeb, CRUISE, situation, params, AccParams())
+    assert command is not None
+    assert command.state == state
+
+
 def test_each_stage_brakes_as_its_parameter_says_and_names_its_cause() -> None:
     _, full = decide(fused(7, 30.0, velocity=(-20.0, 0.0)))
     assert (full.accel_mps2, full.accelerator, full.brake) == (-8.0, 0.0, 1.0)

@@ -107,3 +107,16 @@ def test_what_counts_as_which_failure(case: str, choose: Choice, expected: set[t
 
     found = {(kind, cause.split(", true lead")[0]) for kind, cause in judged(after_the_first)}
     assert found == expected, case
+
+
+def test_nothing_is_judged_after_the_script_drove_into_a_vehicle() -> None:
+    scene, moments = drive()
+    judge = Judge(scene, 1.0 / scene.rate_hz)
+    for k, (now, camera, result) in enumerate(moments):
+        if k == 1:
+            (body, *others) = now.actors
+            hit = evolve(body, cuboid=evolve(body.cuboid, center=(0.0, 0.0, 0.75)))
+            now = replace(now, actors=(hit, *others))
+        judge.take(now, camera, evolve(result, cipv=None, acc=None))
+        assert judge.is_over is (k >= 1)
+    assert not judge.failures, "no lead in twelve frames, eleven of them after the contact"
