@@ -37,6 +37,10 @@ class AccState:
     """Acceleration commanded in the previous frame."""
     on_course: Mapping[int, int] = field(default_factory=dict)
     """By object id, number of consecutive frames in which its course has led into the corridor."""
+    lead_id: int | None = None
+    """The CIPV."""
+    lead_frames: int = 0
+    """Number of consecutive frames in which it has been the CIPV."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,9 @@ def control(
         return AccState(), None
     threats = _on_course(situation, params, emergency)
     on_course = {item.id: state.on_course.get(item.id, 0) + 1 for item in threats}
+    lead_id = situation.lead.id if situation.lead is not None else None
+    lead_frames = state.lead_frames + 1 if lead_id == state.lead_id else 1
+    state = replace(state, on_course=on_course, lead_id=lead_id, lead_frames=lead_frames)
     confirmed = [item for item in threats if on_course[item.id] >= params.confirm_frames]
     # Each rule requests a speed, and the smallest one wins
     demand = min(
@@ -79,7 +86,7 @@ def control(
     hardest = _hardest_mps2(state, demand.object_id, situation, params, emergency)
     state, accel = pid(state, demand.speed_mps - ego.speed_mps, situation.now.dt_s, params, hardest)
     accel = min(accel, 0.0) if demand.no_faster else accel
-    return replace(state, on_course=on_course, accel_mps2=accel), AccCommand(
+    return replace(state, accel_mps2=accel), AccCommand(
         state=demand.state,
         desired_speed_mps=demand.speed_mps,
         accel_mps2=accel,
@@ -94,17 +101,20 @@ def _hardest_mps2(
     state: AccState, object_id: int | None, situation: Situation, params: AccParams, emergency: AebParams
 ) -> float:
     """The hardest permitted braking: comfortable in strength and onset, unless avoiding a collision takes more and the
-    evidence for the object justifies it, which for a lead includes that this frame shows it in the path. A gap that is
-    too short but does not shrink, as after a cut-in, is opened gently, where the paper's law alone would brake fully. A
-    lead of only a few frames hardly slows the car."""
+    evidence for the object justifies it, which for a lead includes that this frame shows it in the path, and the frame
+    before too: two vehicles may be one cluster for a moment. A gap that is too short but does not shrink, as after a
+    cut-in, is opened gently, where the paper's law alone would brake fully. A lead of only a few frames hardly slows
+    the car."""
     assert situation.now.ego is not None
     required, strongest = 0.0, params.comfort_decel_mps2  # also applies when slowing to the set speed
     if object_id is not None:
         item = situation.object(object_id)
         required = _required_mps2(object_id, item, situation, params, emergency)
         is_lead = situation.lead is not None and situation.lead.id == object_id
-        is_beside = item is not None and is_lead and not is_there_now(item, emergency)
-        if item is None or (item.justifies is Braking.FULL and not is_beside):
+        is_doubtful = is_lead and (
+            state.lead_frames < params.confirm_frames or (item is not None and not is_there_now(item, emergency))
+        )
+        if (item is None or item.justifies is Braking.FULL) and not is_doubtful:
             strongest = max(strongest, required)
     return min(strongest, max(_onset_mps2(state, situation.now.ego, situation.now.dt_s, params), required))
 
@@ -248,4 +258,4 @@ def pid(
     wanted = params.kp * error_mps + params.ki * integral + params.kd * slope
     accel = min(max(wanted, -min(hardest_mps2, params.brake_limit_mps2, params.max_decel_mps2)), params.max_accel_mps2)
     winds_up = (wanted != accel) and (error_mps > 0) == (wanted > 0)
-    return AccState(state.integral_m if winds_up else integral, error_mps), accel
+    return replace(state, integral_m=state.integral_m if winds_up else integral, error_mps=error_mps), accel

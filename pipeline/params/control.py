@@ -13,7 +13,13 @@ class AccParams(Section):
     time_gap_s: float = slider(1.8, 0.8, 4.0, 0.1, "s", "d_desired = d_min + time gap × speed")
     ttc_limit_s: float = slider(2.5, 0.5, 10.0, 0.1, "s", "Slow down for any object with a shorter TTC")
     confirm_frames: int = slider(
-        2, 1, 10, 1, "frames", "Consecutive frames on a collision course before ACC slows for an object beside the path"
+        2,
+        1,
+        10,
+        1,
+        "frames",
+        "Consecutive frames on a collision course before ACC slows for an object beside the path, and as the CIPV "
+        "before it brakes harder than is comfortable",
     )
     speed_hits: int = slider(
         2,

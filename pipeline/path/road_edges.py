@@ -117,9 +117,10 @@ def _drove_s(before: Mapping[int, float], objects: tuple[FusedObject, ...], dt_s
 
 
 def _is_traffic(item: FusedObject, drove_s: Mapping[int, float]) -> bool:
-    """Whether it drives or, like a lead that has stopped, drove earlier. Without the camera, what seemed to drive may
-    be a hedge that came into view bit by bit."""
-    return road_structure.drives(item) or (item.label in VEHICLES and drove_s.get(item.id, 0.0) >= _DROVE_S)
+    """Whether it drives, probably comes towards the car or, like a lead that has stopped, drove earlier. Without the
+    camera, what seemed to drive may be a hedge that came into view bit by bit."""
+    has_driven = item.label in VEHICLES and drove_s.get(item.id, 0.0) >= _DROVE_S
+    return road_structure.drives(item) or road_structure.comes(item) or has_driven
 
 
 def _seen(around: Surroundings) -> Cells:

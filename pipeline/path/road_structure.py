@@ -168,6 +168,12 @@ def drives(item: FusedObject) -> bool:
     return item.label in VEHICLES or (item.cuboid is not None and max(item.cuboid.size[:2]) < _LONG_M)
 
 
+def comes(item: FusedObject) -> bool:
+    """Whether the camera's vehicle comes towards the car, as far as its speed is known by now. Until that is certain,
+    the flank of an oncoming bus looks like an edge that runs across our lane."""
+    return bool(item.oncoming) and item.label in VEHICLES and (item.speed_over_ground_mps or 0.0) >= _DRIVES_MPS
+
+
 def long(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int]:
     """Clusters that are too long for a car: hedges, walls, rails."""
     return [

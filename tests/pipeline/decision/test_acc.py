@@ -286,6 +286,19 @@ def test_acc_brakes_hard_only_for_a_lead_that_this_frame_shows_in_the_path(
     assert command.accel_mps2 == pytest.approx(-braking_mps2, abs=0.05)
 
 
+def test_acc_brakes_hard_only_for_a_lead_of_several_frames() -> None:
+    """For a moment, two vehicles may be one cluster that reaches into the path."""
+    params = PARAMS.model_copy(update={"confirm_frames": 2})
+    ego, far, near = EgoState(0, 20.0), Cipv(1, 40.0, 0.0, None, ""), Cipv(2, 4.0, 20.0, 0.2, "")
+    state, braking = AccState(), []
+    for lead in (far, near, far, near, near):
+        state, command = control(state, Situation(moment(ego, 0.1), PATH, (), lead), params, EMERGENCY)
+        assert command is not None
+        braking.append(-command.accel_mps2)
+    assert max(braking[:4]) <= 3.5, "never two frames in a row"
+    assert braking[4] == 8.0
+
+
 @pytest.mark.parametrize(
     ("hits", "speed_hits", "braking_mps2"),
     [

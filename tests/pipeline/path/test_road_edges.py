@@ -122,3 +122,24 @@ def test_a_lead_that_has_stopped_is_no_roadside(label: str | None, is_left: int)
     in_lane = np.abs(state.cells.xy - (20.1, 0.0)).max(axis=1) < 1.2
     assert in_lane.sum() <= is_left
     assert bool(in_lane.any()) is bool(is_left)
+
+
+@pytest.mark.parametrize(
+    ("label", "oncoming", "is_left"),
+    [("bus", True, False), ("bus", False, True), (None, True, True)],
+    ids=["comes", "may stand", "a hedge may seem to come"],
+)
+def test_what_comes_towards_the_car_is_no_roadside(label: str | None, oncoming: bool, is_left: bool) -> None:
+    """Long before it is certain that it moves."""
+    item = fused(3, 20.0, 2.0, source="VL" if label else "L", label=label)
+    item = evolve(item, oncoming=oncoming, surely_moving=False, speed_over_ground_mps=8.0)
+    front = np.column_stack([np.full(8, 20.1), np.linspace(1.2, 2.8, 8), np.full(8, 0.5), np.zeros(8)])
+    hedges = between_hedges()
+    seen = hedges._replace(
+        points=np.vstack([hedges.points, front]).astype(np.float32),
+        kind=np.zeros(len(hedges.points) + 8, np.int32),
+        ring=np.zeros(len(hedges.points) + 8, np.uint8),
+        objects=(item,),
+    )
+    state, _ = road_edges.follow(EdgeState(), seen, NOW, PARAMS)
+    assert bool((np.abs(state.cells.xy - (20.1, 2.0)).max(axis=1) < 1.2).any()) is is_left
