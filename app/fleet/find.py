@@ -8,20 +8,19 @@ import re
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import duckdb
 
 from app.drive.events import event_kinds
 from app.fleet.batch.tables import EQUAL_TABLES, ColumnType, TableShape
 from app.fleet.pack_index import packed_file, packs_of
+from app.fleet.query_result import QueryResult, QueryTable
 from app.fleet.runs import latest_run, runs_of
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
 from pipeline.common.files.user_file_errors import did_you_mean
 
-QueryTable = Literal["events", "frames", "objects", "drives"]
 Answer = TypeVar("Answer")
 _ALWAYS = ("drive", "address", "index", "t_s")
 _SHOWN: dict[QueryTable, tuple[str, ...]] = {
@@ -61,18 +60,6 @@ _UNKNOWN_COLUMN = re.compile(r'Referenced column "(.*)" not found')
 
 MOST_BYTES = 2 << 30
 """Memory that questions with a time limit may take; the usual ones on 10,000 drives take a tenth."""
-
-
-@dataclass(frozen=True)
-class QueryResult:
-    """The result of a query."""
-
-    columns: tuple[str, ...]
-    """Names, in the order of each row's values."""
-    rows: tuple[tuple[Any, ...], ...]
-    """Limited to the requested number; None: unknown."""
-    total: int
-    """Total number of matching rows."""
 
 
 class FleetTables:

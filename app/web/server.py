@@ -90,6 +90,8 @@ def create_app(
         for end in ends:
             end()
         stream.close()
+        if fleet is not None:
+            fleet.close()
         await asyncio.to_thread(exports.close)
         viewer.close()
 
