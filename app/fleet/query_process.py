@@ -21,7 +21,7 @@ import msgspec
 
 from app.core.pipe_messages import PipeClosed, receive, send
 from app.fleet.pack_index import Pack, packs_of
-from app.fleet.runs import latest_run
+from app.fleet.runs import check_run, latest_run
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
 from pipeline.common.files.user_files import Overloaded
@@ -200,6 +200,8 @@ class _OpenTables:
         from app.fleet.find import FleetTables  # DuckDB takes a moment to import
 
         name = run or latest_run(self._store)
+        if self._open is None or self._open[0] != name:
+            check_run(self._store, name)
         packs = packs_of(self._store, name)
         if self._open is None or self._open[:3] != (name, packs, most_s):
             self._open = name, packs, most_s, FleetTables(self._store, name, most_s)
