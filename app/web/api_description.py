@@ -39,11 +39,13 @@ def titled(app: FastAPI) -> Callable[[], dict[str, Any]]:
 def described_by(app: FastAPI) -> Callable[[], Response]:
     """The route of the description. The framework's own makes it on the event loop, which takes half a second of
     processor time, in which no health check is answered and no frame sent."""
-    alone = threading.Lock()
+    alone, made = threading.Lock(), list[bytes]()
 
     def describe() -> Response:
         with alone:
-            return JSONResponse(app.openapi())
+            if not made:
+                made.append(bytes(JSONResponse(app.openapi()).body))
+        return Response(made[0], media_type="application/json")
 
     return describe
 
