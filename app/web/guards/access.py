@@ -117,6 +117,8 @@ class Guard:
         self._tokens = tokens
         self._guesses = Guesses()
         self._threads = ThreadPoolExecutor(1, "cipv-accounts")
+        if tokens is not None and tokens.accounts is not None:
+            self._threads.submit(int)  # starts it: later, there may be no memory for it
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):

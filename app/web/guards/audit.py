@@ -80,6 +80,7 @@ class Audit:
         self._log.addHandler(handler)
         self._file = file
         self._thread = ThreadPoolExecutor(1, "cipv-audit")
+        self._thread.submit(int)  # starts it: later, there may be no memory for it
         self._waiting = threading.BoundedSemaphore(_MOST_WAITING)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
