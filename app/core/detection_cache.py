@@ -50,6 +50,11 @@ class DetectionCache:
         with self._lock:
             self._answers.put(key, answer)
 
+    def close(self) -> None:
+        """Write what is to be kept and is not written yet, and close its file."""
+        if self.kept is not None:
+            self.kept.close()
+
 
 class CachedLook:
     """A ``pipeline.run.Look`` that checks the cache first. For one thread; ``clone`` it for another."""

@@ -101,13 +101,14 @@ class Engine:
         self.takeovers.begin()
 
     def stop(self) -> None:
-        """Close the recording, if any, then end the worker. A network run or a read in progress is finished first, but
-        waited for no longer than systems wait for a program that was asked to end."""
+        """Close the recording, if any, end the worker, and close the databases. A network run or a read in progress is
+        finished first, but waited for no longer than systems wait for a program that was asked to end."""
         self.control.change(stop=True)
         self.desk.stop(SAVE_S)
         ends_s = time.monotonic() + _PATIENCE_S
         self.drives.stop(_PATIENCE_S)
         self.takeovers.end(max(0.0, ends_s - time.monotonic()))
+        self._detections.close()
         self.labels.stop()
 
     @property

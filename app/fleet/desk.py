@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import Any
+from weakref import finalize
 
-from app.fleet.pack_index import Pack, packs_of
+from app.fleet.query_process import MOST_S, FleetReply, QueryKind, QueryProcess
+from app.fleet.query_result import QueryResult, QueryTable
 from app.fleet.runs import about_run, latest_run, runs_of, summary
 from app.fleet.store import Store
+from pipeline.common.files.user_files import Overloaded
 
-if TYPE_CHECKING:
-    from app.fleet.find import FleetTables
-
-MOST_S = 20.0
-"""Time limit of a query from a page."""
 _READERS = 8
+_AT_ONCE = 12
+"""Queries that may wait for their turn, of the forty threads that answer all requests; a page asks three."""
 
 
 class FleetDesk:
@@ -30,9 +28,13 @@ class FleetDesk:
     def __init__(self, address: str) -> None:
         self.store = Store(address)
         latest_run(self.store)
+        self.most_s = MOST_S
+        """Time limit of a query."""
         self._lock = threading.Lock()
+        self._waiting = threading.BoundedSemaphore(_AT_ONCE)
         self._about: dict[str, str] = {}
-        self._open: tuple[str, list[Pack], FleetTables] | None = None
+        self._process = QueryProcess(address)
+        finalize(self, self._process.close)
 
     def runs(self) -> list[str]:
         """Names of all runs, the last batch's first."""
@@ -47,14 +49,37 @@ class FleetDesk:
             self._about |= dict(zip(unread, said, strict=True))
         return {name: self._about[name] for name in self.runs()}
 
-    @contextmanager
-    def tables(self, run: str | None) -> Iterator[FleetTables]:
-        """A run's tables, for the block; None: the last batch's. Raises what ``FleetTables`` raises."""
-        from app.fleet.find import FleetTables  # DuckDB takes a moment to import
+    def find(
+        self, run: str | None, where: str, of: QueryTable, limit: int, order: str = "", *, descending: bool = False
+    ) -> tuple[str, QueryResult]:
+        """A run's name, and the rows that meet a condition; None: the last batch's. Raises what ``FleetTables.find``
+        and ``QueryProcess.ask`` raise."""
+        asked = {"where": where, "of": of, "limit": limit, "order": order, "descending": descending}
+        reply = self._ask(run, "find", asked)
+        found = reply.value
+        return reply.run, QueryResult(tuple(found["columns"]), tuple(map(tuple, found["rows"])), found["total"])
 
-        with self._lock:
-            name = run or latest_run(self.store)
-            packs = packs_of(self.store, name)
-            if self._open is None or self._open[:2] != (name, packs):
-                self._open = name, packs, FleetTables(self.store, name, MOST_S)
-            yield self._open[2]
+    def histogram(
+        self, run: str | None, where: str, of: QueryTable, column: str, bins: int
+    ) -> tuple[list[float], list[int]]:
+        """(bins + 1) edges, and between them the counts of a column's values. Raises what ``find`` raises."""
+        edges, counts = self._ask(run, "histogram", {"where": where, "of": of, "column": column, "bins": bins}).value
+        return edges, counts
+
+    def counts(self, run: str | None, where: str, of: QueryTable, column: str) -> list[tuple[str | None, int]]:
+        """(value, rows with it) of a column, the most frequent first. Raises what ``find`` raises."""
+        value = self._ask(run, "counts", {"where": where, "of": of, "column": column}).value
+        return [(name, count) for name, count in value]
+
+    def close(self) -> None:
+        """End a query in progress, and the process that runs them."""
+        self._process.close()
+
+    def _ask(self, run: str | None, kind: QueryKind, arguments: dict[str, Any]) -> FleetReply:
+        if not self._waiting.acquire(blocking=False):
+            raise Overloaded("too many searches at once; try again")
+        try:
+            with self._lock:
+                return self._process.ask(run, kind, arguments, self.most_s)
+        finally:
+            self._waiting.release()

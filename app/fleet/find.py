@@ -8,20 +8,19 @@ import re
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import duckdb
 
 from app.drive.events import event_kinds
 from app.fleet.batch.tables import EQUAL_TABLES, ColumnType, TableShape
 from app.fleet.pack_index import packed_file, packs_of
-from app.fleet.runs import latest_run, runs_of
+from app.fleet.query_result import QueryResult, QueryTable
+from app.fleet.runs import check_run, latest_run
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
 from pipeline.common.files.user_file_errors import did_you_mean
 
-QueryTable = Literal["events", "frames", "objects", "drives"]
 Answer = TypeVar("Answer")
 _ALWAYS = ("drive", "address", "index", "t_s")
 _SHOWN: dict[QueryTable, tuple[str, ...]] = {
@@ -63,18 +62,6 @@ MOST_BYTES = 2 << 30
 """Memory that questions with a time limit may take; the usual ones on 10,000 drives take a tenth."""
 
 
-@dataclass(frozen=True)
-class QueryResult:
-    """The result of a query."""
-
-    columns: tuple[str, ...]
-    """Names, in the order of each row's values."""
-    rows: tuple[tuple[Any, ...], ...]
-    """Limited to the requested number; None: unknown."""
-    total: int
-    """Total number of matching rows."""
-
-
 class FleetTables:
     """The tables of one run, open for queries. For one thread.
 
@@ -89,8 +76,7 @@ class FleetTables:
 
     def __init__(self, store: Store, run: str | None = None, most_s: float | None = None) -> None:
         self.store, self.run, self._most_s = store, run or latest_run(store), most_s
-        if self.run not in runs_of(store):
-            raise BadInput(f"{store.address}: no run {self.run!r}; there are {', '.join(runs_of(store)) or 'none'}")
+        check_run(store, self.run)
         self._numbers = [each.number for each in packs_of(store, self.run)]
         if not self._numbers:
             raise BadInput(f"{store.address}: run {self.run} has no drives yet")

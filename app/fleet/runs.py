@@ -45,6 +45,13 @@ def runs_of(store: Store) -> list[str]:
     return [name.removeprefix("runs/").removesuffix(".json") for name in store.names("runs")]
 
 
+def check_run(store: Store, run: str) -> None:
+    """Raises BadInput if there is no such run. Called before a name from outside becomes part of a file's."""
+    known = runs_of(store)
+    if run not in known:
+        raise BadInput(f"{store.address}: no run {run!r}; there are {', '.join(known) or 'none'}")
+
+
 def make_latest(store: Store, run: str) -> None:
     """Make a run the one that is searched and compared unless another is named."""
     store.write(LATEST, json.dumps({"run": run}).encode())
@@ -61,9 +68,8 @@ def latest_run(store: Store) -> str:
 def about_run(store: Store, run: str) -> dict[str, Any]:
     """What a run is made from, by name: code, networks, sensors, rings, and every parameter, such as
     ``cluster.tolerance_m``. Raises BadInput if there is no such run."""
-    said = read_json(store, f"runs/{run}.json", _RUN)
-    if said is None:
-        raise BadInput(f"{store.address}: no run {run!r}; there are {', '.join(runs_of(store)) or 'none'}")
+    check_run(store, run)
+    said = read_json(store, f"runs/{run}.json", _RUN) or {}
     return {name: said.get(name) for name in _PARTS} | _flat(said.get("params", {}))
 
 

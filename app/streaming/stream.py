@@ -85,7 +85,10 @@ class Stream:
         self._encoder = Encoder()
         # a separate pool, so that frames continue whatever requests do
         self._threads = ThreadPoolExecutor(1, "cipv-stream")
+        self._encoding = threading.Lock()
+        """Held while a frame is encoded, so never by the event loop, which also answers health checks."""
         self._lock = threading.Lock()
+        """Of ``_frame`` and ``_width_px``; held for moments."""
         self._frame = _Encoded()
         self._width_px = MAX_WIDTH_PX
         self._snapshot: Snapshot | None = None
@@ -234,12 +237,18 @@ class Stream:
         return has_grown
 
     def _encoded(self, snapshot: Snapshot) -> _Encoded:
-        """The frame of this snapshot, or a newer one."""
-        with self._lock:
-            if self._frame.sequence < snapshot.sequence and snapshot.processed is not None:
-                message = self._encoder.message(snapshot, self._width_px)
-                self._frame = _Encoded(snapshot.sequence, message, snapshot)
-            return self._frame
+        """The frame of this snapshot, or a newer one. Not on the event loop."""
+        with self._encoding:
+            while True:
+                with self._lock:
+                    newest, width_px = self._frame, self._width_px
+                if newest.sequence >= snapshot.sequence or snapshot.processed is None:
+                    return newest
+                made = _Encoded(snapshot.sequence, self._encoder.message(snapshot, width_px), snapshot)
+                with self._lock:
+                    if self._width_px <= width_px:  # otherwise a wider client has come meanwhile
+                        self._frame = made
+                        return made
 
     def _picked(self, page: object, number: int | None) -> None:
         """Tell a page what was picked in its 3D view. Any thread."""

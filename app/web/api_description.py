@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
 from fastapi import FastAPI
+from fastapi.responses import JSONResponse, Response
 
 from app.web.routes.shapes.common import Refusal
 
@@ -32,6 +34,20 @@ def titled(app: FastAPI) -> Callable[[], dict[str, Any]]:
         return whole
 
     return described
+
+
+def described_by(app: FastAPI) -> Callable[[], Response]:
+    """The route of the description. The framework's own makes it on the event loop, which takes half a second of
+    processor time, in which no health check is answered and no frame sent."""
+    alone, made = threading.Lock(), list[bytes]()
+
+    def describe() -> Response:
+        with alone:
+            if not made:
+                made.append(bytes(JSONResponse(app.openapi()).body))
+        return Response(made[0], media_type="application/json")
+
+    return describe
 
 
 def _first_sentence(text: str) -> str:

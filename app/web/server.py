@@ -29,7 +29,7 @@ from app.streaming.stream import Stream
 from app.views.colors import palette_css
 from app.views.rerun.web import ViewerFiles
 from app.views.viser.proxy import viser_router
-from app.web.api_description import REFUSALS, titled
+from app.web.api_description import REFUSALS, described_by, titled
 from app.web.guards.access import Access, Guard
 from app.web.guards.audit import Audit
 from app.web.guards.connections import LimitedProtocol, TlsHandshake
@@ -90,14 +90,15 @@ def create_app(
         for end in ends:
             end()
         stream.close()
+        if fleet is not None:
+            fleet.close()
         await asyncio.to_thread(exports.close)
         viewer.close()
 
     app = FastAPI(
         title="CIPV Studio",
         version="1",
-        docs_url=None,
-        redoc_url=None,
+        openapi_url=None,
         lifespan=listening,
         responses=REFUSALS,
         dependencies=[Depends(own_name)],
@@ -113,6 +114,7 @@ def create_app(
     for make_router in ROUTERS:
         app.include_router(make_router(services))
     app.include_router(viser_router(viser_port, access.allowed))
+    app.add_api_route("/openapi.json", described_by(app), methods=["GET", "HEAD"], include_in_schema=False)
     app.add_api_route("/palette.css", _palette, include_in_schema=False)
     app.mount("/", PageFiles(engine.drives.turn.asked), name="pages")
     return app

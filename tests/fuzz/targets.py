@@ -7,6 +7,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from copy import deepcopy
 from functools import lru_cache, partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,6 +15,7 @@ from unittest.mock import patch
 
 import cv2
 import numpy as np
+from ruamel.yaml import YAML
 
 from pipeline.common.files import image_decoding
 from pipeline.common.files.image_decoding import decode_within_budget
@@ -176,8 +178,9 @@ def targets(folder: Path) -> dict[str, Target]:
 
 @contextmanager
 def _undamaged_files_read_once() -> Iterator[None]:
-    """Cache undamaged files, since reading a recording's other images and sweeps would take most of the time."""
-    decode, elevations = cv2.imdecode, hdl64_rings.ring_elevations_deg
+    """Cache undamaged files, since reading a recording's other images, sweeps and descriptions would take most of the
+    time."""
+    decode, elevations, load = cv2.imdecode, hdl64_rings.ring_elevations_deg, YAML.load
 
     @lru_cache(maxsize=64)
     def decoded(data: bytes, flags: int) -> object:
@@ -187,11 +190,16 @@ def _undamaged_files_read_once() -> Iterator[None]:
     def fitted(points: bytes, turn: bytes, count: int) -> object:
         return elevations(np.frombuffer(points, np.float32).reshape(-1, 4), np.frombuffer(turn, np.int64), count)
 
+    @lru_cache(maxsize=64)
+    def described(text: str) -> object:
+        return load(YAML(typ="safe"), text)
+
     fast = SimpleNamespace(**vars(cv2) | {"imdecode": lambda data, flags: decoded(data.tobytes(), flags)})
     by_content = lambda points, turn, count: fitted(points.tobytes(), turn.tobytes(), count)  # noqa: E731
     with (
         patch.object(image_decoding, "cv2", fast),
         patch.object(kitti_source, "ring_elevations_deg", by_content),
+        patch.object(YAML, "load", lambda _, text: deepcopy(described(text))),  # of bags
     ):
         yield
 

@@ -9,8 +9,8 @@ from tests.fuzz.targets import targets
 
 NOT_FROM_OUTSIDE = {
     "app/core/kept_detections.py:KeptDetections.get": "the server's own cache, decoded as the detections of a batch",
-    "app/drive/look_ahead/messages.py:receive": "from the server's own process",
-    "app/drive/look_ahead/process.py:_serve": "from the server's own process",
+    "app/core/pipe_messages.py:receive": "from the server's own processes",
+    "app/drive/look_ahead/process.py:_serve": "from the server's own processes",
     "app/labels/projects/control.py:_results": "the server's own database",
     "app/labels/store/drive_labels.py:DriveLabels.version_json": "the server's own database, and checked by its hash",
     "app/labels/store/items.py:_item": "the server's own database",

@@ -11,7 +11,8 @@ from typing import IO, Any, cast
 import numpy as np
 
 from app.core.kept_detections import answer_of
-from app.drive.look_ahead.messages import ImageHeader, NetworkFile, NetworkReply, Networks, PipeClosed, receive, send
+from app.core.pipe_messages import PipeClosed, receive, send
+from app.drive.look_ahead.messages import ImageHeader, NetworkFile, NetworkReply, Networks
 from pipeline.common.errors import BadInput
 from pipeline.common.watchdog import at_work
 from pipeline.detection import Detectors

@@ -1,21 +1,12 @@
-"""Messages between the server and its process for background networks, over two pipes.
-
-Every message is its length, four bytes, and msgpack. The pixels of an image follow its message, so that they are not
-copied into it.
-"""
+"""Messages between the server and its process for background networks. The pixels of an image follow its message, so
+that they are not copied into it."""
 
 from __future__ import annotations
-
-import struct
-from typing import IO, TypeVar
 
 import msgspec
 
 from app.core.kept_detections import DetectionRow
 from pipeline.lanes.horizon import ImageOutline
-
-_LENGTH = struct.Struct("<I")
-M = TypeVar("M", bound=msgspec.Struct)
 
 
 class NetworkFile(msgspec.Struct, frozen=True):
@@ -58,29 +49,3 @@ class NetworkReply(msgspec.Struct):
     """The detections; None once the networks are open, and after a failure."""
     error: str = ""
     """Why it failed."""
-
-
-class PipeClosed(EOFError):
-    """The other side has ended."""
-
-
-def send(stream: IO[bytes], message: msgspec.Struct, pixels: memoryview | bytes = b"") -> None:
-    """Write a message and the pixels that belong to it. OSError if the other side has ended."""
-    packed = msgspec.msgpack.encode(message)
-    stream.write(_LENGTH.pack(len(packed)) + packed)
-    stream.write(pixels)
-    stream.flush()
-
-
-def receive(stream: IO[bytes], kind: type[M]) -> M:
-    """Wait for a message. PipeClosed if the other side has ended."""
-    (length,) = _LENGTH.unpack(exactly(stream, _LENGTH.size))
-    return msgspec.msgpack.decode(exactly(stream, length), type=kind)
-
-
-def exactly(stream: IO[bytes], count: int) -> bytes:
-    """Read this many bytes. PipeClosed if the other side ends before."""
-    data = stream.read(count)
-    if len(data) < count:
-        raise PipeClosed
-    return data

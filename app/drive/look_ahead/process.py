@@ -17,16 +17,8 @@ from typing import IO
 import numpy as np
 
 from app.core.kept_detections import row_of
-from app.drive.look_ahead.messages import (
-    ImageHeader,
-    NetworkFile,
-    NetworkReply,
-    Networks,
-    PipeClosed,
-    exactly,
-    receive,
-    send,
-)
+from app.core.pipe_messages import PipeClosed, exactly, receive, send
+from app.drive.look_ahead.messages import ImageHeader, NetworkFile, NetworkReply, Networks
 from pipeline.common.errors import BadInput
 from pipeline.common.idle_priority import take_idle_priority
 from pipeline.lanes.network import LaneNetwork, load_lane_network

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import duckdb
 
 from app.drive.compare import SAME_PLACE_M
-from app.fleet.find import FleetTables, QueryTable
+from app.fleet.find import FleetTables
+from app.fleet.query_result import QueryTable
 
 EVENT_SLACK_S = 1.0
 """Events of one kind within this time count as the same."""

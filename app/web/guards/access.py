@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from collections.abc import Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from html import escape
 from urllib.parse import quote, urlencode, urlsplit
 
@@ -22,7 +23,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from app.core.client_role import AccountRole, includes, set_client
+from app.core.client_role import Account, AccountRole, Role, includes, set_client
 from app.core.server_address import LOOPBACK_HOSTS, WILDCARDS, is_address
 from app.web.guards.revocation import serve_while_valid
 from app.web.guards.tokens import Guesses, Tokens
@@ -115,15 +116,19 @@ class Guard:
         self._access = access
         self._tokens = tokens
         self._guesses = Guesses()
+        self._threads = ThreadPoolExecutor(1, "cipv-accounts")
+        if tokens is not None and tokens.accounts is not None:
+            self._threads.submit(int)  # starts it: later, there may be no memory for it
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
             return await self._app(scope, receive, send)
         is_socket = scope["type"] == "websocket"
-        answer = self._refused(HTTPConnection(scope), is_socket or scope["method"] not in _READING)
+        answer = await self._refused(HTTPConnection(scope), is_socket or scope["method"] not in _READING)
         if answer is None:
             if is_socket and self._tokens is not None:
-                return await serve_while_valid(self._app, scope, receive, send, self._still(HTTPConnection(scope)))
+                still = await self._still(HTTPConnection(scope))
+                return await serve_while_valid(self._app, scope, receive, send, still)
             return await self._app(scope, receive, send if is_socket else _with_headers(send))
         if answer is _TOO_MANY_GUESSES:
             await asyncio.sleep(_GUESSER_WAITS_S)
@@ -131,13 +136,27 @@ class Guard:
             return await WebSocket(scope, receive, send).close(code=1008)
         await answer(scope, receive, _with_headers(send))
 
-    def _still(self, connection: HTTPConnection) -> Callable[[], bool]:
+    async def _still(self, connection: HTTPConnection) -> Callable[[], Awaitable[bool]]:
         """Whether a client is still the one as which it was accepted."""
-        given, tokens = _given(connection), self._tokens
-        before = tokens.client_of(given) if tokens is not None else None
-        return lambda: tokens is not None and tokens.client_of(given) == before
+        given = _given(connection)
+        before = await self._client_of(given)
 
-    def _refused(self, connection: HTTPConnection, changes: bool) -> Response | None:
+        async def is_same() -> bool:
+            return await self._client_of(given) == before
+
+        return is_same
+
+    async def _client_of(self, given: str | None) -> tuple[Role, Account | None] | None:
+        """The client with this token. Accounts are looked up on a thread of their own, because their file may be on a
+        disk that hangs: the event loop answers health checks and sends frames."""
+        if self._tokens is None or given is None:
+            return None
+        role = self._tokens.role_of(given)
+        if role is not None or self._tokens.accounts is None:
+            return (role, None) if role is not None else None
+        return await asyncio.get_running_loop().run_in_executor(self._threads, self._tokens.client_of, given)
+
+    async def _refused(self, connection: HTTPConnection, changes: bool) -> Response | None:
         """The response to a refused request; None if it is accepted."""
         refusal = self._access.refusal(connection.headers, changes=changes, path=connection.scope["path"])
         if refusal is not None:
@@ -145,10 +164,10 @@ class Guard:
         if self._tokens is None or (connection.scope["path"] == _OPEN_TO_ALL and not changes):
             return None
         by_link = connection.query_params.get("token") if not changes else None
-        if by_link is not None and self._tokens.client_of(by_link) is not None:
+        if by_link is not None and await self._client_of(by_link) is not None:
             return _signed_in(connection, by_link)
         given = _given(connection)
-        client = self._tokens.client_of(given)
+        client = await self._client_of(given)
         if client is None:
             wrong, address = by_link or given, connection.client.host if connection.client else ""
             is_guessing = wrong is not None and self._guesses.wrong(address, wrong)

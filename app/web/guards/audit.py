@@ -2,6 +2,8 @@
 
 Reads are not logged, except for files that leave the server: whatever a browser saves as a file. The 3D view is
 logged when it is opened, because its controls change parameters. Tokens are never logged.
+
+A thread of its own writes to the disk, which may hang: the event loop answers health checks and sends frames.
 """
 
 from __future__ import annotations
@@ -10,6 +12,8 @@ import json
 import logging
 import os
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from functools import partial
 from io import BufferedWriter, FileIO, TextIOWrapper
@@ -32,6 +36,8 @@ _WITH_CONTROLS = "/viser"
 _SHOWN_BYTES = 500
 """Logged bytes of a request's body: its beginning says what is opened or changed; label files are not copied."""
 _LARGEST_BYTES, _KEPT = 5_000_000, 5
+_MOST_WAITING = 10_000
+"""Entries, of under 3 kB each, that may wait for the disk."""
 
 
 class _PrivateFile(RotatingFileHandler):
@@ -72,6 +78,10 @@ class Audit:
         handler = _PrivateFile(file, maxBytes=_LARGEST_BYTES, backupCount=_KEPT, delay=True)
         handler.setFormatter(logging.Formatter("%(message)s"))
         self._log.addHandler(handler)
+        self._file = file
+        self._thread = ThreadPoolExecutor(1, "cipv-audit")
+        self._thread.submit(int)  # starts it: later, there may be no memory for it
+        self._waiting = threading.BoundedSemaphore(_MOST_WAITING)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
@@ -124,4 +134,12 @@ class Audit:
             "body": body.decode("utf-8", "replace"),
             "status": status,
         }
-        self._log.info(json.dumps(entry, ensure_ascii=False))
+        if self._waiting.acquire(blocking=False):
+            self._thread.submit(self._write_entry, json.dumps(entry, ensure_ascii=False))
+        else:
+            _say_unwritable(self._file, TimeoutError("the disk does not respond"))
+
+    def _write_entry(self, entry: str) -> None:
+        """Runs on the thread of the log."""
+        self._waiting.release()
+        self._log.info(entry)

@@ -28,8 +28,8 @@ AT_ONCE: Mapping[Role, int] = {"person": 30, "display": 6}
 some threads free."""
 STREAMS: Mapping[Role, int] = {"person": 48, "display": 16}
 """Maximum open WebSockets of a role."""
-_WORK = "/api/"
-"""Prefix of requests that may take long."""
+_WORK = ("/api/", "/metrics", "/openapi.json")
+"""Prefixes of requests that are computed."""
 _LOOK_S = 0.25
 T = TypeVar("T")
 

@@ -4,7 +4,7 @@ another role meanwhile."""
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, MutableMapping
+from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
 
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -15,14 +15,14 @@ _POLICY_VIOLATION = 1008
 
 
 async def serve_while_valid(
-    app: ASGIApp, scope: Scope, receive: Receive, send: Send, is_valid: Callable[[], bool]
+    app: ASGIApp, scope: Scope, receive: Receive, send: Send, is_valid: Callable[[], Awaitable[bool]]
 ) -> None:
     """Serve the WebSocket, and check ``is_valid`` once a second. When it is false, the socket is closed; for the app,
     the client has disconnected."""
     revoked = asyncio.get_running_loop().create_future()
 
     async def check() -> None:
-        while is_valid():
+        while await is_valid():
             await asyncio.sleep(CHECK_S)
         revoked.set_result(None)
 

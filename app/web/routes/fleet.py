@@ -97,11 +97,11 @@ def fleet_router(fleet: FleetDesk | None) -> APIRouter:
         limit: Annotated[int, Query(ge=1, le=MOST_ROWS)] = 200,
     ) -> FleetRows:
         """List the rows of a table that meet an SQL condition on its columns. order: a column."""
-        with refusing(), desk().tables(run) as tables:
-            found = tables.find(where, of, limit, order=order, descending=descending)
-            return FleetRows(
-                run=tables.run, columns=list(found.columns), rows=[list(row) for row in found.rows], total=found.total
-            )
+        with refusing():
+            name, found = desk().find(run, where, of, limit, order, descending=descending)
+        return FleetRows(
+            run=name, columns=list(found.columns), rows=[list(row) for row in found.rows], total=found.total
+        )
 
     @router.get("/histogram")
     def histogram(
@@ -112,16 +112,16 @@ def fleet_router(fleet: FleetDesk | None) -> APIRouter:
         bins: Annotated[int, Query(ge=1, le=200)] = 24,
     ) -> FleetHistogram:
         """Get the histogram of a numeric column over the rows that meet a condition."""
-        with refusing(), desk().tables(run) as tables:
-            edges, counts = tables.histogram(where, of, column, bins)
-            return FleetHistogram(edges=edges, counts=counts)
+        with refusing():
+            edges, counts = desk().histogram(run, where, of, column, bins)
+        return FleetHistogram(edges=edges, counts=counts)
 
     @router.get("/counts")
     def counts(
         column: ColumnName, of: TableName = "events", where: SqlCondition = "", run: RunName = None
     ) -> list[FleetCount]:
         """Count the values of a column over the rows that meet a condition, the most frequent first."""
-        with refusing(), desk().tables(run) as tables:
-            return [FleetCount(value=value, count=count) for value, count in tables.counts(where, of, column)]
+        with refusing():
+            return [FleetCount(value=value, count=count) for value, count in desk().counts(run, where, of, column)]
 
     return router

@@ -35,6 +35,8 @@ def parse(files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F6
         T_parent_child = _transform(transform["transform"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise SourceError(f"{INFO}, {TRANSFORM}: incomplete camera info or transform: {error}") from None
+    if distortion.ndim != 1 or not np.all(np.isfinite(distortion)):
+        raise SourceError(f"{INFO}: distortion_coefficients.data: not a list of finite numbers")
     if np.any(distortion) and len(distortion) not in _MODELS.get(model, ()):
         raise SourceError(f"{INFO}: {model} with {len(distortion)} numbers is not supported")
     if own not in (parent, child):

@@ -3,23 +3,39 @@ definitions, and those of Velodyne packets, are then used."""
 
 from __future__ import annotations
 
+import re
+import sqlite3
+import struct
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any, NamedTuple
 from weakref import finalize
 
-from rosbags.highlevel import AnyReader
+from rosbags import rosbag1, rosbag2
+from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.serde import SerdeError
+from rosbags.typesys import TypesysError
 
-from pipeline.common.files.user_file_errors import given_path
+from pipeline.common.files.user_file_errors import given_path, reason_of
 from pipeline.common.files.user_files import check_regular
 from pipeline.formats.velodyne.ros import typestore
 from pipeline.sources.rosbag import unpack_budget
+from pipeline.sources.rosbag.unpack_budget import CutOff, TooLarge
 from pipeline.types.source import SourceError
 
 _SUFFIXES = (".bag", ".db3", ".mcap")
 _TEXTS = (".yaml", ".yml")
 _LARGEST_TEXT_BYTES = 4 << 20
 """Of the description, which the library reads as a whole: that of ten thousand files has 3 MB."""
+
+_SAID = (AnyReaderError, rosbag1.ReaderError, rosbag2.ReaderError, SerdeError, TypesysError)
+"""Errors of the library whose texts are written for people."""
+_QUOTED_ERROR = re.compile(r"\b\w+(?:Error|Exception)\(('[^']*')?\)")
+_STUMBLED = (
+    (UnicodeDecodeError, "a name in it is damaged: not UTF-8"),
+    ((struct.error, EOFError, IndexError), "a record in it is cut off"),
+    (MemoryError, "it asks for more memory than there is"),
+)
 
 
 class Topic(NamedTuple):
@@ -33,6 +49,10 @@ class Topic(NamedTuple):
     """Number of messages."""
     is_defined: bool
     """Whether the message definition is known, from the bag or, if it contains no definitions, from ROS."""
+
+
+class _Invalid(ValueError):
+    """The text is the reason."""
 
 
 class BagError(Exception):
@@ -88,9 +108,9 @@ def bag_path(path: str) -> Path:
             if each.suffix in (*_SUFFIXES, *_TEXTS) or each == bag:
                 check_regular(each)
             if each.suffix in _TEXTS and each.stat().st_size > _LARGEST_TEXT_BYTES:
-                raise ValueError(f"{each.name} is larger than {_LARGEST_TEXT_BYTES >> 20} MiB")
+                raise _Invalid(f"{each.name} is larger than {_LARGEST_TEXT_BYTES >> 20} MiB")
     except (OSError, RuntimeError, ValueError) as error:
-        raise SourceError(f"{path}: cannot be opened: {_in_words(error)}") from None
+        raise SourceError(f"{path}: cannot be opened: {reason_of(error)}") from None
     if bag.is_file() and bag.suffix not in _SUFFIXES:
         raise SourceError(f"{path}: not a bag; file names end in {', '.join(_SUFFIXES)}")
     return bag
@@ -102,13 +122,20 @@ def _topics(reader: AnyReader) -> dict[str, Topic]:
         count = found[connection.topic].held if connection.topic in found else 0
         kind = connection.msgtype.rpartition("/")[2]
         if not isinstance(connection.topic, str):
-            raise ValueError("a topic with an invalid name")
+            raise _Invalid("a topic with an invalid name")
         is_defined = connection.msgtype in reader.typestore.fielddefs
         found[connection.topic] = Topic(connection.topic, kind, count + connection.msgcount, is_defined)
     return found
 
 
 def _in_words(error: Exception) -> str:
-    """A library's message, without the internal error that it appends after a colon."""
-    text = (str(error).strip().splitlines() or [type(error).__name__])[0]
-    return (text.partition(": ")[0] if error.__context__ is not None else text)[:200].rstrip(".")
+    """The reason in words: of the library what it meant to say, and not what Python said where it stumbled over damaged
+    data."""
+    if isinstance(error, OSError | sqlite3.Error | TooLarge | CutOff | _Invalid):
+        return reason_of(error)
+    if isinstance(error, _SAID):
+        text = (str(error).strip().splitlines() or [""])[0]
+        # an internal error is appended after a colon
+        text = text.partition(": ")[0] if error.__context__ is not None else text
+        return _QUOTED_ERROR.sub(r"\1", text)[:200].rstrip(".")
+    return next((text for kind, text in _STUMBLED if isinstance(error, kind)), "a record in it is damaged")

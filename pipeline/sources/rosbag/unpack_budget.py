@@ -28,6 +28,10 @@ class TooLarge(ValueError):
     """Data that unpacks to more than permitted."""
 
 
+class CutOff(ValueError):
+    """Compressed data without its end."""
+
+
 class Decompressor(Protocol):
     """Interface of the decompressors of bz2, lz4 and zstd."""
 
@@ -39,7 +43,7 @@ class Decompressor(Protocol):
 
 def bounded(new: Callable[[], Any], largest: int = LARGEST_CHUNK_BYTES) -> Unpack:
     """Returns a function that unpacks bytes completely. TooLarge for more than ``largest``, of which no more than that
-    is unpacked; ValueError for truncated data."""
+    is unpacked; CutOff for truncated data."""
 
     def unpack(data: bytes) -> bytes:
         decompressor: Decompressor = new()
@@ -47,7 +51,7 @@ def bounded(new: Callable[[], Any], largest: int = LARGEST_CHUNK_BYTES) -> Unpac
         if len(unpacked) > largest:
             raise TooLarge(f"a chunk that unpacks to more than {largest >> 20} MB")
         if not decompressor.eof:
-            raise ValueError("a chunk that is cut off")
+            raise CutOff("a chunk that is cut off")
         return unpacked
 
     return unpack

@@ -13,8 +13,11 @@ import pytest
 
 from app.core.detection_cache import DetectionCache
 from app.core.kept_detections import KeptDetections, seen_mark
+from app.engine.engine import Engine
+from pipeline.params import Params
 from pipeline.types import CameraImage, DistanceLaw, EgoState, Frame, RawBoxes, RawLanes
-from tests.app.waiting import wait_until
+from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
+from tests.app.waiting import WAIT_S, wait_until
 
 LAW = DistanceLaw(1000.0, -1.1, 900.0, 1.5, 2.0, 0.7)
 BOXES = RawBoxes(
@@ -57,6 +60,19 @@ def test_a_new_start_runs_no_network_and_gets_the_same(tmp_path: Path, answer: R
     assert detector.runs == 1
     for name, value in vars(answer).items():
         np.testing.assert_array_equal(getattr(again, name), value)
+
+
+def test_an_engine_that_ends_writes_what_waits_and_closes_the_file(tmp_path: Path) -> None:
+    """Its log of changes is merged, so that the file can be copied alone."""
+    detections = DetectionCache(kept=KeptDetections(tmp_path / "kept.db"))
+    engine = Engine(opener(Recording()), lambda _: CountingDetector(), Params(), uri="test:car", detections=detections)
+    engine.start()
+    engine.wait_for(lambda shown: shown.processed is not None, WAIT_S)
+    engine.stop()
+    assert [file.name for file in tmp_path.iterdir()] == ["kept.db"]
+    with sqlite3.connect(tmp_path / "kept.db") as database:
+        assert database.execute("SELECT count(*) FROM detections").fetchone() == (1,)
+    database.close()
 
 
 def test_what_else_is_asked_runs_the_network(tmp_path: Path) -> None:

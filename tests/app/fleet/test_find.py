@@ -186,12 +186,10 @@ def test_a_desk_finds_what_later_batches_add(fleet: Path, tmp_path: Path):
     shutil.copy(fleet / "near-0.mcap", inside / "near.mcap")
     run = _run_all(inside, out)
     desk = FleetDesk(str(out))
-    with desk.tables(None) as tables:
-        assert tables.find("", "drives").total == 1
+    assert desk.find(None, "", "drives", 1)[1].total == 1
     shutil.copy(fleet / "far-0.mcap", inside / "far.mcap")
     assert _run_all(inside, out) == run
-    with desk.tables(run) as tables:
-        assert tables.find("", "drives").total == 2
+    assert desk.find(run, "", "drives", 1)[1].total == 2
     assert desk.runs() == [run]
 
 

@@ -160,7 +160,7 @@ class Hanging(Recording):
     def frame(self, index):
         return super().frame(index) if index != 7 else for_ever()
 
-engine = Engine(opener(Hanging()), lambda _: CountingDetector(), Params(), uri="test:car", playing=True,
+engine = Engine(opener(Hanging()), lambda _: CountingDetector(), Params(), uri="test:car",
                 desk=SessionRecorder(Path(sys.argv[1])), labels=LabelDesk(open_later=for_ever))
 ServerOptions(port=int(sys.argv[2])).serve(engine)
 """

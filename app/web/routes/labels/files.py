@@ -58,15 +58,18 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         """Import labels that another tool wrote. The body is the file, or a .zip of the folder. They are added to the
         labels that exist, as one act; state.labels.task has the progress. drive: id of the recording; 409 when another
         one is open."""
-        path = _new_file()
+        path = await asyncio.to_thread(_new_file)
         try:
-            with path.open("wb") as file:
+            file = await asyncio.to_thread(path.open, "wb")
+            try:
                 async for piece in request.stream():
                     await asyncio.to_thread(file.write, piece)
+            finally:
+                await asyncio.to_thread(file.close)
             with refusing():
                 number = await asyncio.to_thread(desk.begin_import, person, path, format, drive)
         except BaseException as error:
-            path.unlink(missing_ok=True)
+            await asyncio.to_thread(path.unlink, missing_ok=True)
             # nobody receives the response, but it is not an error of this program
             if isinstance(error, ClientDisconnect):
                 raise HTTPException(400, "the upload was incomplete") from None

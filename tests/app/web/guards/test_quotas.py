@@ -16,6 +16,7 @@ import httpx
 import pytest
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
+from starlette.types import Message
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -98,6 +99,31 @@ def test_displays_that_ask_for_much_hold_nobody_up_and_what_they_leave_ends(addr
     for client in clients:
         client.close()
     assert slow.cancelled.acquire(timeout=WAIT_S), "what nobody waits for ends"
+
+
+@pytest.mark.parametrize("path", ["/api/state", "/metrics", "/openapi.json"])
+def test_whatever_is_computed_counts(path: str) -> None:
+    async def answers() -> list[int]:
+        told, goes_on = list[int](), asyncio.Event()
+
+        async def app(*_: object) -> None:
+            await goes_on.wait()
+
+        async def send(message: Message) -> None:
+            told.extend([message["status"]] if "status" in message else [])
+
+        scope = {"type": "http", "path": path, "headers": [], "state": {"role": "display"}}
+        limited = quotas.RoleQuota(app)
+        requests = [asyncio.create_task(limited(scope, app, send)) for _ in range(quotas.AT_ONCE["display"] + 2)]  # type: ignore[arg-type]
+        done, _ = await asyncio.wait(requests, return_when=asyncio.FIRST_COMPLETED)
+        while len(done) < 2:
+            await asyncio.sleep(0)
+            done = {each for each in requests if each.done()}
+        goes_on.set()
+        await asyncio.gather(*requests)
+        return told
+
+    assert asyncio.run(answers()) == [429, 429]
 
 
 def test_whole_lists_of_labels_are_made_two_at_a_time(address: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -63,6 +63,7 @@ REFUSED = {
     "a column that is more": ("counts", {"column": 'kind", (SELECT 1)'}, 409, "kind"),
     "words, not numbers": ("histogram", {"column": "text"}, 409, "convert"),
     "another run": ("rows", {"run": "../x"}, 409, "no run"),
+    "a run with a NUL": ("rows", {"run": "a\0b"}, 409, "no run"),
     "another table": ("rows", {"of": "duckdb_settings"}, 422, "of"),
     "too many rows": ("rows", {"limit": "100000"}, 422, "limit"),
     "a long condition": ("rows", {"where": "x" * 5000}, 422, "where"),

@@ -12,7 +12,7 @@ import yaml
 
 from pipeline.common.geometry import inverse, rotation
 from pipeline.formats.calibration_files import FORMATS, kalibr
-from pipeline.formats.calibration_files.ros import TRANSFORM
+from pipeline.formats.calibration_files.ros import INFO, TRANSFORM
 from pipeline.formats.extrinsic_mistakes import T_OPTICAL_BODY
 from pipeline.sources.rig import load_rig
 from pipeline.types import F64, CameraCalibration
@@ -123,6 +123,15 @@ def test_rotations_that_are_none_are_refused(rotation_: dict[str, float], named:
     folder = written("ros", STRAIGHT, tmp_path)
     changed(folder, transform={"translation": {"x": 0.0, "y": 0.0, "z": 0.0}, "rotation": rotation_})
     with pytest.raises(SourceError, match=named):
+        FORMATS["ros"].read(folder, None)
+
+
+@pytest.mark.parametrize("data", [None, 0.5, [[0.0], [0.1]], [0.1, 0.0, 0.0, 0.0, float("nan")]])
+def test_a_distortion_of_ros_that_is_no_list_of_numbers_is_refused(data: object, tmp_path: Path):
+    folder = written("ros", STRAIGHT, tmp_path)
+    info = yaml.safe_load((folder / INFO).read_text()) | {"distortion_coefficients": {"data": data}}
+    (folder / INFO).write_text(yaml.safe_dump(info))
+    with pytest.raises(SourceError, match="not a list of finite numbers"):
         FORMATS["ros"].read(folder, None)
 
 

@@ -231,46 +231,6 @@ def test_a_topic_whose_name_is_a_number_is_said(tmp_path: Path) -> None:
         open_source(f"rosbag:{bag}")
 
 
-DAMAGED = {
-    "camera's type": (
-        ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Compres:edImage"),
-        "camera: messages of unknown types on /front/image_raw/compressed (Compres:edImage)",
-    ),
-    "camera's package": (
-        ("sensor_msgs/msg/CompressedImage", "sens\u00d8r_msgs/msg/CompressedImage"),
-        "camera: messages of unknown types on /front/image_raw/compressed (CompressedImage)",
-    ),
-    "camera's count": (
-        (r"count: 3(?=\n    topic_metadata:\n      name: /front/image_raw)", "count: 0"),
-        "camera: no messages on /front/image_raw/compressed",
-    ),
-    "camera's name": (("/front/image_raw/compressed", "/front/image_raw/compresse"), "no image within 0.1 s"),
-    "LiDAR's type": (
-        ("sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/PointCl"),
-        "LiDAR: messages of unknown types on /velodyne_points (PointCl)",
-    ),
-    "LiDAR's name": (("/velodyne_points", "/velodyne_point"), "LiDAR: no complete sweep in the bag"),
-}
-
-
-@pytest.mark.parametrize("what", DAMAGED)
-@pytest.mark.parametrize("kind", ["db3", "mcap"])
-def test_a_sensor_lost_to_damaged_metadata_is_said_in_each_frame(kind: Kind, what: str, tmp_path: Path) -> None:
-    """The other sensor's frames remain."""
-    (pattern, damage), says = DAMAGED[what]
-    bag = write_bag(tmp_path / "drive", kind)
-    metadata = (bag / "metadata.yaml").read_text(encoding="utf-8")
-    damaged, changes = re.subn(pattern, damage, metadata, count=1)
-    assert changes == 1
-    (bag / "metadata.yaml").write_text(damaged, encoding="utf-8")
-    source = open_source(f"rosbag:{bag}")
-    assert len(source) == 3
-    for index in range(3):
-        frame = source.frame(index)
-        assert (frame.sweep is None, frame.image is None) == ("LiDAR" in what, "camera" in what)
-        assert says in frame.notes
-
-
 def test_a_sensor_that_was_left_out_or_never_recorded_is_not_missed(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "drive", "db3") as bag:
         bag.write("/points", bag.cloud(ring_wall(0), HEADER_NS), HEADER_NS)

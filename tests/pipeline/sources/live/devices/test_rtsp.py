@@ -1,17 +1,12 @@
-"""A camera that speaks RTSP, from a real server: found, shown, lost and found again."""
+"""A camera that speaks RTSP: found, shown, lost and found again."""
 
 from __future__ import annotations
 
 import os
 import resource
-import shutil
 import socket
-import subprocess
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,31 +15,12 @@ from pipeline.sources.live.devices.device_reader import DeviceLost, ReaderStop
 from pipeline.sources.live.devices.video_stream import read_stream
 from pipeline.sources.live.source import LiveSensors
 from tests.app.waiting import wait_until
-from tests.pipeline.sources.live.h264_camera import BAR_PX, HEIGHT, WIDTH, Behaviour, h264_camera
 from tests.pipeline.sources.live.rig import frames_until, free_port, loopback_config, opened, tcp_device
-
-CAMERA = Path(__file__).parents[1] / "rtsp_camera.py"
-PYTHON = shutil.which("python3", path=os.defpath)
+from tests.pipeline.sources.live.rtsp_camera import BAR_PX, GREY, HEIGHT, WIDTH, Behaviour, Codec, rtsp_camera
 
 
-@contextmanager
-def camera(codec: str, port: int) -> Iterator[None]:
-    """A camera that is plugged in, and unplugged at the end."""
-    assert PYTHON is not None
-    command = [PYTHON, str(CAMERA), codec, str(port)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            if process.stdout.readline().strip() != "ready":
-                pytest.skip(f"GStreamer's RTSP server: {process.communicate()[1].strip().splitlines()[-1:]}")
-            yield
-        finally:
-            process.kill()
-
-
-@pytest.mark.skipif(PYTHON is None, reason="no Python of the system")
 @pytest.mark.parametrize("codec", ["h264", "mjpeg"])
-def test_a_camera_that_speaks_rtsp(codec: str) -> None:
+def test_a_camera_that_speaks_rtsp(codec: Codec) -> None:
     """Plugged in late, unplugged, and plugged in again."""
     port = free_port(socket.SOCK_STREAM)
     camera_at = {"url": f"rtsp://127.0.0.1:{port}/front"}
@@ -52,13 +28,13 @@ def test_a_camera_that_speaks_rtsp(codec: str) -> None:
     source.start()
     try:
         for _ in range(2):
-            with camera(codec, port):
+            with rtsp_camera(port, codec):
                 for _ in range(20):
                     image = frames_until(source, lambda frame: frame.image is not None).image
                     assert image is not None
-                    assert image.bgr.shape == (360, 640, 3)
-                    assert np.median(image.bgr[:, :90]) > 220, "the white bar"
-                    assert np.median(image.bgr[:, 110:]) == pytest.approx(80, abs=12)
+                    assert image.bgr.shape == (HEIGHT, WIDTH, 3)
+                    assert np.median(image.bgr[:, : BAR_PX - 10]) > 220, "the white bar"
+                    assert np.median(image.bgr[:, BAR_PX + 10 :]) == pytest.approx(GREY, abs=12)
                     assert (image.encoded is not None) == (codec == "mjpeg"), "a JPEG stays as it came"
                 (health,) = source.health()
                 assert (health.sensor, health.note != "") == ("camera", True), "its images have no times of their own"
@@ -73,7 +49,7 @@ def test_a_camera_that_fails_in_any_way_is_back_when_it_is_well_again(
     """Whatever it sends meanwhile: the reader neither hangs nor holds on to it, and its size may change."""
     port = free_port(socket.SOCK_STREAM)
     config = loopback_config(lidar=None, gnss=None, ego=None, camera={"url": f"rtsp://127.0.0.1:{port}/front"})
-    with h264_camera(port) as camera:
+    with rtsp_camera(port) as camera:
         source = opened(config, sensors)
         frame = frames_until(source, lambda frame: frame.image is not None)
         assert frame.image is not None
