@@ -4,6 +4,7 @@ the frame of a page with its own playhead."""
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import viser
@@ -15,13 +16,14 @@ from app.views.viser import nodes as viser_nodes
 from app.views.viser.frame_scene import NAMES, OBJECTS, DisplayOptions, OwnFrameScene, cover, floor_of
 from app.views.viser.gizmo import CuboidGizmo
 from app.views.viser.nodes import Strokes
+from app.views.viser.tags import NameTag, ViewCamera, arranged
 from pipeline.common.geometry import Cuboid
 from pipeline.types import F64, Point3, Result
 
 LABELS = "/own"
 _LIFT_M = 0.3
 _WIDTH_PX = {False: 2.0, True: 4.0}
-_NAME_SCALE, _CHOSEN_SCALE = 1.1, 1.4
+_NAME_SCALE, _CHOSEN_SCALE = 1.3, 1.6
 """Size of name tags, and of the selected label's; the pipeline's are smaller."""
 _BACK, _LEAST_BACK_M = 2.5, 9.0
 """Distance of the camera from a selected label, as a multiple of its longest side, and the minimum distance."""
@@ -35,7 +37,8 @@ class BrowserScene:
     def __init__(self, client: viser.ClientHandle, on_drag: OnDrag) -> None:
         self._client, self._scene = client, client.scene
         self._gizmo = CuboidGizmo(client.scene, on_drag)
-        self._names = 0
+        self._tags: list[NameTag] = []
+        self._texts: list[str] = []
         self._covers: list[viser.FrameHandle] = []
         self._drawn: tuple[LabelsInView | None, int | None] = (None, None)
         self._followed: int | None = None
@@ -96,12 +99,29 @@ class BrowserScene:
                 if (each.track == chosen) is is_chosen:
                     strokes.add(_outline(each), rgb(each.role))
             viser_nodes.lines(self._scene, f"{LABELS}/{'chosen' if is_chosen else 'cuboids'}", strokes, width_px)
-        for place in range(max(len(labels), self._names)):
-            at = labels[place] if place < len(labels) else None
-            text, top = ("", None) if at is None else (at.text, _top(at.cuboid))
-            scale = _CHOSEN_SCALE if at is not None and at.track == chosen else _NAME_SCALE
-            viser_nodes.name_tag(self._scene, f"{LABELS}/names/{place}", text, top, scale)
-        self._names = max(len(labels), self._names)
+        left = [""] * (len(self._tags) - len(labels))
+        self._tags = [_tag(each, is_chosen=each.track == chosen) for each in labels]
+        self._show_names([*arranged(self._tags, self._camera()), *left])
+        self._texts = self._texts[: len(labels)]
+
+    def camera_moved(self) -> None:
+        """Other name tags have room now."""
+        texts = arranged(self._tags, self._camera())
+        if texts != self._texts:
+            with self._client.atomic():
+                self._show_names(texts)
+
+    def _show_names(self, texts: Sequence[str]) -> None:
+        for place, text in enumerate(texts):
+            tag = self._tags[place] if text else None
+            viser_nodes.name_tag(
+                self._scene, f"{LABELS}/names/{place}", text, tag and tag.at, tag.scale if tag else _NAME_SCALE
+            )
+        self._texts = list(texts)
+
+    def _camera(self) -> ViewCamera:
+        camera = self._client.camera
+        return ViewCamera(camera.position, camera.wxyz, camera.fov, camera.image_width, camera.image_height)
 
     def _follow(self, view: PageView) -> None:
         """Move the camera to a label when it is selected; afterwards the user controls it."""
@@ -135,6 +155,8 @@ def _outline(label: LabelInView) -> F64:
     return np.concatenate([edges, np.array([[(x, y, top), nose]])])
 
 
-def _top(cuboid: Cuboid) -> Point3:
-    x, y, z = cuboid.center
-    return x, y, z + cuboid.size[2] / 2 + _LIFT_M
+def _tag(label: LabelInView, *, is_chosen: bool) -> NameTag:
+    x, y, z = label.cuboid.center
+    top: Point3 = (x, y, z + label.cuboid.size[2] / 2 + _LIFT_M)
+    rank = 0 if is_chosen else 1 if label.role == "cipv" else 2
+    return NameTag(label.text, f"#{label.track}", top, rank, _CHOSEN_SCALE if is_chosen else _NAME_SCALE)

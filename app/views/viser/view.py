@@ -133,6 +133,13 @@ class ViserView:
         with self._lock:
             self._browsers[client.client_id] = PAGE.get(), BrowserScene(client, self._on_drag)
             self._draw_browsers()
+        client.camera.on_update(lambda _: self._camera_moved(client.client_id))
+
+    def _camera_moved(self, client_id: int) -> None:
+        with self._lock:
+            _, browser = self._browsers.get(client_id, (None, None))
+            if browser is not None:
+                browser.camera_moved()
 
     # on the event loop: after all messages that it sent before
     async def _left(self, client: viser.ClientHandle) -> None:

@@ -20,7 +20,7 @@ _FEWEST_ON_SIDE = 5
 _SHARE_OF_EYES = 0.3
 """Share of the sweeps that must have seen a side for it to be used: in the others it was hidden by the vehicle
 itself."""
-_MOST_OF_IT = 0.75
+MOST_OF_IT = 0.75
 """If a rear is seen from behind over at least this share of its width, both its edges are visible, so its middle is the
 vehicle's."""
 _CAP_M = 0.4
@@ -94,7 +94,7 @@ def placed(
     middle = found.axes @ np.array(cuboid.center[:2])
     for axis in range(2):
         low, high, side = found.low[axis], found.high[axis], size[axis]
-        is_between = ends[axis] == "none" and found.seen[axis] == "none" and high - low >= _MOST_OF_IT * side
+        is_between = ends[axis] == "none" and found.seen[axis] == "none" and high - low >= MOST_OF_IT * side
         if ends[axis] == "both" or is_between:
             middle[axis] = (low + high) / 2
         elif ends[axis] == "low":

@@ -113,6 +113,11 @@ def _line(times: F64, where: F64, weights: F64) -> tuple[F64, F64]:
 
 def weighted_median(values: Sequence[float] | F64, weights: Sequence[float] | F64) -> float:
     """The value below which half of the weight lies."""
+    return weighted_quantile(values, weights, 0.5)
+
+
+def weighted_quantile(values: Sequence[float] | F64, weights: Sequence[float] | F64, share: float) -> float:
+    """The value below which this share of the weight lies."""
     order = np.argsort(values)
     total = np.cumsum(np.asarray(weights, dtype=float)[order])
-    return float(values[order[int(np.searchsorted(total, total[-1] / 2))]])
+    return float(values[order[int(np.searchsorted(total, total[-1] * share))]])

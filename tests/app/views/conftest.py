@@ -209,9 +209,10 @@ class SceneClient:
         """Every input of the panel with this label, in order."""
         return [each for each in self.messages if each.get("props", {}).get("label") == label]
 
-    def look(self) -> None:
-        """Send the camera, which a browser does first; only then does viser count it as a client."""
-        pose = {"wxyz": (1.0, 0.0, 0.0, 0.0), "position": (-9.0, 0.0, 5.0), "look_at": (9.0, 0.0, 0.0)}
+    def look(self, x: float = -9.0, y: float = 0.0) -> None:
+        """Send the camera, which a browser does first; only then does viser count it as a client. It looks along x from
+        this position."""
+        pose = {"wxyz": (0.5, -0.5, 0.5, -0.5), "position": (x, y, 5.0), "look_at": (x + 18.0, y, 5.0)}
         lens = {"fov": 1.2, "near": 0.01, "far": 1000.0, "image_height": 600, "image_width": 800}
         self._send("ViewerCameraMessage", **pose, **lens, up_direction=(0.0, 0.0, 1.0))
 

@@ -39,6 +39,31 @@ def test_the_next_unlabelled_frame_is_one_whose_lead_is_only_proposed(hand: Hand
     expect(page.locator(".said")).to_contain_text("lead only proposed")
 
 
+def test_once_all_frames_are_computed_the_message_says_that_labels_can_be_proposed(hand: Hand):
+    """Until then, only the computed frames were offered."""
+    page = hand.page
+    page.evaluate(
+        """async () => {
+          const { set } = await import("/js/core/store.js");
+          window.isComputed = false;
+          set("said", "not computed");
+          const offer = { words: "Propose", take: () => null, isOpen: () => !window.isComputed };
+          set("offer", { ...offer, about: "not computed", after: "computed" });
+        }"""
+    )
+    expect(page.locator(".offer")).to_be_visible()
+    expect(page.locator(".said")).to_have_text("not computed")
+    page.evaluate(
+        """async () => {
+          const { get, set } = await import("/js/core/store.js");
+          window.isComputed = true;
+          set("drive", { ...get("drive") });
+        }"""
+    )
+    expect(page.locator(".offer")).to_be_hidden()
+    expect(page.locator(".said")).to_have_text("computed")
+
+
 def test_the_3d_view_is_told_of_labels_with_class_number_and_state_and_of_the_selected_one(
     open_page: OpenPage, site: Site
 ):

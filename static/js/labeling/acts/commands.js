@@ -47,6 +47,7 @@ function offerComputed() {
     take: () => act({ kind: "propose", first: 0, last: computed() - 1, from: "run" }),
     isOpen: () => computed() < all,
     about: get("said") ?? "",
+    after: "All frames are computed: labels can be proposed",
   });
 }
 

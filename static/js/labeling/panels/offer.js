@@ -3,8 +3,8 @@ import { el, text } from "../../core/dom.js";
 import { get, on, set } from "../../core/store.js";
 
 /**
- * isOpen: whether it still fits; about: the status message that goes with it.
- * @typedef {{words: string, take: () => unknown, isOpen: () => boolean, about?: string}} Offer
+ * isOpen: whether it still fits; about: the status message that goes with it; after: the one that follows.
+ * @typedef {{words: string, take: () => unknown, isOpen: () => boolean, about?: string, after?: string}} Offer
  */
 
 const button = el("button", { type: "button", class: "offer", hidden: true, title: "Do this next", onclick: take });
@@ -17,7 +17,7 @@ export function setUp() {
 function reflect() {
   const offer = get("offer");
   if (offer && !(get("labeling")?.on && offer.isOpen())) {
-    if (offer.about && get("said") === offer.about) set("said", "");
+    if (offer.about && get("said") === offer.about) set("said", (get("labeling")?.on && offer.after) || "");
     return set("offer", null);
   }
   button.hidden = !offer;

@@ -115,6 +115,29 @@ def test_each_page_sees_its_own_selection_and_labels(frame: Frame, result: Resul
         view.close()
 
 
+def test_name_tags_that_would_cover_each_other_are_shown_once_the_camera_has_moved(
+    frame: Frame, result: Result, open_scene: Any
+) -> None:
+    near, far = (
+        LabelInView(number, Cuboid((x, 0.0, 0.8), (4.0, 2.0, 1.5), 0.0), f"#{number} car", "fused", True)
+        for number, x in ((3, 20.0), (4, 24.0))
+    )
+    views = {"a1": PageView(labels=LabelsInView((near, far), True))}
+    view = ViserView(Params(), view_of=lambda page: views[page])
+    try:
+        view.show(frame, result)
+        client = open_scene(view.port, page="a1")
+        client.look(-60.0)
+        client.read_until(lambda each: each.get("name") == "/own/names/0" and "props" in each)
+        assert "#3 car" in client.texts()
+        assert "#4 car" not in client.texts()
+        client.look(8.0, 3.0)
+        client.read_until(lambda each: each.get("name") == "/own/names/1" and "props" in each)
+        assert {"#3 car", "#4 car"} <= set(client.texts())
+    finally:
+        view.close()
+
+
 def test_a_page_with_its_own_playhead_sees_its_own_frame_and_the_others_the_shared_one(
     frame: Frame, result: Result, open_scene: Any
 ) -> None:
