@@ -7,10 +7,9 @@ visible sides, sweep by sweep.
 Measured against labels to 50 m, BEV IoU before and after (median): Astyx 0.75 and 0.83, KITTI drive 0009 0.64 and 0.86,
 KITTI 0052 0.81 and 0.86, Astyx's further frames 0.68 and 0.77. The remaining error is mostly in lengths that no sensor
 saw (with the labels' sizes, 0.85 to 0.94; Astyx's labels of one vehicle themselves differ by up to 0.7 m in length
-between frames), in classes (a van called a lorry), and in rows of parked cars of which
-one face was seen: the detector's boxes, occluded by the next car of the row, fit the wrong heading as well as the right
-one. The labels of both cannot be met at once: KITTI's widths (1.65 m, median) follow the points, those of Astyx (1.80
-m) the cars.
+between frames), in classes (a van called a lorry), and in rows of parked cars of which one face was seen: the
+detector's boxes, occluded by the next car of the row, fit the wrong heading as well as the right one. The labels of
+both cannot be met at once: KITTI's widths (1.65 m, median) follow the points, those of Astyx (1.80 m) the cars.
 """
 
 from __future__ import annotations
