@@ -107,6 +107,8 @@ class ExistenceState:
     """By object id."""
     by_vision: dict[int, int] = field(default_factory=dict)
     """Object id of each vision track."""
+    cluster_of: dict[int, int] = field(default_factory=dict)
+    """By object id, the last LiDAR track that was its own."""
     looks_far: bool = False
     """Whether far parts of images are processed a second time, at least in some frames."""
 
@@ -134,9 +136,13 @@ def weigh(
     unboxed = never_boxed(objects, frame) if looked and params.use_missing_boxes else frozenset()
     known: dict[int, Existence] = {}
     judged = []
+    cluster_of = {item.id: state.cluster_of[item.id] for item in objects if item.id in state.cluster_of}
+    cluster_of |= {item.id: item.lidar_track for item in objects if item.lidar_track is not None}
+    seen_clusters = {item.lidar_track for item in objects if item.seen_by_lidar}
     for item in objects:
         before = _before(state, item)
-        found = _updated(before, item, rays.get(item.id), item.id in missed, now, params)
+        is_left = item.lidar_track is None and cluster_of.get(item.id) in seen_clusters
+        found = _updated(before, item, rays.get(item.id), item.id in missed, is_left, now, params)
         if item.id in unboxed:
             found = found._replace(unboxed=min(found.unboxed + 1, _LOOKS))
         known[item.id] = found
@@ -144,7 +150,7 @@ def weigh(
         odds = _bounded(_bounded(camera) + found.lidar)
         judged.append(_told(item, 1.0 / (1.0 + math.exp(-odds)), rays.get(item.id), found.unboxed))
     by_vision = {item.vision_track: item.id for item in objects if item.vision_track is not None}
-    return ExistenceState(known, by_vision, looks_far), tuple(judged)
+    return ExistenceState(known, by_vision, cluster_of, looks_far), tuple(judged)
 
 
 def _before(state: ExistenceState, item: FusedObject) -> Existence:
@@ -158,8 +164,15 @@ def _before(state: ExistenceState, item: FusedObject) -> Existence:
 
 
 def _updated(
-    before: Existence, item: FusedObject, rays: Rays | None, missed: bool, now: Moment, params: ExistenceParams
+    before: Existence,
+    item: FusedObject,
+    rays: Rays | None,
+    missed: bool,
+    is_left: bool,
+    now: Moment,
+    params: ExistenceParams,
 ) -> Existence:
+    """is_left: its former cluster is another object now."""
     dt_s = now.dt_s or 0.0
     score, lidar, age_s = before.score, before.lidar, before.age_s + dt_s
     if item.seen_by_camera and item.score is not None:
@@ -181,7 +194,8 @@ def _updated(
             if shrunk_m > judged_m + _FIRST_SIGMAS * _IMAGE_SHARE * item.distance_m:
                 from_m, travelled_m, judged_m, shrunk_m = item.distance_m, 0.0, 0.0, 0.0
     cluster_s = before.cluster_s + (dt_s if item.seen_by_lidar else 0.0)
-    lidar = _bounded(lidar + _said_by_lidar(item, rays, cluster_s >= _FOLLOWED_S) + _said_by_others(item))
+    may_be_merged = cluster_s >= _FOLLOWED_S and not is_left
+    lidar = _bounded(lidar + _said_by_lidar(item, rays, may_be_merged) + _said_by_others(item))
     return Existence(
         score, lidar, last_place(item), age_s, from_m, travelled_m, judged_m, shrunk_m, cluster_s, before.unboxed
     )
@@ -198,9 +212,11 @@ def _weight(dt_s: float, mean_s: float) -> float:
     return 1.0 - math.exp(-dt_s / mean_s)
 
 
-def _said_by_lidar(item: FusedObject, rays: Rays | None, was_followed: bool) -> float:
+def _said_by_lidar(item: FusedObject, rays: Rays | None, may_be_merged: bool) -> float:
     """Log-odds added by this sweep. If the LiDAR has tracked the object and its returns now belong to another cluster,
-    the two clusters have merged; if the LiDAR never tracked it, it is a second box on the neighbour."""
+    the two clusters have merged; if the LiDAR never tracked it, it is a second box on the neighbour. If its own cluster
+    goes on as another object, the vehicle is there, and its box is misplaced: that of a truck that overtakes, most of
+    which the image's edge cuts off."""
     if item.seen_by_lidar:
         return _CLUSTER
     if item.returns >= MIN_RAYS:  # others passed over it: beyond a crest, the road is lower than it seems
@@ -214,7 +230,7 @@ def _said_by_lidar(item: FusedObject, rays: Rays | None, was_followed: bool) -> 
     if rays.is_silent:
         return _SILENT
     is_near = (item.distance_m or 0.0) < NEAR_M
-    return _TAKEN if is_near and rays.is_taken and not was_followed else 0.0
+    return _TAKEN if is_near and rays.is_taken and not may_be_merged else 0.0
 
 
 def _said_by_others(item: FusedObject) -> float:

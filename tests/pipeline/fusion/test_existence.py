@@ -145,6 +145,23 @@ def test_a_lead_whose_cluster_was_joined_with_its_neighbours_is_still_there(seco
     assert (found.existence > 0.5) == exists
 
 
+@pytest.mark.parametrize(
+    ("number", "exists"), [pytest.param(7, False, id="its own"), pytest.param(9, True, id="another: may have merged")]
+)
+def test_a_box_whose_own_cluster_goes_on_without_it_is_misplaced(number: int, exists: bool) -> None:
+    """A truck that overtakes: the image's edge cuts off most of it, so its box no longer matches its long flank."""
+    truck, rays = camera_car(8.0), Rays(returns(8.5), cluster=3)
+    ranged = replace(truck, source="VL", seen_by="VL", lidar_track=7)
+    flank = replace(fused(2, 8.5, source="L"), lidar_track=number)
+    state = ExistenceState({truck.id: Existence(0.8, 0.0)})
+    for _ in range(10):
+        state, _ = weigh(state, (ranged,), rays, FRAME, moment(None, 0.1), PARAMS)
+    for _ in range(5):
+        state, (found, _) = weigh(state, (truck, flank), rays, FRAME, moment(None, 0.1), PARAMS)
+    assert found.existence is not None
+    assert (found.existence > 0.5) == exists
+
+
 def test_rays_start_at_the_sensor() -> None:
     """A ray from the roof passes over the position, although its return behind is at body height."""
     high = Rays(returns(40.0, height_m=0.6), origin=(0.0, 0.0, 3.0))
