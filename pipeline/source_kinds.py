@@ -53,6 +53,12 @@ class SourceKind:
         """Whether a recording is a folder with folders of its own, rather than files that may lie anywhere."""
         return bool(self.folders) or any("/" in pattern for pattern in self.files)
 
+    def has_folders_in(self, place: Path) -> bool:
+        """Whether a folder has the layout itself, rather than containing recordings."""
+        if any((place / name).is_dir() for name in self.folders):
+            return True
+        return any("/" in pattern and _holds(place, _names(place), pattern) for pattern in self.files)
+
     def load(self) -> Any:
         """The function that opens it."""
         return _imported(self.opener)
@@ -106,7 +112,7 @@ KINDS: tuple[SourceKind, ...] = (
         "nuscenes",
         "nuscenes:<dir>",
         "pipeline.sources.nuscenes:open_recording",
-        files=("v1.0-*/sample_data.json",),
+        files=("v1.0-*/sample_data.json", "v1.0-*/scene.json"),
     ),
     SourceKind("radiate", "radiate:<dir>", "pipeline.sources.radiate:open_recording", folders=("velo_lidar",)),
     SourceKind(

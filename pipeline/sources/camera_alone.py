@@ -219,7 +219,18 @@ def _dash_cam(width: int, height: int, options: dict[str, str]) -> CameraCalibra
 
 
 def _track(path: Path, options: dict[str, str], near_ns: int, notes: list[str]) -> list[GnssFix]:
-    """The fixes in a file beside the recording, in order of time; empty without one."""
+    """The fixes in a file beside the recording, in order of time; empty without one, and, with a note, for a damaged
+    one that no option names."""
+    try:
+        return _fixes(path, options, near_ns, notes)
+    except SourceError as error:
+        if "gpx" in options or "nmea" in options:
+            raise
+        notes.append(f"no GNSS track: {error}")
+        return []
+
+
+def _fixes(path: Path, options: dict[str, str], near_ns: int, notes: list[str]) -> list[GnssFix]:
     gpx = named(path, options, "gpx", (".gpx",)) or _the_only_one(path, options, (".gpx",))
     if gpx is not None:
         fixes = parse_gpx(read_bytes(gpx).decode("utf-8", "replace"), gpx.name)

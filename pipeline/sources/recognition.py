@@ -34,23 +34,34 @@ def recording_at(uri: str) -> tuple[SourceKind, str] | None:
         found = _recording(Path(path).expanduser(), DEEPEST) if path else None
     except PROBLEMS:
         return None
-    if found is None:
+    if found is None or (found[1] is None and _is_only_a_part(Path(path).expanduser(), found[0])):
         return None
     kind, place = found
     return kind, uri if place is None else f"{place}{'?' if options else ''}{options}"
 
 
+def _is_only_a_part(place: Path, kind: SourceKind) -> bool:
+    """Whether a folder that seems to contain recordings is a part of one, such as the poses of KITTI-360's drives."""
+    if not kind.is_layout or not place.is_dir() or kind.has_folders_in(place):
+        return False
+    around = recording_around(place)
+    return around is not None and kind.has_folders_in(around)
+
+
 def recording_around(place: Path) -> Path | None:
     """The folder of the recording that a file or folder is a part of, such as ``image_02`` of a KITTI drive; None if it
     is not part of one, or if that may not be revealed."""
+    holding = None
     for folder in list(place.absolute().parents)[:DEEPEST]:
         with suppress(*PROBLEMS):
             check_allowed(folder)
             scheme = looks_like(folder)
             kind = kind_named(scheme) if scheme is not None else None
-            if kind is not None and kind.is_layout:
+            if kind is not None and kind.has_folders_in(folder):
                 return folder
-    return None
+            if kind is not None and kind.is_layout:  # contains recordings, such as KITTI's folder of a day
+                holding = holding or folder
+    return holding
 
 
 def _recording(place: Path, deepest: int) -> tuple[SourceKind, Path | None] | None:

@@ -15,9 +15,11 @@ from app.commands.serve import Serve
 from pipeline.sources import SourceError, open_source
 from tests.pipeline.recording.frames import full, write
 from tests.pipeline.sources.conftest import write_astyx, write_kitti, write_kitti_raw
+from tests.pipeline.sources.kitti.test_kitti360 import write_kitti360
 from tests.pipeline.sources.made.bags import write_bag
 from tests.pipeline.sources.made.captures import write_capture
 from tests.pipeline.sources.made.clouds_on_disk import write_clouds
+from tests.pipeline.sources.made.nuscenes_on_disk import write_nuscenes
 
 Write = Callable[[Path], Path]
 """Functions that create a recording in a new folder and return what a user types."""
@@ -153,6 +155,12 @@ def part_of_drive(name: str) -> Write:
     return lambda folder: write_kitti_raw(folder) / name
 
 
+def without_table(folder: Path, table: str) -> Path:
+    write_nuscenes(folder)
+    (folder / "v1.0-mini" / f"{table}.json").unlink()
+    return folder
+
+
 def empty_folder(folder: Path) -> Path:
     folder.mkdir()
     return folder
@@ -199,7 +207,7 @@ OTHERS: dict[str, tuple[Write, str]] = {
     "an image of another format": (some_file("a.bmp", b"BM"), "an image of an unsupported format; convert"),
     "a bare stream of images": (
         some_file("a.h264", b"\0\0\0\1g"),
-        r"images without times; put them .* ffmpeg .*a\.h264",
+        r"images without times; put .*ffmpeg .*a\.h264",
     ),
     "a network": (some_file("a.onnx", b"\x08"), "a network; use it as --detector or --lanes"),
     "the sweeps of a drive": (part_of_drive("velodyne_points"), r"a part of the recording .*_sync; open that folder$"),
@@ -207,6 +215,14 @@ OTHERS: dict[str, tuple[Write, str]] = {
     "a calibration": (
         lambda folder: part_of_drive("")(folder).parent / "calib_cam_to_cam.txt",
         r"a part of the recording .*; open that folder$",
+    ),
+    "the poses of KITTI-360": (
+        lambda folder: write_kitti360(folder) / "data_poses",
+        r"a part of the recording .*path; open that folder$",
+    ),
+    "nuScenes without a table": (
+        lambda folder: without_table(folder, "sample_data"),
+        r"v1\.0-mini/sample_data\.json is missing$",
     ),
     "one point cloud": (some_file("a.pcd", b"# .PCD v.7"), "one point cloud; open its folder"),
     "one sweep of KITTI": (some_file("000000.bin", b"\1\2\3\4"), "raw points or packets; open the folder"),
