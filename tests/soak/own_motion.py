@@ -1,10 +1,10 @@
-"""Own motion, and the path that it predicts, on KITTI 0009 at 16 rings, by what the line knows of the car's motion.
+"""Own motion, and the path that it predicts, by what is known of the car's motion.
 
     python -m tests.soak.own_motion
 
 The drive of ``CIPV_DATA`` is copied with and without ``oxts``, and each copy is opened and processed as a user would.
 Speed and yaw rate are compared with the inertial unit's, and the path 30 m ahead with the way then driven, in all
-frames that still have 30 m to drive.
+frames that still have 30 m to drive. The second table has the mean error of the path on the simulator's curves.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ import numpy as np
 
 from pipeline.common.files.data_dir import data_dir
 from pipeline.detection import Detectors, detect, lanes_for
+from pipeline.experiments.curves import scenarios
+from pipeline.experiments.curves.drives import driven
 from pipeline.params import Params, with_changes
 from pipeline.path.corridor import offset
 from pipeline.run import through
@@ -58,6 +60,17 @@ SETUPS: Mapping[str, Setup] = {
 }
 
 
+_CURVES = {**_ALONE, "path.use_gnss": False}
+CURVE_SETUPS: Mapping[str, Mapping[str, object]] = {
+    "CAN": {**_CURVES, "path.use_lanes": False, "motion.source": "can"},
+    "LiDAR": {**_CURVES, "path.use_lanes": False, "motion.source": "lidar"},
+    "none": {**_CURVES, "path.use_lanes": False, "motion.source": "off"},
+    "lane lines only": {**_CURVES, "motion.source": "off"},
+    "LiDAR, edges and vehicles": {"path.use_gnss": False, "path.use_lanes": False, "motion.source": "lidar"},
+    "LiDAR and lane lines": {**_CURVES, "motion.source": "lidar"},
+}
+
+
 def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         copies = {has: _copied(Path(folder) / str(has), has) for has in (True, False)}
@@ -69,7 +82,18 @@ def main() -> int:
         for name, setup in SETUPS.items():
             results = list(_results(frames[setup.has_oxts], setup))
             print(f"| {name} | {' | '.join(_cells(results, own, poses))} |", flush=True)
+    print("\n| path by | R = 125 m | R = 250 m | S-curve | straight |\n|---|---|---|---|---|")
+    errors = [_curve_errors_m(layout) for layout in ("r125", "r250", "s125", "straight")]
+    for name in CURVE_SETUPS:
+        print(f"| {name} | {' | '.join(each[name] for each in errors)} |")
     return 0
+
+
+def _curve_errors_m(layout: str) -> dict[str, str]:
+    """The mean error of the path 30 m ahead on one of the roads, by setup."""
+    road = scenarios.LAYOUTS[layout]
+    drives = driven(scenarios.scenario(road, 0), road.reach_m, tuple(CURVE_SETUPS), None, CURVE_SETUPS)
+    return {name: f"{np.nanmean(np.abs([row[1] for row in drive.errors_m])):.2f}" for name, drive in drives.items()}
 
 
 def poses_of(t_ns: list[int], own: list[EgoState]) -> F64:

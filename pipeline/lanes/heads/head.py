@@ -84,8 +84,11 @@ class LaneHead:
         found = self.read(np.asarray(outputs[self.output][0], np.float32))
         if self.road is not None and self.read_road is not None:
             edges = self.read_road(np.asarray(outputs[self.road][0], np.float32))
-            parts = zip((found.uv, found.score, found.line), (edges.uv, edges.score, edges.line), strict=True)
-            found = Points(*(np.concatenate(pair) for pair in parts))
+            found = Points(
+                np.concatenate([found.uv, edges.uv]),
+                np.concatenate([found.score, edges.score]),
+                np.concatenate([found.line, edges.line]),
+            )
         if self.exists is None:
             return found
         there = np.asarray(outputs[self.exists]).ravel()[found.line] > _THERE
