@@ -16,6 +16,11 @@ from pathlib import Path
 from typing import Any
 
 _MOST_ENTRIES = 20_000
+VIDEO_SUFFIXES = (
+    ".mp4", ".m4v", ".mov", ".3gp", ".avi", ".mkv", ".webm", ".mjpeg", ".ts", ".mts", ".m2ts", ".mpg", ".mpeg", ".wmv",
+    ".asf", ".flv", ".ogv",
+)  # fmt: skip
+"""Suffixes of video files, with sound or without."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,17 @@ class SourceKind:
     """Whether it names devices, which have no random access."""
     built_in: str = ""
     """``module:function`` that lists the built-in recordings: (part after the colon, title) pairs."""
+
+    @property
+    def is_layout(self) -> bool:
+        """Whether a recording is a folder with folders of its own, rather than files that may lie anywhere."""
+        return bool(self.folders) or any("/" in pattern for pattern in self.files)
+
+    def has_folders_in(self, place: Path) -> bool:
+        """Whether a folder has the layout itself, rather than containing recordings."""
+        if any((place / name).is_dir() for name in self.folders):
+            return True
+        return any("/" in pattern and _holds(place, _names(place), pattern) for pattern in self.files)
 
     def load(self) -> Any:
         """The function that opens it."""
@@ -96,15 +112,23 @@ KINDS: tuple[SourceKind, ...] = (
         "nuscenes",
         "nuscenes:<dir>",
         "pipeline.sources.nuscenes:open_recording",
-        files=("v1.0-*/sample_data.json",),
+        files=("v1.0-*/sample_data.json", "v1.0-*/scene.json"),
     ),
     SourceKind("radiate", "radiate:<dir>", "pipeline.sources.radiate:open_recording", folders=("velo_lidar",)),
     SourceKind(
         "video",
         "video:<file>",
         "pipeline.sources.camera_alone:open_video",
-        suffixes=(".mp4", ".m4v", ".avi", ".mkv", ".webm", ".mov", ".mjpeg", ".ts", ".mpg"),
-        begins=((4, b"ftyp"), (8, b"AVI "), (0, b"\x1aE\xdf\xa3")),
+        suffixes=VIDEO_SUFFIXES,
+        begins=(
+            (4, b"ftyp"),
+            (8, b"AVI "),
+            (0, b"\x1aE\xdf\xa3"),
+            (0, b"FLV\x01"),
+            (0, b"OggS"),
+            (0, b"\x30\x26\xb2\x75\x8e\x66\xcf\x11"),  # ASF, WMV
+            (0, b"\x00\x00\x01\xba"),  # MPEG-PS
+        ),
     ),
     SourceKind(
         "pictures",

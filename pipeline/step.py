@@ -26,7 +26,7 @@ from pipeline.fusion.drift import lines as drift_lines
 from pipeline.lanes import road_lines as lanes
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.params import Params
-from pipeline.path import corridor, road_edges, traffic, yaw_rate
+from pipeline.path import corridor, drivable_area, road_edges, traffic, yaw_rate
 from pipeline.ranging import further
 from pipeline.types import (
     VEHICLES,
@@ -76,6 +76,8 @@ class State:
     """Structure beside the road, moved along with the car."""
     traffic: traffic.TrafficState = traffic.NONE
     """Where vehicles have driven, moved along with the car."""
+    drivable: drivable_area.DrivableState = drivable_area.DrivableState()
+    """The path along the drivable area in the last image."""
     path: corridor.PathState = corridor.PathState()
     """Smoothed path and position on the route."""
     cipv: cipv.CipvState = cipv.CipvState()
@@ -128,7 +130,8 @@ def step(
     clock.lap("existence")
     objects = object_motion.describe(objects, now.measured, params.motion, now.dt_s)
 
-    # Path: lane lines, the route, the yaw rate, the road's edges and other vehicles, each weighted by its certainty
+    # Path: lane lines, the route, the yaw rate, the road's edges, other vehicles and the drivable area, each
+    # weighted by its certainty
     road_z_m = frame.camera.road_z_m if frame.camera is not None else None
     view = lanes.RoadView(aligned, sweep.ground, road_z_m, _vehicle_boxes(boxes))
     lane_state, lane = lanes.follow(state.lanes, frame.raw_lanes, view, now, params.lanes)
@@ -152,12 +155,15 @@ def step(
     edge_state, edges = road_edges.follow(state.edges, around, now, params.path, state.path.is_shown)
     clock.lap("edges")
     traffic_state, driving = traffic.follow(state.traffic, objects, now, params.path)
+    sides = lanes.road_edges(frame.raw_lanes, view, lane_state, params.lanes)
+    drivable_state, area = drivable_area.follow(state.drivable, sides, now, params.path, state.path.is_shown)
     evidence = corridor.Evidence(
         lane,
         frame.gnss,
         frame.route,
         edges.path if edges is not None else None,
         driving.path if driving is not None else None,
+        area.path if area is not None else None,
     )
     path_state, path = corridor.predict(state.path, evidence, now, params.path)
     agreement_state = agreement.follow(state.agreement, objects, now.dt_s, params.fusion)
@@ -187,6 +193,7 @@ def step(
         lanes=lane,
         edges=edges.cells if edges is not None else None,
         traffic=driving.headings if driving is not None else None,
+        drivable=area.edges if area is not None else None,
     )
     result = Result(
         frame=frame.name,
@@ -220,6 +227,7 @@ def step(
         lanes=lane_state,
         edges=edge_state,
         traffic=traffic_state,
+        drivable=drivable_state,
         path=path_state,
         cipv=cipv_state,
         lead=lead_state,

@@ -84,7 +84,8 @@ def display_json(result: Result, aligned: Alignment | None, scale: float) -> dic
     ``far_view`` is the window of the detector's second pass, None without one; ``path`` is the corridor on the ground
     of the sweep, None without a ground. ``lanes`` are the ego lane's lines where the camera saw them, None without a
     lane detector; ``plan_lanes`` the same seen from above, x y in metres; ``plan_edges`` the structure beside the road,
-    also from above, None if the path does not use it; ``plan_traffic`` x, y and heading in rad of the vehicles that
+    also from above, None if the path does not use it; ``plan_drivable`` the edges of the drivable area in the
+    image, likewise; ``plan_traffic`` x, y and heading in rad of the vehicles that
     indicate the course of the road; ``ground`` the planes under the sweep, n·p + d = 0, and the segments of x in which
     they apply; ``ranking`` every object, best candidate for the CIPV first."""
     layers = result.layers
@@ -97,6 +98,7 @@ def display_json(result: Result, aligned: Alignment | None, scale: float) -> dic
         "path": _on_ground(path, layers.ground, aligned, scale),
         **_lanes_json(layers.lanes, aligned, scale),
         "plan_edges": np.round(layers.edges, 2).tolist() if layers.edges is not None else None,
+        "plan_drivable": np.round(layers.drivable, 2).tolist() if layers.drivable is not None else None,
         "plan_traffic": np.round(layers.traffic, 3).tolist() if layers.traffic is not None else None,
         "ground": _ground_json(layers.ground),
         "vision_ranges": _vision_ranges(result),

@@ -12,13 +12,12 @@ import numpy as np
 
 from pipeline.common.files.image_decoding import MOST_PIXELS, check_pixels
 from pipeline.common.files.user_file_errors import reason_of
-from pipeline.common.files.user_files import check_regular, overload_told_apart
+from pipeline.common.files.user_files import check_regular, open_regular, overload_told_apart
 from pipeline.common.nearest_in_time import Times
 from pipeline.common.progress import Progress, silent
 from pipeline.types import U8
 from pipeline.types.source import SourceError
 
-SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".mjpeg", ".ts")
 _FORMATS = "mov,mp4,m4a,3gp,3g2,mj2,avi,matroska,webm,mjpeg,mjpeg_2000,mpegts,mpeg,mpegvideo,h264,hevc,ogg,flv,asf"
 _NS = 1_000_000_000
 _DECODE_ON_NS = 2 * _NS
@@ -27,6 +26,11 @@ _TELL_EVERY = 256
 """Images between two words of progress."""
 _PLACES = 2
 """What is shown, and what is computed beside it."""
+_BEFORE_NS = (0, 2 * _NS, 12 * _NS)
+"""Formats without an index, such as MPEG-TS, lead to any image, and only a key image can be decoded alone. From the
+first place whose images do not begin too late, the wanted one is reached."""
+_FROM_START_NS = 60 * _NS
+"""An image within this time is also reached from the beginning of the file."""
 PATIENCE_S = 10.0
 """Maximum time until the next image's data are found: a disk reads half a gigabyte in it, an image has a few MB. FFmpeg
 searches damaged files and gigabytes of zeros byte by byte, and nothing else interrupts it."""
@@ -63,7 +67,7 @@ class VideoFile:
             with open_video(path) as container:
                 stamps, tick_ns = _stamps(container, progress)
         except (av.InvalidDataError, av.ExitError):
-            raise SourceError(f"{path.name}: not a readable video: cut off, or something else") from None
+            raise SourceError(f"{path.name}: not a readable video: {_about_unreadable(path)}") from None
         except (av.FFmpegError, OSError, ValueError) as error:
             raise SourceError(f"{path.name}: not a readable video: {reason_of(error)}") from None
         if not len(stamps):
@@ -87,6 +91,19 @@ class VideoFile:
         except (av.FFmpegError, OSError, ValueError, StopIteration) as error:
             reason = f"not found within {PATIENCE_S:g} s" if isinstance(error, av.ExitError) else reason_of(error)
             raise SourceError(f"{self.path.name}: image {index} cannot be decoded: {reason}") from None
+
+
+def _about_unreadable(path: Path) -> str:
+    """Why FFmpeg finds no video in a file, and what to do about it."""
+    with suppress(OSError), open_regular(path) as file:
+        begin = file.read(8)
+        if not begin:
+            return "an empty file"
+        if begin[4:] == b"ftyp":
+            return (
+                "cut off before its index, which cameras write last; a repair program such as untrunc makes a new one"
+            )
+    return "cut off, or something else"
 
 
 class _Place:
@@ -114,27 +131,55 @@ class _Place:
                 raise
 
     def _decode(self, wanted_ns: int) -> U8:
-        if not self.is_near(wanted_ns):
-            self._seek(wanted_ns)
+        if self.is_near(wanted_ns):
+            frame, _ = self._read_on(wanted_ns)
+        else:
+            frame = self._from_before(wanted_ns)
+        if frame is None:
+            raise ValueError("the video ends before it")
+        check_pixels(frame.width, frame.height)
+        upright = np.rot90(frame.to_ndarray(format="bgr24"), round(frame.rotation / 90))
+        return np.ascontiguousarray(upright, dtype=np.uint8)
+
+    def _from_before(self, wanted_ns: int) -> av.VideoFrame | None:
+        """The image of a time or, if it is damaged, the next one; None if there is none."""
+        frame, begins_too_late = None, True
+        for before_ns in _BEFORE_NS:
+            self._seek(wanted_ns - before_ns)
+            frame, begins_too_late = self._read_on(wanted_ns)
+            if not begins_too_late or before_ns > wanted_ns:
+                break
+        if begins_too_late and wanted_ns <= _FROM_START_NS:
+            self._close()
+            self._open()
+            frame, _ = self._read_on(wanted_ns)
+        return frame
+
+    def _read_on(self, wanted_ns: int) -> tuple[av.VideoFrame | None, bool]:
+        """The next image that is not before a time, None if there is none; and whether it is the first one here, and
+        later than that time."""
         assert self._frames is not None
-        half_tick_ns = self._tick_ns / 2
+        half_tick_ns, is_first = self._tick_ns / 2, True
         for frame in self._frames:
             if frame.pts is None:
                 continue
             self._at_ns = round((frame.pts - self._first_stamp) * self._tick_ns)
             if self._at_ns >= wanted_ns - half_tick_ns:
-                check_pixels(frame.width, frame.height)
-                upright = np.rot90(frame.to_ndarray(format="bgr24"), round(frame.rotation / 90))
-                return np.ascontiguousarray(upright, dtype=np.uint8)
-        raise ValueError("the video ends before it")
+                return frame, is_first and self._at_ns > wanted_ns + half_tick_ns
+            is_first = False
+        return None, is_first
 
     def _seek(self, wanted_ns: int) -> None:
         self.seeks += 1
-        if self._container is None:
-            self._container = open_video(self._path)
-        stream = self._container.streams.video[0]
-        self._container.seek(self._first_stamp + int(wanted_ns / self._tick_ns), stream=stream)
-        self._frames = self._container.decode(stream)
+        container = self._container if self._container is not None else self._open()
+        stream = container.streams.video[0]
+        container.seek(self._first_stamp + int(max(wanted_ns, 0) / self._tick_ns), stream=stream)
+        self._frames = container.decode(stream)
+
+    def _open(self) -> av.container.InputContainer:
+        self._container = open_video(self._path)
+        self._frames = self._container.decode(self._container.streams.video[0])
+        return self._container
 
     def _close(self) -> None:
         if self._container is not None:

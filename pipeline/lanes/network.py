@@ -1,4 +1,5 @@
-"""A lane network in an ONNX file as one function: image in, points on painted lines out.
+"""A lane network in an ONNX file as one function: image in, points on painted lines and on the edges of
+the drivable area out.
 
 The paper uses ENet-SAD; any network whose outputs ``pipeline.lanes.heads`` supports will do.
 """
@@ -68,7 +69,7 @@ class LaneNetwork:
     _session: ort.InferenceSession = field(repr=False, compare=False)
 
     def detect(self, bgr: U8) -> RawLanes:
-        """Points on lines in an image (H, W, 3) uint8, in its pixels.
+        """Points on lines and on the road's edges in an image (H, W, 3) uint8, in its pixels.
 
         DetectorError for an array that is not such an image, or if the network fails on it.
         """
@@ -189,7 +190,7 @@ def _with_rows(
 
 def _name(path: Path, sha256: str, head: LaneHead, outline: ImageOutline) -> str:
     """Of a network. What its input depends on is part of it."""
-    name = f"{path.stem}-{sha256[:12]}"
+    name = f"{path.stem}-{sha256[:12]}" + ("-road" if head.road is not None else "")
     if head.horizon is None:
         return name
     aspect = f"-{outline.aspect:.3f}" if head.keeps_aspect else ""

@@ -50,6 +50,7 @@ _BEYOND = 0.6
 inverse."""
 _COMPARED = powers(10.0)
 _APART_M = 0.6
+_VEHICLE_MARGIN = 0.1
 
 
 @dataclass(frozen=True)
@@ -108,10 +109,8 @@ def follow(
     state: LaneState, raw: RawLanes | None, view: RoadView, now: Moment, params: LaneParams
 ) -> tuple[LaneState, EgoLane | None]:
     """One frame: measure if a lane detector has processed it, and track. None before the first measurement."""
-    # The road: the plane of the LiDAR's ground, else the height from calibration or parameter
     plane, sweeps = _settled(state, road_plane(view.ground))
-    level_m = view.road_z_m if view.road_z_m is not None else -params.mount_height_m
-    road = plane if plane is not None else np.array([0.0, 0.0, level_m])
+    road = _road(plane, view, params)
 
     # In front of a standing car only traffic moves, and the vehicle before it hides the lines
     if now.stands and state.pitch is not None and tracking.is_settled(state.tracks, params):
@@ -142,6 +141,7 @@ def measure(
     plane: (3,) as in ``LaneState``. pitch: estimate before this image. expected: the shape of the tracked lines, which
     narrows the search; None for a wide search.
     """
+    raw = raw.painted()
     nothing = LaneMeasurement(raw.model, (), pitch)
     eye, rays = aligned.rays(np.asarray(raw.points, np.float64))
     height_m = float(eye[2] - (plane[0] * eye[0] + plane[1] * eye[1] + plane[2]))
@@ -162,6 +162,40 @@ def measure(
     to_ego = tracking.shifted(-float(eye[0]))
     lines = [_in_ego(found, eye, to_ego, height_m, pitch) for found in _distinct(lines) if _plausible(found, params)]
     return LaneMeasurement(raw.model, tuple(lines), pitch)
+
+
+def road_edges(raw: RawLanes | None, view: RoadView, state: LaneState, params: LaneParams) -> F64 | None:
+    """(M, 2) ego x, y on the edges of the drivable area in this image; None if no detector looked for it.
+
+    Args:
+        raw: what the lane detector saw.
+        view: of the same image.
+        state: after ``follow`` in this frame: pitch and road.
+        params: of lane tracking.
+    """
+    if raw is None or view.aligned is None or state.pitch is None:
+        return None
+    edges = _beside(raw.road_edges(), [_wider(box) for box in view.vehicles])
+    eye, rays = view.aligned.rays(np.asarray(edges.points, np.float64))
+    plane = _road(state.plane, view, params)
+    height_m = float(eye[2] - (plane[0] * eye[0] + plane[1] * eye[1] + plane[2]))
+    if not len(edges.points) or height_m <= 0.1:
+        return np.zeros((0, 2)) if len(raw.road_edges().points) else None
+    seen, _ = _on_road(edges, rays, plane, height_m, params.max_range_m)
+    x = seen.x_m(state.pitch.rad)
+    return np.column_stack([x + eye[0], seen.slope * x + eye[1]])[(x > 0.0) & (x < params.max_range_m)]
+
+
+def _wider(box: Box) -> Box:
+    """Around a vehicle, the drivable area ends at its wheels or its shadow, not at the road's edge."""
+    margin = _VEHICLE_MARGIN * (box[2] - box[0])
+    return (box[0] - margin, box[1], box[2] + margin, box[3] + margin)
+
+
+def _road(plane: F64 | None, view: RoadView, params: LaneParams) -> F64:
+    """(3,) the road: the plane of the LiDAR's ground, else the height from calibration or parameter."""
+    level_m = view.road_z_m if view.road_z_m is not None else -params.mount_height_m
+    return plane if plane is not None else np.array([0.0, 0.0, level_m])
 
 
 def _beside(raw: RawLanes, vehicles: Sequence[Box]) -> RawLanes:

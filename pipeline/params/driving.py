@@ -44,6 +44,11 @@ class PathParams(Section):
         "Align the corridor with the edges of the road (kerbs, hedges, walls, rails, parked cars) where no lane lines "
         "or route show the road",
     )
+    use_drivable: bool = choice(
+        True,
+        "Align the corridor with the drivable area that the lane network finds where no lane lines or route show the "
+        "road",
+    )
     use_corners: bool = choice(
         True, "Where no lane lines or route show the road, a slow car may turn before what stands ahead of it"
     )

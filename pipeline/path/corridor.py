@@ -5,6 +5,7 @@
     yaw rate's arc ───────┼─► compare, weigh ─► blend with the frame before ─► Path
     the road's edges ─────┤
     other vehicles ───────┤
+    the drivable area ────┤
     (else straight ahead) ┘
 
 The paper uses lane centres on straights and a GPS path in curves, chosen by hand. Here, every source gives its sigma at
@@ -71,6 +72,8 @@ class Evidence(NamedTuple):
     """The path along structures beside the road."""
     traffic: PathEstimate | None = None
     """The path along the headings of other vehicles."""
+    drivable: PathEstimate | None = None
+    """The path along the drivable area in the image."""
 
 
 def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParams) -> tuple[PathState, Path]:
@@ -88,7 +91,7 @@ def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParam
     estimates = [each for each in seen if each is not None]
     is_shown = any(_shows_the_road(each, params) for each in surest)
     if not is_shown:
-        estimates += [each for each in (evidence.edges, evidence.traffic) if each is not None]
+        estimates += [each for each in (evidence.edges, evidence.traffic, evidence.drivable) if each is not None]
     guess = straight(ego, params)
     if all(each.sigma_m[0] > guess.sigma_m[0] for each in estimates) or _fades(ego, estimates):
         # for the next metres, a vague route is worse than the assumption that the car continues in its direction

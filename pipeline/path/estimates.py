@@ -18,8 +18,8 @@ from pipeline.params import PathParams
 from pipeline.types import EgoState
 from pipeline.types.lane import EgoLane, LaneLine
 
-PathSourceName = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "traffic"]
-SOURCES: tuple[PathSourceName, ...] = ("lane", "gnss", "yaw_rate", "straight", "edges", "traffic")
+PathSourceName = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "traffic", "drivable_area"]
+SOURCES: tuple[PathSourceName, ...] = ("lane", "gnss", "yaw_rate", "straight", "edges", "traffic", "drivable_area")
 STEP_M = 1.0
 UNKNOWN_SIGMA_M = 1e3
 """Sigma where a source gives no position."""
@@ -115,6 +115,14 @@ def straight(ego: EgoState | None, params: PathParams) -> PathEstimate:
     center = np.column_stack([s, np.zeros_like(s)])
     bends_by = np.minimum(0.5 * curvature_sigma * s * s, SHARPEST_BEGIN_PER_M2 / 6.0 * s**3)
     return PathEstimate("straight", center, np.hypot(params.lane_keeping_sigma_m, bends_by))
+
+
+def slope_error_m(center: F64) -> F64:
+    """(K,) lateral error of a path of (K, 2) points that was seen in an image: the camera's pitch relative to the road
+    shifts a bend sideways."""
+    way = np.gradient(center, STEP_M, axis=0)
+    too_far_m = center[:, 0] ** 2 / _EYE_HEIGHT_M * _PITCH_SIGMA_RAD
+    return np.asarray(np.abs(way[:, 1]) * too_far_m)
 
 
 def between_lines(lane: EgoLane | None, params: PathParams) -> PathEstimate | None:

@@ -6,11 +6,13 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import cast
+from urllib.parse import unquote
 
 from pipeline.common.files.remote_files import is_remote
 from pipeline.common.progress import Progress, silent
 from pipeline.source_kinds import SourceKind, is_live, kind_named, kind_of_bare, looks_like, usages
-from pipeline.sources.recognition import about_path, recording_at
+from pipeline.sources.recognition import recording_at
+from pipeline.sources.unrecognised import about_path
 from pipeline.types.source import AnySource, LiveSource, Opening, Source, SourceError, TruthObject
 
 __all__ = [
@@ -27,6 +29,7 @@ __all__ = [
     "usages",
 ]
 
+_FILE = "file://"
 _IN_STORE = "files ending in .mcap; `cipv import` converts any recording to one"
 
 
@@ -68,6 +71,8 @@ def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
         if in_store is None or in_store.scheme != "mcap":
             raise SourceError(f"{uri}: only sessions can be opened in a store: {_IN_STORE}")
         return in_store, uri
+    if uri.startswith(_FILE):  # as file managers and browsers name a file
+        return _kind_and_rest(_path_of(uri), live=live)
     scheme, colon, rest = uri.partition(":")
     kind = kind_named(scheme)
     is_drive_letter = len(scheme) == 1
@@ -81,6 +86,12 @@ def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
     # the folder around a recording stands for it with a scheme, too: kitti:kitti_0009 holds one day with one drive
     inside = recording_at(rest) if kind.folders or kind.files else None
     return kind, inside[1] if inside is not None and inside[0] is kind else rest
+
+
+def _path_of(address: str) -> str:
+    """The path in an address that begins with ``file://``; options are kept."""
+    path, mark, options = address.removeprefix(_FILE).removeprefix("localhost").partition("?")
+    return f"{unquote(path)}{mark}{options}"
 
 
 def _exists(uri: str) -> bool:

@@ -18,9 +18,11 @@ from pipeline.common.time_range import is_time
 from pipeline.ego_motion.from_gnss import MotionFromGnss
 from pipeline.formats.file_reading import files_by_name, read_bytes, read_image, recording_file, recording_folder
 from pipeline.formats.gpx_file import parse_gpx
-from pipeline.formats.video_file import SUFFIXES, VideoFile
+from pipeline.formats.video_file import VideoFile
+from pipeline.source_kinds import VIDEO_SUFFIXES
 from pipeline.sources import rig as rig_files
 from pipeline.sources.live.config import CalibrationConfig
+from pipeline.sources.recognition import recording_around
 from pipeline.sources.sidecar_files import FIX_WITHIN_NS, NMEA_SUFFIXES, fixes_of, named
 from pipeline.sources.uri_options import number_option, split_options
 from pipeline.types import U8, CameraCalibration, CameraImage, Frame, GnssFix, Sweep
@@ -71,7 +73,8 @@ def open_images(uri: str, rest: str, how: Opening) -> CameraAlone:
     stamped = all(times) and bool(np.all(np.diff(times) > 0))
     step_ns = round(1e9 / _in_range(options, "rate_hz", _RATE_HZ))
     ticks = times if stamped else [index * step_ns for index in range(len(names))]
-    notes = [] if stamped else [f"no timestamps in the names: {1e9 / step_ns:g} Hz assumed; ?rate_hz= overrides it"]
+    notes = _about_neighbours(folder)
+    notes += [] if stamped else [f"no timestamps in the names: {1e9 / step_ns:g} Hz assumed; ?rate_hz= overrides it"]
     return CameraAlone(uri, folder, options, ticks, lambda index: read_image(paths[index]), notes, names)
 
 
@@ -106,7 +109,8 @@ class CameraAlone:
         follow = MotionFromGnss()
         own = [follow.push(fix) for fix in fixes]
         self._own = Timeline([each.t_ns for each in own], own)
-        self._camera = rig.camera_calibration() or self._assumed(options, notes)
+        self._given, self._options = rig.camera_calibration(), options
+        self._camera = self._given or self._assumed(notes)
         self.notes = (*notes, "no LiDAR: distances come from the camera alone", *([] if fixes else [_NO_SPEED]))
 
     def __len__(self) -> int:
@@ -120,7 +124,7 @@ class CameraAlone:
     def frame(self, index: int) -> Frame:
         t_ns, notes = self.t_ns(index), list[str]()
         image = self._image(index, t_ns, notes)
-        camera = rig_files.calibration_for(self._camera, image, notes)
+        camera = self._calibration_for(image, notes)
         return evolve(self._outline(index), image=image, camera=camera, notes=tuple(notes))
 
     def outlines(self) -> Iterator[Frame]:
@@ -148,7 +152,16 @@ class CameraAlone:
             return None
         return CameraImage(t_ns, bgr, encoded)
 
-    def _assumed(self, options: dict[str, str], notes: list[str]) -> CameraCalibration | None:
+    def _calibration_for(self, image: CameraImage | None, notes: list[str]) -> CameraCalibration | None:
+        """The given calibration if the image fits it; an assumed one is assumed for images of any size."""
+        if self._given is not None or self._camera is None or image is None:
+            return rig_files.calibration_for(self._camera, image, notes)
+        height, width = image.bgr.shape[:2]
+        if (width, height) == (self._camera.width, self._camera.height):
+            return self._camera
+        return _dash_cam(width, height, self._options) if _is_camera_size(width, height) else None
+
+    def _assumed(self, notes: list[str]) -> CameraCalibration | None:
         """A dash cam's calibration with the size of the first readable image."""
         for index in range(len(self)):
             image = self._image(index, 0, [])
@@ -157,29 +170,67 @@ class CameraAlone:
         else:
             return None
         height, width = image.bgr.shape[:2]
-        if not all(_SIZES_PX[0] <= size <= _SIZES_PX[1] for size in (width, height)):
+        if not _is_camera_size(width, height):
             raise SourceError(
                 f"{self.title}: images of {width}×{height} pixels; they need {_SIZES_PX[0]} to {_SIZES_PX[1]}"
             )
-        if "hfov_deg" in options:
-            focal = 0.5 * width / tan(radians(_in_range(options, "hfov_deg", 70.0)) / 2.0)
-        else:
-            focal = 0.5 * hypot(width, height) / tan(radians(_DIAGONAL_DEG) / 2.0)
+        if "hfov_deg" not in self._options:
             notes.append(
                 f"no calibration: a dash cam with a diagonal field of view of {_DIAGONAL_DEG:.0f}°, looking straight "
                 "ahead, is assumed; set the real one with ?hfov_deg= or a .yaml file beside it"
             )
-        pinhole = CalibrationConfig(
-            fx_px=focal, fy_px=focal, cx_px=width / 2, cy_px=height / 2, width_px=width, height_px=height
+        return _dash_cam(width, height, self._options)
+
+
+def _about_neighbours(folder: Path) -> list[str]:
+    """What a folder of images has beside them, or what it is a part of: the user may have meant that."""
+    around = recording_around(folder)
+    if around is not None:
+        return [f"these images are a part of the recording {around}; open that folder to use its other sensors, too"]
+    notes = []
+    sweeps = len(files_by_name(folder, (".bin",)))
+    if sweeps:
+        notes.append(
+            f"{sweeps} .bin beside the images not used: sweeps are read from PCD files or the folders of a data set"
         )
-        return evolve(pinhole.calibration(), road_z_m=-_in_range(options, "height_m", _HEIGHT_M))
+    videos = list(files_by_name(folder, VIDEO_SUFFIXES).values())
+    if videos:
+        notes.append(f"{videos[0].name} beside the images not used: open it by its own name")
+    return notes
 
 
 _NO_SPEED = "no ego speed recorded"
 
 
+def _is_camera_size(width: int, height: int) -> bool:
+    return all(_SIZES_PX[0] <= size <= _SIZES_PX[1] for size in (width, height))
+
+
+def _dash_cam(width: int, height: int, options: dict[str, str]) -> CameraCalibration:
+    """The assumed calibration for images of a size."""
+    if "hfov_deg" in options:
+        focal = 0.5 * width / tan(radians(_in_range(options, "hfov_deg", 70.0)) / 2.0)
+    else:
+        focal = 0.5 * hypot(width, height) / tan(radians(_DIAGONAL_DEG) / 2.0)
+    pinhole = CalibrationConfig(
+        fx_px=focal, fy_px=focal, cx_px=width / 2, cy_px=height / 2, width_px=width, height_px=height
+    )
+    return evolve(pinhole.calibration(), road_z_m=-_in_range(options, "height_m", _HEIGHT_M))
+
+
 def _track(path: Path, options: dict[str, str], near_ns: int, notes: list[str]) -> list[GnssFix]:
-    """The fixes in a file beside the recording, in order of time; empty without one."""
+    """The fixes in a file beside the recording, in order of time; empty without one, and, with a note, for a damaged
+    one that no option names."""
+    try:
+        return _fixes(path, options, near_ns, notes)
+    except SourceError as error:
+        if "gpx" in options or "nmea" in options:
+            raise
+        notes.append(f"no GNSS track: {error}")
+        return []
+
+
+def _fixes(path: Path, options: dict[str, str], near_ns: int, notes: list[str]) -> list[GnssFix]:
     gpx = named(path, options, "gpx", (".gpx",)) or _the_only_one(path, options, (".gpx",))
     if gpx is not None:
         fixes = parse_gpx(read_bytes(gpx).decode("utf-8", "replace"), gpx.name)
@@ -193,7 +244,7 @@ def _the_only_one(path: Path, options: dict[str, str], suffixes: tuple[str, ...]
     """The track file in a folder of images, or beside the only video of a folder, whatever its name; None if there are
     several, or if an option names one."""
     folder = path if path.is_dir() else path.parent
-    if "gpx" in options or "nmea" in options or (path.is_file() and len(files_by_name(folder, SUFFIXES)) > 1):
+    if "gpx" in options or "nmea" in options or (path.is_file() and len(files_by_name(folder, VIDEO_SUFFIXES)) > 1):
         return None
     found = [each for each in files_by_name(folder, suffixes).values()]
     return found[0] if len(found) == 1 else None

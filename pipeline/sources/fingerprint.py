@@ -11,6 +11,7 @@ from urllib.parse import parse_qsl
 import numpy as np
 
 from pipeline.common.files.remote_files import facts, is_remote, version_of
+from pipeline.sources.uri_options import path_and_options
 from pipeline.types import Frame
 
 
@@ -56,7 +57,7 @@ def _as_sent(frame: Frame) -> bytes:
 
 def _files(rest: str) -> Iterator[Path]:
     """The files named by the part after the scheme, in a fixed order."""
-    path, _, query = rest.partition("?")
+    path, query = path_and_options(rest)
     if not path:
         return
     try:

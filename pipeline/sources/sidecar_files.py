@@ -16,6 +16,7 @@ from pipeline.ego_motion.from_gnss import MotionFromGnss
 from pipeline.formats import video_file as video_files
 from pipeline.formats.file_reading import files_by_name
 from pipeline.formats.nmea import NmeaReader
+from pipeline.source_kinds import VIDEO_SUFFIXES
 from pipeline.sources import rig as rig_files
 from pipeline.sources.uri_options import number_option
 from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, GnssFix, Sweep
@@ -48,8 +49,9 @@ class Beside:
         progress: Progress = silent,
     ) -> None:
         self.notes: list[str] = []
+        self._unreadable: list[str] = []
         self._camera = rig.camera_calibration()
-        self._video = self._open_video(named(recording, options, "video", video_files.SUFFIXES), progress)
+        self._video = self._open_video(named(recording, options, "video", VIDEO_SUFFIXES), "video" in options, progress)
         offset_s = number_option(options, "video_offset_s", 0.0) + rig.camera.time_offset_ms / 1e3
         self._video_begins_ns = begin_ns + round(offset_s * 1e9)
         if self._video is not None and not offset_s:
@@ -89,6 +91,7 @@ class Beside:
 
     def _image(self, t_ns: int, notes: list[str]) -> CameraImage | None:
         if self._video is None:
+            notes += self._unreadable
             return None
         index = nearest(self._video.times_ns, t_ns - self._video_begins_ns, _IMAGE_WITHIN_NS)
         if index is None:
@@ -101,11 +104,20 @@ class Beside:
             return None
         return CameraImage(self._video_begins_ns + int(self._video.times_ns[index]), bgr)
 
-    def _open_video(self, path: Path | None, progress: Progress) -> video_files.VideoFile | None:
+    def _open_video(self, path: Path | None, is_asked_for: bool, progress: Progress) -> video_files.VideoFile | None:
+        """None, with a note, for a damaged one that merely lies beside the recording."""
         if path is None:
             return None
+        try:
+            video = video_files.VideoFile(path, progress)
+        except SourceError as error:
+            if is_asked_for:
+                raise
+            self._unreadable.append(f"no images: {error}")
+            self.notes += self._unreadable
+            return None
         self.notes.append(f"images from {path.name}")
-        return video_files.VideoFile(path, progress)
+        return video
 
 
 def rig_of(recording: Path, options: dict[str, str]) -> rig_files.Rig:

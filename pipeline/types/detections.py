@@ -90,6 +90,10 @@ class RawBoxes:
         )
 
 
+ROAD_LEFT, ROAD_RIGHT = -3, -2
+"""``RawLanes.line`` of points on the left and right edge of the drivable area."""
+
+
 @dataclass(frozen=True)
 class RawLanes:
     """What a lane detector saw in one image, before any geometry; cached per image and model like ``RawBoxes``."""
@@ -97,8 +101,20 @@ class RawLanes:
     model: str
     """The detector's name; equal names give equal points."""
     points: F32
-    """(M, 2) float32 ``u v`` on painted lines, pixels of the raw image."""
+    """(M, 2) float32 ``u v`` on painted lines and the edges of the drivable area, pixels of the raw image."""
     scores: F32
     """(M,) float32, 0–1."""
     line: I32
-    """(M,) int32, which line each point belongs to; −1 where the detector does not group its points."""
+    """(M,) int32, which line each point belongs to; −1 where the detector does not group its points, ``ROAD_LEFT`` and
+    ``ROAD_RIGHT`` on the edges of the drivable area."""
+
+    def painted(self) -> RawLanes:
+        """Only the points on painted lines."""
+        return self._only(self.line >= -1)
+
+    def road_edges(self) -> RawLanes:
+        """Only the points on the edges of the drivable area."""
+        return self._only(self.line < -1)
+
+    def _only(self, kept: Mask) -> RawLanes:
+        return self if kept.all() else RawLanes(self.model, self.points[kept], self.scores[kept], self.line[kept])

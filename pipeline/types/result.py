@@ -14,7 +14,7 @@ from pipeline.types.lane import EgoLane
 from pipeline.types.measurements import Ground, Obstacle
 from pipeline.types.objects import FusedObject, LidarTrack, VisionTrack
 
-PathSource = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "traffic", "fused"]
+PathSource = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "traffic", "drivable_area", "fused"]
 
 
 @dataclass(frozen=True)
@@ -187,6 +187,8 @@ class Layers:
     traffic: F64 | None = None
     """(N, 3) ego x, y and heading in rad of vehicles, current and past, that indicate the course of the road; None
     without."""
+    drivable: F64 | None = None
+    """(M, 2) ego x, y of the edges of the drivable area, if the path uses them; else None."""
 
 
 @dataclass(frozen=True)

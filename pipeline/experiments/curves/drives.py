@@ -139,7 +139,7 @@ def driven(
     reach_m: float,
     names: Sequence[str] = tuple(SOURCES),
     over_line_s: float | None = None,
-    settings: Mapping[str, Mapping[str, bool]] = SOURCES,
+    settings: Mapping[str, Mapping[str, object]] = SOURCES,
     lines: LineNoise | None = LINES,
 ) -> dict[str, SourceFrames]:
     """Simulate the sensors once per frame, and run the pipeline once for each of the named sources. over_line_s: when a

@@ -5,7 +5,15 @@ from __future__ import annotations
 from pipeline.formats.velodyne.clock import SensorClock
 from pipeline.formats.velodyne.cutter import OUT_OF_ORDER, DecoderCounts, Rotation, RotationCutter, say_refused
 from pipeline.formats.velodyne.decoder import VelodyneDecoder
-from pipeline.formats.velodyne.models import MODELS, PACKET_BYTES, VLP16, VelodyneModel, about_other_models, model_of
+from pipeline.formats.velodyne.models import (
+    MODELS,
+    PACKET_BYTES,
+    VLP16,
+    VelodyneModel,
+    about_other_models,
+    about_supported_models,
+    model_of,
+)
 from pipeline.formats.velodyne.packet import BadPacket, Packet, read_packet
 from pipeline.formats.velodyne.position import POSITION_BYTES, Position, read_position
 
@@ -25,6 +33,7 @@ __all__ = [
     "VelodyneDecoder",
     "VelodyneModel",
     "about_other_models",
+    "about_supported_models",
     "model_of",
     "read_packet",
     "read_position",

@@ -46,5 +46,9 @@ def model_of(packets: Iterable[bytes]) -> VelodyneModel:
 
 def about_other_models(seen: Mapping[str, int]) -> str:
     """Of packets of models that are not read, by model: which, and which are."""
-    read = ", ".join(model.name for model in MODELS)
-    return f"packets of a Velodyne {max(seen, key=seen.__getitem__)}; only {read} are supported"
+    return f"packets of a Velodyne {max(seen, key=seen.__getitem__)}; {about_supported_models()}"
+
+
+def about_supported_models() -> str:
+    """Which models are read."""
+    return f"only {', '.join(model.name for model in MODELS)} are supported"

@@ -131,7 +131,7 @@ def _bad_packet(fault: int, data: bytes, model: VelodyneModel) -> BadPacket:
         return _bad_flags(data, model)
     if fault == _OTHER_PRODUCT:
         other = _NAMES.get(data[1205])
-        return BadPacket(f"not a {model.name} but {other or 'another product'}", other)
+        return BadPacket(f"not a {model.name} but {other or f'unknown product {data[1205]:#04x}'}", other)
     return BadPacket(_FAULTS[fault])
 
 

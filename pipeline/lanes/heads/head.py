@@ -26,14 +26,14 @@ class UnknownLaneHead(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points on painted lines."""
+    """Points on painted lines and on the edges of the road."""
 
     uv: F64
     """(M, 2) as fractions of the network's input, 0–1 from its left and upper edge."""
     score: F32
     """(M,) 0–1."""
     line: I32
-    """(M,) line of each point; −1 if the network does not tell."""
+    """(M,) line of each point, as in ``RawLanes``."""
 
 
 class LaneOutputs(NamedTuple):
@@ -71,6 +71,10 @@ class LaneHead:
     """Divisor of the difference."""
     horizon: float | None = None
     """Row of the horizon in the input, as a share of its height: as much sky is cut off an image. None: none is."""
+    road: int | None = None
+    """Index of the output with the drivable area; None without one."""
+    read_road: Callable[[F32], Points] | None = None
+    """Decodes that output to points on the edges of the area."""
     keeps_aspect: bool = False
     """Whether the network is fully convolutional, and its input is given as many rows as the image without that sky has
     at its number of columns. Otherwise, its input keeps its size."""
@@ -78,6 +82,13 @@ class LaneHead:
     def points(self, outputs: Sequence[F32]) -> Points:
         """Points on lines from the network's outputs."""
         found = self.read(np.asarray(outputs[self.output][0], np.float32))
+        if self.road is not None and self.read_road is not None:
+            edges = self.read_road(np.asarray(outputs[self.road][0], np.float32))
+            found = Points(
+                np.concatenate([found.uv, edges.uv]),
+                np.concatenate([found.score, edges.score]),
+                np.concatenate([found.line, edges.line]),
+            )
         if self.exists is None:
             return found
         there = np.asarray(outputs[self.exists]).ravel()[found.line] > _THERE

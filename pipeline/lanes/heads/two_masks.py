@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pipeline.lanes.heads.head import IMAGENET, LaneHead, LaneOutputs
-from pipeline.lanes.heads.masks import from_masks
+from pipeline.lanes.heads.masks import from_masks, road_edges
 
 _HORIZON = 0.22
 """TwinLiteNet needs only the road, in its own aspect. Cutting off the sky leaves its lines where they were on 11
@@ -20,6 +20,9 @@ def recognise(answer: LaneOutputs) -> LaneHead | None:
     if len(masks) != 2:
         return None
     lanes = next((i for i in masks if answer.names[i].lower().startswith(("ll", "lane"))), masks[1])
+    road = next(i for i in masks if i != lanes)
     if any(len(shape) == 3 and shape[2] == 6 for shape in answer.shapes):
-        return LaneHead("YOLOP", lanes, from_masks, "letterbox", None, *IMAGENET)
-    return LaneHead("two masks", lanes, from_masks, horizon=_HORIZON, keeps_aspect=True)
+        return LaneHead("YOLOP", lanes, from_masks, "letterbox", None, *IMAGENET, road=road, read_road=road_edges)
+    return LaneHead(
+        "two masks", lanes, from_masks, horizon=_HORIZON, road=road, read_road=road_edges, keeps_aspect=True
+    )

@@ -30,6 +30,7 @@ from pipeline.formats.velodyne import (
     VelodyneDecoder,
     VelodyneModel,
     about_other_models,
+    about_supported_models,
     model_of,
     read_position,
 )
@@ -185,9 +186,18 @@ class _Index:
             return about_maker(maker)
         says = [f"no complete sweep in {counts.packets} packets to port {port}"] if counts.packets else []
         says = says or [f"no Velodyne packets to port {port}"]
-        says += [counts.about_refused()] if counts.refused else []
+        if not counts.packets:
+            says += [self._about_other_ports()]
+        says += [counts.about_refused(), about_supported_models()] if counts.refused else []
         says += [f"the file is {self._capture.damage}"] if self._capture.damage else []
         return "; ".join(says)
+
+    def _about_other_ports(self) -> str:
+        """The ports to which most of the first datagrams are sent."""
+        ports = Counter(to for to, _, _ in islice(self._capture.beginnings(), _LOOK_AT))
+        if not ports:
+            return "it holds no UDP datagrams"
+        return f"its UDP datagrams go to {', '.join(f'port {port}' for port, _ in ports.most_common(3))}"
 
     def _add(self, rotation: Rotation | None) -> None:
         if rotation is None:

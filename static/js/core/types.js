@@ -159,6 +159,7 @@
  * @property {{left: Pixels, right: Pixels}|null} lanes
  * @property {{left: Point2[], right: Point2[]}|null} plan_lanes
  * @property {Point2[]|null} plan_edges
+ * @property {Point2[]|null} plan_drivable  edges of the drivable area in the image
  * @property {[number, number, number][]|null} plan_traffic  x, y, heading of vehicles that show where the road goes
  * @property {GroundPlanes|null} ground
  * @property {Record<string, {distance_m: number, sigma_m: number}>} vision_ranges  camera-only range estimates

@@ -120,7 +120,8 @@ function draw() {
     if (layers.planPath) drawPath(ctx, view, frame.result.path);
     if (layers.planPoints) drawPoints(ctx, frame);
     if (layers.planPath && frame.display.plan_lanes) drawLanes(ctx, frame.display.plan_lanes);
-    if (layers.planPath && frame.display.plan_edges) drawEdges(ctx, frame.display.plan_edges);
+    if (layers.planPath && frame.display.plan_edges) drawEdges(ctx, frame.display.plan_edges, "path");
+    if (layers.planPath && frame.display.plan_drivable) drawEdges(ctx, frame.display.plan_drivable, "lane");
     if (layers.planPath && frame.display.plan_traffic) drawTraffic(ctx, view, frame.display.plan_traffic);
     if (!modeNow() || get("labeling")?.hasObjects) drawObjects(ctx, frame, layers, labels);
     modeNow()?.draw(ctx, view, labels);
@@ -187,12 +188,13 @@ function drawLanes(ctx, lanes) {
 }
 
 /**
- * The road edges, if the path is based on them.
+ * The road edges, or those of the drivable area, if the path is based on them.
  * @param {CanvasRenderingContext2D} ctx
  * @param {import("../core/types.js").Point2[]} cells
+ * @param {"path"|"lane"} tint
  */
-function drawEdges(ctx, cells) {
-  ctx.fillStyle = color("path");
+function drawEdges(ctx, cells, tint) {
+  ctx.fillStyle = color(tint);
   for (const [x, y] of cells) ctx.fillRect(view.u(y) - 1, view.v(x) - 1, 3, 3);
 }
 

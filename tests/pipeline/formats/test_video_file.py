@@ -28,6 +28,17 @@ def test_every_image_in_any_order(name: str, codec: str, order: range, tmp_path:
         assert np.median(image) == pytest.approx(20 * index, abs=8)
 
 
+@pytest.mark.parametrize("name", ["a.ts", "a.m2ts", "a.mpg"])
+def test_a_format_without_an_index_gives_the_image_that_was_asked_for(name: str, tmp_path: Path) -> None:
+    """A place in such a file need not be that of a key image, and the next one would be up to ten images later."""
+    write_video(tmp_path / name, 100, rate=25, codec="mpeg2video", step=2, gop=10)
+    in_order = VideoFile(tmp_path / name)
+    images = [in_order.image(index) for index in range(len(in_order.times_ns))]
+    assert len(images) == 100
+    for index in (99, 87, 55, 18, 3, 0):
+        assert np.array_equal(VideoFile(tmp_path / name).image(index), images[index]), index
+
+
 @pytest.mark.parametrize("data", [b"", b"garbage" * 100, b"RIFF....AVI LIST"])
 def test_no_video(data: bytes, tmp_path: Path) -> None:
     (tmp_path / "a.avi").write_bytes(data)

@@ -36,12 +36,12 @@ _NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
 def twin(path: Path, size: Size = (72, 128), attention: bool = False, windows: bool = False) -> Path:
-    """Two masks: nothing drivable, and a line where red (0–1) is above one half.
+    """Two masks: drivable where blue (0–1) is above one half, and a line where red is.
 
     attention: as in TwinLiteNet's export, a map is flattened to (1, channels, h·w) and restored, with its size as a
     constant. windows: as in TwinLiteNetPlus, it is divided into windows of a fixed size.
     """
-    road, first = _linear("da", [_NOTHING, (0.0, 0.0, 0.0, -9.0)])
+    road, first = _linear("da", [_NOTHING, (0.0, 0.0, 40.0, -20.0)])
     line, second = _linear("ll", [_NOTHING, (40.0, 0.0, 0.0, -20.0)])
     nodes = [road, line]
     if attention or windows:

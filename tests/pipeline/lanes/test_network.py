@@ -16,10 +16,11 @@ from pipeline.lanes.heads.head import LaneHead, LaneOutputs, Points
 from pipeline.lanes.network import LaneNetwork, open_lane_network
 from pipeline.lanes.open_detector import OFF, open_lanes
 from pipeline.types import U8, CameraCalibration
+from pipeline.types.detections import ROAD_LEFT, ROAD_RIGHT
 from tests.pipeline.lanes import lane_networks
 from tests.pipeline.vision import networks
 
-RED, GREEN = (0, 0, 255), (0, 255, 0)
+RED, GREEN, BLUE = (0, 0, 255), (0, 255, 0), (255, 0, 0)
 WIDTH, HEIGHT = 1280, 720
 
 
@@ -33,7 +34,7 @@ def image(**bars: tuple[int, int]) -> U8:
     """Black, with upright bars: ``red=(left, right)`` columns."""
     bgr = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     for name, (left, right) in bars.items():
-        bgr[:, left:right] = {"red": RED, "green": GREEN}[name]
+        bgr[:, left:right] = {"red": RED, "green": GREEN, "blue": BLUE}[name]
     return bgr
 
 
@@ -120,6 +121,25 @@ def test_a_line_is_found_where_it_is_in_the_image(tmp_path: Path, kind: str) -> 
     assert raw.scores.min() > 0.5
     assert raw.model == network.name
     assert set(raw.line.tolist()) == ({1} if head == "classes" else {-1})
+
+
+def test_the_edges_of_the_drivable_area_in_front_of_the_car(tmp_path: Path) -> None:
+    """Another area beside it, the car's bonnet and the image's border give no edge."""
+    bgr = image(blue=(400, 900))
+    bgr[:500, 400:900] = 0
+    bgr[500:, 1000:1100] = BLUE
+    bgr[680:] = 0
+    raw = open_lane_network(str(lane_networks.twin(tmp_path / "tiny.onnx"))).detect(bgr)
+    assert raw.painted().points.shape == (0, 2)
+    assert raw.road_edges() is raw
+    for side, column in ((ROAD_LEFT, 400), (ROAD_RIGHT, 900)):
+        edge = raw.points[raw.line == side]
+        assert np.abs(edge[:, 0] - column).max() < 6.0
+        assert edge[:, 1].min() == pytest.approx(500, abs=8.0)
+        assert edge[:, 1].max() == pytest.approx(680, abs=8.0)
+    bgr[:, :900] = BLUE
+    whole = open_lane_network(str(lane_networks.twin(tmp_path / "tiny.onnx"))).detect(bgr)
+    assert set(whole.line.tolist()) == {ROAD_RIGHT}
 
 
 def test_classes_are_lines_and_one_that_is_not_there_is_dropped(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ def test_the_mean_is_weighted_by_the_inverse_variances() -> None:
     path, notes = fused(estimate("gnss", 0.0, 0.1), estimate("lane", 0.5, 0.2))
     assert not notes
     assert path.center[30] == pytest.approx([30.0, 0.1])
-    assert path.shares[30] == pytest.approx([0.2, 0.8, 0.0, 0.0, 0.0, 0.0])  # in the order of SOURCES
+    assert path.shares[30] == pytest.approx([0.2, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0])  # in the order of SOURCES
 
 
 def test_two_that_agree_are_surer_than_either() -> None:

@@ -157,8 +157,16 @@ def test_names_of_images_beyond_64_bits_are_no_times(names: tuple[str, str], tmp
 @pytest.mark.parametrize("year", ["9999", "0001"])
 def test_a_track_beyond_64_bits_of_time_is_said_in_one_line(year: str, video: Path) -> None:
     video.with_suffix(".gpx").write_text(track(5).replace("2024-", f"{year}-"))
-    with pytest.raises(SourceError, match=r"\.gpx: no track points with times"):
-        open_source(f"video:{video}")
+    assert_no_track(str(video), "no track points with times")
+
+
+def assert_no_track(file: str, reason: str) -> None:
+    """The images are shown without the track, which the notes tell; a track that was asked for is an error."""
+    source = open_source(file)
+    assert source.frame(0).image is not None
+    assert any(note.startswith(f"no GNSS track: drive.gpx: {reason}") for note in source.notes), source.notes
+    with pytest.raises(SourceError, match=rf"drive\.gpx: {reason}"):
+        open_source(f"{file}?gpx=drive.gpx")
 
 
 def test_what_is_no_video_and_no_track_is_said_in_one_line(video: Path, tmp_path: Path) -> None:
@@ -166,11 +174,21 @@ def test_what_is_no_video_and_no_track_is_said_in_one_line(video: Path, tmp_path
     with pytest.raises(SourceError, match=r"cut\.mp4: not a readable video"):
         open_source(str(tmp_path / "cut.mp4"))
     video.with_suffix(".gpx").write_text("<gpx>")
-    with pytest.raises(SourceError, match=r"drive\.gpx: not XML"):
-        open_source(str(video))
+    assert_no_track(str(video), "not XML")
     video.with_suffix(".gpx").write_text(GPX.format(""))
-    with pytest.raises(SourceError, match=r"drive\.gpx: no track points with times"):
-        open_source(str(video))
+    assert_no_track(str(video), "no track points with times")
+
+
+def test_images_of_several_sizes_have_an_assumed_calibration_each(tmp_path: Path) -> None:
+    for name, (width, height) in {"0": (320, 180), "1": (640, 360), "2": (8, 8)}.items():
+        cv2.imwrite(str(tmp_path / f"{name}.png"), np.full((height, width, 3), 9, np.uint8))
+    source = open_source(f"pictures:{tmp_path}")
+    cameras = [source.frame(index).camera for index in range(3)]
+    assert [camera and (camera.width, camera.K[0, 0]) for camera in cameras] == [
+        (320, pytest.approx(226.7, abs=0.1)),
+        (640, pytest.approx(453.4, abs=0.2)),
+        None,
+    ]
 
 
 @pytest.mark.parametrize("size", [(8, 400), (400, 8), (16_500, 16)])

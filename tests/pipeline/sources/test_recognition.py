@@ -15,9 +15,11 @@ from app.commands.serve import Serve
 from pipeline.sources import SourceError, open_source
 from tests.pipeline.recording.frames import full, write
 from tests.pipeline.sources.conftest import write_astyx, write_kitti, write_kitti_raw
+from tests.pipeline.sources.kitti.test_kitti360 import write_kitti360
 from tests.pipeline.sources.made.bags import write_bag
 from tests.pipeline.sources.made.captures import write_capture
 from tests.pipeline.sources.made.clouds_on_disk import write_clouds
+from tests.pipeline.sources.made.nuscenes_on_disk import write_nuscenes
 
 Write = Callable[[Path], Path]
 """Functions that create a recording in a new folder and return what a user types."""
@@ -148,6 +150,17 @@ def holding(name: str) -> Write:
     return written
 
 
+def part_of_drive(name: str) -> Write:
+    """A folder inside a KITTI drive."""
+    return lambda folder: write_kitti_raw(folder) / name
+
+
+def without_table(folder: Path, table: str) -> Path:
+    write_nuscenes(folder)
+    (folder / "v1.0-mini" / f"{table}.json").unlink()
+    return folder
+
+
 def empty_folder(folder: Path) -> Path:
     folder.mkdir()
     return folder
@@ -191,6 +204,26 @@ OTHERS: dict[str, tuple[Write, str]] = {
     "anything": (some_file("x.xyz1", b"\0\1\2\3"), r"a file of unknown content \(\.xyz1\)"),
     "one image": (some_file("a.jpg", b"\xff\xd8\xff"), "one image; open its folder"),
     "one image of no suffix": (some_file("a", b"\x89PNG\r\n"), "one image; open its folder"),
+    "an image of another format": (some_file("a.bmp", b"BM"), "an image of an unsupported format; convert"),
+    "a bare stream of images": (
+        some_file("a.h264", b"\0\0\0\1g"),
+        r"images without times; put .*ffmpeg .*a\.h264",
+    ),
+    "a network": (some_file("a.onnx", b"\x08"), "a network; use it as --detector or --lanes"),
+    "the sweeps of a drive": (part_of_drive("velodyne_points"), r"a part of the recording .*_sync; open that folder$"),
+    "the sweeps' files": (part_of_drive("velodyne_points/data"), r"a part of the recording .*_sync; open that folder$"),
+    "a calibration": (
+        lambda folder: part_of_drive("")(folder).parent / "calib_cam_to_cam.txt",
+        r"a part of the recording .*; open that folder$",
+    ),
+    "the poses of KITTI-360": (
+        lambda folder: write_kitti360(folder) / "data_poses",
+        r"a part of the recording .*path; open that folder$",
+    ),
+    "nuScenes without a table": (
+        lambda folder: without_table(folder, "sample_data"),
+        r"v1\.0-mini/sample_data\.json is missing$",
+    ),
     "one point cloud": (some_file("a.pcd", b"# .PCD v.7"), "one point cloud; open its folder"),
     "one sweep of KITTI": (some_file("000000.bin", b"\1\2\3\4"), "raw points or packets; open the folder"),
     "a GNSS track": (some_file("a.gpx", b"<gpx>"), "a GNSS track; open the video"),
@@ -226,7 +259,12 @@ OTHERS: dict[str, tuple[Write, str]] = {
     "a folder in itself": (folder_in_itself, "it holds folder again"),
     "a folder called like a session": (lambda folder: unrelated(folder / "x.mcap"), r"x\.mcap: not a source: it holds"),
     "a pipe": (pipe, "not a file or folder"),
-    "a video's first bytes": (some_file("a", b"\0\0\0\x20ftypisom"), "a: not a readable video: cut off, or something"),
+    "a video's first bytes": (
+        some_file("a", b"\0\0\0\x20ftypisom"),
+        "a: not a readable video: cut off before its",
+    ),
+    "an empty video": (some_file("a.mp4", b""), r"a\.mp4: not a readable video: an empty file"),
+    "text called a video": (some_file("a.mp4", b"hello"), r"a\.mp4: not a readable video: cut off, or something else"),
     "a capture's first bytes": (some_file("a", b"\xd4\xc3\xb2\xa1"), "a: no Velodyne packets .* the file is cut off"),
 }
 
@@ -272,3 +310,35 @@ def test_a_folder_that_may_not_be_listed_says_so(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr("pipeline.sources.recognition.os.scandir", denied)
     with pytest.raises(SourceError, match=r"not a source: cannot be read: Permission denied$"):
         open_source(str(empty_folder(tmp_path / "closed")))
+
+
+def test_a_question_mark_in_a_name_begins_no_options(tmp_path: Path) -> None:
+    folder = tmp_path / "Straße 1 #2?x"
+    folder.mkdir()
+    file = shutil.copy(video(tmp_path / "drive"), folder / "what now?.avi")
+    whole = len(open_source(str(file)))
+    assert len(open_source(str(folder))) == len(open_source(f"video:{file}")) == whole
+    assert len(open_source(f"{file}?rate_hz=5")) < whole
+
+
+def test_the_address_of_a_file_is_its_path(tmp_path: Path) -> None:
+    file = shutil.copy(video(tmp_path / "drive"), tmp_path / "Straße 1.avi")
+    assert len(open_source(file.as_uri())) == len(open_source(str(file)))
+    assert len(open_source(f"{file.as_uri()}?rate_hz=5")) < len(open_source(str(file)))
+
+
+def test_images_say_which_recording_they_are_a_part_of(tmp_path: Path) -> None:
+    drive = write_kitti_raw(tmp_path / "kitti")
+    for part in ("image_02", "image_02/data"):
+        notes = open_source(str(drive / part)).notes
+        assert any(f"a part of the recording {drive}" in note for note in notes), notes
+    assert not any("a part of" in note for note in open_source(str(images(tmp_path / "alone"))).notes)
+
+
+def test_images_say_what_lies_beside_them_unread(tmp_path: Path) -> None:
+    folder = images(tmp_path / "alone")
+    (folder / "000000.bin").write_bytes(bytes(16))
+    shutil.copy(video(tmp_path / "drive"), folder / "drive.avi")
+    notes = open_source(f"pictures:{folder}").notes
+    assert any("1 .bin beside the images not used" in note for note in notes)
+    assert any("drive.avi beside the images not used" in note for note in notes)

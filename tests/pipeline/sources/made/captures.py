@@ -78,11 +78,14 @@ camera:
 """
 
 
-def write_video(path: Path, images: int, rate: int = 25, codec: str = "mjpeg", step: int = 20) -> None:
-    """A video of 80×48 px; the grey level of each image is ``step`` times its number."""
+def write_video(path: Path, images: int, rate: int = 25, codec: str = "mjpeg", step: int = 20, gop: int = 0) -> None:
+    """A video of 80×48 px; the grey level of each image is ``step`` times its number. gop: images from one key image to
+    the next; 0 for the encoder's own."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream(codec, rate=rate)
         stream.width, stream.height, stream.pix_fmt = 80, 48, "yuvj420p" if codec == "mjpeg" else "yuv420p"
+        if gop:
+            stream.codec_context.gop_size = gop
         for number in range(images):
             grey = np.full((48, 80, 3), step * number, dtype=np.uint8)
             container.mux(stream.encode(av.VideoFrame.from_ndarray(grey, format="bgr24")))

@@ -82,6 +82,16 @@ def test_nothing_beside(tmp_path: Path) -> None:
     assert "not synchronised to GPS" in source.notes[0]
 
 
+def test_a_damaged_video_beside_a_capture_costs_its_images_only(tmp_path: Path) -> None:
+    folder = write_capture(tmp_path / "c")
+    (folder / "drive.avi").write_bytes(b"RIFF....AVI LIST")
+    source = open_source(str(folder / "drive.pcap"))
+    assert any("no images: drive.avi: not a readable video" in note for note in source.notes)
+    frame = source.frame(0)
+    assert frame.sweep is not None
+    assert any("no images: drive.avi" in note for note in frame.notes)
+
+
 def test_options_name_other_files_and_shift_the_video(tmp_path: Path) -> None:
     write_video(tmp_path / "front.mp4", 8, codec="mpeg4")
     (tmp_path / "gps.txt").write_text("".join(sentences(range(2))), encoding="ascii")
