@@ -23,7 +23,7 @@ const CHIPS = {
     [
       "planPath",
       "Path",
-      "Path corridor with 1σ of its edges, ego-lane lines, and the road edges, drivable area and headings of vehicles it follows",
+      "Path corridor with 1σ of its edges, ego-lane lines, and the edges, drivable area and vehicles it follows",
       "path",
     ],
   ],
