@@ -82,7 +82,7 @@ export function showGate(row, gate) {
       : `${quantity(gate.value, kind)}${limit}`,
   );
   row.setAttribute("aria-label", `${kind.label}: ${number.textContent}, ${gate.passed ? "passed" : "failed"}`);
-  const isMeasured = sign !== "" && gate.value !== null && gate.limit !== null;
+  const isMeasured = sign !== "";
   bar.classList.toggle("is-empty", !isMeasured);
   if (!isMeasured) return;
   const most = HEADROOM * Math.max(gate.value ?? 0, gate.limit ?? 0, 1e-9);
@@ -92,8 +92,8 @@ export function showGate(row, gate) {
 
 /** Comparison sign; a dash if the gate depends on more than value and limit. @param {Kind} kind @param {Gate} gate */
 function signOf({ test }, { value, limit, passed }) {
-  if (test === "flag" || limit === null) return "";
-  const holds = value !== null && (test === "least" ? value >= limit : value <= limit);
+  if (test === "flag" || value === null || limit === null) return ""; // without a value, the condition does not apply
+  const holds = test === "least" ? value >= limit : value <= limit;
   if (holds !== passed) return "–";
   return { least: { true: "≥", false: "<" }, most: { true: "≤", false: ">" } }[test][
     /** @type {"true"|"false"} */ (String(holds))
