@@ -115,7 +115,7 @@ def test_nothing_is_judged_after_the_script_drove_into_a_vehicle() -> None:
     for k, (now, camera, result) in enumerate(moments):
         if k == 1:
             (body, *others) = now.actors
-            hit = evolve(body, cuboid=evolve(body.cuboid, center=(0.0, 0.0, 0.75)))
+            hit = evolve(body, cuboid=body.cuboid._replace(center=(0.0, 0.0, 0.75)))
             now = replace(now, actors=(hit, *others))
         judge.take(now, camera, evolve(result, cipv=None, acc=None))
         assert judge.is_over is (k >= 1)
