@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
+from fnmatch import fnmatch
 from itertools import islice
 from pathlib import Path
 
@@ -16,6 +17,8 @@ DEEPEST = 3
 """Depth of nested folders that are searched for a recording: ``data/2011_09_26/2011_09_26_drive_0009_sync``."""
 MOST_ENTRIES = 1000
 """Maximum entries of a folder that are examined: other folders may have millions."""
+_SHARED = ("calib_*.txt", "calibration", "data_poses")
+"""Names of what several recordings of a folder share: a calibration and poses of KITTI and KITTI-360."""
 PROBLEMS = (OSError, RuntimeError, ValueError, Overloaded)
 """Errors that a path may cause: unknown home directory, a null byte, a link to itself."""
 
@@ -51,7 +54,6 @@ def _is_only_a_part(place: Path, kind: SourceKind) -> bool:
 def recording_around(place: Path) -> Path | None:
     """The folder of the recording that a file or folder is a part of, such as ``image_02`` of a KITTI drive; None if it
     is not part of one, or if that may not be revealed."""
-    holding = None
     for folder in list(place.absolute().parents)[:DEEPEST]:
         with suppress(*PROBLEMS):
             check_allowed(folder)
@@ -59,9 +61,10 @@ def recording_around(place: Path) -> Path | None:
             kind = kind_named(scheme) if scheme is not None else None
             if kind is not None and kind.has_folders_in(folder):
                 return folder
-            if kind is not None and kind.is_layout:  # contains recordings, such as KITTI's folder of a day
-                holding = holding or folder
-    return holding
+            is_beside = folder == place.absolute().parent and any(fnmatch(place.name, each) for each in _SHARED)
+            if kind is not None and kind.is_layout and is_beside:
+                return folder  # contains recordings, such as KITTI's folder of a day
+    return None
 
 
 def _recording(place: Path, deepest: int) -> tuple[SourceKind, Path | None] | None:

@@ -335,6 +335,15 @@ def test_images_say_which_recording_they_are_a_part_of(tmp_path: Path) -> None:
     assert not any("a part of" in note for note in open_source(str(images(tmp_path / "alone"))).notes)
 
 
+def test_what_lies_beside_a_recording_is_no_part_of_it(tmp_path: Path) -> None:
+    drive = write_kitti_raw(tmp_path / "kitti")
+    note = some_file("notes.txt", b"hello\n")(drive.parent / "notes")
+    for path in (note.parent, note):
+        with pytest.raises(SourceError) as refused:
+            open_source(str(path))
+        assert "a part of" not in str(refused.value)
+
+
 def test_images_say_what_lies_beside_them_unread(tmp_path: Path) -> None:
     folder = images(tmp_path / "alone")
     (folder / "000000.bin").write_bytes(bytes(16))

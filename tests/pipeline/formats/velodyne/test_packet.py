@@ -31,7 +31,7 @@ REFUSED = {
         "not a VLP-16 but VLS-128 (Alpha Prime)",
         "VLS-128 (Alpha Prime)",
     ),
-    "nobody's product": (with_byte(GOOD, PRODUCT, 0x77), "not a VLP-16 but another product", None),
+    "nobody's product": (with_byte(GOOD, PRODUCT, 0x77), "not a VLP-16 but unknown product 0x77", None),
     "return mode": (with_byte(GOOD, MODE, 0x36), "unknown return mode", None),
     "time": (stamped(GOOD, 3_600_000_000), "time beyond the hour", None),
     "azimuth of 360°": (with_azimuth(GOOD, 3, 36_000), "azimuth of 360° or more", None),
