@@ -30,16 +30,18 @@ def test_it_opens_and_shows_the_frame_everywhere(open_page: OpenPage, site: Site
     expect(page.locator("#link")).to_have_text("connected")
 
 
-def known_accel(shown: Snapshot) -> float | None:
-    """The acceleration of the lead in the shown frame."""
+def surely_brakes(shown: Snapshot) -> bool:
+    """Whether the lead in the shown frame surely brakes."""
     lead = shown.processed.result.cipv if shown.processed is not None else None
-    return lead.accel_mps2 if lead is not None else None
+    if lead is None or lead.accel_mps2 is None or lead.accel_sigma_mps2 is None:
+        return False
+    return lead.accel_mps2 < -2.0 * lead.accel_sigma_mps2
 
 
 def test_the_banner_says_what_the_result_says(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
-    site.engine.wait_for(lambda s: known_accel(s) is not None, WAIT_S)  # once the frames before are computed too
+    site.engine.wait_for(surely_brakes, WAIT_S)  # once enough of the frames before are computed too
     tick = site.engine.snapshot.processed
     assert tick is not None
     cipv = tick.result.cipv
@@ -48,7 +50,6 @@ def test_the_banner_says_what_the_result_says(open_page: OpenPage, site: Site):
     accel, sigma = cipv.accel_mps2, cipv.accel_sigma_mps2
     assert accel is not None
     assert sigma is not None
-    assert accel < -2.0 * sigma, "it surely brakes"
     said = f"{cipv.reason}; brakes by {-accel:.1f} ± {sigma:.1f} m/s²"
     expect(page.locator(".lead .reason")).to_have_text(said)
     expect(page.locator("tr.is-cipv td").first).to_have_text(f"#{cipv.id}")
