@@ -61,8 +61,8 @@ class DriveState:
 
 
 class BackgroundRuns:
-    """``open`` a recording, ``want`` parameters, read ``recording``. ``on_change`` is called on any thread after a
-    change of ``state``, at most every 0.25 s while a run is in progress."""
+    """``open`` a recording, ``want`` other parameters, read ``recording``. ``on_change`` is called on any thread after
+    a change of ``state``, at most every 0.25 s while a run is in progress."""
 
     def __init__(self, detections: DetectionCache) -> None:
         self.turn = ComputeScheduler()
@@ -121,12 +121,22 @@ class BackgroundRuns:
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(patience_s)
 
-    def open(self, setup: RunSetup | None) -> None:
-        """Switch to another recording, or none."""
+    def open(self, setup: RunSetup, params: Params, preset: str) -> None:
+        """Switch to another recording and its first run: none is seen that has no run."""
         with self._condition:
             self._ahead.end()
-            number = self._recording.runs.next_number if self._recording else 1
-            self._recording = OpenRecording(setup, self._detections, number) if setup is not None else None
+            recording = OpenRecording(
+                setup, self._detections, self._recording.runs.next_number if self._recording else 1
+            )
+            recording.runs.want(params, preset)
+            self._recording = recording
+            self.changed()
+
+    def close(self) -> None:
+        """Leave the recording, for live sensors."""
+        with self._condition:
+            self._ahead.end()
+            self._recording = None
             self.changed()
 
     def want(self, params: Params, preset: str) -> None:

@@ -151,7 +151,7 @@ class Engine:
         turn = self.drives.turn
         if wish.uri is not None:
             with turn.foreground():
-                if not self._open(wish.uri):
+                if not self._open(wish.uri, wish):
                     return
                 warm_up()  # usually already done by ``drives`` while the source was opened
                 self._publisher.publish(replace(self.snapshot, busy=None))
@@ -196,7 +196,7 @@ class Engine:
 
     # ------------------------------------------------------------ opening
 
-    def _open(self, uri: str) -> bool:
+    def _open(self, uri: str, wish: Wish) -> bool:
         """Replace the open source; if the new one cannot be opened, the old one stays, a notice gives the reason, and
         the result is false. If opening takes long, it is aborted for a newer request."""
         self._publisher.publish(replace(self.snapshot, busy=f"Opening {uri} …"))
@@ -221,7 +221,7 @@ class Engine:
         self._close()
         self.takeovers.forget()
         player = self._player_of(source, detectors)
-        player.open()
+        player.open(wish)
         self._player, self.detectors = player, detectors
         self.labels.open(uri, self.drives.recording)
         opened = self._with_parts(self.snapshot.opened(uri, player, detectors))

@@ -46,9 +46,9 @@ class LivePlayer:
     def skipped(self) -> int:
         return self._pipeline.source.dropped
 
-    def open(self) -> None:
+    def open(self, wish: Wish) -> None:
         """Shows ticks from the first one on."""
-        self._drives.open(None)
+        self._drives.close()
         self._pipeline.open()
         self._control.change(playing=True)
 

@@ -37,8 +37,8 @@ class Player(Protocol):
     @property
     def skipped(self) -> int: ...
 
-    def open(self) -> None:
-        """Start, after the previous source was closed."""
+    def open(self, wish: Wish) -> None:
+        """Start, after the previous source was closed, with the parameters of a request."""
         ...
 
     def wait_s(self, index: int) -> float | None:

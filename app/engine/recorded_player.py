@@ -52,8 +52,11 @@ class RecordedPlayer:
         self._given_up: int | None = None
         self._ahead = ReadAhead(self._prepare, control.change, watching)
 
-    def open(self) -> None:
-        self._drives.open(self._setup)
+    def open(self, wish: Wish) -> None:
+        if self._setup is not None:
+            self._drives.open(self._setup, wish.params, wish.preset)
+        else:
+            self._drives.close()
 
     def successor(self, detectors: Detectors) -> None:
         """None: a newly created player can take over, since the frames remain available. Pending preparation is not

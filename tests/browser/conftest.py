@@ -225,7 +225,7 @@ def opening(pages: Pages, site: Site) -> Iterator[OpenPage]:
 
         def said(message: ConsoleMessage) -> None:
             if message.type in ("error", "warning"):
-                complain(message.text)
+                complain(f"{message.text} ({message.location.get('url', '')})")
 
         def asked(request: Request) -> None:
             if _leaves(request.url, own):

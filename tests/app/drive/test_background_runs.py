@@ -116,8 +116,8 @@ def test_another_run_asks_neither_source_nor_network():
 def test_the_newest_wish_wins_and_the_base_is_finished_after_it(drives: BackgroundRuns):
     drives.start()
     with drives.turn.foreground():
-        drives.open(setup(Recording()))
-        for hits in (3, 4, 5):
+        drives.open(setup(Recording()), with_hits(3), "default")
+        for hits in (4, 5):
             drives.want(with_hits(hits), "default")
     newest = wait_done(drives)
     assert newest.params == with_hits(5)
@@ -131,10 +131,19 @@ def test_the_newest_wish_wins_and_the_base_is_finished_after_it(drives: Backgrou
     assert recording.runs.base is recording.runs.get(1)
 
 
+def test_whoever_is_told_of_a_recording_finds_its_run(drives: BackgroundRuns):
+    """A page asks for the columns as soon as it hears of a change; there must be something to answer."""
+    told = list[int | None]()
+    drives.on_change = lambda: told.append(drives.state.run)
+    drives.open(setup(Recording()), with_hits(3), "default")
+    drives.open(setup(Recording()), with_hits(3), "default")
+    drives.close()
+    assert told == [1, 2, None]
+
+
 def test_going_back_to_parameters_of_before_computes_nothing_again(drives: BackgroundRuns):
     drives.start()
-    drives.open(setup(Recording()))
-    drives.want(with_hits(3), "default")
+    drives.open(setup(Recording()), with_hits(3), "default")
     first = wait_done(drives)
     drives.want(with_hits(4), "default")
     wait_done(drives)
@@ -146,8 +155,7 @@ def test_a_frame_that_cannot_be_read_fails_the_run_and_says_which(
     drives: BackgroundRuns, caplog: pytest.LogCaptureFixture
 ):
     drives.start()
-    drives.open(setup(Recording(broken=frozenset({7}))))
-    drives.want(Params(), "default")
+    drives.open(setup(Recording(broken=frozenset({7}))), Params(), "default")
     failed = wait_done(drives)
     assert (failed.done, drives.state.phase) == (7, "failed")
     assert "frame 7 is not there" in drives.state.note
@@ -159,8 +167,7 @@ def test_nothing_of_a_drive_is_read_or_looked_at_while_somebody_is_in_front(driv
     source, detector = Recording(), CountingDetector()
     drives.start()
     with drives.turn.foreground():
-        drives.open(setup(source, detector))
-        drives.want(Params(), "default")
+        drives.open(setup(source, detector), Params(), "default")
         assert not source.reading.wait(0.05)
     assert wait_done(drives).is_complete
     assert (len(source.reads), detector.calls) == (30, 30)
@@ -172,8 +179,7 @@ def test_a_network_that_is_stopped_for_who_asks_looks_again_and_nothing_is_lost(
 ):
     detector = SlowDetector(slow_at=stopped_at)
     drives.start()
-    drives.open(setup(Recording(), detector))
-    drives.want(Params(), "default")
+    drives.open(setup(Recording(), detector), Params(), "default")
     assert detector.slow.wait(WAIT_S)
     drives.turn.asked(rests=True)
     of = wait_done(drives)
@@ -184,7 +190,7 @@ def test_a_network_that_is_stopped_for_who_asks_looks_again_and_nothing_is_lost(
 
 def test_without_a_recording_there_is_nothing_to_say(drives: BackgroundRuns):
     drives.start()
-    drives.open(None)
+    drives.close()
     drives.want(Params(), "default")
     drives.offer(Recording().frame(0))
     assert drives.state.to_json() | {"revision": 0} == {
@@ -309,8 +315,7 @@ def test_what_could_not_be_read_for_a_moment_is_no_frames_final_result(
     monkeypatch.setattr("app.drive.background_runs._TRY_AGAIN_S", 0.0)
     monkeypatch.setattr("pipeline.run._SILENCE_S", 0.0)
     drives.start()
-    drives.open(setup(Starved(count=6)))
-    drives.want(Params(), "default")
+    drives.open(setup(Starved(count=6)), Params(), "default")
     run_ = wait_done(drives)
     assert (run_.note, run_.done) == ("", 6)
     undisturbed = [result.objects for _, result in run(Recording(count=6), Params(), Detectors(CountingDetector()))]
@@ -341,8 +346,7 @@ def test_a_network_that_hangs_is_tried_again_and_given_up_after_the_third_time(
     drives.watchdog.start()
     try:
         drives.start()
-        drives.open(setup(Recording(), detector))
-        drives.want(Params(), "default")
+        drives.open(setup(Recording(), detector), Params(), "default")
         of = wait_done(drives)
     finally:
         detector.gate.set()

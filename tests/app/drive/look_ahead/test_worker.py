@@ -55,8 +55,7 @@ def drives() -> Iterator[BackgroundRuns]:
 def computed(drives: BackgroundRuns, detectors: Detectors) -> DriveRun:
     """The run that the drives make."""
     drives.start()
-    drives.open(setup(detectors))
-    drives.want(Params(), "default")
+    drives.open(setup(detectors), Params(), "default")
     with drives._condition:
         assert drives._condition.wait_for(lambda: not drives.state.running, WAIT_S)
     assert drives.recording is not None
@@ -120,7 +119,7 @@ def test_frames_that_do_not_fit_are_handed_on(detectors: Detectors, seen: Detect
 
 def test_the_drives_use_it_and_end_it(drives: BackgroundRuns, detectors: Detectors, alone: DriveRun) -> None:
     assert is_equal(computed(drives, detectors), alone)
-    drives.open(None)
+    drives.close()
     assert drives._ahead._work is None
 
 
@@ -219,8 +218,7 @@ def test_detections_that_are_known_need_no_process(detectors: Detectors, seen: D
 
 def test_what_cannot_be_read_is_left_to_the_run(drives: BackgroundRuns, detectors: Detectors) -> None:
     drives.start()
-    drives.open(setup(detectors, Recording(count=FRAMES, broken=frozenset({7}))))
-    drives.want(Params(), "default")
+    drives.open(setup(detectors, Recording(count=FRAMES, broken=frozenset({7}))), Params(), "default")
     with drives._condition:
         assert drives._condition.wait_for(lambda: not drives.state.running, WAIT_S)
     assert (drives.state.phase, drives.state.done) == ("failed", 7)
