@@ -109,7 +109,7 @@ def test_with_another_recording_nothing_of_the_old_one_is_told():
         engine.wait_for(lambda s: s.uri == "test:other" and s.processed is not None and s.drive.run is not None, WAIT_S)
         first = next(s for s in told if s.uri == "test:other")
         assert first.processed is None
-        assert (first.drive.run, first.index, first.time_s) == (None, 0, 0.0)
+        assert (first.drive.done, first.index, first.time_s) == (0, 0, 0.0)
         assert all(s.drive.run != old for s in told if s.uri == "test:other")
     finally:
         engine.stop()
