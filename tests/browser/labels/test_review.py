@@ -41,6 +41,9 @@ def test_labels_and_who_leads_are_found_right_or_sent_back_one_after_the_other(h
     (lead,) = labels.everything["leads"]
     assert (lead["state"], lead["comment"], lead["reviewer"]) == ("proposed", "it begins later", "")
     expect(page.locator("#label-bar .where")).to_have_text(f"sent back {START + 3}–{START + 7}: it begins later")
+    expect(under).to_have_text("nothing")
+    hand.keys("a")
+    expect(said).to_have_text("No label selected, and no lead to review in this frame")
     mark = page.locator(f".track-row[data-id='{made}'] .mark")
     expect(mark).to_have_text("✓✓")
     assert mark.evaluate("(node) => node.scrollWidth <= node.clientWidth"), "both ticks are seen"

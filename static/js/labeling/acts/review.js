@@ -72,7 +72,8 @@ async function step(frame, direction, after, isLast = false) {
 }
 
 /**
- * The label under review: the selected track, else the current review item, else the lead range at this frame.
+ * The label under review: the selected track, else the current review item, else the lead range at this frame if it
+ * awaits review.
  * @returns {Target|null}
  */
 export function target() {
@@ -95,25 +96,27 @@ export function target() {
       comment: event.comment,
     };
   const lead = leadAt(shown());
-  return (
-    lead && {
-      ref: { kind: "lead", id: lead.id, revision: lead.revision },
-      name: `lead ${leadName(lead.lead)}, frames ${lead.first + 1}–${lead.last + 1}`,
-      comment: lead.comment,
-    }
-  );
+  if (!lead || !awaitsReview(lead)) return null;
+  return {
+    ref: { kind: "lead", id: lead.id, revision: lead.revision },
+    name: `lead ${leadName(lead.lead)}, frames ${lead.first + 1}–${lead.last + 1}`,
+    comment: lead.comment,
+  };
 }
+
+/** @param {import("../state/types.js").LeadRange} lead */
+const awaitsReview = ({ state, reviewer }) => (state === "accepted" || state === "corrected") && !reviewer;
 
 /** Approve the label under review. */
 export async function reviewOk() {
   const under = target();
-  if (!under) return say("No label selected, and no lead in this frame");
+  if (!under) return say("No label selected, and no lead to review in this frame");
   if ((await act({ kind: "review_ok", items: [under.ref] })) && isReviewing()) await goOn();
 }
 
 export async function sendBack() {
   const under = target();
-  if (!under) return say("No label selected, and no lead in this frame");
+  if (!under) return say("No label selected, and no lead to review in this frame");
   const comment = await ask(
     "Send back",
     el("p", { textContent: `${under.name} goes back to its annotator.` }),
