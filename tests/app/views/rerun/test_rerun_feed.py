@@ -54,10 +54,11 @@ def test_shown_frames_reach_a_viewer_also_one_that_comes_late(engine: Engine, tm
             wait_sent(feed, 1)
             engine.control.seek(5)
             wait_sent(feed, 2)
+            is_saved = wait_until(lambda: saved.exists() and saved.stat().st_size > 20_000)
         finally:
             viewer.kill()
             viewer.wait()
-    assert saved.stat().st_size > 20_000, "a sweep and an image"
+    assert is_saved, "a sweep and an image"
 
 
 @pytest.mark.parametrize("url", ["", "nowhere", "http://127.0.0.1:9876", "rerun+http://127.0.0.1/proxy"])
