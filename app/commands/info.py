@@ -14,6 +14,7 @@ from rich.table import Table
 
 from app.commands.support.arguments import option
 from pipeline.common.errors import BadInput
+from pipeline.common.files.remote_files import is_remote
 from pipeline.common.files.signing import expected_key
 from pipeline.common.files.user_file_errors import given_path
 from pipeline.recording.info import Info, Rhythm, info, info_of_source
@@ -41,7 +42,7 @@ class ShowInfo:
     """Public key that the session must be signed with, of `cipv keys new`; exit code 1 if it is not"""
 
     def __call__(self) -> int:
-        if self.source.lower().endswith(".mcap"):
+        if self.source.lower().endswith(".mcap") and not is_remote(self.source):
             if self.quick and self.public_key is not None:
                 raise BadInput("--quick does not check signatures; leave out --quick or --public-key")
             key = None if self.quick else expected_key(self.public_key)

@@ -227,9 +227,7 @@ class FleetTables:
             self._duckdb.execute("SET temp_directory = ''")
         if self.store.folder is None:
             self._duckdb.register_filesystem(self.store.system)
-            self._duckdb.execute("SET allowed_directories = [$1]", [f"{self.store.address}/packed/"])
-        else:
-            self._duckdb.execute("SET allowed_directories = [$1]", [f"{self.store.folder}/packed/"])
+        self._duckdb.execute("SET allowed_directories = [$1]", [self._path("packed/")])
         for setting in ("autoinstall_known_extensions", "autoload_known_extensions", "enable_external_access"):
             self._duckdb.execute(f"SET {setting} = false")
         self._duckdb.execute("SET lock_configuration = true")
@@ -262,8 +260,9 @@ class FleetTables:
         return f"(SELECT {', '.join(['*', *missing])} FROM {source})" if missing else source
 
     def _path(self, name: str) -> str:
+        """A file or folder as DuckDB calls it: in a store by the first of its protocol's names, ``abfs`` for ``az``."""
         if self.store.folder is not None:
-            return str(self.store.folder / name)
+            return f"{self.store.folder}/{name}"
         return str(self.store.system.unstrip_protocol(self.store.path(name)))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import errno
 import io
+import logging
 import os
 import re
 import time
@@ -21,6 +22,8 @@ BLOCK_BYTES = 256 << 10
 """Minimum read size of one request, since record headers lie close together."""
 _OF_TESTS = "memory"
 _STORES = frozenset({"s3", "gs", "gcs", "az", "abfs", "abfss", "adl", "http", "https", _OF_TESTS})
+_PREFETCHING = "PrefetchProducer"
+"""In asyncio's complaint about what gcsfs reads ahead of a file that its reader, DuckDB, drops without closing."""
 _TRIES = 6
 _FIRST_PAUSE_S = 0.1
 _T = TypeVar("_T")
@@ -54,11 +57,16 @@ def file_system(address: str) -> tuple[Any, str]:
         raise NotReachable(
             f"{address}: stores need fsspec; `make install` installs it with the extra `fleet`"
         ) from None
+    logging.getLogger("asyncio").addFilter(_is_of_use)
     try:
         system, path = url_to_fs(address)
     except Exception as error:  # each store's package has its own errors, without a common base class
         raise NotReachable(f"{address}: {first_line(error)}") from None
     return system, path
+
+
+def _is_of_use(message: logging.LogRecord) -> bool:
+    return _PREFETCHING not in message.getMessage()
 
 
 def patiently(work: Callable[[], _T], what: str) -> _T:

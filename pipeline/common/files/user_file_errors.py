@@ -12,6 +12,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from pipeline.common.errors import BadInput
+from pipeline.common.files.remote_files import is_remote
 from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
 
 _MOST_NODES = 200_000
@@ -82,6 +83,8 @@ def _nodes_of(node: yaml.Node | None, known: dict[int, int]) -> int:
 def given_path(text: str | Path, refuse: Callable[[str], BadInput] = BadInput) -> Path:
     """A path as typed by a user, with ``~`` resolved. On failure, raises the error that ``refuse`` makes from a
     sentence."""
+    if is_remote(str(text)):
+        raise refuse(f"{text}: an address in a store; expected a file or folder on this machine")
     try:
         return Path(text).expanduser()
     except RuntimeError:

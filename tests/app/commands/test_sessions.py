@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import fsspec
 import pytest
 from rerun.chunk import RrdReader
 
@@ -133,6 +134,16 @@ def test_info_prints_topics_rates_and_duration(
     }
     assert cipv("info", "sim:straight") == 0
     assert "10.00 Hz" in capsys.readouterr().out
+
+
+def test_info_of_a_session_in_a_store(recorded: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store = fsspec.filesystem("memory")
+    store.pipe_file("/fleet/drive.mcap", recorded.read_bytes())
+    try:
+        assert cipv("info", "memory://fleet/drive.mcap") == 0
+    finally:
+        store.rm("/fleet", recursive=True)
+    assert "11 frames, 1.0 s, 10.00 Hz" in capsys.readouterr().out
 
 
 def test_info_says_what_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,9 +8,12 @@ import shutil
 import signal
 import threading
 from pathlib import Path
+from typing import Any, ClassVar
 
+import fsspec
 import pyarrow.parquet as pq
 import pytest
+from fsspec.implementations.memory import MemoryFileSystem
 
 from app.bench.fleet_tables import make_tables
 from app.cli import main
@@ -24,6 +27,16 @@ from app.fleet.pack_index import packed_file, packs_of
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
 from tests.app.fleet.fleets import BAD, LENGTH, SESSIONS, begun, plan_of
+
+
+class _SeveralNames(MemoryFileSystem):
+    protocol = ("abfs", "az")
+    store: ClassVar[dict[str, Any]] = {}
+    pseudo_dirs: ClassVar[list[str]] = [""]
+
+    @classmethod
+    def _strip_protocol(cls, path: str) -> str:
+        return str(super()._strip_protocol(path.rpartition("://")[2]))
 
 
 @pytest.fixture(scope="module")
@@ -245,6 +258,21 @@ def test_what_is_no_condition_is_refused_in_one_line(tables: FleetTables, where:
 def test_only_the_packs_can_be_read(tables: FleetTables, batch: Path):
     with pytest.raises(BadInput, match="Cannot access"):
         tables.find(f"address IN (SELECT content FROM read_text('{batch / 'batch.json'}'))")
+
+
+def test_tables_in_a_store_whose_protocol_has_several_names(batch: Path, tables: FleetTables):
+    """adlfs answers to ``az``, but calls its own files ``abfs://…``."""
+    fsspec.register_implementation("az", _SeveralNames, clobber=True)
+    try:
+        store = Store("az://fleet/out")
+        for file in batch.rglob("*"):
+            if file.is_file():
+                store.put(str(file.relative_to(batch)), file)
+        found = FleetTables(store).find("true", of="drives")
+    finally:
+        fsspec.register_implementation("az", "adlfs.AzureBlobFileSystem", clobber=True)
+        _SeveralNames.store.clear()
+    assert found == tables.find("true", of="drives")
 
 
 def test_cipv_find_prints_rows_with_links(batch: Path, capsys: pytest.CaptureFixture[str]):

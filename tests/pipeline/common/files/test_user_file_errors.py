@@ -10,7 +10,7 @@ import pytest
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from pipeline.common.errors import BadInput
-from pipeline.common.files.user_file_errors import did_you_mean, first_complaint
+from pipeline.common.files.user_file_errors import did_you_mean, first_complaint, given_path
 from pipeline.params import Params, from_yaml
 from pipeline.replay import faults
 from pipeline.simulation import scenario
@@ -113,3 +113,9 @@ def test_a_file_that_cannot_be_used_is_named_in_one_sentence(
     said = str(refused.value)
     assert f"mine.yaml: {says}" in said
     assert "\n" not in said
+
+
+def test_an_address_in_a_store_is_no_path():
+    with pytest.raises(BadInput, match=r"^s3://fleet/a\.bag: an address in a store; expected a file or folder"):
+        given_path("s3://fleet/a.bag")
+    assert given_path("~") == Path.home()
