@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from pipeline.common.errors import BadInput
-from pipeline.common.files.remote_files import NotReachable, file_system, is_remote, patiently
+from pipeline.common.files.remote_files import NotReachable, NotThere, file_system, is_remote, patiently
 from pipeline.common.files.whole_files import replacing
 
 try:
@@ -56,9 +57,7 @@ class Store:
         """A whole file; None where there is none."""
         try:
             return patiently(lambda: bytes(self.system.cat_file(self.path(name))), f"{self.address}/{name}")
-        except NotReachable:
-            if self.has(name):
-                raise
+        except NotThere:
             return None
 
     def has(self, name: str) -> bool:
@@ -89,6 +88,12 @@ class Store:
                 shutil.copyfileobj(source, written, _BLOCK_BYTES)
         except OSError as error:
             raise _not_writable(target, error) from None
+
+    def put_all(self, files: Mapping[str, Path]) -> None:
+        """The same for several files, by name, all at once, since each waits for the answer of a store."""
+        with ThreadPoolExecutor(max(1, len(files))) as beside:
+            for put in [beside.submit(self.put, name, file) for name, file in files.items()]:
+                put.result()
 
     @contextmanager
     def alone(self) -> Iterator[None]:

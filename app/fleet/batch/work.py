@@ -189,10 +189,11 @@ def _run(job: Job, source: Source, detectors: Detectors, folder: Path) -> int:
     write_events(folder / f"{EVENTS.name}.parquet", find_events(rows, objects, job.key.params), rows, gaps, gap_s)
     write_scores(folder / f"{SCORES.name}.parquet", scores_of(history, labelled, source, job.key.params))
     write_drive(folder / f"{DRIVES.name}.parquet", _drive_values(job, source, rows, len(labelled), light))
-    for shape in (FRAMES, OBJECTS, TIMINGS, EVENTS, SCORES, DRIVES):
-        job.store.put(file_of(shape.name, run_name, drive), folder / f"{shape.name}.parquet")
+    shapes = (FRAMES, OBJECTS, TIMINGS, EVENTS, SCORES, DRIVES)
+    files = {file_of(shape.name, run_name, drive): folder / f"{shape.name}.parquet" for shape in shapes}
     if job.keeps_results:
-        job.store.put(f"results/run={run_name}/{drive}.jsonl.zst", folder / _Lines.NAME)
+        files[f"results/run={run_name}/{drive}.jsonl.zst"] = folder / _Lines.NAME
+    job.store.put_all(files)
     return kept.asked
 
 

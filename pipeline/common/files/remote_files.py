@@ -34,6 +34,10 @@ class NotReachable(BadInput):
     missing."""
 
 
+class NotThere(NotReachable):
+    """Nothing exists at an address, which its store answered."""
+
+
 def is_remote(address: str) -> bool:
     """Whether this is the address of a store instead of a local file."""
     scheme, separator, _ = address.partition("://")
@@ -70,8 +74,8 @@ def _is_of_use(message: logging.LogRecord) -> bool:
 
 
 def patiently(work: Callable[[], _T], what: str) -> _T:
-    """Result of a request to a store, retried a few times if it fails. NotReachable if nothing exists there or access
-    is denied; Overloaded if all retries fail."""
+    """Result of a request to a store, retried a few times if it fails. NotThere if nothing exists there, NotReachable
+    if access is denied, Overloaded if all retries fail."""
     pause_s = _FIRST_PAUSE_S
     for left in reversed(range(_TRIES)):
         try:
@@ -80,7 +84,7 @@ def patiently(work: Callable[[], _T], what: str) -> _T:
             raise NotReachable(f"{what}: access denied: {first_line(error)}") from None
         except Exception as error:  # each store's package has its own errors, without a common base class
             if isinstance(error, FileNotFoundError) and not _may_pass(error.__cause__):
-                raise NotReachable(f"{what}: not found") from None
+                raise NotThere(f"{what}: not found") from None
             if not left:
                 failure = error.__cause__ if isinstance(error, FileNotFoundError) else error
                 raise Overloaded(f"{what}: store error: {first_line(failure or error)}") from error
@@ -138,11 +142,13 @@ def _is_below(address: str, beginning: str) -> bool:
 
 
 class _Ranges(io.RawIOBase):
-    """A remote file in which each read is one request."""
+    """A remote file in which each read is one request. Its first and its last block are kept once read: an index is
+    read in many small steps, from both ends."""
 
     def __init__(self, system: Any, path: str, address: str, size: int) -> None:
         self._system, self._path, self._address, self._size = system, path, address, size
         self._at = 0
+        self._kept: dict[int, bytes] = {}
 
     def readable(self) -> bool:
         return True
@@ -162,10 +168,22 @@ class _Ranges(io.RawIOBase):
         end = min(self._at + len(buffer), self._size)
         if end <= self._at:
             return 0
-        data = patiently(lambda: self._range(self._at, end), self._address)
+        data = self._read(self._at, end)
         buffer[: len(data)] = data
         self._at += len(data)
         return len(data)
+
+    def _read(self, start: int, end: int) -> bytes:
+        for first in (0, max(0, self._size - BLOCK_BYTES)):
+            last = min(first + BLOCK_BYTES, self._size)
+            if first <= start and end <= last:
+                if first not in self._kept:
+                    self._kept[first] = self._requested(first, last)
+                return self._kept[first][start - first : end - first]
+        return self._requested(start, end)
+
+    def _requested(self, start: int, end: int) -> bytes:
+        return patiently(lambda: self._range(start, end), self._address)
 
     def _range(self, start: int, end: int) -> bytes:
         data = bytes(self._system.cat_file(self._path, start=start, end=end))

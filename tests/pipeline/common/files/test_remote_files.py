@@ -65,6 +65,7 @@ def test_only_what_is_needed_is_read(session, monkeypatch: pytest.MonkeyPatch):
     open_source(ADDRESS).frame(0)
     assert asked
     assert max(end - start for start, end in asked) < len(padded)
+    assert len(set(asked)) == len(asked), "an index is read in many steps, each block of it once"
 
 
 def test_a_file_that_is_replaced_has_another_fingerprint(session):
