@@ -39,7 +39,8 @@ class Detects(Protocol[Seen_co]):
 
 @dataclass(frozen=True)
 class Detectors:
-    """The detectors of a recording. For live sensors wrap them in ``LiveDetectors``."""
+    """The detectors of a recording. For live sensors wrap them in
+    ``pipeline.live_detection.LiveDetectors``."""
 
     boxes: Detects[RawBoxes] | None = None
     """Finds vehicles; None without a detector."""
@@ -68,40 +69,6 @@ class Detectors:
     def looks_far(self, index: int) -> bool:
         """Whether the far view runs in the frame with this index."""
         return self.far is not None and index % self.far_every == 0
-
-
-_FAR_LEFT_OUT = "the far view was left out, because sensor data was dropped: this machine is too slow for all networks"
-CALM_TICKS = 50
-"""Number of ticks without a dropped one after which the far view runs in every tick again: 5 s at 10 Hz."""
-
-
-class LiveDetectors:
-    """Selects the detectors for each processed tick of live sensors. Lane lines are detected again after
-    ``lanes_every`` processed ticks; the frame index cannot be used, because it also counts dropped ticks. If ticks are
-    dropped, the machine is too slow for everything, and the far view runs only in every other tick."""
-
-    def __init__(self, detectors: Detectors) -> None:
-        self._detectors = detectors
-        self._since_lanes = detectors.lanes_every
-        self._last_index: int | None = None
-        self._calm = CALM_TICKS
-        self._looked_far = False
-
-    def of(self, frame: Frame) -> Detectors:
-        """The detectors for a tick; call this once per tick. A tick without an image passes its turn to the next."""
-        is_due = self._since_lanes >= self._detectors.lanes_every and frame.image is not None
-        self._since_lanes = 1 if is_due else self._since_lanes + 1
-        lanes = self._detectors.lanes if is_due else None
-        far = self._detectors.far if self._has_time_to_look_far(frame) else None
-        left_out = (_FAR_LEFT_OUT,) if far is not self._detectors.far and frame.image is not None else ()
-        return replace(self._detectors, lanes=lanes, lanes_every=1, far=far, far_every=1, left_out=left_out)
-
-    def _has_time_to_look_far(self, frame: Frame) -> bool:
-        dropped = self._last_index is not None and frame.index > self._last_index + 1
-        self._calm = 0 if dropped else self._calm + 1
-        self._last_index = frame.index
-        self._looked_far = self._calm >= CALM_TICKS or not self._looked_far
-        return self._looked_far
 
 
 class Look(Protocol):

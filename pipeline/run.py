@@ -12,7 +12,8 @@ from typing import Literal, NamedTuple
 from pipeline import lidar_branch
 from pipeline.common.ahead import ahead
 from pipeline.common.files.user_files import Overloaded
-from pipeline.detection import Detectors, LiveDetectors, Look, detect, look
+from pipeline.detection import Detectors, Look, detect, look
+from pipeline.live_detection import LiveDetectors
 from pipeline.params import Params
 from pipeline.step import State, step
 from pipeline.types import Frame, Result
@@ -110,21 +111,21 @@ def through(
     frames: Iterable[Frame], params: Params, detectors: Detectors, sensors: Sensors = "both", ask: Look = look
 ) -> Iterator[tuple[Frame, Result]]:
     """Each of these frames with its result, starting from an empty state."""
-    return _through(frames, params, lambda _: detectors, sensors, ask)
+    return _through(frames, params, lambda frame: (frame, detectors), sensors, ask)
 
 
 def _through(
     frames: Iterable[Frame],
     params: Params,
-    detectors_of: Callable[[Frame], Detectors],
+    prepared: Callable[[Frame], tuple[Frame, Detectors]],
     sensors: Sensors,
     ask: Look = look,
 ) -> Iterator[tuple[Frame, Result]]:
     warm_up()
     state = State()
     for frame in frames:
-        asked = used(detectors_of(frame), params)
-        seen, state, result, _ = advance(state, frame, params, asked, sensors, ask)
+        ready, detectors = prepared(frame)
+        seen, state, result, _ = advance(state, ready, params, used(detectors, params), sensors, ask)
         yield seen, result
 
 

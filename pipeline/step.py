@@ -155,7 +155,7 @@ def step(
     edge_state, edges = road_edges.follow(state.edges, around, now, params.path, state.path.is_shown)
     clock.lap("edges")
     traffic_state, driving = traffic.follow(state.traffic, objects, now, params.path)
-    sides = lanes.road_edges(frame.raw_lanes, view, lane_state, params.lanes)
+    sides = lanes.road_edges(frame.raw_lanes, view, lane_state, now, params.lanes)
     drivable_state, area = drivable_area.follow(state.drivable, sides, now, params.path, state.path.is_shown)
     evidence = corridor.Evidence(
         lane,

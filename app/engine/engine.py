@@ -248,7 +248,9 @@ class Engine:
             from app.engine.live_pipeline import LivePipeline
             from app.engine.live_player import LivePlayer
 
-            return LivePlayer(LivePipeline(source, detectors, self._sensors), self.control, self.drives, self.desk)
+            of_lanes = partial(self.takeovers.watching_helper, "lane detection")
+            live = LivePipeline(source, detectors, self._sensors, of_lanes)
+            return LivePlayer(live, self.control, self.drives, self.desk)
         recording = cast("Source", source)
 
         def seekable() -> SeekablePipeline:

@@ -6,14 +6,17 @@ and the pipeline allow. Not thread-safe.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from time import monotonic, perf_counter
 
 from app.engine.processed_frame import ProcessedFrame
 from app.engine.snapshot import Notice
 from pipeline.common.watchdog import NETWORK, at_work
-from pipeline.detection import Detectors, Detects, LiveDetectors, Seen
+from pipeline.detection import Detectors, Detects, Seen
+from pipeline.live_detection import LiveDetectors
 from pipeline.params import Params
-from pipeline.run import Sensors, advance
+from pipeline.run import Sensors, advance, used
 from pipeline.sources.live.health import not_delivering
 from pipeline.step import State
 from pipeline.types import U8, Frame
@@ -23,13 +26,20 @@ _SILENCE_S = 1.0
 
 
 class LivePipeline:
-    """``open`` the sensors, then repeatedly ``wait`` for a frame and ``run`` it; finally ``close``."""
+    """``open`` the sensors, then repeatedly ``wait`` for a frame and ``run`` it; finally ``close``. watching: a context
+    around the work of a thread beside it."""
 
-    def __init__(self, source: LiveSource, detectors: Detectors, sensors: Sensors) -> None:
+    def __init__(
+        self,
+        source: LiveSource,
+        detectors: Detectors,
+        sensors: Sensors,
+        watching: Callable[[], AbstractContextManager[None]] = nullcontext,
+    ) -> None:
         self.source = source
         self.newest: ProcessedFrame | None = None
         """The last processed tick."""
-        self._detectors, self._sensors = LiveDetectors(detectors), sensors
+        self._detectors, self._sensors, self._watching = LiveDetectors(detectors, watching), sensors, watching
         self._first_ns: int | None = None
         self._ticked_s = monotonic()
         self._silence: Notice | None = None
@@ -42,7 +52,7 @@ class LivePipeline:
 
     def successor(self, detectors: Detectors) -> LivePipeline:
         """Continues from the newest tick with the same sensors, which stay open, and other detectors."""
-        fresh = LivePipeline(self.source, detectors, self._sensors)
+        fresh = LivePipeline(self.source, detectors, self._sensors, self._watching)
         fresh.newest, fresh._first_ns = self.newest, self._first_ns
         fresh._silence = self._silence  # its notice is still shown
         return fresh
@@ -59,7 +69,8 @@ class LivePipeline:
         before = self.newest.after if self.newest is not None else State()
         ask = _TimedLook()
         with at_work("the pipeline"):
-            ran = advance(before, frame, params, self._detectors.of(frame), self._sensors, ask)
+            frame, detectors = self._detectors.of(frame)
+            ran = advance(before, frame, params, used(detectors, params), self._sensors, ask)
         self.newest = ProcessedFrame(
             before, ran.frame, ran.state, ran.result, ran.lidar, params, ask.spent_ms, exact=True
         )

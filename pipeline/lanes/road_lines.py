@@ -73,6 +73,8 @@ class LaneMeasurement:
     """Strongest first."""
     pitch: Pitch
     """Pitch used to map the lines to the ground."""
+    age_s: float = 0.0
+    """How much older their image is than the frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +110,8 @@ class RoadView(NamedTuple):
 def follow(
     state: LaneState, raw: RawLanes | None, view: RoadView, now: Moment, params: LaneParams
 ) -> tuple[LaneState, EgoLane | None]:
-    """One frame: measure if a lane detector has processed it, and track. None before the first measurement."""
+    """One frame: measure if a lane detector has processed it or, more recently than the last frame, an earlier image;
+    and track. None before the first measurement."""
     plane, sweeps = _settled(state, road_plane(view.ground))
     road = _road(plane, view, params)
 
@@ -123,12 +126,13 @@ def follow(
     if raw is not None and view.aligned is not None:
         expected = tracking.expected_shape(state.tracks)
         measured = measure(_beside(raw, view.vehicles), view.aligned, road, pitch, params, expected)
+        measured = evolve(measured, lines=tracking.moved(measured.lines, now.ego, raw.age_s))
         pitch = measured.pitch
 
     # Every line is tracked; the ego lane is the pair of lines around the car
     tracks = tracking.predict(state.tracks, now.ego, now.dt_s, params)
     if measured is not None:
-        tracks = tracking.update(tracks, measured.source, measured.lines, params)
+        tracks = tracking.update(tracks, measured.source, measured.lines, params, measured.age_s)
     lane = tracking.ego_lane(tracks, pitch.rad, road, params)
     return LaneState(tracks, pitch, plane, sweeps, measured), lane
 
@@ -142,7 +146,7 @@ def measure(
     narrows the search; None for a wide search.
     """
     raw = raw.painted()
-    nothing = LaneMeasurement(raw.model, (), pitch)
+    nothing = LaneMeasurement(raw.model, (), pitch, raw.age_s)
     eye, rays = aligned.rays(np.asarray(raw.points, np.float64))
     height_m = float(eye[2] - (plane[0] * eye[0] + plane[1] * eye[1] + plane[2]))
     if height_m <= 0.1:
@@ -161,16 +165,17 @@ def measure(
     lines = [found for found, _ in _fitted(again, shape, sigma)]
     to_ego = tracking.shifted(-float(eye[0]))
     lines = [_in_ego(found, eye, to_ego, height_m, pitch) for found in _distinct(lines) if _plausible(found, params)]
-    return LaneMeasurement(raw.model, tuple(lines), pitch)
+    return LaneMeasurement(raw.model, tuple(lines), pitch, raw.age_s)
 
 
-def road_edges(raw: RawLanes | None, view: RoadView, state: LaneState, params: LaneParams) -> F64 | None:
-    """(M, 2) ego x, y on the edges of the drivable area in this image; None if no detector looked for it.
+def road_edges(raw: RawLanes | None, view: RoadView, state: LaneState, now: Moment, params: LaneParams) -> F64 | None:
+    """(M, 2) ego x, y on the edges of the drivable area; None if no detector looked for it.
 
     Args:
         raw: what the lane detector saw.
-        view: of the same image.
+        view: of the frame's image.
         state: after ``follow`` in this frame: pitch and road.
+        now: own motion, for what was seen in an earlier image.
         params: of lane tracking.
     """
     if raw is None or view.aligned is None or state.pitch is None:
@@ -183,7 +188,8 @@ def road_edges(raw: RawLanes | None, view: RoadView, state: LaneState, params: L
         return np.zeros((0, 2)) if len(raw.road_edges().points) else None
     seen, _ = _on_road(edges, rays, plane, height_m, params.max_range_m)
     x = seen.x_m(state.pitch.rad)
-    return np.column_stack([x + eye[0], seen.slope * x + eye[1]])[(x > 0.0) & (x < params.max_range_m)]
+    edge = np.column_stack([x + eye[0], seen.slope * x + eye[1]])[(x > 0.0) & (x < params.max_range_m)]
+    return tracking.moved_points(edge, now.ego, raw.age_s)
 
 
 def _wider(box: Box) -> Box:
@@ -205,7 +211,7 @@ def _beside(raw: RawLanes, vehicles: Sequence[Box]) -> RawLanes:
     u, v = raw.points.T[:, :, None]
     x1, y1, x2, y2 = np.array(vehicles).T
     free = ~np.any((u > x1) & (u < x2) & (v > y1) & (v < y2), axis=1)
-    return RawLanes(raw.model, raw.points[free], raw.scores[free], raw.line[free])
+    return raw.only(free)
 
 
 def road_plane(ground: Ground | None) -> F64 | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numba
 import numpy as np
@@ -20,6 +21,7 @@ from pipeline.params import LaneParams
 from pipeline.types import EgoState
 from pipeline.types.lane import EgoLane, LaneLine, Side, powers
 
+Line = TypeVar("Line", "LineTrack", FittedLine)
 _COMPARE_AT = powers([5.0, 15.0])
 _SIDE_AT_M = 4.0
 """Distance ahead at which a line counts as left or right of the car: about the front wheels."""
@@ -88,33 +90,54 @@ def predict(tracks: LaneTracks, ego: EgoState | None, dt_s: float | None, params
     """The lines ``dt_s`` later, relative to the moved car, without those not seen for too long."""
     if dt_s is None:
         return tracks
-    speed = ego.speed_mps if ego is not None else 0.0
-    yaw_rate = ego.yaw_rate_radps if ego is not None else None
-    way, turn = speed * dt_s, (yaw_rate or 0.0) * dt_s
+    later = [evolve(line, unseen_s=line.unseen_s + dt_s) for line in moved(tracks.lines, ego, dt_s)]
+    kept = tuple(line for line in later if line.unseen_s <= params.max_age_s and line.x_max_m > 0.0)
+    return LaneTracks(kept, tracks.source, tracks.age_s + dt_s)
+
+
+def moved(lines: tuple[Line, ...], ego: EgoState | None, dt_s: float) -> tuple[Line, ...]:
+    """Lines relative to the car ``dt_s`` later; unchanged after no time."""
+    if dt_s == 0.0:
+        return lines
+    way, turn = _way_and_turn(ego, dt_s)
     move, offset = shifted(way), np.array([-0.5 * way * turn, -turn, 0.0, 0.0])
     noise = _noise(ego, dt_s)
-    moved = [
+    return tuple(
         evolve(
             line,
             coefficients=move @ line.coefficients + offset,
             covariance=move @ line.covariance @ move.T + noise,
             x_min_m=line.x_min_m - way,
             x_max_m=line.x_max_m - way,
-            unseen_s=line.unseen_s + dt_s,
         )
-        for line in tracks.lines
-    ]
-    kept = tuple(line for line in moved if line.unseen_s <= params.max_age_s and line.x_max_m > 0.0)
-    return LaneTracks(kept, tracks.source, tracks.age_s + dt_s)
+        for line in lines
+    )
 
 
-def update(tracks: LaneTracks, source: str, measured: tuple[FittedLine, ...], params: LaneParams) -> LaneTracks:
-    """The lines after an image. A line that was not found in it fades; a new line starts with its measured quality."""
+def moved_points(points: F64, ego: EgoState | None, dt_s: float) -> F64:
+    """The same for points (M, 2), x y."""
+    way, turn = _way_and_turn(ego, dt_s)
+    x = points[:, 0] - way
+    return np.column_stack([x, points[:, 1] - x * turn - 0.5 * way * turn])
+
+
+def _way_and_turn(ego: EgoState | None, dt_s: float) -> tuple[float, float]:
+    """Metres driven and radians turned in this time; 0 where not known."""
+    if ego is None:
+        return 0.0, 0.0
+    return ego.speed_mps * dt_s, (ego.yaw_rate_radps or 0.0) * dt_s
+
+
+def update(
+    tracks: LaneTracks, source: str, measured: tuple[FittedLine, ...], params: LaneParams, age_s: float = 0.0
+) -> LaneTracks:
+    """The lines after an image, which was taken ``age_s`` ago. A line that was not found in it fades; a new line starts
+    with its measured quality."""
     pairs = _pairs(tracks.lines, measured, params.gate_m)
     lines = [_joined(line, measured[pairs[i]]) if i in pairs else _faded(line) for i, line in enumerate(tracks.lines)]
     new = [found for j, found in enumerate(measured) if j not in pairs.values()]
     lines += [LineTrack(f.coefficients, f.covariance, f.x_min_m, f.x_max_m, f.quality) for f in new]
-    return LaneTracks(tuple(line for line in lines if line.quality >= _FORGOTTEN), source, 0.0)
+    return LaneTracks(tuple(line for line in lines if line.quality >= _FORGOTTEN), source, age_s)
 
 
 def is_settled(tracks: LaneTracks, params: LaneParams) -> bool:

@@ -107,14 +107,20 @@ class RawLanes:
     line: I32
     """(M,) int32, which line each point belongs to; −1 where the detector does not group its points, ``ROAD_LEFT`` and
     ``ROAD_RIGHT`` on the edges of the drivable area."""
+    age_s: float = 0.0
+    """How much older their image is than the frame, in seconds; 0 for the frame's own image. With live sensors, a
+    network that is slower than they are must not delay a frame."""
 
     def painted(self) -> RawLanes:
         """Only the points on painted lines."""
-        return self._only(self.line >= -1)
+        return self.only(self.line >= -1)
 
     def road_edges(self) -> RawLanes:
         """Only the points on the edges of the drivable area."""
-        return self._only(self.line < -1)
+        return self.only(self.line < -1)
 
-    def _only(self, kept: Mask) -> RawLanes:
-        return self if kept.all() else RawLanes(self.model, self.points[kept], self.scores[kept], self.line[kept])
+    def only(self, kept: Mask) -> RawLanes:
+        """The points of a mask (M,)."""
+        if kept.all():
+            return self
+        return replace(self, points=self.points[kept], scores=self.scores[kept], line=self.line[kept])

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pipeline.detection import Detectors, LiveDetectors, detect, detector_for, lanes_for
+from pipeline.detection import Detectors, detect, detector_for, lanes_for
 from pipeline.inference.model_registry import EMBEDDED, find, register
-from pipeline.params import Params, SyncParams
-from pipeline.run import advance, run, run_live
+from pipeline.params import Params
+from pipeline.run import advance, run
 from pipeline.sources import open_source
 from pipeline.step import State
 from pipeline.types import U8, CameraImage, Frame, RawBoxes, RawLanes
@@ -85,49 +83,6 @@ def test_lanes_are_looked_for_in_every_nth_frame_and_boxes_in_all() -> None:
     seen = [detect(frame, Detectors(boxes, lanes, lanes_every=3)) for frame in _frames(7)]
     assert (boxes.calls, lanes.calls) == (7, 3)
     assert [frame.index for frame in seen if frame.raw_lanes is not None] == [0, 3, 6]
-
-
-@pytest.mark.parametrize(
-    ("indices", "looked"),
-    [
-        (range(7), [0, 3, 6]),
-        (range(0, 21, 3), [0, 9, 18]),
-        (range(1, 22, 3), [1, 10, 19]),
-        ((0, 1, 4, 5, 6, 10, 11), [0, 5, 11]),
-    ],
-    ids=["none dropped", "two of three dropped", "the same, out of step", "some dropped"],
-)
-def test_of_live_sensors_lanes_are_looked_for_in_every_nth_tick_that_is_run(
-    indices: Iterable[int], looked: list[int]
-) -> None:
-    frames = [replace(frame, index=index) for frame, index in zip(_frames(7), indices, strict=True)]
-    sensors, lanes = _Ticks(frames), _Seen(_NO_LANES)
-    ran = islice(run_live(sensors, Params(), Detectors(_Seen(_NO_BOXES), lanes, lanes_every=3)), 7)
-    assert [frame.index for frame, _ in ran if frame.raw_lanes is not None] == looked
-    assert lanes.calls == len(looked)
-
-
-def test_of_live_sensors_a_tick_without_an_image_passes_the_lanes_turn_on() -> None:
-    frames = _frames(6)
-    frames[3] = replace(frames[3], image=None)
-    turns = LiveDetectors(Detectors(None, _Seen(_NO_LANES), lanes_every=3))
-    assert [frame.index for frame in frames if turns.of(frame).lanes is not None] == [0, 4]
-
-
-class _Ticks:
-    """Live sensors that tick with these frames."""
-
-    def __init__(self, frames: list[Frame]) -> None:
-        self._left = iter(frames)
-
-    def start(self) -> None:
-        pass
-
-    def close(self) -> None:
-        pass
-
-    def next(self, timeout_s: float, params: SyncParams) -> Frame:
-        return next(self._left)
 
 
 def test_a_car_with_lidar_alone_asks_no_detector() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,10 +11,11 @@ from hypothesis import strategies as st
 
 from pipeline.alignment.projection import Angular
 from pipeline.lanes.drawn_lines import in_image, polylines
-from pipeline.lanes.road_lines import LaneState, Pitch, RoadView, follow, measure, road_plane
+from pipeline.lanes.road_lines import LaneState, Pitch, RoadView, follow, measure, road_edges, road_plane
 from pipeline.lidar.ground import Ground
 from pipeline.params import LaneParams
 from pipeline.types import EgoState, RawLanes
+from pipeline.types.detections import ROAD_LEFT, ROAD_RIGHT
 from pipeline.types.lane import EgoLane
 from tests.pipeline.build import moment
 from tests.pipeline.lanes.lane_scenes import FLAT, GROUND_M, STRAIGHT, aligned, paint
@@ -303,3 +306,38 @@ def test_a_car_that_stands_from_the_start_finds_its_lane() -> None:
     assert lane is not None
     assert lane.left is not None
     assert lane.left.coefficients[0] == pytest.approx(1.75, abs=0.1)
+
+
+def _after(xy: np.ndarray, speed_mps: float, yaw_rate_radps: float, dt_s: float) -> np.ndarray:
+    """Points (M, 2) relative to a car that has driven along an arc."""
+    turn = yaw_rate_radps * dt_s
+    gone = np.array([np.sin(turn), 1.0 - np.cos(turn)]) * speed_mps / yaw_rate_radps
+    return (xy - gone) @ np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+
+
+TURNING = EgoState(0, 15.0, 0.1)
+
+
+def test_lines_of_an_earlier_image_are_where_they_are_now() -> None:
+    raw = replace(paint(numbered=True), age_s=0.3)
+    _, lane = follow(LaneState(), raw, RoadView(aligned()), moment(TURNING, 0.1), PARAMS)
+    assert lane is not None
+    assert lane.age_s == 0.3
+    for line, y_m in ((lane.left, 1.75), (lane.right, -1.75)):
+        assert line is not None
+        x = np.linspace(10.0, 35.0, 20)
+        now = _after(np.column_stack([x, np.full(20, y_m)]), 15.0, 0.1, 0.3)
+        assert np.asarray(line.y_m(now[:, 0])) == pytest.approx(now[:, 1], abs=0.12)
+
+
+def test_edges_of_the_drivable_area_of_an_earlier_image_too() -> None:
+    lines = paint(numbered=True)
+    edges = replace(lines, line=np.where(lines.line == 0, ROAD_LEFT, ROAD_RIGHT).astype(np.int32), age_s=0.3)
+    now = moment(TURNING, 0.1)
+    state, _ = follow(LaneState(), edges, RoadView(aligned()), now, PARAMS)
+    found = road_edges(edges, RoadView(aligned()), state, now, PARAMS)
+    fresh = road_edges(replace(edges, age_s=0.0), RoadView(aligned()), state, now, PARAMS)
+    assert found is not None
+    assert fresh is not None
+    assert found == pytest.approx(_after(fresh, 15.0, 0.1, 0.3), abs=0.08)
+    assert np.abs(found - fresh).max() > 4.0

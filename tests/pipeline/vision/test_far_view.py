@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.detection import CALM_TICKS, Detectors, LiveDetectors, detect
+from pipeline.detection import Detectors, detect
+from pipeline.live_detection import CALM_TICKS, LiveDetectors
 from pipeline.params import DetectionParams
 from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, RawBoxes
 from pipeline.vision.detector import open_detector
@@ -158,10 +159,9 @@ def test_every_nth_frame_by_its_index() -> None:
 def test_where_ticks_are_dropped_the_far_view_sits_out_every_other_one() -> None:
     asked = LiveDetectors(Detectors(far=FarView(Answers("native", raw([[1, 1, 2, 2]], [0.1])))))
     tick = Frame(0, "0", 0, image=CameraImage(0, bright_at()))
-    looked = [asked.of(replace(tick, index=index)).far is not None for index in (0, 1, 2, 4, 5, 6, 7, 9, 10)]
+    looked = [asked.of(replace(tick, index=index))[1].far is not None for index in (0, 1, 2, 4, 5, 6, 7, 9, 10)]
     assert looked == [True, True, True, False, True, False, True, False, True]
     for index, notes in ((11, 1), (12, 0), (13, 1)):
-        live = asked.of(replace(tick, index=index))
-        assert len(detect(replace(tick, index=index), live).notes) == notes, "the result says what was left out"
-    calm = [asked.of(replace(tick, index=index)).far is not None for index in range(14, 14 + 2 * CALM_TICKS)]
+        assert len(detect(*asked.of(replace(tick, index=index))).notes) == notes, "the result says what was left out"
+    calm = [asked.of(replace(tick, index=index))[1].far is not None for index in range(14, 14 + 2 * CALM_TICKS)]
     assert all(calm[CALM_TICKS:]), "once nothing is dropped for a while, every tick again"
