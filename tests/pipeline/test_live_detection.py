@@ -180,3 +180,4 @@ def test_results_of_live_sensors_say_how_old_the_lines_are(lanes: _Lanes) -> Non
     found = ran[3][1].layers.lanes
     assert found is not None
     assert found.age_s == pytest.approx(0.3)
+    assert [result.sensors.lanes_age_ms for _, result in ran] == [None, None, None, pytest.approx(300.0), None]

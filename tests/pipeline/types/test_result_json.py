@@ -35,7 +35,7 @@ FIELDS = {
     "": "version frame t_ns sensors ego own_motion objects path cipv next_cipv rejected acc notes timing_ms",
     "sensors": "lidar camera ego",
     "sensors.lidar": "age_ms points",
-    "sensors.camera": "age_ms skew_ms far_view",
+    "sensors.camera": "age_ms skew_ms far_view lanes_age_ms",
     "sensors.ego": "age_ms",
     "ego": "speed_mps yaw_rate_radps",
     "own_motion": "speed_from speed_sigma_mps yaw_rate_from yaw_rate_sigma_radps pose sources",
