@@ -123,6 +123,11 @@ def step(
     fusion_state, fused = fusion.fuse(
         state.fusion, lidar_tracks, vision_tracks, aligned, frame.image_size, params.fusion, ranged
     )
+    if fused.bereft and params.vision_tracking.forget_heights:
+        vision_state, vision_tracks = vision_tracking.forget_heights(vision_state, vision_tracks, fused.bereft)
+        fusion_state, fused = fusion.fuse(
+            state.fusion, lidar_tracks, vision_tracks, aligned, frame.image_size, params.fusion, ranged
+        )
     vision_state = vision_tracking.learn_heights(vision_state, fused.ranged_boxes(), params.vision_tracking)
     clock.lap("fusion")
     # Existence: evidence from each sensor for and against every object being at its reported position

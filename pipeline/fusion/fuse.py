@@ -61,6 +61,10 @@ class Fusion:
     """Projected clusters in image pixels, by object id."""
     vision_boxes: dict[int, Box]
     """Boxes of the camera tracks in image pixels, by object id."""
+    bereft: Mapping[int, tuple[int, float]] = field(default_factory=dict)
+    """Camera tracks that are seen alone now, while the cluster that they were one object with goes on with another box:
+    one of the two boxes was, or is, that of another vehicle. By track id: id of the other box's track, and the
+    cluster's range in metres."""
 
     def ranged_boxes(self) -> dict[int, tuple[float, float]]:
         """LiDAR distance and its standard deviation, by id of the vision track, for objects that both sensors surely
@@ -145,7 +149,22 @@ def fuse(
     numbered = list(zip(ids, rows, strict=True))
     lidar_boxes = {number: box for number, row in numbered if L in row and (box := projected[row[L]]) is not None}
     vision_boxes = {number: vision[row[V]].bbox for number, row in numbered if V in row}
-    return state, Fusion(_nearest_first(objects), lidar_boxes, vision_boxes)
+    bereft = _bereft(were_one, vision, partner, ranges_m)
+    return state, Fusion(_nearest_first(objects), lidar_boxes, vision_boxes, bereft)
+
+
+def _bereft(
+    were_one: Mask, vision: tuple[VisionTrack, ...], partner: Mapping[int, int], ranges_m: list[float]
+) -> dict[int, tuple[int, float]]:
+    """As ``Fusion.bereft``."""
+    taken = {j: i for i, j in partner.items() if not vision[i].carried}
+    return {
+        each.id: (vision[taken[j]].id, ranges_m[j])
+        for i, each in enumerate(vision)
+        if i not in partner and not each.carried
+        for j in np.flatnonzero(were_one[i]).tolist()
+        if j in taken
+    }
 
 
 def _nearest_first(objects: list[FusedObject]) -> tuple[FusedObject, ...]:

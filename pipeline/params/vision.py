@@ -98,6 +98,11 @@ class VisionTrackingParams(Section):
     learn_height: bool = choice(
         True, "kalman: learn a vehicle's height while the LiDAR ranges it; off: assume that of its class"
     )
+    forget_heights: bool = choice(
+        True,
+        "kalman: a height is forgotten if the cluster by which it was learned turns out to be another vehicle's; off: "
+        "it is kept",
+    )
     use_aspect: bool = choice(
         True, "kalman: a car whose box is tall for its width is taken for a van; off: assume the height of its class"
     )

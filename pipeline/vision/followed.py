@@ -186,6 +186,47 @@ def learned(followed: Followed, range_m: float, sigma_m: float, params: VisionTr
     return evolve(followed, height=height, place_filter=place)
 
 
+def is_likelier(one: Followed, other: Followed, range_m: float) -> bool:
+    """Whether a measured range is rather that of one object than that of the other: it would make its height the more
+    usual one."""
+    return _unusual(one, range_m) < _unusual(other, range_m)
+
+
+def _unusual(followed: Followed, range_m: float) -> float:
+    """|ln(height / usual height)| of an object at a range, as what it is called or as a car; infinite if its box is not
+    measured in this image."""
+    seen, label = followed.seen, followed.track.label
+    if seen is None or seen.distance_m is None:
+        return math.inf
+    by_class = math.log(range_m / (seen.distance_as(label) or seen.distance_m))
+    return min(abs(by_class), abs(by_class + math.log(_class_factor(label, seen))))
+
+
+def without_ranges(followed: Followed) -> Followed:
+    """The object as if its height had never been learned from a range: again as its class, its shape and the road say.
+    Its place moves with that."""
+    seen, label = followed.seen, followed.track.label
+    if seen is None or not followed.height.is_ranged:
+        return followed
+    share = seen.size_share or 0.0
+    height = hinted(
+        followed.shape if label == "car" else BoxShape(), followed.contact, share, _class_factor(label, seen)
+    )
+    followed = evolve(followed, height=height, place_filter=_rescaled(followed, height))
+    if followed.place_filter is None:
+        return followed
+    track = with_place(followed.track, followed.place_filter, followed.placed, height.share(share))
+    return evolve(followed, track=evolve(track, height_from=_height_from(followed)))
+
+
+def _rescaled(followed: Followed, height: Height) -> CvState | None:
+    """The place with another height, so that the change is no motion."""
+    place = followed.place_filter
+    if place is None or height.mean == followed.height.mean:
+        return place
+    return place_filter.scaled(place, height.factor / followed.height.factor)
+
+
 def _hinted(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
     """The object with this sighting, and with what its box tells of the height while no range has: by its shape, and by
     where it meets the road. Its place moves with that, so that it is no motion."""
@@ -202,9 +243,7 @@ def _hinted(followed: Followed, seen: VisionMeasurement, params: VisionTrackingP
     factor = _class_factor(label, seen)
     height = hinted(shape if label == "car" else BoxShape(), contact, seen.size_share or 0.0, factor)
     height = height._replace(contradictions=followed.height.contradictions)
-    place = followed.place_filter
-    if place is not None and height.mean != followed.height.mean:
-        place = place_filter.scaled(place, height.factor / followed.height.factor)
+    place = _rescaled(followed, height)
     return evolve(followed, seen=seen, shape=shape, contact=contact, height=height, place_filter=place)
 
 

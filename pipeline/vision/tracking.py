@@ -30,11 +30,13 @@ from pipeline.vision.followed import (
     Followed,
     PredictedPlace,
     SpeedGuess,
+    is_likelier,
     learned,
     predict_places,
     renamed,
     take_place,
     with_place,
+    without_ranges,
 )
 
 
@@ -113,6 +115,26 @@ def learn_heights(
             learned(each, *ranges[each.track.id], params) if each.track.id in ranges else each
             for each in state.followed
         ),
+    )
+
+
+def forget_heights(
+    state: VisionTrackerState, tracks: tuple[VisionTrack, ...], bereft: Mapping[int, tuple[int, float]]
+) -> tuple[VisionTrackerState, tuple[VisionTrack, ...]]:
+    """The objects and their tracks, without heights that were learned from another vehicle's ranges.
+
+    bereft: by track id, the track whose box has the cluster now by which the height was learned, and the cluster's
+    range in metres. The cluster belongs to the box whose height it makes the more usual one.
+    """
+    by_id = {each.track.id: each for each in state.followed}
+    wrong = {
+        number: without_ranges(by_id[number])
+        for number, (other, range_m) in bereft.items()
+        if by_id[number].height.is_ranged and is_likelier(by_id[other], by_id[number], range_m)
+    }
+    followed = tuple(wrong.get(each.track.id, each) for each in state.followed)
+    return evolve(state, followed=followed), tuple(
+        wrong[each.id].track if each.id in wrong else each for each in tracks
     )
 
 

@@ -53,6 +53,33 @@ def as_bytes(results: list[Result]) -> bytes:
     return out.getvalue().encode()
 
 
+@pytest.mark.parametrize("forgets", [True, False])
+def test_a_height_learned_from_another_vehicle_is_forgotten_at_once(frames: list[Frame], forgets: bool) -> None:
+    """The detector misses a car at 14 m, and boxes one behind it, with which its cluster is joined; then it boxes
+    both."""
+    params = with_changes(Params(), {"vision_tracking.forget_heights": forgets})
+    state, results = State(), []
+    for number, frame in enumerate(frames):
+        raw = frame.raw_boxes
+        assert raw is not None
+        x1, y1, x2, y2 = (float(each) for each in raw.boxes[1])
+        w, h = x2 - x1, y2 - y1
+        behind = (x1 - 0.12 * w, y1 + 0.1 * h, x1 + 0.6 * w, y1 + 0.95 * h)
+        boxes = [behind, (x1, y1, x2, y2)] if number == len(frames) - 1 else [behind]
+        count = len(boxes)
+        seen = RawBoxes("two", np.array(boxes, np.float32), np.full(count, 0.9, np.float32), ("car",) * count)
+        state, result = step(state, dataclasses.replace(frame, raw_boxes=seen), params)
+        results.append(result)
+    before, after = ([item for item in result.objects if item.imaged] for result in results[-2:])
+    (joined,) = [item for item in before if item.source == "VL"]
+    (alone,) = [item for item in after if item.source == "V"]
+    assert [item.lidar_track for item in after if item.source == "VL"] == [joined.lidar_track]
+    assert joined.distance_m is not None
+    assert alone.distance_m is not None
+    assert (alone.distance_m > 1.1 * joined.distance_m) == forgets
+    assert (alone.height_from == "range") != forgets
+
+
 @pytest.mark.parametrize("name", ["default", "paper"])
 def test_the_same_input_twice_gives_the_same_bytes(frames: list[Frame], name: str) -> None:
     first, second = (as_bytes(drive(frames, preset(name))) for _ in range(2))

@@ -67,6 +67,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "path errors of one normal distribution": {"cipv.road_goes_on": 0.0},
     "flanks taken for rears": {"cipv.use_flank": False},
     "boxes widen what drives along": {"cipv.narrow_along": False},
+    "heights of other vehicles kept": {"vision_tracking.forget_heights": False},
     "tall boxes treated like others": {"vision_tracking.use_aspect": False},
     "boxes placed by height alone": {"fusion.use_ground_contact": False},
     "merged clusters left whole": {"fusion.merged_clusters": False},

@@ -185,6 +185,22 @@ def test_the_cluster_of_a_vehicle_that_is_still_boxed_becomes_nothing_else(label
     assert pair.vision_track == who
 
 
+def test_a_box_whose_cluster_goes_on_with_another_box_is_named() -> None:
+    """The nearer of two parked cars was not boxed at first, and its cluster was joined with the farther one's box."""
+    near = lidar_track(1, 15.0)
+    far = vision_track(1, box_of(near), 15.0)
+    state, first = joined([near], [far])
+    assert first.bereft == {}
+    x1, y1, x2, y2 = box_of(near)
+    aside = replace(far, bbox=(x1 - 60, y1, x2 - 60, y2))
+    own = vision_track(2, box_of(near), 15.0)
+    assert joined([near], [aside, own], OPTIMAL, state)[1].bereft == {1: (2, pytest.approx(15.0))}
+    unseen = joined([near], [replace(aside, carried=True), own], OPTIMAL, state)[1]
+    assert unseen.bereft == {}, "it may be hidden"
+    assert joined([near], [aside], OPTIMAL, state)[1].bereft == {}, "nobody else has the cluster"
+    assert joined([near], [aside, replace(own, carried=True)], OPTIMAL, state)[1].bereft == {}
+
+
 @pytest.mark.parametrize(("known", "sources"), [(True, ["VL"]), (False, ["V", "L"])], ids=["joined before", "new"])
 def test_a_pair_stays_joined_when_its_overlap_falls_a_little(known: bool, sources: list[str]) -> None:
     """A lorry that is called a car seems to be at half of its distance. With a few rings, the overlap of its cluster

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.params import VisionTrackingParams
 from pipeline.types import Detection, VisionMeasurement
-from pipeline.vision.tracking import VisionTrackerState, learn_heights, track
+from pipeline.vision.tracking import VisionTrackerState, forget_heights, learn_heights, track
 from pipeline.vision.vehicle_height import FLOOR_SHARE, NEAREST_M, BoxShape, Height, RoadContact, hinted, learn
 
 SPREAD, NOISE = 0.2, 0.03
@@ -138,6 +138,30 @@ def test_what_was_learned_is_kept_when_the_class_turns_out_to_be_another() -> No
         labels.append(one.label)
     assert labels[0] == "car"
     assert labels[-1] == "truck"
+
+
+@pytest.mark.parametrize(("other_m", "is_forgotten"), [(16.0, True), (9.0, False)])
+def test_what_was_learned_from_another_vehicles_ranges_is_forgotten(other_m: float, is_forgotten: bool) -> None:
+    """A car at 22 m, ranged at 16 m by the cluster of a nearer one, which now goes on with another box. other_m: where
+    that box puts its own vehicle. If the cluster fits it less than the first, it was not the first that was wrong."""
+    state = VisionTrackerState()
+    for k in range(6):
+        state, (one,) = track(state, (seen(22.0),), 0.1 if k else None, PARAMS, 0.0)
+        state = learn_heights(state, {one.id: (16.0, 0.2)}, PARAMS)
+    x1, y1, x2, y2 = seen(other_m).detection.bbox
+    beside = replace(seen(other_m), detection=Detection((x1 + 300, y1, x2 + 300, y2), "car", 0.8))
+    state, tracks = track(state, (seen(22.0), beside), 0.1, PARAMS, 0.0)
+    first, second = tracks
+    assert first.distance_m == pytest.approx(16.0, rel=0.05)
+    state, (after, _) = forget_heights(state, tracks, {first.id: (second.id, 16.0)})
+    assert after.distance_m == pytest.approx(22.0 if is_forgotten else 16.0, rel=0.05)
+    assert after.height_from == ("class" if is_forgotten else "range")
+    assert after.sigma_m is not None
+    assert (after.sigma_m > 0.15 * 22.0) == is_forgotten
+    state, (later, _) = track(state, (seen(22.0), beside), 0.1, PARAMS, 0.0)
+    assert later.distance_m == pytest.approx(22.0 if is_forgotten else 16.0, rel=0.05)
+    assert later.velocity_mps is not None
+    assert abs(later.velocity_mps[0]) < 3.0, "the correction is no motion"
 
 
 def test_a_range_of_no_track_changes_nothing() -> None:
