@@ -14,7 +14,9 @@ from pipeline.detection import Detectors, Detects
 from pipeline.types import U8, Frame, RawLanes
 
 FAR_LEFT_OUT = "the far view was left out, because sensor data was dropped: this machine is too slow for all networks"
-LANES_LEFT_OUT = "lane detection was left out, because it still processes an earlier image: this machine is too slow"
+LANES_LEFT_OUT = (
+    "lane detection was left out, because it is still processing an earlier image: this machine is too slow"
+)
 CALM_TICKS = 50
 """Number of ticks without a dropped one after which the far view runs in every tick again: 5 s at 10 Hz."""
 

@@ -59,6 +59,10 @@ class Store:
             return patiently(lambda: bytes(self.system.cat_file(self.path(name))), f"{self.address}/{name}")
         except NotThere:
             return None
+        except NotReachable:  # some stores deny access to what is not there
+            if self.has(name):
+                raise
+            return None
 
     def has(self, name: str) -> bool:
         """Whether there is such a file."""

@@ -123,7 +123,7 @@ def follow(
     # A processed image gives lines on the road, and the pitch for which they are parallel
     pitch = _drifted(state.pitch, now.dt_s, params)
     measured = None
-    if raw is not None and view.aligned is not None:
+    if raw is not None and view.aligned is not None and raw.age_s <= params.max_age_s:
         expected = tracking.expected_shape(state.tracks)
         measured = measure(_beside(raw, view.vehicles), view.aligned, road, pitch, params, expected)
         measured = evolve(measured, lines=tracking.moved(measured.lines, now.ego, raw.age_s))
@@ -178,7 +178,7 @@ def road_edges(raw: RawLanes | None, view: RoadView, state: LaneState, now: Mome
         now: own motion, for what was seen in an earlier image.
         params: of lane tracking.
     """
-    if raw is None or view.aligned is None or state.pitch is None:
+    if raw is None or view.aligned is None or state.pitch is None or raw.age_s > params.max_age_s:
         return None
     edges = _beside(raw.road_edges(), [_wider(box) for box in view.vehicles])
     eye, rays = view.aligned.rays(np.asarray(edges.points, np.float64))

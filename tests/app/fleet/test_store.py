@@ -37,9 +37,11 @@ def test_a_file_that_may_not_be_read_is_not_taken_for_a_missing_one(store: Store
     def denied(_: str) -> bytes:
         raise PermissionError("Forbidden")
 
+    store.write("a.json", b"{}")
     monkeypatch.setattr(store.system, "cat_file", denied)
     with pytest.raises(BadInput, match=r"a\.json: access denied"):
         store.read("a.json")
+    assert store.read("none.json") is None, "some stores deny access to what is not there"
 
 
 @pytest.mark.parametrize("in_a_store", [True, False])

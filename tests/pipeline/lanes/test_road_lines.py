@@ -330,6 +330,13 @@ def test_lines_of_an_earlier_image_are_where_they_are_now() -> None:
         assert np.asarray(line.y_m(now[:, 0])) == pytest.approx(now[:, 1], abs=0.12)
 
 
+def test_lines_of_an_image_before_a_long_silence_are_not_used() -> None:
+    raw = replace(paint(numbered=True), age_s=PARAMS.max_age_s + 0.1)
+    state, lane = follow(LaneState(), raw, RoadView(aligned()), moment(TURNING, 0.1), PARAMS)
+    assert lane is None
+    assert road_edges(raw, RoadView(aligned()), state, moment(TURNING, 0.1), PARAMS) is None
+
+
 def test_edges_of_the_drivable_area_of_an_earlier_image_too() -> None:
     lines = paint(numbered=True)
     edges = replace(lines, line=np.where(lines.line == 0, ROAD_LEFT, ROAD_RIGHT).astype(np.int32), age_s=0.3)
