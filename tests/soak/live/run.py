@@ -61,8 +61,7 @@ OURS = Networks(EMBEDDED, CLASSICAL)
 
 def for_real_roads(lanes: str = OURS.lanes) -> Networks:
     """The setting for real roads and two cores, YOLOX-nano and lanes without a network, where its file is here, else
-    what comes with the program. lanes: a file of ``models``. With TwinLiteNet, which takes both cores for 90 ms, every
-    third result is 180 ms old: it needs more cores."""
+    what comes with the program. lanes: a file of ``models``."""
     detector, network = data_dir() / "models" / "yolox_nano.onnx", data_dir() / "models" / lanes
     return Networks(
         str(detector) if detector.exists() else OURS.detector, str(network) if network.exists() else OURS.lanes
