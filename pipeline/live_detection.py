@@ -1,17 +1,22 @@
-"""Which detectors run on a tick of live sensors. A tick must leave before the next one arrives, and only the newest is
-processed, so what a slow machine has no time for is left out, and the result says so."""
+"""When detectors run on live sensors, and which. A tick must leave before the next one arrives, and only the newest is
+processed, so what a slow machine has no time for is left out, and the result says so. A fast machine is idle until the
+next sweep is complete, and processes the image that belongs to it in the meantime."""
 
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from typing import cast
 
 from pipeline.common.watchdog import NETWORK, at_work
-from pipeline.detection import Detectors, Detects
-from pipeline.types import U8, Frame, RawLanes
+from pipeline.detection import Detectors, Detects, Look, Seen, look
+from pipeline.params import Params
+from pipeline.types import U8, Frame, RawBoxes, RawLanes
+from pipeline.types.source import LiveSource
 
 FAR_LEFT_OUT = "the far view was left out, because sensor data was dropped: this machine is too slow for all networks"
 LANES_LEFT_OUT = (
@@ -19,6 +24,8 @@ LANES_LEFT_OUT = (
 )
 CALM_TICKS = 50
 """Number of ticks without a dropped one after which the far view runs in every tick again: 5 s at 10 Hz."""
+_LOOK_AGAIN_S = 0.005
+"""How often it is checked whether the image of the next tick is known."""
 
 
 class LiveDetectors:
@@ -32,12 +39,18 @@ class LiveDetectors:
     Args:
         detectors: those of the source.
         watching: a context around the work of that thread.
+        ask: how all other detectors are called.
     """
 
     def __init__(
-        self, detectors: Detectors, watching: Callable[[], AbstractContextManager[None]] = nullcontext
+        self,
+        detectors: Detectors,
+        watching: Callable[[], AbstractContextManager[None]] = nullcontext,
+        ask: Look = look,
     ) -> None:
-        self._detectors, self._watching = detectors, watching
+        self._detectors, self._watching, self._ask = detectors, watching, ask
+        self._early: tuple[U8, dict[str, RawBoxes | RawLanes]] | None = None
+        """The image processed before its tick, and what detectors found in it, by their names."""
         self._since_lanes = detectors.lanes_every
         self._last_index: int | None = None
         self._calm = CALM_TICKS
@@ -61,6 +74,40 @@ class LiveDetectors:
             left_out.append(FAR_LEFT_OUT)
         asked = replace(self._detectors, lanes=lanes, lanes_every=1, far=far, far_every=1, left_out=tuple(left_out))
         return frame, asked
+
+    def next_tick(self, source: LiveSource, timeout_s: float, params: Params) -> Frame | None:
+        """The newest tick of the source; None if none arrives in time. Until then, the detectors process the image
+        that it will have."""
+        end_s = time.monotonic() + timeout_s
+        while True:
+            left_s = end_s - time.monotonic()
+            frame = source.next(max(0.0, min(left_s, _LOOK_AGAIN_S)), params.sync)
+            if frame is not None or left_s <= 0.0:
+                return frame
+            upcoming = source.upcoming(params.sync)
+            if upcoming is not None:
+                self._process_early(upcoming, params.detection.far_view)
+
+    def look(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
+        """What the detector found in this image before its tick, or finds in it now."""
+        if self._early is not None and self._early[0] is bgr and detector.name in self._early[1]:
+            return cast("Seen", self._early[1][detector.name])
+        return self._ask(detector, frame, bgr)
+
+    def _process_early(self, frame: Frame, far_view: bool) -> None:
+        """Run those detectors that ``of`` will ask for on the image of a tick."""
+        if frame.image is None or (self._early is not None and self._early[0] is frame.image.bgr):
+            return
+        bgr = frame.image.bgr
+        found: dict[str, RawBoxes | RawLanes] = {}
+        self._early = bgr, found
+        boxes, far, lanes = self._detectors.boxes, self._detectors.far, self._detectors.lanes
+        if boxes is not None:
+            found[boxes.name] = self._ask(boxes, frame, bgr)
+        if far is not None and far_view and self._calm >= CALM_TICKS:
+            found[far.name] = self._ask(far.of(frame), frame, bgr)
+        if lanes is not None and self._detectors.lanes_every == 1:
+            found[lanes.name] = self._ask(lanes, frame, bgr)
 
     def _is_lanes_turn(self, frame: Frame) -> bool:
         is_due = self._since_lanes >= self._detectors.lanes_every and frame.image is not None

@@ -94,7 +94,8 @@ def run_live(
 ) -> Iterator[tuple[Frame, Result]]:
     """The newest tick of live sensors with its result, repeatedly until the iterator is closed, which releases the
     sensors. on_silence: called every half second while no sensor delivers."""
-    return _through(_ticks(source, params, on_silence), params, LiveDetectors(detectors).of, sensors)
+    live = LiveDetectors(detectors)
+    return _through(_ticks(source, params, live, on_silence), params, live.of, sensors, live.look)
 
 
 def patiently(source: Source, index: int) -> Frame:
@@ -134,11 +135,11 @@ def used(detectors: Detectors, params: Params) -> Detectors:
     return detectors if params.detection.far_view else replace(detectors, far=None)
 
 
-def _ticks(source: LiveSource, params: Params, on_silence: Callable[[], None]) -> Iterator[Frame]:
+def _ticks(source: LiveSource, params: Params, live: LiveDetectors, on_silence: Callable[[], None]) -> Iterator[Frame]:
     source.start()
     try:
         while True:
-            frame = source.next(_SILENCE_S, params.sync)
+            frame = live.next_tick(source, _SILENCE_S, params)
             if frame is not None:
                 yield frame
             else:

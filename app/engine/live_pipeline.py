@@ -39,7 +39,9 @@ class LivePipeline:
         self.source = source
         self.newest: ProcessedFrame | None = None
         """The last processed tick."""
-        self._detectors, self._sensors, self._watching = LiveDetectors(detectors, watching), sensors, watching
+        self._ask = _TimedLook()
+        self._detectors = LiveDetectors(detectors, watching, self._ask)
+        self._sensors, self._watching = sensors, watching
         self._first_ns: int | None = None
         self._ticked_s = monotonic()
         self._silence: Notice | None = None
@@ -58,22 +60,21 @@ class LivePipeline:
         return fresh
 
     def wait(self, params: Params, timeout_s: float) -> Frame | None:
-        """The newest tick of the sensors; None if none arrived in time."""
+        """The newest tick of the sensors; None if none arrived in time. The image of the next one is processed
+        meanwhile."""
         with at_work("the sensors' next tick"):
-            return self.source.next(timeout_s, params.sync)
+            return self._detectors.next_tick(self.source, timeout_s, params)
 
     def run(self, frame: Frame, params: Params) -> ProcessedFrame:
         """Run the pipeline on what ``wait`` returned."""
         self._ticked_s = monotonic()
         self._first_ns = frame.t_ns if self._first_ns is None else self._first_ns
         before = self.newest.after if self.newest is not None else State()
-        ask = _TimedLook()
         with at_work("the pipeline"):
             frame, detectors = self._detectors.of(frame)
-            ran = advance(before, frame, params, used(detectors, params), self._sensors, ask)
-        self.newest = ProcessedFrame(
-            before, ran.frame, ran.state, ran.result, ran.lidar, params, ask.spent_ms, exact=True
-        )
+            ran = advance(before, frame, params, used(detectors, params), self._sensors, self._detectors.look)
+        spent_ms = self._ask.since_last_asked_ms()
+        self.newest = ProcessedFrame(before, ran.frame, ran.state, ran.result, ran.lidar, params, spent_ms, exact=True)
         self._ticked_s = monotonic()  # on a busy machine, a tick may take longer than sensors may be silent
         return self.newest
 
@@ -96,11 +97,16 @@ class _TimedLook:
     """Calls detectors directly, and measures their run time."""
 
     def __init__(self) -> None:
-        self.spent_ms = 0.0
+        self._spent_ms = 0.0
+
+    def since_last_asked_ms(self) -> float:
+        """Run time of all detectors since the last call of this method."""
+        spent_ms, self._spent_ms = self._spent_ms, 0.0
+        return spent_ms
 
     def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
         start = perf_counter()
         with at_work(NETWORK + detector.name):
             found = detector.detect(bgr)
-        self.spent_ms += (perf_counter() - start) * 1e3
+        self._spent_ms += (perf_counter() - start) * 1e3
         return found

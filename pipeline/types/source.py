@@ -113,6 +113,12 @@ class LiveSource(Protocol):
         nearest image, or an image alone while the LiDAR is silent. params: how sensors are synchronised."""
         ...
 
+    def upcoming(self, params: SyncParams | None = None) -> Frame | None:
+        """The next tick without its sweep, as soon as its image is known, so that detectors can process that while the
+        sweep is still being measured. The tick has the same array ``image.bgr``, unless its sweep is not at the
+        expected time. None while the image is not known."""
+        ...
+
     @property
     def lidar_mount(self) -> tuple[F64, int] | None:
         """T_ego_lidar (4, 4) and the offset in ns that is added to the LiDAR's timestamps; None without a LiDAR."""

@@ -21,9 +21,9 @@ from pipeline.sources.live.devices.gnss import GnssInput
 from pipeline.sources.live.devices.lidar import LidarInput
 from pipeline.sources.live.devices.sensor_input import Input
 from pipeline.sources.live.health import StreamStats, not_delivering
-from pipeline.sources.live.sync import SensorBuffer, Synchroniser, Together
+from pipeline.sources.live.sync import SensorBuffer, Stamped, Synchroniser, Together
 from pipeline.sources.rig import calibration_for
-from pipeline.types import F64, CameraImage, EgoState, Frame, GnssFix, StreamHealth, Sweep
+from pipeline.types import F64, U8, CameraImage, EgoState, Frame, GnssFix, StreamHealth, Sweep
 from pipeline.types.camera_shot import Shot
 from pipeline.types.source import Opening, Tap
 
@@ -54,6 +54,8 @@ class LiveSensors:
         self._came = threading.Condition()
         self._is_open = False
         self._tap: Tap | None = None
+        self._decoded: tuple[Shot, U8 | None] | None = None
+        """The last decoded image: an upcoming tick and the tick share it."""
         self._wire(config)
         self.notes = _about(config)
 
@@ -125,6 +127,17 @@ class LiveSensors:
         together = self._wait(timeout_s, params or SyncParams())
         return self._frame(together) if together is not None else None
 
+    def upcoming(self, params: SyncParams | None = None) -> Frame | None:
+        """The next tick without its sweep; None while its image is not known."""
+        with self._came:
+            known = self._sync.upcoming(self._clock.now_ns(), params or SyncParams())
+        image = self._image(known.image, []) if known is not None else None
+        if known is None or image is None:
+            return None
+        index = self._index + 1
+        camera = calibration_for(self.camera, image, [])
+        return Frame(index, f"{index:06d}", known.t_ns, image=image, camera=camera, ego=known.ego)
+
     def now_ns(self) -> int:
         """Current time on the timeline of the ticks."""
         return self._clock.now_ns()
@@ -194,7 +207,7 @@ class LiveSensors:
         self.dropped += together.replaced
         self._index += 1 + together.replaced
         notes = list(together.notes)
-        image = self._image(together, notes)
+        image = self._image(together.image, notes) if together.image is not None else None
         decoded_ns = self._clock.now_ns()
         streams = self.health()
         missing = not_delivering(streams)
@@ -218,15 +231,15 @@ class LiveSensors:
             },
         )
 
-    def _image(self, together: Together[Shot], notes: list[str]) -> CameraImage | None:
-        if together.image is None:
-            return None
-        shot = together.image.value
-        bgr = shot.bgr()
+    def _image(self, taken: Stamped[Shot], notes: list[str]) -> CameraImage | None:
+        shot = taken.value
+        if self._decoded is None or self._decoded[0] is not shot:
+            self._decoded = shot, shot.bgr()
+        bgr = self._decoded[1]
         if bgr is None:
             notes.append("the image is damaged")
             return None
-        return CameraImage(together.image.t_ns, bgr, shot.encoded)
+        return CameraImage(taken.t_ns, bgr, shot.encoded)
 
 
 def _about(config: LiveConfig) -> tuple[str, ...]:

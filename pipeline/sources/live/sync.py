@@ -108,6 +108,18 @@ class Together(Generic[P]):
     """What is missing and why."""
 
 
+@dataclass(frozen=True)
+class Upcoming(Generic[P]):
+    """What is known of the next tick before its sweep is complete."""
+
+    t_ns: int
+    """When it will most likely be."""
+    image: Stamped[P]
+    """The image nearest to that time."""
+    ego: EgoState | None
+    """Own motion nearest to that time; None when too old."""
+
+
 class Synchroniser(Generic[P]):
     """``P`` is the type of an image. A sensor that is not configured is simply never added."""
 
@@ -131,6 +143,22 @@ class Synchroniser(Generic[P]):
             if self._newer(image) is not None:
                 return self._together(None, image, params)
         return None
+
+    def upcoming(self, now_ns: int, params: SyncParams) -> Upcoming[P] | None:
+        """The image of the next tick, known before its sweep is complete: a sweep's time is the middle of its
+        rotation, so the image nearest to it usually arrives first. None while a later image may still be nearer, and
+        if the next sweep cannot be foreseen."""
+        last, period_ns = self.sweeps.newest(), self.sweeps.period_ns()
+        if last is None or period_ns is None or self._newer(last) is not None or self.lidar_is_silent(now_ns):
+            return None
+        t_ns = last.t_ns + period_ns
+        newest, image = self._shifted(self.images.newest(), params), self._image_near(t_ns, params)
+        if newest is None or image is None or abs(image.t_ns - t_ns) > params.max_skew_ms * 1e6:
+            return None
+        until_next_ns = self.images.period_ns()
+        if newest.t_ns < t_ns and (until_next_ns is None or newest.t_ns + until_next_ns - t_ns < t_ns - newest.t_ns):
+            return None
+        return Upcoming(t_ns, image, _own_motion_at(self.egos, t_ns, params.ego_offset_ms))
 
     def lidar_is_silent(self, now_ns: int) -> bool:
         """Whether there was no sweep for three of its periods, or never one."""

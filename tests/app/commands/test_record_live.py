@@ -14,7 +14,7 @@ from app.commands.record import Record
 from app.commands.support.options import PipelineOptions, SourceOptions
 from pipeline.params import SyncParams
 from pipeline.recording.session.source import SessionSource
-from pipeline.types import Frame
+from pipeline.types import Frame, StreamHealth
 from tests.app.engine.test_live_engine import Sensors
 from tests.pipeline.sources.live.bench import endless
 from tests.pipeline.sources.live.rig import Replaying, loopback_config
@@ -45,16 +45,16 @@ def test_what_was_recorded_until_an_error_is_a_whole_session(tmp_path: Path, mon
 
 
 class Silent(Sensors):
-    """Sensors that deliver nothing; at the second poll, Ctrl-C is pressed."""
+    """Sensors that deliver nothing; when they are asked why, Ctrl-C is pressed."""
 
     lidar_mount = None
-    looks = 0
+    was_pressed = False
 
-    def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
-        self.looks += 1
-        if self.looks == 2:
+    def health(self) -> tuple[StreamHealth, ...]:
+        if not self.was_pressed:
+            self.was_pressed = True
             os.kill(os.getpid(), signal.SIGINT)
-        return None
+        return super().health()
 
 
 def test_sensors_that_give_nothing_are_said_and_leave_no_file(
@@ -75,11 +75,14 @@ class Overwhelming(Sensors):
     """Sensors that tick three times for every processed frame, until Ctrl-C is pressed."""
 
     lidar_mount = None
+    was_pressed = False
 
     def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
         if self.given >= 6:
-            os.kill(os.getpid(), signal.SIGINT)
-            return None
+            if not self.was_pressed:
+                self.was_pressed = True
+                os.kill(os.getpid(), signal.SIGINT)
+            return super().next(timeout_s, params)
         for _ in range(3):
             self.give(self.given + 1)
         return super().next(timeout_s, params)

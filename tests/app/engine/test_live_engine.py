@@ -66,6 +66,9 @@ class Sensors:
             newest, self._newest = self._newest, None
             return replace(newest, streams=self.health()) if newest is not None else None
 
+    def upcoming(self, params: SyncParams | None = None) -> Frame | None:
+        return None
+
     def now_ns(self) -> int:
         return 10**18 + self._recording.t_ns(self.given)
 

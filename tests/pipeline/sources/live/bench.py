@@ -57,10 +57,11 @@ class MovedClock(HostClock):
 
 @dataclass(frozen=True)
 class Taken:
-    """A frame, and when it was taken, in seconds after the start."""
+    """A frame, and when it was taken, in seconds after the start. known: what was known of it before its sweep."""
 
     frame: Frame
     at_s: float
+    known: Frame | None = None
 
     @property
     def age_s(self) -> float:
@@ -115,12 +116,16 @@ class Bench:
     def drive(self, events: Iterator[WireEvent], params: SyncParams | None = None, until_s: float = 0.0) -> list[Taken]:
         """Every frame, taken as soon as it is available."""
         taken: list[Taken] = []
+        known: Frame | None = None
 
         def look_until(at_ns: int) -> None:
+            nonlocal known
             while True:
                 frame = self.source.next(0.0, params)
                 if frame is not None:
-                    taken.append(Taken(frame, (self.clock.at_ns - START) / SECOND))
+                    taken.append(Taken(frame, (self.clock.at_ns - START) / SECOND, known))
+                    known = None
+                known = self.source.upcoming(params) or known
                 if self.clock.at_ns >= at_ns:
                     return
                 self.clock.at_ns = min(at_ns, self.clock.at_ns + _LOOK_EVERY_NS)

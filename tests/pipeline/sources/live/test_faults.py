@@ -65,6 +65,18 @@ def test_without_trouble_every_sweep_comes_once_with_its_image() -> None:
     assert [each.sensor for each in bench.source.health()] == ["lidar", "camera", "gnss", "ego"]
 
 
+@pytest.mark.parametrize("camera_hz", [30.0, 60.0])
+def test_the_image_of_a_tick_is_known_before_its_sweep(camera_hz: float) -> None:
+    taken, _ = driven(camera_hz=camera_hz)
+    for each in [each for each in taken if each.frame.sweep is not None][5:]:
+        assert each.known is not None
+        assert each.known.image is not None
+        assert each.frame.image is not None
+        assert each.known.image.bgr is each.frame.image.bgr, "decoded once"
+        assert (each.known.index, each.known.ego) == (each.frame.index, each.frame.ego)
+        assert abs(each.known.t_ns - each.frame.t_ns) < 1 * MS
+
+
 def test_camera_of_60_hz_against_lidar_of_10_hz() -> None:
     taken, _ = driven(camera_hz=60.0)
     whole = [each.frame for each in taken if each.frame.sweep is not None][5:]

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.params import SyncParams
-from pipeline.sources.live.sync import SensorBuffer, Synchroniser, Together
+from pipeline.sources.live.sync import SensorBuffer, Synchroniser, Together, Upcoming
 from pipeline.types import EgoState, Sweep
 
 MS = 1_000_000
@@ -37,6 +37,9 @@ class Bench:
 
     def tick(self, now_ms: float) -> Together[str] | None:
         return self.sync.tick(START + round(now_ms * MS), self.params)
+
+    def upcoming(self, now_ms: float) -> Upcoming[str] | None:
+        return self.sync.upcoming(START + round(now_ms * MS), self.params)
 
 
 def at_ms(together: Together[str] | None) -> float | None:
@@ -126,6 +129,66 @@ def test_a_sweep_does_not_wait_longer_than_it_may() -> None:
     together = bench.tick(156 + 26)
     assert together is not None
     assert together.image is not None
+
+
+@pytest.mark.parametrize(
+    ("case", "images", "now_ms", "expected"),
+    [
+        ("the next one will be nearer", (133, 166), 190, None),
+        ("the next one will be farther away", (133, 166, 199), 200, "at 199"),
+        ("one from after the sweep's time is there", (153, 186, 219), 220, "at 186"),
+        ("nearest of several", (191, 202, 213), 217, "at 202"),
+        ("a single image: nobody knows when the next one comes", (199,), 200, None),
+        ("a single image from after the sweep's time", (201,), 202, "at 201"),
+        ("too far away", (100, 130, 270), 271, None),
+        ("no image", (), 200, None),
+    ],
+)
+def test_the_image_of_the_next_sweep_is_known_before_it(
+    case: str, images: tuple[float, ...], now_ms: float, expected: str | None
+) -> None:
+    bench = Bench()
+    bench.lidar(0, 51)
+    bench.tick(90)
+    bench.lidar(100, 151)
+    bench.tick(190)
+    for t in images:
+        bench.camera(t)
+    known = bench.upcoming(now_ms)
+    assert (known.image.value if known is not None else None) == expected, case
+    if known is not None:
+        assert known.t_ns == START + 200 * MS
+        bench.lidar(200, 251)
+        together = bench.tick(280)
+        assert together is not None
+        assert together.image == known.image, "that one"
+
+
+def test_the_image_of_the_next_sweep_is_known_with_the_cameras_offset() -> None:
+    bench = Bench(params=SyncParams(camera_offset_ms=-30.0))
+    bench.lidar(0, 51)
+    bench.lidar(100, 151)
+    bench.tick(190)
+    for t in (166, 199, 232):
+        bench.camera(t)
+    known = bench.upcoming(240)
+    assert known is not None
+    assert known.image.value == "at 232"
+
+
+def test_no_next_sweep_is_expected_before_two_in_a_row_or_while_one_waits_or_from_a_silent_lidar() -> None:
+    bench = Bench()
+    for t in (-17, 17, 83, 117, 183, 217):
+        bench.camera(t)
+    assert bench.upcoming(218) is None, "no sweep"
+    bench.lidar(0, 51)
+    bench.tick(218)
+    assert bench.upcoming(218) is None, "one sweep"
+    bench.lidar(100, 151)
+    assert bench.upcoming(218) is None, "a tick waits"
+    bench.tick(218)
+    assert bench.upcoming(218) is not None
+    assert bench.upcoming(600) is None, "silent"
 
 
 def test_without_a_camera_lidar_goes_on() -> None:
