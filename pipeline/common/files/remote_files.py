@@ -80,6 +80,8 @@ def patiently(work: Callable[[], _T], what: str) -> _T:
     for left in reversed(range(_TRIES)):
         try:
             return work()
+        except NotReachable:  # already says so, as where the package for a store is missing
+            raise
         except PermissionError as error:
             raise NotReachable(f"{what}: access denied: {first_line(error)}") from None
         except Exception as error:  # each store's package has its own errors, without a common base class

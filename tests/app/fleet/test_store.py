@@ -10,6 +10,7 @@ import pytest
 
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
+from pipeline.common.files.remote_files import NotReachable
 
 
 @pytest.fixture
@@ -42,6 +43,19 @@ def test_a_file_that_may_not_be_read_is_not_taken_for_a_missing_one(store: Store
     with pytest.raises(BadInput, match=r"a\.json: access denied"):
         store.read("a.json")
     assert store.read("none.json") is None, "some stores deny access to what is not there"
+
+
+def test_a_store_whose_package_is_missing_is_named_at_once(monkeypatch: pytest.MonkeyPatch):
+    waited: list[float] = []
+
+    def missing(address: str) -> None:
+        raise ImportError("Install adlfs to access Azure")
+
+    monkeypatch.setattr("fsspec.core.url_to_fs", missing)
+    monkeypatch.setattr("time.sleep", waited.append)
+    with pytest.raises(NotReachable, match="^az://fleet/out: Install adlfs"):
+        Store("az://fleet/out").read("a.json")
+    assert waited == []
 
 
 @pytest.mark.parametrize("in_a_store", [True, False])
