@@ -53,7 +53,7 @@ def test_a_store_whose_package_is_missing_is_named_at_once(monkeypatch: pytest.M
 
     monkeypatch.setattr("fsspec.core.url_to_fs", missing)
     monkeypatch.setattr("time.sleep", waited.append)
-    with pytest.raises(NotReachable, match="^az://fleet/out: Install adlfs"):
+    with pytest.raises(NotReachable, match=r"^az://fleet/out: Install adlfs"):
         Store("az://fleet/out").read("a.json")
     assert waited == []
 
