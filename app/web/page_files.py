@@ -7,11 +7,13 @@ these to the addresses with a hash; a browser without import maps asks about eac
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import re
 from base64 import b64encode
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from hashlib import blake2b, sha256
 from mimetypes import guess_type
 from pathlib import Path
@@ -44,28 +46,37 @@ class _File(NamedTuple):
 
 
 class PageFiles(StaticFiles):
-    """Static files. on_ask: called for each request, because a user waits for a page."""
+    """Static files. on_ask: called for each request, because a user waits for a page.
+
+    Pages are put together on a thread of their own, one at a time: that looks at every script, and the event loop
+    answers health checks and sends frames."""
 
     def __init__(self, on_ask: Callable[[], object], folder: Path = STATIC) -> None:
         super().__init__(directory=folder, html=True)
         self._on_ask = on_ask
         self._folder = folder
         self._held: dict[str, _File] = {}
+        self._thread = ThreadPoolExecutor(1, "cipv-pages")
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         """A page with the current addresses of its files, or a file."""
         self._on_ask()
-        name = _file_of(path)
+        name, response = _file_of(path), None
         if scope["method"] in ("GET", "HEAD"):
-            if scope["path"].endswith("/") or name.endswith(".html"):
-                page = self._file(name if name.endswith(".html") else os.path.normpath(f"{name}/index.html"))
-                if page is not None:
-                    return self._page(page.content.decode(), name, scope)
-            asked = parse_qs(scope["query_string"].decode("latin-1")).get("v")
-            file = self._file(name) if asked else None
-            if file is not None and asked == [file.version]:
-                return Response(file.content, media_type=guess_type(name)[0], headers={"cache-control": _STAYS})
-        return await super().get_response(name, scope)
+            response = await asyncio.get_running_loop().run_in_executor(self._thread, self._own, name, scope)
+        return response if response is not None else await super().get_response(name, scope)
+
+    def _own(self, name: str, scope: Scope) -> Response | None:
+        """A page, or a file by an address with the hash of its content; None for anything else."""
+        if scope["path"].endswith("/") or name.endswith(".html"):
+            page = self._file(name if name.endswith(".html") else os.path.normpath(f"{name}/index.html"))
+            if page is not None:
+                return self._page(page.content.decode(), name, scope)
+        asked = parse_qs(scope["query_string"].decode("latin-1")).get("v")
+        file = self._file(name) if asked else None
+        if file is not None and asked == [file.version]:
+            return Response(file.content, media_type=guess_type(name)[0], headers={"cache-control": _STAYS})
+        return None
 
     def file_response(self, *args: Any, **kwargs: Any) -> Response:
         """A file by an address without the hash of its content, or with that of another version."""

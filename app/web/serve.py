@@ -44,13 +44,15 @@ def serve(
     """Serve until Ctrl-C, SIGTERM or SIGHUP. Starts and stops the engine; once it responds, prints the page's address
     on its own line, and links with tokens if other machines can connect.
 
-    always_token: require tokens even if only this machine can connect, since its other users could do everything
-    otherwise. tls: files of a certificate and its key. fleet: the tables that the Fleet view searches. ends_process:
-    the process does nothing else, and ends even if some of its work hangs.
+    hosts: names by which a proxy on this machine asks. always_token: require tokens even if only this machine can
+    connect, since its other users could do everything otherwise. tls: files of a certificate and its key. fleet: the
+    tables that the Fleet view searches. ends_process: the process does nothing else, and ends even if some of its work
+    hangs.
 
     PortTaken and BadInput (a weak token, unreadable accounts, no certificate) are raised before anything is started.
     """
-    is_private = is_loopback(host) and not tuple(hosts) and not always_token
+    hosts = tuple(hosts)
+    is_private = is_loopback(host) and not hosts and not always_token
     tokens = None if is_private else Tokens.from_environment(accounts=Accounts())
     bound = listen_socket(host, port, strict=strict_port)
     number = bound.getsockname()[1]
@@ -75,7 +77,7 @@ def serve(
             alignments = AlignmentVersions(SESSIONS / "alignments.json")
             app = create_app(engine, viser_port, (*hosts, host), marks, looks, tokens, audit, alignments, fleet)
             freeze_loaded_objects("server")
-            Server(app, address, on_ready, tokens, asked, context).run(sockets=[bound])
+            Server(app, address, on_ready, tokens, asked, context, bool(hosts)).run(sockets=[bound])
         finally:
             engine.stop()
             bound.close()

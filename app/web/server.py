@@ -122,7 +122,9 @@ def create_app(
 
 class Server(uvicorn.Server):
     """Prints its address as soon as it responds, and ends shortly after ``asked`` is set. Compression is off, because
-    compressing the stream would cost more than sending it."""
+    compressing the stream would cost more than sending it.
+
+    behind_proxy: a proxy on this machine may say in headers who its client is. Otherwise any program here could."""
 
     def __init__(
         self,
@@ -132,6 +134,7 @@ class Server(uvicorn.Server):
         tokens: Tokens | None = None,
         asked: threading.Event | None = None,
         tls: ssl.SSLContext | None = None,
+        behind_proxy: bool = False,
     ) -> None:
         def shaking_hands(**given: Any) -> asyncio.Protocol:
             return LimitedProtocol(**given) if tls is None else TlsHandshake(tls, partial(LimitedProtocol, **given))
@@ -145,6 +148,7 @@ class Server(uvicorn.Server):
                 ws_per_message_deflate=False,
                 ws_max_size=LARGEST_MESSAGE,
                 timeout_graceful_shutdown=1,
+                proxy_headers=behind_proxy,
                 backlog=_BACKLOG,
             )
         )

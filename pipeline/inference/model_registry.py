@@ -169,12 +169,14 @@ def is_checked(path: Path) -> bool:
 def _expected_sha256(path: Path) -> str | None:
     if _same(path, EMBEDDED_FILE):
         return str(json.loads(law_file(EMBEDDED_FILE).read_text(encoding="utf-8"))["network_sha256"])
-    if not _same(path.parent, store()):
+    # whatever its path: links lead into the store and out of it
+    name = next((each.stem for each in store().glob("*.onnx") if each.exists() and each.samefile(path)), None)
+    if name is None:
         return None
-    registered = _read_registry().models.get(path.stem)
+    registered = _read_registry().models.get(name)
     if registered is not None and registered.sha256:
         return registered.sha256
-    return next((known.sha256 for known in KNOWN if known.name == path.stem), None)
+    return next((known.sha256 for known in KNOWN if known.name == name), None)
 
 
 def known_model(name: str) -> KnownModel:

@@ -42,13 +42,14 @@ class _Client(Protocol):
         """Close the connection at once."""
 
 
-def make_room(connections: MutableSet[_Client]) -> None:
+def make_room(connections: MutableSet[_Client], newest: _Client) -> None:
     """With too many connections, close the one whose client has kept the server waiting longest: for its handshake, for
-    a complete header, or to take more of a response. The new one is among them. Those between two requests come last:
-    a page keeps such a connection."""
+    a complete header, for the rest of a body that is already answered, or to take more of a response. Those between two
+    requests come after them: a page keeps such a connection, and opens another without a word. The newest comes last,
+    so that nobody can lock others out with requests that are answered."""
     if len(connections) > MOST_CONNECTIONS:
         waits = {
-            each: (each.is_between_requests, since_s)
+            each: (each is newest, each.is_between_requests, since_s)
             for each in connections
             if (since_s := getattr(each, "waits_since_s", None)) is not None
         }
@@ -71,14 +72,17 @@ class LimitedProtocol(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
         self._wait(HEADER_S)
-        make_room(self.connections)  # type: ignore[arg-type]
+        make_room(self.connections, self)  # type: ignore[arg-type]
 
     @property
     def waits_since_s(self) -> float | None:
-        """Since when the client has sent no complete header, or received nothing of a response."""
-        if self._stalled_s is not None or not self._is_waiting:
+        """Since when the client has sent no complete header, not the rest of an answered request, or received nothing
+        of a response."""
+        if self._stalled_s is not None:
             return self._stalled_s
-        return self._began_s if self._waits is not None else self._answered_s
+        if self._is_waiting:
+            return self._began_s if self._waits is not None else self._answered_s
+        return self._answered_s if self._is_answered and self.conn.their_state is h11.SEND_BODY else None
 
     @property
     def is_between_requests(self) -> bool:
@@ -88,7 +92,12 @@ class LimitedProtocol(H11Protocol):
     @property
     def _is_waiting(self) -> bool:
         """Whether it is waiting for a complete header."""
-        return self.conn.their_state is h11.IDLE and (self.cycle is None or self.cycle.response_complete)
+        return self.conn.their_state is h11.IDLE and self._is_answered
+
+    @property
+    def _is_answered(self) -> bool:
+        """Whether no response is due."""
+        return self.cycle is None or self.cycle.response_complete
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
@@ -170,7 +179,7 @@ class TlsHandshake(asyncio.Protocol):
         self._transport = transport
         self._connections.add(self)
         self._shaking = self._loop.create_task(self._shake())
-        make_room(self._connections)
+        make_room(self._connections, self)
 
     async def _shake(self) -> None:
         assert self._transport is not None

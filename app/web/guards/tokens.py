@@ -14,6 +14,7 @@ import secrets
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 from app.core.client_role import Account, Role
 from app.web.guards.accounts import Accounts
@@ -21,12 +22,17 @@ from pipeline.common.errors import BadInput
 
 _BYTES = 24
 _MOST_ADDRESSES = 10_000
+_ALL = "all networks"
+"""Their key among those of networks, which are addresses."""
 _HOST_BITS = 64
 """Of an IPv6 address: the part that a host in a network chooses by itself (RFC 4291)."""
 SHORTEST = 16
 """Minimum length of a user-defined token; 16 random characters cannot be guessed over a network."""
 FEWEST_DIFFERENT = 8
 """Minimum number of distinct characters: sixteen random letters have fewer once in ten million cases."""
+_FEWEST_STEPS = 6
+"""Minimum number of distinct steps from one character to the next: ``1234567890123456`` has two, random hexadecimal
+digits have fewer than this less than once in a million cases."""
 _VARIABLES: dict[Role, str] = {"person": "CIPV_TOKEN", "display": "CIPV_DISPLAY_TOKEN"}
 
 
@@ -52,7 +58,7 @@ class Tokens:
             token = environment.get(variable) or secrets.token_urlsafe(_BYTES)
             if len(token) < SHORTEST or not (token.isascii() and token.replace("-", "").replace("_", "").isalnum()):
                 raise BadInput(f"{variable}: must have at least {SHORTEST} letters, digits, - or _")
-            if len(set(token)) < FEWEST_DIFFERENT or _repeats(token):
+            if len(set(token)) < FEWEST_DIFFERENT or _repeats(token) or _counts_up(token):
                 raise BadInput(f"{variable}: too easy to guess; `openssl rand -hex 24` makes a good one")
             chosen[role] = token
         if chosen["person"] == chosen["display"]:
@@ -85,27 +91,42 @@ def _repeats(token: str) -> bool:
     return token in (token + token)[1:-1]
 
 
+def _counts_up(token: str) -> bool:
+    """Whether it follows the alphabet or the digits."""
+    return len({ord(after) - ord(before) for before, after in pairwise(token)}) < _FEWEST_STEPS
+
+
 class Guesses:
     """Wrong tokens by network, since everybody may choose among the 2^64 IPv6 addresses of a network. A client that
-    tries more than ``allowed`` different ones in ``per_s`` must wait for each response; a correct token is never
-    delayed, so that nobody can lock others out."""
+    tries more than ``allowed`` different ones in ``per_s`` must wait for each response, and everyone with a wrong one
+    if all networks together tried more than ``allowed_to_all``: a proxy may believe its client's word for an address. A
+    correct token is never delayed, so that nobody can lock others out."""
 
-    def __init__(self, allowed: int = 10, per_s: float = 60.0, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        allowed: int = 10,
+        per_s: float = 60.0,
+        clock: Callable[[], float] = time.monotonic,
+        allowed_to_all: int = 200,
+    ) -> None:
         self._allowed, self._per_s, self._clock = allowed, per_s, clock
+        self._allowed_to_all = allowed_to_all
         self._wrong: dict[str, dict[bytes, float]] = {}
 
     def wrong(self, address: str, token: str) -> bool:
-        """Count an attempt; returns whether it exceeds the limit. Repeating the same token, as by a page with an old
+        """Count an attempt; returns whether it exceeds a limit. Repeating the same token, as by a page with an old
         cookie, does not count."""
-        address = network_of(address)
+        return self._count(_ALL, self._allowed_to_all, token) or self._count(network_of(address), self._allowed, token)
+
+    def _count(self, whose: str, allowed: int, token: str) -> bool:
         if len(self._wrong) >= _MOST_ADDRESSES:
             self._wrong.clear()  # so many at once come from one attacker who controls all addresses
         now_s = self._clock()
-        recent = {each: at_s for each, at_s in self._wrong.get(address, {}).items() if at_s > now_s - self._per_s}
-        if len(recent) <= self._allowed:
+        recent = {each: at_s for each, at_s in self._wrong.get(whose, {}).items() if at_s > now_s - self._per_s}
+        if len(recent) <= allowed:
             recent.setdefault(_digest(token), now_s)
-        self._wrong[address] = recent
-        return len(recent) > self._allowed
+        self._wrong[whose] = recent
+        return len(recent) > allowed
 
 
 def network_of(address: str) -> str:

@@ -66,7 +66,7 @@ class Bag:
         self.path = path
         unpack_budget.install()
         try:
-            self._reader = AnyReader([path], default_typestore=typestore())
+            self._reader = AnyReader([unpack_budget.BoundedPath(path)], default_typestore=typestore())
             self._reader.open()
             finalize(self, self._reader.close)
             self.topics = _topics(self._reader)

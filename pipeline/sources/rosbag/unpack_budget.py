@@ -1,11 +1,14 @@
-"""Limits the decompressed size of a bag: ``rosbags`` has no limit, and a few kilobytes can decompress to terabytes.
+"""Limits the decompressed size of a bag, and that of its records: ``rosbags`` has no limits, a few kilobytes can
+decompress to terabytes, and a sparse file that takes no disk can contain a record of gigabytes.
 
-The library finds its decompressors in tables of its modules; this module replaces them by bounded ones.
+The library finds its decompressors in tables of its modules; this module replaces them by bounded ones. It opens files
+by the paths that it is given.
 """
 
 from __future__ import annotations
 
 import bz2
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -55,6 +58,31 @@ def bounded(new: Callable[[], Any], largest: int = LARGEST_CHUNK_BYTES) -> Unpac
         return unpacked
 
     return unpack
+
+
+class BoundedPath(type(Path())):  # type: ignore[misc]
+    """A path, and those below it, whose files are read within the budget."""
+
+    def open(self, mode: str = "r", *arguments: Any, **options: Any) -> Any:
+        """A file, as by ``Path.open``. In binary mode, TooLarge for more than one chunk at a time."""
+        return _BoundedReader(io.FileIO(self)) if mode == "rb" else super().open(mode, *arguments, **options)
+
+
+class _BoundedReader(io.BufferedReader):
+    """Reads at most as much at a time as a chunk may have."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        wanted = LARGEST_CHUNK_BYTES + 1 if size is None or size < 0 else min(size, LARGEST_CHUNK_BYTES + 1)
+        return self._checked(super().read(wanted))
+
+    def readline(self, size: int | None = -1, /) -> bytes:
+        assert size is None or size < 0
+        return self._checked(super().readline(LARGEST_CHUNK_BYTES + 1))
+
+    def _checked(self, data: bytes) -> bytes:
+        if len(data) > LARGEST_CHUNK_BYTES:
+            raise TooLarge(f"a record of more than {LARGEST_CHUNK_BYTES >> 20} MB")
+        return data
 
 
 class _BoundedFile:

@@ -256,6 +256,21 @@ def test_weights_that_changed_since_they_were_installed_are_not_run(tmp_path: Pa
     assert model_registry.read_verified(pulled) == CONTENT
 
 
+def test_an_installed_network_is_checked_by_whatever_path_it_is_opened(tmp_path: Path):
+    (tmp_path / "mine.onnx").write_bytes(CONTENT)
+    installed = model_registry.register(tmp_path / "mine.onnx", "mine")
+    link, hard, elsewhere = tmp_path / "link.onnx", tmp_path / "hard.onnx", tmp_path / "elsewhere"
+    link.symlink_to(installed)
+    hard.hardlink_to(installed)
+    assert model_registry.read_verified(link) == CONTENT
+    installed.rename(elsewhere)
+    installed.symlink_to(elsewhere)
+    elsewhere.write_bytes(CONTENT[::-1])
+    for path in (link, hard, installed):
+        with pytest.raises(model_registry.ModelError, match="damaged or was changed"):
+            model_registry.read_verified(path)
+
+
 def test_the_embedded_network_is_the_one_that_its_law_was_fitted_to():
     embedded = model_registry.find(model_registry.EMBEDDED)
     assert embedded is not None

@@ -116,3 +116,9 @@ def test_a_log_that_cannot_be_written_is_said_in_a_line_and_work_goes_on(
         assert wait_until(lambda: any(said in each for each in caplog.messages))
     assert all("\n" not in each for each in caplog.messages)
     assert "Traceback" not in capfd.readouterr().err
+
+
+def test_nobody_claims_another_address(address: str, log: Path):
+    with client(address, "person") as person:
+        person.post("/api/playback", json={"playing": False}, headers={"x-forwarded-for": "192.0.2.7"})
+    assert [each["client"] for each in entries(log, 1)] == ["127.0.0.1"]

@@ -86,6 +86,23 @@ def test_who_is_between_two_requests_is_not_hung_up_on_for_those_who_end_none(
         assert any(b"HTTP/1.1 200" in data for data in iter(lambda: page.recv(1000), b""))
 
 
+@pytest.mark.parametrize(
+    "said",
+    [
+        b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
+        b"POST /api/playback HTTP/1.1\r\nHost: elsewhere\r\nContent-Length: 9\r\n\r\n",
+    ],
+    ids=["asked nothing more", "never sent the body"],
+)
+def test_too_many_who_are_answered_make_room(address: str, said: bytes, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(connections, "MOST_CONNECTIONS", 20)
+    with ExitStack() as stack:
+        for _ in range(20):
+            assert stack.enter_context(half_open(address, said)).recv(9) == b"HTTP/1.1 "
+        for _ in range(3):
+            assert httpx.get(f"{address}/healthz", timeout=WAIT_S).status_code == 200
+
+
 LARGE = b"a" * (16 << 20)
 """More than the system keeps for a client that does not read."""
 

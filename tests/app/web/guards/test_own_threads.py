@@ -22,6 +22,7 @@ from app.streaming.encode import Encoder
 from app.web.guards import accounts, audit
 from app.web.guards.accounts import Accounts, add_account
 from app.web.guards.tokens import Tokens
+from app.web.page_files import PageFiles
 from app.web.server import create_app
 from tests.app.web.serving import WAIT_S, running, serving
 from tests.app.web.test_api_description import routes_of
@@ -165,6 +166,16 @@ def test_a_disk_of_the_accounts_that_hangs_holds_up_only_those_that_it_would_let
         assert httpx.get(f"{address}/api/state", headers=OWN, timeout=WAIT_S).is_success
         hanging.goes_on.set()
         assert answer.result(WAIT_S).status_code == 401
+
+
+@pytest.mark.parametrize("path", ["/drive/", "/js/app.js?v=1"])
+def test_a_disk_of_the_pages_that_hangs_holds_up_only_pages(app: FastAPI, monkeypatch: pytest.MonkeyPatch, path: str):
+    with serving(app) as address, ThreadPoolExecutor(1) as client, Hanging() as hanging:
+        monkeypatch.setattr(PageFiles, "_file", hanging)
+        client.submit(httpx.get, f"{address}{path}", headers=OWN, timeout=WAIT_S)
+        assert hanging.has_begun()
+        assert is_healthy(address)
+        assert httpx.get(f"{address}/api/state", headers=OWN, timeout=WAIT_S).is_success
 
 
 def test_every_route_that_the_event_loop_answers_is_known(app: FastAPI):

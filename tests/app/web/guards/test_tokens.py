@@ -57,6 +57,9 @@ WEAK = {
     "one letter": {"CIPV_TOKEN": "a" * 16},
     "few letters": {"CIPV_TOKEN": "abcabcabdabcabca"},
     "a word again and again": {"CIPV_DISPLAY_TOKEN": "password" * 4},
+    "digits in order": {"CIPV_TOKEN": "1234567890123456"},
+    "the alphabet": {"CIPV_TOKEN": "0123456789abcdefghij"},
+    "letters twice each": {"CIPV_TOKEN": "aabbccddeeffgghh"},
     "with a space": {"CIPV_TOKEN": "a b" * 10},
     "with what a link would change": {"CIPV_DISPLAY_TOKEN": "abc&def=" * 4},
     "the same for both": {"CIPV_TOKEN": PERSON, "CIPV_DISPLAY_TOKEN": PERSON},
@@ -106,3 +109,9 @@ def test_a_guesser_who_changes_its_address_within_a_network_is_slowed_down() -> 
     slowed = [guesses.wrong(f"2001:db8:1:2::{number:x}", f"guess {number}") for number in range(20)]
     assert slowed == [False] * 10 + [True] * 10
     assert not guesses.wrong("2001:db8:1:3::1", "guess 0"), "others are not"
+
+
+def test_a_guesser_who_claims_any_address_is_slowed_down() -> None:
+    guesses = Guesses(clock=lambda: 0.0, allowed_to_all=50)
+    slowed = [guesses.wrong(f"192.0.2.{number}", f"guess {number}") for number in range(100)]
+    assert slowed == [False] * 50 + [True] * 50

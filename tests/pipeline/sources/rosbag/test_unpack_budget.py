@@ -62,3 +62,35 @@ def test_a_bag_whose_chunk_swells_is_read_without_it(
     }
     with pytest.raises(SourceError, match="unpacks to more than"):
         open_source(f"rosbag:{path}")
+
+
+BAGS = {
+    "no.bag": b"",
+    "header.bag": b"#ROSBAG V2.0\n\xff\xff\xff\xff",
+    "header.mcap": b"\x89MCAP0\r\n\x01" + (1 << 40).to_bytes(8, "little"),
+}
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_a_record_of_gigabytes_in_a_file_that_takes_no_disk_is_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setattr(unpack_budget, "LARGEST_CHUNK_BYTES", 1 << 20)
+    path = tmp_path / name
+    with path.open("wb") as file:
+        file.write(BAGS[name])
+        file.truncate(64 << 20)
+    open_source_of(path)  # what is imported at first does not count
+    tracemalloc.start()
+    try:
+        assert open_source_of(path) == f"{name}: cannot be read as a bag: a record of more than 1 MB"
+        assert tracemalloc.get_traced_memory()[1] < 8 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def open_source_of(path: Path) -> str:
+    """What is said about a bag that cannot be opened."""
+    with pytest.raises(SourceError) as raised:
+        open_source(f"rosbag:{path}")
+    return str(raised.value)
