@@ -25,6 +25,8 @@ MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")
 _CHUNK_TIMES = struct.Struct("<QQ")
 _FOOTER = struct.Struct("<QQI")  # start of the summary, start of its offsets, checksum
+SHORTEST_BYTES = 2 * len(MAGIC) + RECORD_HEAD.size + _FOOTER.size
+"""No shorter file has a footer."""
 
 
 class Unreadable(Exception):
@@ -136,6 +138,12 @@ def read_summary(file: BinaryIO, size: int) -> Summary | None:
     if not is_complete or (summary.statistics.message_count and not ends):
         return None
     return summary
+
+
+def is_closed(file: BinaryIO, size: int) -> bool:
+    """Whether a file ends like a complete one."""
+    file.seek(size - len(MAGIC))
+    return file.read(len(MAGIC)) == MAGIC
 
 
 def summary_start(file: BinaryIO, size: int) -> int:

@@ -3,10 +3,12 @@ definitions, and those of Velodyne packets, are then used."""
 
 from __future__ import annotations
 
+import io
 import re
 import sqlite3
 import struct
 from collections.abc import Generator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 from weakref import finalize
@@ -17,8 +19,9 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import TypesysError
 
 from pipeline.common.files.user_file_errors import given_path, reason_of
-from pipeline.common.files.user_files import check_regular
+from pipeline.common.files.user_files import check_regular, open_regular
 from pipeline.formats.velodyne.ros import typestore
+from pipeline.recording.mcap.index import MAGIC, SHORTEST_BYTES, Unreadable, is_closed, read_directory, summary_start
 from pipeline.sources.rosbag import unpack_budget
 from pipeline.sources.rosbag.unpack_budget import CutOff, TooLarge
 from pipeline.types.source import SourceError
@@ -66,6 +69,7 @@ class Bag:
         self.path = path
         unpack_budget.install()
         try:
+            _check_records(path)
             self._reader = AnyReader([unpack_budget.BoundedPath(path)], default_typestore=typestore())
             self._reader.open()
             finalize(self, self._reader.close)
@@ -114,6 +118,19 @@ def bag_path(path: str) -> Path:
     if bag.is_file() and bag.suffix not in _SUFFIXES:
         raise SourceError(f"{path}: not a bag; file names end in {', '.join(_SUFFIXES)}")
     return bag
+
+
+def _check_records(path: Path) -> None:
+    """Whether MCAP files without an index consist of records. The library reads these record by record, also through
+    the hole of a sparse file, where gigabytes of zeros take no disk: nine of them are a record without content."""
+    for each in path.glob("*.mcap") if path.is_dir() else [path] if path.suffix == ".mcap" else []:
+        with open_regular(each) as file, suppress(Unreadable, struct.error):  # the library says why it is none
+            size = file.seek(0, io.SEEK_END)
+            if size < SHORTEST_BYTES or not is_closed(file, size) or summary_start(file, size):
+                continue
+            directory = read_directory(file, size, walk=True)
+            if directory.is_cut and directory.sound_bytes < size - len(MAGIC):
+                raise _Invalid(f"{each.name} has no index, and is damaged after {directory.sound_bytes:,} bytes")
 
 
 def _topics(reader: AnyReader) -> dict[str, Topic]:

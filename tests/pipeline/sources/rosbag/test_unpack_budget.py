@@ -12,6 +12,7 @@ from lz4.frame import LZ4FrameDecompressor
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import reader as rosbag2
 
+from pipeline.recording.mcap.index import MAGIC
 from pipeline.sources import SourceError, open_source
 from pipeline.sources.rosbag import unpack_budget
 from pipeline.sources.rosbag.unpack_budget import TooLarge, bounded
@@ -87,6 +88,25 @@ def test_a_record_of_gigabytes_in_a_file_that_takes_no_disk_is_not_read(
         assert tracemalloc.get_traced_memory()[1] < 8 << 20
     finally:
         tracemalloc.stop()
+
+
+def test_zeros_that_take_no_disk_are_not_read_as_records(tmp_path: Path) -> None:
+    """A hundred million of them here."""
+    path = tmp_path / "hole.mcap"
+    header = record(1, b"".join(len(text).to_bytes(4, "little") + text for text in (b"ros2", b"")))
+    begin, end = MAGIC + header, record(15, bytes(4)) + record(2, bytes(20)) + MAGIC
+    with path.open("wb") as file:
+        file.write(begin)
+        file.seek(900 << 20)
+        file.write(end)
+    said = f"hole.mcap has no index, and is damaged after {len(begin)} bytes"
+    assert open_source_of(path) == f"hole.mcap: cannot be read as a bag: {said}"
+    path.write_bytes(begin + end)
+    assert "damaged" not in open_source_of(path), "without them it is only empty"
+
+
+def record(opcode: int, content: bytes) -> bytes:
+    return bytes([opcode]) + len(content).to_bytes(8, "little") + content
 
 
 def open_source_of(path: Path) -> str:
