@@ -99,8 +99,9 @@ def _counts_up(token: str) -> bool:
 class Guesses:
     """Wrong tokens by network, since everybody may choose among the 2^64 IPv6 addresses of a network. A client that
     tries more than ``allowed`` different ones in ``per_s`` must wait for each response, and everyone with a wrong one
-    if all networks together tried more than ``allowed_to_all``: a proxy may believe its client's word for an address. A
-    correct token is never delayed, so that nobody can lock others out."""
+    if all networks together tried more than ``allowed_to_all``: a proxy may believe its client's word for an address.
+    That takes twenty networks at their limit; at that rate, no token is guessed. A correct token is never delayed, so
+    that nobody can lock others out."""
 
     def __init__(
         self,
