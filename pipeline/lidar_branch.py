@@ -91,7 +91,8 @@ def follow(before: Before, frame: Frame, params: Params, earlier: LidarBranch | 
 
     # Objects on the ground in this sweep, tracked from sweep to sweep
     tracker = before.lidar if dt_s is not None else lidar_tracking.LidarTrackerState()
-    sweep = segmentation.segment(frame.sweep, now.ego, params, clock, tracker, dt_s)
+    road = before.ground if dt_s is not None else None
+    sweep = segmentation.segment(frame.sweep, now.ego, params, clock, tracker, dt_s, road)
     change = _frame_change(last, now, params.motion)
     tracker, tracks = lidar_tracking.track(tracker, sweep.obstacles, dt_s, params.lidar_tracking, change)
     clock.lap("lidar_tracking")

@@ -228,7 +228,7 @@ def step(
         drift=drift_state,
         own=now.motion,
         measured=motion.state,
-        ground=sweep.ground,
+        ground=sweep.ground or state.ground,
         lanes=lane_state,
         edges=edge_state,
         traffic=traffic_state,

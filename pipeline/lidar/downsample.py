@@ -8,10 +8,14 @@ import numpy as np
 from pipeline.params import DownsampleParams
 from pipeline.types import Mask, Sweep
 
+_AHEAD_M = 0.1
+"""The ego origin is the middle of the front bumper, so nothing this far ahead of it belongs to the car. The returns
+nearer than a metre that Astyx's sweeps contain are all more than a metre behind it."""
+
 
 def keep_mask(sweep: Sweep, params: DownsampleParams) -> Mask:
     """(N,) bool: the first and then every ``keep_every``-th point of each channel, in the order of the sweep, without
-    points closer than ``blind_range_m``, since a sensor on the bumper sees the car's own body.
+    points closer than ``blind_range_m`` that are not ahead of the bumper, since a sensor sees the car's own body.
 
     Points are counted per channel, so that every ring is down-sampled equally in any order of points.
     """
@@ -31,8 +35,10 @@ def _thinned(sweep: Sweep, params: DownsampleParams) -> Mask:
 
 @numba.njit(cache=True, nogil=True)
 def _beyond(points, range_m):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(N,) bool: points at least this far away, horizontally."""
+    """(N,) bool: points at least this far away, horizontally, or ahead of the bumper."""
     far, limit2 = np.empty(len(points), dtype=np.bool_), np.float32(range_m * range_m)
+    ahead = np.float32(_AHEAD_M)
     for i in range(len(points)):
-        far[i] = points[i, 0] * points[i, 0] + points[i, 1] * points[i, 1] >= limit2
+        x, y = points[i, 0], points[i, 1]
+        far[i] = (x * x + y * y >= limit2) | (x >= ahead)
     return far

@@ -33,6 +33,19 @@ def no_higher_than(ground: Ground, points: F32, of: Mask, height_m: float) -> Ma
     return np.asarray(kernels.no_higher_than(points, of, ground.planes, ground.edges, height_m))
 
 
+def follow_ground(points: F32, keep: Mask, params: GroundParams, before: Ground | None) -> Ground:
+    """As ``fit_ground``, but if a sweep shows too little of the road for a plane, that of the previous sweep goes on.
+
+    A metre behind a truck, the road that is left to see is a few arcs beside the bumper; taken for obstacles, they form
+    one cluster with the truck, too large for a vehicle.
+    """
+    now = fit_ground(points, keep, params)
+    if before is None or now.fitted.any() or not np.isfinite(before.planes).any():
+        return now
+    mask = no_higher_than(before, points, keep, params.distance_m)
+    return Ground(mask, before.planes, before.edges, np.zeros_like(before.fitted))
+
+
 def fit_ground(points: F32, keep: Mask, params: GroundParams) -> Ground:
     """Planes of the road, and which points lie on it.
 

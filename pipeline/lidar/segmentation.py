@@ -47,9 +47,10 @@ def segment(
     clock: Stopwatch,
     before: LidarTrackerState | None = None,
     dt_s: float | None = None,
+    road_before: Ground | None = None,
 ) -> SegmentedSweep:
     """Obstacles and ground of a sweep. ego: own motion, for deskewing. clock: records a lap for each stage. before:
-    tracker state of the previous sweep, dt_s ago; None to segment each sweep independently."""
+    tracker state of the previous sweep, dt_s ago; None to segment each sweep independently. road_before: its ground."""
     # Move points to where they were at the tick, instead of while the sensor turned
     sweep = deskew.deskew(sweep, ego, params.deskew)
     clock.lap("deskew")
@@ -61,7 +62,7 @@ def segment(
     clock.lap("downsample")
 
     # The road: planes through the lowest points
-    plane = ground.fit_ground(sweep.points, keep, params.ground)
+    plane = ground.follow_ground(sweep.points, keep, params.ground, road_before)
     clock.lap("ground")
 
     # Objects on the road: neighbouring points form one cluster, also across the gaps between rings

@@ -17,7 +17,12 @@ class DownsampleParams(Section):
     """Per-channel down-sampling (paper: "down-sampling … points of each channel")."""
 
     blind_range_m: float = slider(
-        1.0, 0.0, 5.0, 0.1, "m", "Returns nearer than this come from the ego vehicle and are dropped"
+        1.0,
+        0.0,
+        5.0,
+        0.1,
+        "m",
+        "Nearer returns, unless from ahead of the bumper, come from the ego vehicle and are dropped",
     )
     keep_every: int = slider(1, 1, 10, 1, "points", "Keep every n-th point of each channel; 1 keeps all")
 

@@ -25,7 +25,7 @@ class Ground:
     edges: F64
     """(S + 1,) float64, bounds of the segments along x in metres; the outer segments extend beyond theirs."""
     fitted: Mask
-    """(S,) bool, false where the plane is a neighbour's."""
+    """(S,) bool, false where the plane is a neighbour's or the previous sweep's."""
 
     def height(self, xy: npt.NDArray[np.floating]) -> F64:
         """(M,) ground z in metres at (M, 2) ego places; NaN where no ground was found."""

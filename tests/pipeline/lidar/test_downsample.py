@@ -16,10 +16,11 @@ def _sweep(ring: list[int]) -> Sweep:
     return Sweep(0, points, np.array(ring, np.uint8), 16)
 
 
-def test_the_own_body_is_dropped() -> None:
-    points = np.array([[0.6, 0.3, 0.0, 0.0], [0.0, -0.9, 0.0, 0.0], [1.1, 0.0, 0.0, 0.0]], np.float32)
-    kept = keep_mask(Sweep(0, points, np.zeros(3, np.uint8), 16), DownsampleParams(blind_range_m=1.0))
-    assert kept.tolist() == [False, False, True]
+def test_the_own_body_is_dropped_but_nothing_ahead_of_the_bumper() -> None:
+    places = [(-0.6, 0.3), (0.05, -0.9), (-1.1, 0.0), (0.6, 0.3), (1.1, 0.0)]
+    points = np.array([[x, y, 0.0, 0.0] for x, y in places], np.float32)
+    kept = keep_mask(Sweep(0, points, np.zeros(5, np.uint8), 16), DownsampleParams(blind_range_m=1.0))
+    assert kept.tolist() == [False, False, True, True, True]
 
 
 def test_every_second_point_of_each_channel_in_the_order_of_the_sweep() -> None:

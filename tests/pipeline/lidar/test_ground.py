@@ -15,7 +15,7 @@ from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats.base import drive_of
 from pipeline.labels.formats.registry import import_labels
 from pipeline.labels.model import Origin
-from pipeline.lidar.ground import Ground, fit_ground, no_higher_than
+from pipeline.lidar.ground import Ground, fit_ground, follow_ground, no_higher_than
 from pipeline.params import GroundParams
 from pipeline.sources import open_source
 from pipeline.types import F32
@@ -91,6 +91,27 @@ def test_a_hedge_beside_the_car_does_not_lift_the_road_ahead() -> None:
     points[:, 2] += rng.normal(0.0, 0.03, len(points))
     ground = _fit(points)
     assert ground.height(np.array([[-20.0, 0.0], [0.0, 0.0], [20.0, 0.0], [40.0, 0.0]])) == pytest.approx(-1.7, abs=0.1)
+
+
+def test_the_road_goes_on_a_metre_behind_a_truck() -> None:
+    """It leaves a few arcs of road to see, too short for a plane; as obstacles they would join the truck."""
+    points = np.array([[0.0, 0.0, 0.0, 0.0]], np.float32)
+    free, stuck = (_ahead_of_the_bumper(blocks) for blocks in ([], [(0.5, -1.25, -0.1, 8.0, 1.25, 3.0)]))
+    road = fit_ground(free, np.ones(len(free), np.bool_), GroundParams())
+    every, on_road = np.ones(len(stuck), np.bool_), stuck[:, 2] < -0.4
+    assert not fit_ground(stuck, every, GroundParams()).mask.any()
+    ground = follow_ground(stuck, every, GroundParams(), road)
+    assert np.array_equal(ground.mask, on_road)
+    assert ground.above(points) == pytest.approx([0.5], abs=0.02)
+    assert not ground.fitted.any()
+    again = follow_ground(stuck, every, GroundParams(), ground)
+    assert np.array_equal(again.mask, on_road), "for as long as it lasts"
+    assert follow_ground(free, np.ones(len(free), np.bool_), GroundParams(), again).fitted.any()
+
+
+def _ahead_of_the_bumper(blocks: list[Block]) -> F32:
+    points = scan(blocks, 0.5)
+    return points[(points[:, 0] > 0.0) & (np.hypot(points[:, 0], points[:, 1]) < 12.0)]
 
 
 def test_points_not_kept_neither_count_nor_are_ground() -> None:
