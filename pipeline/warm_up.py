@@ -18,7 +18,7 @@ from pipeline.fusion import free_road, returns
 from pipeline.lanes import road_lines
 from pipeline.path import corridor, road_edges, traffic
 from pipeline.types import ground_planes, lane
-from pipeline.vision import place_filter
+from pipeline.vision import place_filter, vehicle_height
 
 _LOCK = threading.Lock()
 
@@ -50,6 +50,7 @@ def _warm_up() -> None:
     free_road.warm_up()
     returns.warm_up()
     place_filter.warm_up()
+    vehicle_height.warm_up()
     road_lines.warm_up()
     corridor.warm_up()
     road_edges.warm_up()

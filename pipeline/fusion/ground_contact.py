@@ -1,15 +1,20 @@
-"""The distance of a vehicle by where its box meets the road.
+"""How the lower edge of a box fits the road, at each distance that the vehicle may have.
 
 A distance from the height of a box is only as good as the assumed height of the vehicle: a van that is classified as a
-car is placed a third too near. The lower edge of the box needs no such assumption. It is where the tyres touch the
-road, whose height the LiDAR measures (Stein, Mano, Shashua, IV 2003, on a flat road). The pitch of the car does not
-matter, because both sensors pitch with it. The remaining errors are the shape of the road beyond its last return
-(``pipeline.lidar.road_profile``) and the noise of the edge.
+car is placed a third too near, a truck at half of its distance. The lower edge of the box needs no such assumption. It
+is where the tyres touch the road, whose height the LiDAR measures (Stein, Mano, Shashua, IV 2003, on a flat road). The
+pitch of the car does not matter, because both sensors pitch with it. The remaining errors are the shape of the road
+beyond its last return (``pipeline.lidar.road_profile``) and the noise of the edge.
+
+The road is known well nearby and hardly at all at 100 m. So where a line of sight meets it says little about a truck at
+100 m, but that it passes a metre above the road at 40 m says for sure that this is no car at 40 m. Therefore the edge
+is compared with the road at each distance, with the uncertainty that the road has there; what follows for the height of
+the vehicle is decided in ``pipeline.vision.vehicle_height``.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -19,7 +24,8 @@ from pipeline.common.geometry import F64
 from pipeline.fusion.boxes_in_front import EDGE_PX, nearer
 from pipeline.lidar.road_profile import ASIDE_M, RoadProfile, fit_road_profile
 from pipeline.params import FusionParams
-from pipeline.types import F32, VEHICLES, Ground, Mask, VisionMeasurement
+from pipeline.types import F32, VEHICLES, Ground, Mask, RoadSight, VisionMeasurement
+from pipeline.vision.vehicle_height import HEIGHT_RATIOS
 
 NEAREST_M = 10.0
 """Minimum distance by the box's height. Nearer, the lower edge is as often a shadow as a tyre
@@ -34,19 +40,6 @@ _PITCH_SIGMA_RAD = np.radians(0.15)
 nine of ten starts (docs/reference/accuracy.md); a calibration target is more accurate."""
 _HIDDEN_SHARE = 0.3
 """Covered share of a box's lower edge above which the network draws it where the nearer vehicle begins."""
-_WORTHLESS_SHARE = 0.35
-"""Above this relative sigma, a contact says less than the vehicle's class does."""
-
-
-class _Contacts(NamedTuple):
-    """Where the lower edges of (M,) boxes meet the road."""
-
-    range_m: F64
-    """Horizontal range from the ego origin; NaN if the line of sight does not meet the known strip of road."""
-    share: F64
-    """Standard deviation of ln(range) due to errors that persist from image to image."""
-    noise_share: F64
-    """Standard deviation of ln(range) due to the noise of the edge."""
 
 
 def road_ahead(
@@ -82,25 +75,40 @@ def measure_contacts(
     alignment: Alignment | None,
     params: FusionParams,
 ) -> tuple[VisionMeasurement, ...] | None:
-    """The boxes, with ``contact_m`` and its standard deviations for vehicles whose lower edge is visible. road: None
-    while unknown; then there are no contacts."""
-    if not params.use_ground_contact or not boxes or alignment is None or not alignment.is_metric:
-        return boxes
-    asked = [each.detection.label in VEHICLES and (each.distance_m or 0.0) >= NEAREST_M for each in boxes]
-    if not any(asked) or road is None:
+    """The boxes, with ``road`` for vehicles whose lower edge is visible. road: None while unknown; then no box has
+    any."""
+    if not params.use_ground_contact or not boxes or alignment is None or not alignment.is_metric or road is None:
         return boxes
     bbox = np.array([each.detection.bbox for each in boxes])
-    found = _contacts(bbox, alignment, road)
-    usable = (
-        np.array(asked)
-        & np.logical_not(_hidden_below(bbox))
-        & (np.hypot(found.share, found.noise_share) < _WORTHLESS_SHARE)
-    )
-    columns = (column.tolist() for column in (usable, *found))
-    return tuple(
-        evolve(each, contact_m=range_m, contact_share=share, contact_noise_share=noise) if is_usable else each
-        for each, is_usable, range_m, share, noise in zip(boxes, *columns, strict=True)
-    )
+    law_m = np.array([each.distance_m or 0.0 for each in boxes])
+    is_vehicle = np.array([each.detection.label in VEHICLES for each in boxes])
+    rows = np.flatnonzero(is_vehicle & (law_m >= NEAREST_M) & ~_hidden_below(bbox))
+    if not len(rows):
+        return boxes
+    measured = list(boxes)
+    for row, sight in zip(rows.tolist(), _sights(bbox[rows], law_m[rows], alignment, road), strict=True):
+        measured[row] = evolve(boxes[row], road=sight)
+    return tuple(measured)
+
+
+def _sights(bbox: F64, law_m: F64, alignment: Alignment, road: RoadProfile) -> Iterator[RoadSight | None]:
+    """How the lower edge of each box (M, 4) fits the road; None for those beside the known strip. law_m: (M,) distance
+    of a vehicle as tall as its class."""
+    middle, upper, lower = (bbox[:, 0] + bbox[:, 2]) / 2.0, bbox[:, 1], bbox[:, 3]
+    eye, rays = alignment.rays(np.column_stack([middle, lower]))
+    along = rays / np.hypot(rays[:, 0], rays[:, 1])[:, None]
+    range_m = law_m[:, None] * np.exp(HEIGHT_RATIOS)
+    back = along[:, :2] @ eye[:2]
+    way_m = np.sqrt(range_m**2 + (back**2 - eye[:2] @ eye[:2])[:, None]) - back[:, None]
+    place = eye + along[:, None] * way_m[:, :, None]  # (M, G, 3): on the line of sight, where the vehicle would begin
+    above = (place[:, :, 2] - road.height(place)) / way_m
+    tall = _elevation(alignment, middle, upper) - along[:, 2]
+    noise = (_elevation(alignment, middle, lower - EDGE_PX) - _elevation(alignment, middle, lower + EDGE_PX)) / 2.0
+    by_road = road.height_sigma_m(place[:, :, 0].ravel()).reshape(way_m.shape) / way_m
+    lasting = np.sqrt(by_road**2 + _PITCH_SIGMA_RAD**2 + (_FLOOR_SHARE * tall[:, None]) ** 2)
+    is_known = np.abs(along[:, 1] * law_m) < ASIDE_M
+    for row, known in enumerate(is_known.tolist()):
+        yield RoadSight(above[row], lasting[row], float(abs(noise[row])), float(tall[row])) if known else None
 
 
 def _hidden_below(bbox: F64) -> Mask:
@@ -111,42 +119,8 @@ def _hidden_below(bbox: F64) -> Mask:
     return hidden
 
 
-def _contacts(bbox: F64, alignment: Alignment, road: RoadProfile) -> _Contacts:
-    """Where the lower edges of boxes (M, 4) meet the road."""
-    middle, upper, lower = (bbox[:, 0] + bbox[:, 2]) / 2.0, bbox[:, 1], bbox[:, 3]
-    edges = np.concatenate([lower, lower - EDGE_PX, lower + EDGE_PX])
-    meets = _meets(np.column_stack([np.tile(middle, 3), edges]), alignment, road)
-    (x, _, _), (range_m, far_m, near_m), (closing, _, _) = (each.reshape(3, -1) for each in meets)
-    tall_rad = _elevation(alignment, middle, upper) - _elevation(alignment, middle, lower)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        by_edge = np.log(far_m / near_m) / 2.0
-        by_road = road.height_sigma_m(x) / closing / range_m
-        by_pitch = _PITCH_SIGMA_RAD / closing
-        by_floor = _FLOOR_SHARE * np.maximum(tall_rad / closing, 1.0)
-    return _Contacts(range_m, np.sqrt(by_road**2 + by_pitch**2 + by_floor**2), by_edge)
-
-
 def _elevation(alignment: Alignment, u: F64, v: F64) -> F64:
     """(M,) slope of the lines of sight of pixels u, v (M,): rise per horizontal metre."""
     _, rays = alignment.rays(np.column_stack([u, v]))
     slope: F64 = rays[:, 2] / np.hypot(rays[:, 0], rays[:, 1])
     return slope
-
-
-def _meets(pixels: F64, alignment: Alignment, road: RoadProfile) -> tuple[F64, F64, F64]:
-    """(M,) ego x and range of the points where the lines of sight of pixels (M, 2) meet the road, and by how much they
-    approach it per metre there; NaN where they do not meet."""
-    eye, rays = alignment.rays(pixels)
-    along = rays / np.hypot(rays[:, 0], rays[:, 1])[:, None]
-    height, slope, curvature, cross = road.mean
-    # road minus line of sight, over the horizontal way t: a t² + b t + c
-    a = curvature * along[:, 0] ** 2 / 2.0
-    b = slope * along[:, 0] + curvature * eye[0] * along[:, 0] + cross * along[:, 1] - along[:, 2]
-    c = height + slope * eye[0] + curvature * eye[0] ** 2 / 2.0 + cross * eye[1] - eye[2]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        closing = np.sqrt(b * b - 4.0 * a * c)
-        t = -2.0 * c / (b + closing)
-        t = np.where((t > 0.0) & (c < 0.0), t, np.nan)
-    place = eye[:2] + along[:, :2] * t[:, None]
-    place[np.abs(place[:, 1]) > ASIDE_M] = np.nan
-    return place[:, 0], np.hypot(place[:, 0], place[:, 1]), closing

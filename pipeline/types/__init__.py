@@ -36,7 +36,7 @@ from pipeline.types.frame import (
     StreamHealth,
     Sweep,
 )
-from pipeline.types.measurements import Detection, Ground, Obstacle, VisionMeasurement
+from pipeline.types.measurements import Detection, Ground, Obstacle, RoadSight, VisionMeasurement
 from pipeline.types.objects import FusedObject, HeightFrom, LidarTrack, RangedTrack, VisionTrack
 from pipeline.types.result import (
     DROPPED,
@@ -111,6 +111,7 @@ __all__ = [
     "RawLanes",
     "Rejection",
     "Result",
+    "RoadSight",
     "Route",
     "SensorHealth",
     "Situation",

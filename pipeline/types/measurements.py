@@ -50,6 +50,20 @@ class Detection:
     """0–1."""
 
 
+class RoadSight(NamedTuple):
+    """How a box's lower edge fits the road if the vehicle is G times as tall as its class
+    (``pipeline.vision.vehicle_height.HEIGHT_RATIOS``) and therefore as much farther away."""
+
+    above: F64
+    """(G,) height at which the line of sight of the edge passes over the road there, divided by the distance."""
+    lasting: F64
+    """(G,) its standard deviation for what lasts from image to image: the shape of the road, and the alignment."""
+    noise: float
+    """Its standard deviation for what changes: the noise of the edge."""
+    tall: float
+    """Slope that the box spans from its lower edge to its upper one."""
+
+
 @dataclass(frozen=True)
 class VisionMeasurement:
     """A detection with its estimated place."""
@@ -73,12 +87,8 @@ class VisionMeasurement:
     """Standard deviation of ``ranged_m``."""
     returns: int = 0
     """How many returns that is."""
-    contact_m: float | None = None
-    """The same distance by where the box meets the road; None where that is not seen."""
-    contact_share: float = 0.0
-    """Standard deviation of ln(``contact_m``) for what lasts from image to image."""
-    contact_noise_share: float = 0.0
-    """The same for what changes: the noise of the box's lower edge."""
+    road: RoadSight | None = None
+    """Where its lower edge is relative to the road; None where that is not seen."""
     aspect: float | None = None
     """ln(height / width) of the box; None where it may show only part of the object's width."""
     class_factors: Mapping[str, float] = field(default_factory=dict)

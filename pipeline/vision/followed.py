@@ -15,7 +15,15 @@ from pipeline.params import VisionTrackingParams
 from pipeline.types import HeightFrom, VisionMeasurement, VisionTrack
 from pipeline.vision import place_filter
 from pipeline.vision.place_filter import PlaceMeasurement
-from pipeline.vision.vehicle_height import BoxShape, Height, RoadContact, hinted, learn
+from pipeline.vision.vehicle_height import (
+    BoxShape,
+    Height,
+    RoadContact,
+    hinted,
+    learn,
+    other_class,
+    relative_to,
+)
 
 FASTEST_OVER_GROUND_MPS = 70.0
 """250 km/h: nothing on a road is faster, and a filter that says so has run away."""
@@ -209,9 +217,8 @@ def without_ranges(followed: Followed) -> Followed:
     if seen is None or not followed.height.is_ranged:
         return followed
     share = seen.size_share or 0.0
-    height = hinted(
-        followed.shape if label == "car" else BoxShape(), followed.contact, share, _class_factor(label, seen)
-    )
+    shape, other = followed.shape if label == "car" else BoxShape(), other_class(label, seen.class_factors)
+    height = hinted(shape, followed.contact, share, other)
     followed = evolve(followed, height=height, place_filter=_rescaled(followed, height))
     if followed.place_filter is None:
         return followed
@@ -230,18 +237,17 @@ def _rescaled(followed: Followed, height: Height) -> CvState | None:
 def _hinted(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
     """The object with this sighting, and with what its box tells of the height while no range has: by its shape, and by
     where it meets the road. Its place moves with that, so that it is no motion."""
-    by_class_m = seen.distance_as(followed.track.label)
     shape, contact = followed.shape, followed.contact
     if params.use_aspect:
         shape = shape.seen(seen.aspect)
-    if seen.contact_m is not None and by_class_m is not None:
-        log_ratio = math.log(seen.contact_m / by_class_m)
-        contact = contact.seen(log_ratio, seen.contact_share, seen.contact_noise_share)
+    by_class_m = seen.distance_as(followed.track.label)
+    if seen.road is not None and by_class_m is not None:
+        contact = contact.seen(relative_to(seen.road, math.log((seen.distance_m or by_class_m) / by_class_m)))
     if followed.height.is_ranged:
         return evolve(followed, seen=seen, shape=shape, contact=contact)
     label = followed.track.label
-    factor = _class_factor(label, seen)
-    height = hinted(shape if label == "car" else BoxShape(), contact, seen.size_share or 0.0, factor)
+    other = other_class(label, seen.class_factors)
+    height = hinted(shape if label == "car" else BoxShape(), contact, seen.size_share or 0.0, other)
     height = height._replace(contradictions=followed.height.contradictions)
     place = _rescaled(followed, height)
     return evolve(followed, seen=seen, shape=shape, contact=contact, height=height, place_filter=place)
@@ -266,7 +272,7 @@ def renamed(followed: Followed, label: str, seen: VisionMeasurement) -> Followed
     if before is None or now is None or before == now:
         return followed
     step = math.log(before / now)
-    contact = followed.contact._replace(log_ratio=followed.contact.log_ratio + step)
+    contact = followed.contact.as_ratio_to(step)
     height = followed.height
     if height.sigma is not None:
         height = height._replace(mean=height.mean + step)

@@ -20,7 +20,7 @@ from pipeline.sources import open_source
 from pipeline.types import VEHICLES
 from pipeline.vision import nms
 from pipeline.vision.distance import measure
-from pipeline.vision.vehicle_height import BoxShape, RoadContact, hinted
+from pipeline.vision.vehicle_height import BoxShape, RoadContact, hinted, other_class
 from tests import looking
 from tests.accuracy.drives import FOLDERS
 
@@ -58,13 +58,11 @@ def placed(folder: Path) -> Iterator[Placed]:
         drawn = [project_cuboid(aligned, each, width, height) or (0.0, 0.0, 0.0, 0.0) for each in corners]
         overlap = iou_matrix(np.array([each.detection.bbox for each in boxes]).reshape(-1, 4), np.array(drawn))
         for row, each in enumerate(boxes):
-            if each.contact_m is None or each.distance_m is None or overlap[row].max(initial=0.0) < SAME_IOU:
+            if each.road is None or each.distance_m is None or overlap[row].max(initial=0.0) < SAME_IOU:
                 continue
             true_m = float(np.hypot(*corners[int(overlap[row].argmax())][:, :2].T).min())
-            ratio = math.log(each.contact_m / each.distance_m)
-            contact = RoadContact().seen(ratio, each.contact_share, each.contact_noise_share)
-            factor = max(each.class_factors.get(each.detection.label, 1.0), 1.0)
-            known = hinted(BoxShape().seen(each.aspect), contact, each.size_share or 0.0, factor)
+            contact, other = RoadContact().seen(each.road), other_class(each.detection.label, each.class_factors)
+            known = hinted(BoxShape().seen(each.aspect), contact, each.size_share or 0.0, other)
             by_height = math.log(each.distance_m / true_m)
             sigma = math.hypot(known.share(each.size_share or 0.0), each.noise_share or 0.0)
             if true_m > FAR_M:

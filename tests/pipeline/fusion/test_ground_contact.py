@@ -7,10 +7,11 @@ import pytest
 
 from pipeline.alignment.projection import Alignment, Angular, resolve
 from pipeline.common.geometry import F64
-from pipeline.fusion.ground_contact import measure_contacts, road_ahead
+from pipeline.fusion.ground_contact import NEAREST_M, measure_contacts, road_ahead
 from pipeline.lidar.road_profile import RoadProfile
 from pipeline.params import AlignmentParams, FusionParams
-from pipeline.types import F32, Box, CameraCalibration, Detection, Ground, VisionMeasurement
+from pipeline.types import F32, Box, CameraCalibration, Detection, Ground, RoadSight, VisionMeasurement
+from pipeline.vision.vehicle_height import HEIGHT_RATIOS, BoxShape, RoadContact, hinted
 from tests.pipeline.lidar.test_road_profile import road
 
 EYE_M, FOCAL_PX, HORIZON_PX, MIDDLE_PX = 1.2, 1200.0, 300.0, 640.0
@@ -46,32 +47,52 @@ def seen(bbox: Box, distance_m: float | None, label: str = "car") -> VisionMeasu
     return VisionMeasurement(Detection(bbox, label, 0.8), distance_m, sigma_m, place, 0.05, 0.2)
 
 
-def contact(*boxes: VisionMeasurement, points: F32 | None = None) -> VisionMeasurement:
-    """The measured contact of the first box, given the others."""
+def sight(*boxes: VisionMeasurement, points: F32 | None = None) -> RoadSight | None:
+    """How the lower edge of the first box fits the road, given the others."""
     found = measure_contacts(boxes, swept(points), aligned(), FusionParams())
     assert found is not None
-    return found[0]
+    return found[0].road
+
+
+def ratio_and_sigma(found: RoadSight | None, usual: float = 1.0) -> tuple[float, float]:
+    """The height over that of the class that a road alone tells of a vehicle of any height, and its sigma in ln."""
+    assert found is not None
+    height = hinted(BoxShape(), RoadContact().seen(found), 3.0)
+    assert height.sigma is not None
+    return height.factor * usual, height.sigma
 
 
 @pytest.mark.parametrize("range_m", [15.0, 30.0, 45.0])
-@pytest.mark.parametrize(("height_m", "by_height"), [(1.5, 1.0), (2.1, 0.7)])
-def test_a_van_and_a_car_stand_where_they_meet_the_road(range_m: float, height_m: float, by_height: float) -> None:
-    measured = contact(seen(box_of(range_m, height_m), by_height * range_m))
-    assert measured.contact_m == pytest.approx(range_m, rel=0.05)
-    assert measured.distance_m == by_height * range_m, "the law's own distance stays what it was"
+@pytest.mark.parametrize(("height_m", "by_height"), [(1.5, 1.0), (2.1, 0.7), (3.8, 0.4)])
+def test_a_car_a_van_and_a_truck_stand_where_they_meet_the_road(
+    range_m: float, height_m: float, by_height: float
+) -> None:
+    found = sight(seen(box_of(range_m, height_m), max(by_height * range_m, NEAREST_M)))
+    assert found is not None
+    fits = int(np.abs(found.above).argmin())
+    assert max(by_height * range_m, NEAREST_M) * np.exp(HEIGHT_RATIOS[fits]) == pytest.approx(range_m, rel=0.05)
 
 
-def test_the_farther_the_less_sure_until_it_says_nothing() -> None:
-    shares = [contact(seen(box_of(range_m), range_m)).contact_share for range_m in (15.0, 30.0, 45.0)]
-    assert 0.07 <= shares[0] < shares[1] < shares[2] < 0.2
-    assert contact(seen(box_of(110.0), 110.0)).contact_m is None
+def test_the_farther_the_less_sure() -> None:
+    sigmas = [ratio_and_sigma(sight(seen(box_of(range_m), range_m)))[1] for range_m in (15.0, 30.0, 45.0)]
+    assert 0.07 <= sigmas[0] < sigmas[1] < sigmas[2] < 0.5
 
 
 def test_the_taller_the_vehicle_the_less_sure() -> None:
     """The edge is off by a share of the box's height: for a lorry, three times as far down the road as for a car."""
-    low, tall = (contact(seen(box_of(20.0, height_m), 20.0)).contact_share for height_m in (1.2, 3.6))
-    assert 0.07 <= low < 0.12
-    assert 0.2 < tall < 0.25
+    low, tall = (sight(seen(box_of(20.0, height_m), 20.0)) for height_m in (1.2, 3.6))
+    assert low is not None
+    assert tall is not None
+    assert (tall.lasting > 1.5 * low.lasting).all()
+
+
+def test_a_truck_at_100_m_is_no_car_at_40_m() -> None:
+    """Where it meets the road is hardly known at that distance, but the road at 40 m is."""
+    found = sight(seen(box_of(100.0, 3.75), 40.0))
+    assert found is not None
+    at_40, at_100 = (int(np.abs(HEIGHT_RATIOS - np.log(ratio)).argmin()) for ratio in (1.0, 2.5))
+    assert found.above[at_40] > 3.0 * found.lasting[at_40]
+    assert abs(found.above[at_100]) < found.lasting[at_100]
 
 
 @pytest.mark.parametrize("slope", [-0.04, 0.04])
@@ -79,8 +100,16 @@ def test_a_road_that_rises_or_falls_is_followed(slope: float) -> None:
     range_m = 30.0
     bottom = HORIZON_PX + FOCAL_PX * (EYE_M - slope * range_m) / range_m
     u1, _, u2, _ = box_of(range_m)
-    measured = contact(seen((u1, bottom - 60.0, u2, bottom), range_m), points=road(slope=slope))
-    assert measured.contact_m == pytest.approx(range_m, rel=0.06)
+    found = sight(seen((u1, bottom - 60.0, u2, bottom), range_m), points=road(slope=slope))
+    assert found is not None
+    assert abs(HEIGHT_RATIOS[int(np.abs(found.above).argmin())]) < 0.07
+
+
+def test_a_lower_edge_above_the_horizon_fits_the_road_nowhere() -> None:
+    found = sight(seen((600.0, 200.0, 680.0, 290.0), 40.0))
+    assert found is not None
+    assert (found.above > 0.0).all()
+    assert found.above[0] > found.above[-1]
 
 
 NEARER = seen(box_of(15.0), 15.0)
@@ -94,17 +123,16 @@ NEARER = seen(box_of(15.0), 15.0)
         ("nearer than a height is learned", (seen(box_of(9.0), 9.0),)),
         ("no vehicle", (seen(box_of(40.0), 40.0, "person"),)),
         ("beside the road", (seen(box_of(30.0, y_m=9.0), 30.0),)),
-        ("its lower edge is above the horizon", (seen((600.0, 200.0, 680.0, 290.0), 40.0),)),
     ],
 )
 def test_no_contact(case: str, boxes: tuple[VisionMeasurement, ...]) -> None:
-    assert contact(*boxes).contact_m is None, case
+    assert sight(*boxes) is None, case
 
 
 def test_a_nearer_vehicle_beside_it_and_a_second_box_on_itself_hide_nothing() -> None:
-    assert contact(seen(box_of(40.0), 40.0), seen(box_of(15.0, y_m=3.0), 15.0)).contact_m is not None
+    assert sight(seen(box_of(40.0), 40.0), seen(box_of(15.0, y_m=3.0), 15.0)) is not None
     u1, v1, u2, v2 = box_of(40.0)
-    assert contact(seen((u1, v1, u2, v2), 40.0), seen((u1, v1 - 2.0, u2, v2 + 4.0), 36.0)).contact_m is not None
+    assert sight(seen((u1, v1, u2, v2), 40.0), seen((u1, v1 - 2.0, u2, v2 + 4.0), 36.0)) is not None
 
 
 @pytest.mark.parametrize("range_m", [20.0, 40.0])
@@ -112,9 +140,10 @@ def test_a_nearer_vehicle_beside_it_and_a_second_box_on_itself_hide_nothing() ->
 def test_a_camera_that_is_turned_a_little_stays_within_its_sigma(range_m: float, turned_deg: float) -> None:
     u1, v1, u2, v2 = box_of(range_m)
     off = FOCAL_PX * np.radians(turned_deg)
-    measured = contact(seen((u1, v1 + off, u2, v2 + off), range_m))
-    assert measured.contact_m is not None
-    assert abs(np.log(measured.contact_m / range_m)) < 2.2 * measured.contact_share
+    found = sight(seen((u1, v1 + off, u2, v2 + off), range_m))
+    assert found is not None
+    right = int(np.abs(HEIGHT_RATIOS).argmin())
+    assert abs(found.above[right]) < 2.2 * found.lasting[right]
 
 
 def test_without_what_it_rests_on_boxes_stay_as_they_are() -> None:

@@ -9,9 +9,21 @@ import numpy as np
 import pytest
 
 from pipeline.params import VisionTrackingParams
-from pipeline.types import Detection, VisionMeasurement
+from pipeline.types import Detection, RoadSight, VisionMeasurement
 from pipeline.vision.tracking import VisionTrackerState, forget_heights, learn_heights, track
-from pipeline.vision.vehicle_height import FLOOR_SHARE, NEAREST_M, BoxShape, Height, RoadContact, hinted, learn
+from pipeline.vision.vehicle_height import (
+    FLOOR_SHARE,
+    HEIGHT_RATIOS,
+    NEAREST_M,
+    NO_OTHER,
+    BoxShape,
+    Height,
+    OtherClass,
+    RoadContact,
+    hinted,
+    learn,
+    other_class,
+)
 
 SPREAD, NOISE = 0.2, 0.03
 PARAMS = VisionTrackingParams()
@@ -247,53 +259,88 @@ def test_what_the_lidar_taught_counts_more_than_the_shape() -> None:
     assert one.distance_m == pytest.approx(26.0, rel=0.02)
 
 
+EYE_M, LAW_M = 1.2, 40.0
+
+
+def sight(log_ratio: float, sigma: float = 0.07, noise: float = 0.0, law_m: float = LAW_M) -> RoadSight:
+    """A box whose lower edge meets a flat road where ln(height ratio) is ``log_ratio``, give or take ``sigma``."""
+    slope = EYE_M / law_m * math.exp(-log_ratio)
+    above = EYE_M / law_m * np.exp(-HEIGHT_RATIOS) - slope
+    return RoadSight(above, np.full(len(HEIGHT_RATIOS), sigma * slope), noise * slope, 1.5 / law_m)
+
+
+def contact(log_ratio: float, sigma: float) -> RoadContact:
+    return RoadContact().seen(sight(log_ratio, sigma))
+
+
+MAY_BE_A_TRUCK = OtherClass(math.log(2.0), 0.03)
+
+
 @pytest.mark.parametrize(
-    ("case", "contact", "factor", "sigma"),
+    ("case", "seen_on_road", "other", "factor", "sigma"),
     [
-        ("no contact", RoadContact(), 1.0, None),
-        ("a van", RoadContact().seen(math.log(1.4), 0.07, 0.0), 1.35, 0.105),
-        ("a road that is hardly known", RoadContact().seen(math.log(1.4), 0.2, 0.0), 1.18, 0.168),
-        ("as the class says", RoadContact().seen(0.0, 0.07, 0.0), 1.0, 0.066),
-        ("taller than any van", RoadContact().seen(math.log(2.2), 0.07, 0.0), 1.0, None),
-        ("half as tall as a car", RoadContact().seen(math.log(0.5), 0.12, 0.0), 1.0, None),
-        ("as low as a sports car, or lower", RoadContact().seen(math.log(0.7), 0.1, 0.0), 0.82, 0.1),
+        ("no contact", RoadContact(), NO_OTHER, 1.0, None),
+        ("a van", contact(math.log(1.4), 0.07), NO_OTHER, 1.36, 0.08),
+        ("a road that is hardly known", contact(math.log(1.4), 0.2), NO_OTHER, 1.21, 0.16),
+        ("as the class says", contact(0.0, 0.07), NO_OTHER, 1.0, 0.07),
+        ("a truck that is called a car", contact(math.log(2.1), 0.1), MAY_BE_A_TRUCK, 1.86, 0.25),
+        ("half as tall as a car", contact(math.log(0.5), 0.12), NO_OTHER, 0.82, 0.24),
+        ("something hides its tyres", contact(math.log(3.2), 0.07), NO_OTHER, 1.0, 0.2),
     ],
 )
-def test_where_boxes_meet_the_road_tells_the_height_as_well_as_the_road_is_known(
-    case: str, contact: RoadContact, factor: float, sigma: float | None
+def test_how_boxes_fit_the_road_tells_the_height_as_well_as_the_road_is_known(
+    case: str, seen_on_road: RoadContact, other: OtherClass, factor: float, sigma: float | None
 ) -> None:
-    height = hinted(BoxShape(), contact, SPREAD)
-    assert height.factor == pytest.approx(factor, abs=0.01), case
-    assert height.sigma == (None if sigma is None else pytest.approx(sigma, abs=0.001)), case
+    height = hinted(BoxShape(), seen_on_road, SPREAD, other)
+    assert height.factor == pytest.approx(factor, rel=0.05), case
+    assert height.sigma == (None if sigma is None else pytest.approx(sigma, rel=0.2)), case
     assert not height.is_ranged
 
 
-def test_a_road_that_contradicts_the_class_leaves_both_possible() -> None:
-    """A truck whose boxes meet the road at 40 % of the law's distance: their edges are too low, or it is no truck."""
-    height = hinted(BoxShape(), RoadContact().seen(math.log(0.4), 0.2, 0.0), SPREAD, 1.6)
+def test_a_line_of_sight_above_the_road_leaves_a_car_and_a_truck_possible() -> None:
+    """The road is known at the distance of a car, and hardly at that of a truck."""
+    found = sight(math.log(2.2), 0.07)
+    found = found._replace(lasting=found.lasting * np.where(HEIGHT_RATIOS < 0.4, 3.0, 8.0))
+    height = hinted(BoxShape(), RoadContact().seen(found), SPREAD, MAY_BE_A_TRUCK)
     assert height.sigma is not None
-    assert height.mean - 2.0 * height.sigma < math.log(0.45)
-    assert height.mean + 2.0 * height.sigma > 0.0
+    assert height.mean - 2.0 * height.sigma < 0.0 < math.log(2.0) < height.mean + 2.0 * height.sigma
+    assert height.sigma > SPREAD
 
 
 def test_what_is_called_a_truck_may_be_a_car() -> None:
-    contact = RoadContact().seen(math.log(1.0 / 1.6), 0.08, 0.0)
-    assert hinted(BoxShape(), contact, SPREAD).sigma is None
-    assert hinted(BoxShape(), contact, SPREAD, 1.6).factor == pytest.approx(1.6**-0.86, rel=0.01)
+    as_car, other = contact(math.log(1.0 / 1.6), 0.08), other_class("truck", {"car": 1.0, "truck": 1.6})
+    assert other.ratio == pytest.approx(math.log(1.0 / 1.6))
+    assert hinted(BoxShape(), as_car, SPREAD, other).factor == pytest.approx(1.0 / 1.6, rel=0.08)
+    assert hinted(BoxShape(), as_car, SPREAD).factor > 1.05 / 1.6
+
+
+def test_only_what_the_detector_confuses_may_be_another_class() -> None:
+    factors = {"car": 1.0, "truck": 1.6, "bus": 2.0, "motorcycle": 0.8}
+    assert other_class("car", factors).ratio == pytest.approx(math.log(2.0))
+    assert other_class("bus", factors).ratio == pytest.approx(-math.log(2.0))
+    assert other_class("motorcycle", factors) == NO_OTHER
+    assert other_class("car", {"car": 1.0}) == NO_OTHER
 
 
 def test_a_contact_averages_single_boxes() -> None:
-    contact = RoadContact()
+    seen_on_road, sigmas = RoadContact(), []
     for k in range(20):
-        contact = contact.seen(0.3 + (0.1 if k % 2 else -0.1), 0.08, 0.1)
-        assert math.sqrt(contact.variance) > 0.08, "the road stays unknown"
-    assert contact.log_ratio == pytest.approx(0.3, abs=0.02)
-    assert math.sqrt(contact.variance) == pytest.approx(math.hypot(0.08, 0.1 / math.sqrt(10)))
+        seen_on_road = seen_on_road.seen(sight(0.1 + (0.1 if k % 2 else -0.1), 0.08, 0.1))
+        sigmas.append(hinted(BoxShape(), seen_on_road, SPREAD).sigma or 0.0)
+    assert hinted(BoxShape(), seen_on_road, SPREAD).mean == pytest.approx(0.09, abs=0.02)
+    assert sigmas[9] == pytest.approx(sigmas[19], rel=1e-3)
+    assert sigmas[9] < 0.85 * sigmas[0]
+    assert sigmas[19] > 0.07, "the road stays unknown"
+
+
+def test_a_contact_is_the_same_place_for_another_class() -> None:
+    moved = contact(0.3, 0.07).as_ratio_to(-0.2)
+    assert hinted(BoxShape(), moved, 3.0).mean == pytest.approx(0.1, abs=0.01)
 
 
 def test_a_range_overrules_a_contact() -> None:
     """Even a contact that is far off and has a small sigma."""
-    height = hinted(BoxShape(), RoadContact().seen(0.4, 0.03, 0.0), SPREAD)
+    height = hinted(BoxShape(), contact(0.4, 0.03), SPREAD)
     for _ in range(5):
         height = learn(height, 25.0, NOISE, SPREAD, 25.0, 0.2)
     assert height.is_ranged
@@ -305,8 +352,9 @@ def test_a_van_that_only_the_camera_sees_stands_where_it_meets_the_road(from_k: 
     """It keeps its distance; the correction by the road is not motion. from_k: when its lower edge becomes visible."""
     state, true_m = VisionTrackerState(), 50.0
     for k in range(25):
-        contact_m = true_m if k >= from_k else None
-        measured = replace(seen(true_m / 1.4), contact_m=contact_m, contact_share=0.08 if contact_m else 0.0)
+        law_m = true_m / 1.4
+        on_road = sight(math.log(1.4), 0.08, law_m=law_m) if k >= from_k else None
+        measured = replace(seen(law_m), road=on_road, class_factors={"car": 1.0})
         state, (one,) = track(state, (measured,), 0.1 if k else None, PARAMS, 0.0)
     assert one.distance_m == pytest.approx(true_m * 1.4**-0.14, rel=0.02)
     assert one.sigma_m is not None
@@ -323,7 +371,7 @@ def test_another_class_leaves_a_vehicle_where_it_meets_the_road() -> None:
         plain = seen(40.0 * factors[label] / 1.25)
         measured = replace(
             plain, detection=replace(plain.detection, label=label), class_factors=factors,
-            contact_m=40.0, contact_share=0.07,
+            road=sight(math.log(1.25 / factors[label]), law_m=40.0 * factors[label] / 1.25),
         )  # fmt: skip
         state, (one,) = track(state, (measured,), 0.1 if k else None, PARAMS, 0.0)
         assert one.distance_m == pytest.approx(40.0, rel=0.1)
