@@ -22,13 +22,16 @@ from pipeline.decision.path_position import place
 from pipeline.decision.place import SURE, Place
 from pipeline.fusion.last_place import AGREEMENT_SIGMAS, LastPlace, is_elsewhere, last_place
 from pipeline.params import CipvParams
-from pipeline.types import Cipv, FusedObject, Moment, Path, Rejection, sensors_in_words
+from pipeline.types import VEHICLES, Cipv, FusedObject, Moment, Path, Rejection, sensors_in_words
 
 _BLUR_M = 0.2
 """Sightings of an object that moves sideways are averaged over at most the time in which it moves this far."""
 _HOVERS_MPS = 1.0
 _DRIVES_S = 1.0
 """What was surely moving for this long has driven: a new side that comes into view moves an object for less."""
+_BOXED_S = 0.5
+"""What camera and LiDAR both saw for this long, as a vehicle, is one: a box matches a neighbour's cluster for a few
+sweeps at most (``pipeline.fusion.existence``)."""
 _HALF_WAY = 0.7
 """A running mean reaches half of a step after 0.7 of its time constant: an object that moves sideways is judged at its
 predicted position at that time."""
@@ -46,6 +49,8 @@ class CipvState:
     """By object id."""
     driving_s: dict[int, float] = field(default_factory=dict)
     """By object id, time for which it was seen to drive."""
+    boxed_s: dict[int, float] = field(default_factory=dict)
+    """By object id, time for which both sensors saw it, the camera as a vehicle."""
 
 
 class Choice(NamedTuple):
@@ -70,6 +75,8 @@ class _Judged(NamedTuple):
     """Running mean of its log-odds; None if its position is not known."""
     driving_s: float
     """Time for which it was seen to drive."""
+    boxed_s: float
+    """Time for which both sensors saw it, the camera as a vehicle."""
     why_not: str | None
     """Why it cannot be the lead; None if it can."""
 
@@ -98,7 +105,8 @@ def choose(
     odds = {each.item.id: each.odds for each in judged if each.odds is not None}
     at = {each.item.id: last_place(each.item) for each in judged}
     driving_s = {each.item.id: each.driving_s for each in judged if each.driving_s > 0.0}
-    return CipvState(lead.id if lead is not None else None, odds, at, driving_s), choice
+    boxed_s = {each.item.id: each.boxed_s for each in judged if each.boxed_s > 0.0}
+    return CipvState(lead.id if lead is not None else None, odds, at, driving_s, boxed_s), choice
 
 
 def _judge(
@@ -121,14 +129,18 @@ def _judge(
         now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY) if clears_s is None else -SURE
         before = now if moved else state.odds.get(item.id, now)
         odds = before + _fresh(moment.dt_s, decide_s) * (now - before)
-    driving_s = 0.0 if moved else state.driving_s.get(item.id, 0.0)
+    driving_s, boxed_s = (0.0 if moved else known.get(item.id, 0.0) for known in (state.driving_s, state.boxed_s))
     if item.surely_moving:
         driving_s += moment.dt_s or 0.0
-    has_driven = driving_s >= _DRIVES_S
+    if item.seen_by_camera and item.seen_by_lidar and item.label in VEHICLES:
+        boxed_s += moment.dt_s or 0.0
+    has_driven, was_boxed = driving_s >= _DRIVES_S, boxed_s >= _BOXED_S
     is_ahead = where is not None and where.ahead_m > 0.0
     probability = 1.0 / (1.0 + exp(-odds)) if is_ahead and odds is not None else 0.0
     is_in = probability > 0.5
-    verdict = judge(Candidate(item, where, odds or 0.0, leads, widening_m, path, params, clears_s, has_driven))
+    verdict = judge(
+        Candidate(item, where, odds or 0.0, leads, widening_m, path, params, clears_s, has_driven, was_boxed)
+    )
     if clears_s is None and where is not None and where.margin_m() >= 0.0 and is_ahead:
         comes_in = where.middle_m * where.believed_mps < 0.0
         if not is_in or (comes_in and not verdict.eligibility.probable):
@@ -145,11 +157,11 @@ def _judge(
         crossing_s=crossing_s,
         clears_path_s=clears_s,
     )
-    return _Judged(item, odds, driving_s, verdict.why_not)
+    return _Judged(item, odds, driving_s, boxed_s, verdict.why_not)
 
 
 def _rejections(judged: list[_Judged], lead: FusedObject | None) -> Iterator[Rejection]:
-    for item, _, _, why_not in judged:
+    for item, *_, why_not in judged:
         if why_not is not None:
             yield Rejection(item.id, why_not)
         elif lead is not None and item.id != lead.id:

@@ -54,6 +54,8 @@ class Candidate(NamedTuple):
     """How long before the car arrives it will have left the path that it crosses; None if it does not."""
     has_driven: bool = False
     """Whether it was seen to drive for long enough that it did not only seem to."""
+    was_boxed: bool = False
+    """Whether both sensors saw it, the camera as a vehicle, for long enough that it is one."""
 
     @property
     def aside_m(self) -> float:
@@ -156,11 +158,11 @@ def _not_seen(who: Candidate) -> str:
 
 
 def _size(who: Candidate) -> Answer:
-    """An object not classified by a camera must be as large as a vehicle's rear or side: kerbs, posts and hedges are
+    """An object that no camera has classified must be as large as a vehicle's rear or side: kerbs, posts and hedges are
     not leads. The shorter side of a vehicle's box is at most 2.6 m (Directive 96/53/EC), or more if the box is askew by
     20° to 6 m of its flank. A larger one holds several vehicles, such as a passing bus, the lead and a parked car."""
     item, params = who.item, who.params
-    if item.imaged or item.cuboid is None:
+    if item.imaged or who.was_boxed or item.cuboid is None:
         return True, None, params.min_width_m
     length, width, height = item.cuboid.size
     across = length if length > width else width

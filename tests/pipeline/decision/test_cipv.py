@@ -74,6 +74,16 @@ def test_why_not(item: FusedObject, reason: str) -> None:
     assert why_not == {1: reason}
 
 
+@pytest.mark.parametrize(("frames", "stays"), [(7, True), (3, False)])
+def test_what_both_sensors_saw_as_a_vehicle_stays_one_while_the_lidar_follows_it(frames: int, stays: bool) -> None:
+    """A truck at 55 m, on which one ring lies; the camera misses it for more than a second. After a few frames its box
+    may have been a neighbour's."""
+    state, sliver = CipvState(), fused(1, 20.0, source="L", height=0.1)
+    for item in (*(fused(1, 20.0, label="truck"),) * frames, *(sliver,) * 5):
+        state, choice = choose(state, (item,), PATH, moment(dt_s=0.1), PARAMS)
+    assert (choice.lead is not None) == stays
+
+
 @pytest.mark.parametrize(
     "item",
     [
