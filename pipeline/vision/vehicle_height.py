@@ -197,20 +197,22 @@ def warm_up() -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _posterior(above, lasting, noise2, tall, usual, spread, other, odds):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Mean and standard deviation of ln(height / height of the class)."""
-    total = first = second = 0.0
+    """Median and standard deviation of ln(height / height of the class). The median, because the distribution is
+    skewed: the farther away, the less the road says."""
+    weights = np.empty(len(above))
     for k in range(len(above)):
-        ratio = HEIGHT_RATIOS[k]
-        a, b = (ratio - usual) / spread, (ratio - other) / spread
+        a, b = (HEIGHT_RATIOS[k] - usual) / spread, (HEIGHT_RATIOS[k] - other) / spread
         prior = math.exp(-0.5 * a * a) + odds * math.exp(-0.5 * b * b)
         variance = lasting[k] * lasting[k] + noise2
         fits = math.exp(-0.5 * above[k] * above[k] / variance) / math.sqrt(2.0 * math.pi * variance)
-        weight = prior * ((1.0 - _MISDRAWN) * fits + _MISDRAWN / (2.0 * tall))
-        total += weight
-        first += weight * ratio
-        second += weight * ratio * ratio
-    mean = first / total
-    return mean, math.sqrt(max(second / total - mean * mean, 0.0))
+        weights[k] = prior * ((1.0 - _MISDRAWN) * fits + _MISDRAWN / (2.0 * tall))
+    weights /= weights.sum()
+    mean, below, k = (weights * HEIGHT_RATIOS).sum(), 0.0, 0
+    while below + weights[k] < 0.5:
+        below += weights[k]
+        k += 1
+    median = HEIGHT_RATIOS[k] + _STEP * ((0.5 - below) / weights[k] - 0.5)
+    return median, math.sqrt((weights * (HEIGHT_RATIOS - mean) ** 2).sum())
 
 
 def learn(

@@ -283,7 +283,7 @@ MAY_BE_A_TRUCK = OtherClass(math.log(2.0), 0.03)
         ("a van", contact(math.log(1.4), 0.07), NO_OTHER, 1.36, 0.08),
         ("a road that is hardly known", contact(math.log(1.4), 0.2), NO_OTHER, 1.21, 0.16),
         ("as the class says", contact(0.0, 0.07), NO_OTHER, 1.0, 0.07),
-        ("a truck that is called a car", contact(math.log(2.1), 0.1), MAY_BE_A_TRUCK, 1.86, 0.25),
+        ("a truck that is called a car", contact(math.log(2.1), 0.1), MAY_BE_A_TRUCK, 2.03, 0.25),
         ("half as tall as a car", contact(math.log(0.5), 0.12), NO_OTHER, 0.82, 0.24),
         ("something hides its tyres", contact(math.log(3.2), 0.07), NO_OTHER, 1.0, 0.2),
     ],
