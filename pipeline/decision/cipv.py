@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from math import exp, hypot
+from math import exp
 from typing import NamedTuple
 
 from pipeline.common.fast_replace import evolve
@@ -20,7 +20,8 @@ from pipeline.decision.gates import Candidate, judge, may_cut_in
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.decision.path_position import place
 from pipeline.decision.place import SURE, Place
-from pipeline.fusion.last_place import AGREEMENT_SIGMAS, LastPlace, is_elsewhere, last_place
+from pipeline.decision.same_car import Rival, surer, surety, the_same
+from pipeline.fusion.last_place import LastPlace, is_elsewhere, last_place
 from pipeline.params import CipvParams
 from pipeline.types import VEHICLES, Cipv, FusedObject, Moment, Path, Rejection, sensors_in_words
 
@@ -51,6 +52,8 @@ class CipvState:
     """By object id, time for which it was seen to drive."""
     boxed_s: dict[int, float] = field(default_factory=dict)
     """By object id, time for which both sensors saw it, the camera as a vehicle."""
+    rival: Rival | None = None
+    """The object that would lead if it were not probably the same car as the lead; None without one."""
 
 
 class Choice(NamedTuple):
@@ -95,7 +98,9 @@ def choose(
     # The nearest object that meets all conditions is the lead
     able = [each.item for each in judged if each.why_not is None]
     nearest = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
-    lead = _surer(nearest, able) if nearest is not None else None
+    lead, rival = None, None
+    if nearest is not None:
+        lead, rival = the_same(state.lead_id, state.rival, surer(nearest, able), able, params.confirm_hits)
     choice = Choice(
         objects=tuple(each.item for each in judged),
         lead=_named(lead, _why(lead, len(able))) if lead is not None else None,
@@ -106,7 +111,7 @@ def choose(
     at = {each.item.id: last_place(each.item) for each in judged}
     driving_s = {each.item.id: each.driving_s for each in judged if each.driving_s > 0.0}
     boxed_s = {each.item.id: each.boxed_s for each in judged if each.boxed_s > 0.0}
-    return CipvState(lead.id if lead is not None else None, odds, at, driving_s, boxed_s), choice
+    return CipvState(lead.id if lead is not None else None, odds, at, driving_s, boxed_s, rival), choice
 
 
 def _judge(
@@ -179,30 +184,11 @@ def _widening_m(leads: bool, moving_mps: float, params: CipvParams) -> float:
     return params.hysteresis_m * max(0.0, 1.0 - abs(moving_mps) / _HOVERS_MPS) if leads else 0.0
 
 
-def _surer(nearest: FusedObject, able: list[FusedObject]) -> FusedObject:
-    """The nearest candidate, or a better measured one that is probably the same car. One car has two rows if its box
-    and its cluster were not joined, or if it was lost and found again under another id. If the two distances agree, a
-    carried row yields to one seen now, and a camera-only row to one with a measured range."""
-    rank = _surety(nearest)
-    same_place = [item for item in able if _surety(item) > rank and _agree(nearest, item)]
-    return min(same_place, key=lambda item: (item.distance_m or 0.0, item.id), default=nearest)
-
-
-def _surety(item: FusedObject) -> int:
-    return 0 if item.carried else 2 if item.ranged else 1
-
-
-def _agree(a: FusedObject, b: FusedObject) -> bool:
-    """Whether two distances agree within three standard deviations of both."""
-    if a.distance_m is None or b.distance_m is None:
-        return False
-    sigma = hypot(a.distance_sigma_m or 0.0, b.distance_sigma_m or 0.0)
-    return abs(a.distance_m - b.distance_m) <= AGREEMENT_SIGMAS * sigma
-
-
 def _why_after(item: FusedObject, lead: FusedObject) -> str:
-    doubtful = (item.distance_m or 0.0) < (lead.distance_m or 0.0)
-    return f"probably the same object as #{lead.id}, which is better measured" if doubtful else f"behind #{lead.id}"
+    if (item.distance_m or 0.0) >= (lead.distance_m or 0.0):
+        return f"behind #{lead.id}"
+    better = ", which is better measured" if surety(lead) > surety(item) else ""
+    return f"probably the same object as #{lead.id}{better}"
 
 
 # ---------------------------------------------------------------- next lead
