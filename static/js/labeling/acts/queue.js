@@ -153,7 +153,8 @@ async function settle({ act, done }, answer) {
   if (answer.act != null) savedAt_ms = Date.now();
   tell("saved");
   const how = { undo: "undone: ", redo: "redone: " }[act.kind] ?? "";
-  set("said", how + [answer.what, answer.note].filter(Boolean).join(": "));
+  // a task reports its outcome itself, which may already have arrived
+  if (!answer.task) set("said", how + [answer.what, answer.note].filter(Boolean).join(": "));
   if (answer.changed) {
     for (const later of queue) later.act = rebased(later.act, act, answer);
     await data.accept(answer.changed);
