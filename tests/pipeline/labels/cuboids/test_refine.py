@@ -224,7 +224,7 @@ def hand_drawn(sightings: tuple[Sighting, ...], rng: np.random.Generator) -> lis
 
 
 def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
-    """Up to 15 m, for the side that faces the sensor, where it changes anything. A mesh's bumper is not flat, so its
+    """Up to 15 m, for the sides that face the sensor, where it changes anything. A mesh's bumper is not flat, so its
     face lies some centimetres inside."""
     source = open_source("sim:straight")
     names = tuple(str(index) for index in range(len(source)))
@@ -250,9 +250,10 @@ def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
                 continue
             if not snapped.is_better:
                 continue
-            found, ((x, y, _), (length, _, _), yaw_rad) = snapped.cuboid, true.cuboid
+            found, ((x, y, _), (length, width, _), yaw_rad) = snapped.cuboid, true.cuboid
             rear = found.center[0] - found.size[0] / 2 - (x - length / 2)
-            off.append((abs(rear), abs(found.center[1] - y), abs(math.remainder(found.yaw_rad - yaw_rad, math.tau))))
+            aside = abs(found.center[1]) - found.size[1] / 2 - (abs(y) - width / 2) if abs(y) > width / 2 else 0.0
+            off.append((abs(rear), abs(aside), abs(math.remainder(found.yaw_rad - yaw_rad, math.tau))))
     assert len(off) >= 10
     rear_m, aside_m, yaw_rad = np.median(off, axis=0)
     assert rear_m < 0.07
