@@ -72,6 +72,19 @@ def test_a_parked_cars_rear_and_side_are_one_outline_over_own_motion() -> None:
     assert max(before) < 0.85
 
 
+@pytest.mark.parametrize(("label", "height_m"), [("car", 1.5), ("truck", 2.6)])
+def test_a_car_under_a_tree_is_no_taller_than_cars_are(label: str, height_m: float) -> None:
+    """With points, and without."""
+    car = standing(15.0, 4.0, size=(4.4, 1.8, 2.6))
+    seen = {at: clustered(sweep_of(standing(15.0, 4.0))) for at in range(3)}
+    for sweeps in (seen.get, lambda _: None):
+        (after,) = refined([replace(track_of(dict.fromkeys(range(4), car)), label=label)], sweeps, driving(0.0, 4))
+        for each in after.sightings:
+            assert each.cuboid is not None
+            assert each.cuboid.size[2] == height_m
+            assert each.cuboid.center[2] - height_m / 2 == pytest.approx(car.center[2] - 1.3)
+
+
 def test_a_driving_car_is_laid_over_itself_along_its_track() -> None:
     """It keeps its distance while the ego vehicle drives: aligned by ego motion, its points would be smeared over 14
     m."""
