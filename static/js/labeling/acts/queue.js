@@ -158,7 +158,7 @@ async function settle({ act, done }, answer) {
   tell("saved");
   const how = { undo: "undone: ", redo: "redone: " }[act.kind] ?? "";
   // a task reports its outcome itself, which may already have arrived
-  if (!answer.task) set("said", how + [answer.what, answer.note].filter(Boolean).join(": "));
+  if (!("task" in answer)) set("said", how + [answer.what, answer.note].filter(Boolean).join(": "));
   if (answer.changed) {
     for (const later of queue) later.act = rebased(later.act, act, answer);
     await data.accept(answer.changed);

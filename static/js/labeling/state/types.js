@@ -113,7 +113,6 @@
  * @property {string} what in a few words
  * @property {LabelsAnswer|null} changed
  * @property {string} note
- * @property {number} [task] a task was begun; it has none of the others but `what`
  * @typedef {object} Still one frame of a track's filmstrip
  * @property {number} frame
  * @property {"keyframe"|"end"|"fits worst"} why

@@ -22,7 +22,10 @@ export class Labels {
     this.taken = [];
   }
 
-  /** Whether a rectangle is in view. @param {number} left @param {number} top @param {number} right @param {number} bottom */
+  /**
+   * Whether a rectangle is in view.
+   * @param {number} left @param {number} top @param {number} right @param {number} bottom
+   */
   shows(left, top, right, bottom) {
     return left < this.width && right > 0 && top < this.bottom && bottom > this.top;
   }
