@@ -117,7 +117,10 @@ function draw() {
   ctx.restore();
 }
 
-/** Name tags within the part of the image that is in view. @param {CanvasRenderingContext2D} ctx @param {Frame} frame */
+/**
+ * Name tags within the part of the image that is in view.
+ * @param {CanvasRenderingContext2D} ctx @param {Frame} frame
+ */
 export function tagsIn(ctx, { image }) {
   const [width, height] = [image?.width ?? 0, image?.height ?? 0].map((side) => side * laid.scale);
   return new Labels(
