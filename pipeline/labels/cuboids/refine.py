@@ -59,9 +59,9 @@ _LARGEST_BODY_M: dict[str, tuple[float, float]] = {"car": (LONGEST_CAR_M, WIDEST
 """Points of a car that extend farther are of something beside it, too: boxes 8 m long and 2.6 m wide were proposed on
 labelled cars, with an IoU of 0.3."""
 _TALLEST_BODY_M = {"car": 2.0}
-"""Points of a car that reach higher are of a tree or a sign above it. The heights of proposed cuboids are then 0.13 m off
-instead of 0.26 m (mean, KITTI 0009), 0.14 instead of 0.20 (Astyx), 0.18 instead of 0.25 (its further frames); of KITTI
-0052, none is as tall. Vans of more than 2 m that the detector calls cars become too low; they are fewer."""
+"""Points of a car that reach higher are of a tree or a sign above it. The heights of proposed cuboids are then 0.13 m
+off instead of 0.26 m (mean, KITTI 0009), 0.14 instead of 0.20 (Astyx), 0.18 instead of 0.25 (its further frames); of
+KITTI 0052, none is as tall. Vans of more than 2 m that the detector calls cars become too low; they are fewer."""
 _MEAN_M: dict[str, tuple[float, float]] = {"car": (4.1, 1.8)}
 """Length and width of labelled vehicles if they differ from the usual sizes in fusion: the mean of 560 cars in Astyx
 drives other than those used for the measurements above."""
