@@ -276,7 +276,8 @@ def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
 
 @pytest.mark.parametrize("drive", ["astyx", "astyx_more"])
 def test_a_snap_hardly_ever_makes_a_real_box_worse(drive: str, data_dir: Path) -> None:
-    """Up to 50 m. When every box was changed, half of them got worse, a third by more than 0.1."""
+    """Up to 50 m. When every box was changed, half of them got worse, a third by more than 0.1; when each was moved
+    as a whole, 1 % of them."""
     source = open_source(f"astyx:{data_dir / drive}")
     labels, _ = truth_labels(source, tuple(str(index) for index in range(len(source))), ORIGIN)
     sweeps, change = sweeps_in(source), []
@@ -299,5 +300,5 @@ def test_a_snap_hardly_ever_makes_a_real_box_worse(drive: str, data_dir: Path) -
     gains = np.array(change)
     assert len(gains) >= 50
     assert float((gains > 0.02).mean()) > 0.04
-    assert float((gains < -0.02).mean()) < 0.01
-    assert float((gains < -0.1).mean()) < 0.005
+    assert float((gains < -0.02).mean()) < 0.005
+    assert float(gains.min()) > -0.1
