@@ -117,6 +117,20 @@ function draw() {
   ctx.restore();
 }
 
+/**
+ * Name tags within the part of the image that is in view.
+ * @param {CanvasRenderingContext2D} ctx @param {Frame} frame
+ */
+export function tagsIn(ctx, { image }) {
+  const [width, height] = [image?.width ?? 0, image?.height ?? 0].map((side) => side * laid.scale);
+  return new Labels(
+    ctx,
+    Math.min(surface.width, laid.x + width),
+    Math.max(0, laid.y),
+    Math.min(surface.height, laid.y + height),
+  );
+}
+
 /** @param {CanvasRenderingContext2D} ctx @param {Frame} frame */
 function drawBelief(ctx, frame) {
   const layers = get("layers") ?? {},
@@ -125,7 +139,7 @@ function drawBelief(ctx, frame) {
   if (layers.farView && display.far_view) drawWindow(ctx, display.far_view, X, Y);
   if (layers.points) drawPoints(ctx, frame);
   if (layers.lanes && display.lanes) for (const lane of [display.lanes.left, display.lanes.right]) drawLane(ctx, lane);
-  const labels = new Labels(ctx, surface.width, laid.y, laid.y + (frame.image?.height ?? 0) * laid.scale);
+  const labels = tagsIn(ctx, frame);
   const hasObjects = !get("labeling")?.on || get("labeling")?.hasObjects;
   const chosen = hasObjects ? result.objects.find(({ id }) => id === get("selection")) : undefined;
   if (chosen) {

@@ -6,6 +6,9 @@ const menu = $("#menu");
 /** @type {HTMLElement|null} */
 let owner = null;
 
+// what the server says of an entry comes after it is shown
+new ResizeObserver(() => owner && menu.matches(":popover-open") && place(owner)).observe(menu);
+
 /**
  * @param {HTMLElement} button @param {string} label @param {() => (Node|string)[]} fill called on every opening
  */
@@ -36,11 +39,16 @@ export function close() {
   if (menu.matches(":popover-open")) menu.hidePopover();
 }
 
-/** @param {HTMLElement} button */
+/** Below the button if most of the window is there, else above it. @param {HTMLElement} button */
 function place(button) {
+  menu.style.left = "0"; // its text wraps at the window's edge: at the old place, it would be too narrow
+  menu.style.maxHeight = "";
   const at = button.getBoundingClientRect(),
     own = menu.getBoundingClientRect();
-  const below = at.bottom + GAP_PX;
+  const below = at.bottom + GAP_PX,
+    room = innerHeight - below - GAP_PX,
+    isBelow = own.height <= room || room > innerHeight / 2;
   menu.style.left = `${Math.max(GAP_PX, Math.min(at.right - own.width, innerWidth - own.width - GAP_PX))}px`;
-  menu.style.top = `${below + own.height > innerHeight ? Math.max(GAP_PX, at.top - own.height - GAP_PX) : below}px`;
+  menu.style.top = `${isBelow ? below : Math.max(GAP_PX, at.top - own.height - GAP_PX)}px`;
+  if (isBelow) menu.style.maxHeight = `${room}px`;
 }

@@ -34,13 +34,39 @@ def whole(page: Page) -> None:
         page.keyboard.press("<")
 
 
+def tags(page: Page) -> set[str]:
+    """Which of a bus and the selected label have a name tag in the part of the image that is in view."""
+    drawn = page.evaluate(
+        """async () => {
+          const canvas = document.querySelector("#camera"), drawn = [], own = canvas.getContext("2d");
+          own.fillText = (words, x, y) => {
+            if (y > 0 && y < canvas.clientHeight) drawn.push(words);
+            CanvasRenderingContext2D.prototype.fillText.call(own, words, x, y);
+          };
+          const { get, set } = await import("/js/core/store.js");
+          set("layers", { ...get("layers") });
+          await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+          delete own.fillText;
+          return drawn;
+        }"""
+    )
+    names = [words.split() for words in drawn]
+    return {"bus" for words in names if words[1:2] == ["bus"]} | {words[0] for words in names if words[1:2] == ["car"]}
+
+
 def test_the_image_is_zoomed_by_keys_wheel_and_fingers_to_single_pixels(hand: Hand, labels: Labels):
     page = hand.page
-    draw(hand, labels)
+    beside = {**CAR, "center": [LEAD_X, 6.0, 0.1]}
+    labels.act("Ada", {"kind": "add_track", "label": "bus", "frame": START, "cuboid": beside, "bbox": None})
+    made = draw(hand, labels)
     is_saved(page)
     whole(page)
     least, shown = canvas_per_pixel(page), pixels(page, "#camera")
-    for _ in range(14):
+    assert tags(page) == {"bus", f"#{made}"}
+    for _ in range(6):
+        page.keyboard.press(">")
+    assert tags(page) == {f"#{made}"}, "of what is in view"
+    for _ in range(8):
         page.keyboard.press(">")
     assert canvas_per_pixel(page) > 10, "a pixel of the camera is many of the page"
     assert repainted(page, "#camera", shown)

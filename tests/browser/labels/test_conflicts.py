@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
@@ -56,6 +58,31 @@ def test_a_shape_is_shown_in_its_frame_though_the_page_went_on(hand: Hand, label
     line.deaf = False
     dialog.get_by_role("button", name="Use theirs").click()
     is_saved(page)
+
+
+def test_who_keeps_theirs_is_not_asked_again_for_what_came_after_it(hand: Hand, labels: Labels, line: Line) -> None:
+    """Nor does the page keep showing it once somebody else has changed the label again."""
+    page = hand.page
+    made = draw(hand, labels)
+    is_saved(page)
+    was = labels.cuboid(made, START)
+    line.full = line.deaf = True
+    hand.keys("q")
+    expect(page.locator(".saved")).to_have_text("not saved: the disk is full")
+    hand.keys("q", "t")
+    change(labels, made, kind="set_sighting", frame=START, cuboid={**was, "yaw_rad": 0.3})
+    line.full = False
+    page.get_by_role("button", name="Retry").click()
+    dialog = dialog_of(page)
+    line.deaf = False
+    dialog.get_by_role("button", name="Keep mine").click()
+    labels.wait_for(lambda now: now.tracks[made]["label"] == "truck")
+    expect(dialog).to_be_hidden()
+    assert labels.cuboid(made, START)["yaw_rad"] == pytest.approx(was["yaw_rad"] + math.radians(2))
+
+    is_saved(page)
+    change(labels, made, kind="set_sighting", frame=START, cuboid={**was, "yaw_rad": 0.35})
+    expect(page.get_by_label("Heading, degrees to the left")).to_have_value("20.05")
 
 
 def test_a_shape_of_a_track_that_was_removed_is_not_lost(hand: Hand, labels: Labels, line: Line) -> None:

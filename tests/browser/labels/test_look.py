@@ -64,6 +64,14 @@ def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, hei
         assert box["y"] >= 0, part
         assert box["x"] + box["width"] <= width, part
         assert box["y"] + box["height"] <= height, part
+    page.locator(EXPORT).click()
+    menu = page.locator("#menu")
+    expect(menu.locator(".losses li").first).to_be_attached()  # what a format loses comes after the menu is shown
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    box = box_of(menu)
+    assert box["x"] + box["width"] <= width
+    assert box["y"] + box["height"] <= height
+    page.keyboard.press("Escape")
 
 
 def test_the_labels_panel_stays_when_the_window_becomes_small(open_page: OpenPage, site: Site):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -145,6 +146,19 @@ def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, 
     written = json.loads(download.value.path().read_text(encoding="utf-8"))
     accepted = {number for number, each in labels.tracks.items() if each["state"] == "accepted"}
     assert {each["id"] for each in written["labels"]["tracks"]} == accepted
+
+
+def test_the_outcome_of_a_task_does_not_replace_a_later_answer(hand: Hand, labels: Labels, site: Site):
+    whole_drive(hand.page, site)
+    hand.page.evaluate("""async () => {
+        const commands = await import("/js/labeling/acts/commands.js");
+        commands.propose();
+        commands.say("extended #3");
+    }""")
+    labels.wait_for(lambda now: len(now.leads) > 0)
+    expect(hand.page.locator(".said")).to_have_text(re.compile(r"^extended #3 · proposed \d+ tracks"))
+    hand.keys("p")
+    expect(hand.page.locator(".said")).to_have_text(re.compile(r"^(proposed|nothing|no )"))
 
 
 def only_sure_ones_are_listed(hand: Hand, labels: Labels) -> None:

@@ -50,7 +50,7 @@ def standing(x: float, y: float, yaw_rad: float = 0.0, size: tuple[float, float,
     return Cuboid((x, y, GROUND_M + size[2] / 2), size, yaw_rad)
 
 
-@pytest.mark.parametrize(("dx", "dy", "dyaw"), [(0.4, -0.3, 0.1), (-0.5, 0.4, -0.15), (0.5, 0.0, 0.0)])
+@pytest.mark.parametrize(("dx", "dy", "dyaw"), [(0.6, -0.3, 0.1), (-0.5, 0.5, -0.15), (0.5, 0.0, 0.0)])
 def test_a_cuboid_near_a_car_is_laid_on_it(dx: float, dy: float, dyaw: float) -> None:
     car = standing(15.0, 4.0, 0.1)
     found = refit(sweep_of(car), standing(15.0 + dx, 4.0 + dy, 0.1 + dyaw))
@@ -59,6 +59,15 @@ def test_a_cuboid_near_a_car_is_laid_on_it(dx: float, dy: float, dyaw: float) ->
     assert found.cuboid.center == pytest.approx(car.center, abs=0.12)
     assert found.cuboid.size == pytest.approx(car.size, abs=0.12)
     assert found.cuboid.yaw_rad == pytest.approx(0.1, abs=math.radians(2.0))
+
+
+def test_of_a_cuboid_that_is_slightly_off_only_the_contradicted_side_is_moved() -> None:
+    """Whether it is too short or in the wrong place, nobody saw its front."""
+    car = standing(15.0, 4.0)
+    found = refit(sweep_of(car, faces="rear"), standing(15.3, 4.0))
+    assert found.is_better
+    assert found.cuboid.center[0] - found.cuboid.size[0] / 2 == pytest.approx(15.0 - 4.4 / 2, abs=0.05)
+    assert found.cuboid.center[0] + found.cuboid.size[0] / 2 == pytest.approx(15.3 + 4.4 / 2)
 
 
 def test_a_cuboid_that_fits_is_left_as_it_is() -> None:
@@ -98,7 +107,7 @@ def test_points_of_a_wider_body_do_not_widen_a_car() -> None:
 
 def test_of_a_car_seen_from_behind_length_and_turn_are_a_hands() -> None:
     car = standing(15.0, 0.0)
-    found = refit(sweep_of(car, faces="rear"), standing(15.4, 0.2, 0.02))
+    found = refit(sweep_of(car, faces="rear"), standing(15.5, 0.2, 0.02))
     assert (found.turned, found.cuboid.yaw_rad) == (False, 0.02)
     assert found.cuboid.size == pytest.approx(car.size, abs=0.1)
     assert found.cuboid.center[0] == pytest.approx(15.0, abs=0.1)
@@ -107,7 +116,7 @@ def test_of_a_car_seen_from_behind_length_and_turn_are_a_hands() -> None:
 
 def test_a_part_seen_in_one_sweep_turns_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """The rear and a metre of the side: a corner has a yaw of its own."""
-    sweep, drawn = sweep_of(standing(13.4, 3.84, 0.1, (1.2, 1.8, 1.5))), standing(14.7, 4.1, 0.0)
+    sweep, drawn = sweep_of(standing(13.4, 3.84, 0.1, (1.2, 1.8, 1.5))), standing(15.0, 4.1, 0.0)
     assert not refit(sweep, drawn).turned
     monkeypatch.setattr(snap, "_FEWEST_TO_TURN", 0)
     assert refit(sweep, drawn).turned, "the points would have it so"
@@ -180,7 +189,7 @@ def test_where_nothing_tells_it_is_said(frame: Frame) -> None:
 
 
 def test_real_cars_are_found_where_the_labels_have_them(data_dir: Path) -> None:
-    """Astyx: the cars in every fifth frame that the LiDAR sees, from a box around them and from a point half a metre
+    """Astyx: the cars in every fifth frame that the LiDAR sees, from a box around them and from a point 0.7 m
     off."""
     source = open_source(f"astyx:{data_dir / 'astyx'}")
     lifted, fitted = [], []
@@ -193,7 +202,7 @@ def test_real_cars_are_found_where_the_labels_have_them(data_dir: Path) -> None:
             if item.label.lower() != "car" or box is None or _points_in(frame, item.cuboid) < 10:
                 continue
             x, y, z = item.cuboid.center
-            off = Cuboid((x + 0.4, y - 0.3, z), item.cuboid.size, item.cuboid.yaw_rad + 0.1)
+            off = Cuboid((x + 0.6, y - 0.4, z), item.cuboid.size, item.cuboid.yaw_rad + 0.1)
             fitted.append(_apart(refit(frame.sweep.points, off).cuboid, item.cuboid))
             if box[0] > 1.0 and box[2] < frame.camera.width - 1.0:
                 lifted.append(_apart(lift(frame, Params(), "car", bbox=box).cuboid, item.cuboid))

@@ -33,6 +33,7 @@ export const refOf = ({ id, revision }) => ({ kind: "track", id, revision });
 export async function propose() {
   const isMarked = get("marked") !== null,
     whole = { first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1) };
+  say(""); // the outcome is reported beside what is said from now on
   const answer = await span.over((frames) => act({ kind: "propose", ...(isMarked ? frames : whole), from: "run" }));
   if (!answer) offerComputed();
   return answer;

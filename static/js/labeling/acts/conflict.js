@@ -5,7 +5,7 @@ import { num } from "../../core/format.js";
 import { isOwn } from "../../drive/own_playhead.js";
 import { seekTo } from "../../drive/seek.js";
 import { on } from "../../core/store.js";
-import { shown, trackOf } from "../state/labels.js";
+import { leadName, shown, trackOf } from "../state/labels.js";
 import { fromAbove, inImage, pathFromAbove, range } from "./conflict_image.js";
 import { open } from "../panels/dialogs.js";
 import { based } from "./revisions.js";
@@ -231,6 +231,7 @@ const WORDS = {
   frame: counted,
   first: counted,
   last: counted,
+  lead: leadName,
   cuboid: cuboidWords,
   bbox: (box) => `${box.map((/** @type {number} */ each) => Math.round(each)).join(", ")} px`,
   left: lineWords,

@@ -8,7 +8,7 @@ import { get, on, set } from "../../core/store.js";
 import { choose } from "./conflict.js";
 import * as data from "../state/sync.js";
 import { knownName, personName } from "../state/person.js";
-import { rebased } from "./revisions.js";
+import { rebased, rebasedOnKept } from "./revisions.js";
 import { driveNow } from "../state/undo_state.js";
 
 /** @typedef {import("../state/types.js").Act} Act */
@@ -133,7 +133,11 @@ async function refused(waiting, refusal) {
   data.look(); // this page may be behind the server
   if (item) {
     const mine = await choose(waiting.act, detail, item, theirs, revision);
-    if (mine) return queue.unshift({ ...waiting, act: mine, body: { ...waiting.body, act_id: newId() } });
+    if (mine) {
+      // who kept theirs is not asked again for what was done after it
+      for (const later of queue) later.act = rebasedOnKept(later.act, waiting.act, mine);
+      return queue.unshift({ ...waiting, act: mine, body: { ...waiting.body, act_id: newId() } });
+    }
   }
   tell("saved");
   set("said", refusal.message);
@@ -153,7 +157,8 @@ async function settle({ act, done }, answer) {
   if (answer.act != null) savedAt_ms = Date.now();
   tell("saved");
   const how = { undo: "undone: ", redo: "redone: " }[act.kind] ?? "";
-  set("said", how + [answer.what, answer.note].filter(Boolean).join(": "));
+  // a task reports its outcome itself, which may already have arrived
+  if (!("task" in answer)) set("said", how + [answer.what, answer.note].filter(Boolean).join(": "));
   if (answer.changed) {
     for (const later of queue) later.act = rebased(later.act, act, answer);
     await data.accept(answer.changed);

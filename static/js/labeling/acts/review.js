@@ -17,6 +17,9 @@ import { knownName, mayReview } from "../state/person.js";
  * @typedef {{ref: import("../state/types.js").ItemRef, name: string, comment: string}} Target
  */
 
+/** Revision of the labels at which the server knew of nothing to review. @type {number|null} */
+let doneAt = null;
+
 export const isReviewing = () => get("labeling")?.on === true && get("labeling")?.review === true;
 
 export function toggleReview() {
@@ -55,6 +58,7 @@ async function step(frame, direction, after, isLast = false) {
     say(found.message);
     return true;
   }
+  doneAt = found.left ? null : (get("labels")?.revision ?? null);
   if (found.frame === null || !found.item) {
     if (isLast)
       say(
@@ -104,8 +108,12 @@ export function target() {
   };
 }
 
-/** @param {import("../state/types.js").LeadRange} lead */
-const awaitsReview = ({ state, reviewer }) => (state === "accepted" || state === "corrected") && !reviewer;
+/** Not this person's own. @param {import("../state/types.js").LeadRange} lead */
+const awaitsReview = ({ state, reviewer, origin }) =>
+  (state === "accepted" || state === "corrected") &&
+  !reviewer &&
+  !(origin.maker === "person" && origin.name === knownName()) &&
+  get("labels")?.revision !== doneAt;
 
 /** Approve the label under review. */
 export async function reviewOk() {

@@ -65,3 +65,19 @@ export function rebased(act, earlier, answer) {
       : revision;
   });
 }
+
+/**
+ * Rebase a waiting act on an earlier one that was kept in a conflict.
+ * @param {Act} act
+ * @param {Act} before the earlier one as it was refused
+ * @param {Act} kept the same, based on the other person's change
+ * @returns {Act}
+ */
+export function rebasedOnKept(act, before, kept) {
+  const old = refsOf(before),
+    now = refsOf(kept);
+  return based(act, ({ kind, id, revision }) => {
+    const at = old.findIndex((each) => each.kind === kind && each.id === id && each.revision === revision);
+    return now[at]?.revision ?? revision;
+  });
+}

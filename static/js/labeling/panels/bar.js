@@ -17,6 +17,7 @@ import * as offer from "./offer.js";
 import { markMore, scrolls } from "../../core/scrolled_row.js";
 import * as review from "../acts/review.js";
 import * as span from "../state/marked_frames.js";
+import { besides } from "../state/outcome.js";
 
 /** @typedef {import("../state/types.js").Lead} Lead */
 
@@ -273,7 +274,7 @@ function reflectTask() {
   task.dataset.failed = String(isFailed);
   if (current && !current.running && !isFailed && current.id !== ended) {
     ended = current.id;
-    set("said", current.note);
+    set("said", besides(said.textContent ?? "", current.note));
   }
   if (!current) return;
   const bar = $("progress", HTMLProgressElement, task);

@@ -87,7 +87,9 @@ export async function release() {
   const now = get("draft");
   if (now?.track !== track || now.frame !== frame) return;
   const left = answer?.changed?.tracks.find(({ id }) => id === track)?.revision ?? revision;
-  if (now !== draft) set("draft", { ...now, revision: Math.max(now.revision, left) });
+  // not the object: an answer to an earlier change replaces it
+  const isEdited = now.cuboid !== cuboid || now.bbox !== bbox || now.box_set !== box_set;
+  if (isEdited) set("draft", { ...now, revision: Math.max(now.revision, left) });
   else if (answer) settle({ ...now, revision: left }, answer.revision);
   else set("draft", null);
 }

@@ -1,4 +1,5 @@
 /** Labels in the camera image: cuboid edges, boxes and names. */
+import { tagsIn } from "../../views/camera.js";
 import { drawBox, drawCuboid } from "../../views/drawing/image.js";
 import { get } from "../../core/store.js";
 import { presentOf, present } from "../state/draft.js";
@@ -6,7 +7,6 @@ import { shown } from "../state/labels.js";
 import { lookOf } from "./style.js";
 import { isOn } from "../state/mode.js";
 import { NEW } from "./projection.js";
-import { Labels } from "../../views/drawing/text_labels.js";
 
 /** @typedef {import("../state/types.js").Box} Box */
 /** @typedef {import("../state/types.js").LabelSighting} LabelSighting */
@@ -26,7 +26,7 @@ export function drawInImage(ctx, frame, place) {
     Y = (/** @type {number} */ v) => place.y + v * scale;
   const isProjected = projected?.frame === frame.state.index,
     pixels = isProjected ? projected.pixels : new Map();
-  const tags = new Labels(ctx, place.x + image.width * place.scale, place.y, place.y + image.height * place.scale);
+  const tags = tagsIn(ctx, frame);
   for (const { track } of present()) {
     const box = lookOf(track, true) && boxOf(track);
     if (box) tags.keepFree(X(box[0]), Y(box[1]), (box[2] - box[0]) * scale, (box[3] - box[1]) * scale);
@@ -42,7 +42,7 @@ export function drawInImage(ctx, frame, place) {
     if (bbox && (look.isChosen || !corners)) drawBox(ctx, bbox, look.isChosen ? NEW_TINT : look.tint, 1.5, X, Y);
     ctx.setLineDash([]);
     const at = corners ? boundsOf(corners) : bbox;
-    if (at && isIn(at, image))
+    if (at && tags.shows(X(at[0]), Y(at[1]), X(at[2]), Y(at[3])))
       tags.put(
         look.name,
         X(at[0]),
@@ -56,10 +56,6 @@ export function drawInImage(ctx, frame, place) {
   if (fresh) drawCuboid(ctx, fresh, NEW_TINT, 2.5, X, Y);
   if (draft?.track === null && draft.bbox) drawBox(ctx, draft.bbox, NEW_TINT, 2, X, Y);
 }
-
-/** @param {Box} box @param {import("../../core/types.js").SentImage} image */
-const isIn = ([x1, y1, x2, y2], { width, height, scale }) =>
-  x1 * scale < width && y1 * scale < height && x2 > 0 && y2 > 0;
 
 /**
  * Bounding box of the visible corners of a cuboid, or null.

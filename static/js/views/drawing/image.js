@@ -85,6 +85,7 @@ export function drawObjects(ctx, { result, display }, layers, labels, X, Y) {
     if (!anchor || !(isLead || isNext || item.id === chosen || deservesTag(item))) continue;
     const isShown = vision ? layers.visionBoxes : layers.cuboids || layers.lidarBoxes;
     if (!isShown && !isLead) continue;
+    if (!labels.shows(X(anchor[0]), Y(anchor[1]), X(anchor[2]), Y(anchor[3]))) continue;
     const name = isLead ? `CIPV #${item.id}` : `${isNext ? "next " : ""}#${item.id} ${item.type ?? ""}`.trim();
     const words = item.distance_m === null ? name : `${name}  ${num(item.distance_m)} m`;
     labels.put(

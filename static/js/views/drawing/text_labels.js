@@ -22,6 +22,14 @@ export class Labels {
     this.taken = [];
   }
 
+  /**
+   * Whether a rectangle is in view.
+   * @param {number} left @param {number} top @param {number} right @param {number} bottom
+   */
+  shows(left, top, right, bottom) {
+    return left < this.width && right > 0 && top < this.bottom && bottom > this.top;
+  }
+
   /** Keep a rectangle free of labels. @param {number} x @param {number} y @param {number} w @param {number} h */
   keepFree(x, y, w, h) {
     this.taken.push({ x, y, w, h });

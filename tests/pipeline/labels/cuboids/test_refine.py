@@ -72,6 +72,19 @@ def test_a_parked_cars_rear_and_side_are_one_outline_over_own_motion() -> None:
     assert max(before) < 0.85
 
 
+@pytest.mark.parametrize(("label", "height_m"), [("car", 1.5), ("truck", 2.6)])
+def test_a_car_under_a_tree_is_no_taller_than_cars_are(label: str, height_m: float) -> None:
+    """With points, and without."""
+    car = standing(15.0, 4.0, size=(4.4, 1.8, 2.6))
+    seen = {at: clustered(sweep_of(standing(15.0, 4.0))) for at in range(3)}
+    for sweeps in (seen.get, lambda _: None):
+        (after,) = refined([replace(track_of(dict.fromkeys(range(4), car)), label=label)], sweeps, driving(0.0, 4))
+        for each in after.sightings:
+            assert each.cuboid is not None
+            assert each.cuboid.size[2] == height_m
+            assert each.cuboid.center[2] - height_m / 2 == pytest.approx(car.center[2] - 1.3)
+
+
 def test_a_driving_car_is_laid_over_itself_along_its_track() -> None:
     """It keeps its distance while the ego vehicle drives: aligned by ego motion, its points would be smeared over 14
     m."""
@@ -224,7 +237,7 @@ def hand_drawn(sightings: tuple[Sighting, ...], rng: np.random.Generator) -> lis
 
 
 def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
-    """Up to 15 m, for the side that faces the sensor, where it changes anything. A mesh's bumper is not flat, so its
+    """Up to 15 m, for the sides that face the sensor, where it changes anything. A mesh's bumper is not flat, so its
     face lies some centimetres inside."""
     source = open_source("sim:straight")
     names = tuple(str(index) for index in range(len(source)))
@@ -250,9 +263,10 @@ def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
                 continue
             if not snapped.is_better:
                 continue
-            found, ((x, y, _), (length, _, _), yaw_rad) = snapped.cuboid, true.cuboid
+            found, ((x, y, _), (length, width, _), yaw_rad) = snapped.cuboid, true.cuboid
             rear = found.center[0] - found.size[0] / 2 - (x - length / 2)
-            off.append((abs(rear), abs(found.center[1] - y), abs(math.remainder(found.yaw_rad - yaw_rad, math.tau))))
+            aside = abs(found.center[1]) - found.size[1] / 2 - (abs(y) - width / 2) if abs(y) > width / 2 else 0.0
+            off.append((abs(rear), abs(aside), abs(math.remainder(found.yaw_rad - yaw_rad, math.tau))))
     assert len(off) >= 10
     rear_m, aside_m, yaw_rad = np.median(off, axis=0)
     assert rear_m < 0.07
@@ -262,7 +276,8 @@ def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
 
 @pytest.mark.parametrize("drive", ["astyx", "astyx_more"])
 def test_a_snap_hardly_ever_makes_a_real_box_worse(drive: str, data_dir: Path) -> None:
-    """Up to 50 m. When every box was changed, half of them got worse, a third by more than 0.1."""
+    """Up to 50 m. When every box was changed, half of them got worse, a third by more than 0.1; when each was moved
+    as a whole, 1 % of them."""
     source = open_source(f"astyx:{data_dir / drive}")
     labels, _ = truth_labels(source, tuple(str(index) for index in range(len(source))), ORIGIN)
     sweeps, change = sweeps_in(source), []
@@ -285,5 +300,5 @@ def test_a_snap_hardly_ever_makes_a_real_box_worse(drive: str, data_dir: Path) -
     gains = np.array(change)
     assert len(gains) >= 50
     assert float((gains > 0.02).mean()) > 0.04
-    assert float((gains < -0.02).mean()) < 0.01
-    assert float((gains < -0.1).mean()) < 0.005
+    assert float((gains < -0.02).mean()) < 0.005
+    assert float(gains.min()) > -0.1
