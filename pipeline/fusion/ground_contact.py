@@ -42,6 +42,10 @@ _HIDDEN_SHARE = 0.3
 """Covered share of a box's lower edge above which the network draws it where the nearer vehicle begins."""
 
 
+_NEAREST_WAY_M = 1.0
+"""Nothing begins nearer to the camera."""
+
+
 def road_ahead(
     points: F32,
     ground: Ground | None,
@@ -99,10 +103,12 @@ def _sights(bbox: F64, law_m: F64, alignment: Alignment, road: RoadProfile) -> I
     along = rays / np.hypot(rays[:, 0], rays[:, 1])[:, None]
     range_m = law_m[:, None] * np.exp(HEIGHT_RATIOS)
     back = along[:, :2] @ eye[:2]
-    way_m = np.sqrt(range_m**2 + (back**2 - eye[:2] @ eye[:2])[:, None]) - back[:, None]
+    # a camera far behind the bumper may be farther from it than the nearest of the vehicle's possible places
+    way_m = np.sqrt(np.maximum(range_m**2 + (back**2 - eye[:2] @ eye[:2])[:, None], 0.0)) - back[:, None]
+    way_m = np.maximum(way_m, _NEAREST_WAY_M)
     place = eye + along[:, None] * way_m[:, :, None]  # (M, G, 3): on the line of sight, where the vehicle would begin
     above = (place[:, :, 2] - road.height(place)) / way_m
-    tall = _elevation(alignment, middle, upper) - along[:, 2]
+    tall = np.abs(_elevation(alignment, middle, upper) - along[:, 2])
     noise = (_elevation(alignment, middle, lower - EDGE_PX) - _elevation(alignment, middle, lower + EDGE_PX)) / 2.0
     by_road = road.height_sigma_m(place[:, :, 0].ravel()).reshape(way_m.shape) / way_m
     lasting = np.sqrt(by_road**2 + _PITCH_SIGMA_RAD**2 + (_FLOOR_SHARE * tall[:, None]) ** 2)

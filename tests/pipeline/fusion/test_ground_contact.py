@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from pipeline.alignment.projection import Alignment, Angular, resolve
 from pipeline.common.geometry import F64
@@ -110,6 +112,28 @@ def test_a_lower_edge_above_the_horizon_fits_the_road_nowhere() -> None:
     assert found is not None
     assert (found.above > 0.0).all()
     assert found.above[0] > found.above[-1]
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.floats(0.0, 1270.0), st.floats(0.0, 700.0), st.floats(0.5, 300.0), st.floats(10.0, 120.0), st.floats(0.0, 5.0)
+)
+@example(u=845.0, v=340.0, px=10.0, law_m=10.0, back_m=15.0)
+def test_any_box_in_any_view_is_compared_with_numbers(
+    u: float, v: float, px: float, law_m: float, back_m: float
+) -> None:
+    """Also at the edge of a very wide image, with the camera far behind the bumper."""
+    K = np.array([[300.0, 0.0, MIDDLE_PX], [0.0, 300.0, HORIZON_PX], [0.0, 0.0, 1.0]])
+    T_camera_ego = np.array([[0, -1, 0, 0], [0, 0, -1, EYE_M - 0.8], [1, 0, 0, back_m], [0, 0, 0, 1]], dtype=np.float64)
+    wide = resolve(AlignmentParams(), CameraCalibration(K, np.zeros(5), T_camera_ego, 1280, 720))
+    boxes = (seen((u, v, u + px, v + px), law_m),)
+    found = measure_contacts(boxes, swept(), wide, FusionParams())
+    assert found is not None
+    if found[0].road is not None:
+        height = hinted(BoxShape(), RoadContact().seen(found[0].road), 0.2)
+        assert np.isfinite(height.mean)
+        assert height.sigma is not None
+        assert 0.0 < height.sigma < 1.0
 
 
 NEARER = seen(box_of(15.0), 15.0)
