@@ -111,7 +111,7 @@ def iou_of(views: Sequence[View], values: Sequence[tuple[CameraCalibration | Non
     table = PairTable.of([each.scene for each in views])
     best = np.zeros((len(values), len(table.boxes)))
     for row, (camera, params) in zip(best, values, strict=True):
-        model = FitModel(params.model, camera, views[0].scene.size, offset=True)
+        model = FitModel(params.model, camera, views[0].scene.size, offset=True, zoom=params.zoom)
         vector = model.vector(params)
         assert vector is not None
         np.maximum.at(row, table.box, table.overlap(model.aligned(vector)))
