@@ -120,17 +120,20 @@ def _with_edges(
 def _agree(table: PairTable, model: FitModel, vector: F64, sigmas: F64, boxes: Found) -> bool:
     """Whether boxes do not contradict the mount by depth edges."""
     shared = np.array([SHARED_DEG["yaw_deg"], SHARED_DEG["pitch_deg"]])
-    off = np.abs(_boxes_off(table, model, vector)) / np.hypot(np.hypot(sigmas[:2], shared), shared)
+    off = np.abs(boxes_off(table, model, vector, GATES[-3:]).vector[:2]) / np.hypot(
+        np.hypot(sigmas[:2], shared), shared
+    )
     return bool(off.max() <= AGREED_SIGMAS and explained(table, model, vector) >= AGREED * boxes.explained)
 
 
-def _boxes_off(table: PairTable, model: FitModel, vector: F64) -> F64:
-    """(2,) yaw and pitch, degrees, by which the boxes would turn a mount, with its roll, place and lens as they are:
-    boxes hardly determine these, and where they are wrong, so are the boxes' yaw and pitch."""
+def boxes_off(table: PairTable, model: FitModel, vector: F64, gates: Sequence[tuple[float, float]] = GATES) -> Found:
+    """By which yaw and pitch, the first two numbers, in degrees, boxes would turn a mount, with its roll, place and
+    lens as they are: boxes hardly determine these, and where they are wrong, so are the boxes' yaw and pitch. gates: as
+    for ``refine``; all of them for a mount that may be some degrees off."""
     assert model.camera is not None
     camera = corrected(model.params(vector), model.camera)
     near = replace(model, camera=camera, offset=False, roll_deg=(0.0, _EXACT_DEG), place_m={}, zoom=1.0)
-    return refine(table, near, np.zeros(3), GATES[-3:]).vector[:2]
+    return refine(table, near, np.zeros(3), gates)
 
 
 def _rolls(
