@@ -45,6 +45,8 @@ BLOCK_NS = 1_000_000_000
 """Frames within a second show the same cars and are resampled together."""
 HELD_OUT = 5
 """Every fifth block is held out for the score."""
+WORSE_IOU = 0.02
+"""Loss of overlap from which a fit is doubted; right ones are within 0.01 of the calibration's."""
 FEWEST_PAIRS = 12
 """Minimum number of pairs for a fit."""
 
@@ -138,6 +140,8 @@ def fit_alignment(
     judged = PairTable.of([scenes[k] for k in held]) if held else table
     start = model.vector(present)
     after, *before = overlaps_of(judged, model, [vector, *([start] if start is not None else [])])
+    if before and held and after.mean_iou < before[0].mean_iou - WORSE_IOU:
+        warnings += ("clusters and boxes of held-out frames cover each other less than with the current alignment",)
     return AlignmentFit(
         model=name,
         values=rounded(model.values(vector)),
