@@ -30,7 +30,7 @@ from pipeline.calibration.alignment.overlaps import Overlaps, overlaps_of
 from pipeline.calibration.alignment.pairs import PairTable
 from pipeline.calibration.alignment.scenes import FitScene
 from pipeline.calibration.alignment.search import GATES, explained, refine
-from pipeline.calibration.alignment.solve import SHARED_DEG, SHARED_ZOOM, SOLVE_STEPS, solve
+from pipeline.calibration.alignment.solve import SHARED_DEG, SHARED_WITH_PLACE, SHARED_ZOOM, SOLVE_STEPS, solve
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
 from pipeline.params import AlignmentParams
@@ -171,7 +171,7 @@ def looks_undistorted(table: PairTable, model: FitModel, vector: F64, blocks: li
 def _with_shared(model: FitModel, vector: F64, sigmas: Mapping[str, float]) -> dict[str, float]:
     """The standard deviations with the errors that all frames share; an angular model's origin stands for yaw and
     pitch."""
-    shared = SHARED_DEG | {"zoom": SHARED_ZOOM}
+    shared = (SHARED_WITH_PLACE if model.offset else SHARED_DEG) | {"zoom": SHARED_ZOOM}
     if model.name == "angular":
         px_per_deg = 1.0 / model.values(vector)["h_res_deg"]
         shared = {"cx_px": SHARED_DEG["yaw_deg"] * px_per_deg, "cy_px": SHARED_DEG["pitch_deg"] * px_per_deg}

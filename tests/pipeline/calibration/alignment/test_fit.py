@@ -11,7 +11,7 @@ import pytest
 from pipeline.alignment.projection import resolve
 from pipeline.calibration.alignment.fit import BLOCK_NS, HELD_OUT, NothingToFit, fit_alignment, overlap_sentence
 from pipeline.calibration.alignment.scenes import FitScene, fit_scene
-from pipeline.calibration.alignment.solve import SHARED_DEG
+from pipeline.calibration.alignment.solve import SHARED_DEG, SHARED_WITH_PLACE
 from pipeline.common.geometry import inverse, rotation
 from pipeline.params import AlignmentParams, Params, with_changes
 from pipeline.sources import open_source
@@ -48,6 +48,7 @@ def test_a_camera_that_sits_elsewhere_is_found():
     assert fit.values["left_m"] == pytest.approx(0.25, abs=0.06)
     assert fit.values["up_m"] == pytest.approx(-0.2, abs=0.06)
     assert fit.values["yaw_deg"] == pytest.approx(1.3, abs=0.3)
+    assert all(fit.sigmas[name] >= shared for name, shared in SHARED_WITH_PLACE.items())
 
 
 def test_angles_alone_are_fitted_to_the_position_that_the_camera_has():
