@@ -116,7 +116,7 @@ def _brief(found: EdgeScore) -> str:
     if found.borders < FEWEST:
         return "too few edges"
     if found.score is None:
-        return "no clear best" + (f" · vehicles: {_words(found.better)}" if found.better else "")
+        return f"by vehicles: {_words(found.better)}" if found.better else "no clear best"
     return f"{100 * found.score:.0f} %" + (f" · better {_words(found.better)}" if found.better else "")
 
 

@@ -16,7 +16,7 @@ from pipeline.calibration.local_match import NO_MATCH
         (EdgeScore(None, 3.1, 900), "no clear best", "No mount rotation within 3°"),
         (
             EdgeScore(None, 3.1, 900, {"yaw_deg": 2.5}),
-            "no clear best · vehicles: yaw +2.5°",
+            "by vehicles: yaw +2.5°",
             "vehicles ask for yaw +2.5°",
         ),
         (EdgeScore(0.97, 6.0, 900), "97 %", "clearly better than the current one (900 depth edges in 20 frames)"),
