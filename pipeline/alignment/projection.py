@@ -154,7 +154,8 @@ _last: tuple[AlignmentParams, CameraCalibration | None, Alignment | None] | None
 
 def _resolved(params: AlignmentParams, camera: CameraCalibration | None) -> Alignment | None:
     if params.model == "pinhole" and camera is not None:
-        return Pinhole(camera.K, camera.distortion, corrected(params, camera).T_camera_ego)
+        given = corrected(params, camera)
+        return Pinhole(given.K, given.distortion, given.T_camera_ego)
     measured = angular_from_calibration(camera) if camera is not None else None
     typed = (params.h_res_deg, params.v_res_deg, params.cx_px, params.cy_px)
     if measured is None and any(value is None for value in typed):
@@ -169,8 +170,12 @@ def _resolved(params: AlignmentParams, camera: CameraCalibration | None) -> Alig
 
 
 def corrected(params: AlignmentParams, camera: CameraCalibration) -> CameraCalibration:
-    """The calibration with the parameters' correction of its mount."""
-    return replace(camera, T_camera_ego=camera.T_camera_ego @ inverse(_correction(params, camera)))
+    """The calibration with the parameters' correction of its mount and focal length."""
+    K = camera.K
+    if params.zoom != 1.0:
+        K = K.copy()
+        K[:2, :2] *= params.zoom
+    return replace(camera, K=K, T_camera_ego=camera.T_camera_ego @ inverse(_correction(params, camera)))
 
 
 def _correction(params: AlignmentParams, camera: CameraCalibration) -> F64:

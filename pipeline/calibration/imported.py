@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.alignment.convert import angular_of, angular_values, costs
-from pipeline.alignment.projection import Pinhole
-from pipeline.calibration.alignment.models import FARTHEST_OFF_M, PLACE, REACH_DEG
+from pipeline.alignment.projection import Pinhole, corrected
+from pipeline.calibration.alignment.models import FARTHEST_OFF_M, PLACE, REACH_DEG, ZOOM_REACH
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import inverse
 from pipeline.params import AlignmentParams
@@ -50,8 +50,9 @@ def imported(
     """Parameters of the present model.
 
     given: the calibration, whose ego frame is the LiDAR's own. camera: the recording's, of which the pinhole model
-    keeps the lens. size: width and height of the recording's images. T_ego_lidar: (4, 4), the LiDAR's mount; None where
-    the ego frame is its own. ImportRefused for another image size or a mount that is far from the recording's.
+    keeps the lens, apart from the focal length. size: width and height of the recording's images. T_ego_lidar: (4, 4),
+    the LiDAR's mount; None where the ego frame is its own. ImportRefused for another image size or a mount that is far
+    from the recording's.
     """
     if (given.width, given.height) != size:
         raise ImportRefused(
@@ -71,15 +72,16 @@ def imported(
                 f"the mount differs from the recording's by {value:+.1f}{unit} in {name.rpartition('_')[0]}, more than "
                 f"{most:.0f}{unit}: is it the calibration of this camera and this LiDAR?"
             )
-    warnings = _lens_warnings(given, camera)
+    zoom, warnings = _zoom(given, camera)
     far = max(map(abs, turn_deg.values())), max(map(abs, shift_m.values()))
     if far[0] > TURNED_DEG or far[1] > SHIFTED_M:
         warnings += (
             f"the mount differs from the recording's by {far[0]:.1f}° and {far[1]:.2f} m: is the file from this rig?",
         )
     values = {name: round(value, 4) for name, value in (*turn_deg.items(), *shift_m.items())}
-    text = "Mount of the file, as a correction of the recording's calibration"
-    return ImportedAlignment({"model": "pinhole", **values}, text, warnings)
+    what = "Mount" if zoom == 1.0 else "Mount and focal length"
+    text = f"{what} of the file, as a correction of the recording's calibration"
+    return ImportedAlignment({"model": "pinhole", "zoom": zoom, **values}, text, warnings)
 
 
 def correction(camera: CameraCalibration, wanted: CameraCalibration) -> tuple[dict[str, float], dict[str, float]]:
@@ -102,6 +104,16 @@ def _angular(given: CameraCalibration) -> ImportedAlignment:
     ]
     text = f"The angular model that comes nearest to the file, off by {', '.join(parts)}"
     return ImportedAlignment(angular_values(found), text, ())
+
+
+def _zoom(given: CameraCalibration, camera: CameraCalibration) -> tuple[float, tuple[str, ...]]:
+    """The factor on the focal length that makes the recording's lens that of the file, and no warning; 1 and what is
+    wrong if none does."""
+    zoom = round(float(given.K[0, 0] / camera.K[0, 0]), 4)
+    scaled = corrected(AlignmentParams.model_construct(**{**AlignmentParams().model_dump(), "zoom": zoom}), camera)
+    if 1.0 / ZOOM_REACH <= zoom <= ZOOM_REACH and not _lens_warnings(given, scaled):
+        return zoom if _lens_warnings(given, camera) else 1.0, ()
+    return 1.0, _lens_warnings(given, camera)
 
 
 def _lens_warnings(given: CameraCalibration, camera: CameraCalibration) -> tuple[str, ...]:

@@ -138,6 +138,7 @@ class AlignmentParams(Section):
     forward_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: shifts the camera forwards")
     left_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: shifts the camera to the left")
     up_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: shifts the camera upwards")
+    zoom: float = slider(1.0, 0.7, 1.4, 0.001, "", "pinhole: factor on the calibration's focal length")
 
 
 class ExistenceParams(Section):

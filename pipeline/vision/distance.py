@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.alignment.projection import Alignment, Angular
+from pipeline.alignment.projection import Alignment, Angular, Pinhole
 from pipeline.common.geometry import F64
 from pipeline.params import DistanceParams
 from pipeline.types import REAL_VEHICLES, Box, CameraCalibration, Detection, DistanceLaw, VisionMeasurement
@@ -225,8 +225,10 @@ def _centres(boxes: F64) -> F64:
 
 
 def _focal_px(alignment: Alignment | None, camera: CameraCalibration | None) -> float | None:
-    """Vertical focal length in pixels per radian: from the calibration, else from the parameters of the angular
-    model."""
+    """Vertical focal length in pixels per radian: from the calibration and its correction, else from the parameters of
+    the angular model."""
+    if isinstance(alignment, Pinhole):
+        return float(alignment.K[1, 1])
     if camera is not None:
         return float(camera.K[1, 1])
     return 1.0 / alignment.v_res_rad if isinstance(alignment, Angular) else None

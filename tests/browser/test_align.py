@@ -266,6 +266,9 @@ MOST_MOVES, MOST_S = 8, 120.0
 def test_the_sliders_alone_align_a_turned_rig(open_page: OpenPage, site: Site, paused_in_traffic: None):
     turned = with_changes(Params(), {"alignment.yaw_deg": -2.0, "alignment.pitch_deg": 1.5})
     site.engine.control.set_params(turned, "default")
+    site.engine.wait_for(  # until detectors have looked at all frames
+        lambda s: s.params == turned and s.drive.done == s.drive.total > 0, WAIT_S
+    )
     page = open_page()
     page.keyboard.press("a")
     expect(page.locator("#align-bar .score")).to_have_text(re.compile(r"\d+ %"))
@@ -289,7 +292,7 @@ def test_the_sliders_alone_align_a_turned_rig(open_page: OpenPage, site: Site, p
     print(f"aligned by {moves} moves in {took_s:.1f} s: yaw {found.yaw_deg:.2f}°, pitch {found.pitch_deg:.2f}°")
     assert moves > 0
     assert abs(found.yaw_deg) <= 0.5
-    assert abs(found.pitch_deg) <= 1.75, "drawn images have few edges that end above or below"
+    assert abs(found.pitch_deg) <= 0.5, "which vehicles show; drawn images have few edges that end above or below"
     assert took_s < MOST_S
     assert "%" in page.locator(".ranges").inner_text()
     regions = page.get_by_role("button", name="Regions")

@@ -4,8 +4,9 @@
 
 Each start turns the recording's calibration by up to ``OFF_DEG`` about each axis (with ``--offset``, it also shifts the
 camera by up to ``OFF_M``) and takes its own random subset of the frames, with YOLOX-nano and 16 rings. The fit does not
-know the calibration itself. ``--model angular`` draws both resolutions up to ``OFF_SHARE`` off, instead of the
-calibration's, and scores the IoU only: an angular model has no mount. Prints one table row for each number of frames.
+know the calibration itself. ``--scale`` also makes the focal length wrong by up to ``OFF_SHARE``. ``--model angular``
+draws both resolutions up to ``OFF_SHARE`` off, instead of the calibration's, and scores the IoU only: an angular model
+has no mount. Prints one table row for each number of frames.
 """
 
 from __future__ import annotations
@@ -110,7 +111,7 @@ def iou_of(views: Sequence[View], values: Sequence[tuple[CameraCalibration | Non
     table = PairTable.of([each.scene for each in views])
     best = np.zeros((len(values), len(table.boxes)))
     for row, (camera, params) in zip(best, values, strict=True):
-        model = FitModel(params.model, camera, views[0].scene.size, offset=True)
+        model = FitModel(params.model, camera, views[0].scene.size, offset=True, zoom=params.zoom)
         vector = model.vector(params)
         assert vector is not None
         np.maximum.at(row, table.box, table.overlap(model.aligned(vector)))
@@ -118,8 +119,10 @@ def iou_of(views: Sequence[View], values: Sequence[tuple[CameraCalibration | Non
     return [float(row.mean()) if len(row) else np.nan for row in shared]
 
 
-def start(views: Sequence[View], frames: int, number: int, model: ModelName, offset: bool) -> Start | None:
-    """One fit; None if it is refused."""
+def start(
+    views: Sequence[View], frames: int, number: int, model: ModelName, offset: bool, scale: bool = False
+) -> Start | None:
+    """One fit; None if it is refused. scale: the focal length is wrong, too."""
     rng = np.random.default_rng([frames, number])
     chosen = np.sort(rng.permutation(len(views))[:frames])
     others = [views[k] for k in range(len(views)) if k not in chosen] or list(views)
@@ -130,6 +133,10 @@ def start(views: Sequence[View], frames: int, number: int, model: ModelName, off
         K = given.K.copy()
         K[0, 0] *= 1.0 + rng.uniform(-OFF_SHARE, OFF_SHARE)
         K[1, 1] *= 1.0 + rng.uniform(-OFF_SHARE, OFF_SHARE)
+        given = replace(given, K=K)
+    elif scale:
+        K = given.K.copy()
+        K[[0, 1], [0, 1]] *= 1.0 + rng.uniform(-OFF_SHARE, OFF_SHARE)
         given = replace(given, K=K)
     scenes = [replace(views[k].scene, camera=given) for k in chosen]
     edges = [views[chosen[k]].edges for k in frames_kept(len(chosen), scenes[0].size)]
@@ -174,6 +181,7 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=50)
     parser.add_argument("--model", choices=("pinhole", "angular"), default="pinhole")
     parser.add_argument("--offset", action="store_true", help="also fit the camera's position")
+    parser.add_argument("--scale", action="store_true", help="the focal length of the start is wrong, too")
     asked = parser.parse_args()
     views = views_of(asked.recording)
     print(
@@ -181,7 +189,7 @@ def main() -> None:
     )
     print("| frames | yaw | pitch | roll | left | up | yaw, pitch near | roll too | place too | IoU | own | |")
     for frames in asked.frames:
-        found = [start(views, frames, number, asked.model, asked.offset) for number in range(asked.starts)]
+        found = [start(views, frames, number, asked.model, asked.offset, asked.scale) for number in range(asked.starts)]
         print(row(frames, found), flush=True)
 
 

@@ -17,7 +17,10 @@ SAME_RANGE = 1.5
 """If the ranges of the pairs (90th to 10th percentile) differ by a smaller factor, they count as one distance."""
 SAME_BEARING_DEG = 4.0
 """If the bearings have a smaller standard deviation, they count as one direction."""
-UNSURE = {"yaw_deg": 0.3, "pitch_deg": 0.3, "roll_deg": 1.0, "left_m": 0.1, "up_m": 0.1, "res": 0.03, "origin_deg": 0.3}
+OTHER_LENS = 0.02
+"""A fitted focal length that differs by more makes a warning."""
+UNSURE = {"yaw_deg": 0.3, "pitch_deg": 0.3, "roll_deg": 1.0, "left_m": 0.1, "up_m": 0.1, "zoom": 0.03, "res": 0.03,
+          "origin_deg": 0.3}  # fmt: skip
 """Standard deviations from which a warning says that the drive does not determine the parameter."""
 AMBIGUOUS = 0.8
 """If another solution explains at least this share of what the best one explains, the fit is ambiguous."""
@@ -54,10 +57,12 @@ def warnings_of(
         warnings.append(f"all vehicles are {near:.0f}–{far:.0f} m away: angle and offset cannot be told apart")
     if bearing_deg.std() < SAME_BEARING_DEG:
         warnings.append("all vehicles are in one direction: roll and resolution need vehicles to the sides")
+    if abs(zoom := model.values(best.vector).get("zoom", 1.0) - 1.0) > OTHER_LENS:
+        warnings.append(f"the calibration's focal length is wrong: the drive asks for {1.0 + zoom:.3f} times as much")
     for name, sigma in sigmas.items():
         limit, unit = _limit(model, best.vector, name)
         if sigma > limit:
-            warnings.append(f"{name.rpartition('_')[0]} is known only to ±{sigma:.2g}{unit}")
+            warnings.append(f"{name.rpartition('_')[0] or name} is known only to ±{sigma:.2g}{unit}")
     others = [each for each in found[1:] if _apart(model, best.vector, each.vector)]
     if others and others[0].explained > AMBIGUOUS * best.explained:
         warnings.append("another alignment explains the drive nearly as well: choose a drive with more traffic")
@@ -87,4 +92,4 @@ def _limit(model: FitModel, vector: F64, name: str) -> tuple[float, str]:
         return UNSURE["origin_deg"] / model.values(vector)["h_res_deg"], " px"
     if name.endswith("res_deg"):
         return UNSURE["res"] * model.values(vector)[name], "°/px"
-    return UNSURE[name], " m" if name.endswith("_m") else "°"
+    return UNSURE[name], " m" if name.endswith("_m") else "" if name == "zoom" else "°"

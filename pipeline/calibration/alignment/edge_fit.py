@@ -20,16 +20,16 @@ from pipeline.calibration.alignment.edges import WIDEST_DEG, EdgeStack, EdgeView
 from pipeline.calibration.alignment.models import FitModel
 from pipeline.types import F64
 
-SPREAD = np.array([0.25, 0.4, 0.5, 0.07, 0.12])
-"""Standard deviations of the random mounts around that of the boxes: yaw, pitch, roll (degrees), left, up (metres). The
-largest errors of the boxes' fit on three recordings are twice as large (``docs/reference/accuracy.md``)."""
+SPREAD = {"yaw_deg": 0.25, "pitch_deg": 0.4, "roll_deg": 0.5, "left_m": 0.07, "up_m": 0.12, "zoom": 0.012}
+"""Standard deviations of the random mounts around that of the boxes; of the zoom, in shares of it. The largest errors
+of the boxes' fit on three recordings are twice as large (``docs/reference/accuracy.md``)."""
 CANDIDATES, STARTS = 150, 3
 """Random mounts, and how many of the best are improved."""
 STEPS = STARTS + 1
 """Number of progress steps."""
 _REACH = 4.0
 """Farthest from the boxes' mount, in standard deviations; a best mount there is none."""
-_UNIT = np.array([0.2, 0.2, 0.4, 0.05, 0.05])
+_UNIT = {"yaw_deg": 0.2, "pitch_deg": 0.2, "roll_deg": 0.4, "left_m": 0.05, "up_m": 0.05, "zoom": 0.008}
 """Differences that lower the score about equally: a few pixels at the usual ranges, or at the image's border."""
 ROLL = 2
 """Of the unknowns."""
@@ -56,7 +56,7 @@ def fit_edges(
     if stack is None:
         return None
     rng, count = np.random.default_rng(0), len(start)
-    unit, spread = _UNIT[:count], SPREAD[:count]
+    unit, spread = (np.array([each[name] for name in model.unknowns]) for each in (_UNIT, SPREAD))
 
     def score(vector: F64) -> float:
         return float(stack.strengths(model, vector).sum())
@@ -103,7 +103,7 @@ def _sigmas(stack: EdgeStack, model: FitModel, best: F64, unit: F64, rng: np.ran
     curvature = -(curvature + curvature.T)
     strength, axes = np.linalg.eigh(curvature)
     # A direction in which the score does not fall is unknown within the mounts looked at
-    widest = float((SPREAD[:count] / unit).max())
+    widest = max(SPREAD[name] / _UNIT[name] for name in model.unknowns)
     scatter = ((slopes - slopes.mean(axis=0)) @ axes).std(axis=0) * np.sqrt(len(slopes))
     sigma = np.minimum(scatter / np.maximum(strength, 1e-9), widest)
     return np.asarray(np.sqrt((axes**2) @ sigma**2) * unit)

@@ -1,7 +1,9 @@
 """Fits the alignment of LiDAR and camera to an ordinary drive, without a target, picked points or an initial guess.
 
 1. **Coarse.** For every mount (and lens, for the angular model) of a grid, count how many of the detector's boxes have
-   a cluster where that mount predicts one. The correct one stands out over many frames.
+   a cluster where that mount predicts one. The correct one stands out over many frames. A pinhole model is searched
+   twice, with the calibration's focal length and with any; the second counts only where the first is clearly wrong
+   (``solve``).
 2. **Fine.** From the best few mounts: pair each box with its cluster, move the projected edges onto the box's edges
    with a robust loss, and pair again more strictly, until both converge.
 3. **Roll.** Boxes ahead hardly determine it; edges of the images do (``edges``).
@@ -21,44 +23,30 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pipeline.alignment.projection import corrected
-from pipeline.calibration.alignment.doubts import Found, looks_like_radians, warnings_of
-from pipeline.calibration.alignment.edge_fit import STEPS as EDGE_STEPS
-from pipeline.calibration.alignment.edge_fit import fit_edges
-from pipeline.calibration.alignment.edges import ROLL_STEPS, EdgeView, RollScores, roll_scores
+from pipeline.calibration.alignment.doubts import looks_like_radians, warnings_of
+from pipeline.calibration.alignment.edges import EdgeView, RollScores
 from pipeline.calibration.alignment.models import PLACE, FitModel, ModelName, rounded
-from pipeline.calibration.alignment.overlaps import Overlaps, most_overlap, overlaps_of
+from pipeline.calibration.alignment.overlaps import Overlaps, overlaps_of
 from pipeline.calibration.alignment.pairs import PairTable
 from pipeline.calibration.alignment.scenes import FitScene
-from pipeline.calibration.alignment.search import GATES, SEARCH_STEPS, explained, refine, search
+from pipeline.calibration.alignment.search import GATES, explained, refine
+from pipeline.calibration.alignment.solve import SHARED_DEG, SHARED_WITH_PLACE, SHARED_ZOOM, SOLVE_STEPS, solve
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
 from pipeline.params import AlignmentParams
 from pipeline.types import F64, I64
 
-_EXACT_DEG = 0.01
-"""Standard deviation that holds a roll in place."""
 BOOTSTRAPS = 24
-_ROLLS_FROM = SEARCH_STEPS
-_EDGES_FROM = _ROLLS_FROM + ROLL_STEPS
-_BOOTSTRAPS_FROM = _EDGES_FROM + EDGE_STEPS
-STEPS = _BOOTSTRAPS_FROM + BOOTSTRAPS
+STEPS = SOLVE_STEPS + BOOTSTRAPS
 """Number of progress steps of a fit."""
-AGREED = 0.8
-"""Share of what the boxes' mount explains that the edges' mount has to explain too. The boxes' shared error of some per
-cent of their sides costs less than that; a mount that lies on other edges pairs fewer vehicles."""
-AGREED_SIGMAS = 2.0
-"""Largest turn in yaw and pitch that boxes ask for at the edges' mount, in standard deviations of both, with shared
-errors. Where few edges end above or below, as in drawn images, edges put the pitch half a degree off."""
 CLEAR_SIGMAS = 3.0
 """Random differences between blocks of the drive stay below this many standard deviations in sum."""
 BLOCK_NS = 1_000_000_000
 """Frames within a second show the same cars and are resampled together."""
 HELD_OUT = 5
 """Every fifth block is held out for the score."""
-SHARED_DEG = {"yaw_deg": 0.1, "pitch_deg": 0.15, "roll_deg": 0.1}
-"""Standard deviation of errors that all frames share and resampling cannot show: a detector draws the lower edge of
-every car a few pixels too high or too low, and the LiDAR misses the sides of every car. Root mean square of the median
-errors on KITTI 0009, KITTI 0052 and Astyx; those of any two of them cover the third within two standard deviations."""
+WORSE_IOU = 0.02
+"""Loss of overlap from which a fit is doubted; right ones are within 0.01 of the calibration's."""
 FEWEST_PAIRS = 12
 """Minimum number of pairs for a fit."""
 
@@ -95,7 +83,8 @@ class AlignmentFit:
     @property
     def section(self) -> dict[str, float | str]:
         """The alignment parameters to use with the fit."""
-        return {"model": self.model, **self.place_m, **self.values}
+        lens = {"zoom": 1.0} if self.model == "pinhole" else {}  # a fit starts from the calibration's own
+        return {"model": self.model, **lens, **self.place_m, **self.values}
 
     @property
     def changes(self) -> dict[str, float | str]:
@@ -131,21 +120,11 @@ def fit_alignment(
     model = FitModel(name, scenes[0].camera, scenes[0].size, offset, place_m=place_m)
     train, held = _split(scenes)
     table = PairTable.of([scenes[k] for k in train])
-    found = search(table, model, progress, STEPS)
-    if len(found[0].rows) < FEWEST_PAIRS:
-        raise NothingToFit(_too_few(len(found[0].rows), len(table.boxes)))
     numbers = {scenes[k].t_ns // BLOCK_NS for k in train}
     views = [each for each in edges if each.t_ns // BLOCK_NS in numbers]
-    rolls = _rolls(table, model, found[0].vector, views, progress)
-    if rolls is not None:
-        model = replace(model, roll_deg=(rolls.best_deg(), rolls.sigma_deg()))
-        found = [refine(table, model, found[0].vector, GATES[-3:]), *found[1:]]
-    by_edges: Mapping[str, float] | None = None
-    if name == "angular":
-        better = _found(table, model, most_overlap(table, model, found[0].vector))
-    else:
-        better, by_edges = _by_edges(table, model, found[0], views, progress)
-    found = [better, *found[1:]]
+    model, found, by_edges, rolls = solve(table, views, model, progress, STEPS)
+    if len(found[0].rows) < FEWEST_PAIRS:
+        raise NothingToFit(_too_few(len(found[0].rows), len(table.boxes)))
     vector, rows = found[0].vector, found[0].rows
     blocks = _blocks([scenes[k] for k in train])
     if by_edges is None:
@@ -161,6 +140,8 @@ def fit_alignment(
     judged = PairTable.of([scenes[k] for k in held]) if held else table
     start = model.vector(present)
     after, *before = overlaps_of(judged, model, [vector, *([start] if start is not None else [])])
+    if before and held and after.mean_iou < before[0].mean_iou - WORSE_IOU:
+        warnings += ("clusters and boxes of held-out frames cover each other less than with the current alignment",)
     return AlignmentFit(
         model=name,
         values=rounded(model.values(vector)),
@@ -173,35 +154,6 @@ def fit_alignment(
         warnings=warnings,
         place_m={each: value for each, value in place_m.items() if each not in model.unknowns},
     )
-
-
-def _by_edges(
-    table: PairTable, model: FitModel, boxes: Found, views: Sequence[EdgeView], progress: Progress
-) -> tuple[Found, Mapping[str, float] | None]:
-    """The mount by depth edges with its standard deviations; that of the boxes and None where they contradict it."""
-    edges = fit_edges(views, model, boxes.vector, lambda done: progress(_EDGES_FROM + done, STEPS))
-    if edges is None:
-        return boxes, None
-    shared = np.array([SHARED_DEG["yaw_deg"], SHARED_DEG["pitch_deg"]])
-    off = np.abs(_boxes_off(table, model, edges.vector)) / np.hypot(np.hypot(edges.sigmas[:2], shared), shared)
-    if off.max() > AGREED_SIGMAS or explained(table, model, edges.vector) < AGREED * boxes.explained:
-        return boxes, None
-    return _found(table, model, edges.vector), dict(zip(model.unknowns, edges.sigmas.tolist(), strict=True))
-
-
-def _found(table: PairTable, model: FitModel, vector: F64) -> Found:
-    """A result that pairs do not ask for alone."""
-    rows = table.matched(table.residuals(model.aligned(vector), GATES[-1][0]), GATES[-1][1])
-    return Found(vector, rows, explained(table, model, vector))
-
-
-def _boxes_off(table: PairTable, model: FitModel, vector: F64) -> F64:
-    """(2,) yaw and pitch, degrees, by which the boxes would turn a mount, with its roll and place as they are: boxes
-    hardly determine these, and where they are wrong, so are the boxes' yaw and pitch."""
-    assert model.camera is not None
-    camera = corrected(model.params(vector), model.camera)
-    near = replace(model, camera=camera, offset=False, roll_deg=(0.0, _EXACT_DEG), place_m={})
-    return refine(table, near, np.zeros(3), GATES[-3:]).vector[:2]
 
 
 def looks_undistorted(table: PairTable, model: FitModel, vector: F64, blocks: list[I64]) -> bool:
@@ -219,7 +171,7 @@ def looks_undistorted(table: PairTable, model: FitModel, vector: F64, blocks: li
 def _with_shared(model: FitModel, vector: F64, sigmas: Mapping[str, float]) -> dict[str, float]:
     """The standard deviations with the errors that all frames share; an angular model's origin stands for yaw and
     pitch."""
-    shared = SHARED_DEG
+    shared = (SHARED_WITH_PLACE if model.offset else SHARED_DEG) | {"zoom": SHARED_ZOOM}
     if model.name == "angular":
         px_per_deg = 1.0 / model.values(vector)["h_res_deg"]
         shared = {"cx_px": SHARED_DEG["yaw_deg"] * px_per_deg, "cy_px": SHARED_DEG["pitch_deg"] * px_per_deg}
@@ -232,27 +184,13 @@ def _bootstrap(
     """(K, P) vectors fitted to resampled blocks of frames, with the roll of resampled edges."""
     rng, found = np.random.default_rng(0), []
     for number in range(BOOTSTRAPS):
-        progress(_BOOTSTRAPS_FROM + number, STEPS)
+        progress(SOLVE_STEPS + number, STEPS)
         drawn = np.concatenate([blocks[k] for k in rng.integers(0, len(blocks), len(blocks))])
         if rolls is not None:
             roll_deg = rolls.best_deg(rng.integers(0, len(rolls.blocks), len(rolls.blocks)))
             model = replace(model, roll_deg=(roll_deg, model.roll_deg[1]))
         found.append(refine(table.taken(drawn), model, vector, GATES[-2:]).vector)
     return np.array(found)
-
-
-def _rolls(
-    table: PairTable, model: FitModel, vector: F64, edges: Sequence[EdgeView], progress: Progress
-) -> RollScores | None:
-    """How well edges match by roll; None for an angular model, and if no roll stands out."""
-    if model.name != "pinhole":
-        return None
-
-    def with_roll(roll_deg: float) -> F64:
-        start = np.array([*vector[:2], roll_deg, *vector[3:]])
-        return refine(table, replace(model, roll_deg=(roll_deg, _EXACT_DEG)), start, GATES[-2:]).vector
-
-    return roll_scores(edges, model, with_roll, lambda done: progress(_ROLLS_FROM + done, STEPS))
 
 
 def _blocks(scenes: Sequence[FitScene]) -> list[I64]:

@@ -34,12 +34,14 @@ ZOOM_STEP = 1.12
 """Step of the coarse search over focal lengths: the sides of a car move by 6 % of its width."""
 ZOOM_REACH = 1.35
 """Search range of the focal length, as a factor on the calibration's in both directions."""
+ZOOMS = 2
+"""Steps of the coarse search over a pinhole model's focal length, to either side."""
 
 
 @dataclass(frozen=True)
 class FitModel:
-    """A model of one camera. Vectors of unknowns are in degrees and metres (pinhole), or in logarithms and degrees
-    (angular)."""
+    """A model of one camera. Vectors of unknowns are in degrees and metres (pinhole, with the logarithm of the
+    zoom), or in logarithms and degrees (angular)."""
 
     name: ModelName
     """Which of the two projections it is."""
@@ -54,18 +56,22 @@ class FitModel:
     """Pinhole: what is known of the roll besides the boxes, and its standard deviation."""
     place_m: Mapping[str, float] = field(default_factory=dict)
     """Pinhole: shift of the camera's position by parameter, as far as it is not fitted."""
+    zoom: float | None = 1.0
+    """Pinhole: factor on the calibration's focal length; None: it is also fitted."""
 
     @property
     def unknowns(self) -> tuple[str, ...]:
         """The fitted parameters, in the order of the vector."""
         if self.name == "pinhole":
-            return ("yaw_deg", "pitch_deg", "roll_deg", "left_m", "up_m")[: 5 if self.offset else 3]
+            place = ("left_m", "up_m") if self.offset else ()
+            return ("yaw_deg", "pitch_deg", "roll_deg", *place, *(("zoom",) if self.zoom is None else ()))
         return ("h_res_deg", "v_res_deg", "cx_px", "cy_px")
 
     def values(self, vector: F64) -> dict[str, float]:
         """The vector as parameter values."""
         if self.name == "pinhole":
-            return dict(zip(self.unknowns, map(float, vector), strict=True))
+            found = dict(zip(self.unknowns, map(float, vector), strict=True))
+            return found | {"zoom": float(np.exp(found["zoom"]))} if self.zoom is None else found
         h, v = np.exp(vector[:2])
         return {
             "h_res_deg": float(h),
@@ -77,7 +83,8 @@ class FitModel:
     def vector(self, params: AlignmentParams) -> F64 | None:
         """Current parameters as a vector, if they are complete."""
         if self.name == "pinhole":
-            return np.array([getattr(params, name) for name in self.unknowns])
+            found = [getattr(params, name) for name in self.unknowns]
+            return np.array([*found[:-1], np.log(found[-1])] if self.zoom is None else found)
         aligned = resolve(params.model_copy(update={"model": "angular"}), self.camera)
         if not isinstance(aligned, Angular):
             return None
@@ -88,7 +95,13 @@ class FitModel:
     def params(self, vector: F64) -> AlignmentParams:
         """As parameters, not rounded or clipped, for use during the search."""
         return AlignmentParams.model_construct(
-            **{**AlignmentParams().model_dump(), **self.place_m, "model": self.name, **self.values(vector)}
+            **{
+                **AlignmentParams().model_dump(),
+                **self.place_m,
+                **({} if self.zoom is None else {"zoom": self.zoom}),
+                "model": self.name,
+                **self.values(vector),
+            }
         )
 
     def aligned(self, vector: F64, camera: CameraCalibration | None = None) -> Alignment:
@@ -109,7 +122,8 @@ class FitModel:
         """(K, P) vectors of the coarse search."""
         turns = np.arange(-REACH_DEG, REACH_DEG + STEP_DEG / 2, STEP_DEG)
         if self.name == "pinhole":
-            return _product([turns, turns, *[[0.0]] * (len(self.unknowns) - 2)])
+            lens = [np.arange(-ZOOMS, ZOOMS + 1) * np.log(ZOOM_STEP)] if self.zoom is None else []
+            return _product([turns, turns, *[[0.0]] * (len(self.unknowns) - 2 - len(lens)), *lens])
         width, height = self.size
         if self.camera is not None:
             usual = angular_from_calibration(self.camera)
@@ -133,7 +147,8 @@ class FitModel:
     def bounds(self) -> tuple[F64, F64]:
         """Lower and upper bounds of the refinement."""
         if self.name == "pinhole":
-            reach = np.array([REACH_DEG] * 3 + [FARTHEST_OFF_M] * 2)[: len(self.unknowns)]
+            reaches = {"left_m": FARTHEST_OFF_M, "up_m": FARTHEST_OFF_M, "zoom": np.log(ZOOM_REACH)}
+            reach = np.array([reaches.get(name, REACH_DEG) for name in self.unknowns])
             return -reach, reach
         low, high = np.log(np.array([0.005, 0.3]))
         return np.array([low, low, -60.0, -45.0]), np.array([high, high, 60.0, 45.0])
@@ -141,7 +156,7 @@ class FitModel:
 
 def rounded(values: Mapping[str, float]) -> dict[str, float]:
     """Parameter values with as many digits as mean something."""
-    digits = {"h_res_deg": 5, "v_res_deg": 5, "cx_px": 1, "cy_px": 1}
+    digits = {"h_res_deg": 5, "v_res_deg": 5, "cx_px": 1, "cy_px": 1, "zoom": 4}
     return {name: round(value, digits.get(name, 3)) for name, value in values.items()}
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 
@@ -35,16 +37,17 @@ def residual_image(frame: Frame, fit: AlignmentFit, params: Params) -> U8 | None
     found, present = model.vector(fitted), model.vector(params.alignment)
     if found is None:
         return None
-    rows = table.matched(table.residuals(model.aligned(found)), GATES[-1][1])
+    before, after = replace(model, zoom=params.alignment.zoom), replace(model, zoom=fit.values.get("zoom", 1.0))
+    rows = table.matched(table.residuals(after.aligned(found)), GATES[-1][1])
     if not len(rows):
         return None
     drawn = frame.image.bgr.copy()
     boxes, whole = table.boxes[table.box[rows]], table.whole[table.box[rows]]
     said = [(f"{len(rows)} vehicles", _BOX)]
-    for name, colour, vector in (("before", _BEFORE, present), ("after", _AFTER, found)):
+    for name, colour, lens, vector in (("before", _BEFORE, before, present), ("after", _AFTER, after, found)):
         if vector is None:
             continue
-        rectangles = _rectangles(table, model.aligned(vector))[rows]
+        rectangles = _rectangles(table, lens.aligned(vector))[rows]
         _draw(drawn, rectangles, colour)
         off = (rectangles - boxes)[whole & np.isfinite(rectangles)]
         said.append((f"{name}: {np.sqrt(np.mean(off**2)):.1f} px" if len(off) else name, colour))

@@ -63,6 +63,8 @@ def _richest(table: PairTable, frames: int) -> PairTable:
 def _peaks(model: FitModel, grid: F64, scores: F64) -> list[F64]:
     """The best grid points that are not neighbours of each other."""
     scale = np.array([0.2, 0.2, 4.0, 4.0]) if model.name == "angular" else np.full(grid.shape[1], 2.5)
+    if model.zoom is None:
+        scale[-1] = 0.2
     chosen: list[F64] = []
     for vector in grid[np.argsort(-scores, kind="stable")]:
         if all(np.abs((vector - other) / scale).max() > 1.0 for other in chosen):
@@ -102,5 +104,6 @@ def _prior(model: FitModel, vector: F64) -> F64:
     """Residuals of the prior, in standard deviations."""
     if model.name == "pinhole":
         roll_deg, sigma_deg = model.roll_deg
-        return np.array([(vector[2] - roll_deg) / sigma_deg, *(vector[3:] / OFFSET_SIGMA_M)])
+        place = vector[3:5] if model.offset else vector[:0]
+        return np.array([(vector[2] - roll_deg) / sigma_deg, *(place / OFFSET_SIGMA_M)])
     return np.array([(vector[1] - vector[0]) / SQUARE_SIGMA])

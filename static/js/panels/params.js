@@ -24,6 +24,7 @@ const MODEL_OF = {
   "alignment.forward_m": "pinhole",
   "alignment.left_m": "pinhole",
   "alignment.up_m": "pinhole",
+  "alignment.zoom": "pinhole",
 };
 const PROMINENT = new Set(["alignment.h_res_deg", "alignment.v_res_deg"]);
 

@@ -96,7 +96,10 @@ def test_an_alignment_is_fitted_and_written_as_parameters(tmp_path: Path, capsys
     more = ("--out", str(out), "--images", str(images), "--json")
     assert calibrate(f"sim:{path}", *more, what="alignment") == 0
     printed = capsys.readouterr()
-    assert yaml.safe_load(out.read_text())["alignment"] == {"model": "pinhole", **json.loads(printed.out)["values"]}
+    assert (
+        yaml.safe_load(out.read_text())["alignment"]
+        == {"model": "pinhole", "zoom": 1.0} | json.loads(printed.out)["values"]
+    )
     fitted = from_yaml(out, Params()).alignment
     assert fitted.yaw_deg == pytest.approx(2.0, abs=0.3)
     assert fitted.pitch_deg == pytest.approx(-1.5, abs=0.3)

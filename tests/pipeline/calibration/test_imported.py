@@ -66,6 +66,14 @@ def test_a_calibration_of_something_else_is_refused(given, named: str):
         imported(given, AlignmentParams(), CAMERA, SIZE)
 
 
+def test_a_file_with_another_focal_length_gives_a_zoom():
+    given = corrected(AlignmentParams(zoom=1.05), GIVEN)
+    found = imported(given, AlignmentParams(), CAMERA, SIZE)
+    assert found.values["zoom"] == 1.05
+    assert found.warnings == ()
+    assert imported(GIVEN, AlignmentParams(zoom=1.05), CAMERA, SIZE).values["zoom"] == 1.0
+
+
 @pytest.mark.parametrize(
     ("given", "named"),
     [

@@ -13,6 +13,7 @@ from app.engine.engine import Engine
 from app.web.routes.shapes.common import ApiModel
 from pipeline.calibration.edge_match import FEWEST, REACH_DEG, EdgeScore, Seen, edge_score
 from pipeline.calibration.local_match import BANDS_M, LocalMatch, local_match
+from pipeline.calibration.vehicle_match import with_vehicles
 
 _NOTHING = "No frame has both an image and LiDAR points in it"
 
@@ -69,11 +70,14 @@ def alignment_router(engine: Engine, scenes: AlignmentScenes) -> APIRouter:
     @router.get("/score")
     def score() -> Score:
         """Score the alignment of LiDAR and camera. Compares how well depth edges match image edges with the same
-        for the mount rotated by up to 3°. Uses frames of the whole recording, which takes a second the first time; for
-        live sensors, the frames shown at each request. 404 when nothing is shown."""
+        for the mount rotated by up to 3°; where detectors have seen enough vehicles, these tell the pitch. Uses frames
+        of the whole recording, which takes a second the first time; for live sensors, the frames shown at each request.
+        404 when nothing is shown."""
         seen = seen_now(engine, scenes)
         params = engine.control.peek().params.alignment
-        return _json(edge_score(seen, params), local_match(seen, params), len(seen))
+        recording = engine.drives.recording
+        vehicles = scenes.vehicles_of(recording) if recording is not None else []
+        return _json(with_vehicles(edge_score(seen, params), vehicles, params), local_match(seen, params), len(seen))
 
     return router
 
@@ -112,19 +116,21 @@ def _brief(found: EdgeScore) -> str:
     if found.borders < FEWEST:
         return "too few edges"
     if found.score is None:
-        return "no clear best"
+        return f"by vehicles: {_words(found.better)}" if found.better else "no clear best"
     return f"{100 * found.score:.0f} %" + (f" · better {_words(found.better)}" if found.better else "")
 
 
 def _sentence(found: EdgeScore) -> str:
     if found.borders < FEWEST:
         return "Too few LiDAR depth edges in the images for a score"
+    if found.score is None and found.better:
+        return f"No mount rotation is clearly the best match of the edges; the vehicles ask for {_words(found.better)}"
     if found.score is None:
         return (
             f"No mount rotation within {REACH_DEG:.0f}° is clearly the best match; on a recording, Fit searches farther"
         )
     if found.better:
-        return f"LiDAR depth edges match the image edges better with {_words(found.better)}"
+        return f"LiDAR and images match better with {_words(found.better)}"
     return f"No mount rotation within {REACH_DEG:.0f}° matches the image edges clearly better than the current one"
 
 

@@ -9,8 +9,9 @@ import pytest
 
 from pipeline.alignment.projection import Alignment
 from pipeline.calibration.alignment.edges import EdgeView, roll_scores
-from pipeline.calibration.alignment.fit import SHARED_DEG, fit_alignment
+from pipeline.calibration.alignment.fit import fit_alignment
 from pipeline.calibration.alignment.models import FitModel
+from pipeline.calibration.alignment.solve import SHARED_DEG
 from pipeline.calibration.depth_edges import EdgeScene
 from pipeline.params import AlignmentParams
 from pipeline.types import F64

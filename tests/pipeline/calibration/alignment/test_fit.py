@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from pipeline.alignment.projection import resolve
-from pipeline.calibration.alignment.fit import SHARED_DEG, NothingToFit, fit_alignment, overlap_sentence
+from pipeline.calibration.alignment.fit import BLOCK_NS, HELD_OUT, NothingToFit, fit_alignment, overlap_sentence
 from pipeline.calibration.alignment.scenes import FitScene, fit_scene
+from pipeline.calibration.alignment.solve import SHARED_DEG, SHARED_WITH_PLACE
 from pipeline.common.geometry import inverse, rotation
 from pipeline.params import AlignmentParams, Params, with_changes
 from pipeline.sources import open_source
@@ -47,6 +48,7 @@ def test_a_camera_that_sits_elsewhere_is_found():
     assert fit.values["left_m"] == pytest.approx(0.25, abs=0.06)
     assert fit.values["up_m"] == pytest.approx(-0.2, abs=0.06)
     assert fit.values["yaw_deg"] == pytest.approx(1.3, abs=0.3)
+    assert all(fit.sigmas[name] >= shared for name, shared in SHARED_WITH_PLACE.items())
 
 
 def test_angles_alone_are_fitted_to_the_position_that_the_camera_has():
@@ -56,6 +58,16 @@ def test_angles_alone_are_fitted_to_the_position_that_the_camera_has():
     assert fit.values["pitch_deg"] == pytest.approx(0.6, abs=0.15)
     assert fit.after.mean_iou > 0.8
     assert {name: fit.changes[f"alignment.{name}"] for name in place} == place, "a file of the fit has them, too"
+
+
+def test_a_fit_that_held_out_frames_contradict_is_doubted():
+    turned, plain = made(yaw_deg=2.0), made()
+    blocks = sorted({each.t_ns // BLOCK_NS for each in turned})
+    held = blocks[HELD_OUT // 2 :: HELD_OUT]
+    mixed = [own if own.t_ns // BLOCK_NS in held else other for own, other in zip(plain, turned, strict=True)]
+    said = "held-out frames cover each other less"
+    assert any(said in each for each in fit_alignment(mixed, "pinhole", AlignmentParams()).warnings)
+    assert not any(said in each for each in fit_alignment(turned, "pinhole", AlignmentParams()).warnings)
 
 
 ANGULAR = {"model": "angular", "h_res_deg": 0.062, "v_res_deg": 0.063, "cx_px": 690.0, "cy_px": 230.0}
