@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.conftest import START, Site
+from tests.browser.conftest import START
 from tests.browser.labels.hands import LEAD_X, Hand, Labels, is_at
-from tests.browser.looks import COUNT, go_to, whole_drive
+from tests.browser.looks import COUNT, go_to
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
@@ -54,15 +54,14 @@ def test_labels_and_who_leads_are_found_right_or_sent_back_one_after_the_other(h
     expect(page.locator(".reviewing")).to_be_hidden()
 
 
-def test_with_nothing_left_no_lead_of_ones_own_is_offered(hand: Hand, labels: Labels, site: Site):
+def test_with_nothing_left_no_lead_of_ones_own_is_offered(hand: Hand, labels: Labels):
     """Neither one that the person set, nor a proposal that the person accepted: the server would refuse both."""
     page, under = hand.page, hand.page.locator(".reviewing .under")
-    whole_drive(page, site)
     labels.act("Ada", {"kind": "set_lead", "first": 0, "last": START - 1, "lead": "none"})
-    labels.act("Ada", {"kind": "propose", "first": START, "last": COUNT - 1, "from": "run"})
-    labels.wait_for(lambda now: len(now.leads) > 1)
-    proposed = [each for each in labels.everything["leads"] if each["state"] == "proposed"]
-    labels.act("Ada", {"kind": "accept", "items": [ref_of(each) for each in proposed]})
+    labels.act("Bob", {"kind": "set_lead", "first": START, "last": COUNT - 1, "lead": "none"})
+    of_bob = labels.everything["leads"][-1]
+    labels.act("Cid", {"kind": "send_back", "items": [ref_of(of_bob)], "comment": "a car"})
+    labels.act("Ada", {"kind": "accept", "items": [ref_of(labels.everything["leads"][-1])]})
     expect(page.locator("#label-bar .where")).to_contain_text("accepted")
     hand.keys("Shift+R")
     expect(page.locator(".said")).to_contain_text("No labels from others left to review")
