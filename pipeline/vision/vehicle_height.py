@@ -60,10 +60,10 @@ _MAX_SIGMAS = 2.0
 _STEP = 0.04
 HEIGHT_RATIOS: F64 = np.arange(-1.2, 1.2 + _STEP / 2, _STEP)
 """(G,) values of ln(own height / height of the class) that are compared with the road: from a car that is called a bus
-to a bus that is called a car. The step is half of the smallest standard deviation (``FLOOR_SHARE``)."""
+to a bus that is called a car. The step is less than the smallest standard deviation (``FLOOR_SHARE``)."""
 _MISDRAWN = 0.05
-"""Share of boxes whose lower edge has nothing to do with the road, as where something without a box hides the tyres;
-beyond two standard deviations, as many labelled vehicles are too many (``pipeline.fusion.ground_contact``)."""
+"""Share of boxes whose lower edge has nothing to do with the road, as where something without a box hides the tyres. As
+many edges of labelled vehicles are more than two standard deviations off (``pipeline.fusion.ground_contact``)."""
 _LARGE_CALLED_CAR, _CAR_CALLED_LARGE = 0.03, 0.5
 """Odds that what is called a car is a truck or a bus, and the reverse. YOLOX-nano calls a third of the labelled trucks
 and buses of Astyx and KITTI cars, and 2.5 % of the cars trucks (``measured_noise.json``). One in forty vehicles there
