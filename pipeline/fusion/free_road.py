@@ -175,7 +175,8 @@ def _beams(points: F32, ring: U8, origin: F64) -> _Beams:
     if not len(steps):
         return _Beams(slope, math.inf)
     low, high = np.partition(steps, (half - 1, half))[[half - 1, half]].tolist() if half else steps[[0, 0]].tolist()
-    return _Beams(slope, high if len(steps) % 2 else (low + high) / 2)
+    step_rad = high if len(steps) % 2 else (low + high) / 2
+    return _Beams(slope, step_rad if step_rad > 0.0 else math.inf)  # most in one direction: a damaged sweep
 
 
 def warm_up() -> None:

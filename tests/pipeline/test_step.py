@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from pipeline.params import Params, preset, with_changes
 from pipeline.sources import open_source
 from pipeline.step import State, step
-from pipeline.types import Frame, RawBoxes, Result
+from pipeline.types import F32, Frame, RawBoxes, Result
 from pipeline.types.result_json import write_line
 
 
@@ -118,6 +119,34 @@ def test_the_lead_is_found_by_both_sensors(frames: list[Frame]) -> None:
 def test_a_missing_branch(frames: list[Frame], missing: dict[str, None], kinds: set[str]) -> None:
     results = drive([dataclasses.replace(frame, **missing) for frame in frames], Params())
     assert {item.source for result in results for item in result.objects} == kinds
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        pytest.param(lambda p: p[:1], id="one point"),
+        pytest.param(lambda p: np.repeat(p[:1], len(p), axis=0), id="every point the same"),
+        pytest.param(np.zeros_like, id="every point at the origin"),
+        pytest.param(lambda p: p * np.array([1, 0, 0, 1], np.float32), id="all in one direction"),
+        pytest.param(lambda p: p * np.array([0, 0, 1, 1], np.float32), id="one upright line"),
+        pytest.param(lambda p: p * np.array([1, 1, 0, 1], np.float32), id="all at one height"),
+    ],
+)
+def test_a_damaged_sweep_stops_nothing_and_the_camera_still_sees(
+    frames: list[Frame], damage: Callable[[F32], F32]
+) -> None:
+    """The third sweep of a drive, and the first of one."""
+    for at in (2, 0):
+        damaged = list(frames[:5])
+        sweep = damaged[at].sweep
+        assert sweep is not None
+        points = damage(sweep.points)
+        time_s = sweep.time_s[: len(points)] if sweep.time_s is not None else None
+        shown = dataclasses.replace(sweep, points=points, ring=sweep.ring[: len(points)], time_s=time_s)
+        damaged[at] = dataclasses.replace(frames[at], sweep=shown)
+        results = drive(damaged, Params())
+        assert any("V" in item.source for item in results[at].objects)
+        assert results[-1].cipv is not None
 
 
 def test_a_sensor_lost_midway_is_carried_and_says_so(frames: list[Frame]) -> None:
