@@ -70,6 +70,7 @@ ON_IT = (46.0, 0.2, 0.0, LOOSE)
         ("below its roof", [(54.0, 0.2, 0.5, LOOSE)], 54.0),
         ("beside the box", [(46.0, 1.5, 0.0, LOOSE)], None),
         ("far nearer than any vehicle of that height", [(25.0, 0.1, 0.0, LOOSE)], None),
+        ("a post in front of it, so near that a car would have a cluster", [(29.5, 0.1, 0.0, LOOSE)], None),
         ("far beyond it", [(95.0, 0.1, 0.0, LOOSE)], None),
         ("a cluster's point", [(46.0, 0.2, 0.0, CLUSTER)], None),
         ("a wall that goes on to both sides", [ON_IT, (46.0, 1.2, 0.0, LOOSE), (46.0, -1.2, 0.0, LOOSE)], None),
