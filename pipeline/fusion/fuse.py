@@ -9,6 +9,7 @@ join these rows by their place, or get a row of their own.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -278,17 +279,22 @@ def _assign(overlap: F64, joinable: np.ndarray, params: FusionParams) -> dict[in
 
 
 def _identities(state: FusionState, keys: list[dict[str, int]]) -> tuple[FusionState, list[int]]:
-    """The object id of each row. keys: the track id of each of its sensors, by letter. A row inherits the oldest id of
-    its tracks that is not yet taken; rows of more sensors choose first, so that a single fragment never takes over the
-    id of a whole object."""
+    """The object id of each row. keys: the track id of each of its sensors, by letter. A row inherits an id of its
+    tracks that is not yet taken: one that no other row could inherit, so that a cluster that was joined with another
+    object for a moment does not bring along that object's number, and of those the oldest. Rows of more sensors choose
+    first, so that a single fragment never takes over the id of a whole object."""
+    before = [
+        {known for letter, track in key.items() if (known := state.objects_of(letter).get(track)) is not None}
+        for key in keys
+    ]
+    heirs = Counter(each for known in before for each in known)
     order = sorted(range(len(keys)), key=lambda k: (-len(keys[k]), k))
     ids = [0] * len(keys)
     taken: set[int] = set()
     next_id = state.next_id
     for k in order:
-        before = [state.objects_of(letter).get(track) for letter, track in keys[k].items()]
-        known = [each for each in before if each is not None and each not in taken]
-        ids[k] = min(known) if known else next_id
+        known = before[k] - taken
+        ids[k] = min(known, key=lambda each: (heirs[each], each)) if known else next_id
         next_id += not known
         taken.add(ids[k])
     by_track: dict[str, dict[int, int]] = {}

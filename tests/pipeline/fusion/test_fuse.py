@@ -299,6 +299,14 @@ def test_a_fragment_does_not_take_the_number_of_the_whole() -> None:
     assert by_box == {1: 2, 2: first.objects[0].id}
 
 
+def test_a_cluster_that_another_object_had_for_a_moment_does_not_bring_its_number_along() -> None:
+    """In the last frame, the cluster ahead was joined with the older object's box. Both boxes are still there."""
+    cluster = lidar_track(1, 34.0)
+    aside, ahead = vision_track(1, (900.0, 300.0, 960.0, 350.0), 33.0), vision_track(2, box_of(cluster), 35.0)
+    _, after = joined([cluster], [aside, ahead], state=FusionState(3, {"V": {1: 1, 2: 2}, "L": {1: 1}}))
+    assert {item.vision_track: (item.id, item.source) for item in after.objects} == {1: (1, "V"), 2: (2, "VL")}
+
+
 def test_two_numbers_that_become_one_object_keep_the_older_and_part_again_without_a_clash() -> None:
     track = lidar_track(1, 20.0)
     apart = vision_track(1, (900.0, 300.0, 1000.0, 400.0), 20.0)
