@@ -35,10 +35,10 @@ CLEAR_SHARE = 0.8
 """A place is free if this share of the rays that reached it passed through."""
 _SILENT_RAYS = 10
 """Minimum number of rays without a return for this to be evidence: two rings, 1° each."""
-_SILENT_M = 36.0
-"""Closer than this, the body of a vehicle returns rays whatever its paint. Measured for vehicles within 30 m (see
-``existence``), whose position uncertainty extends to this distance. Missing returns say nothing of an object that may
-be farther away, its tail included."""
+_SILENT_FROM_M, _SILENT_M = 30.0, 36.0
+"""Closer than the first, the body of a vehicle returns rays whatever its paint: measured for vehicles within 30 m (see
+``existence``), whose position uncertainty extends to the second. Missing returns say nothing of an object that is, or
+may be, farther away, its tail included: a vehicle that the LiDAR follows may leave its reach there."""
 NEAR_M = 20.0
 """Closer than this, every vehicle has a cluster: of 47 labelled ones on Astyx and KITTI, none was seen by the camera
 alone."""
@@ -153,7 +153,9 @@ def rays_to(objects: tuple[FusedObject, ...], sweep: SweepRays) -> dict[int, Ray
     at = np.asarray(origin, dtype=np.float64)
     beams = _beams(sweep.points, sweep.ring, at)
     wanted = np.concatenate([places, road, tails[:, None]], axis=1)
-    rows = _count(sweep.points, sweep.ring, sweep.kind, at, wanted, beams.slope, beams.step_rad, _SILENT_M)
+    rows = _count(
+        sweep.points, sweep.ring, sweep.kind, at, wanted, beams.slope, beams.step_rad, _SILENT_FROM_M, _SILENT_M
+    )
     return {item.id: Rays(*row) for item, row in zip(asked, rows.tolist(), strict=True)}
 
 
@@ -185,7 +187,7 @@ def warm_up() -> None:
     kind, origin = np.zeros(2, np.int32), np.zeros(3)
     points, ring = made_sweep()
     slope, _ = _slopes(points, ring, origin)
-    _count(points, ring, kind, origin, place, slope, 0.1, _SILENT_M)
+    _count(points, ring, kind, origin, place, slope, 0.1, _SILENT_FROM_M, _SILENT_M)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -259,7 +261,7 @@ def _slices(places):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 @numba.njit(cache=True, nogil=True)
-def _count(points, ring, kind, origin, places, slope, step_rad, silent_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _count(points, ring, kind, origin, places, slope, step_rad, silent_from_m, silent_m):  # type: ignore[no-untyped-def]  # pragma: no cover
     """(K, 6) fields of ``Rays`` for (K, 8) places: unit x, y, near, far, tangent of half the angle, height of the road
     at near and far, and how far beyond far the object may be, all relative to ``origin``. slope, step_rad: beams."""
     out = np.zeros((len(places), 6))
@@ -293,7 +295,7 @@ def _count(points, ring, kind, origin, places, slope, step_rad, silent_m):  # ty
                     stopped[k, b] += kind[i] < 0 and at - half <= along <= at + half
                     taken[k, b] += kind[i] >= 0 and at - half <= along <= at + half
     for k in range(len(places)):
-        is_near = places[k, 3] + places[k, 7] <= silent_m
+        is_near = 0.5 * (places[k, 2] + places[k, 3]) <= silent_from_m and places[k, 3] + places[k, 7] <= silent_m
         rays, live = 2.0 * places[k, 4] / step_rad, is_near and seen[k].sum() >= MIN_RAYS and hidden[k] < MIN_RAYS
         out[k, 0] = out[k, 3] = out[k, 4] = out[k, 5] = np.inf
         for b in range(counts[k]):

@@ -187,6 +187,8 @@ def test_missing_returns_say_nothing_of_a_car_that_may_be_too_far() -> None:
     missing = Rays(np.concatenate([ASIDE, TARMAC]))
     assert gate(after(camera_car(27.0, sigma_m=1.0), missing)) is False
     assert gate(after(camera_car(27.0, sigma_m=2.7), missing)) is None
+    assert gate(after(camera_car(29.5, sigma_m=0.3), missing)) is False
+    assert gate(after(camera_car(32.0, sigma_m=0.3), missing)) is None, "the LiDAR followed it out of its reach"
 
 
 def test_rays_that_end_somewhere_in_a_vague_distance_do_not_speak_for_it() -> None:
