@@ -38,8 +38,9 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: Ae
     that stands or may stand beside the road stays there: its lateral speed is noise, and half of its points may vanish.
 
     If the path's uncertainty exceeds its width, no course counts as leading into it: in a bend, other traffic follows
-    the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty. Oncoming
-    or crossing objects behind the lead cannot be reached. What crosses and is gone before the car arrives is not met.
+    the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty where the two
+    meet, also while it was seen for too short a time to be sure that it moves. Oncoming or crossing objects behind the
+    lead cannot be reached. What crosses and is gone before the car arrives is not met.
 
     What is in the corridor must be seen there in this frame as well.
     """
@@ -51,18 +52,16 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: Ae
         is_hidden = lead is not None and distance_m > lead.distance_m
         if is_hidden or sigma_m > path.half_width_m:
             return False
-    if item.surely_moving is False or (item.in_path and not oncoming):
+    if not oncoming and (item.surely_moving is False or item.in_path):
         return item.in_path and is_there_now(item, params)
     if item.closest_point is None or item.closest_point[0] < ABREAST_M:
         return False  # already beside the car: braking would not avoid it
     sideways = believed_mps(item.lateral_mps, item)
+    if oncoming and params.react_where_met:
+        return abs(item.path_offset_m + sideways * item.ttc_s) + _SURE_SIGMAS * sigma_m <= path.half_width_m
     toward = -sideways if item.path_offset_m > 0 else sideways
     aside_m = abs(item.path_offset_m) - max(toward, 0.0) * item.ttc_s
-    if oncoming:
-        if params.react_where_met:
-            aside_m = abs(aside_m)  # negative: on the other side by then
-        return aside_m + _SURE_SIGMAS * sigma_m <= path.half_width_m
-    return aside_m <= path.half_width_m
+    return aside_m + (_SURE_SIGMAS * sigma_m if oncoming else 0.0) <= path.half_width_m
 
 
 def _sigma_m(path: Path, ahead_m: float) -> float:

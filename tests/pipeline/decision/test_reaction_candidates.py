@@ -103,6 +103,10 @@ IN_OUR_LANE = fused(1, 30.0, 0.2, velocity=(-35.0, 0.0))
 """It is oncoming."""
 CROSSES_OVER = fused(1, 29.0, -0.8, velocity=(-29.0, 2.5))
 """It is oncoming, and in our lane only on its way from one side to the other, as before a bend."""
+LEAVES = fused(1, 29.0, 0.4, velocity=(-29.0, 2.5))
+"""It is oncoming, and leaves our lane for its own, as at the end of a bend."""
+JUST_RANGED = dataclasses.replace(fused(1, 30.0, 0.9, velocity=(-35.0, 0.0)), ranged_steady=3)
+"""It is oncoming at the edge of our lane, and not surely moving after three sweeps."""
 STANDS = fused(1, 30.0, 0.2, velocity=(-20.0, 0.0))
 
 
@@ -118,6 +122,9 @@ STANDS = fused(1, 30.0, 0.2, velocity=(-20.0, 0.0))
         pytest.param(IN_OUR_LANE, 1.0, None, False, id="oncoming, in our lane, more likely than not"),
         pytest.param(IN_OUR_LANE, 0.3, 12.0, False, id="oncoming, behind the lead"),
         pytest.param(CROSSES_OVER, 0.3, None, False, id="oncoming, in our lane for a moment"),
+        pytest.param(LEAVES, 0.3, None, False, id="oncoming, still in our lane"),
+        pytest.param(JUST_RANGED, 0.6, None, False, id="oncoming, just ranged, at the edge"),
+        pytest.param(JUST_RANGED, 0.1, None, True, id="oncoming, just ranged, surely in our lane"),
         pytest.param(STANDS, 2.5, None, True, id="stands in the way, wherever that leads"),
         pytest.param(STANDS, 0.3, 12.0, True, id="stands before the lead, which may swerve"),
     ],
@@ -130,4 +137,4 @@ def test_where_a_course_says_nothing(
     known = judged(item, 20.0)
     assert enters_corridor(known, path, lead, AebParams()) is enters
     also_before = enters_corridor(known, path, lead, AebParams(react_where_met=False))
-    assert also_before is (enters or item is CROSSES_OVER)
+    assert also_before is (enters or item in (CROSSES_OVER, LEAVES))
