@@ -142,10 +142,10 @@ def _judge(
     has_driven, was_boxed = driving_s >= _DRIVES_S, boxed_s >= _BOXED_S
     is_ahead = where is not None and where.ahead_m > 0.0
     probability = 1.0 / (1.0 + exp(-odds)) if is_ahead and odds is not None else 0.0
-    is_in = probability > 0.5
     verdict = judge(
         Candidate(item, where, odds or 0.0, leads, widening_m, path, params, clears_s, has_driven, was_boxed)
     )
+    is_in = is_ahead and verdict.eligibility.in_path
     if clears_s is None and where is not None and where.margin_m() >= 0.0 and is_ahead:
         comes_in = where.middle_m * where.believed_mps < 0.0
         if not is_in or (comes_in and not verdict.eligibility.probable):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from math import exp
+from math import exp, log
 from typing import NamedTuple
 
 from pipeline.decision.place import Place
@@ -58,12 +58,23 @@ class Candidate(NamedTuple):
     """Whether both sensors saw it, the camera as a vehicle, for long enough that it is one."""
 
     @property
+    def least_odds(self) -> float:
+        """Log-odds above which it counts as in the path: even ones, and lower ones for the current lead."""
+        stays = self.params.stay_probability
+        return min(log(stays / (1.0 - stays)), 0.0) if self.leads and stays > 0.0 else 0.0
+
+    @property
+    def is_in_path(self) -> bool:
+        """Whether it counts as in the path."""
+        return self.odds > self.least_odds
+
+    @property
     def aside_m(self) -> float:
         """Its distance from the middle of the path: as measured now, unless its earlier sightings contradict it; then
         the offset that corresponds to the running mean."""
         assert self.place is not None
         margin_m = self.place.margin_m(self.widening_m)
-        if (margin_m >= 0.0) == (self.odds > 0.0):
+        if (margin_m >= self.place.margin_of(self.least_odds)) == self.is_in_path:
             return abs(self.place.middle_m)
         return self.place.limit_m + self.widening_m - self.place.margin_of(self.odds)
 
@@ -200,10 +211,12 @@ def _stays(who: Candidate) -> Answer:
 
 
 def _in_path(who: Candidate) -> Answer:
-    """The running mean of the log-odds, expressed in metres: see ``aside_m``."""
+    """The running mean of the log-odds, expressed in metres: see ``aside_m``. The lead leaves the path once it is
+    probably outside: in a bend, a car whose distance is uncertain by a fifth may seem to be beside it."""
     if who.place is None:
         return False, None, who.path.half_width_m
-    return who.odds > 0.0, who.aside_m, who.place.limit_m + who.widening_m
+    limit_m = who.place.limit_m + who.widening_m - who.place.margin_of(who.least_odds)
+    return who.is_in_path, who.aside_m, limit_m
 
 
 def _out_of_path(who: Candidate) -> str:
@@ -246,7 +259,7 @@ def _probable(who: Candidate) -> Answer:
     a row of parked cars in a bend, as if it drove ahead. A lead may stay with less: in a bend of 125 m without a route,
     true leads fall below 60 %. Clearly inside, a low probability only says that the road is not known.
     """
-    there, in_path = _existence(who), _in_path_probability(who) if who.odds > 0.0 else 1.0
+    there, in_path = _existence(who), _in_path_probability(who) if who.is_in_path else 1.0
     # objects out of the path already fail another gate
     to_exist, to_be_in_path = _needed_existence(who), _needed_probability(who)
     probability = in_path if who.leads else there * in_path

@@ -38,9 +38,9 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: Ae
     that stands or may stand beside the road stays there: its lateral speed is noise, and half of its points may vanish.
 
     If the path's uncertainty exceeds its width, no course counts as leading into it: in a bend, other traffic follows
-    the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty where the two
-    meet, also while it was seen for too short a time to be sure that it moves. Oncoming or crossing objects behind the
-    lead cannot be reached. What crosses and is gone before the car arrives is not met.
+    the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty where the
+    two meet, also while it was seen for too short a time to be sure that it moves. Oncoming or crossing objects behind
+    the lead cannot be reached. What crosses and is gone before the car arrives is not met.
 
     What is in the corridor must be seen there in this frame as well.
     """

@@ -170,7 +170,27 @@ def test_hysteresis_holds_the_lead_at_the_edge_but_takes_in_nobody_new() -> None
     assert decide(at_edge, last=None)[0] is None
     held, _ = decide(at_edge, last=1)
     assert held is not None
-    assert decide(fused(1, 20.0, 1.9), last=1)[0] is None
+    assert decide(fused(1, 20.0, 3.0), last=1)[0] is None
+
+
+@pytest.mark.parametrize(
+    ("sigma_m", "stay_probability", "stays"),
+    [
+        pytest.param(8.0, 0.4, True, id="its distance is uncertain by a third"),
+        pytest.param(0.2, 0.4, False, id="its distance is measured"),
+        pytest.param(8.0, 0.5, False, id="it must be in the path as probably as a new one"),
+        pytest.param(8.0, 0.0, False, id="only its side of the edge counts"),
+    ],
+)
+def test_a_lead_leaves_the_path_once_it_is_probably_outside(
+    sigma_m: float, stay_probability: float, stays: bool
+) -> None:
+    """Half a metre outside, and seen so far aside that an error of its distance moves it across the path."""
+    params = CipvParams(hysteresis_m=0.0, stay_probability=stay_probability)
+    seen = dataclasses.replace(fused(1, 20.0, 2.0, source="V", velocity=None), distance_sigma_m=sigma_m)
+    (item,) = (choice := choose(CipvState(1), (seen,), PATH, moment(), params)[1]).objects
+    assert (item.path_margin_m or 0.0) < 0.0
+    assert (choice.lead is not None, item.in_path) == (stays, stays)
 
 
 def test_a_carried_object_may_stay_the_lead_but_not_become_it() -> None:
