@@ -155,11 +155,12 @@ def weigh(
 
 def _before(state: ExistenceState, item: FusedObject) -> Existence:
     """Evidence about an object until now. If its id went to another part of it, its boxes are still the same: what they
-    said, and what the LiDAR said against them, still holds. What it said for them was about the other part."""
+    said, and what the LiDAR said against them, still holds. What it said for them was about the other part, and it was
+    the other part that it followed."""
     known = state.known.get(item.id)
     if known is None and item.vision_track in state.by_vision:
         before = state.known[state.by_vision[item.vision_track]]
-        known = before._replace(lidar=min(before.lidar, 0.0))
+        known = before._replace(lidar=min(before.lidar, 0.0), cluster_s=0.0)
     return known if known is not None else Existence(None, 0.0)
 
 

@@ -9,9 +9,9 @@ join these rows by their place, or get a row of their own.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -38,18 +38,27 @@ _SETTLED_RANGES = 3
 """Distances of a camera track, after which a single cluster does not contradict it."""
 
 
+class Owner(NamedTuple):
+    """The object that a track belongs to."""
+
+    id: int
+    """Of the object."""
+    frames: int = 1
+    """Number of frames in a row."""
+
+
 @dataclass(frozen=True)
 class FusionState:
     """Object id of each sensor's tracks, so that an object keeps its id when it changes from VL to V or L."""
 
     next_id: int = 1
     """Id of the next new object; ids are never reused."""
-    by_track: Mapping[str, Mapping[int, int]] = field(default_factory=dict)
-    """Object id of each track id in the last frame, by the sensor's letter."""
+    owners: Mapping[str, Mapping[int, Owner]] = field(default_factory=dict)
+    """The object of each track id in the last frame, by the sensor's letter."""
 
-    def objects_of(self, letter: str) -> Mapping[int, int]:
-        """Object id of each of this sensor's track ids, in the last frame."""
-        return self.by_track.get(letter, {})
+    def owner_of(self, letter: str, track: int) -> Owner | None:
+        """The object of a sensor's track in the last frame; None for a new track."""
+        return self.owners.get(letter, {}).get(track)
 
 
 @dataclass(frozen=True)
@@ -207,8 +216,8 @@ def _overlap(vision: tuple[VisionTrack, ...], projected: list[Box | None]) -> F6
 
 def _were_one(state: FusionState, vision: tuple[VisionTrack, ...], lidar: tuple[LidarTrack, ...]) -> Mask:
     """(n, m) bool: the pairs that were one object in the last frame."""
-    hits = np.array([state.objects_of(L).get(each.id, -1) for each in lidar])
-    seen = np.array([state.objects_of(V).get(each.id, -2) for each in vision])
+    hits = np.array([owner.id if (owner := state.owner_of(L, each.id)) else -1 for each in lidar])
+    seen = np.array([owner.id if (owner := state.owner_of(V, each.id)) else -2 for each in vision])
     return np.asarray(seen[:, None] == hits[None])
 
 
@@ -280,25 +289,23 @@ def _assign(overlap: F64, joinable: np.ndarray, params: FusionParams) -> dict[in
 
 def _identities(state: FusionState, keys: list[dict[str, int]]) -> tuple[FusionState, list[int]]:
     """The object id of each row. keys: the track id of each of its sensors, by letter. A row inherits an id of its
-    tracks that is not yet taken: one that no other row could inherit, so that a cluster that was joined with another
-    object for a moment does not bring along that object's number, and of those the oldest. Rows of more sensors choose
-    first, so that a single fragment never takes over the id of a whole object."""
-    before = [
-        {known for letter, track in key.items() if (known := state.objects_of(letter).get(track)) is not None}
-        for key in keys
-    ]
-    heirs = Counter(each for known in before for each in known)
+    tracks that is not yet taken: that which one of them has had for longest, so that a track that another object had
+    for a moment does not bring along that object's id; of several, the oldest. Rows of more sensors choose first, so
+    that a single fragment never takes over the id of a whole object."""
     order = sorted(range(len(keys)), key=lambda k: (-len(keys[k]), k))
     ids = [0] * len(keys)
     taken: set[int] = set()
     next_id = state.next_id
     for k in order:
-        known = before[k] - taken
-        ids[k] = min(known, key=lambda each: (heirs[each], each)) if known else next_id
+        before = [state.owner_of(letter, track) for letter, track in keys[k].items()]
+        known = [(-owner.frames, owner.id) for owner in before if owner is not None and owner.id not in taken]
+        ids[k] = min(known)[1] if known else next_id
         next_id += not known
         taken.add(ids[k])
-    by_track: dict[str, dict[int, int]] = {}
+    owners: dict[str, dict[int, Owner]] = {}
     for object_id, key in zip(ids, keys, strict=True):
         for letter, track in key.items():
-            by_track.setdefault(letter, {})[track] = object_id
-    return FusionState(next_id, by_track), ids
+            last = state.owner_of(letter, track)
+            frames = last.frames + 1 if last is not None and last.id == object_id else 1
+            owners.setdefault(letter, {})[track] = Owner(object_id, frames)
+    return FusionState(next_id, owners), ids

@@ -162,6 +162,19 @@ def test_a_box_whose_own_cluster_goes_on_without_it_is_misplaced(number: int, ex
     assert (found.existence > 0.5) == exists
 
 
+@pytest.mark.parametrize(("number", "exists"), [(1, True), (2, False)], ids=["the object's", "a number of its own"])
+def test_what_the_lidar_followed_under_another_number_has_not_merged(number: int, exists: bool) -> None:
+    """An oncoming van, whose box jumps to a second one on it. The van keeps its number, and the box gets a new one."""
+    van, rays = replace(camera_car(8.0), vision_track=7), Rays(returns(8.5), cluster=3)
+    state = ExistenceState()
+    for _ in range(10):
+        state, _ = weigh(state, (replace(van, source="VL", seen_by="VL"),), rays, FRAME, moment(None, 0.1), PARAMS)
+    for _ in range(10):
+        state, (found,) = weigh(state, (replace(van, id=number),), rays, FRAME, moment(None, 0.1), PARAMS)
+    assert found.existence is not None
+    assert (found.existence > 0.5) == exists
+
+
 def test_rays_start_at_the_sensor() -> None:
     """A ray from the roof passes over the position, although its return behind is at body height."""
     high = Rays(returns(40.0, height_m=0.6), origin=(0.0, 0.0, 3.0))

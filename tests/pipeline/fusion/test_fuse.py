@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from pipeline.alignment.projection import Alignment, Angular, project_cuboid
 from pipeline.common.fast_replace import evolve
-from pipeline.fusion.fuse import Fusion, FusionState, fuse
+from pipeline.fusion.fuse import Fusion, FusionState, Owner, fuse
 from pipeline.fusion.vehicle_sizes import LONGEST_M
 from pipeline.params import FusionParams, preset
 from pipeline.types import Box, LidarTrack, VisionTrack
@@ -299,12 +299,25 @@ def test_a_fragment_does_not_take_the_number_of_the_whole() -> None:
     assert by_box == {1: 2, 2: first.objects[0].id}
 
 
-def test_a_cluster_that_another_object_had_for_a_moment_does_not_bring_its_number_along() -> None:
-    """In the last frame, the cluster ahead was joined with the older object's box. Both boxes are still there."""
+@pytest.mark.parametrize(
+    ("box_frames", "cluster_frames", "ahead"),
+    [
+        pytest.param(30, 1, 2, id="the cluster was joined with the older object for one frame"),
+        pytest.param(1, 12, 1, id="the box is new, the cluster has long been the older object's"),
+    ],
+)
+def test_an_object_takes_the_number_that_its_tracks_have_had_for_longest(
+    box_frames: int, cluster_frames: int, ahead: int
+) -> None:
+    """The cluster of object 1 is joined with the box of object 2, and the box of object 1 is somewhere else."""
     cluster = lidar_track(1, 34.0)
-    aside, ahead = vision_track(1, (900.0, 300.0, 960.0, 350.0), 33.0), vision_track(2, box_of(cluster), 35.0)
-    _, after = joined([cluster], [aside, ahead], state=FusionState(3, {"V": {1: 1, 2: 2}, "L": {1: 1}}))
-    assert {item.vision_track: (item.id, item.source) for item in after.objects} == {1: (1, "V"), 2: (2, "VL")}
+    aside, on_it = vision_track(1, (900.0, 300.0, 960.0, 350.0), 33.0), vision_track(2, box_of(cluster), 35.0)
+    owners = {"V": {1: Owner(1, 40), 2: Owner(2, box_frames)}, "L": {1: Owner(1, cluster_frames)}}
+    state, after = joined([cluster], [aside, on_it], state=FusionState(3, owners))
+    by_box = {item.vision_track: (item.id, item.source) for item in after.objects}
+    assert by_box[2] == (ahead, "VL")
+    assert by_box[1] == (1 if ahead == 2 else 3, "V")
+    assert state.owner_of("L", 1) == Owner(ahead, cluster_frames + 1 if ahead == 1 else 1)
 
 
 def test_two_numbers_that_become_one_object_keep_the_older_and_part_again_without_a_clash() -> None:
