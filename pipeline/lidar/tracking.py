@@ -27,7 +27,7 @@ from pipeline.params import LidarTrackingParams
 from pipeline.types import F64, I64, LidarTrack, Obstacle, Point3
 
 NEVER = 1e6
-"""Cost of a pair that a gate forbids: more than the cost of all permitted pairs together."""
+"""Cost of a pair that a gate forbids."""
 MIN_GATE_POINTS = 10
 """Below this many points, counts and densities are noise: one ring more or less doubles them."""
 _SIDES_FRAMES = 10
@@ -173,8 +173,9 @@ def _looks(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
 def associate(
     state: LidarTrackerState, filters: kalman.CvState, seen: Looks, dt_s: float, params: LidarTrackingParams
 ) -> I64:
-    """(T,) the obstacle of each track, −1 for none: one-to-one, with the smallest total distance, gated pairs only. The
-    filters are already predicted to now."""
+    """(T,) the obstacle of each track, −1 for none: one-to-one, gated pairs only, with the smallest total distance,
+    where an unmatched track costs as much as a pair at its gate. (Maximising the number of pairs would swap the tracks
+    of two cars if the obstacle of one has changed too much.) The filters are already predicted to now."""
     partner = np.full(len(state.tracks), -1)
     if not state.tracks or not len(seen.place):
         return partner
@@ -192,7 +193,7 @@ def associate(
         params.max_density_ratio,
         params.max_spread_change_m,
     )
-    rows, columns = linear_sum_assignment(cost)
+    rows, columns = linear_sum_assignment(np.minimum(cost, gate[:, None]))
     allowed = cost[rows, columns] < NEVER
     partner[rows[allowed]] = columns[allowed]
     return partner

@@ -125,8 +125,20 @@ def test_a_few_points_more_or_less_are_no_other_object() -> None:
 def test_least_total_distance_one_to_one() -> None:
     """Taking the nearest pair first would leave the other track with a partner outside its gate."""
     params = LidarTrackingParams(gate_m=1.3, start_speed_mps=1.0, max_missed_s=0.0)
-    seen = _drive([(_car(20.0), _car(21.0)), (_car(21.1), _car(21.9))], params)
-    assert [(t.id, t.obstacle.closest_point[0]) for t in seen[-1]] == [(1, 21.1), (2, 21.9)]
+    seen = _drive([(_car(20.0), _car(21.0)), (_car(20.7), _car(21.5))], params)
+    assert [(t.id, t.obstacle.closest_point[0]) for t in seen[-1]] == [(1, 20.7), (2, 21.5)]
+
+
+def test_a_lead_does_not_swap_its_track_with_a_parked_car_that_looks_different_now() -> None:
+    """The lead drives 1.7 m ahead of where a parked car comes out from behind another. Two tracks with the obstacle of
+    the other would be two pairs, but one track with its own and one without are nearer to the truth."""
+    lead = _car(15.9)._replace(density=17.0)
+    hidden, parked = _car(17.4, -1.8)._replace(density=4.0), _car(16.6, -1.8)._replace(density=30.0)
+    seen = _drive([(lead, hidden), (lead, parked)], LidarTrackingParams())
+    assert {t.id: t.obstacle.closest_point for t in seen[-1] if not t.carried} == {
+        1: (15.9, 0.0, 0.0),
+        3: (16.6, -1.8, 0.0),
+    }
 
 
 def test_numbers_are_never_given_twice_and_the_first_tick_forgets() -> None:
