@@ -94,8 +94,7 @@ def _labels(folder: Path) -> list[list[Labelled]]:
         frame, _, *row = line.split()
         lines[int(frame)].append(" ".join(row))
     found = []
-    for index in range(len(source)):
-        camera = source.frame(index).camera
+    for index, camera in enumerate(frame.camera for frame in source.outlines()):
         aligned = resolve(AlignmentParams(), camera)
         assert camera is not None
         assert aligned is not None

@@ -306,7 +306,7 @@ class _Part:
     def __init__(self, source, numbers: range) -> None:
         self.uri, self.title, self.rate_hz, self.notes = source.uri, source.title, source.rate_hz, source.notes
         self._source = source
-        self._chosen = [i for i in range(len(source)) if int(source.frame(i).name) in numbers]
+        self._chosen = [i for i, frame in enumerate(source.outlines()) if int(frame.name) in numbers]
 
     def __len__(self) -> int:
         return len(self._chosen)

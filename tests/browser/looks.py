@@ -51,6 +51,11 @@ _TWO_TURNS = "() => new Promise((done) => requestAnimationFrame(() => requestAni
 """Two screen refreshes: pending drawing is done, and so are the texts that follow it."""
 
 
+def settle(page: Page) -> None:
+    """Wait until what is to be drawn now is drawn."""
+    page.evaluate(_TWO_TURNS)
+
+
 _DIGEST = """async ([selector, pauseMs]) => {
   if (pauseMs) await new Promise((done) => setTimeout(done, pauseMs));
   for (let turn = 0; turn < 2; turn++) await new Promise(requestAnimationFrame);
@@ -67,7 +72,7 @@ def pixels(page: Page, canvas: str, pause_ms: float = 0.0) -> str:
 
 def table(page: Page) -> str:
     """The text of the objects table, once the rows out of sight show the current frame too."""
-    page.evaluate(_TWO_TURNS)
+    settle(page)
     body = page.locator("#objects tbody")
     expect(body).to_have_attribute("aria-busy", "false")
     said = body.text_content()

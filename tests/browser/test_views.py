@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.streaming.sent_image import WIDTH_STEP_PX
 from tests.browser.conftest import START, OpenPage, Site
-from tests.browser.looks import box_of, pixels, repainted, wait_for_frame, whole_drive
+from tests.browser.looks import box_of, pixels, repainted, settle, wait_for_frame, whole_drive
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
@@ -179,7 +179,7 @@ def test_a_failed_test_of_the_selected_object_is_drawn_with_its_number(open_page
       };
     }""")
     page.locator(f"#objects tr[data-id='{aside.id}']").click()
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    settle(page)
     gate = next(gate for gate in aside.gates if gate.name == "path_offset")
     written = page.evaluate("window.written")
     assert f"bev: {gate.value:.2f} m, limit {gate.limit:.2f}" in written

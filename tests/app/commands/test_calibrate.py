@@ -19,6 +19,7 @@ from pipeline.inference.distance_laws import find_law
 from pipeline.inference.model_registry import EMBEDDED, find
 from pipeline.params import Params, from_yaml
 from pipeline.sources import open_source
+from pipeline.types.source import InParts
 from tests.pipeline.sources.made.clouds_on_disk import pcd, rows_of
 
 SCENE = """
@@ -131,8 +132,9 @@ def test_a_mount_is_fitted_to_a_drive_and_corrected_by_its_rig_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     drive, turn = open_source("sim:curve_125"), rotation(*np.radians([0.0, 2.0, 3.0])).astype(np.float32)
+    assert isinstance(drive, InParts)
     for index in range(60):
-        sweep = drive.frame(index).sweep
+        sweep = drive.sweep(index)
         assert sweep is not None
         points = sweep.points.copy()
         points[:, :3] = points[:, :3] @ turn

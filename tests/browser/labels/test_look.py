@@ -12,7 +12,7 @@ from app.labels.store.values import LONGEST_NAME
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.judges import LOW_CONTRAST
 from tests.browser.labels.hands import Labels, begin, draw
-from tests.browser.looks import COUNT, box_of, pixels, wait_for_frame
+from tests.browser.looks import COUNT, box_of, pixels, settle, wait_for_frame
 
 SCREENS = Path(__file__).resolve().parents[3] / "build" / "screens"
 
@@ -67,7 +67,7 @@ def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, hei
     page.locator(EXPORT).click()
     menu = page.locator("#menu")
     expect(menu.locator(".losses li").first).to_be_attached()  # what a format loses comes after the menu is shown
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    settle(page)
     box = box_of(menu)
     assert box["x"] + box["width"] <= width
     assert box["y"] + box["height"] <= height
@@ -97,7 +97,7 @@ def test_a_name_is_no_longer_than_the_server_takes_and_leaves_the_bar_its_room(o
     page.get_by_role("textbox", name="Name", exact=True).press_sequentially("A" * (LONGEST_NAME + 9))
     page.keyboard.press("Enter")
     page.wait_for_function("() => localStorage.getItem('cipv.person')")
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    settle(page)
     assert shown.inner_text() == "A" * LONGEST_NAME, "it is shown at once"
     assert box_of(page.locator(".annotator"))["width"] <= 150
     page.evaluate("localStorage.removeItem('cipv.person')")

@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Route, expect
 
 from tests.browser.conftest import START
 from tests.browser.labels.hands import LEAD_X, Hand, Labels, is_at
-from tests.browser.looks import COUNT, go_to
+from tests.browser.looks import COUNT, go_to, settle
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
+UNREVIEWED = "**/api/labels/next?what=unreviewed*"
 CAR = {"center": [LEAD_X, 0.0, 0.1], "size": [4.4, 1.8, 1.5], "yaw_rad": 0.0}
 
 
@@ -63,9 +64,16 @@ def test_with_nothing_left_no_lead_of_ones_own_is_offered(hand: Hand, labels: La
     labels.act("Cid", {"kind": "send_back", "items": [ref_of(of_bob)], "comment": "a car"})
     labels.act("Ada", {"kind": "accept", "items": [ref_of(labels.everything["leads"][-1])]})
     expect(page.locator("#label-bar .where")).to_contain_text("accepted")
-    hand.keys("Shift+R")
+    held: list[Route] = []
+    page.route(UNREVIEWED, lambda route: held.append(route))
+    with page.expect_request(UNREVIEWED):
+        hand.keys("Shift+R")
+    settle(page)
+    page.unroute(UNREVIEWED)
+    held[0].continue_()
     expect(page.locator(".said")).to_contain_text("No labels from others left to review")
-    expect(under).to_have_text("nothing")
+    settle(page)
+    assert under.inner_text() == "nothing", "known by the answer alone, though no frame comes after it"
     go_to(page, 0)
     is_at(page, 0)
     expect(under).to_have_text("nothing")

@@ -15,7 +15,7 @@ from pipeline.evaluation.lead_verdict import LeadRule, nearest_face_m, true_lead
 from pipeline.params import Params, with_changes
 from pipeline.sources import open_source
 from pipeline.types import REAL_VEHICLES, RawBoxes
-from pipeline.types.source import Source
+from pipeline.types.source import InParts, Source
 from pipeline.vision import distance, nms, tracking
 from tests.looking import LooksOnce, yolox_nano
 
@@ -43,7 +43,8 @@ def kitti(data_dir: Path) -> Recording:
 
 def _recording(uri: str, data_dir: Path, size: tuple[int, int]) -> Recording:
     source, detector = open_source(uri), yolox_nano(data_dir, *size)
-    names = tuple(source.frame(index).name for index in range(len(source)))
+    assert isinstance(source, InParts)
+    names = tuple(frame.name for frame in source.outlines())
     return Recording(source, detector, collect_pairs(source, detector), names)
 
 

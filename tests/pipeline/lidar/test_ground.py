@@ -19,6 +19,7 @@ from pipeline.lidar.ground import Ground, fit_ground, follow_ground, no_higher_t
 from pipeline.params import GroundParams
 from pipeline.sources import open_source
 from pipeline.types import F32
+from pipeline.types.source import InParts
 from tests.pipeline.lidar.scenes import Block, real_frames, road_height, scan
 
 CAR_AHEAD: Block = (12.0, -0.9, -1.5, 16.0, 0.9, 0.0)
@@ -170,12 +171,13 @@ def test_every_real_sweep(data_dir: Path) -> None:
 def test_the_road_of_a_street_with_hedges_is_where_parked_cars_stand(data_dir: Path) -> None:
     """KITTI 0009: beside a hedge, the plane next to the car tilted and lifted the road ahead by up to 2.5 m."""
     source = open_source(f"kitti:{data_dir / 'kitti_0009/2011_09_26/2011_09_26_drive_0009_sync'}")
+    assert isinstance(source, InParts)
     labels = import_labels(
         data_dir / "kitti_0009" / "label_02.txt", drive_of(source), "kitti-tracking", Origin("file", "test", 0)
     ).labels
     under_vehicles = []
     for index in range(30, len(source), 2):
-        sweep = source.frame(index).sweep
+        sweep = source.sweep(index)
         assert sweep is not None
         ground = _fit(sweep.points)
         there = [s.cuboid for t in labels.tracks for s in t.sightings if s.frame == index and t.label in VEHICLES]

@@ -191,7 +191,7 @@ def test_real_labels_hold_the_points_of_their_cars(data_dir: Path) -> None:
     source = opened(data_dir / "astyx")
     inside, beside = [], []
     for index in range(0, len(source), 3):
-        sweep, truth = source.frame(index).sweep, source.truth(index)
+        sweep, truth = source.sweep(index), source.truth(index)
         assert sweep is not None
         assert truth is not None
         for item in truth:
@@ -215,10 +215,10 @@ def test_real_labels_hold_the_points_of_their_cars(data_dir: Path) -> None:
 def test_real_distances_shrink_in_the_closing_run(data_dir: Path) -> None:
     source = opened(data_dir / "astyx")
     nearest = []
-    for index in range(len(source)):
+    for index, frame in enumerate(source.outlines()):
         truth = source.truth(index) or ()
         ahead = [item.cuboid.center[0] for item in truth if abs(item.cuboid.center[1]) < 1.5 and item.label == "car"]
-        if source.frame(index).name >= "000414" and ahead:
+        if frame.name >= "000414" and ahead:
             nearest.append(min(ahead))
     assert nearest[0] == pytest.approx(34.2, abs=0.1)
     assert nearest[-1] < 27.0

@@ -9,16 +9,13 @@ import { act } from "./queue.js";
 import { ahead, refOf, say } from "./commands.js";
 import { ask } from "../panels/dialogs.js";
 import { chosen, leadAt, leadName, nameOf, shown } from "../state/labels.js";
-import { setItem, setReview } from "../state/mode.js";
+import { setDoneAt, setItem, setReview } from "../state/mode.js";
 import { knownName, mayReview } from "../state/person.js";
 
 /**
  * The label under review, its display name, and the comment if it was sent back before.
  * @typedef {{ref: import("../state/types.js").ItemRef, name: string, comment: string}} Target
  */
-
-/** Revision of the labels at which the server knew of nothing to review. @type {number|null} */
-let doneAt = null;
 
 export const isReviewing = () => get("labeling")?.on === true && get("labeling")?.review === true;
 
@@ -58,7 +55,7 @@ async function step(frame, direction, after, isLast = false) {
     say(found.message);
     return true;
   }
-  doneAt = found.left ? null : (get("labels")?.revision ?? null);
+  setDoneAt(found.left ? null : (get("labels")?.revision ?? null));
   if (found.frame === null || !found.item) {
     if (isLast)
       say(
@@ -113,7 +110,7 @@ const awaitsReview = ({ state, reviewer, origin }) =>
   (state === "accepted" || state === "corrected") &&
   !reviewer &&
   !(origin.maker === "person" && origin.name === knownName()) &&
-  get("labels")?.revision !== doneAt;
+  get("labels")?.revision !== get("labeling")?.doneAt;
 
 /** Approve the label under review. */
 export async function reviewOk() {

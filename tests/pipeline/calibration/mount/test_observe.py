@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from pipeline.common.geometry import rotation
 from pipeline.params import Params
 from pipeline.sources import open_source
 from pipeline.types import F64, Frame
+from pipeline.types.source import InParts
 
 MOUNT_DEG = (1.0, 2.0, -2.0)
 """Roll, pitch, yaw."""
@@ -23,7 +25,8 @@ FRAMES = 70
 @pytest.fixture(scope="module")
 def drive() -> list[Frame]:
     source = open_source("sim:curve_125")
-    return [replace(frame, image=None) for frame in (source.frame(index) for index in range(FRAMES))]
+    assert isinstance(source, InParts)
+    return [replace(frame, sweep=source.sweep(frame.index)) for frame in islice(source.outlines(), FRAMES)]
 
 
 def seen(frame: Frame, turn: F64) -> Frame:

@@ -18,6 +18,7 @@ from pipeline.labels.formats.registry import import_labels
 from pipeline.labels.headings import Moment, Pose, own_poses
 from pipeline.labels.model import Origin, Sighting
 from pipeline.sources import open_source
+from pipeline.types.source import InParts
 from tests.pipeline.labels.cuboids.test_refine import driving, iou, sweeps_in
 from tests.pipeline.labels.test_measured import standing, sweep_of
 
@@ -83,7 +84,8 @@ def test_a_street_is_labelled_from_one_frame_a_car(data_dir: Path) -> None:
     source = open_source(f"kitti:{folder / '2011_09_26' / '2011_09_26_drive_0009_sync'}")
     t_ns = tuple(source.t_ns(index) for index in range(len(source)))
     labels = import_labels(folder / "label_02.txt", drive_of(source), "kitti-tracking", Origin("import", "x", 0)).labels
-    egos = [source.frame(index).ego for index in range(len(source))]
+    assert isinstance(source, InParts)
+    egos = [frame.ego for frame in source.outlines()]
     moments = {
         index: Moment(t_ns[index], ego.speed_mps if ego else None, ego.yaw_rate_radps if ego else None, 0.0)
         for index, ego in enumerate(egos)

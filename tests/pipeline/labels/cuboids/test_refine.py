@@ -22,7 +22,7 @@ from pipeline.labels.headings import Moment, Pose, own_poses
 from pipeline.labels.model import LabelTrack, Origin, Sighting
 from pipeline.labels.recorded_truth import truth_labels
 from pipeline.sources import open_source
-from pipeline.types.source import Source
+from pipeline.types.source import InParts, Source
 from tests.pipeline.labels.test_measured import standing, sweep_of
 
 ORIGIN = Origin("pipeline", "test", 0)
@@ -37,9 +37,11 @@ def iou(a: Cuboid, b: Cuboid) -> float:
 
 
 def sweeps_in(source: Source) -> Callable[[int], Clustered | None]:
+    assert isinstance(source, InParts), "without its images"
+
     @lru_cache(None)
     def of(index: int) -> Clustered | None:
-        sweep = source.frame(index).sweep
+        sweep = source.sweep(index)
         return clustered(sweep.points) if sweep is not None else None
 
     return of
@@ -242,10 +244,11 @@ def test_near_by_a_snap_is_as_good_as_the_simulators_truth() -> None:
     source = open_source("sim:straight")
     names = tuple(str(index) for index in range(len(source)))
     labels, _ = truth_labels(source, names, ORIGIN)
-    moments = {}
-    for index in range(len(source)):
-        ego = source.frame(index).ego
-        moments[index] = Moment(source.t_ns(index), ego.speed_mps if ego else None, 0.0, 60.0)
+    assert isinstance(source, InParts)
+    moments = {
+        frame.index: Moment(frame.t_ns, frame.ego.speed_mps if frame.ego else None, 0.0, 60.0)
+        for frame in source.outlines()
+    }
     sweeps, poses, rng = sweeps_in(source), own_poses(moments), np.random.default_rng(1)
     off = []
     for track in labels.tracks:
