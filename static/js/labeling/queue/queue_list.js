@@ -82,8 +82,8 @@ function row(work) {
     { class: "queue-row", data: { key: work.key } },
     name,
     el("div", { class: "menu-row" }, state, take),
-    el("p", { class: "facts", textContent: facts(work) }),
     ...(undone?.key === work.key ? [refusal(work, undone.words)] : []),
+    el("p", { class: "facts", textContent: facts(work) }),
   );
 }
 
@@ -96,7 +96,7 @@ function refusal(work, words) {
     el("button", {
       type: "button",
       textContent: "Mark as done anyway",
-      hidden: !mayAssign(),
+      hidden: !mayAssign() || !work.labelled || work.person === knownName(),
       onclick: () => finish(work, true),
     }),
   );
@@ -115,6 +115,7 @@ async function finish(work, anyway) {
     queue = await request("api/labels/queue").catch(() => queue);
   }
   show(queue);
+  list.querySelector("[role=alert]")?.scrollIntoView({ block: "nearest" });
 }
 
 /** Go to the first open proposal, else to the first unreviewed label; opens the recording first. @param {Work} work */
