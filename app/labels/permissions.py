@@ -3,7 +3,8 @@ by address.
 
 A labeler labels, and takes recordings from the queue. A reviewer also approves labels and sends them back, marks
 recordings as done, imports labels, freezes versions, and sees the results of control frames. An admin also assigns
-recordings to others. A client without an account may do everything, under any name.
+recordings to others, and marks them as done although labels are left to review. A client without an account may do
+everything, under any name.
 """
 
 from __future__ import annotations
@@ -37,9 +38,13 @@ def check_act(account: Account | None, kind: str) -> None:
         raise NotAllowed(f"requires the role {needed}")
 
 
-def check_work(account: Account | None, assigned: str, person: str | None, state: State | None) -> None:
+def check_work(
+    account: Account | None, assigned: str, person: str | None, state: State | None, *, anyway: bool = False
+) -> None:
     """NotAllowed if the account may not change a recording of the queue so. assigned: its present assignee; person: the
-    new one, empty for nobody; None to leave it."""
+    new one, empty for nobody; None to leave it. anyway: whether labels may be left to review."""
+    if anyway and not includes(account, "admin"):
+        raise NotAllowed("requires the role admin")
     if state == "done" and not includes(account, "reviewer"):
         raise NotAllowed("requires the role reviewer")
     if person is None or account is None or includes(account, "admin"):

@@ -97,7 +97,7 @@ class LabelEffort:
 class LabelQueue:
     """List the recordings to label, most valuable first: assignee, state, how much is labelled and reviewed, and
     priority (uncertain proposals and unclear leads per frame). With --drive and --assign or --state: change one. The
-    person who labels a recording cannot mark it as done.
+    person who labels a recording cannot mark it as done, and nobody while proposals are open or labels not reviewed.
 
     Example: cipv labels queue --drive "Astyx HiRes2019" --assign Ada
     """
@@ -108,6 +108,8 @@ class LabelQueue:
     """Assign it to this person"""
     state: Annotated[State | None, option("open|labeling|review|done")] = None
     """Its new state"""
+    anyway: bool = False
+    """Mark it as done although proposals are open or labels not reviewed"""
     database: Database = None
     """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
     person: Person = field(default_factory=getpass.getuser)
@@ -124,7 +126,7 @@ class LabelQueue:
         database = open_database(self.database)
         try:
             if self.drive is not None:
-                put(database, self.drive, self.person, person=self.assign, state=self.state)
+                put(database, self.drive, self.person, person=self.assign, state=self.state, anyway=self.anyway)
             found = queue(database)
         finally:
             database.close()

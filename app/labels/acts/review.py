@@ -36,15 +36,15 @@ def reject(draft: Draft, scope: Scope, act: Reject) -> str:
 
 
 def review_ok(draft: Draft, scope: Scope, act: ReviewOk) -> str:
-    """Approval by a second person: whoever made a label or changed it last cannot review it."""
+    """Approval by a second person: a label's author (``read_authors``) cannot review it."""
     done = []
     for ref in act.items:
-        value = stated(draft.get(ref.kind, ref.id, ref.revision))
+        item = draft.get(ref.kind, ref.id, ref.revision)
+        value = stated(item)
         if value.reviewer == draft.person:
             raise ActRefused(f"you have already reviewed {_name(value)}")
-        made = value.origin.name if value.origin.maker == "person" else None
-        if draft.person in (made, draft.changed_by(ref.kind, ref.id)):
-            raise ActRefused(f"you changed {_name(value)} last: a second person must review it")
+        if draft.person == draft.author_of(item):
+            raise ActRefused(f"{_name(value)} is your own: a second person must review it")
         draft.put(ref.kind, ref.id, replace(_answered(value), state="accepted", reviewer=draft.person))
         done.append(value)
     return f"reviewed and accepted {_names(done)}"

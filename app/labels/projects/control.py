@@ -46,14 +46,14 @@ def _results(database: Database, row: Any, classes: ClassList) -> list[ControlRe
     """Of one range of frames, by person. A review does not make a label somebody else's."""
     truth = from_json(zlib.decompress(row.truth), "control frames")
     labels = DriveLabels(database, DriveInfo(row.key, row.uri, row.title, truth.t_ns, lambda: truth.frames))
-    known, made_by = labels.classes() or classes, labels.made_by()
+    known, authors = labels.classes() or classes, labels.authors()
     truth, there = as_bases(truth, known), as_bases(within(labels.label_set(), row.first, row.last), known)
     leads: dict[str, list[LeadRange]] = {}
     for number, item in labels.items("lead").items():
-        leads.setdefault(made_by.get(("lead", number), ""), []).append(cast("LeadRange", item.value))
+        leads.setdefault(authors.get(("lead", number), ""), []).append(cast("LeadRange", item.value))
     tracks: dict[str, list[LabelTrack]] = {}
     for track in there.tracks:
-        tracks.setdefault(made_by.get(("track", track.id), ""), []).append(track)
+        tracks.setdefault(authors.get(("track", track.id), ""), []).append(track)
     found = []
     for person in sorted(leads.keys() | tracks.keys()):
         theirs = within(replace(there, leads=tuple(leads.get(person, ()))), row.first, row.last)

@@ -3,6 +3,7 @@ file."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from app.labels.store.values import HistoryEntry, Item, ItemKind, value_to_json
@@ -18,7 +19,7 @@ def changes_json(info: DriveInfo, changes: LabelSetChanges) -> dict[str, Any]:
     """What changed, by kind; tracks are without their sightings."""
     lists: dict[str, list[dict[str, Any]]] = {name: [] for name in _LISTS.values()}
     for item in changes.items:
-        body = item_json(item)
+        body = item_json(item, changes.authors)
         if item.kind == "track":
             first, last, count, keyframes = changes.extents.get(item.id, (None, None, 0, []))
             body |= {"first": first, "last": last, "keyframes": keyframes, "sightings": count}
@@ -43,16 +44,17 @@ def window_json(labels: DriveLabels, first: int, last: int) -> dict[str, Any]:
     }
 
 
-def track_json(item: Item) -> dict[str, Any]:
+def track_json(item: Item, authors: Mapping[tuple[ItemKind, int], str]) -> dict[str, Any]:
     """A whole track."""
     assert isinstance(item.value, LabelTrack)
     sightings = [{"frame": each.frame, **placed_json(each)} for each in item.value.sightings]
-    return {**item_json(item), "sightings": sightings}
+    return {**item_json(item, authors), "sightings": sightings}
 
 
-def item_json(item: Item) -> dict[str, Any]:
-    """An item in the API's format, with its revision."""
-    return {"id": item.id, **value_to_json(item.kind, item.value), "revision": item.revision}
+def item_json(item: Item, authors: Mapping[tuple[ItemKind, int], str]) -> dict[str, Any]:
+    """An item in the API's format, with its revision and, except for tags, its author."""
+    author = {"author": authors.get((item.kind, item.id), "")} if item.kind != "tag" else {}
+    return {"id": item.id, **value_to_json(item.kind, item.value), "revision": item.revision, **author}
 
 
 def placed_json(sighting: Sighting) -> dict[str, Any]:

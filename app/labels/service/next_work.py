@@ -14,7 +14,7 @@ from pipeline.labels.model import NEXT_TAG, EventLabel, FrameTag, LabelTrack, Le
 
 if TYPE_CHECKING:
     from app.labels.service.scoring import LabelScores
-    from app.labels.store.drive_labels import DriveLabels
+    from app.labels.store.drive_labels import DriveLabels, LabelSetChanges
 
 What = Literal["unlabelled", "asked", "disagreement", "proposed", "sent_back", "unreviewed"]
 LabelKey = tuple[ItemKind, int]
@@ -122,7 +122,7 @@ def _asked(labels: DriveLabels) -> list[WorkPlace]:
 def _waiting(labels: DriveLabels, *, sent_back: bool) -> list[WorkPlace]:
     """Starts of labels that are proposed, or were sent back."""
     places = []
-    for frame, item in _begun(labels):
+    for frame, item in _begun(labels.changes()):
         value = item.value
         if isinstance(value, FrameTag) or value.state != "proposed" or (sent_back and not value.comment):
             continue
@@ -132,24 +132,21 @@ def _waiting(labels: DriveLabels, *, sent_back: bool) -> list[WorkPlace]:
 
 
 def _unreviewed(labels: DriveLabels, person: str) -> list[WorkPlace]:
-    """Starts of labels accepted by other people that no second person has reviewed. Labels that this person made or
-    changed last are reviewed by others."""
-    changed_by = labels.changed_by()
+    """Starts of accepted labels that no second person has reviewed; their author does not review them."""
+    found = labels.changes()
     places = []
-    for frame, item in _begun(labels):
+    for frame, item in _begun(found):
         value = item.value
         if isinstance(value, FrameTag) or value.state not in ("accepted", "corrected") or value.reviewer:
             continue
-        made = value.origin.name if value.origin.maker == "person" else ""
-        last = changed_by.get((item.kind, item.id), made)
-        if person not in (made, last):
-            places.append(WorkPlace(frame, f"{_name(item)} by {last or value.origin.name}", (item.kind, item.id)))
+        author = found.authors.get((item.kind, item.id), "")
+        if not person or person != author:
+            places.append(WorkPlace(frame, f"{_name(item)} by {author or value.origin.name}", (item.kind, item.id)))
     return places
 
 
-def _begun(labels: DriveLabels) -> Iterable[tuple[int, Item]]:
+def _begun(found: LabelSetChanges) -> Iterable[tuple[int, Item]]:
     """Every label, with its first frame."""
-    found = labels.changes()
     for item in found.items:
         value = item.value
         if isinstance(value, LabelTrack):

@@ -6,12 +6,12 @@ import json
 from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import Any
 
-from sqlalchemy import Connection, and_, bindparam, delete, func, insert, select, tuple_
+from sqlalchemy import Connection, bindparam, delete, func, insert, select, tuple_
 
 from app.labels.errors import ActRefused, NoSuchLabel, Stale
+from app.labels.store.authors import read_authors
 from app.labels.store.items import Change, read_changes_of_others, read_item, read_items, read_track
 from app.labels.store.tables import ActRow, ChangeRow, ItemRow, SightingRow
-from app.labels.store.undo_order import WAYS
 from app.labels.store.values import (
     Content,
     Frames,
@@ -212,21 +212,9 @@ class Draft:
             )
         )
 
-    def changed_by(self, kind: ItemKind, number: int) -> str | None:
-        """Person of the last effective act on an item; undone acts and undos do not count. None if there is none."""
-        return self._connection.scalars(
-            select(ActRow.person)
-            .join(ChangeRow, and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act))
-            .where(
-                ChangeRow.drive_id == self._drive_id,
-                ChangeRow.kind == kind,
-                ChangeRow.item == str(number),
-                ActRow.status == "done",
-                ActRow.kind.not_in(WAYS),
-            )
-            .order_by(ActRow.number.desc())
-            .limit(1)
-        ).first()
+    def author_of(self, item: Item) -> str:
+        """Whose decision an item is, before this act; empty for nobody's. See ``read_authors``."""
+        return read_authors(self._connection, self._drive_id, [item]).get((item.kind, item.id), "")
 
     def changes_of_others(self, kind: ItemKind, since: int) -> Iterator[Change]:
         """Changes by other persons' acts after ``since`` to items of a kind, by act."""

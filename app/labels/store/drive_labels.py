@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from typing import Any, cast
 
@@ -13,11 +13,11 @@ from sqlalchemy import and_, func, select
 
 from app.labels.errors import ActRefused, NoSuchLabel
 from app.labels.store.act_log import Log
+from app.labels.store.authors import read_authors
 from app.labels.store.database import Database
 from app.labels.store.items import (
     SIGHTINGS,
     read_changed,
-    read_changers,
     read_extents,
     read_item,
     read_items,
@@ -33,9 +33,6 @@ from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, PathLabel, Sighting
 from pipeline.sources.fingerprint import content_key
 from pipeline.types.source import Source
-
-_REVIEWS = ("review_ok", "send_back")
-"""Acts that judge a label without changing it."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +95,8 @@ class LabelSetChanges:
     """Kind and id of each removed item."""
     extents: dict[int, tuple[int, int, int, list[int]]]
     """By track: first and last frame, number of sightings, keyframes."""
+    authors: dict[tuple[ItemKind, int], str]
+    """Who cannot review the items, by kind and id; see ``read_authors``."""
 
 
 class DriveLabels:
@@ -121,7 +120,8 @@ class DriveLabels:
             items, removed = read_changed(connection, self._id, since)
             tracks = [item.id for item in items if item.kind == "track"]
             extents = read_extents(connection, self._id, tracks) if tracks else {}
-        return LabelSetChanges(revision, items, removed if since else [], extents)
+            authors = read_authors(connection, self._id, items)
+        return LabelSetChanges(revision, items, removed if since else [], extents, authors)
 
     def window(self, first: int, last: int) -> tuple[int, dict[int, list[tuple[int, Sighting]]]]:
         """(revision, for each frame its tracks and their sightings)."""
@@ -136,15 +136,11 @@ class DriveLabels:
         with self._database.reading() as connection:
             return read_items(connection, self._id, kind)
 
-    def changed_by(self) -> dict[tuple[ItemKind, int], str]:
-        """The last person who changed each item, by kind and id."""
+    def authors(self, items: Iterable[Item] | None = None) -> dict[tuple[ItemKind, int], str]:
+        """Who cannot review these items, by kind and id; see ``read_authors``. items: None for all."""
         with self._database.reading() as connection:
-            return read_changers(connection, self._id)
-
-    def made_by(self) -> dict[tuple[ItemKind, int], str]:
-        """Like ``changed_by``, but reviews do not count."""
-        with self._database.reading() as connection:
-            return read_changers(connection, self._id, _REVIEWS)
+            of = read_changed(connection, self._id, 0)[0] if items is None else items
+            return read_authors(connection, self._id, of)
 
     def classes(self) -> ClassList | None:
         """The class list of the recording's project; None if it has none."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, cast
@@ -11,8 +11,7 @@ from typing import Any, cast
 from sqlalchemy import Connection, and_, func, select
 
 from app.labels.store.tables import ActRow, ChangeRow, ItemRow, SightingRow
-from app.labels.store.undo_order import WAYS
-from app.labels.store.values import KINDS, Item, ItemKind, Value, sighting_of, unpack_content, value_from_json
+from app.labels.store.values import Item, ItemKind, Value, sighting_of, unpack_content, value_from_json
 from pipeline.labels.model import Sighting
 
 SIGHTINGS = tuple(SightingRow.__table__.columns)
@@ -96,28 +95,6 @@ def read_extents(
     for track, frame in connection.execute(keys.order_by(SightingRow.track, SightingRow.frame)):
         found[track][3].append(frame)
     return found
-
-
-def read_changers(
-    connection: Connection, drive_id: int, without: Sequence[str] = ()
-) -> dict[tuple[ItemKind, int], str]:
-    """Person of the last effective act on each item, by kind and id; undone acts and undos do not count. without: kinds
-    of acts that do not count either."""
-    of_act = and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act)
-    last = (
-        select(ChangeRow.kind, ChangeRow.item, func.max(ChangeRow.act).label("act"))
-        .join(ActRow, of_act)
-        .where(ChangeRow.drive_id == drive_id, ActRow.status == "done", ActRow.kind.not_in((*WAYS, *without)))
-        .where(ChangeRow.kind.in_(KINDS))
-        .group_by(ChangeRow.kind, ChangeRow.item)
-        .subquery()
-    )
-    found = connection.execute(
-        select(last.c.kind, last.c.item, ActRow.person).join(
-            ActRow, and_(ActRow.drive_id == drive_id, ActRow.number == last.c.act)
-        )
-    )
-    return {(cast("ItemKind", row.kind), int(row.item)): row.person for row in found}
 
 
 @dataclass(frozen=True)

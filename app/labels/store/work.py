@@ -13,8 +13,11 @@ from app.labels.errors import ActRefused, NoSuchLabel
 from app.labels.store.database import Database
 from app.labels.store.items import read_items
 from app.labels.store.tables import DriveRow, ProjectDriveRow, SightingRow, WorkRow
+from app.labels.store.values import ItemKind
 from app.labels.work_states import State
-from pipeline.labels.model import NEXT_TAG, FrameTag, LabelTrack, LeadRange
+from pipeline.labels.model import NEXT_TAG, EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel
+
+_FRAME_KINDS: tuple[ItemKind, ...] = ("path", "event")
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,10 @@ class Work:
     """Frames requested for labeling, whether labelled since or not."""
     project: str
     """The project that it is in; empty if none."""
+    open_proposals: int
+    """Labels of any kind that are only proposed, or were sent back."""
+    unreviewed: int
+    """Accepted labels of any kind that no second person has reviewed."""
 
 
 def queue(database: Database) -> list[Work]:
@@ -79,11 +86,13 @@ def put(
     *,
     person: str | None = None,
     state: State | None = None,
+    anyway: bool = False,
     allowed: Callable[[str], None] = lambda assigned: None,
 ) -> Work:
     """Assign a recording, or set its state. drive: its title, address or key. NoSuchLabel if there is none or several;
-    ActRefused if its labeler would mark it as reviewed, or nothing was labelled. allowed: raises an error if the
-    change is not allowed for a recording with this assignee."""
+    ActRefused if it cannot be done: nothing is labelled, its labeler would mark it, or, unless ``anyway``, proposals
+    are open or labels not reviewed. allowed: raises an error if the change is not allowed for a recording with this
+    assignee."""
     with database.reading() as connection:
         matches = or_(DriveRow.key == drive, DriveRow.title == drive, DriveRow.uri == drive)
         rows = connection.execute(select(DriveRow.id, DriveRow.key).where(matches, DriveRow.count > 0)).all()
@@ -97,6 +106,8 @@ def put(
         raise ActRefused(f"{by} labels {now.title}: a second person must mark it as done")
     if state in ("review", "done") and not now.labelled:
         raise ActRefused(f"{now.title}: nothing is labelled yet")
+    if state == "done" and not anyway and (now.open_proposals or now.unreviewed):
+        raise ActRefused(f"{now.title} is not done: {_left(now)}")
     if person and state is None and now.state == "open":
         new = replace(new, state="labeling")
     values = {"drive_id": number, "person": new.person, "state": new.state, "t_unix_ms": int(time.time() * 1000)}
@@ -106,6 +117,16 @@ def put(
                 WorkRow.__table__.update().where(WorkRow.drive_id == number).values(values)  # type: ignore[attr-defined]
             )
     return new
+
+
+def _left(work: Work) -> str:
+    """What keeps a recording from being done."""
+    proposals, labels = work.open_proposals, work.unreviewed
+    return " and ".join(
+        f"{count:,} {noun}{'' if count == 1 else 's'} {'is' if count == 1 else 'are'} {what}"
+        for count, noun, what in ((proposals, "proposal", "open"), (labels, "label", "not reviewed"))
+        if count
+    )
 
 
 def _work(connection: Connection, drive: Any, person: str, state: State) -> Work:
@@ -124,6 +145,9 @@ def _work(connection: Connection, drive: Any, person: str, state: State) -> Work
     tags = [cast("FrameTag", item.value) for item in read_items(connection, drive.id, "tag").values()]
     sampled = {frame for tag in tags if tag.tag == NEXT_TAG for frame in range(tag.first, tag.last + 1)}
     asked = sampled - {frame for span in spans for frame in span}
+    others = [item.value for kind in _FRAME_KINDS for item in read_items(connection, drive.id, kind).values()]
+    placed = [each for each in tracks if lengths.get(each.id)]
+    stated = cast("list[LabelTrack | LeadRange | PathLabel | EventLabel]", [*placed, *leads, *others])
     return Work(
         drive.key,
         drive.title,
@@ -138,6 +162,8 @@ def _work(connection: Connection, drive: Any, person: str, state: State) -> Work
         round((unsure + unclear + len(asked)) / drive.count, 3),
         len(sampled),
         drive.project or "",
+        sum(each.state == "proposed" for each in stated),
+        sum(each.state in ("accepted", "corrected") and not each.reviewer for each in stated),
     )
 
 

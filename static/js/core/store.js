@@ -44,11 +44,9 @@
 /**
  * @typedef
  *   {{on: boolean, tool: null|"new"|"shape"|"merge"|"path", from: number|null, hasObjects: boolean, review: boolean,
- *   follows: boolean, item: {kind: import("../labeling/state/types.js").ItemKind, id: number}|null,
- *   doneAt: number|null}}
+ *   follows: boolean, item: {kind: import("../labeling/state/types.js").ItemKind, id: number}|null}}
  *   Labeling tool: what the next drag or click does; from: the track to merge; hasObjects: whether pipeline objects are
- *   drawn; review: whether review is on; follows: the shared playhead; item: the label under review; doneAt: revision
- *   of the labels at which the server had nothing left to review
+ *   drawn; review: whether review is on; follows: the shared playhead; item: the label under review
  */
 /** @typedef {keyof Values} Key */
 

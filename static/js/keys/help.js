@@ -40,8 +40,9 @@ export function show() {
         }),
         el("p", {
           textContent:
-            "3D: drag to orbit, scroll to zoom, right-drag to pan; W A S D Q E and arrow keys fly. " +
-            "Other shortcuts work as usual; Esc returns all keys to the page.",
+            "3D: drag to orbit, scroll to zoom, right-drag to pan; W A S D Q E and arrow keys fly, " +
+            "but while labeling they do the same as elsewhere on the page. " +
+            "Other shortcuts always work; Esc returns all keys to the page.",
         }),
         el("h2", { textContent: "Documentation" }),
         el("p", {}, link("help/", "Help: how to use CIPV Studio")),

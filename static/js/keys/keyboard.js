@@ -1,9 +1,13 @@
 /** Global keyboard shortcuts (keymap.js). Ignored while typing; a focused slider keeps its arrow keys. */
 import { $ } from "../core/dom.js";
 import { on } from "../core/store.js";
+import { isOn as isLabeling } from "../labeling/state/mode.js";
 import { keymap } from "./keymap.js";
 
-/** Camera movement keys of the 3D view (viser's CAMERA_MOVEMENT_KEYS), with any modifier. */
+/**
+ * Camera movement keys of the 3D view (viser's CAMERA_MOVEMENT_KEYS), with any modifier. While the view has the focus,
+ * they only move its camera; while labeling, they are the page's and do not move it.
+ */
 const FLYING = new Set([
   "KeyW",
   "KeyA",
@@ -39,10 +43,17 @@ export function setUp() {
 
 /** @param {HTMLIFrameElement} view @param {(event: KeyboardEvent) => void} act */
 function hearIn(view, act) {
-  view.contentDocument?.addEventListener("keydown", (event) => {
+  const page = view.contentDocument;
+  page?.addEventListener("keydown", (event) => {
     if (event.key === "Escape" && !event.defaultPrevented) giveBack(view);
     else if (!FLYING.has(event.code)) act(event);
   });
+  const beforeCamera = (/** @type {KeyboardEvent} */ event) => {
+    if (!isLabeling() || !FLYING.has(event.code) || isTaken(event)) return;
+    event.stopPropagation();
+    act(event);
+  };
+  page?.addEventListener("keydown", beforeCamera, true);
 }
 
 /** Return keyboard focus to the page. @param {HTMLIFrameElement} view */

@@ -200,6 +200,8 @@ def test_recordings_are_assigned_and_whoever_labels_one_does_not_say_that_it_is_
     assert "Ada" in {each["person"] for each in work["efforts"]}
     refused = change(state="done")
     assert (refused.status_code, "a second person" in refused.json()["detail"]) == (409, True)
-    assert change(state="done", person="Bob").status_code == 200
+    left = change(state="done", person="Bob")
+    assert (left.status_code, "not reviewed" in left.json()["detail"]) == (409, True)
+    assert change(state="done", person="Bob", anyway=True).status_code == 200
     assert change(assign="", state="open").status_code == 200
     assert client.post("/api/labels/queue", json={"person": "Ada", "drive": "none"}).status_code == 404

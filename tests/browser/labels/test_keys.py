@@ -69,3 +69,31 @@ def test_a_key_is_changed_refused_where_it_is_taken_and_kept_for_its_person(hand
     dialog.get_by_role("button", name="Reset all").click()
     expect(dialog.locator("[title^='Change the key: reverse the track']")).to_have_text("Shift X")
     dialog.get_by_role("button", name="Close").click()
+
+
+def test_while_labeling_no_key_moves_the_camera_of_the_3d_view(hand: Hand, labels: Labels):
+    page = hand.page
+    page.route("**/viser/**", lambda route: route.fulfill(body="<input>", content_type="text/html"))
+    made = draw(hand, labels)
+    before = labels.cuboid(made, START)["yaw_rad"]
+    page.get_by_role("tab", name="3D").click()
+    view = page.frame_locator("iframe[title='3D view']")
+    heard = "body => { body.ownerDocument.addEventListener('keydown', ({ code }) => (body.dataset.heard = code)); }"
+    view.locator("body").evaluate(heard)  # as viser listens
+    view.locator("body").click()
+    hand.keys("e")
+    labels.wait_for(lambda now: now.cuboid(made, START)["yaw_rad"] < before)
+    expect(view.locator("body")).not_to_have_attribute("data-heard", "KeyE")
+    view.locator("input").click()
+    page.keyboard.press("e")
+    expect(view.locator("input")).to_have_value("e")
+    view.locator("body").click(position={"x": 5, "y": 60})
+    hand.keys("Shift+L")
+    expect(page.locator("#label-bar")).to_be_hidden()
+    hand.keys("s")
+    expect(view.locator("body")).to_have_attribute("data-heard", "KeyS")
+    hand.keys("Shift+L")
+    expect(page.locator("#label-bar")).to_be_visible()
+    page.keyboard.press("Escape")
+    page.get_by_role("tab", name="Plan").click()
+    page.unroute("**/viser/**")

@@ -77,7 +77,9 @@ def labels_router(desk: LabelDesk) -> APIRouter:
     def track(number: Id) -> Response:
         """Get a track with all its sightings."""
         with refusing():
-            return JSONResponse(track_json(desk.labels.track(number)))
+            labels = desk.labels
+            found = labels.track(number)
+            return JSONResponse(track_json(found, labels.authors([found])))
 
     @router.get("/next")
     def following(

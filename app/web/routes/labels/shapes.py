@@ -46,7 +46,10 @@ class StatedItem(LabelItem):
     comment: str
     """Why it was sent back; empty otherwise."""
     reviewer: str
-    """Who found it right, another than who made it; empty while nobody has."""
+    """Who found it right, another than its author; empty while nobody has."""
+    author: str
+    """Whose decision it is, and who cannot review it: who set it, or accepted or imported it where the pipeline or a
+    file made it; empty while it is only proposed by these."""
 
 
 class AttributeJson(ApiModel):

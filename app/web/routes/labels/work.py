@@ -30,16 +30,24 @@ def label_work_router(desk: LabelDesk) -> APIRouter:
     @router.post("/queue", responses={404: {"description": "No such recording"}})
     def change(body: WorkChange, request: Request) -> list[WorkJson]:
         """Assign a recording, or set its state; answers with the queue. 403 where the account's role does not include
-        it; 409 where its labeler would mark it as done."""
+        it; 409 where its labeler would mark it as done, or labels are left to review."""
         from app.labels.store.work import put  # with the database's library
 
         with refusing():
             database = desk.kept.opened()
 
             def allowed(assigned: str) -> None:
-                check_work(account_of(request), assigned, body.assign, body.state)
+                check_work(account_of(request), assigned, body.assign, body.state, anyway=body.anyway)
 
-            put(database, body.drive, body.person, person=body.assign, state=body.state, allowed=allowed)
+            put(
+                database,
+                body.drive,
+                body.person,
+                person=body.assign,
+                state=body.state,
+                anyway=body.anyway,
+                allowed=allowed,
+            )
             return _queue(database)
 
     @router.get("/projects")

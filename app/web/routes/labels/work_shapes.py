@@ -51,6 +51,10 @@ class WorkJson(ApiModel):
     """Frames queued by hand or by sampling, whether labelled since or not."""
     project: str
     """The project that it is in; empty if none."""
+    open_proposals: int
+    """Labels of any kind that are only proposed, or were sent back."""
+    unreviewed: int
+    """Accepted labels of any kind that no second person has reviewed."""
     efforts: list[EffortJson]
     """What each person has done there."""
 
@@ -66,3 +70,5 @@ class WorkChange(Strict):
     """Who labels it; empty for nobody, null to leave it."""
     state: State | None = None
     """Its new state; null to leave it."""
+    anyway: bool = False
+    """Mark it as done although proposals are open or labels not reviewed; accounts need the role admin."""

@@ -8,7 +8,7 @@ import { classNames, usualSize } from "../state/classes.js";
 import * as draft from "../state/draft.js";
 import { following, which } from "../state/listed.js";
 import { chosen, leadAt, shown, trackOf } from "../state/labels.js";
-import { setTool } from "../state/mode.js";
+import { setItem, setTool } from "../state/mode.js";
 import { isSure, parted } from "../state/threshold.js";
 import * as span from "../state/marked_frames.js";
 
@@ -271,6 +271,17 @@ export async function goTo(what, direction) {
   if (found instanceof Error) return say(found.message);
   if (found.frame === null) return say(`No ${what.replace("_", " ")} ${direction > 0 ? "after" : "before"} this frame`);
   if (found.item) set("track", found.item.kind === "track" ? found.item.id : null);
+  seekTo(found.frame);
+  say(found.why);
+}
+
+/** Go to the first of the whole drive, whoever made it. @param {"proposed"|"unreviewed"} what */
+export async function goToFirst(what) {
+  const found = await ahead(what, -1, 1);
+  if (found instanceof Error) return say(found.message);
+  if (found.frame === null || !found.item) return say(`Nothing ${what} any more`);
+  set("track", found.item.kind === "track" ? found.item.id : null);
+  setItem(found.item);
   seekTo(found.frame);
   say(found.why);
 }

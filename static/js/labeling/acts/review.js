@@ -6,16 +6,19 @@ import { el } from "../../core/dom.js";
 import { seekTo } from "../../drive/seek.js";
 import { get, set } from "../../core/store.js";
 import { act } from "./queue.js";
-import { ahead, refOf, say } from "./commands.js";
+import { ahead, say } from "./commands.js";
 import { ask } from "../panels/dialogs.js";
 import { chosen, leadAt, leadName, nameOf, shown } from "../state/labels.js";
-import { setDoneAt, setItem, setReview } from "../state/mode.js";
+import { setItem, setReview } from "../state/mode.js";
 import { knownName, mayReview } from "../state/person.js";
 
 /**
- * The label under review, its display name, and the comment if it was sent back before.
- * @typedef {{ref: import("../state/types.js").ItemRef, name: string, comment: string}} Target
+ * The label under review, its display name, the comment if it was sent back before, and why this person cannot approve
+ * it ("" if they can).
+ * @typedef {{ref: import("../state/types.js").ItemRef, name: string, comment: string, refusal: string}} Target
  */
+
+export const NOTHING = "No label selected, and no lead to review in this frame";
 
 export const isReviewing = () => get("labeling")?.on === true && get("labeling")?.review === true;
 
@@ -55,7 +58,6 @@ async function step(frame, direction, after, isLast = false) {
     say(found.message);
     return true;
   }
-  setDoneAt(found.left ? null : (get("labels")?.revision ?? null));
   if (found.frame === null || !found.item) {
     if (isLast)
       say(
@@ -81,47 +83,48 @@ export function target() {
   const track = chosen(),
     labels = get("labels"),
     item = get("labeling")?.item;
-  if (track) return { ref: refOf(track), name: nameOf(track), comment: track.comment };
+  if (track) return about("track", track, nameOf(track));
   const path = item?.kind === "path" ? labels?.paths.find(({ id }) => id === item.id) : null;
   const event = item?.kind === "event" ? labels?.events.find(({ id }) => id === item.id) : null;
-  if (path)
-    return {
-      ref: { kind: "path", id: path.id, revision: path.revision },
-      name: `path in frame ${path.frame + 1}`,
-      comment: path.comment,
-    };
-  if (event)
-    return {
-      ref: { kind: "event", id: event.id, revision: event.revision },
-      name: `${event.kind.replace("_", "-")} in frame ${event.frame + 1}`,
-      comment: event.comment,
-    };
+  if (path) return about("path", path, `path in frame ${path.frame + 1}`);
+  if (event) return about("event", event, `${event.kind.replace("_", "-")} in frame ${event.frame + 1}`);
   const lead = leadAt(shown());
   if (!lead || !awaitsReview(lead)) return null;
-  return {
-    ref: { kind: "lead", id: lead.id, revision: lead.revision },
-    name: `lead ${leadName(lead.lead)}, frames ${lead.first + 1}–${lead.last + 1}`,
-    comment: lead.comment,
-  };
+  return about("lead", lead, `lead ${leadName(lead.lead)}, frames ${lead.first + 1}–${lead.last + 1}`);
+}
+
+/**
+ * @param {import("../state/types.js").ItemKind} kind
+ * @param {{id: number, revision: number, comment: string, author: string, reviewer: string}} label
+ * @param {string} name
+ * @returns {Target}
+ */
+function about(kind, { id, revision, comment, author, reviewer }, name) {
+  const me = knownName(),
+    refusal = !me
+      ? ""
+      : author === me
+        ? "Your own label: a second person must review it"
+        : reviewer === me
+          ? "You have already reviewed it"
+          : "";
+  return { ref: { kind, id, revision }, name, comment, refusal };
 }
 
 /** Not this person's own. @param {import("../state/types.js").LeadRange} lead */
-const awaitsReview = ({ state, reviewer, origin }) =>
-  (state === "accepted" || state === "corrected") &&
-  !reviewer &&
-  !(origin.maker === "person" && origin.name === knownName()) &&
-  get("labels")?.revision !== get("labeling")?.doneAt;
+const awaitsReview = ({ state, reviewer, author }) =>
+  (state === "accepted" || state === "corrected") && !reviewer && author !== knownName();
 
 /** Approve the label under review. */
 export async function reviewOk() {
   const under = target();
-  if (!under) return say("No label selected, and no lead to review in this frame");
+  if (!under || under.refusal) return say(under?.refusal ?? NOTHING);
   if ((await act({ kind: "review_ok", items: [under.ref] })) && isReviewing()) await goOn();
 }
 
 export async function sendBack() {
   const under = target();
-  if (!under) return say("No label selected, and no lead to review in this frame");
+  if (!under) return say(NOTHING);
   const comment = await ask(
     "Send back",
     el("p", { textContent: `${under.name} goes back to its annotator.` }),

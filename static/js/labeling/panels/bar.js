@@ -16,6 +16,7 @@ import { askName, hasAccount, shownName } from "../state/person.js";
 import * as offer from "./offer.js";
 import { markMore, scrolls } from "../../core/scrolled_row.js";
 import * as review from "../acts/review.js";
+import * as reviewRow from "./review_row.js";
 import * as span from "../state/marked_frames.js";
 import { besides } from "../state/outcome.js";
 
@@ -86,32 +87,6 @@ const reviewToggle = el("button", {
   title: "Review labels made by others (Shift R)",
   onclick: review.toggleReview,
 });
-const under = el("span", { class: "under" }),
-  reviewed = el(
-    "span",
-    { class: "reviewing", hidden: true },
-    el("b", { textContent: "Review" }),
-    under,
-    el("button", {
-      type: "button",
-      textContent: "Approve",
-      title: "Approve and go to next (A)",
-      onclick: review.reviewOk,
-    }),
-    el("button", {
-      type: "button",
-      textContent: "Send back",
-      title: "Send back with a comment and go to next (R)",
-      onclick: review.sendBack,
-    }),
-    el("button", {
-      type: "button",
-      textContent: "Skip",
-      title: "Skip (N)",
-      onclick: () => review.nextUnreviewed(1),
-    }),
-  );
-
 const kind = el("select", {
   class: "kind",
   aria: { label: "Class of new labels" },
@@ -163,7 +138,7 @@ export function setUp() {
       forth,
       name,
     ),
-    el("div", { class: "label-row label-line" }, where, reviewed, said, offer.setUp(), task, saved, again, discarded),
+    el("div", { class: "label-row label-line" }, where, reviewRow.row, said, offer.setUp(), task, saved, again, discarded),
   );
   scrolls(leads);
   showKeys();
@@ -232,8 +207,7 @@ function reflect() {
   );
   press(follow, get("labeling")?.follows === true);
   press(reviewToggle, review.isReviewing());
-  reviewed.hidden = !review.isReviewing();
-  text(under, review.target()?.name ?? "nothing");
+  reviewRow.reflect();
   press(fresh, get("labeling")?.tool === "new");
   Object.assign(name, { textContent: shownName() || "your name", title: `Annotator: ${shownName()}` });
 }

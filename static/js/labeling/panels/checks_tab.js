@@ -16,6 +16,7 @@ export const look = newestOnly(async () => {
   const state = get("state"),
     key = `${state?.uri} ${state?.labels?.revision}`;
   if (!body || !isSeen() || !state?.labels || key === known) return;
+  if (!known) body.replaceChildren(el("p", { class: "facts pad", textContent: "Checking …" }));
   /** @type {{revision: number, problems: Problem[]}|Error} */
   const found = await request("api/labels/checks").catch((error) => error);
   known = found instanceof Error ? "" : key;

@@ -6,16 +6,7 @@ import { resetInspector, toggle as togglePane } from "../../workspace/panes.js";
 import { personName } from "./person.js";
 
 /** @type {import("../../core/store.js").Labeling} */
-const OFF = {
-  on: false,
-  tool: null,
-  from: null,
-  hasObjects: false,
-  review: false,
-  item: null,
-  doneAt: null,
-  follows: false,
-};
+const OFF = { on: false, tool: null, from: null, hasObjects: false, review: false, item: null, follows: false };
 
 const button = $("#label-button", HTMLButtonElement);
 
@@ -76,11 +67,6 @@ export function setTool(tool) {
 
 /** Set the label under review, or null. @param {import("../../core/store.js").Labeling["item"]} item */
 export const setItem = (item) => change({ item });
-
-/** Set the revision of the labels without anything left to review, or null. @param {number|null} doneAt */
-export function setDoneAt(doneAt) {
-  if (get("labeling")?.doneAt !== doneAt) change({ doneAt });
-}
 
 /** @param {boolean} review */
 export const setReview = (review) => change({ review, item: null, tool: null });

@@ -24,6 +24,7 @@
  * @property {LabelOrigin} origin
  * @property {string} comment why it was sent back
  * @property {string} reviewer who approved it, other than its author; "" if not reviewed
+ * @property {string} author who set or accepted it, and cannot review it; "" if nobody has
  * @property {number|null} confidence of a proposal, 0–1; null for others
  * @property {""|"motion"|"lane"|"unknown"} heading what told its front from its rear; "" once somebody has looked
  * @property {{first: number, last: number, name: string, value: string}[]} attributes
@@ -57,6 +58,7 @@
  * @property {LabelOrigin} origin
  * @property {string} comment
  * @property {string} reviewer
+ * @property {string} author
  * @typedef {object} EventLabel
  * @property {number} id
  * @property {number} revision
@@ -67,6 +69,7 @@
  * @property {LabelOrigin} origin
  * @property {string} comment
  * @property {string} reviewer
+ * @property {string} author
  * @typedef {object} FrameTag both ends included
  * @property {number} id
  * @property {number} revision
@@ -84,6 +87,7 @@
  * @property {LabelOrigin} origin
  * @property {string} comment
  * @property {string} reviewer
+ * @property {string} author
  * @typedef {object} LabelTask
  * @property {number} id same id as in the 202 response that started it
  * @property {"propose"|"import"} what

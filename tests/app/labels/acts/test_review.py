@@ -25,7 +25,7 @@ def test_a_correction_that_is_accepted_stays_one_until_a_second_person_reviews_i
     act(labels, kind="relabel", track=1, label="Truck")
     assert (track(labels).label, track(labels).state, track(labels).origin.name) == ("truck", "corrected", "Ada")
     assert act(labels, kind="accept", items=[("track", 1)]).act is None
-    with pytest.raises(ActRefused, match="you changed #1 last: a second person must review it"):
+    with pytest.raises(ActRefused, match="#1 is your own: a second person must review it"):
         act(labels, kind="review_ok", items=[("track", 1)])
     act(labels, "Bob", kind="review_ok", items=[("track", 1)])
     assert (track(labels).state, track(labels).origin.name, track(labels).reviewer) == ("accepted", "Ada", "Bob")
@@ -81,7 +81,7 @@ def test_the_lead_paths_and_events_are_sent_back_and_reviewed(labels: DriveLabel
     act(labels, kind="set_path", frame=12, left=[[0, 1], [5, 1]], right=None)
     act(labels, kind="add_event", frame=11, event="cut_in", tracks=[1])
     act(labels, kind="accept", items=[("lead", 1)])
-    with pytest.raises(ActRefused, match=f"you changed {what} last"):
+    with pytest.raises(ActRefused, match=f"{what} is your own"):
         act(labels, kind="review_ok", items=[(kind, 1)])
     assert act(labels, "Bob", kind="send_back", items=[(kind, 1)], comment="no").what == f"sent back {what}: no"
     assert said_of(labels, kind) == ("proposed", "no", "")
@@ -138,3 +138,56 @@ def test_labels_that_changed_after_they_were_frozen_are_not_removed(labels: Driv
     with pytest.raises(ActRefused, match="somebody has changed labels since"):
         act(labels, kind="clear_all", revision=seen)
     assert labels.items("track")
+
+
+CUTS: list[tuple[str, dict[str, Any]]] = [
+    ("its middle", {"kind": "set_lead", "first": 34, "last": 35, "lead": "none"}),
+    ("its end", {"kind": "set_lead", "first": 38, "last": 45, "lead": 2}),
+    ("cleared", {"kind": "clear_lead", "first": 34, "last": 35}),
+    ("its track split", {"kind": "split", "track": 1, "frame": 15}),
+]
+
+
+@pytest.mark.parametrize("cut", [pytest.param(cut, id=name) for name, cut in CUTS])
+def test_what_is_left_of_a_lead_range_is_reviewed_by_who_cut_it(labels: DriveLabels, cut: dict[str, Any]) -> None:
+    act(labels, kind="set_lead", first=10, last=20, lead=1)
+    act(labels, kind="set_lead", first=30, last=40, lead=2)
+    act(labels, "Bob", **cut)
+    ranges = {number: cast("LeadRange", item.value) for number, item in labels.items("lead").items()}
+    assert "Ada" in {each.origin.name for each in ranges.values()}
+    for number, each in ranges.items():
+        author = each.origin.name
+        with pytest.raises(ActRefused, match="a second person must review it"):
+            act(labels, author, kind="review_ok", items=[("lead", number)])
+        act(labels, "Bob" if author == "Ada" else "Ada", kind="review_ok", items=[("lead", number)])
+
+
+def test_who_accepted_a_proposed_lead_does_not_review_what_another_left_of_it(labels: DriveLabels) -> None:
+    act(labels, kind="accept", items=[("lead", 1)])
+    act(labels, "Bob", kind="set_lead", first=14, last=15, lead="none")
+    act(labels, "Bob", kind="clear_lead", first=18, last=18)
+    parts = {number for number, each in labels.items("lead").items() if each.value.lead == 1}  # type: ignore[union-attr]
+    assert len(parts) == 3
+    assert {labels.authors()["lead", number] for number in parts} == {"Ada"}
+    for number in parts:
+        with pytest.raises(ActRefused, match=r"lead #1 in .* is your own"):
+            act(labels, kind="review_ok", items=[("lead", number)])
+        act(labels, "Bob", kind="review_ok", items=[("lead", number)])
+    labels.log.move("undo", "Bob")
+    assert {labels.authors()["lead", number] for number in parts} == {"Ada"}
+
+
+def test_whoever_moves_the_end_of_a_range_is_its_author(labels: DriveLabels) -> None:
+    act(labels, kind="set_lead", first=30, last=40, lead=2)
+    number = max(labels.items("lead"))
+    revision = labels.items("lead")[number].revision
+    act(labels, "Bob", kind="trim_lead", range=number, revision=revision, first=30, last=45)
+    assert labels.authors()["lead", number] == "Bob"
+
+
+def test_a_proposal_has_no_author_until_it_is_accepted(labels: DriveLabels) -> None:
+    assert labels.authors() == {}
+    act(labels, "Bob", kind="accept", items=[("track", 1), ("lead", 1)])
+    assert labels.authors() == {("track", 1): "Bob", ("lead", 1): "Bob"}
+    labels.log.move("undo", "Bob")
+    assert labels.authors() == {}

@@ -52,11 +52,31 @@ def test_what_is_least_sure_comes_first_and_what_is_done_last(database: Database
     put(database, unsure, "Ada", state="review")
     with pytest.raises(ActRefused, match="a second person must mark it as done"):
         put(database, unsure, "Ada", state="done")
-    put(database, unsure, "Bob", state="done")
+    with pytest.raises(ActRefused, match="is not done: 1 proposal is open and 1 label is not reviewed"):
+        put(database, unsure, "Bob", state="done")
+    put(database, unsure, "Bob", state="done", anyway=True)
     done = of(database, unsure)
     assert (done.state, done.labelled, done.proposals, done.worth) == ("done", 0.5, 1, 0.5)
     order = [each.key for each in queue(database)]
     assert order.index(unsure) > order.index(sure)
+
+
+def test_a_recording_is_done_once_every_proposal_is_judged_and_every_label_reviewed(database: Database) -> None:
+    key = f"judged {database.is_sqlite}"
+    labels = proposed(database, key, 0.5)
+    act(labels, "Ada", kind="add_event", frame=3, event="cut_in")
+    act(labels, "Ada", kind="accept", items=[("lead", 1)])
+
+    def refused(left: str) -> None:
+        with pytest.raises(ActRefused, match=f"is not done: {left}$"):
+            put(database, key, "Bob", state="done")
+
+    refused("1 proposal is open and 2 labels are not reviewed")
+    act(labels, "Bob", kind="review_ok", items=[("lead", 1), ("event", 1)])
+    refused("1 proposal is open")
+    act(labels, "Ada", kind="reject", items=[("track", 1)])
+    put(database, key, "Bob", state="done")
+    assert (of(database, key).state, of(database, key).open_proposals, of(database, key).unreviewed) == ("done", 0, 0)
 
 
 def test_what_nobody_has_labelled_is_not_reviewed_and_what_is_not_there_is_said(database: Database) -> None:

@@ -154,7 +154,7 @@ def test_a_labeler_does_not_review_and_a_reviewer_does_not_assign(people: dict[s
         assert (answer.status_code, answer.json()["detail"]) == (403, "requires the role reviewer")
     assert act(reviewer, "Reviewer", approve).status_code == 200
 
-    def change(client: httpx.Client, person: str, **to: str) -> int:
+    def change(client: httpx.Client, person: str, **to: str | bool) -> int:
         body = {"person": person, "drive": drive(client)} | to
         return client.post("/api/labels/queue", json=body).status_code
 
@@ -165,4 +165,8 @@ def test_a_labeler_does_not_review_and_a_reviewer_does_not_assign(people: dict[s
     assert change(labeler, "Labeler", state="done") == 403
     assert change(admin, "Admin", assign="Reviewer") == 200
     assert change(reviewer, "Reviewer", state="done") == 409, "nobody reviews their own labels"
-    assert change(admin, "Admin", state="done") == 200
+    assert act(labeler, "Labeler", {"kind": "set_lead", "first": 4, "last": 5, "lead": "none"}).status_code == 200
+    assert change(admin, "Admin", state="done") == 409, "a lead is not reviewed"
+    assert change(admin, "Admin", assign="Labeler") == 200
+    assert change(reviewer, "Reviewer", state="done", anyway=True) == 403
+    assert change(admin, "Admin", state="done", anyway=True) == 200
