@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from pipeline.alignment.projection import resolve
@@ -47,6 +48,28 @@ def test_the_side_of_a_vehicle_that_the_lidar_does_not_hit_is_no_angle():
     )
     assert len(found) == 3
     assert [each.yaw_deg for each in found] == pytest.approx([0.0] * 3, abs=0.15)
+
+
+@pytest.mark.parametrize("radius_m", [60.0, -60.0])
+def test_vehicles_that_are_all_turned_by_a_bend_are_no_angle(radius_m: float):
+    """Each shows its outer side, whose far end is the outer edge of its box."""
+    on_arc = [
+        (abs(radius_m) * np.sin(at_m / abs(radius_m)), radius_m * (1.0 - np.cos(at_m / radius_m)), at_m / radius_m)
+        for at_m in (12.0, 20.0, 28.0)
+    ]
+    found = told(
+        [track(k, x, y, heading_rad=heading) for k, (x, y, heading) in enumerate(on_arc)],
+        [box(x, y, AlignmentParams(), length_m=4.5, heading_rad=heading) for x, y, heading in on_arc],
+    )
+    assert len(found) == 3
+    assert [each.yaw_deg for each in found] == pytest.approx([0.0] * 3, abs=0.25)
+
+
+def test_a_cluster_that_may_show_either_side_tells_no_yaw():
+    """Turned by 2° against the line of sight, and narrower than its box."""
+    seen, hit = box(20.0, 0.7, AlignmentParams(), length_m=8.0), track(1, 20.0, 0.7)
+    narrow = hit.obstacle.cuboid._replace(size=(0.2, 1.4, 1.5))
+    assert told([hit._replace(obstacle=hit.obstacle._replace(cuboid=narrow))], [seen]) == []
 
 
 @pytest.mark.parametrize("what", ["carried", "new", "narrow", "passed", "cut", "not sure", "no vehicle", "too high"])

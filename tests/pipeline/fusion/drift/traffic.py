@@ -20,22 +20,35 @@ WIDTH_M, HEIGHT_M, BEAM_M = 1.75, 1.5, 0.0035
 """Size of each car; a cluster ends half a beam step inside it, in metres per metre of range."""
 
 
-def track(number: int, x: float, y: float, velocity: tuple[float, float] = (0.0, 0.0)) -> LidarTrack:
+def track(
+    number: int, x: float, y: float, velocity: tuple[float, float] = (0.0, 0.0), heading_rad: float = 0.0
+) -> LidarTrack:
     """The rear of a car."""
     hit_m = WIDTH_M - BEAM_M * float(np.hypot(x, y))
-    cuboid = Cuboid((x + 0.1, y, ROAD_M + HEIGHT_M / 2), (0.2, hit_m, HEIGHT_M), 0.0)
+    cuboid = _behind_face(x, y, (0.2, hit_m, HEIGHT_M), heading_rad)
     return LidarTrack(
         number, Obstacle(number, cuboid, (x, y, ROAD_M), 40, 10.0, (0.1, 0.5, 0.4)), velocity, 9, 0, False
     )
 
 
+def _behind_face(x: float, y: float, size: tuple[float, float, float], heading_rad: float) -> Cuboid:
+    ahead_m = size[0] / 2
+    center = (x + ahead_m * np.cos(heading_rad), y + ahead_m * np.sin(heading_rad), ROAD_M + HEIGHT_M / 2)
+    return Cuboid(center, size, heading_rad)
+
+
 def box(
-    x: float, y: float, turned: AlignmentParams, off: Sequence[float] = (0.0, 0.0, 0.0, 0.0), length_m: float = 0.2
+    x: float,
+    y: float,
+    turned: AlignmentParams,
+    off: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
+    length_m: float = 0.2,
+    heading_rad: float = 0.0,
 ) -> VisionMeasurement:
     """Its box. off: error of each edge, as a share of its height."""
     aligned = resolve(turned, CAMERA)
     assert aligned is not None
-    cuboid = Cuboid((x + length_m / 2, y, ROAD_M + HEIGHT_M / 2), (length_m, WIDTH_M, HEIGHT_M), 0.0)
+    cuboid = _behind_face(x, y, (length_m, WIDTH_M, HEIGHT_M), heading_rad)
     edges = project_cuboid(aligned, cuboid.corners(), *SIZE)
     assert edges is not None
     x1, y1, x2, y2 = (edge + share * (edges[3] - edges[1]) for edge, share in zip(edges, off, strict=True))
