@@ -37,7 +37,7 @@
  * @property {import("../labeling/state/undo_state.js").Steps} steps
  * @property {number} threshold how sure a proposal must be to be shown, 0–1
  * @property {string} said status message of the labeling mode
- * @property {import("../labeling/panels/offer.js").Offer} offer a next step that fits it
+ * @property {import("../labeling/bar/offer.js").Offer} offer a next step that fits it
  * @property {import("../labeling/views/projection.js").Projected} projected
  * @property {{left: import("./types.js").Point2[], right: import("./types.js").Point2[]}} drawnPath a path being drawn
  */

@@ -3,7 +3,7 @@ import { addMode } from "../views/plan.js";
 import { addLayer } from "../views/camera.js";
 import { addLane } from "../timeline/lanes/registry.js";
 import * as acts from "./acts/queue.js";
-import * as bar from "./panels/bar.js";
+import * as bar from "./bar/bar.js";
 import * as classes from "./state/classes.js";
 import * as data from "./state/sync.js";
 import * as draft from "./state/draft.js";

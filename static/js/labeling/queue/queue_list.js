@@ -137,7 +137,8 @@ function arrive() {
 /** @param {Work} work */
 function facts({ frames, labelled, reviewed, open_proposals, unreviewed, asked, worth, efforts }) {
   const people = efforts.map(({ person, acts, active_s }) => {
-    return `${person} ${count(acts, "change")} (${(acts / frames).toFixed(1)} a frame), ${Math.round(active_s / 60)} min`;
+    const perFrame = (acts / frames).toFixed(1);
+    return `${person} ${count(acts, "change")} (${perFrame} a frame), ${Math.round(active_s / 60)} min`;
   });
   return [
     `${frames} frames, lead labelled in ${percent(labelled)}, ${percent(reviewed)} of tracks reviewed`,

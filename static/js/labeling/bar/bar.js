@@ -138,7 +138,18 @@ export function setUp() {
       forth,
       name,
     ),
-    el("div", { class: "label-row label-line" }, where, reviewRow.row, said, offer.setUp(), task, saved, again, discarded),
+    el(
+      "div",
+      { class: "label-row label-line" },
+      where,
+      reviewRow.row,
+      said,
+      offer.setUp(),
+      task,
+      saved,
+      again,
+      discarded,
+    ),
   );
   scrolls(leads);
   showKeys();
