@@ -11,7 +11,7 @@ from pipeline.fusion.existence import ExistenceState, weigh
 from pipeline.params import CipvParams, ExistenceParams
 from pipeline.types import CameraCalibration, Frame, FusedObject, RawBoxes
 from tests.pipeline.build import fused, moment
-from tests.pipeline.fusion.test_existence import FRAME, NOTHING, PARAMS, Rays
+from tests.pipeline.fusion.ray_towards import FRAME, NOTHING, PARAMS, Rays
 
 NO_RAYS = Rays(NOTHING)
 LENS = np.array([[700.0, 0.0, 640.0], [0.0, 700.0, 360.0], [0.0, 0.0, 1.0]])
