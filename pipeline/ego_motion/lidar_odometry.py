@@ -5,7 +5,7 @@ rates.
 
 The result is used once the sweeps agree with each other, and while enough structure constrains it. Few points, a
 tunnel, or nothing but vehicles nearby end it, with a note. Accuracy on KITTI at 16 rings:
-``docs/reference/accuracy.md``."""
+``docs/reference/accuracy-ego-motion.md``."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ as much. With this value, one sigma covers 76 and 79 % of the errors, and two si
 and KITTI 0009 at 20–30 m, where the road is known; beyond that, 86 and 94 % or more."""
 _PITCH_SIGMA_RAD = np.radians(0.15)
 """Standard deviation of the alignment between the sensors. A fit to traffic determines its pitch to within so much from
-nine of ten starts (docs/reference/accuracy.md); a calibration target is more accurate."""
+nine of ten starts (docs/reference/accuracy-alignment.md); a calibration target is more accurate."""
 _HIDDEN_SHARE = 0.3
 """Covered share of a box's lower edge above which the network draws it where the nearer vehicle begins."""
 

@@ -5,7 +5,7 @@ A detector receives a wide image scaled down: a car at 80 m, 40 px wide in an im
 input. In a window of native pixels, the same network detects it. The window is the smallest that contains the road
 ahead: a square around the car's heading, shifted sideways with the curve that ego motion implies. It depends on the
 frame alone, never on tracks, so boxes can be cached and computed ahead, and a wrong track cannot move the window away.
-It still contains the lead: see docs/reference/accuracy.md.
+It still contains the lead: see docs/reference/accuracy-distances.md.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from pipeline.types import F64
 
 SPREAD = {"yaw_deg": 0.25, "pitch_deg": 0.4, "roll_deg": 0.5, "left_m": 0.07, "up_m": 0.12, "zoom": 0.012}
 """Standard deviations of the random mounts around that of the boxes; of the zoom, in shares of it. The largest errors
-of the boxes' fit on three recordings are twice as large (``docs/reference/accuracy.md``)."""
+of the boxes' fit on three recordings are twice as large (``docs/reference/accuracy-alignment.md``)."""
 CANDIDATES, STARTS = 150, 3
 """Random mounts, and how many of the best are improved."""
 STEPS = STARTS + 1
