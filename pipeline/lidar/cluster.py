@@ -8,22 +8,28 @@ cells that is joined already: near walls, where each point has hundreds of neigh
 
 A tolerance that holds the bonnet and the roof of a far car together also joins a queue with the parked row 0.8 m beside
 it. A cluster that is wider across the line of sight than any vehicle is therefore divided at smaller gaps. Along a
-ring, the returns of one surface are centimetres apart, so a vehicle seen from the side stays whole.
+ring, the returns of one surface are centimetres apart, so a vehicle seen from the side stays whole. Most points of a
+street belong to such clusters, so both partitions are made at once, on one grid: the fine one, then the coarse one from
+its components.
 """
 
 from __future__ import annotations
 
 import numba
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.lidar import cluster_kernels as kernels
 from pipeline.lidar.ground import Ground, no_higher_than
 from pipeline.params import ClusterParams
-from pipeline.types import DROPPED, F32, F64, GROUND, I32, UNCLUSTERED, Mask
+from pipeline.types import DROPPED, F32, GROUND, I32, UNCLUSTERED, Mask
 
 UNLABELLED = -1
 WIDEST_M = 2.6
 """No vehicle's rear is wider (Directive 96/53/EC: 2.55 m, 2.60 m if refrigerated)."""
+
+
+_ONE_GRID = 2.0
+"""Up to this ratio of the two tolerances, cells for the smaller one serve both: each has few neighbours."""
 
 
 def candidates(points: F32, ground: Ground, keep: Mask, params: ClusterParams) -> Mask:
@@ -43,45 +49,62 @@ def cluster(points: F32, candidates: Mask, params: ClusterParams) -> I32:
     labels = np.full(len(points), UNLABELLED, dtype=np.int32)
     if len(chosen) == 0:
         return labels
-    # slightly smaller than tolerance/√3, so that rounding cannot put two points that are too far apart into one cell
-    cell_m = params.tolerance_m / np.sqrt(3.0) * (1.0 - 1e-6)
-    xyz, column, level, shape = _cells(points, chosen, params.z_weight, cell_m)
-    # np.zeros allocates lazily, so that a large empty grid costs nothing
-    first_cell = np.zeros(shape[0] * shape[1], dtype=np.int32)
-    roots = _components(xyz, column, level, first_cell, shape[1], params.tolerance_m)
-    if params.divide_m < params.tolerance_m:
-        _divide(points, chosen, roots, params)
+    fine_m = min(params.divide_m, params.tolerance_m)
+    if params.tolerance_m <= _ONE_GRID * fine_m:
+        fine, roots = _partitions(points, chosen, params.z_weight, fine_m, params.tolerance_m)
+    else:
+        fine, _ = _partitions(points, chosen, params.z_weight, fine_m, fine_m)
+        roots, _ = _partitions(points, chosen, params.z_weight, params.tolerance_m, params.tolerance_m)
+    if fine_m < params.tolerance_m:
+        _divide(points, chosen, roots, fine, WIDEST_M)
     _number(roots, chosen, labels, params.min_points, params.max_points)
     return labels
 
 
-def _divide(points: F32, chosen: I32, roots: I32, params: ClusterParams) -> None:
-    """Splits components that are too wide for one vehicle by using the tolerance ``divide_m`` for their points; changes
-    ``roots`` in place."""
-    wide = np.flatnonzero(_is_wide(points, chosen, roots, WIDEST_M)).astype(np.int32)
-    if not len(wide):
-        return
-    cell_m = params.divide_m / np.sqrt(3.0) * (1.0 - 1e-6)
-    xyz, column, level, shape = _cells(points, chosen[wide], params.z_weight, cell_m)
+def _partitions(points: F32, chosen: I32, z_weight: float, fine_m: float, coarse_m: float) -> tuple[I32, I32]:
+    """(M,) twice: for the fine and for the coarse tolerance, the first point of the component of each chosen point."""
+    # slightly smaller than tolerance/√3, so that rounding cannot put two points that are too far apart into one cell
+    cell_m = fine_m / np.sqrt(3.0) * (1.0 - 1e-6)
+    reach = int(np.ceil(coarse_m / cell_m))
+    xyz, column, level, shape = kernels.cells(points, chosen, z_weight, cell_m, reach)
+    # np.zeros allocates lazily, so that a large empty grid costs nothing
     first_cell = np.zeros(shape[0] * shape[1], dtype=np.int32)
-    roots[wide] = wide[_components(xyz, column, level, first_cell, shape[1], params.divide_m)]
+    return kernels.components(xyz, column, level, first_cell, shape[1], fine_m, coarse_m, reach)
 
 
 @numba.njit(cache=True, nogil=True)
-def _is_wide(points: F32, chosen: I32, roots: I32, widest_m: float) -> Mask:
-    """(M,) bool: the angle of the point's component is larger than that of an object of this width at the component's
-    nearest point."""
-    low, high = np.full(len(roots), np.inf), np.full(len(roots), -np.inf)
-    nearest = np.full(len(roots), np.inf)
-    for k in range(len(roots)):
-        x, y, root = points[chosen[k], 0], points[chosen[k], 1], roots[k]
-        turn = np.arctan2(y, x)
-        low[root], high[root] = min(low[root], turn), max(high[root], turn)
-        nearest[root] = min(nearest[root], np.hypot(x, y))
-    wide = np.zeros(len(roots), dtype=np.bool_)
-    for k in range(len(roots)):
-        wide[k] = (high[roots[k]] - low[roots[k]]) * nearest[roots[k]] > widest_m
-    return wide
+def _divide(points: F32, chosen: I32, roots: I32, fine: I32, widest_m: float) -> None:
+    """Splits components that are too wide for one vehicle into their ``fine`` components; changes ``roots`` in place.
+
+    A component is too wide if its angle is larger than that of an object of this width at its nearest point. Of the
+    points, only the leftmost and the rightmost need an arctangent: a cheaper number grows with the angle, too.
+    """
+    count = len(roots)
+    low, high, nearest2 = np.full(count, np.inf), np.full(count, -np.inf), np.full(count, np.inf)
+    first, last = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
+    for k in range(count):
+        x, y, root = float(points[chosen[k], 0]), float(points[chosen[k], 1]), roots[k]
+        nearest2[root] = min(nearest2[root], x * x + y * y)
+        turn = 1.0 - x / max(abs(x) + abs(y), 1e-9)
+        if y < 0.0:
+            turn = -turn
+        if turn < low[root]:
+            low[root], first[root] = turn, chosen[k]
+        if turn > high[root]:
+            high[root], last[root] = turn, chosen[k]
+    wide = np.zeros(count, dtype=np.bool_)
+    for k in range(count):
+        if roots[k] == k:
+            angle = _turn(points, last[k]) - _turn(points, first[k])
+            wide[k] = angle * np.sqrt(nearest2[k]) > widest_m
+    for k in range(count):
+        if wide[roots[k]]:
+            roots[k] = fine[k]
+
+
+@numba.njit(cache=True, nogil=True)
+def _turn(points: F32, i: int) -> float:
+    return np.arctan2(float(points[i, 1]), float(points[i, 0]))  # type: ignore[no-any-return]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -108,143 +131,6 @@ def _within(points: F32, candidates: Mask, max_range_m: float, front_only: bool)
         chosen[count] = i
         count += candidates[i] & (x * x + y * y <= limit2) & ((x > 0.0) | (not front_only))
     return chosen[:count]
-
-
-@numba.njit(cache=True, nogil=True)
-def _cells(
-    points: F32, chosen: I32, z_weight: float, cell_m: float
-) -> tuple[F64, npt.NDArray[np.int64], I32, tuple[int, int]]:
-    """xyz (M, 3) float64 with z weighted; the column and the level of each point; number of columns along x and y.
-
-    Two empty columns surround the grid, so that neighbours need no bounds check.
-    """
-    xyz = np.empty((len(chosen), 3))
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for k in range(len(chosen)):
-        for a in range(3):
-            value = float(points[chosen[k], a])
-            if a == 2:
-                value *= z_weight
-            xyz[k, a] = value
-            low[a], high[a] = min(low[a], value), max(high[a], value)
-    per_m = 1.0 / cell_m
-    nx = int((high[0] - low[0]) * per_m) + 5
-    ny = int((high[1] - low[1]) * per_m) + 5
-    column = np.empty(len(chosen), dtype=np.int64)
-    level = np.empty(len(chosen), dtype=np.int32)
-    for k in range(len(chosen)):
-        ix = int((xyz[k, 0] - low[0]) * per_m) + 2
-        iy = int((xyz[k, 1] - low[1]) * per_m) + 2
-        column[k] = ix * ny + iy
-        level[k] = int((xyz[k, 2] - low[2]) * per_m)
-    return xyz, column, level, (nx, ny)
-
-
-@numba.njit(cache=True, nogil=True)
-def _components(
-    xyz: F64, column: npt.NDArray[np.int64], level: I32, first_cell: I32, ny: int, tolerance_m: float
-) -> I32:
-    """(M,) the first point of each point's component. ``first_cell`` is the grid, all zeros on entry: for each column,
-    one plus the number of its newest cell. The cells of a column form a linked list."""
-    count = len(xyz)
-    cell_of = np.empty(count, dtype=np.int32)
-    below = np.empty(count, dtype=np.int32)  # the next cell of the same column, −1 at the end
-    cell_column = np.empty(count, dtype=np.int64)
-    cell_level = np.empty(count, dtype=np.int32)
-    size = np.zeros(count + 1, dtype=np.int32)
-    cells, c = 0, -1
-    for k in range(count):
-        if k > 0 and column[k] == column[k - 1] and level[k] == level[k - 1]:  # usually the next point of the same beam
-            cell_of[k] = c
-            size[c] += 1
-            continue
-        c = first_cell[column[k]] - 1
-        while c >= 0 and cell_level[c] != level[k]:
-            c = below[c]
-        if c < 0:
-            c, cells = cells, cells + 1
-            below[c] = first_cell[column[k]] - 1
-            cell_column[c], cell_level[c] = column[k], level[k]
-            first_cell[column[k]] = c + 1
-        cell_of[k] = c
-        size[c] += 1
-    start = np.zeros(cells + 1, dtype=np.int32)
-    for c in range(cells):
-        start[c + 1] = start[c] + size[c]
-    place = start[:-1].copy()
-    by_cell = np.empty(count, dtype=np.int32)
-    for k in range(count):  # stable order: a cell's first entry is its first point
-        by_cell[place[cell_of[k]]] = k
-        place[cell_of[k]] += 1
-    packed = np.empty((count, 3))
-    for j in range(count):
-        packed[j, 0], packed[j, 1], packed[j, 2] = xyz[by_cell[j], 0], xyz[by_cell[j], 1], xyz[by_cell[j], 2]
-
-    bounds = _bounds(packed, start)
-    parent = np.arange(cells).astype(np.int32)
-    limit2 = tolerance_m * tolerance_m
-    for c in range(cells):
-        mine = _root(parent, c)
-        for dx in range(3):
-            for dy in range(-2 if dx > 0 else 0, 3):  # half of the neighbours suffices by symmetry
-                other = first_cell[cell_column[c] + dx * ny + dy] - 1
-                while other >= 0:
-                    if abs(cell_level[other] - cell_level[c]) <= 2:
-                        theirs = _root(parent, other)
-                        if mine != theirs and _touch(packed, start, bounds, c, other, limit2):
-                            mine, theirs = min(mine, theirs), max(mine, theirs)
-                            parent[theirs] = mine
-                    other = below[other]
-    # cells are numbered by their first points, so the lowest cell of a component contains its first point
-    roots = np.empty(count, dtype=np.int32)
-    for k in range(count):
-        roots[k] = by_cell[start[_root(parent, cell_of[k])]]
-    return roots
-
-
-@numba.njit(cache=True, nogil=True)
-def _root(parent: I32, c: int) -> int:
-    """The lowest cell joined with ``c``; halves the path on the way."""
-    while parent[c] != c:
-        parent[c] = parent[parent[c]]
-        c = parent[c]
-    return c
-
-
-@numba.njit(cache=True, nogil=True)
-def _bounds(packed: F64, start: I32) -> F64:
-    """(C, 6) minimum and maximum x, y, z of each cell's points."""
-    bounds = np.empty((len(start) - 1, 6))
-    for c in range(len(bounds)):
-        for axis in range(3):
-            low = high = packed[start[c], axis]
-            for j in range(start[c] + 1, start[c + 1]):
-                low, high = min(low, packed[j, axis]), max(high, packed[j, axis])
-            bounds[c, axis], bounds[c, axis + 3] = low, high
-    return bounds
-
-
-@numba.njit(cache=True, nogil=True)
-def _touch(packed: F64, start: I32, bounds: F64, c: int, other: int, limit2: float) -> bool:
-    """Whether any point of one cell is within the tolerance of any point of the other. Most pairs are ruled out early:
-    a point that is too far from a cell's bounds is too far from all its points."""
-    dx = max(bounds[other, 0] - bounds[c, 3], bounds[c, 0] - bounds[other, 3], 0.0)
-    dy = max(bounds[other, 1] - bounds[c, 4], bounds[c, 1] - bounds[other, 4], 0.0)
-    dz = max(bounds[other, 2] - bounds[c, 5], bounds[c, 2] - bounds[other, 5], 0.0)
-    if dx * dx + dy * dy + dz * dz > limit2:
-        return False
-    for a in range(start[c], start[c + 1]):
-        x, y, z = packed[a, 0], packed[a, 1], packed[a, 2]
-        dx = max(bounds[other, 0] - x, x - bounds[other, 3], 0.0)
-        dy = max(bounds[other, 1] - y, y - bounds[other, 4], 0.0)
-        dz = max(bounds[other, 2] - z, z - bounds[other, 5], 0.0)
-        if dx * dx + dy * dy + dz * dz > limit2:
-            continue
-        for b in range(start[other], start[other + 1]):
-            dx, dy, dz = x - packed[b, 0], y - packed[b, 1], z - packed[b, 2]
-            if dx * dx + dy * dy + dz * dz <= limit2:
-                return True
-    return False
 
 
 @numba.njit(cache=True, nogil=True)

@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pipeline.lidar.cluster import candidates, cluster
+from pipeline.lidar.cluster import WIDEST_M, candidates, cluster
 from pipeline.lidar.ground import Ground
 from pipeline.params import ClusterParams
 from pipeline.types import F32, I32
@@ -63,6 +63,49 @@ def test_same_partition_on_a_sweep_with_a_near_wall(tolerance_m: float) -> None:
     assert np.array_equal(_cluster(points, tolerance_m=tolerance_m, z_weight=0.4), _kd_tree(points, tolerance_m, 0.4))
 
 
+def _along(start: tuple[float, float], end: tuple[float, float], step_m: float = 0.1) -> F32:
+    """Two rings of points along a line in the plan."""
+    count = int(np.hypot(end[0] - start[0], end[1] - start[1]) / step_m) + 1
+    x, y = np.linspace(start[0], end[0], count), np.linspace(start[1], end[1], count)
+    return np.concatenate([np.stack([x, y, np.full(count, z), np.zeros(count)], axis=1) for z in (0.0, 0.4)]).astype(
+        np.float32
+    )
+
+
+def _divided(points: F32, tolerance_m: float, divide_m: float) -> I32:
+    """Components at the tolerance; those wider than any vehicle, as components at the smaller one."""
+    coarse, fine = _kd_tree(points, tolerance_m, 0.4), _kd_tree(points, min(divide_m, tolerance_m), 0.4)
+    turn, range_m = np.arctan2(points[:, 1], points[:, 0]), np.hypot(points[:, 0], points[:, 1])
+    for each in range(coarse.max(initial=-1) + 1):
+        mine = coarse == each
+        if np.ptp(turn[mine]) * range_m[mine].min() > WIDEST_M:
+            coarse[mine] = len(points) + fine[mine]
+    first, rank = {}, 0
+    for label in coarse.tolist():
+        if label not in first:
+            first[label], rank = rank, rank + 1
+    return np.array([first[label] for label in coarse.tolist()], dtype=np.int32)
+
+
+@pytest.mark.parametrize("front_only", [True, False])
+@pytest.mark.parametrize(
+    ("tolerance_m", "divide_m"), [(0.9, 0.7), (0.9, 0.45), (0.6, 3.0), (1.8, 0.9), (2.5, 0.1), (3.0, 0.3)]
+)
+def test_what_is_wider_than_a_vehicle_is_divided_at_smaller_gaps(
+    tolerance_m: float, divide_m: float, front_only: bool
+) -> None:
+    """Against a KD-tree, among 300 short walls on all sides."""
+    rng = np.random.default_rng(7)
+    start, change = rng.uniform((-40.0, -20.0), (40.0, 20.0), (300, 2)), rng.uniform(-2.0, 2.0, (300, 2))
+    points = np.concatenate([_along(tuple(a), tuple(a + d)) for a, d in zip(start, change, strict=True)])
+    points = points[(points[:, 0] > 0.0) | (not front_only)]
+    found = _cluster(points, tolerance_m=tolerance_m, divide_m=divide_m, z_weight=0.4, front_only=front_only)
+    wanted = _divided(points, tolerance_m, divide_m)
+    if divide_m < tolerance_m:
+        assert wanted.max() > _kd_tree(points, tolerance_m, 0.4).max()
+    assert np.array_equal(found, wanted)
+
+
 def test_two_rings_on_one_car_are_one_object_by_the_weight_on_height() -> None:
     rings = _points((30.0, 0.0, -0.8), (30.0, 0.4, -0.8), (30.0, 0.0, 0.25), (30.0, 0.4, 0.25))
     assert _cluster(rings, tolerance_m=0.7, z_weight=0.4).tolist() == [0, 0, 0, 0]
@@ -71,15 +114,6 @@ def test_two_rings_on_one_car_are_one_object_by_the_weight_on_height() -> None:
 
 def test_neighbours_in_the_next_lane_stay_two() -> None:
     assert _cluster(_points((20.0, 0.0, 0.0), (20.0, 1.2, 0.0)), tolerance_m=0.9).tolist() == [0, 1]
-
-
-def _along(start: tuple[float, float], end: tuple[float, float], step_m: float = 0.1) -> F32:
-    """Two rings of points along a line in the plan."""
-    count = int(np.hypot(end[0] - start[0], end[1] - start[1]) / step_m) + 1
-    x, y = np.linspace(start[0], end[0], count), np.linspace(start[1], end[1], count)
-    return np.concatenate([np.stack([x, y, np.full(count, z), np.zeros(count)], axis=1) for z in (0.0, 0.4)]).astype(
-        np.float32
-    )
 
 
 def test_a_lead_and_the_row_parked_beside_it_are_two() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-from pipeline.lidar import boxes, cluster, ground, ground_kernels, plane_kernels, warm_up
+from pipeline.lidar import boxes, cluster, cluster_kernels, ground, ground_kernels, plane_kernels, warm_up
 from pipeline.params import Params
 from pipeline.types import Sweep
 from tests.pipeline.lidar.scenes import scan
@@ -16,7 +16,7 @@ def _compiled() -> dict[str, int]:
     """Signatures of all kernels called from Python; those called only by kernels are compiled into them."""
     return {
         f"{module.__name__}.{name}": len(thing.signatures)
-        for module in (boxes, cluster, ground_kernels, plane_kernels)
+        for module in (boxes, cluster, cluster_kernels, ground_kernels, plane_kernels)
         for name, thing in vars(module).items()
         if isinstance(thing, Dispatcher)
     }
