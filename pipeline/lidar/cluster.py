@@ -69,7 +69,7 @@ def _partitions(points: F32, chosen: I32, z_weight: float, fine_m: float, coarse
     xyz, column, level, shape = kernels.cells(points, chosen, z_weight, cell_m, reach)
     # np.zeros allocates lazily, so that a large empty grid costs nothing
     first_cell = np.zeros(shape[0] * shape[1], dtype=np.int32)
-    return kernels.components(xyz, column, level, first_cell, shape[1], fine_m, coarse_m, reach)
+    return kernels.components(xyz, column, level, first_cell, shape[1], cell_m, fine_m, coarse_m, reach)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -104,7 +104,7 @@ def _divide(points: F32, chosen: I32, roots: I32, fine: I32, widest_m: float) ->
 
 @numba.njit(cache=True, nogil=True)
 def _turn(points: F32, i: int) -> float:
-    return np.arctan2(float(points[i, 1]), float(points[i, 0]))  # type: ignore[no-any-return]
+    return np.arctan2(float(points[i, 1]), float(points[i, 0]))
 
 
 @numba.njit(cache=True, nogil=True)

@@ -47,6 +47,7 @@ def components(
     level: I32,
     first_cell: I32,
     ny: int,
+    cell_m: float,
     fine_m: float,
     coarse_m: float,
     reach: int,
@@ -88,11 +89,12 @@ def components(
     for j in range(count):
         packed[j, 0], packed[j, 1], packed[j, 2] = xyz[by_cell[j], 0], xyz[by_cell[j], 1], xyz[by_cell[j], 2]
 
-    pairs = np.empty((cells * 32 + 2, 3), dtype=np.int32)
-    count = _pairs(first_cell, ny, cell_column[:cells], cell_level, below, reach, pairs)
+    offsets = _offsets(ny, cell_m, coarse_m, reach)
+    pairs = np.empty((cells * 24 + 2, 3), dtype=np.int32)
+    count = _pairs(first_cell, offsets, cell_column[:cells], cell_level, below, reach, pairs)
     if count >= len(pairs):
         pairs = np.empty((count + 1, 3), dtype=np.int32)
-        count = _pairs(first_cell, ny, cell_column[:cells], cell_level, below, reach, pairs)
+        count = _pairs(first_cell, offsets, cell_column[:cells], cell_level, below, reach, pairs)
     pairs = pairs[:count]
     bounds = _bounds(packed, start)
     parent = np.arange(cells).astype(np.int32)
@@ -107,21 +109,34 @@ def components(
 
 
 @numba.njit(cache=True, nogil=True)
-def _pairs(first_cell, ny, cell_column, cell_level, below, reach, pairs):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _offsets(ny: int, cell_m: float, tolerance_m: float, reach: int) -> npt.NDArray[np.int64]:
+    """(K, 2) of each neighbouring column that may have points within the tolerance: how far it is in the grid, and how
+    many columns away. By symmetry, half of them suffice."""
+    offsets, count = np.empty(((reach + 1) * (2 * reach + 1), 2), dtype=np.int64), 0
+    for dx in range(reach + 1):
+        for dy in range(-reach if dx > 0 else 0, reach + 1):
+            gap_x, gap_y = max(dx - 1, 0) * cell_m, max(abs(dy) - 1, 0) * cell_m
+            if gap_x * gap_x + gap_y * gap_y <= tolerance_m * tolerance_m * (1.0 + 1e-6):  # whatever rounding does
+                offsets[count, 0], offsets[count, 1] = dx * ny + dy, max(dx, abs(dy))
+                count += 1
+    return offsets[:count]
+
+
+@numba.njit(cache=True, nogil=True)
+def _pairs(first_cell, offsets, cell_column, cell_level, below, reach, pairs):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Writes each pair of cells that are at most ``reach`` columns and levels apart, and by how many, into ``pairs``
     (P, 3). Returns the number of pairs, which may be larger than P."""
     count, most = 0, len(pairs) - 1
     for c in range(len(cell_column)):
         column, level = cell_column[c], cell_level[c]
-        for dx in range(reach + 1):
-            for dy in range(-reach if dx > 0 else 0, reach + 1):  # half of the neighbours suffices by symmetry
-                other = first_cell[column + dx * ny + dy] - 1
-                while other >= 0:
-                    apart = max(dx, abs(dy), abs(cell_level[other] - level))
-                    row = min(count, most)
-                    pairs[row, 0], pairs[row, 1], pairs[row, 2] = c, other, apart
-                    count += int(apart <= reach)
-                    other = below[other]
+        for k in range(len(offsets)):
+            other = first_cell[column + offsets[k, 0]] - 1
+            while other >= 0:
+                apart = max(offsets[k, 1], abs(cell_level[other] - level))
+                row = min(count, most)
+                pairs[row, 0], pairs[row, 1], pairs[row, 2] = c, other, apart
+                count += int(apart <= reach)
+                other = below[other]
     return count
 
 
