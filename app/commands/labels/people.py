@@ -123,6 +123,8 @@ class LabelQueue:
 
         if (self.drive is None) != (self.assign is None and self.state is None):
             raise BadInput("--drive must be given together with --assign or --state")
+        if self.anyway and self.state != "done":
+            raise BadInput("--anyway must be given together with --state done")
         database = open_database(self.database)
         try:
             if self.drive is not None:

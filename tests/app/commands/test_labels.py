@@ -138,3 +138,19 @@ def test_bad_input_is_one_sentence(what: str, drive: Path, tmp_path: Path, capsy
     assert "Traceback" not in said
     assert said
     assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (("--assign", "Ada"), "--drive must be given together with --assign or --state"),
+        (("--drive", "any"), "--drive must be given together with --assign or --state"),
+        (("--drive", "any", "--assign", "Ada", "--anyway"), "--anyway must be given together with --state done"),
+        (("--drive", "any", "--state", "review", "--anyway"), "--anyway must be given together with --state done"),
+    ],
+)
+def test_an_option_without_what_it_needs_is_said(
+    options: tuple[str, ...], why: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cipv("labels", "queue", *options) == 2
+    assert why in capsys.readouterr().err
