@@ -97,7 +97,7 @@ function dismissFirst() {
   update();
 }
 
-/** Notes of frames differ in their numbers: dismissed once, they stay away. @param {Shown} notice */
+/** Notes of frames differ in their numbers: dismissed once, they stay away. @type {(each: Shown) => string} */
 const kindOf = ({ text: said, ofFrame }) => (ofFrame ? said.replace(/[\d.]+/g, "#") : said);
 
 /** @param {{status: string, since: number}|null} link @returns {Shown[]} */
@@ -141,7 +141,7 @@ function ofFrames() {
   return [...held.keys()].map((said) => ({ level: "warning", text: said, ofFrame: true }));
 }
 
-/** @param {Shown} notice */
+/** @param {Shown} each */
 function notice(each) {
   const close = () => {
     dismissed.add(kindOf(each));
