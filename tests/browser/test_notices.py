@@ -12,21 +12,30 @@ from tests.browser.looks import wait_for_frame, whole_drive
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
-SAY = """async ([notes, notices]) => {
-  const { get, set } = await import("/js/core/store.js");
-  const frame = get("frame"), state = get("state");
-  set("state", { ...state, notices });
-  set("frame", { ...frame, result: { ...frame.result, notes } });
+HOLD = """async (wanted) => {
+  const { get, on, set } = await import("/js/core/store.js");
+  const differs = (now, then) => Object.entries(then).some(([key, value]) => now[key] !== value);
+  const hold = () => {
+    const { state, frame, notes } = window.wanted;
+    if (differs(get("state"), state)) set("state", { ...get("state"), ...state });
+    const shown = get("frame");
+    if (differs(shown, frame) || shown.result.notes !== notes)
+      set("frame", { ...shown, ...frame, result: { ...shown.result, notes } });
+  };
+  if (!window.wanted) on(["state", "frame"], hold);
+  window.wanted = wanted;
+  hold();
   return document.querySelector("#workspace").getBoundingClientRect().top;
 }"""
-"""Show the current frame again, with these notes and these notices of the source; the top of what lies below."""
+"""Show the current frame with these notes, values and values of the source, even if the server sends it again; the top
+of what lies below the notices."""
 INFO = {"level": "info", "text": "Lane lines by a network"}
 SILENT = {"level": "warning", "text": "Waiting for sensors: lidar silent, camera silent, gnss silent, ego silent"}
 MANY = ["lidar stale", "the far view was left out", "Camera or LiDAR has turned: yaw +0.1°, pitch +2.3°"]
 
 
 def say(page: Page, notes: list[str], *notices: dict[str, str]) -> Any:
-    return page.evaluate(SAY, [notes, list(notices)])
+    return page.evaluate(HOLD, {"notes": notes, "frame": {}, "state": {"notices": list(notices)}})
 
 
 def settled(open_page: OpenPage, site: Site) -> Page:
@@ -69,3 +78,21 @@ def test_a_note_that_was_dismissed_stays_away_with_other_numbers(open_page: Open
     expect(notices).not_to_contain_text("disagrees")
     say(page, ["gnss stale"])
     expect(notices).to_contain_text("gnss stale")
+
+
+def follow(page: Page, made_unix_ms: int) -> None:
+    """The shown frame as if it came from live sensors and was made at this time."""
+    live = {"live": True, "playing": True}
+    page.evaluate(HOLD, {"notes": [], "frame": {"madeUnixMs": made_unix_ms}, "state": live})
+
+
+def test_live_data_that_stops_coming_looks_old(open_page: OpenPage, site: Site) -> None:
+    page = settled(open_page, site)
+    follow(page, 1)
+    assert page.evaluate("getComputedStyle(document.querySelector('#banner')).filter") == "none"
+    error = page.locator(".notice[data-level=error]")
+    expect(error).to_contain_text("No new data for")
+    assert "saturate" in page.evaluate("getComputedStyle(document.querySelector('#banner')).filter")
+    follow(page, 2)
+    expect(error).to_have_count(0)
+    assert page.evaluate("getComputedStyle(document.querySelector('#banner')).filter") == "none"

@@ -11,6 +11,8 @@ import { get, on } from "../core/store.js";
 
 /** @type {Set<string>} */
 const dismissed = new Set();
+/** After how long without a new frame live data is called old. */
+const OLD_MS = 2000;
 /** How long a refusal is shown. */
 const REFUSAL_MS = 10_000;
 /** How long a note of a frame stays while frames go by: one frame is too short to read. */
@@ -23,6 +25,8 @@ const held = new Map();
 /** The source whose frames had notes: their row stays, so that the next one does not move the page. */
 let noted = "";
 let isOpen = false;
+/** The newest frame, by when it was made, and when it came, in the page's own monotonic time. */
+const newest = { madeUnixMs: -1, at: 0 };
 
 const errors = el("div"),
   level = el("b"),
@@ -60,7 +64,7 @@ function update() {
   $("#busy").hidden = !busy;
   document.documentElement.toggleAttribute("data-busy", Boolean(busy)); // other panes show outdated content
   text($("#busy"), busy ?? "");
-  const notices = [...lost(link), ...ofHand(), ...standing(), ...ofFrames()].filter(
+  const notices = [...lost(link), ...silence(), ...ofHand(), ...standing(), ...ofFrames()].filter(
     (each) => !dismissed.has(kindOf(each)),
   );
   calm = ["warning", "info"].flatMap((one) => notices.filter((each) => each.level === one));
@@ -111,6 +115,21 @@ function lost(link) {
       fixed: true,
     },
   ];
+}
+
+/** Live sensors that send nothing: what is shown must not look fresh. @returns {Shown[]} */
+function silence() {
+  const state = get("state"),
+    frame = get("frame"),
+    now = performance.now();
+  const isFollowing = state?.live && state.playing && !state.busy && frame?.state.uri === state.uri;
+  if (!isFollowing || frame.madeUnixMs !== newest.madeUnixMs) newest.at = now;
+  newest.madeUnixMs = frame?.madeUnixMs ?? -1;
+  const old = now - newest.at;
+  document.documentElement.toggleAttribute("data-old", old > OLD_MS);
+  if (old <= OLD_MS || get("link")?.status === "lost") return [];
+  const words = `No new data for ${Math.floor(old / 1000)} s. The view is out of date.`;
+  return [{ level: "error", text: words, fixed: true }];
 }
 
 /** @returns {Shown[]} */
