@@ -59,3 +59,24 @@ def test_the_timelines_ticks_are_at_round_times_and_equally_far_apart(open_page:
     assert [words for words, _ in ticks] == [f"0:{2 * k:02d}.0" for k in range(len(ticks))]
     gaps = [after[1] - before[1] for before, after in zip(ticks, ticks[1:], strict=False)]
     assert max(gaps) - min(gaps) < 2.0
+
+
+LEAST_PLAN = 4
+"""Height of the plan in heights of the tools that lie on it."""
+OUTSIDE = """() => [...document.querySelectorAll(".card, .topbar > *, .transport > *")]
+  .filter((node) => node.checkVisibility() && node.getBoundingClientRect().right > innerWidth)
+  .map((node) => node.id || node.className)"""
+"""Parts of the page that end beyond its right edge."""
+
+
+def test_a_phone_shows_lead_acc_and_every_control(open_page: OpenPage, site: Site) -> None:
+    page = open_page(390, 844)
+    wait_for_frame(page, START)
+    assert page.evaluate(OUTSIDE) == []
+    for part in (".card.lead", ".card.acc", "[data-figure=ttc]", "#params-button", "#transport .record"):
+        expect(page.locator(part)).to_be_in_viewport(ratio=1)
+    assert page.evaluate(CUT, "[data-figure] .label") == []
+    plan, tools = (page.locator(part).bounding_box() for part in ("#bev", "[aria-label='plan tools']"))
+    assert plan is not None
+    assert tools is not None
+    assert plan["height"] > LEAST_PLAN * tools["height"]
