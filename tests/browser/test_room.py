@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from playwright.sync_api import expect
 
@@ -41,7 +43,8 @@ TICKS = """async () => {
   const { get, set } = await import("/js/core/store.js");
   const drive = get("drive"), written = [];
   const t_s = drive.t_s.map((_, k) => 0.1035 * k + 0.004 * (k % 3));
-  const ctx = { fillText: (words, x) => written.push([words, x]), beginPath() {}, moveTo() {}, lineTo() {}, stroke() {} };
+  const line = { beginPath() {}, moveTo() {}, lineTo() {}, stroke() {} };
+  const ctx = { ...line, fillText: (words, x) => written.push([words, x]) };
   const left = 132, width = 900, perFrame = width / t_s.length;
   const span = { left, width, perFrame, x: (k) => left + k * perFrame };
   set("drive", { ...drive, t_s });
@@ -57,7 +60,7 @@ def test_the_timelines_ticks_are_at_round_times_and_equally_far_apart(open_page:
     whole_drive(page, site)
     ticks = page.evaluate(TICKS)
     assert [words for words, _ in ticks] == [f"0:{2 * k:02d}.0" for k in range(len(ticks))]
-    gaps = [after[1] - before[1] for before, after in zip(ticks, ticks[1:], strict=False)]
+    gaps = [after[1] - before[1] for before, after in pairwise(ticks)]
     assert max(gaps) - min(gaps) < 2.0
 
 
