@@ -155,6 +155,31 @@ SHOW = """async (change) => {
 }"""
 """Another command with the shown frame, even if the server sends the frame again with an image of another size."""
 
+TOLD = """() => {
+  const reason = document.querySelector("#acc-reason");
+  return {
+    whole: reason.scrollHeight <= reason.clientHeight && reason.scrollWidth <= reason.clientWidth,
+    top: document.querySelector(".data").getBoundingClientRect().top,
+  };
+}"""
+"""Whether ACC's reason is seen to its end, and where the rest of the display begins."""
+
+
+@pytest.mark.usefixtures("paused_in_traffic")
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_what_acc_does_not_do_is_told_to_its_end_without_moving_the_rest(
+    open_display: OpenDisplay, site: Site, width: int, height: int
+):
+    page = open_display(site.address, width, height)
+    is_now(page, "paused")
+    told = []
+    for reason in ("free road", "camera and LiDAR disagree about where cars are: ACC will not accelerate"):
+        page.evaluate(SHOW, {"state": "cruise", "reason": reason})
+        told.append(page.evaluate(TOLD))
+    assert [each["whole"] for each in told] == [True, True]
+    assert told[0]["top"] == told[1]["top"]
+
+
 ALARM_PIXELS = """(selector) => {
   const canvas = document.querySelector(selector), ctx = canvas.getContext("2d");
   const { data } = ctx.getImageData(0, 0, canvas.width, canvas.height);
