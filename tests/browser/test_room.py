@@ -38,6 +38,22 @@ def test_an_event_is_told_to_its_end(open_page: OpenPage, site: Site) -> None:
     assert page.evaluate(CUT, ".event .what") == []
 
 
+REASONS = ("beside or behind the bumper", "out of path by 11.4 m", "17 by 4 m: not a vehicle")
+
+
+def test_the_ranking_of_candidates_tells_the_usual_reasons_to_their_end(open_page: OpenPage, site: Site) -> None:
+    page = open_page()
+    whole_drive(page, site)
+    what = page.locator(".ranked .what")
+    expect(what.first).to_be_visible()
+    for reason in REASONS:
+        assert what.first.evaluate(
+            "(node, words) => ((node.textContent = words), node.scrollWidth <= node.clientWidth)", reason
+        ), reason
+    far = page.locator(".ranked .far").first
+    assert far.evaluate("(node) => ((node.textContent = '101.6 m'), node.scrollWidth <= node.clientWidth)")
+
+
 TICKS = """async () => {
   const { drawAxis } = await import("/js/timeline/axis.js");
   const { get, set } = await import("/js/core/store.js");
