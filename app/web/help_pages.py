@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 INDEX = "README.md"
 _PAGE = ".md"
+_NUMBER_AND_UNIT = re.compile(r"(?<=\d) (?=(?:%|°|k?m(?:/h|/s²?)?|cm|px|ms|s|Hz|[kMG]B)(?!\w))")
+"""The space between a number and its unit, where no line may break."""
 
 
 class PageHeading(NamedTuple):
@@ -78,7 +80,9 @@ def render(text: str, file: str) -> HelpPage:
     for token in tokens:
         children = token.children or []
         for index, child in enumerate(children):
-            if child.type == "link_open":
+            if child.type == "text":
+                child.content = _NUMBER_AND_UNIT.sub("\u00a0", child.content)
+            elif child.type == "link_open":
                 _point(child, next(each for each in children[index:] if each.type == "link_close"), file)
     body = _parser().renderer.render(tokens, _parser().options, {})
     title = next((each.text for each in headings if each.level == 1), file)

@@ -187,6 +187,35 @@ def test_a_failed_test_of_the_selected_object_is_drawn_with_its_number(open_page
         assert f"camera: {words}" in written
 
 
+STROKES = """async () => {
+  const { get } = await import("/js/core/store.js"), { drawObjects } = await import("/js/views/drawing/image.js");
+  const frame = get("frame"), alphas = {};
+  for (const item of frame.result.objects) {
+    if (!frame.display.cuboids[item.id]) continue;
+    const stroke = function () { alphas[item.id] = this.globalAlpha; };
+    const ctx = { setLineDash() {}, beginPath() {}, moveTo() {}, lineTo() {}, stroke };
+    const one = { ...frame, result: { ...frame.result, objects: [item] } }, axis = (pixel) => pixel;
+    drawObjects(ctx, one, { cuboids: true }, { shows: () => false }, axis, axis);
+  }
+  return alphas;
+}"""
+"""How opaque the cuboid of each object in the image is drawn."""
+
+
+def test_roadside_returns_are_fainter_in_the_image_than_vehicles(open_page: OpenPage, site: Site):
+    page = opened(open_page, site)
+    alphas = page.evaluate(STROKES)
+    tick = site.engine.snapshot.processed
+    assert tick is not None
+    objects = {str(item.id): item for item in tick.result.objects}
+    aside = [key for key in alphas if objects[key].source == "L" and not objects[key].in_path]
+    vehicles = [key for key in alphas if "V" in objects[key].source and not objects[key].carried]
+    assert aside
+    assert vehicles
+    assert max(alphas[key] for key in aside) < 0.5
+    assert {alphas[key] for key in vehicles} == {1}
+
+
 def test_trails_follow_what_is_played(open_page: OpenPage, site: Site):
     page = opened(open_page, site)
     for step in range(1, 4):

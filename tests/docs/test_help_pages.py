@@ -54,6 +54,12 @@ def test_every_link_of_a_page_is_served(client: httpx.Client, file: str) -> None
     assert "../" not in "".join(re.findall(r'href="([^"]*)"', body)), "a link that leaves docs/ is no link here"
 
 
+def test_no_line_breaks_between_a_number_and_its_unit() -> None:
+    text = "At 13 m/s, 62 % within 0.3 s and 40 km/h; 3 sensors, 5 main roads. `--at 20 m`"
+    body = help_pages.render(text, "a.md").body.replace("\u00a0", "~")
+    assert "At 13~m/s, 62~% within 0.3~s and 40~km/h; 3 sensors, 5 main roads. <code>--at 20 m</code>" in body
+
+
 def test_a_page_is_found_by_its_file_name_too(client: httpx.Client) -> None:
     assert client.get("/help/guides/why.md").text == client.get("/help/guides/why").text
 

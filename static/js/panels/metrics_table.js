@@ -39,7 +39,7 @@ export function metricsTable({ metrics, truth, judged }, isAlone = false) {
 function row(metric, isAlone) {
   const { name, unit, base, run } = metric;
   const digits = [base, run].every((value) => value === null || Number.isInteger(value)) ? 0 : 2;
-  const change = base === null || run === null ? null : run - base;
+  const change = base === null || run === null ? null : Number((run - base).toFixed(digits)); // as it is shown
   const title = el("th", { scope: "row", textContent: unit ? `${name}, ${unit}` : name });
   if (isAlone) return el("tr", {}, title, el("td", { textContent: num(run, digits) }));
   return el(

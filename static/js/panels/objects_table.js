@@ -196,7 +196,7 @@ function fill(row, { item, why }) {
   cells.inPath.className = item.in_path ? "yes" : "no";
   const words = item.carried ? `carried, not detected in this frame · ${why}` : why;
   if (reason.title === words) return;
-  text(reason, words);
+  text(reason, item.carried ? `carried · ${why}` : why);
   reason.title = words;
 }
 

@@ -126,7 +126,7 @@ function rankedRow() {
 /** @param {HTMLElement} row @param {Ranked} ranked */
 function showRanked(row, { id, order, distance_m, stopped_by, reason }) {
   const [place, name, far, what] = row.children;
-  row.title = `Select #${id}`;
+  row.title = `Select #${id}${reason ? `: ${reason}` : ""}`;
   text(place, stopped_by && stopped_by !== "behind" ? "✕" : String(order));
   text(name, `#${id}`);
   text(far, distance_m === null ? DASH : `${num(distance_m)} m`);

@@ -28,12 +28,16 @@ export function drawAxis(ctx, size, span, rows) {
     taken = -Infinity;
   for (let i = 0; i < times.length; i++) {
     if (times[i] < due - 1e-6) continue;
+    // a round time between two frames; the frame's own after a gap
+    const before = times[i - 1] ?? times[i],
+      isRound = due > before && times[i] - before <= step,
+      at = isRound ? due : times[i];
     due = (Math.floor(times[i] / step + 1e-6) + 1) * step;
-    const x = span.x(i);
+    const x = isRound ? span.x(i - (times[i] - at) / (times[i] - before)) : span.x(i);
     if (x < span.left - 1 || x > span.left + span.width - 30 || x < taken + TICK_APART_PX) continue;
     taken = x;
     line(ctx, x + 0.5, rows.axis.top + 4, x + 0.5, size.height - rows.bar.height);
-    ctx.fillText(clock(times[i]), x + 4, rows.axis.top + 11);
+    ctx.fillText(clock(at), x + 4, rows.axis.top + 11);
   }
 }
 

@@ -13,7 +13,7 @@ from tests.browser.conftest import OpenPage, Site
 from tests.browser.display.conftest import WAIT_S, OpenDisplay, is_now, keep
 from tests.browser.judges import LOW_CONTRAST
 
-SIZES = [(1024, 600), (1280, 800), (800, 480)]
+SIZES = [(1024, 600), (1280, 800), (800, 480), (390, 844)]
 FINGER_PX = 48
 
 STREAMS = """async () => {
@@ -62,6 +62,24 @@ CUT_OFF = """() => {
 }"""
 """Units that large numbers have pushed out of view."""
 
+OVERLAPS = """() => {
+  const parts = ["#acc-word", "#acc-reason", ".speeds", ".lead", ".road", ".plan", "#sensors", "#night", "#record",
+    "#mark"].map((one) => [one, document.querySelector(one)]);
+  const box = (node) => {
+    const range = document.createRange();
+    range.selectNodeContents(node);
+    return (node.matches("strong, span") ? range : node).getBoundingClientRect();
+  };
+  const inside = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left);
+  const over = (a, b) => Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+  return parts.flatMap(([a, one], place) => parts.slice(place + 1)
+    .filter(([, other]) => inside(box(one), box(other)) > 8 && over(box(one), box(other)) > 8)
+    .map(([b]) => `${a} ${b}`));
+}"""
+"""Parts of the display that lie on each other, by more than the empty edges of letters."""
+LEAST_ROAD_PX = 200
+"""Width of a camera image in which a car ahead can be made out."""
+
 
 @pytest.mark.usefixtures("paused_in_traffic")
 def test_it_fits_a_finger_finds_it_and_it_can_be_read(open_display: OpenDisplay, site: Site):
@@ -82,6 +100,8 @@ def test_it_fits_a_finger_finds_it_and_it_can_be_read(open_display: OpenDisplay,
             width,
             height,
         ]
+        assert page.evaluate(OVERLAPS) == []
+        assert page.evaluate("document.querySelector('.road').clientWidth") > LEAST_ROAD_PX
         targets = page.eval_on_selector_all("button", "all => all.map((node) => node.getBoundingClientRect().toJSON())")
         assert len(targets) == 3
         for box in targets:
@@ -134,6 +154,31 @@ SHOW = """async (change) => {
   await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
 }"""
 """Another command with the shown frame, even if the server sends the frame again with an image of another size."""
+
+TOLD = """() => {
+  const reason = document.querySelector("#acc-reason");
+  return {
+    whole: reason.scrollHeight <= reason.clientHeight && reason.scrollWidth <= reason.clientWidth,
+    top: document.querySelector(".data").getBoundingClientRect().top,
+  };
+}"""
+"""Whether ACC's reason is seen to its end, and where the rest of the display begins."""
+
+
+@pytest.mark.usefixtures("paused_in_traffic")
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_what_acc_does_not_do_is_told_to_its_end_without_moving_the_rest(
+    open_display: OpenDisplay, site: Site, width: int, height: int
+):
+    page = open_display(site.address, width, height)
+    is_now(page, "paused")
+    told = []
+    for reason in ("free road", "camera and LiDAR disagree about where cars are: ACC will not accelerate"):
+        page.evaluate(SHOW, {"state": "cruise", "reason": reason})
+        told.append(page.evaluate(TOLD))
+    assert [each["whole"] for each in told] == [True, True]
+    assert told[0]["top"] == told[1]["top"]
+
 
 ALARM_PIXELS = """(selector) => {
   const canvas = document.querySelector(selector), ctx = canvas.getContext("2d");

@@ -30,13 +30,35 @@ def test_the_next_unlabelled_frame_is_one_whose_lead_is_only_proposed(hand: Hand
     page = hand.page
     labels.act("Bob", {"kind": "set_lead", "first": 0, "last": COUNT - 1, "lead": "none"})
     hand.keys("n")
-    expect(page.locator(".said")).to_have_text("No unlabelled after this frame")
+    expect(page.locator(".said")).to_have_text("No unlabelled frame after this frame")
     (lead,) = labels.everything["leads"]
     ref = {"kind": "lead", "id": lead["id"], "revision": lead["revision"]}
     labels.act("Bob", {"kind": "send_back", "items": [ref], "comment": "look again"})
     hand.keys("n")
     is_at(page, START + 1)
     expect(page.locator(".said")).to_contain_text("lead only proposed")
+
+
+def test_a_search_that_finds_nothing_names_what_it_looked_for(hand: Hand):
+    hand.page.get_by_role("button", name="Queued", exact=True).click()
+    expect(hand.page.locator(".said")).to_have_text("No queued frame after this frame")
+
+
+TASK = """async (running) => {
+  const { get, set } = await import("/js/core/store.js");
+  const state = get("state"), task = { id: 900, what: "propose", done: 8, total: 100, note: "", error: null, running };
+  set("state", { ...state, labels: { ...state.labels, task } });
+}"""
+
+
+def test_while_labels_are_proposed_the_list_says_so_and_offers_it_no_second_time(hand: Hand):
+    propose = hand.page.locator(".begin")
+    expect(propose).to_be_visible()
+    hand.page.evaluate(TASK, True)
+    expect(hand.page.locator(".track-list")).to_contain_text("Proposing labels: 8 of 100 …")
+    expect(propose).to_be_hidden()
+    hand.page.evaluate(TASK, False)
+    expect(propose).to_be_visible()
 
 
 def test_once_all_frames_are_computed_the_message_says_that_labels_can_be_proposed(hand: Hand):

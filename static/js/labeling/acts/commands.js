@@ -11,10 +11,11 @@ import { chosen, leadAt, shown, trackOf } from "../state/labels.js";
 import { setItem, setTool } from "../state/mode.js";
 import { isSure, parted } from "../state/threshold.js";
 import * as span from "../state/marked_frames.js";
+import { noneLeft } from "./wanted.js";
 
 /** @typedef {import("../state/types.js").LabelTrack} LabelTrack */
 /** @typedef {import("../state/types.js").ItemRef} ItemRef */
-/** @typedef {"unlabelled"|"asked"|"disagreement"|"proposed"|"sent_back"|"unreviewed"} Wanted */
+/** @typedef {import("./wanted.js").Wanted} Wanted */
 
 /** Show a status message. @param {string} words */
 export const say = (words) => set("said", words);
@@ -269,7 +270,7 @@ export async function goTo(what, direction) {
     isOfLabels && track !== null ? `&after_kind=track&after_id=${track}` : "",
   );
   if (found instanceof Error) return say(found.message);
-  if (found.frame === null) return say(`No ${what.replace("_", " ")} ${direction > 0 ? "after" : "before"} this frame`);
+  if (found.frame === null) return say(noneLeft(what, direction));
   if (found.item) set("track", found.item.kind === "track" ? found.item.id : null);
   seekTo(found.frame);
   say(found.why);

@@ -71,7 +71,10 @@ export function setUp(parent) {
   body.append(nothing, begin);
   new ResizeObserver(bringIntoView).observe(body);
   body.addEventListener("click", (event) => pick(within(event, ".track-row")));
-  const reflect = paintAfter(["labels", "labelFrames", "frame", "track", "labeling", "draft", "threshold"], show);
+  const reflect = paintAfter(
+    ["labels", "labelFrames", "frame", "track", "labeling", "draft", "threshold", "state"],
+    show,
+  );
   body.addEventListener("settle", reflect);
   /** @param {Which} key */
   function choose(key) {
@@ -93,7 +96,7 @@ export function setUp(parent) {
     scrolledTo = get("track") ?? null;
     nothing.hidden = found.length > 0;
     text(nothing, emptyWords());
-    begin.hidden = (get("labels")?.tracks.size ?? 0) > 0;
+    begin.hidden = (get("labels")?.tracks.size ?? 0) > 0 || proposing() !== null;
   }
 }
 
@@ -116,7 +119,15 @@ function showSureness() {
   text(above, `≥ ${percent(threshold())}: ${left.length} proposed, ${hidden.length} hidden`);
 }
 
+/** The proposals being made now, which a second press would only repeat; else null. */
+function proposing() {
+  const task = get("state")?.labels?.task ?? null;
+  return task?.running && task.what === "propose" ? task : null;
+}
+
 function emptyWords() {
+  const task = proposing();
+  if (task) return `Proposing labels: ${task.done} of ${task.total} …`;
   if (!get("labels")?.tracks.size) return "No labels yet. Propose labels from the pipeline (P), or draw one (G).";
   return which() === "open" ? "Nothing left to do." : "No labels in this frame.";
 }

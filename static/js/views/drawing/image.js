@@ -9,6 +9,8 @@ import { get } from "../../core/store.js";
 /** @typedef {import("../../core/types.js").Pixels} Pixels */
 /** @typedef {(pixel: number) => number} Axis  maps an image pixel to a canvas pixel */
 
+/** Of roadside returns, of which a street has a hundred: the vehicles must be seen behind them. */
+const ASIDE_ALPHA = 0.4;
 const EDGES = [
   [0, 1],
   [1, 2],
@@ -66,10 +68,11 @@ export function drawObjects(ctx, { result, display }, layers, labels, X, Y) {
     const vision = display.vision_boxes[item.id],
       lidar = display.lidar_boxes[item.id],
       corners = display.cuboids[item.id];
-    ctx.globalAlpha = item.carried ? 0.5 : 1;
+    const isAside = !strong && item.id !== next && !deservesTag(item);
+    ctx.globalAlpha = isAside ? ASIDE_ALPHA : item.carried ? 0.5 : 1;
     ctx.setLineDash(item.carried ? [4, 3] : []);
     if (layers.cuboids && corners)
-      drawCuboid(ctx, corners, strong ? tint : onImage("lidar"), strong ? 2.5 : 1.2, X, Y);
+      drawCuboid(ctx, corners, strong ? tint : onImage("lidar"), strong ? 2.5 : isAside ? 1 : 1.2, X, Y);
     if (layers.lidarBoxes && lidar) drawBox(ctx, lidar, onImage("lidar"), 1, X, Y);
     if (layers.visionBoxes && vision) drawBox(ctx, vision, strong ? tint : onImage("vision"), strong ? 3 : 1.5, X, Y);
     if (strong && !vision && lidar) drawBox(ctx, lidar, tint, 2.5, X, Y);
