@@ -1,15 +1,17 @@
-"""Detectors that process each image once, since tests run the same recordings again and again."""
+"""Detectors that process each image once, and recordings that are read once, since tests run the same recordings again
+and again."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Generic
+from typing import Any, Generic
 
 from pipeline.detection import Detects, Seen_co, lanes_for
 from pipeline.sources import open_source
-from pipeline.types import U8, RawBoxes, RawLanes
+from pipeline.types import U8, Frame, RawBoxes, RawLanes
+from pipeline.types.source import Source
 from pipeline.vision.detector import open_detector
 from pipeline.vision.far_view import FarView, open_far_view
 
@@ -34,6 +36,26 @@ class LooksOnce(Generic[Seen_co]):
         if key not in self._answers:
             self._answers[key] = self.detector.detect(bgr)
         return self._answers[key]
+
+
+class ReadsOnce:
+    """Wraps a recording and keeps its frames: those of the simulator take longer to draw than to process. For short
+    recordings, since an image takes 2.8 MB."""
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._frames: dict[int, Frame] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._source, name)
+
+    def __len__(self) -> int:
+        return len(self._source)
+
+    def frame(self, index: int) -> Frame:
+        if index not in self._frames:
+            self._frames[index] = self._source.frame(index)
+        return self._frames[index]
 
 
 @cache

@@ -15,6 +15,7 @@ from pipeline.params import preset, with_changes
 from pipeline.run import Sensors, through
 from pipeline.sources import open_source
 from pipeline.types import Frame, Result
+from pipeline.types.source import Source
 from tests import looking
 from tests.looking import yolox_nano
 
@@ -68,7 +69,7 @@ def drive(
     preset. lanes: another lane detector, as on the command line, run on every ``lanes_every``-th image (None: the
     default). own_motion: False removes the recorded ego motion."""
     uri = f"{SCHEMES[kind]}:{folder / FOLDERS[kind]}"
-    source, frames = open_source(uri), _frames(uri)
+    source, frames = opened(uri), frames_of(uri)
     if not own_motion:
         frames = tuple(replace(frame, ego=None, gnss=None) for frame in frames)
     params = with_changes(preset(preset_name), dict(changes))
@@ -92,9 +93,15 @@ def drive(
 
 
 @cache
-def _frames(uri: str) -> tuple[Frame, ...]:
+def opened(uri: str) -> Source:
+    """Opened once: that reads the whole folder."""
+    return open_source(uri)
+
+
+@cache
+def frames_of(uri: str) -> tuple[Frame, ...]:
     """Read once: reading an image takes longer than running the pipeline on it."""
-    source = open_source(uri)
+    source = opened(uri)
     return tuple(source.frame(index) for index in range(len(source)))
 
 
@@ -122,4 +129,4 @@ def camera_alone_without_own_clip(folder: Path) -> Iterator[Judged]:
 @cache
 def _pairs(folder: Path) -> tuple[Pair, ...]:
     """Every detected vehicle of Astyx with its labelled depth."""
-    return collect_pairs(open_source(f"astyx:{folder / FOLDERS['astyx']}"), yolox_nano(folder, 2048, 618))
+    return collect_pairs(opened(f"astyx:{folder / FOLDERS['astyx']}"), yolox_nano(folder, 2048, 618))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.detection import Detectors, far_view_for, lanes_for
+from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.run import through
 from pipeline.sources import open_source
-from pipeline.vision.detector import open_detector
+from tests import looking
 
 
 def test_the_empty_road_is_no_car_as_wide_as_the_far_view(data_dir: Path) -> None:
@@ -17,8 +17,8 @@ def test_the_empty_road_is_no_car_as_wide_as_the_far_view(data_dir: Path) -> Non
     frames = [source.frame(index) for index in range(len(source))]
     assert frames[0].image is not None
     height, width = frames[0].image.bgr.shape[:2]
-    boxes = open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (width, height))
-    far, lanes = far_view_for(source, boxes), lanes_for(source, "twinlitenet")
+    boxes, far = looking.yolox_nano(data_dir, width, height), looking.far_view(data_dir, width, height)
+    lanes = looking.lanes(source.uri, "twinlitenet")
     assert far is not None
     leads = {}
     for case, view in (("as it is", far), ("every box of the far view", replace(far, sure_px=float("inf")))):

@@ -5,6 +5,7 @@ The images that these tests judge are written to ``build/lanes``, for people to 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import pytest
 
 from pipeline.alignment.projection import Pinhole
 from pipeline.common.fast_replace import evolve
-from pipeline.detection import Detectors, Detects, lanes_for
+from pipeline.detection import Detectors, Detects
 from pipeline.evaluation.lead_verdict import judge
 from pipeline.lanes.classical import open_classical
 from pipeline.lanes.network import open_lane_network
@@ -22,13 +23,23 @@ from pipeline.lanes.road_lines import LaneState, RoadView, follow, road_plane
 from pipeline.params import Params, with_changes
 from pipeline.run import run, through
 from pipeline.simulation.sensors.camera import calibration
-from pipeline.sources import open_source
 from pipeline.types import F64, GROUND, U8, Frame, Moment, RawLanes, Result
 from pipeline.types.lane import EgoLane
-from pipeline.vision.detector import open_detector
+from pipeline.types.source import Source
 from pipeline.warm_up import warm_up
+from tests import looking
 from tests.accuracy import lane_images, lane_truth
-from tests.accuracy.drives import FOLDERS, RECORDED_CLIPS, RULE, SCORED_CLIPS, all_scored, drive
+from tests.accuracy.drives import (
+    FOLDERS,
+    RECORDED_CLIPS,
+    RULE,
+    SCHEMES,
+    SCORED_CLIPS,
+    all_scored,
+    drive,
+    frames_of,
+    opened,
+)
 from tests.accuracy.lane_images import Miss, alone, draw, misses, tiles
 from tests.accuracy.lane_marks import MARKS
 from tests.conftest import ROOT
@@ -136,9 +147,8 @@ ASTYX_CLEAR = {"on a country road": range(47, 52), "two lanes at a light": range
 @cache
 def astyx(folder: Path, clip: str) -> tuple[tuple[str, Frame, Result], ...]:
     """Name, frame and result of a clip, lane lines by TwinLiteNet."""
-    source = open_source(f"astyx:{folder / 'astyx'}")
-    detectors = Detectors(None, lanes_for(source, str(folder / "models" / "twinlitenet.onnx")))
-    part = _Part(source, ASTYX_CLEAR[clip])
+    part = _part(folder, "astyx", ASTYX_CLEAR[clip])
+    detectors = Detectors(None, looking.lanes(part.uri, "twinlitenet"))
     return tuple((frame.name, frame, result) for frame, result in run(part, Params(), detectors))
 
 
@@ -163,7 +173,7 @@ def test_metres_on_the_astyx_road(data_dir: Path, clip: str) -> None:
 def test_the_road_lies_where_the_calibration_has_it_without_a_sweep(data_dir: Path, kind: str) -> None:
     """The road's height from a recording's own sweeps, and the lanes that the camera alone sees on it."""
     planes = [road_plane(result.layers.ground) for result in drive(data_dir, kind).results.values()]
-    camera = open_source(f"{kind}:{data_dir / FOLDERS[kind]}").frame(0).camera
+    camera = frames_of(f"{kind}:{data_dir / FOLDERS[kind]}")[0].camera
     assert camera is not None
     assert camera.road_z_m == pytest.approx(np.median([plane[2] for plane in planes if plane is not None]), abs=0.05)
     seen = [result.layers.lanes for result in drive(data_dir, kind, sensors="camera").results.values()]
@@ -204,10 +214,10 @@ def _bright_ground(frame: Frame, result: Result) -> F64:
 def test_both_lines_are_found_in_wide_images(data_dir: Path, kind: str, least: int) -> None:
     """Images that are more than three times as wide as high. Stretched to 16:9, both lines were found in 24 of 39 and
     12 of 23 frames; measured now: 35 and 23."""
-    source = open_source(f"{kind}:{data_dir / FOLDERS[kind]}")
     clips = RECORDED_CLIPS if kind == "astyx" else (range(10**6),)
-    detectors = Detectors(None, lanes_for(source, str(data_dir / "models" / "twinlitenet.onnx")))
-    lanes = [result.layers.lanes for clip in clips for _, result in run(_Part(source, clip), Params(), detectors)]
+    parts = [_part(data_dir, kind, clip) for clip in clips]
+    detectors = Detectors(None, looking.lanes(parts[0].uri, "twinlitenet"))
+    lanes = [result.layers.lanes for part in parts for _, result in run(part, Params(), detectors)]
     assert sum(lane is not None and None not in (lane.left, lane.right) for lane in lanes) >= least
 
 
@@ -226,9 +236,8 @@ def test_the_lead_is_still_right_on_astyx(data_dir: Path, kind: str, every: int 
 def test_a_dark_image_ends_in_less_confidence_and_no_wrong_lead(data_dir: Path, light: float) -> None:
     """A real drive at night through the whole pipeline: the vehicle detector and classical lane detection find almost
     nothing."""
-    source = open_source(f"astyx:{data_dir / 'astyx'}")
-    eyes = Detectors(open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (2048, 618)), open_classical(None))
-    part = _Part(source, SCORED_CLIPS["following at 22–24 m"])
+    part = _part(data_dir, "astyx", SCORED_CLIPS["following at 22–24 m"])
+    eyes = Detectors(looking.yolox_nano(data_dir, 2048, 618), open_classical(None))
     dark = [_darker(part.frame(k), light) for k in range(len(part))]
     params = with_changes(Params(), {"motion.source": "can"})  # the LiDAR's own motion is no matter of light
     results = [result for _, result in through(dark, params, eyes)]
@@ -300,19 +309,25 @@ def test_at_night_there_is_no_wrong_lane(data_dir: Path, light: float) -> None:
         assert lane.left is None or lane.right is None
 
 
+def _part(folder: Path, kind: str, numbers: range) -> _Part:
+    """Some frames of a recording of the data folder, which are read once for all tests."""
+    uri = f"{SCHEMES[kind]}:{folder / FOLDERS[kind]}"
+    return _Part(opened(uri), frames_of(uri), numbers)
+
+
 class _Part:
     """Some frames of a recording, by their names' numbers."""
 
-    def __init__(self, source, numbers: range) -> None:
+    def __init__(self, source: Source, frames: Sequence[Frame], numbers: range) -> None:
         self.uri, self.title, self.rate_hz, self.notes = source.uri, source.title, source.rate_hz, source.notes
-        self._source = source
-        self._chosen = [i for i, frame in enumerate(source.outlines()) if int(frame.name) in numbers]
+        self._source, self._frames = source, frames
+        self._chosen = [i for i, frame in enumerate(frames) if int(frame.name) in numbers]
 
     def __len__(self) -> int:
         return len(self._chosen)
 
     def frame(self, index: int):
-        return self._source.frame(self._chosen[index])
+        return self._frames[self._chosen[index]]
 
     def t_ns(self, index: int) -> int:
         return self._source.t_ns(self._chosen[index])

@@ -16,8 +16,8 @@ from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
 from pipeline.path.corridor import offset
 from pipeline.run import through
-from pipeline.sources import open_source
 from pipeline.types import F64, EgoState, Frame, Result
+from tests.accuracy.drives import FOLDERS, frames_of
 
 LOOK_AHEAD_M = 30.0
 
@@ -33,8 +33,7 @@ class Driven(NamedTuple):
 
 @cache
 def street(data_dir: Path) -> Driven:
-    source = open_source(f"kitti:{data_dir / 'kitti_0009/2011_09_26/2011_09_26_drive_0009_sync'}")
-    frames = tuple(source.frame(index) for index in range(len(source)))
+    frames = frames_of(f"kitti:{data_dir / FOLDERS['street']}")
     own = tuple(frame.ego for frame in frames if frame.ego is not None)
     poses = np.zeros((len(frames), 3))
     for k in range(1, len(frames)):

@@ -11,8 +11,7 @@ from pipeline.alignment.projection import Alignment, angular_from_calibration, r
 from pipeline.evaluation.lead_verdict import LeadScore, score
 from pipeline.params import Params
 from pipeline.run import Sensors
-from pipeline.sources import open_source
-from tests.accuracy.drives import all_scored, camera_alone_without_own_clip, drive, made_up_leads
+from tests.accuracy.drives import all_scored, camera_alone_without_own_clip, drive, made_up_leads, opened
 from tests.conftest import ROOT
 
 LANES = "twinlitenet"
@@ -66,7 +65,7 @@ def _alignment_cost(data_dir: Path) -> Iterator[str]:
     pinhole, over all LiDAR points that fall into the image, by their bearing."""
     yield "| bearing | Astyx, f = 1818 px | KITTI, f = 721 px |"
     yield "|---|---|---|"
-    columns = [_by_bearing(open_source(f"{kind}:{data_dir / name}")) for kind, name in _CALIBRATED]
+    columns = [_by_bearing(opened(f"{kind}:{data_dir / name}")) for kind, name in _CALIBRATED]
     for low, high in _BEARINGS_DEG:
         cells = [f"{column[low]:.0f} px" if column[low] is not None else "outside" for column in columns]
         yield f"| {low}–{high}° | {' | '.join(cells)} |"

@@ -21,6 +21,7 @@ from pipeline.sources import open_source
 from pipeline.types import Frame
 from tests.browser.conftest import WAIT_MS, CountedDetector, OpenPage, Pages, Site, opening
 from tests.browser.looks import pixels, repainted
+from tests.looking import ReadsOnce
 
 WAIT_S = WAIT_MS / 1e3
 SCENE = """
@@ -46,7 +47,8 @@ def knocked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """A dashboard on a drive whose camera is rotated relative to its calibration."""
     scene = tmp_path_factory.mktemp("scene") / "knocked.yaml"
     scene.write_text(SCENE)
-    engine = Engine(open_source, CountedDetector, Params(), uri=f"sim:{scene}", whole_drives=True)
+    drawn = ReadsOnce(open_source(f"sim:{scene}"))
+    engine = Engine(lambda uri, progress: drawn, CountedDetector, Params(), uri=drawn.uri, whole_drives=True)
     engine.start()
     engine.wait_for(lambda s: s.processed is not None, WAIT_S)
     site = Site(engine, 0)
@@ -216,7 +218,7 @@ class LateCamera:
     """Six seconds of a bend whose images are those of the next frame."""
 
     def __init__(self) -> None:
-        self._bend = open_source("sim:curve_125")
+        self._bend = ReadsOnce(open_source("sim:curve_125"))
         self.uri, self.title, self.rate_hz = "sim:late", "a late camera", self._bend.rate_hz
         self.calibrated_focal_px, self.notes, self.images_given = None, (), True
 

@@ -8,13 +8,16 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, Route, expect
 
+from app.engine.engine import Engine
 from app.fleet.batch.work import run_drive
 from app.fleet.desk import FleetDesk
 from app.fleet.find import FleetTables
 from app.fleet.pack import pack
 from app.fleet.store import Store
+from pipeline.params import Params
+from pipeline.sources import open_source
 from tests.app.fleet.fleets import begun, make_fleet, plan_of
-from tests.browser.conftest import WAIT_MS, OpenPage, Pages, Site, opening
+from tests.browser.conftest import WAIT_MS, CountedDetector, OpenPage, Pages, Site, opening
 from tests.browser.judges import LOW_CONTRAST
 from tests.browser.looks import box_of
 from tests.browser.test_look import SCREENS
@@ -37,15 +40,18 @@ def tables(out: Path) -> FleetTables:
 
 
 @pytest.fixture(scope="module")
-def fleet_site(site: Site, out: Path) -> Iterator[Site]:
-    """The same dashboard with a fleet, restored afterwards."""
-    before = site.engine.snapshot.uri
-    running = Site(site.engine, 0, fleet=FleetDesk(str(out)))
+def fleet_site(out: Path) -> Iterator[Site]:
+    """A dashboard with a fleet, which shows one of its drives. Of its own: after other drives, that of all other files
+    would compute its own anew."""
+    shown = str(out.parent / "in" / "near-0.mcap")
+    engine = Engine(open_source, CountedDetector, Params(), uri=shown, whole_drives=True)
+    engine.start()
+    engine.wait_for(lambda s: s.processed is not None, WAIT_MS / 1e3)
+    running = Site(engine, 0, fleet=FleetDesk(str(out)))
     running.start()
     yield running
     running.stop()
-    site.engine.control.change(uri=before, playing=False, target=0, steps=0)
-    site.engine.wait_for(lambda s: s.uri == before and s.processed is not None, WAIT_MS / 1e3)
+    engine.stop()
 
 
 @pytest.fixture

@@ -36,6 +36,7 @@ ZOOM_REACH = 1.35
 """Search range of the focal length, as a factor on the calibration's in both directions."""
 ZOOMS = 2
 """Steps of the coarse search over a pinhole model's focal length, to either side."""
+_DEFAULTS = AlignmentParams().model_dump()
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ class FitModel:
         """As parameters, not rounded or clipped, for use during the search."""
         return AlignmentParams.model_construct(
             **{
-                **AlignmentParams().model_dump(),
+                **_DEFAULTS,
                 **self.place_m,
                 **({} if self.zoom is None else {"zoom": self.zoom}),
                 "model": self.name,

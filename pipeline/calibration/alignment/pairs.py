@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numba
 import numpy as np
@@ -71,26 +72,45 @@ class PairTable:
         """Only these pairs, with the required data of their clusters."""
         used, cluster = np.unique(self.cluster[rows], return_inverse=True)
         parts = {name: getattr(self, name)[used] for name in ("outline", "roof", "foot", "range_m")}
-        return PairTable(**{**vars(self), **parts, "box": self.box[rows], "cluster": cluster})
+        return replace(self, **parts, box=self.box[rows], cluster=cluster)
+
+    @cached_property
+    def _points(self) -> F64:
+        """(C · K, 3) everything that is projected; what is not known is somewhere ahead."""
+        points = np.concatenate([self.outline, self.roof[:, None], self.foot], axis=1).reshape(-1, 3)
+        return np.where(np.isfinite(points[:, 0])[:, None], points, 1.0)
+
+    @cached_property
+    def _has_roof(self) -> np.ndarray:
+        """(C,) bool, whether there is a ring above."""
+        return np.isfinite(self.roof[:, 0])
+
+    @cached_property
+    def _edges(self) -> tuple[F64, np.ndarray]:
+        """(4, P) edges of each pair's box, and (P, 4) bool, whether they are whole."""
+        return self.boxes[self.box].T, self.whole[self.box]
+
+    @cached_property
+    def _noise(self) -> F64:
+        """(2, P) error of each pair's box across and down, pixels (1 σ)."""
+        return np.asarray(np.hypot(BOX_NOISE * (self.boxes[:, 2:] - self.boxes[:, :2])[self.box].T, EDGE_PX))
 
     def extents(self, aligned: Alignment) -> F64:
         """(C, 5) left, right, lowest and highest possible roof (−inf if there is no ring above), foot; pixels. NaN
         behind the camera."""
-        count = len(self.outline)
-        points = np.concatenate([self.outline, self.roof[:, None], self.foot], axis=1).reshape(-1, 3)
-        known = np.isfinite(points[:, 0])
-        uv = aligned.project(np.where(known[:, None], points, 1.0)).reshape(count, -1, 2)
+        uv = aligned.project(self._points).reshape(len(self.outline), -1, 2)
         around, roof, foot = uv[:, :-4], uv[:, -4, 1], uv[:, -3:, 1]
-        highest = np.where(np.isfinite(self.roof[:, 0]), roof, -np.inf)
-        low = around[..., 1].min(axis=1)
-        return np.column_stack(
-            [around[..., 0].min(axis=1), around[..., 0].max(axis=1), low, np.minimum(highest, low), foot.max(axis=1)]
-        )
+        found = np.empty((len(uv), 5))
+        around[..., 0].min(axis=1, out=found[:, 0])
+        around[..., 0].max(axis=1, out=found[:, 1])
+        low = around[..., 1].min(axis=1, out=found[:, 2])
+        np.minimum(np.where(self._has_roof, roof, -np.inf), low, out=found[:, 3])
+        foot.max(axis=1, out=found[:, 4])
+        return found
 
     def deviations(self, widen: float, slack_px: float) -> tuple[F64, F64]:
         """(P,) and (P,) standard deviations of a box's vertical and horizontal edges, pixels."""
-        sides = (self.boxes[:, 2:] - self.boxes[:, :2])[self.box].T
-        across, down = np.hypot(np.hypot(BOX_NOISE * sides, EDGE_PX) * widen, slack_px)
+        across, down = np.hypot(self._noise * widen, slack_px)
         return across, down
 
     def residuals(self, aligned: Alignment, widen: float = 1.0, slack_px: float = 0.0) -> F64:
@@ -98,12 +118,16 @@ class PairTable:
         deviations; 0 for an edge without information. widen, slack_px: increase the standard deviation, for a search
         that is still far off."""
         left, right, low, high, foot = self.extents(aligned)[self.cluster].T
-        x1, y1, x2, y2 = self.boxes[self.box].T
+        (x1, y1, x2, y2), whole = self._edges
         across, down = self.deviations(widen, slack_px)
-        top = np.where(y1 > low, low - y1, np.where(y1 < high, high - y1, 0.0))
-        off = np.column_stack([(left - x1) / across, top / down, (right - x2) / across, (foot - y2) / down])
-        off = np.where(self.whole[self.box], off, 0.0)
-        return np.where(np.isfinite(off), off, 1e3)
+        off = np.empty((len(self.box), 4))
+        off[:, 0] = (left - x1) / across
+        off[:, 1] = np.where(y1 > low, low - y1, np.where(y1 < high, high - y1, 0.0)) / down
+        off[:, 2] = (right - x2) / across
+        off[:, 3] = (foot - y2) / down
+        off[~whole] = 0.0
+        off[~np.isfinite(off)] = 1e3
+        return off
 
     def matched(self, off: F64, gate: float) -> I64:
         """Rows of the matched pairs: mutually nearest boxes and clusters within ``gate`` (root mean square of the

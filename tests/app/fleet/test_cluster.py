@@ -60,7 +60,7 @@ def test_tasks_that_dask_drops_are_submitted_again(fleet: Path, tmp_path: Path, 
     assert contents(tmp_path) == expected
 
 
-def test_a_store_that_fails_every_twentieth_request_and_workers_that_are_killed_change_nothing(
+def test_a_store_that_fails_every_twelfth_request_and_workers_that_are_killed_change_nothing(
     fleet: Path, monkeypatch: pytest.MonkeyPatch, expected: dict[str, str]
 ):
     """Recordings and tables are in S3. Whenever a drive is done, a worker is killed in the middle of another one.
@@ -73,7 +73,7 @@ def test_a_store_that_fails_every_twentieth_request_and_workers_that_are_killed_
             killed.add(workers[0])
             os.kill(workers[0], signal.SIGKILL)
 
-    with s3_server(monkeypatch, every=20) as server:
+    with s3_server(monkeypatch, every=12) as server:
         system = fsspec.filesystem("s3", skip_instance_cache=True)
         system.put(str(fleet), f"{BUCKET}/in", recursive=True)
         work = begun(plan_of(f"s3://{BUCKET}/in", results=True), f"s3://{BUCKET}/out")
