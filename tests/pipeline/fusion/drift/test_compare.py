@@ -14,7 +14,6 @@ from pipeline.types import LidarTrack, VisionMeasurement
 from tests.pipeline.calibration.alignment.made_drive import CAMERA, SIZE
 from tests.pipeline.fusion.drift.traffic import PLACES, box, track
 
-
 RIGHT = AlignmentParams()
 
 
@@ -68,8 +67,8 @@ def test_vehicles_that_are_all_turned_by_a_bend_are_no_angle(radius_m: float):
 
 @pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
 def test_an_edge_that_a_nearer_vehicle_may_hide_is_none(side: float):
-    """The detector ends the box of a parked car where the box of a nearer one begins; the LiDAR, mounted elsewhere, sees
-    more of it. The outer edge, at its near face, is the one that tells the yaw."""
+    """The detector ends the box of a parked car where the box of a nearer one begins; the LiDAR, mounted
+    elsewhere, sees more of it. The outer edge, at its near face, is the one that tells the yaw."""
     whole, hit = box(24.0, 6.0 * side, RIGHT, length_m=4.5), track(1, 24.0, 6.0 * side)
     x1, y1, x2, y2 = whole.detection.bbox
     hidden = 0.25 * (x2 - x1)
