@@ -34,8 +34,8 @@ SIZES_OVER = 10
 ROAD_DEG = 0.25
 """Under a vehicle whose foot is less certain than this for the road's height, the pitch is not compared: the road's
 shape is the same for all vehicles and for seconds, so such errors do not average out, and ``SMALLEST_DEG`` is not much
-larger. In two drives of random traffic, vehicles with 0.3° to 0.7° were off by −0.5° to −1.3° together for five seconds.
-"""
+larger. In two drives of random traffic, vehicles with 0.3° to 0.7° were off by −0.5° to −1.3° for five seconds, all
+together."""
 FORGOTTEN_S = 3.0
 """A vehicle unseen for so long counts as another one: it may have turned."""
 HELD = 2
