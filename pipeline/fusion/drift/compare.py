@@ -16,8 +16,9 @@ import numpy as np
 
 from pipeline.alignment.projection import Alignment
 from pipeline.common.geometry import corners_of
+from pipeline.fusion.boxes_in_front import nearer
 from pipeline.lidar.road_profile import ASIDE_M, RoadProfile
-from pipeline.types import F64, VEHICLES, LidarTrack, VisionMeasurement
+from pipeline.types import F64, VEHICLES, LidarTrack, Mask, VisionMeasurement
 
 REACH_DEG = 4.0
 """Largest angle between a box and its cluster."""
@@ -37,6 +38,9 @@ FACING_DEG = 3.0
 the side of a car of 4.5 m would be 0.2 m wide."""
 HALF_BEAM_DEG = 0.1
 """A cluster ends on average half a step between two beams inside the vehicle's edge."""
+HIDDEN_SHARE = 0.1
+"""A box that ends nearer than this share of its width to a nearer box may be hidden there: edges of boxes vary by as
+much."""
 NARROWEST_M = 1.3
 """Narrower clusters are the visible part of a vehicle behind others; a detector draws the box of the whole vehicle."""
 LOWEST_M, HIGHEST_M = 1.0, 4.5
@@ -66,6 +70,9 @@ class Offset(NamedTuple):
     """Rate of change of its bearing, positive to the left."""
     height_deg: float
     """Height of the box."""
+    road_deg: float
+    """Standard deviation of the pitch for not knowing the road's height under the vehicle; 0 where the cluster's own
+    foot is compared."""
     sizes_m: tuple[float, float, float]
     """Height and width of the box and width of the cluster, at the range of the cluster. A turned camera changes none
     of them; another box or cluster does."""
@@ -98,10 +105,11 @@ def offsets(
     span, edge = spans[track[chosen]], edges[box[chosen]]
     heights = edge[:, 3] - edge[:, 2]
     sizes = np.radians(np.column_stack([heights, edge[:, 0] - edge[:, 1], span[:, 0] - span[:, 1]])) * span[:, 5:6]
-    columns = (track[chosen].tolist(), votes[chosen].tolist(), span[:, 4].tolist(), heights.tolist(), sizes.tolist())
+    columns = (votes[chosen], span[:, 4], heights, span[:, 6], sizes)
+    rows = zip(track[chosen].tolist(), *(column.tolist() for column in columns), strict=True)
     return [
-        Offset(usable[number].id, yaw, pitch, rate, height, (high, wide, cluster))
-        for number, (yaw, pitch), rate, height, (high, wide, cluster) in zip(*columns, strict=True)
+        Offset(usable[number].id, yaw, pitch, rate, height, road_deg, (high, wide, cluster))
+        for number, (yaw, pitch), rate, height, road_deg, (high, wide, cluster) in rows
     ]
 
 
@@ -118,32 +126,44 @@ def _may_tell(track: LidarTrack) -> bool:
 
 
 def _box_edges(boxes: Sequence[VisionMeasurement], aligned: Alignment, size: tuple[int, int]) -> F64:
-    """(B, 4) left and right azimuth, lower and upper elevation of the vehicles' boxes that the border does not cut,
-    degrees."""
-    found = [
-        each.detection.bbox for each in boxes if each.detection.label in VEHICLES and each.detection.score >= MIN_SCORE
-    ]
-    box = np.array(found).reshape(-1, 4)
+    """(B, 6) of the vehicles' boxes that the border does not cut: left and right azimuth, lower and upper elevation,
+    degrees; whether something nearer may hide the left and the right edge."""
+    vehicles = [each.detection for each in boxes if each.detection.label in VEHICLES]
+    box = np.array([each.bbox for each in vehicles]).reshape(-1, 4)
     whole = (box[:, :2].min(axis=1, initial=np.inf) > BORDER_PX) & (box[:, 2] < size[0] - BORDER_PX)
-    box = box[whole & (box[:, 3] < size[1] - BORDER_PX)]
-    if not len(box):
-        return np.zeros((0, 4))
+    whole &= (box[:, 3] < size[1] - BORDER_PX) & (np.array([each.score for each in vehicles]) >= MIN_SCORE)
+    if not whole.any():
+        return np.zeros((0, 6))
+    hidden, box = _hidden_edges(box)[whole], box[whole]
     u, v = box[:, :3:2].mean(axis=1), box[:, 1::2].mean(axis=1)
     pixels = np.stack([box[:, 0], v, box[:, 2], v, u, box[:, 3], u, box[:, 1]], axis=1).reshape(-1, 2)
     _, rays = aligned.rays(pixels)
     azimuth = np.degrees(np.arctan2(rays[:, 1], rays[:, 0])).reshape(-1, 4)
     elevation = np.degrees(np.arctan2(rays[:, 2], np.hypot(rays[:, 0], rays[:, 1]))).reshape(-1, 4)
-    return np.column_stack([azimuth[:, :2], elevation[:, 2:]])
+    return np.column_stack([azimuth[:, :2], elevation[:, 2:], hidden])
+
+
+def _hidden_edges(box: F64) -> Mask:
+    """(B, 2) whether the left and the right edge of each box (B, 4) is within or just beside a nearer box. Detectors
+    end the box of a vehicle where a nearer one begins, and the LiDAR looks past it from another place."""
+    x1, y1, x2, y2 = box.T[:, :, None]
+    beside = HIDDEN_SHARE * (x2 - x1)
+    in_front = nearer(box) & (y1 < y2.T) & (y2 > y1.T)
+    at = [in_front & (x1.T - beside < x) & (x < x2.T + beside) for x in (x1, x2)]
+    return np.stack([each.any(axis=1) for each in at], axis=1)
 
 
 def _cluster_spans(tracks: Sequence[LidarTrack], start: F64, road: RoadProfile | None) -> F64:
-    """(T, 6) left and right azimuth and elevation of the foot as the camera sees them; +1 if the left edge is at the
-    near face, −1 if the right one is, 0 if that is not clear; rate of its bearing, range; degrees and metres."""
-    corners = corners_of([each.obstacle.cuboid for each in tracks])
+    """(T, 7) left and right azimuth and elevation of the foot as the camera sees them; +1 if the left edge is at the
+    near face, −1 if the right one is, 0 if that is not clear; rate of its bearing, range; standard deviation of the
+    foot's elevation for that of the road; degrees and metres."""
+    corners, road_sigma_m = corners_of([each.obstacle.cuboid for each in tracks]), np.zeros(len(tracks))
     if road is not None:
         # the planes under the clusters have steps, and beyond their returns no curvature
         beside = np.abs(corners[:, :4, 1]) < ASIDE_M + BESIDE_M
         corners[:, :4, 2] = np.where(beside, road.height(corners[:, :4, :2]), corners[:, :4, 2])
+        nearest_x = corners[:, :4, 0].min(axis=1)
+        road_sigma_m = np.where(beside.any(axis=1), road.height_sigma_m(nearest_x), 0.0)
     from_camera = corners - start
     azimuth = np.degrees(np.arctan2(from_camera[..., 1], from_camera[..., 0]))
     feet = from_camera[:, :4]
@@ -158,7 +178,7 @@ def _cluster_spans(tracks: Sequence[LidarTrack], start: F64, road: RoadProfile |
     rate = np.degrees((middle[:, 0] * velocity[:, 1] - middle[:, 1] * velocity[:, 0]) / squared)
     range_m = np.hypot(from_camera[..., 0], from_camera[..., 1]).min(axis=1)
     left, right = azimuth.max(axis=1) + HALF_BEAM_DEG, azimuth.min(axis=1) - HALF_BEAM_DEG
-    return np.column_stack([left, right, foot, near, rate, range_m])
+    return np.column_stack([left, right, foot, near, rate, range_m, np.degrees(road_sigma_m / range_m)])
 
 
 def _candidates(spans: F64, edges: F64) -> tuple[np.ndarray, np.ndarray]:
@@ -171,19 +191,21 @@ def _candidates(spans: F64, edges: F64) -> tuple[np.ndarray, np.ndarray]:
     return track, box
 
 
-def _yaws(spans: F64, edges: F64) -> tuple[F64, np.ndarray]:
+def _yaws(spans: F64, edges: F64) -> tuple[F64, Mask]:
     """(P,) yaw of each pair, and whether it tells one.
 
     Of a vehicle that stands at an angle to the line of sight, one edge of the box is at the far end of its side, which
     the LiDAR rarely hits; the other edge is at the corner of its near face in both. Unless the widths are the same,
     only the latter is used. For a vehicle parallel to the camera's axis it is the outer edge, but in a bend, where all
-    vehicles ahead are turned the same way, it is the inner one.
+    vehicles ahead are turned the same way, it is the inner one. An edge that something nearer may hide is none.
     """
     left, right = spans[:, 0] - edges[:, 0], spans[:, 1] - edges[:, 1]
     share = (spans[:, 0] - spans[:, 1]) / (edges[:, 0] - edges[:, 1])
-    is_same = np.abs(share - 1.0) < SAME_WIDTH
-    yaw = np.where(is_same, (left + right) / 2, np.where(spans[:, 3] > 0.0, left, right))
-    return yaw, is_same | (spans[:, 3] != 0.0)
+    hides_left, hides_right = edges[:, 4] > 0.0, edges[:, 5] > 0.0
+    is_same = (np.abs(share - 1.0) < SAME_WIDTH) & ~hides_left & ~hides_right
+    by_left, by_right = (spans[:, 3] > 0.0) & ~hides_left, (spans[:, 3] < 0.0) & ~hides_right
+    yaw = np.where(is_same, (left + right) / 2, np.where(by_left, left, right))
+    return yaw, is_same | by_left | by_right
 
 
 def _agreeing(track: np.ndarray, box: np.ndarray, votes: F64, held: tuple[float, float]) -> list[int]:

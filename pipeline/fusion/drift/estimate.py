@@ -81,12 +81,14 @@ class AngleChange(NamedTuple):
     """(T, V) error of each vehicle."""
 
 
-def box_errors(frames: F64, height_deg: F64, rate_degps: F64, has_side: Mask) -> tuple[F64, F64]:
+def box_errors(frames: F64, height_deg: F64, rate_degps: F64, has_side: Mask, road_deg: F64) -> tuple[F64, F64]:
     """(M,) and (M,) standard deviations of the new and the lasting error of a vehicle's angle in a piece of time.
     frames: in which it was seen. height_deg: of its box. rate_degps: of its bearing. has_side: whether its side is seen
-    too; False for elevations."""
+    too; False for elevations. road_deg: the error of an elevation for that of the road, which is the same for half a
+    second, and then another; 0 for azimuths."""
     passing = (PASSING_S * rate_degps) ** 2
     new = (FRAME_SHARE * height_deg) ** 2 / frames + SLOW_DEG**2 + (SLOW_SHARE * height_deg) ** 2 + passing
+    new += road_deg**2
     lasting = LASTING_DEG**2 + (LASTING_SHARE * height_deg) ** 2 + SIDE_DEG**2 * has_side + passing
     return np.sqrt(new), np.sqrt(lasting)
 

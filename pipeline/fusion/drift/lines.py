@@ -46,6 +46,8 @@ so many metres: the LiDAR's road is measured nearer than lines are seen."""
 LASTING_DEG = (0.5, 0.15)
 """Errors of yaw and pitch that last (1 σ): the LiDAR's yaw in the car, as mounts are that nobody has measured; the
 camber of the road."""
+FEWEST_PIECES = 6
+"""Pieces of time from which the scatter of the angle is known."""
 _PIECE, _YAW, _YAW_SIGMA, _PITCH, _PITCH_SIGMA, _FRAMES = range(6)
 
 
@@ -176,4 +178,15 @@ def angles(state: LineState, axis: int) -> LineAngles:
     """axis: 0 for yaw, 1 for pitch."""
     value, sigma = ((_YAW, _YAW_SIGMA), (_PITCH, _PITCH_SIGMA))[axis]
     rows = state.rows[np.isfinite(state.rows[:, value])]
-    return LineAngles(rows[:, _PIECE], rows[:, value], rows[:, sigma], rows[:, _FRAMES])
+    values, sigma_deg = rows[:, value], rows[:, sigma]
+    return LineAngles(rows[:, _PIECE], values, sigma_deg * _scatter(values, sigma_deg), rows[:, _FRAMES])
+
+
+def _scatter(values: F64, sigma_deg: F64) -> float:
+    """By how much the values of successive pieces differ more than their standard deviations explain; at least 1. How
+    well lines are seen depends on the network, the paint and the weather: of two random roads at 20 m/s, the yaw of a
+    piece varied by 0.2° on one and by 0.85° on the other. A turn of the camera changes one difference only."""
+    if len(values) < FEWEST_PIECES:
+        return 1.0
+    steps = np.abs(np.diff(values)) / np.hypot(sigma_deg[1:], sigma_deg[:-1])
+    return max(1.4826 * float(np.median(steps)), 1.0)

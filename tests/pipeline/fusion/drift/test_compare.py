@@ -14,6 +14,8 @@ from pipeline.types import LidarTrack, VisionMeasurement
 from tests.pipeline.calibration.alignment.made_drive import CAMERA, SIZE
 from tests.pipeline.fusion.drift.traffic import PLACES, box, track
 
+RIGHT = AlignmentParams()
+
 
 def told(
     tracks: list[LidarTrack], boxes: list[VisionMeasurement], held: tuple[float, float] = (0.0, 0.0)
@@ -42,10 +44,7 @@ def test_a_box_of_a_neighbour_is_not_taken_when_the_others_disagree():
 
 def test_the_side_of_a_vehicle_that_the_lidar_does_not_hit_is_no_angle():
     places = ((14.0, -3.5), (20.0, -3.6), (27.0, 3.4))
-    found = told(
-        [track(k, *place) for k, place in enumerate(places)],
-        [box(*place, AlignmentParams(), length_m=4.5) for place in places],
-    )
+    found = [each for place in places for each in told([track(0, *place)], [box(*place, RIGHT, length_m=4.5)])]
     assert len(found) == 3
     assert [each.yaw_deg for each in found] == pytest.approx([0.0] * 3, abs=0.15)
 
@@ -57,12 +56,28 @@ def test_vehicles_that_are_all_turned_by_a_bend_are_no_angle(radius_m: float):
         (abs(radius_m) * np.sin(at_m / abs(radius_m)), radius_m * (1.0 - np.cos(at_m / radius_m)), at_m / radius_m)
         for at_m in (12.0, 20.0, 28.0)
     ]
-    found = told(
-        [track(k, x, y, heading_rad=heading) for k, (x, y, heading) in enumerate(on_arc)],
-        [box(x, y, AlignmentParams(), length_m=4.5, heading_rad=heading) for x, y, heading in on_arc],
-    )
+    pairs = [
+        (track(0, x, y, heading_rad=turned), box(x, y, RIGHT, length_m=4.5, heading_rad=turned))
+        for x, y, turned in on_arc
+    ]
+    found = [each for hit, drawn in pairs for each in told([hit], [drawn])]
     assert len(found) == 3
     assert [each.yaw_deg for each in found] == pytest.approx([0.0] * 3, abs=0.25)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
+def test_an_edge_that_a_nearer_vehicle_may_hide_is_none(side: float):
+    """The detector ends the box of a parked car where the box of a nearer one begins; the LiDAR, mounted
+    elsewhere, sees more of it. The outer edge, at its near face, is the one that tells the yaw."""
+    whole, hit = box(24.0, 6.0 * side, RIGHT, length_m=4.5), track(1, 24.0, 6.0 * side)
+    x1, y1, x2, y2 = whole.detection.bbox
+    hidden = 0.25 * (x2 - x1)
+    part = (x1 + hidden, y1, x2, y2) if side > 0.0 else (x1, y1, x2 - hidden, y2)
+    cut = replace(whole, detection=replace(whole.detection, bbox=part))
+    outside, inside = box(14.0, 4.6 * side, RIGHT), box(14.0, 1.7 * side, RIGHT)
+    assert abs(told([hit], [cut])[0].yaw_deg) > 1.0
+    assert told([hit], [cut, outside]) == []
+    assert told([hit], [whole, inside])[0].yaw_deg == pytest.approx(0.0, abs=0.15)
 
 
 def test_a_cluster_that_may_show_either_side_tells_no_yaw():

@@ -14,7 +14,7 @@ def sightings(vehicles: int, pieces: int, rates: F64 | None = None) -> AngleSigh
     piece, vehicle = (each.ravel() for each in np.meshgrid(np.arange(pieces), np.arange(vehicles), indexing="ij"))
     rate = np.zeros(len(piece)) if rates is None else rates[vehicle]
     frames, count = np.full(len(piece), 5.0), len(piece)
-    new, lasting = box_errors(frames, np.full(count, 3.0), rate, np.zeros(count, bool))
+    new, lasting = box_errors(frames, np.full(count, 3.0), rate, np.zeros(count, bool), np.zeros(count))
     return AngleSightings(piece, vehicle, vehicle, frames, rate, new, lasting, np.zeros(count, bool))
 
 
@@ -63,6 +63,6 @@ def test_a_time_offset_is_told_from_an_angle():
 
 def test_a_vehicle_whose_side_is_seen_too_tells_less_of_the_yaw():
     frames, height = np.full(2, 5.0), np.full(2, 5.0)
-    new, lasting = box_errors(frames, height, np.zeros(2), np.array([False, True]))
+    new, lasting = box_errors(frames, height, np.zeros(2), np.array([False, True]), np.zeros(2))
     assert new[0] == new[1]
     assert lasting[1] ** 2 - lasting[0] ** 2 == pytest.approx(SIDE_DEG**2)

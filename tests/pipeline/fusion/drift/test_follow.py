@@ -9,8 +9,9 @@ import pytest
 
 from pipeline.alignment.projection import resolve
 from pipeline.fusion.drift.follow import Drift, DriftState, Seen, follow
+from pipeline.lidar.road_profile import RoadProfile
 from pipeline.params import AlignmentParams, FusionParams
-from tests.pipeline.calibration.alignment.made_drive import CAMERA, SIZE
+from tests.pipeline.calibration.alignment.made_drive import CAMERA, ROAD_M, SIZE
 from tests.pipeline.fusion.drift.traffic import FRAME_NS, PLACES, seen
 
 PARAMS = FusionParams()
@@ -55,6 +56,16 @@ def test_a_knock_is_reported_since_its_frame(places: tuple[tuple[float, float], 
     assert last.since is not None
     assert abs(int(last.since) - 100) <= 20
     assert f"frame {last.since}" in last.note
+
+
+@pytest.mark.parametrize(("sigma_m", "is_told"), [(0.03, True), (0.25, False)], ids=["known", "hardly known"])
+def test_where_the_road_is_hardly_known_vehicles_tell_no_pitch(sigma_m: float, is_told: bool):
+    """All vehicles stand on the same road, so its error looks like a pitch of the camera."""
+    road = RoadProfile(np.array([ROAD_M, 0.0, 0.0, 0.0]), np.diag([sigma_m**2, 0.0, 0.0, 0.0]))
+    knocked = AlignmentParams(pitch_deg=1.0)
+    assert (told(seen(k, knocked)._replace(road=road) for k in range(80))[-1] is not None) is is_told
+    turned = told(seen(k, AlignmentParams(yaw_deg=1.0))._replace(road=road) for k in range(80))[-1]
+    assert turned is not None, "the yaw does not depend on the road"
 
 
 def test_it_is_reported_until_the_alignment_is_changed():

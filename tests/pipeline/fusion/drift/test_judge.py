@@ -24,7 +24,7 @@ def turn(
     piece, vehicle = (each.ravel() for each in np.meshgrid(np.arange(pieces), np.arange(vehicles), indexing="ij"))
     count, track = len(piece), vehicle if tracks is None else np.array(tracks)[vehicle]
     frames, rate = np.full(count, 5.0), np.zeros(count)
-    new, lasting = box_errors(frames, np.full(count, 3.0), rate, np.zeros(count, bool))
+    new, lasting = box_errors(frames, np.full(count, 3.0), rate, np.zeros(count, bool), np.zeros(count))
     is_line = vehicle == (vehicles - 1 if lines_deg is not None else vehicles)
     new, lasting = np.where(is_line, 0.2, new), np.where(is_line, 0.5, lasting)
     seen = AngleSightings(piece, vehicle, track, frames, rate, new, lasting, is_line)

@@ -89,3 +89,14 @@ def test_what_is_old_is_forgotten():
     state = driven(6, 1.0)
     assert len(closed(state, 8, 6.0).rows) == 1
     assert len(closed(state, 8, 7.0).rows) == 0
+
+
+@pytest.mark.parametrize(("noise_deg", "factor"), [(0.05, 1.0), (0.9, 3.0)])
+def test_lines_that_scatter_are_less_certain_and_a_turn_is_no_scatter(noise_deg: float, factor: float):
+    state, rng = LineState(), np.random.default_rng(3)
+    turned = np.where(np.arange(40) < 20, 0.0, 1.5)
+    yaw = turned + rng.normal(0.0, noise_deg, 40)
+    rows = np.column_stack([np.arange(40), yaw, np.full(40, 0.25), np.full((40, 2), np.nan), np.full(40, 5.0)])
+    sigma_deg = angles(state._replace(rows=rows), 0).sigma_deg
+    assert sigma_deg == pytest.approx(0.25 * factor, rel=0.35)
+    assert np.array_equal(angles(state._replace(rows=rows[:5]), 0).sigma_deg, rows[:5, 2]), "too few to tell"

@@ -14,7 +14,7 @@ from pipeline.types import Detection, LidarTrack, VisionMeasurement
 from pipeline.types.measurements import Obstacle
 from tests.pipeline.calibration.alignment.made_drive import CAMERA, ROAD_M, SIZE
 
-PLACES = ((12.0, -3.0), (18.0, 0.5), (22.0, 4.0), (30.0, -5.0), (35.0, 3.0), (26.0, -8.0))
+PLACES = ((12.0, -3.0), (18.0, 0.5), (22.0, 4.0), (34.0, -2.2), (35.0, 3.0), (26.0, -8.0))
 FRAME_NS = 100_000_000
 WIDTH_M, HEIGHT_M, BEAM_M = 1.75, 1.5, 0.0035
 """Size of each car; a cluster ends half a beam step inside it, in metres per metre of range."""
