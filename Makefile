@@ -1,6 +1,9 @@
 # CIPV Studio. `make demo` shows it, `make test` proves it; neither needs more than Python 3.11, make and git.
 
-PYTHON ?= python3
+# python3, unless some library has no package for its version and another Python is there.
+FIT := import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))
+PYTHON ?= $(shell for each in python3 python3.13 python3.12 python3.11 python3; do \
+  $$each -c '$(FIT)' 2>/dev/null && break; done; echo $$each)
 BIN := .venv/bin
 PROCESSES ?= 3
 
@@ -17,6 +20,8 @@ install: .venv/.compiled
 # The lock pins every version; --no-deps-like strictness comes from installing it first and the project without deps.
 .venv/.installed: pyproject.toml requirements.lock
 	@echo "1/4 environment in .venv, and uv, which installs the rest"
+	@test -x $(BIN)/python || $(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("Python 3.11 or newer is \
+	needed; $(PYTHON) is " + sys.version.split()[0] + ". Name another with make PYTHON=…")'
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "uv>=0.5"
 	@echo "2/4 $$(grep -c == requirements.lock) libraries at the versions of requirements.lock"

@@ -116,6 +116,8 @@ def follow(
     if before.unplaced_s + dt_s > _LONGEST_GAP_S:
         before = OdometryState()
     since_s = before.unplaced_s + dt_s
+    if sweep is not None and not registration.is_available():
+        return OdometryStep(OdometryState(), None, _NOT_INSTALLED)
     if sweep is None or ground is None:
         return OdometryStep(evolve(before, unplaced_s=since_s, agreeing=0), None)
     speed, turning = _foreseen(before, since_s, prior)
@@ -164,6 +166,7 @@ def follow(
 
 
 _CONTRADICTS = "LiDAR odometry: sweeps contradict each other"
+_NOT_INSTALLED = "LiDAR odometry: not available, since kiss-icp has no package for this version of Python"
 
 
 def _too_little(points: int, fixed: structure.Support) -> str:

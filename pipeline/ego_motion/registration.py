@@ -39,8 +39,18 @@ class Registration(NamedTuple):
 
 
 def warm_up() -> None:
-    """Load the library."""
-    _library()
+    """Load the library, where it is installed."""
+    is_available()
+
+
+@cache
+def is_available() -> bool:
+    """Whether KISS-ICP is installed: it has no package for every Python (``pyproject.toml``)."""
+    try:
+        _library()
+    except ModuleNotFoundError:
+        return False
+    return True
 
 
 def thinned(points: F32) -> F32:

@@ -6,6 +6,7 @@ from math import cos, sin
 
 import pytest
 
+from pipeline.ego_motion import registration
 from pipeline.ego_motion.lidar_odometry import OdometryState, OdometryStep, follow
 from pipeline.types import EgoState
 from tests.pipeline.ego_motion.streets import ROAD, seen, street, tunnel
@@ -73,3 +74,19 @@ def test_a_gap_starts_odometry_anew() -> None:
     state = drive(STREET, 12.0)[-1].state
     assert follow(state, seen(STREET, 50.0, 0.0, 0.0, 1), ROAD, (), None, None).state.clouds == ()
     assert len(follow(state, seen(STREET, 50.0, 0.0, 0.0, 1), ROAD, (), 1.6, None).state.clouds) == 1
+
+
+def test_without_the_library_there_is_no_motion_and_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> None:
+        raise ModuleNotFoundError("kiss_icp")
+
+    monkeypatch.setattr(registration, "_library", missing)
+    registration.is_available.cache_clear()
+    try:
+        found = drive(STREET, 12.0)
+    finally:
+        registration.is_available.cache_clear()
+    assert {each.motion for each in found} == {None}
+    assert {each.note for each in found} == {
+        "LiDAR odometry: not available, since kiss-icp has no package for this version of Python"
+    }
