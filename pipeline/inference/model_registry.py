@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
 import urllib.error
 import urllib.request
@@ -20,6 +19,7 @@ from pydantic import BaseModel
 
 from pipeline.common.errors import BadInput
 from pipeline.common.files.data_dir import data_dir, file_sha256
+from pipeline.common.files.own_folder import own_folder
 from pipeline.common.files.user_file_errors import given_path
 from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.common.files.whole_files import replace_text
@@ -66,8 +66,7 @@ class ModelEntry:
 
 def store() -> Path:
     """The folder of installed networks; it need not exist."""
-    home = os.environ.get("CIPV_HOME")
-    return (Path(home) if home else Path.home() / ".cache" / "cipv") / "models"
+    return own_folder() / "models"
 
 
 def list_models() -> tuple[ModelEntry, ...]:

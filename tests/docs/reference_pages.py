@@ -137,7 +137,8 @@ def _cli_lines() -> Iterator[str]:
         "| variable | meaning |",
         "|---|---|",
         "| `CIPV_DATA` | folder with this machine's data sets and networks (`models/`) |",
-        "| `CIPV_HOME` | folder for downloaded and registered networks and caches; default: `~/.cache/cipv` |",
+        "| `CIPV_HOME` | folder for downloaded and registered networks and caches, and for compiled kernels if the "
+        "installation is read-only; default: `~/.cache/cipv`, or a private temporary folder if there is no home |",
         "| `CIPV_FOLDERS` | folders that the page and the API may open files from, separated by `:` |",
         "| `CIPV_SIGNING_KEY` | private key, of `cipv keys new`, that sessions and label versions are signed with |",
         "| `CIPV_PUBLIC_KEY` | public key that `cipv info` and label versions are checked with; versions that it "

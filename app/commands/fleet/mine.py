@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 import json
 import sys
 from dataclasses import asdict, dataclass, field
@@ -13,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from app.commands.evaluate import DASHBOARD, dashboard_link
-from app.commands.labels.files import Database, Person
+from app.commands.labels.files import Database, Person, account
 from app.commands.support.arguments import option
 from app.fleet.extra import need_extra
 from pipeline.common.errors import BadInput
@@ -44,7 +43,7 @@ class Mine:
     """The run to search; default: that of the last batch"""
     database: Database = None
     """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
-    person: Person = field(default_factory=getpass.getuser)
+    person: Person = field(default_factory=account)
     """Author of the change, who can undo it in the dashboard"""
     dashboard: Annotated[str, tyro.conf.arg(metavar="URL")] = DASHBOARD
     """Dashboard address for the links, as `cipv serve` prints it"""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -38,6 +39,15 @@ _NOBODY_KNOWS_WHEN = 0
 
 Database = Annotated[str | None, option("URL")]
 Person = Annotated[str, tyro.conf.arg(metavar="NAME")]
+
+
+def account() -> str:
+    """Name of the account that runs the command: who labels, unless a name is given. Its number if it has no name, as
+    in a container that is started for a number."""
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):  # OSError from Python 3.13 on
+        return f"account {os.getuid()}"
 
 
 @dataclass(frozen=True)
@@ -102,7 +112,7 @@ class ImportLabels:
     """The file to write; must not exist"""
     database: Database = None
     """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
-    person: Person = field(default_factory=getpass.getuser)
+    person: Person = field(default_factory=account)
     """Author of the change, who can undo it in the dashboard"""
     classes: Annotated[Path | None, option("FILE")] = None
     """A class list (YAML), by which names in the file are read; default: that of the recording's project in the

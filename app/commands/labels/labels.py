@@ -3,7 +3,6 @@ imported on use, because that takes two seconds."""
 
 from __future__ import annotations
 
-import getpass
 import json
 import time
 from dataclasses import dataclass, field, replace
@@ -13,7 +12,7 @@ from typing import Annotated
 
 import tyro
 
-from app.commands.labels.files import Database, ExportLabels, ImportLabels, Person, say
+from app.commands.labels.files import Database, ExportLabels, ImportLabels, Person, account, say
 from app.commands.labels.people import LabelAgreement, LabelEffort, LabelQueue
 from app.commands.labels.projects import LabelProjects
 from app.commands.support.arguments import option
@@ -37,7 +36,7 @@ class ProposeLabels:
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     database: Database = None
     """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
-    person: Person = field(default_factory=getpass.getuser)
+    person: Person = field(default_factory=account)
     """Author of the change, who can undo it in the dashboard"""
 
     def __call__(self) -> int:

@@ -3,7 +3,6 @@ work."""
 
 from __future__ import annotations
 
-import getpass
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from app.commands.labels.files import Database, Person, say
+from app.commands.labels.files import Database, Person, account, say
 from app.commands.support.arguments import option
 from pipeline.common.errors import BadInput
 from pipeline.common.files.user_file_errors import given_path
@@ -112,7 +111,7 @@ class LabelQueue:
     """Mark it as done although proposals are open or labels not reviewed"""
     database: Database = None
     """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
-    person: Person = field(default_factory=getpass.getuser)
+    person: Person = field(default_factory=account)
     """Author of the change"""
     json: bool = False
     """Print the list as JSON"""

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import getpass
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-from app.commands.labels.files import Database, Person, say
+from app.commands.labels.files import Database, Person, account, say
 from app.commands.labels.people import percent
 from app.commands.support.arguments import option
 from app.labels.project_classes import project_classes
@@ -27,7 +26,7 @@ class LabelProjects:
     """The project's file; see the guide on labeling"""
     database: Database = None
     """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
-    person: Person = field(default_factory=getpass.getuser)
+    person: Person = field(default_factory=account)
     """Author of the change"""
     json: bool = False
     """Print the list as JSON"""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import getpass
 import json
+import os
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -53,6 +55,18 @@ def test_truth_goes_out_and_comes_back(drive: Path, tmp_path: Path, capsys: pyte
     assert [track["id"] for track in labels["labels"]["tracks"]] == [7]
     assert cipv("labels", "export", drive, "--labels", file, "--format", "csv", "--out", tmp_path / "lead.csv") == 0
     assert "cipv: 1 track not written: the format cannot hold them" in capsys.readouterr().err
+
+
+def test_an_account_without_a_name_labels_under_its_number(
+    drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(getpass, "getuser", Mock(side_effect=KeyError("getpwuid(): uid not found: 1234")))
+    monkeypatch.setattr(os, "getuid", lambda: 1234)
+    assert cipv("labels", "export", drive, "--format", "openlabel", "--out", tmp_path / "out.json") == 0
+    assert cipv("labels", "import", drive, tmp_path / "out.json", "--format", "openlabel") == 0
+    capsys.readouterr()
+    assert cipv("labels", "effort") == 0
+    assert "account 1234" in capsys.readouterr().out
 
 
 READ: dict[FormatName, tuple[int, int]] = {
