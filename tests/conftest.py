@@ -28,6 +28,10 @@ settings.load_profile("ci" if os.environ.get("CI") else "desk")
 _LABELS = tempfile.TemporaryDirectory(prefix="cipv-test-labels-", ignore_cleanup_errors=True)
 os.environ["CIPV_LABELS_URL"] = f"sqlite:///{_LABELS.name}/labels.db"
 
+# Tests talk to servers of their own on this machine, which a company's proxy does not know.
+for _variable in [name for name in os.environ if name.lower() in ("http_proxy", "https_proxy", "all_proxy")]:
+    del os.environ[_variable]
+
 ROOT = Path(__file__).resolve().parent.parent
 _TOGETHER = ("accuracy",)
 """Folders whose files stay in one process: they use the same recordings and networks, and each image is processed once

@@ -144,7 +144,13 @@ async def _measure(server: _Server, number: int, for_s: float, compression: str 
 
 async def _open(url: str, compression: str | None) -> ClientConnection:
     return await connect(
-        url, max_size=None, compression=compression, open_timeout=_OPEN_TIMEOUT_S, max_queue=2, ping_interval=None
+        url,
+        max_size=None,
+        compression=compression,
+        open_timeout=_OPEN_TIMEOUT_S,
+        max_queue=2,
+        ping_interval=None,
+        proxy=None,
     )
 
 

@@ -45,7 +45,7 @@ def browser() -> Iterator[Browser]:
         command = [str(CHROMIUM), "--headless", "--remote-debugging-port=0", f"--user-data-dir={profile}", *FLAGS]
         running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
-            with connect(_address(Path(profile), running), max_size=None) as socket:
+            with connect(_address(Path(profile), running), max_size=None, proxy=None) as socket:
                 yield Browser(socket)
         finally:
             running.terminate()

@@ -6,10 +6,11 @@ from __future__ import annotations
 import json
 import time
 from urllib.parse import urlencode
-from urllib.request import Request, urlopen
+from urllib.request import Request
 
 from app.bench.page.browser import opened
 from app.bench.page.devtools import Browser
+from app.core.local_requests import open_local
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats.native import from_json, to_json
@@ -105,16 +106,16 @@ def many(drive: LabelSet, labels: int = MOST) -> LabelSet:
 def _fill(address: str) -> int:
     """Import the synthetic labels as a file of one person. Returns the number of tracks; BadInput if the import
     fails."""
-    with urlopen(f"{address}/api/labels/export?format=native") as answer:
+    with open_local(f"{address}/api/labels/export?format=native") as answer:
         labels = many(from_json(answer.read(), address))
-    with urlopen(f"{address}/api/labels") as answer:
+    with open_local(f"{address}/api/labels") as answer:
         drive = json.load(answer)["drive"]["id"]
     query = urlencode({"format": "native", "person": _PERSON, "drive": drive})
-    with urlopen(Request(f"{address}/api/labels/import?{query}", to_json(labels), method="POST")) as answer:
+    with open_local(Request(f"{address}/api/labels/import?{query}", to_json(labels), method="POST")) as answer:
         task = json.load(answer)["task"]
     deadline = time.monotonic() + _ALL_THERE_WITHIN_S
     while time.monotonic() < deadline:
-        with urlopen(f"{address}/api/state") as answer:
+        with open_local(f"{address}/api/state") as answer:
             now = json.load(answer)["labels"]["task"]
         if now is not None and now["id"] == task and not now["running"]:
             if now["error"]:

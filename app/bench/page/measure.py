@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
-from urllib.request import Request, urlopen
+from urllib.request import Request
 
 import numpy as np
 from websockets.sync.client import connect
@@ -20,6 +20,7 @@ from websockets.sync.client import connect
 from app.bench.page.browser import Waits, first_views_ms, paused, playing
 from app.bench.page.devtools import FLAGS, Browser, browser
 from app.bench.page.labelled import labelled
+from app.core.local_requests import open_local
 from pipeline.common.errors import BadInput
 
 _ALL_SEEN_WITHIN_S, _ASK_EVERY_S = 120.0, 0.5
@@ -78,7 +79,7 @@ def _dashboard(source: str) -> Iterator[str]:
 
 
 def _wait_until_it_plays(address: str) -> None:
-    with connect(_stream(address), max_size=None) as socket:
+    with connect(_stream(address), max_size=None, proxy=None) as socket:
         for message in socket:
             if isinstance(message, bytes):
                 return
@@ -149,14 +150,14 @@ def _paused_with_all_seen(address: str) -> int:
 
 
 def _state(address: str) -> Any:
-    with urlopen(f"{address}/api/state") as answer:
+    with open_local(f"{address}/api/state") as answer:
         return json.load(answer)
 
 
 def _parameter(address: str, for_s: float) -> dict[str, Any]:
     """Figures for changing one parameter back and forth during playback."""
     waits_ms: list[float] = []
-    with connect(_stream(address), max_size=None, compression=None) as socket:
+    with connect(_stream(address), max_size=None, compression=None, proxy=None) as socket:
         end = time.monotonic() + for_s
         while time.monotonic() < end:
             value = _PARAMETER_VALUES[len(waits_ms) % 2]
@@ -177,7 +178,7 @@ def _change(address: str, changes: dict[str, float]) -> int:
 
 def _post(address: str, method: str, path: str, body: dict[str, Any]) -> Any:
     request = Request(address + path, json.dumps(body).encode(), {"content-type": "application/json"}, method=method)
-    with urlopen(request) as answer:
+    with open_local(request) as answer:
         return json.load(answer)
 
 

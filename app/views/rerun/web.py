@@ -15,10 +15,10 @@ import subprocess
 import tempfile
 import threading
 import time
-import urllib.request
 from pathlib import Path
 from typing import IO
 
+from app.core.local_requests import open_local
 from pipeline.common.errors import BadInput
 
 FILES = ("re_viewer.js", "re_viewer_bg.wasm")
@@ -120,10 +120,8 @@ def _wait_for(server: subprocess.Popen[bytes], port: int) -> None:
 
 
 def _get(port: int, name: str) -> IO[bytes]:
-    """An open response from the program; proxies are bypassed."""
-    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
-    response: IO[bytes] = opener.open(f"http://127.0.0.1:{port}/{name}", timeout=_READ_S)
-    return response
+    """An open response from the program."""
+    return open_local(f"http://127.0.0.1:{port}/{name}", _READ_S)
 
 
 def free_ports(count: int) -> list[int]:
