@@ -4,6 +4,8 @@ import { $, el, text } from "../core/dom.js";
 import { refused } from "./notices.js";
 import { get, on } from "../core/store.js";
 
+/** @typedef {{uri: string, title: string}} Offered */
+
 const dialog = $("#source-dialog", HTMLDialogElement);
 /** The last URI that could not be opened, so that a typo can be corrected. @type {string|null} */
 let wanted = null;
@@ -21,7 +23,7 @@ export function setUp() {
 }
 
 export async function open() {
-  /** @type {{sources: {uri: string, title: string}[], open: string|null}} */
+  /** @type {{sources: Offered[], open: string|null}} */
   const { sources, open: current } = await request("api/sources").catch(() => ({ sources: [], open: null }));
   const field = el("input", {
     type: "text",
@@ -33,23 +35,31 @@ export async function open() {
   });
   const form = el("form", { class: "open-row", method: "dialog" }, field, el("button", { textContent: "Open" }));
   form.addEventListener("submit", () => choose(field.value));
-  const list = sources.map(({ uri, title }) => {
+  const isSimulated = (/** @type {Offered} */ { uri }) => uri.startsWith("sim:");
+  dialog.replaceChildren(
+    el("h2", { textContent: "Open a recording" }),
+    form,
+    ...list("Recordings", sources.filter((each) => !isSimulated(each)), current),
+    ...list("Simulations", sources.filter(isSimulated), current),
+  );
+  dialog.showModal();
+  field.select();
+}
+
+/** @param {string} heading @param {Offered[]} offered @param {string|null} current @returns {HTMLElement[]} */
+function list(heading, offered, current) {
+  if (!offered.length) return [];
+  const buttons = offered.map(({ uri, title }) => {
     const button = el(
       "button",
       { type: "button", onclick: () => choose(uri) },
       el("span", { textContent: title }),
-      el("code", { textContent: uri }),
+      el("code", { textContent: uri, title: uri }),
     );
     if (uri === current) button.setAttribute("aria-current", "true");
     return button;
   });
-  dialog.replaceChildren(
-    el("h2", { textContent: "Open a recording" }),
-    form,
-    el("div", { class: "open-list" }, ...list),
-  );
-  dialog.showModal();
-  field.select();
+  return [el("h3", { textContent: heading }), el("div", { class: "open-list" }, ...buttons)];
 }
 
 /** @param {string} uri */
