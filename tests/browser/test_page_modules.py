@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import OpenPage
 
@@ -53,6 +53,15 @@ WHEEL = """async (wheel) => {
 }"""
 
 
+FIELD = """async () => {
+  const { numberField, numberOf } = await import("/js/core/number_field.js");
+  const field = numberField({ label: "Width of the test", least: 0, most: 8, step: 0.1 }, { value: "7" });
+  window.heard = [];
+  field.addEventListener("change", () => window.heard.push(numberOf(field)));
+  document.querySelector("#params").prepend(field);
+}"""
+
+
 def tags(page: Page, cars: list[tuple[int, float, float, bool]], **ids: int) -> list[dict[str, Any]]:
     return page.evaluate(TAGS, [cars, {"lead": None, "chosen": None, "next": None, **ids}])
 
@@ -93,3 +102,33 @@ def test_shift_and_the_wheel_pan_the_timeline_also_in_browsers_that_turn_the_whe
 ) -> None:
     first, end = open_page().evaluate(WHEEL, {axis: 50})
     assert first == pytest.approx(end) == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(
+    ("typed", "heard"),
+    [("1,5", 1.5), ("1.5", 1.5), ("−1,5", -1.5), (" 15 ", 15), ("", None), ("1,234.5", "nothing"), ("x", "nothing")],
+)
+def test_a_number_may_be_typed_with_a_comma_and_what_is_none_is_taken_back(
+    open_page: OpenPage, typed: str, heard: float | str | None
+) -> None:
+    page = open_page()
+    page.evaluate(FIELD)
+    field = page.get_by_label("Width of the test")
+    field.press("Control+a")
+    field.press_sequentially(typed) if typed else field.press("Delete")
+    expect(field).to_have_attribute("aria-invalid", str(heard == "nothing").lower())
+    field.press("Enter")
+    assert page.evaluate("window.heard") == ([] if heard == "nothing" else [heard])
+    expect(field).to_have_value("7" if heard == "nothing" else typed)
+
+
+def test_arrow_keys_step_a_number_within_its_limits(open_page: OpenPage) -> None:
+    page = open_page()
+    page.evaluate(FIELD)
+    field = page.get_by_label("Width of the test")
+    for key in ("ArrowUp", "ArrowUp", "ArrowDown"):
+        field.press(key)
+    assert page.evaluate("window.heard") == [7.1, 7.2, 7.1]
+    field.fill("7,95")
+    field.press("ArrowUp")
+    expect(field).to_have_value("8")
