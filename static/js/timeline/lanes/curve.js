@@ -150,7 +150,7 @@ function drawGrid(ctx, span, row, { low, high }, y, { limit, unit }) {
 }
 
 const short = (/** @type {number} */ value) =>
-  (Math.abs(value) < 3 ? value.toFixed(1) : value.toFixed(0)).replace("-", "−");
+  (value && Math.abs(value) < 3 ? value.toFixed(1) : value.toFixed(0)).replace("-", "−");
 
 /** @param {CanvasRenderingContext2D} ctx @param {number} x1 @param {number} y1 @param {number} x2 @param {number} y2 */
 function line(ctx, x1, y1, x2, y2) {
