@@ -109,7 +109,7 @@ def test_shift_and_the_wheel_pan_the_timeline_also_in_browsers_that_turn_the_whe
     [("1,5", 1.5), ("1.5", 1.5), ("−1,5", -1.5), (" 15 ", 15), ("", None), ("1,234.5", "nothing"), ("x", "nothing")],
 )
 def test_a_number_may_be_typed_with_a_comma_and_what_is_none_is_taken_back(
-    open_page: OpenPage, typed: str, heard: float | str | None
+    open_page: OpenPage, typed: str, heard: Any
 ) -> None:
     page = open_page()
     page.evaluate(FIELD)
@@ -119,7 +119,7 @@ def test_a_number_may_be_typed_with_a_comma_and_what_is_none_is_taken_back(
     expect(field).to_have_attribute("aria-invalid", str(heard == "nothing").lower())
     field.press("Enter")
     assert page.evaluate("window.heard") == ([] if heard == "nothing" else [heard])
-    expect(field).to_have_value("7" if heard == "nothing" else typed)
+    expect(field).to_have_value("7" if heard == "nothing" else f"{heard:g}" if heard is not None else "")
 
 
 def test_arrow_keys_step_a_number_within_its_limits(open_page: OpenPage) -> None:

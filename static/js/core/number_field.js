@@ -22,7 +22,8 @@ export function numberField({ label, least = -Infinity, most = Infinity, step = 
   field.addEventListener("focus", () => (before = field.value));
   field.addEventListener("input", check);
   field.addEventListener("change", (event) => {
-    if (!isNumber()) {
+    if (isNumber()) field.value = String(numberOf(field) ?? "");
+    else {
       field.value = before;
       event.stopImmediatePropagation();
     }

@@ -1,6 +1,6 @@
 /** The dialog for opening another recording. */
 import { request } from "../core/api.js";
-import { $, el, text } from "../core/dom.js";
+import { $, el, entitle, text } from "../core/dom.js";
 import { refused } from "./notices.js";
 import { get, on } from "../core/store.js";
 
@@ -19,6 +19,7 @@ export function setUp() {
     if (state?.uri !== openUri) wanted = null;
     openUri = state?.uri;
     text($("#source-title"), state?.title || state?.uri || "opening …");
+    entitle($("#source-title"), `${state?.title ?? ""} (${state?.uri ?? ""}): open another recording (F)`);
   });
 }
 
