@@ -23,9 +23,10 @@ export function setUp() {
   });
 }
 
+/** Shown at once: on a busy server, the list may take seconds. */
 export async function open() {
-  /** @type {{sources: Offered[], open: string|null}} */
-  const { sources, open: current } = await request("api/sources").catch(() => ({ sources: [], open: null }));
+  const current = get("state")?.uri ?? null,
+    offers = el("div", {}, el("p", { class: "facts", textContent: "Loading the list …" }));
   const field = el("input", {
     type: "text",
     name: "uri",
@@ -36,15 +37,18 @@ export async function open() {
   });
   const form = el("form", { class: "open-row", method: "dialog" }, field, el("button", { textContent: "Open" }));
   form.addEventListener("submit", () => choose(field.value));
-  const isSimulated = (/** @type {Offered} */ { uri }) => uri.startsWith("sim:");
-  dialog.replaceChildren(
-    el("h2", { textContent: "Open a recording" }),
-    form,
-    ...list("Recordings", sources.filter((each) => !isSimulated(each)), current),
-    ...list("Simulations", sources.filter(isSimulated), current),
-  );
-  dialog.showModal();
+  dialog.replaceChildren(el("h2", { textContent: "Open a recording" }), form, offers);
+  if (!dialog.open) dialog.showModal();
   field.select();
+  /** @type {{sources: Offered[]}|Error} */
+  const answer = await request("api/sources").catch((problem) => problem);
+  if (answer instanceof Error)
+    return offers.replaceChildren(el("p", { class: "facts", textContent: `No list: ${answer.message}` }));
+  const isSimulated = (/** @type {Offered} */ { uri }) => uri.startsWith("sim:");
+  offers.replaceChildren(
+    ...list("Recordings", answer.sources.filter((each) => !isSimulated(each)), current),
+    ...list("Simulations", answer.sources.filter(isSimulated), current),
+  );
 }
 
 /** @param {string} heading @param {Offered[]} offered @param {string|null} current @returns {HTMLElement[]} */
