@@ -5,7 +5,7 @@ import * as review from "../acts/review.js";
 const under = el("span", { class: "under" }),
   approve = el("button", { type: "button", textContent: "Approve", onclick: review.reviewOk }),
   sendBack = el("button", { type: "button", textContent: "Send back", onclick: review.sendBack }),
-  next = el("button", { type: "button", onclick: () => review.nextUnreviewed(1) });
+  next = el("button", { type: "button", textContent: "Find next", onclick: () => review.nextUnreviewed(1) });
 
 export const row = el(
   "span",
