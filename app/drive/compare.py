@@ -62,7 +62,7 @@ def compare(base: Sequence[Row], run: Sequence[Row]) -> Comparison:
     base, run = base[:frames], run[:frames]
     differs = [index for index in range(frames) if not same_lead(base[index], run[index])]
     ranges = tuple(_ranges(differs))
-    sentences = {first: f"base: {_lead(base[first])}; now: {_lead(run[first])}" for first, _ in ranges}
+    sentences = {first: f"compared run: {_lead(base[first])}; shown run: {_lead(run[first])}" for first, _ in ranges}
     judged = sum(row.judged is not None for row in base)
     metrics = (*(_against_truth(base, run) if judged else ()), *_by_themselves(base, run))
     return Comparison(frames, ranges, sentences, metrics, judged)

@@ -14,6 +14,13 @@ from tests.browser.looks import colours, frame_name, go_to, pixels, repainted, t
 
 WAIT_S = WAIT_MS / 1e3
 
+WITH_A_LONG_NAME = """() => {
+  const bar = document.querySelector("#transport");
+  bar.querySelector(".name").textContent = "a_frame_of_a_drive_from_Munich_".repeat(9);
+  return Math.max(...[...bar.children].map((part) => part.getBoundingClientRect().right));
+}"""
+"""Where the playback bar ends, in pixels."""
+
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
 
@@ -240,6 +247,7 @@ def test_everything_fits_on_the_screen(open_page: OpenPage, width: int, height: 
         assert box["y"] >= 0
         assert box["x"] + box["width"] <= width + 0.5
         assert box["y"] + box["height"] <= height + 0.5
+    assert page.evaluate(WITH_A_LONG_NAME) <= width
 
 
 def test_a_pane_can_have_the_whole_workspace_and_give_it_back(open_page: OpenPage):

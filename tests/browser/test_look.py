@@ -197,6 +197,18 @@ def test_an_address_that_could_not_be_opened_is_there_to_be_mended(open_page: Op
         expect(address).to_be_hidden()
 
 
+def test_what_can_be_opened_is_listed_recordings_first_and_the_dialog_does_not_wait_for_the_list(open_page: OpenPage):
+    page, held = open_page(), []
+    page.route("**/api/sources", lambda route: held.append(route))
+    page.keyboard.press("f")
+    expect(page.get_by_label("Recording URI")).to_be_focused()
+    offers = [{"uri": "sim:straight", "title": "Simulation"}, {"uri": "kitti:/drive", "title": "drive"}]
+    expect(page.locator("#source-dialog")).to_contain_text("Loading the list")
+    held[0].fulfill(json={"sources": offers, "open": None})
+    expect(page.locator(".open-list code")).to_have_text(["kitti:/drive", "sim:straight"])
+    expect(page.locator(".open-list button[aria-current=true]")).to_have_text("Simulationsim:straight")
+
+
 def test_a_key_right_after_a_dialog_is_the_pages(open_page: OpenPage):
     page = open_page()
     page.keyboard.press("f")

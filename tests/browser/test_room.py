@@ -29,6 +29,7 @@ def test_the_name_of_the_recording_and_the_reasons_of_objects_are_whole(
     expect(page.locator("#objects td.reason").first).to_be_visible()
     page.locator("#objects td.reason").nth(1).evaluate("(cell) => (cell.textContent = 'out of path by 11.4 m')")
     assert page.locator("#objects td.reason").nth(1).evaluate("(cell) => cell.scrollWidth <= cell.clientWidth")
+    assert page.locator("#objects").evaluate("(table) => table.offsetWidth <= table.parentElement.clientWidth")
 
 
 def test_an_event_is_told_to_its_end(open_page: OpenPage, site: Site) -> None:

@@ -107,8 +107,11 @@ def test_a_link_restores_moment_selection_parameters_and_layout(page: Page, site
     page.keyboard.press("4")
     expect(page.locator("[data-section=path] .count")).to_have_text("1 changed")
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    share, box = page.locator("#share-button"), box_of(page.locator("#share-button"))
     page.keyboard.press("c")
-    expect(page.locator("#share-button")).to_have_text("Copied")
+    expect(share.locator("> *").last).to_be_visible()
+    assert box_of(share) == box, "and nothing beside it moves"
+    expect(page.locator("#announcement")).to_have_text("Link copied")
     link = page.evaluate("navigator.clipboard.readText()")
     query = parse_qs(urlsplit(link).fragment)
     assert query["uri"] == ["sim:straight"]

@@ -212,6 +212,7 @@ def aligned(page: Page, site: Site) -> None:
         versions.get_by_role("button", name="Save").click()
         expect(versions.get_by_role("listitem")).to_have_count(count)
     expect(versions.get_by_role("button", name="Restore alignment 2")).to_be_disabled()
+    expect(page.locator("#align-bar .score")).not_to_contain_text("better")  # the score of the second
     site.engine.wait_for(lambda shown: shown.drive.total > 0 and shown.drive.done == shown.drive.total, WAIT_MS / 1e3)
     expect(page.locator(".timeline-pane")).to_have_attribute("aria-busy", "false")
     painted(page)

@@ -53,7 +53,7 @@ def _time_gaps(t_ns: Sequence[int]) -> Iterator[Event]:
     for at in np.flatnonzero((steps > TIME_GAP_PERIODS * usual) | (steps <= 0)):
         step = float(steps[at])
         text = f"gap of {step:.1f} s in the recording" if step > 0 else f"time jumps back by {-step:.1f} s"
-        yield Event("sensor_gap", int(at) + 1, text, (), "info")
+        yield Event("sensor_gap", int(at) + 1, text, (), "notice")
 
 
 DISAGREEMENT_FINDER = EventFinder(("vl_disagreement",), disagreements)

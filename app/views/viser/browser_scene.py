@@ -13,18 +13,20 @@ from app.core.shared_view_state import FrameInView, LabelInView, LabelsInView, O
 from app.views import scene
 from app.views.colors import rgb
 from app.views.viser import nodes as viser_nodes
-from app.views.viser.frame_scene import NAMES, OBJECTS, DisplayOptions, OwnFrameScene, cover, floor_of
+from app.views.viser.frame_scene import OBJECTS, DisplayOptions, OwnFrameScene, cover, floor_of, has_name
 from app.views.viser.gizmo import CuboidGizmo
 from app.views.viser.nodes import Strokes
 from app.views.viser.tags import NameTag, ViewCamera, arranged
 from pipeline.common.geometry import Cuboid
-from pipeline.types import F64, Point3, Result
+from pipeline.types import F64, FusedObject, Point3, Result
 
 LABELS = "/own"
 _LIFT_M = 0.3
 _WIDTH_PX = {False: 2.0, True: 4.0}
-_NAME_SCALE, _CHOSEN_SCALE = 1.3, 1.6
-"""Size of name tags, and of the selected label's; the pipeline's are smaller."""
+_OBJECT_SCALE, _LABEL_SCALE, _CHOSEN_SCALE = 0.8, 1.3, 1.6
+"""Size of the name tags of objects, of labels and of the selected label."""
+_CHOSEN, _LEAD, _NEXT, _LABELED, _IN_PATH, _OTHER = range(6)
+"""Ranks of name tags: where there is no room for all, the first ones have it."""
 _BACK, _LEAST_BACK_M = 2.5, 9.0
 """Distance of the camera from a selected label, as a multiple of its longest side, and the minimum distance."""
 _UP = 0.5
@@ -37,6 +39,7 @@ class BrowserScene:
     def __init__(self, client: viser.ClientHandle, on_drag: OnDrag) -> None:
         self._client, self._scene = client, client.scene
         self._gizmo = CuboidGizmo(client.scene, on_drag)
+        self._label_tags: list[NameTag] = []
         self._tags: list[NameTag] = []
         self._texts: list[str] = []
         self._covers: list[viser.FrameHandle] = []
@@ -55,8 +58,6 @@ class BrowserScene:
         floor_m = floor_of(result)
         found = next((each for each in result.objects if each.id == view.selected), None)
         viser_nodes.filled(self._scene, "/selection", found, rgb("ego"), 0.2, floor_m)
-        at = scene.top_of(found, floor_m) if found is not None and found.bev is not None else None
-        viser_nodes.name_tag(self._scene, f"{LABELS}/selected", "" if found is None else scene.object_text(found), at)
         is_alone = view.labels is not None and view.labels.alone
         self._hide_objects(is_alone and view.frame is None)
         self._draw_frame(view.frame, options, has_objects=not is_alone)
@@ -64,13 +65,15 @@ class BrowserScene:
         if wanted != self._drawn:
             self._draw_labels(() if view.labels is None else view.labels.labels, wanted[1])
             self._drawn = wanted
+        named = "none" if is_alone else options.named
+        self._name([*self._label_tags, *_object_tags(result, named, view.selected, floor_m)])
         self._gizmo.hold(view.held)
         self._follow(view)
 
     def _hide_objects(self, hides: bool) -> None:
         """Of the shared frame."""
         if hides and not self._covers:
-            self._covers = cover(self._scene, (*OBJECTS, NAMES))
+            self._covers = cover(self._scene, OBJECTS)
         elif not hides:
             for each in self._covers:
                 each.remove()
@@ -89,7 +92,7 @@ class BrowserScene:
                 self._own = None
                 return
             if self._own is None:
-                self._own = OwnFrameScene(self._scene, f"{LABELS}/objects")
+                self._own = OwnFrameScene(self._scene)
             self._own.draw(shown.frame, shown.result, options, has_objects=has_objects)
 
     def _draw_labels(self, labels: tuple[LabelInView, ...], chosen: int | None) -> None:
@@ -99,10 +102,15 @@ class BrowserScene:
                 if (each.track == chosen) is is_chosen:
                     strokes.add(_outline(each), rgb(each.role))
             viser_nodes.lines(self._scene, f"{LABELS}/{'chosen' if is_chosen else 'cuboids'}", strokes, width_px)
-        left = [""] * (len(self._tags) - len(labels))
-        self._tags = [_tag(each, is_chosen=each.track == chosen) for each in labels]
-        self._show_names([*arranged(self._tags, self._camera()), *left])
-        self._texts = self._texts[: len(labels)]
+        self._label_tags = [_label_tag(each, is_chosen=each.track == chosen) for each in labels]
+
+    def _name(self, tags: list[NameTag]) -> None:
+        """Show these name tags, in numbered slots that they reuse: the number of ids is unlimited."""
+        left = [""] * (len(self._tags) - len(tags))
+        self._tags = tags
+        with self._client.atomic():
+            self._show_names([*arranged(tags, self._camera()), *left])
+        self._texts = self._texts[: len(tags)]
 
     def camera_moved(self) -> None:
         """Other name tags have room now."""
@@ -115,7 +123,7 @@ class BrowserScene:
         for place, text in enumerate(texts):
             tag = self._tags[place] if text else None
             viser_nodes.name_tag(
-                self._scene, f"{LABELS}/names/{place}", text, tag and tag.at, tag.scale if tag else _NAME_SCALE
+                self._scene, f"{LABELS}/names/{place}", text, tag and tag.at, tag.scale if tag else _OBJECT_SCALE
             )
         self._texts = list(texts)
 
@@ -155,8 +163,27 @@ def _outline(label: LabelInView) -> F64:
     return np.concatenate([edges, np.array([[(x, y, top), nose]])])
 
 
-def _tag(label: LabelInView, *, is_chosen: bool) -> NameTag:
+def _label_tag(label: LabelInView, *, is_chosen: bool) -> NameTag:
     x, y, z = label.cuboid.center
     top: Point3 = (x, y, z + label.cuboid.size[2] / 2 + _LIFT_M)
-    rank = 0 if is_chosen else 1 if label.role == "cipv" else 2
-    return NameTag(label.text, f"#{label.track}", top, rank, _CHOSEN_SCALE if is_chosen else _NAME_SCALE)
+    rank = _CHOSEN if is_chosen else _LEAD if label.role == "cipv" else _LABELED
+    return NameTag(label.text, f"#{label.track}", top, rank, _CHOSEN_SCALE if is_chosen else _LABEL_SCALE)
+
+
+def _object_tags(result: Result, named: str, selected: int | None, floor_m: float) -> list[NameTag]:
+    """Name tags of the objects that have one, by the user's choice ``named``, and of the selected one."""
+    wanted = [each for each in result.objects if each.id == selected or has_name(each, result, named)]
+    following = None if result.next_cipv is None else result.next_cipv.id
+
+    def rank(each: FusedObject) -> int:
+        if each.id == selected:
+            return _CHOSEN
+        if each.id == scene.cipv_id(result):
+            return _LEAD
+        return _NEXT if each.id == following else _IN_PATH if each.in_path else _OTHER
+
+    return [
+        NameTag(scene.object_text(each), f"#{each.id}", scene.top_of(each, floor_m), rank(each), _OBJECT_SCALE)
+        for each in wanted
+        if each.bev is not None
+    ]

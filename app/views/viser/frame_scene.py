@@ -16,9 +16,7 @@ from app.views.viser.nodes import Strokes
 from pipeline.types import Frame, FusedObject, Result
 
 OBJECTS = ("/cuboids", "/footprints", "/rays", "/velocities", "/cipv", "/next_cipv")
-"""Nodes of the pipeline's objects."""
-NAMES = "/labels"
-"""Parent of their name tags."""
+"""Nodes of the pipeline's objects. Their name tags depend on the camera: see ``BrowserScene``."""
 OTHERS = ("/points", "/path/ribbon", "/path/lines", "/path/lanes", "/camera/image", "/camera/edges")
 ALWAYS = ("/grid", "/ego")
 COLOR_BY = get_args(scene.ColorBy)
@@ -42,11 +40,10 @@ class DisplayOptions:
 
 
 class FrameScene:
-    """Draws frames into a scene, each in place of the one before. names: parent of the objects' name tags."""
+    """Draws frames into a scene, each in place of the one before."""
 
-    def __init__(self, scene_api: viser.SceneApi, names: str = NAMES) -> None:
-        self._scene, self._names = scene_api, names
-        self._slots = 0
+    def __init__(self, scene_api: viser.SceneApi) -> None:
+        self._scene = scene_api
 
     def draw(self, frame: Frame, result: Result, options: DisplayOptions, *, has_objects: bool = True) -> None:
         """has_objects: whether the pipeline's objects are drawn."""
@@ -56,7 +53,6 @@ class FrameScene:
             self._scene, points[:, :3], scene.point_colors(result, options.color_by), options.point_size_m
         )
         self._draw_objects(frame, result, result.objects if has_objects else (), floor_m)
-        self._draw_names(result, options.named if has_objects else "none", floor_m)
         viser_nodes.path(self._scene, result.path, floor_m)
         viser_nodes.lanes(self._scene, scene.lane_lines(result), floor_m)
         viser_nodes.floor(self._scene, floor_m)
@@ -91,29 +87,18 @@ class FrameScene:
             found = None if number is None else by_id.get(number)
             viser_nodes.filled(self._scene, name, found, rgb(role), opacity, floor_m)
 
-    def _draw_names(self, result: Result, named: str, floor_m: float) -> None:
-        """Name tags are numbered slots that objects reuse, instead of one node per object: the number of ids is
-        unlimited."""
-        tagged = [each for each in result.objects if _has_name(each, result, named) and each.bev is not None]
-        for slot in range(max(len(tagged), self._slots)):
-            each = tagged[slot] if slot < len(tagged) else None
-            text, at = ("", None) if each is None else (scene.object_text(each), scene.top_of(each, floor_m))
-            viser_nodes.name_tag(self._scene, f"{self._names}/{slot}", text, at)
-        self._slots = max(len(tagged), self._slots)
-
 
 class OwnFrameScene(FrameScene):
     """The frame of one page, drawn into the scene of its browser, where nodes override the shared ones of the same
     name. A part that this frame lacks is covered by an empty node, since the shared one would show."""
 
-    def __init__(self, scene_api: viser.SceneApi, names: str) -> None:
-        super().__init__(scene_api, names)
-        cover(scene_api, (*OBJECTS, *OTHERS, NAMES))
+    def __init__(self, scene_api: viser.SceneApi) -> None:
+        super().__init__(scene_api)
+        cover(scene_api, (*OBJECTS, *OTHERS))
 
     def clear(self) -> None:
         """Show the shared frame again."""
-        slots = (f"{self._names}/{slot}" for slot in range(self._slots))
-        for name in (*OBJECTS, *OTHERS, *ALWAYS, NAMES, *slots):
+        for name in (*OBJECTS, *OTHERS, *ALWAYS):
             handle = self._scene.get_handle_by_name(name)
             if handle is not None:
                 handle.remove()
@@ -129,7 +114,8 @@ def floor_of(result: Result) -> float:
     return scene.ground_height_m(result) or 0.0
 
 
-def _has_name(each: FusedObject, result: Result, named: str) -> bool:
+def has_name(each: FusedObject, result: Result, named: str) -> bool:
+    """Whether an object has a name tag, by the user's choice, one of ``NAMED``."""
     if named == "all":
         return True
     return named == NAMED[0] and scene.stands_out(each, result)

@@ -103,7 +103,7 @@ def lanes(scene: viser.SceneApi, found: Sequence[F64], floor_m: float) -> None:
     lines(scene, "/path/lanes", Strokes(parts, [rgb("lane")] * len(parts)), 4.0)
 
 
-def name_tag(scene: viser.SceneApi, name: str, text: str, position: Point3 | None, scale: float = 0.8) -> None:
+def name_tag(scene: viser.SceneApi, name: str, text: str, position: Point3 | None, scale: float) -> None:
     """A text in the scene; hidden without a position. scale: of its size."""
     if position is None:
         return _hide(scene, name)

@@ -1,7 +1,7 @@
 """Which name tags of the 3D view have room.
 
-Of tags that would cover each other, the selected label's is shown, then the lead's, then the one nearest to the camera.
-The others show their number alone, if there is room for that, or nothing.
+Of tags that would cover each other, the one of the lowest rank is shown, and of the same rank the one nearest to the
+camera. The others show their number alone, if there is room for that, or nothing.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ _BORDER_PX = 5.0
 
 
 class NameTag(NamedTuple):
-    """A name tag above a label."""
+    """A name tag above an object or a label."""
 
     text: str
-    """Number, class and state."""
+    """Number, class, and distance or state."""
     number: str
     """Shown instead where the text has no room."""
     at: Point3

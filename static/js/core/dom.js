@@ -50,6 +50,11 @@ export function text(node, value) {
   if (node.textContent !== value) node.textContent = value;
 }
 
+/** Set the title only if it differs. @param {HTMLElement} node @param {string} words */
+export function entitle(node, words) {
+  if (node.title !== words) node.title = words;
+}
+
 /** Set a data attribute only if it differs. @param {HTMLElement} node @param {string} name @param {string} value */
 export function mark(node, name, value) {
   if (node.dataset[name] !== value) node.dataset[name] = value;

@@ -1,5 +1,6 @@
 /** Histograms and counts of the Fleet view; clicking or dragging them sets a filter. */
 import { el, press } from "../core/dom.js";
+import { numberField, numberOf } from "../core/number_field.js";
 
 /** @typedef {import("./filters.js").Range} Range */
 
@@ -56,11 +57,11 @@ export function histogram(chart, chosen, onRange) {
   let edges = [];
   dragging(bars, () => edges, onRange);
   const fields = ["from", "to"].map((word, place) => {
-    const field = el("input", { type: "number", step: "any", aria: { label: `${chart.title} ${word}` } });
+    const field = numberField({ label: `${chart.title} ${word}` });
     field.addEventListener("change", () => {
       /** @type {Range} */
       const range = [...chosen()];
-      range[place] = field.value === "" ? null : field.valueAsNumber;
+      range[place] = numberOf(field);
       onRange(range);
     });
     return field;

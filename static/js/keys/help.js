@@ -3,6 +3,7 @@ import { $, el } from "../core/dom.js";
 import { nameOf } from "./keyboard.js";
 import { keymap } from "./keymap.js";
 import { change, reset, shownAs } from "./own_keys.js";
+import { styleOf, weights } from "../timeline/lanes/flags.js";
 
 const COLORS = [
   ["cipv", "CIPV: closest in-path vehicle"],
@@ -28,6 +29,10 @@ export function show() {
         ...COLORS.map(shade),
         el("p", { class: "facts", textContent: "Dashed: carried (not detected in this frame)." }),
         el("p", { class: "facts", textContent: "Timeline: solid VL, hatched up V, hatched down L, faint carried." }),
+        el("h2", { textContent: "Events" }),
+        ...weights().map((weight) =>
+          el("div", {}, el("i", { class: "event-shape", style: styleOf(weight) }), weight.words),
+        ),
       ),
       el(
         "div",

@@ -1,4 +1,4 @@
-/** Table of metrics before and after, coloured by improvement. */
+/** Table of metrics of the compared and the shown run, coloured by improvement. */
 import { el } from "../core/dom.js";
 import { DASH, num, signed } from "../core/format.js";
 
@@ -19,7 +19,7 @@ export function metricsTable({ metrics, truth, judged }, isAlone = false) {
   const judge = truth
     ? `Evaluated on ${judged} ${judged === 1 ? "frame" : "frames"} against ${JUDGES[truth]}`
     : "No labels: only metrics that need none";
-  const head = (isAlone ? [] : ["", "before", "after", "change"]).map((words) =>
+  const head = (isAlone ? [] : ["", "compared", "shown", "change"]).map((words) =>
     el("th", { scope: "col", textContent: words }),
   );
   return el(

@@ -1,8 +1,10 @@
 /** The dialog for opening another recording. */
 import { request } from "../core/api.js";
-import { $, el, text } from "../core/dom.js";
+import { $, el, entitle, text } from "../core/dom.js";
 import { refused } from "./notices.js";
 import { get, on } from "../core/store.js";
+
+/** @typedef {{uri: string, title: string}} Offered */
 
 const dialog = $("#source-dialog", HTMLDialogElement);
 /** The last URI that could not be opened, so that a typo can be corrected. @type {string|null} */
@@ -17,12 +19,14 @@ export function setUp() {
     if (state?.uri !== openUri) wanted = null;
     openUri = state?.uri;
     text($("#source-title"), state?.title || state?.uri || "opening …");
+    entitle($("#source-title"), `${state?.title ?? ""} (${state?.uri ?? ""}): open another recording (F)`);
   });
 }
 
+/** Shown at once: on a busy server, the list may take seconds. */
 export async function open() {
-  /** @type {{sources: {uri: string, title: string}[], open: string|null}} */
-  const { sources, open: current } = await request("api/sources").catch(() => ({ sources: [], open: null }));
+  const current = get("state")?.uri ?? null,
+    offers = el("div", {}, el("p", { class: "facts", textContent: "Loading the list …" }));
   const field = el("input", {
     type: "text",
     name: "uri",
@@ -33,23 +37,34 @@ export async function open() {
   });
   const form = el("form", { class: "open-row", method: "dialog" }, field, el("button", { textContent: "Open" }));
   form.addEventListener("submit", () => choose(field.value));
-  const list = sources.map(({ uri, title }) => {
+  dialog.replaceChildren(el("h2", { textContent: "Open a recording" }), form, offers);
+  if (!dialog.open) dialog.showModal();
+  field.select();
+  /** @type {{sources: Offered[]}|Error} */
+  const answer = await request("api/sources").catch((problem) => problem);
+  if (answer instanceof Error)
+    return offers.replaceChildren(el("p", { class: "facts", textContent: `No list: ${answer.message}` }));
+  const isSimulated = (/** @type {Offered} */ { uri }) => uri.startsWith("sim:");
+  offers.replaceChildren(
+    ...list("Recordings", answer.sources.filter((each) => !isSimulated(each)), current),
+    ...list("Simulations", answer.sources.filter(isSimulated), current),
+  );
+}
+
+/** @param {string} heading @param {Offered[]} offered @param {string|null} current @returns {HTMLElement[]} */
+function list(heading, offered, current) {
+  if (!offered.length) return [];
+  const buttons = offered.map(({ uri, title }) => {
     const button = el(
       "button",
       { type: "button", onclick: () => choose(uri) },
       el("span", { textContent: title }),
-      el("code", { textContent: uri }),
+      el("code", { textContent: uri, title: uri }),
     );
     if (uri === current) button.setAttribute("aria-current", "true");
     return button;
   });
-  dialog.replaceChildren(
-    el("h2", { textContent: "Open a recording" }),
-    form,
-    el("div", { class: "open-list" }, ...list),
-  );
-  dialog.showModal();
-  field.select();
+  return [el("h3", { textContent: heading }), el("div", { class: "open-list" }, ...buttons)];
 }
 
 /** @param {string} uri */

@@ -1,5 +1,6 @@
 /** Control of one parameter: name, input, and reset to the preset value. */
 import { el, press } from "../core/dom.js";
+import { numberField, numberOf } from "../core/number_field.js";
 import { attachTooltip } from "../core/tooltip.js";
 
 /** Slider range of a parameter that is null by default, relative to its effective value. */
@@ -89,14 +90,10 @@ function slider(id, param, change) {
     high = param.max ?? 1,
     step = String(param.step ?? "any");
   const range = el("input", { type: "range", id, step, min: String(low), max: String(high) });
-  const box = el("input", {
-    type: "number",
-    step,
-    min: String(low),
-    max: String(high),
-    aria: { label: `${words(param.key)}, value` },
-  });
-  const read = (/** @type {string} */ text) => (param.kind === "integer" ? Math.round(Number(text)) : Number(text));
+  const label = `${words(param.key)}, ${param.unit || "value"}`;
+  const box = numberField({ label, least: low, most: high, step: param.step ?? (high - low) / 100 });
+  const read = (/** @type {string|number} */ said) =>
+    param.kind === "integer" ? Math.round(Number(said)) : Number(said);
   range.addEventListener("input", () => {
     box.value = range.value;
     fill(range);
@@ -104,7 +101,8 @@ function slider(id, param, change) {
   });
   range.addEventListener("change", () => change(read(range.value), true));
   box.addEventListener("change", () => {
-    if (box.value !== "") change(Math.min(high, Math.max(low, read(box.value))), true);
+    const typed = numberOf(box);
+    if (typed !== null) change(Math.min(high, Math.max(low, read(typed))), true);
     else if (param.nullable) change(null, true);
   });
   return {

@@ -1,6 +1,6 @@
 /** Playback bar: play, step, speed, loop and record. */
 import { playback } from "../core/api.js";
-import { $, el, press, text } from "../core/dom.js";
+import { $, el, entitle, press, text } from "../core/dom.js";
 import { NO_DRIVE } from "../drive/live_buffer.js";
 import * as shuttle from "../drive/shuttle.js";
 import { clock } from "../core/format.js";
@@ -15,7 +15,7 @@ const playIcon = icon("play"),
 const back = button("Step back", "Previous frame (←)", () => playback({ step: -1 }), icon("back"));
 const play = button("Play", "Play or pause (Space)", togglePlay, playIcon, pauseIcon);
 const next = button("Step forward", "Next frame (→)", () => playback({ step: 1 }), icon("next"));
-const name = el("span", { class: "name", title: "Frame name in the recording" });
+const name = el("span", { class: "name" });
 const count = el("span", { class: "dim" });
 const time = el("span");
 const live = el("span", { class: "tag live", textContent: "LIVE", title: NO_DRIVE, hidden: true });
@@ -71,6 +71,7 @@ function update() {
   const frame = get("frame")?.state,
     at = frame?.uri === state.uri ? frame : state; // name of the displayed frame
   text(name, at.frame ?? "");
+  entitle(name, `Frame name in the recording: ${at.frame ?? "none"}`);
   text(count, has && !state.live ? `${at.index + 1}/${state.count}` : "");
   text(time, state.live ? clock(at.time_s) : `${clock(at.time_s)} / ${clock(state.duration_s)}`);
   live.hidden = !state.live;

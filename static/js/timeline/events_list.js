@@ -5,7 +5,7 @@ import { seekTo } from "../drive/seek.js";
 import { clock } from "../core/format.js";
 import { refused } from "../panels/notices.js";
 import { get, on, paint, set } from "../core/store.js";
-import { nameOf, tintOf } from "./lanes/flags.js";
+import { nameOf, styleOf, weightOf } from "./lanes/flags.js";
 
 /** @typedef {import("../drive/types.js").DriveEvent} DriveEvent */
 
@@ -62,10 +62,10 @@ function rowOf(event) {
       type: "button",
       class: "event",
       title: event.text,
-      style: { "--flag": tintOf(event) },
+      style: styleOf(weightOf(event)),
       onclick: () => jump(event),
     },
-    el("i"),
+    el("i", { title: weightOf(event).words, aria: { role: "img", label: weightOf(event).words } }),
     el("span", { class: "when", textContent: clock(event.t_s) }),
     el("b", { textContent: nameOf(event) }),
     el("span", { class: "what", textContent: event.text }),

@@ -101,7 +101,7 @@ function click({ span, rows }, x, y) {
 /** @param {Hand} hand @param {WheelEvent} event */
 function onWheel({ span, zoomed }, event) {
   event.preventDefault();
-  const along = event.shiftKey ? event.deltaY : event.deltaX;
+  const along = event.shiftKey ? event.deltaY || event.deltaX : event.deltaX; // some browsers turn the wheel with Shift
   if (Math.abs(along) > Math.abs(event.shiftKey ? 0 : event.deltaY)) span.pan(along / span.perFrame);
   else span.zoom(Math.exp(event.deltaY * ZOOM_PER_PX), event.offsetX);
   zoomed();

@@ -10,12 +10,13 @@ const LABEL = '10.5px system-ui, "DejaVu Sans", sans-serif';
 const VALUE = '600 10.5px system-ui, "DejaVu Sans", sans-serif';
 
 /**
- * Names at the left, and the values at a frame.
+ * Names at the left, and the values at a frame; of the time axis, its unit.
  * @param {CanvasRenderingContext2D} ctx @param {Rows} rows @param {number} index @param {boolean} isLight
  * @param {number} edge where the plot begins, CSS pixels
  */
 export function drawValues(ctx, rows, index, isLight, edge) {
   ctx.textBaseline = "middle";
+  label(ctx, { name: "Time", value: "min:s", tint: ui("dim") }, rows.axis, edge);
   for (const { lane, row } of rows.lanes) {
     const said = lane.label?.(index, isLight);
     if (said) label(ctx, said, row, edge);

@@ -1,15 +1,15 @@
 /** The plan view: the ego frame from above, x up and y left, in metres. */
-import { color, onImage, roleOf, ui } from "../core/colors.js";
+import { color, roleOf, ui } from "../core/colors.js";
 import { $, el, press } from "../core/dom.js";
 import { isImaged } from "../core/object_sources.js";
 import { drawInPlan } from "./drawing/gates.js";
-import { num } from "../core/format.js";
 import { followHover } from "./hover.js";
 import { Labels } from "./drawing/text_labels.js";
 import { addTool } from "./layers.js";
 import { nearestPoint, ownerOf } from "./drawing/hit_test.js";
 import { drawArrow, drawOutline, drawPath, drawRing, drawSigma } from "./drawing/plan.js";
 import { drawTraffic, drawTrail, trace } from "./drawing/plan.js";
+import { drawTags } from "./drawing/plan_tags.js";
 import { CLUSTER, tints } from "./drawing/point_colors.js";
 import { DotRaster } from "./drawing/dot_raster.js";
 import { get, paint, select, set } from "../core/store.js";
@@ -227,17 +227,7 @@ function drawObjects(ctx, frame, layers, labels) {
   const selected = order.find(({ id }) => id === chosen);
   if (selected)
     drawInPlan(ctx, frame, selected, labels, { u: (y) => view.u(y), v: (x) => view.v(x), scale: view.scale });
-  for (const item of order.reverse()) {
-    if (!item.bev || (!important(item) && (item.carried || (!isImaged(item) && !item.in_path)))) continue;
-    const u = Math.max(...item.bev.map(([, y]) => view.u(y))) + 3,
-      v = Math.min(...item.bev.map(([x]) => view.v(x))) + 14;
-    const distance = item.distance_m === null ? "" : ` ${num(item.distance_m)}`,
-      isLead = item.id === lead;
-    const words = isLead
-      ? `CIPV #${item.id} ${distance} m`
-      : `${item.id === next ? "next " : ""}#${item.id}${distance}`;
-    labels.put(words, u, v, onImage(roleOf(item, lead)), isLead ? "strong" : important(item) ? "must" : "weak");
-  }
+  drawTags(view, order, { lead, next, chosen }, labels);
 }
 
 /** The ego vehicle: the origin is at its front bumper or just behind it. @param {CanvasRenderingContext2D} ctx */

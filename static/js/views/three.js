@@ -9,6 +9,7 @@ import { get, on } from "../core/store.js";
 const NAME = [...crypto.getRandomValues(new Uint8Array(16))].map((each) => each.toString(16).padStart(2, "0")).join("");
 /** Narrower frames are scaled down, since there the 3D view's own panel would cover the scene. */
 const LEAST_PX = 600;
+const NO_WEBGL = "The 3D view needs WebGL 2, which this browser lacks or has switched off.";
 
 export function setUp() {
   const body = $("#three-body");
@@ -27,6 +28,7 @@ export function setUp() {
 export function open() {
   const body = $("#three-body");
   if (body.firstChild) return;
+  if (!hasWebGl()) return body.append(el("p", { class: "busy", textContent: NO_WEBGL }));
   tell("page_3d", NAME);
   const note = el("p", { class: "busy", aria: { role: "status" }, textContent: "Opening the 3D view …" });
   const view = el("iframe", { src: `viser/of/${NAME}/`, title: "3D view" });
@@ -35,6 +37,12 @@ export function open() {
     keepConnecting(view);
   });
   body.append(note, view);
+}
+
+function hasWebGl() {
+  const found = document.createElement("canvas").getContext("webgl2");
+  found?.getExtension("WEBGL_lose_context")?.loseContext(); // a browser keeps only a few
+  return found !== null;
 }
 
 /**

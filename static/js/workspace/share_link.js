@@ -3,7 +3,7 @@
  * to servers. A link is applied once and then removed from the URL, so that a reload does not go back.
  */
 import { playback, request } from "../core/api.js";
-import { $, el } from "../core/dom.js";
+import { $, el, text } from "../core/dom.js";
 import { seekTo } from "../drive/seek.js";
 import { refused } from "../panels/notices.js";
 import { get, on, set } from "../core/store.js";
@@ -79,12 +79,17 @@ export async function share() {
   const address = link();
   try {
     await navigator.clipboard.writeText(address);
-    const button = $("#share-button");
-    button.textContent = "Copied";
-    setTimeout(() => (button.textContent = "Share"), SAID_MS);
+    sayCopied(true);
+    setTimeout(() => sayCopied(false), SAID_MS);
   } catch {
     show("Copy this link", address);
   }
+}
+
+/** @param {boolean} isCopied */
+function sayCopied(isCopied) {
+  $("#share-button").classList.toggle("is-other", isCopied);
+  text($("#announcement"), isCopied ? "Link copied" : "");
 }
 
 /** Remove a link from the URL, and apply it once the state is known. */

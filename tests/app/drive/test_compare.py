@@ -38,7 +38,7 @@ def test_where_they_differ(name: str, base: list[Any], run: list[Any], differing
 
 
 def test_a_difference_is_said_in_words():
-    assert compare(drive(7), drive(None)).sentences == {0: "base: #7 at 30.0 m; now: none"}
+    assert compare(drive(7), drive(None)).sentences == {0: "compared run: #7 at 30.0 m; shown run: none"}
 
 
 def test_figures_without_truth():

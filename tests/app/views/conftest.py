@@ -181,6 +181,11 @@ class SceneClient:
         self.look()
         self.read_until(lambda each: each["type"] == "ReplayDoneMessage")
 
+    def read_names(self, *wanted: str) -> None:
+        """Read until these are the texts of the visible name tags, in any order; TimeoutError if they never are."""
+        while sorted(self.texts()) != sorted(wanted):
+            self.read_until(lambda each: True)
+
     def nodes(self) -> dict[str, bool]:
         """Name → visibility of every scene node, after all messages so far."""
         seen: dict[str, bool] = {}
@@ -201,7 +206,7 @@ class SceneClient:
         words: dict[str, str] = {}
         for each in self.messages:
             written = each.get("props", each.get("updates", {}))
-            if each.get("name", "").startswith(("/labels/", "/own/")) and "text" in written:
+            if each.get("name", "").startswith("/own/names/") and "text" in written:
                 words[each["name"]] = written["text"]
         return [words[name] for name, shown in self.nodes().items() if shown and name in words]
 

@@ -21,7 +21,7 @@ export const look = newestOnly(async () => {
   const found = await request("api/labels/checks").catch((error) => error);
   known = found instanceof Error ? "" : key;
   if (found instanceof Error) return body.replaceChildren(el("p", { class: "facts pad", textContent: found.message }));
-  text($("#tab-label-checks"), found.problems.length ? `⚠ ${found.problems.length}` : "⚠");
+  text($("#tab-label-checks"), found.problems.length ? `Checks ${found.problems.length}` : "Checks");
   body.replaceChildren(
     el("p", { class: "facts pad", textContent: words(found.problems.length) }),
     ...found.problems.slice(0, MOST).map(row),

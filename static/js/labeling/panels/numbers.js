@@ -1,5 +1,6 @@
 /** Place, size and heading of the selected cuboid as numbers that can be typed. */
 import { el } from "../../core/dom.js";
+import { numberField, numberOf } from "../../core/number_field.js";
 import { get, paint } from "../../core/store.js";
 import { hold, presentOf, release } from "../state/draft.js";
 import { chosen } from "../state/labels.js";
@@ -9,6 +10,8 @@ import { chosen } from "../state/labels.js";
  *   with: (cuboid: Cuboid, value: number) => Cuboid}} Field */
 
 const DEG = 180 / Math.PI;
+/** Of the arrow keys, metres or degrees. */
+const STEP = 0.1;
 
 /** @param {"center"|"size"} part @param {number} axis @param {string} name @param {string} title @returns {Field} */
 const side = (part, axis, name, title) => ({
@@ -42,7 +45,7 @@ const FIELDS = [
 ];
 
 const inputs = FIELDS.map(({ name, title, least, most }) =>
-  el("input", { type: "number", step: "any", min: String(least), max: String(most), aria: { label: title }, name }),
+  numberField({ label: title, least, most, step: STEP }, { name }),
 );
 export const node = el(
   "div",
@@ -69,8 +72,9 @@ function show() {
 /** @param {Field} field @param {HTMLInputElement} input */
 function put(field, input) {
   const id = chosen()?.id ?? null,
-    cuboid = presentOf(id)?.cuboid;
-  if (id === null || !cuboid || !input.validity.valid || input.value === "") return show();
-  hold(id, { cuboid: field.with(cuboid, input.valueAsNumber) });
+    cuboid = presentOf(id)?.cuboid,
+    typed = numberOf(input) ?? NaN;
+  if (id === null || !cuboid || !(typed >= field.least && typed <= field.most)) return show();
+  hold(id, { cuboid: field.with(cuboid, typed) });
   release();
 }

@@ -10,7 +10,7 @@ import * as tracks from "./track_list.js";
 const TABS = /** @type {const} */ ([
   ["tracks", "Tracks"],
   ["moment", "Frame"],
-  ["checks", "⚠"],
+  ["checks", "Checks"],
   ["score", "Score"],
   ["files", "Files"],
 ]);
@@ -30,8 +30,7 @@ export function setUp() {
       id: `tab-label-${key}`,
       textContent: words,
       data: { tab: key },
-      title: key === "checks" ? "Checks" : "",
-      aria: { role: "tab", controls: `label-${key}`, ...(key === "checks" ? { label: "Checks" } : {}) },
+      aria: { role: "tab", controls: `label-${key}` },
       onclick: () => show(key),
     }),
   );

@@ -14,6 +14,6 @@ export const comparedLead = {
     drawRibbon(ctx, run, place);
     ctx.globalAlpha = 1;
   },
-  label: (index, isLight) => leadLabel("before", get("drive")?.base, index, isLight),
+  label: (index, isLight) => leadLabel("compared", get("drive")?.base, index, isLight),
   click: (span, x) => selectLead(get("drive")?.base, span.index(x)),
 };

@@ -44,7 +44,7 @@ function drawCurve(ctx, span, row, curve, now, base) {
   );
   const scale = scaleOf(curve, /** @type {(number|null)[][]} */ ([...lines, own ?? []]));
   const y = yOf(row, scale, curve.most);
-  drawGrid(ctx, span, row, scale, y, curve.limit);
+  drawGrid(ctx, span, row, scale, y, curve);
   if (base) stroke(ctx, ofSeries(base, curve.key, curve.factor), span, y, { style: ui("dim"), width: 1, alpha: 0.75 });
   if (curve.also)
     stroke(ctx, ofSeries(now, curve.also, curve.factor), span, y, { style: ui("dim"), width: 1, alpha: 0.8 });
@@ -128,9 +128,9 @@ function fillArea(ctx, samples, span, y, tint) {
 
 /**
  * @param {CanvasRenderingContext2D} ctx @param {Span} span @param {Row} row @param {{low: number, high: number}} scale
- * @param {(value: number) => number} y @param {number} [limit]
+ * @param {(value: number) => number} y @param {import("../curves.js").Curve} curve
  */
-function drawGrid(ctx, span, row, { low, high }, y, limit) {
+function drawGrid(ctx, span, row, { low, high }, y, { limit, unit }) {
   ctx.font = "9px system-ui, sans-serif";
   ctx.fillStyle = ui("dim");
   ctx.strokeStyle = color("grid");
@@ -144,13 +144,13 @@ function drawGrid(ctx, span, row, { low, high }, y, limit) {
   if (row.height < 28) return;
   ctx.textAlign = "right";
   const edge = span.left + span.width - 3;
-  ctx.fillText(short(high), edge, row.top + 10);
-  ctx.fillText(short(low), edge, row.top + row.height - 3);
+  ctx.fillText(`${short(high)} ${unit}`, edge, row.top + 10);
+  ctx.fillText(`${short(low)} ${unit}`, edge, row.top + row.height - 3);
   ctx.textAlign = "start";
 }
 
 const short = (/** @type {number} */ value) =>
-  (Math.abs(value) < 3 ? value.toFixed(1) : value.toFixed(0)).replace("-", "−");
+  (value && Math.abs(value) < 3 ? value.toFixed(1) : value.toFixed(0)).replace("-", "−");
 
 /** @param {CanvasRenderingContext2D} ctx @param {number} x1 @param {number} y1 @param {number} x2 @param {number} y2 */
 function line(ctx, x1, y1, x2, y2) {

@@ -1,10 +1,15 @@
 /** Text labels on a canvas that avoid overlaps. */
 
 const HEIGHT = 16;
+/** How often a label is moved up by its height to find room; and, if it must be drawn, then. */
+const MOVES = 3,
+  MOST_MOVES = 11;
 /**
  * "strong" labels are filled and always drawn, "must" labels are always drawn, "weak" ones only if there is room.
  * @typedef {"strong"|"must"|"weak"} Weight
  */
+
+/** @typedef {{x: number, y: number, w: number, h: number}} Rectangle */
 
 export class Labels {
   /**
@@ -18,8 +23,10 @@ export class Labels {
     this.width = width;
     this.top = top;
     this.bottom = bottom;
-    /** @type {{x: number, y: number, w: number, h: number}[]} */
+    /** Labels. @type {Rectangle[]} */
     this.taken = [];
+    /** What no label covers, unless it must be drawn and has no other room. @type {Rectangle[]} */
+    this.kept = [];
   }
 
   /**
@@ -32,7 +39,7 @@ export class Labels {
 
   /** Keep a rectangle free of labels. @param {number} x @param {number} y @param {number} w @param {number} h */
   keepFree(x, y, w, h) {
-    this.taken.push({ x, y, w, h });
+    this.kept.push({ x, y, w, h });
   }
 
   /**
@@ -46,10 +53,14 @@ export class Labels {
     const h = strong ? HEIGHT + 4 : HEIGHT;
     ctx.font = `${strong ? "700 13px" : "600 11px"} system-ui, "DejaVu Sans", sans-serif`;
     const w = ctx.measureText(words).width + 10;
+    const beside = (/** @type {Rectangle[]} */ others) =>
+      this.#free(x, y, w, h, MOVES, others) ??
+      (end === undefined ? null : this.#free(end - w, y, w, h, MOVES, others));
     const at =
-      this.#free(x, y, w, h, 3) ??
-      (end === undefined ? null : this.#free(end - w, y, w, h, 3)) ??
-      (weight === "weak" ? null : (this.#free(x, y, w, h, 11) ?? this.#inside(x, y, w, h)));
+      beside([...this.taken, ...this.kept]) ??
+      (weight === "weak"
+        ? null
+        : (beside(this.taken) ?? this.#free(x, y, w, h, MOST_MOVES, this.taken) ?? this.#inside(x, y, w, h)));
     if (!at) return;
     this.taken.push(at);
     ctx.fillStyle = strong ? tint : "rgb(8 10 13 / .78)";
@@ -63,12 +74,13 @@ export class Labels {
   }
 
   /**
-   * A rectangle near (x, y), its bottom left corner, that overlaps no other, or null. It is moved up this often.
-   * @param {number} x @param {number} y @param {number} w @param {number} h @param {number} moves
+   * A rectangle near (x, y), its bottom left corner, that overlaps none of the others, or null.
+   * @param {number} x @param {number} y @param {number} w @param {number} h
+   * @param {number} moves how often it is moved up @param {Rectangle[]} others
    */
-  #free(x, y, w, h, moves) {
+  #free(x, y, w, h, moves, others) {
     const at = this.#inside(x, y, w, h);
-    for (let tries = 0; this.#overlaps(at); tries++) {
+    for (let tries = 0; overlapsOne(at, others); tries++) {
       if (tries === moves) return null;
       at.y = at.y - h - 1 > this.top ? at.y - h - 1 : at.y + (tries + 2) * (h + 1);
       if (at.y + h > this.bottom) return null;
@@ -85,9 +97,8 @@ export class Labels {
       h,
     };
   }
-
-  /** @param {{x: number, y: number, w: number, h: number}} a */
-  #overlaps(a) {
-    return this.taken.some((b) => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h);
-  }
 }
+
+/** @param {Rectangle} a @param {Rectangle[]} others */
+const overlapsOne = (a, others) =>
+  others.some((b) => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h);

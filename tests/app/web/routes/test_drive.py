@@ -167,7 +167,7 @@ def test_a_changed_threshold_is_compared_with_before(client: httpx.Client, engin
     found = client.get("/api/compare").json()
     assert (found["base"], found["run"], found["done"], found["truth"]) == (base, new, 30, None)
     assert found["differing"] == [[0, 29]], "without its box, and too small for a lead, the car leads in no frame"
-    assert found["first"] == {"0": "base: #1 at 30.0 m; now: none"}
+    assert found["first"] == {"0": "compared run: #1 at 30.0 m; shown run: none"}
     figures = {each["name"]: (each["base"], each["run"]) for each in found["metrics"]}
     assert figures["frames with a CIPV"] == (30, 0)
     same = client.get(f"/api/compare?base={new}&run={new}").json()
