@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, read_xml
+from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, named_path, read_xml
 
 
 def referenced_files(path: Path) -> Iterator[Path]:
@@ -39,4 +39,4 @@ def _of_scenario(path: Path) -> Iterator[Path]:
 
 
 def _named(path: Path, at: XmlElement, attribute: str) -> Path:
-    return path.parent / at.attributes.get(attribute, "").replace("\\", "/")
+    return named_path(path.parent, at.attributes.get(attribute, ""))

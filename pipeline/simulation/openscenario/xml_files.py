@@ -85,6 +85,21 @@ def shown(text: str) -> str:
     return f"{plain[:_LONGEST_SHOWN]}…" if len(plain) > _LONGEST_SHOWN else plain
 
 
+def named_path(folder: Path, name: str) -> Path:
+    """A file or folder that a file in ``folder`` names: there, or else beside that file, if both were copied."""
+    there = folder / name.replace("\\", "/")
+    try:
+        if there.exists():
+            return there
+        beside = folder / there.name
+        for each in (beside, beside.with_name(f"{beside.name}.xodr")):
+            if there.name and each.is_file():
+                return each
+    except (OSError, ValueError):  # a name that no file can have; reading it says so
+        pass
+    return there
+
+
 def read_xml(path: Path, root: str) -> XmlElement:
     """The root element of a file, which must be called ``root``. OpenScenarioError if the file cannot be read, is not
     well-formed, or has a document type: entities could expand to gigabytes or name other files."""

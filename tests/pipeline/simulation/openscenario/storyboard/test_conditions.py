@@ -161,7 +161,11 @@ def test_a_variable_that_an_action_sets(tmp_path: Path) -> None:
     ("trigger", "says"),
     [
         (condition(by_value("<TimeOfDayCondition/>")), "TimeOfDayCondition is not supported; SimulationTime"),
-        (condition(by_entity("<OffroadCondition/>")), "OffroadCondition is not supported; TimeHeadway"),
+        (condition(by_entity("<AngleCondition/>")), "AngleCondition is not supported; TimeHeadway"),
+        (
+            condition(by_entity('<AccelerationCondition direction="lateral" value="1"/>')),
+            "AccelerationCondition is supported along the road only",
+        ),
         (condition(by_entity(TTC, "Nobody")), "no entity 'Nobody' with a position"),
         (condition(at_time(1.0), edge="sideways"), "unknown conditionEdge 'sideways'"),
         (condition(at_time(1.0), delay=-1.0), "a negative delay"),
@@ -172,7 +176,7 @@ def test_a_variable_that_an_action_sets(tmp_path: Path) -> None:
         (condition(by_value(STATE.format("event", "nothing", "completeState"))), "no event 'nothing'"),
         (condition(by_entity(GAP.format("around", "true", 1))), "distance type 'around' is not supported"),
         (condition(by_entity('<CollisionCondition><ByType type="vehicle"/></CollisionCondition>')), "with a ByType"),
-        (condition(by_entity(REACHED.format("<RoutePosition/>"))), "ReachPositionCondition needs a LanePosition"),
+        (condition(by_entity(REACHED.format("<RoutePosition/>"))), "RoutePosition is not supported; LanePosition"),
         (condition(""), "has neither ByValueCondition nor ByEntityCondition"),
     ],
 )
