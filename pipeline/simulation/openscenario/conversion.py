@@ -23,10 +23,12 @@ from pipeline.simulation.openscenario.storyboard.start import ego_roads, file_st
 from pipeline.simulation.openscenario.storyboard.storyboard import Storyboard
 from pipeline.simulation.openscenario.variants import Variants
 from pipeline.simulation.openscenario.xml_files import XmlElement, named_path, read_xml, shown
+from pipeline.simulation.world.roads import Road
 
 _LONGEST_S = 120.0
 """Duration of a scenario that no StopTrigger ends."""
 _BRIEFEST_S = 1.0
+_WIDEST_SHOULDER_M = 10.0
 
 
 def convert(path: Path, variant: int | None, given: Mapping[str, str], ego: str | None = None) -> dict[str, Any]:
@@ -116,11 +118,22 @@ class _Conversion:
         return {
             "title": title,
             "duration_s": duration_s,
-            "road": stage.road.road,
+            "road": self._paved(stage.road.road),
             "ego": {**ego.script.model_dump(), "start_m": nose_m},
             "actors": actors,
             "notes": stage.notes,
         }
+
+    def _paved(self, road: Road) -> Road:
+        """The road with shoulders as wide as its vehicles need: lanes that begin later are not drawn."""
+        edges = [edge for pair in road.edges_m() for edge in pair]
+        beyond = [
+            max(d_m - max(edges), min(edges) - d_m) + mover.body.size_m[1]
+            for mover in self._stage.movers.values()
+            for d_m in mover.offsets_m()
+        ]
+        needed = min(max(beyond, default=0.0), _WIDEST_SHOULDER_M)
+        return road if needed <= road.shoulder_m else road.model_copy(update={"shoulder_m": needed})
 
     def _actor(self, number: int, mover: Mover, nose_m: float) -> dict[str, Any]:
         """``ahead_m`` is to the face that is nearer to the ego vehicle's nose."""

@@ -14,8 +14,8 @@ from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
 
 _DEEPEST = 60
 """Nested elements; OpenSCENARIO files have about twenty."""
-_MOST_ELEMENTS = 100_000
-"""Elements of one file; Euro NCAP's scenarios have a few hundred."""
+_MOST_ELEMENTS = 300_000
+"""Elements of one file: scenarios have hundreds, the road network of a town a hundred thousand."""
 _LONGEST_SHOWN = 60
 
 

@@ -21,6 +21,7 @@ from pipeline.simulation.world.roads import Road
 from pipeline.types import F64
 
 _SEARCH_STEP_M = 0.5
+_CONVERGED_M = 1e-9
 
 
 class OffTheWay(OpenScenarioError):
@@ -84,8 +85,11 @@ class DrivenRoad:
             s_m = float(s[int(np.argmin(np.hypot(line[:, 0] - x, line[:, 1] - y)))])
         for _ in range(5):  # Newton's steps along the tangent converge within a micrometre
             px, py, heading = self.road.to_world(s_m, 0.0)[0].tolist()
-            s_m += (x - px) * cos(heading) + (y - py) * sin(heading)
+            step_m = (x - px) * cos(heading) + (y - py) * sin(heading)
+            s_m += step_m
             d_m = (y - py) * cos(heading) - (x - px) * sin(heading)
+            if abs(step_m) < _CONVERGED_M:
+                break
         return s_m, d_m
 
     def place(self, road: FileRoad, s_m: float, t_m: float, at: XmlElement) -> tuple[float, float, int]:
@@ -119,8 +123,9 @@ class DrivenRoad:
         """d of the middle of a lane of the file."""
         lanes = self.lanes_at(s_m)
         if lane not in lanes:
-            known, road = ", ".join(map(str, sorted(lanes))), shown(self.track_at(s_m).road.id)
-            raise at.refusal(f"road {road} has no driving lane {lane} at s = {s_m:.4g} m; there are {known}")
+            known, track = ", ".join(map(str, sorted(lanes))), self.track_at(s_m)
+            there = f"road {shown(track.road.id)} has no driving lane {lane} at s = {track.road_m(s_m):.4g} m"
+            raise at.refusal(f"{there}; there are {known}")
         return lanes[lane]
 
     @cached_property

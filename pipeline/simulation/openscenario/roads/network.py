@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
+from math import ceil, inf
 
 import numpy as np
+import numpy.typing as npt
 
 from pipeline.simulation.openscenario.roads.lane_sections import RoadLanes
 from pipeline.simulation.openscenario.roads.plan_view import PlanView
 from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, shown
+from pipeline.types import F64
 
-_SEARCH_STEP_M = 0.5
+_SEARCH_STEP_M, _COARSE_STEP_M = 0.5, 5.0
+_NEAR_M = 40.0
+"""Roads whose reference lines are farther than the nearest by more than this have no lane there."""
 _NO_JUNCTION = ("", "-1")
 
 
@@ -95,17 +99,33 @@ class Network:
     def project(self, x_m: float, y_m: float) -> tuple[FileRoad, float, float]:
         """The road nearest to a point of the file's world, with s and t there. Of roads that are equally near, one that
         is not inside a junction."""
+        points, owners, roads = self._points
+        away_m = np.hypot(points[:, 0] - x_m, points[:, 1] - y_m)
+        near = np.unique(owners[away_m < away_m.min(initial=inf) + _NEAR_M]).tolist()
         best: tuple[float, FileRoad, float, float] | None = None
-        for road in sorted(self.roads.values(), key=lambda each: each.junction is not None):
-            try:
-                s, t, away = self._on_road(road, x_m, y_m)
-            except OpenScenarioError:
-                continue  # a road that cannot be simulated is not driven on either
+        for road in sorted((roads[number] for number in near), key=lambda each: each.junction is not None):
+            s, t, away = self._on_road(road, x_m, y_m)
             if best is None or away < best[0] - 0.01:
                 best = away, road, s, t
         if best is None:
             raise self.at.refusal("no road that can be simulated")
         return best[1:]
+
+    @cached_property
+    def _points(self) -> tuple[F64, npt.NDArray[np.intp], list[FileRoad]]:
+        """(N, 2) points on the reference lines of all roads that can be simulated, the number of each one's road, and
+        these roads."""
+        roads, points, owners = list[FileRoad](), [np.zeros((0, 2))], [np.zeros(0, dtype=np.intp)]
+        for road in self.roads.values():
+            try:
+                line, _ = road.line, road.lanes
+            except OpenScenarioError:
+                continue  # it cannot be driven on either
+            s = np.linspace(0.0, line.length_m, max(ceil(line.length_m / _COARSE_STEP_M), 1) + 1)
+            points.append(line.at(s)[:, :2])
+            owners.append(np.full(len(s), len(roads)))
+            roads.append(road)
+        return np.concatenate(points), np.concatenate(owners), roads
 
     @staticmethod
     def _on_road(road: FileRoad, x_m: float, y_m: float) -> tuple[float, float, float]:

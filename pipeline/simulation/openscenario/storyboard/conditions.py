@@ -7,7 +7,7 @@ from collections.abc import Callable
 from math import hypot, inf
 
 from pipeline.simulation.openscenario.parameters import RULES, ParameterScope, compare
-from pipeline.simulation.openscenario.storyboard.positions import RoadPlace, file_point, place_at
+from pipeline.simulation.openscenario.storyboard.positions import ON_ROADS, RoadPlace, file_point, place_at
 from pipeline.simulation.openscenario.storyboard.stage import PlayedScenario
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
 
@@ -171,6 +171,7 @@ def _to_position(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScena
     position, kind = at.one("Position"), _distance_type(at, scope)
     is_fixed = not position.only().tag.startswith("Relative")
     known: list[RoadPlace] = []
+    points: list[tuple[float, float]] = []
 
     def target(stage: PlayedScenario) -> RoadPlace:
         if not known or not is_fixed:
@@ -180,11 +181,14 @@ def _to_position(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScena
     def in_plane(stage: PlayedScenario, name: str) -> float:
         here = stage.place_of(name, at)
         x, y = stage.road.to_file_world(here.s_m, here.d_m)
-        if is_fixed and position.only().tag in ("LanePosition", "RoadPosition", "WorldPosition"):
-            there = file_point(position.only(), scope, stage.road.network)
-        else:
-            there = stage.road.to_file_world(*target(stage)[:2])
-        return hypot(x - there[0], y - there[1])
+        if not points or not is_fixed:
+            points[:] = [point(stage)]
+        return hypot(x - points[0][0], y - points[0][1])
+
+    def point(stage: PlayedScenario) -> tuple[float, float]:
+        if position.only().tag in ON_ROADS:
+            return file_point(position.only(), scope, stage.road.network)
+        return stage.road.to_file_world(*target(stage)[:2])
 
     def in_lane(stage: PlayedScenario, name: str) -> float:
         here, there = stage.place_of(name, at), target(stage)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pipeline.simulation.openscenario.storyboard.stage import PlayedScenario
 from pipeline.simulation.openscenario.xml_files import shown
 
-_EVERY_S = 0.2
+_EVERY_S = 0.5
 _MOST_M = 0.3
 """A sixth of the room that a car has in its lane; more could change whose path it is in."""
 

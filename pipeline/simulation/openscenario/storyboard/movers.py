@@ -65,6 +65,11 @@ class Mover:
         s_m, moved = self.now(t_s)
         return RoadPlace(s_m - self.way * self.body.centre_m, moved.d_m, self.way)
 
+    def offsets_m(self) -> list[float]:
+        """d at the start and after each lane change."""
+        times_s = [0.0, *(change.ends_s() for change in self._changes)]
+        return [motion(self.script, self._road.road, t_s).d_m for t_s in times_s]
+
     def change_speed(self, t_s: float, to_mps: float, shape: str, duration_s: float, at: XmlElement) -> float:
         """A change of speed that starts at time t and replaces what was planned; returns when it ends. Shape as in
         ``SHAPES``."""

@@ -13,6 +13,8 @@ from pipeline.simulation.openscenario.roads.driven_road import DrivenRoad
 from pipeline.simulation.openscenario.roads.network import FileRoad, Network
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
 
+ON_ROADS = ("LanePosition", "RoadPosition", "WorldPosition")
+"""Positions that refer to no entity."""
 _ALONG_RAD = 0.09
 """Maximum rotation from the road's direction, 5°: vehicles in the simulator point along the road."""
 _LANE_M = 3.0
@@ -172,6 +174,8 @@ def _from_object(at: XmlElement, scope: ParameterScope, road: DrivenRoad, place_
     turned = road.heading(other.s_m) + (pi if other.way < 0 else 0.0) if is_turned else 0.0
     x, y = road.to_file_world(other.s_m, other.d_m)
     dx, dy = scope.number(at, "dx"), scope.number(at, "dy")
+    if dx == dy == 0.0:
+        return other._replace(way=_way(at, scope, road.heading(other.s_m), other.way, other))
     near_m = other.s_m + dx * other.way if is_turned else None
     s, d = road.project(x + dx * cos(turned) - dy * sin(turned), y + dx * sin(turned) + dy * cos(turned), near_m)
     return RoadPlace(s, d, _way(at, scope, road.heading(s), other.way, other))

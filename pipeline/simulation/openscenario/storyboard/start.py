@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 from pipeline.simulation.openscenario.parameters import ParameterScope
 from pipeline.simulation.openscenario.roads.network import FileRoad, Network
-from pipeline.simulation.openscenario.storyboard.positions import file_place
+from pipeline.simulation.openscenario.storyboard.positions import ON_ROADS, file_place
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
-
-_ON_ROADS = ("LanePosition", "RoadPosition", "WorldPosition")
 
 
 @dataclass(frozen=True)
@@ -40,13 +38,11 @@ def file_start(
     """Where an entity starts. A position relative to another entity stands for the place of that one. asked: who is
     waiting for it."""
     at = teleports[name].only()
-    if at.tag in _ON_ROADS:
+    if at.tag in ON_ROADS:
         road, s, _, lane = file_place(at, scope, network)
         return FileStart(road, s, lane)
     if not at.tag.startswith("Relative"):
-        raise at.refusal(
-            f"{shown(at.tag)} is not supported; {', '.join(_ON_ROADS)} and positions relative to these are"
-        )
+        raise at.refusal(f"{shown(at.tag)} is not supported; {', '.join(ON_ROADS)} and positions relative to these are")
     other = scope.text(at, "entityRef")
     if other in (name, *asked):
         raise at.refusal(f"the position of {shown(other)} refers to itself")
