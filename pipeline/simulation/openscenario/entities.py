@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
 from pipeline.common.files.user_file_errors import did_you_mean, reason_of
-from pipeline.common.files.user_files import check_allowed
 from pipeline.simulation.openscenario.parameters import ParameterScope
-from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, named_path, read_xml, shown
+from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, catalog_paths, read_xml, shown
 from pipeline.simulation.world.actors import VehicleKind
 
 _KINDS: dict[str, str] = {"car": "car", "van": "van", "truck": "truck", "bus": "bus", "motorbike": "motorcycle"}
@@ -51,11 +49,11 @@ class CatalogFiles:
     """The catalogs that a scenario names, read when they are needed."""
 
     def __init__(self, scenario: XmlElement, scope: ParameterScope, folder: Path) -> None:
-        self._folders: list[tuple[XmlElement, Path]] = []
+        self._folder, self._named = folder, list[tuple[XmlElement, str]]()
         locations = scenario.find("CatalogLocations")
         for kind in locations.children if locations is not None else []:
             for each in kind.all("Directory"):
-                self._folders.append((each, named_path(folder, scope.text(each, "path"))))
+                self._named.append((each, scope.text(each, "path")))
         self._catalogs: dict[str, XmlElement] | None = None
 
     def entry(self, reference: XmlElement, scope: ParameterScope) -> tuple[XmlElement, ParameterScope]:
@@ -79,16 +77,16 @@ class CatalogFiles:
 
     def _read(self) -> dict[str, XmlElement]:
         found: dict[str, XmlElement] = {}
-        for at, folder in self._folders:
+        for at, name in self._named:
+            last = shown(Path(name).name)
             try:
-                check_allowed(folder)
-                names = sorted(name for name in os.listdir(folder) if name.lower().endswith(".xosc"))
+                paths = catalog_paths(self._folder, name)
             except (OSError, ValueError) as error:
-                raise at.refusal(f"the catalogs in {shown(folder.name)} cannot be read: {reason_of(error)}") from None
-            if len(names) > _MOST_CATALOG_FILES:
-                raise at.refusal(f"more than {_MOST_CATALOG_FILES} files in {shown(folder.name)}")
-            for name in names:
-                catalog = read_xml(folder / name, "OpenSCENARIO").find("Catalog")
+                raise at.refusal(f"the catalogs in {last} cannot be read: {reason_of(error)}") from None
+            if len(paths) > _MOST_CATALOG_FILES:
+                raise at.refusal(f"more than {_MOST_CATALOG_FILES} files in {last}")
+            for path in paths:
+                catalog = read_xml(path, "OpenSCENARIO").find("Catalog")
                 if catalog is not None:
                     found.setdefault(catalog.attributes.get("name", ""), catalog)
         return found

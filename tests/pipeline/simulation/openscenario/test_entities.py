@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.simulation.openscenario import referenced_files
 from pipeline.simulation.scenario import ScenarioError
 from tests.pipeline.simulation.openscenario.files import (
     Parts,
@@ -58,7 +59,16 @@ def test_a_body_from_a_catalog_with_its_own_parameters(tmp_path: Path) -> None:
     assert parts.load(tmp_path).actors[0].size_m == (3.0, 2.0, 1.4)
 
 
-@pytest.mark.parametrize("name", ["Ego", "ego", "EGO", "Hero", "hero"])
+def test_catalogs_that_were_copied_beside_the_scenario(tmp_path: Path) -> None:
+    parts = with_catalog(tmp_path)
+    (tmp_path / "catalogs" / "any name.xosc").rename(tmp_path / "VehicleCatalog.xosc")
+    (tmp_path / "catalogs").rmdir()
+    (tmp_path / "other.xosc").write_text("not a catalog, and not XML")
+    assert parts.load(tmp_path).actors[0].size_m == (3.0, 2.0, 1.2)
+    assert tmp_path / "VehicleCatalog.xosc" in list(referenced_files(tmp_path / "drive.xosc"))
+
+
+@pytest.mark.parametrize("name", ["Ego", "ego", "EGO", "Hero", "hero", "EgoVehicle", "hero_1"])
 def test_the_ego_vehicle_by_its_name(name: str, tmp_path: Path) -> None:
     parts = Parts(
         entities=entity("Lead", controller=CONTROLLER) + entity(name),
