@@ -110,6 +110,8 @@ class _Conversion:
         self._set_up()
         duration_s = self._play(Storyboard(self._root.one("Storyboard"), self._scope, self._catalogs, stage))
         ego = stage.movers[stage.ego]
+        if not any(ego.script.speed_mps.values()):
+            stage.note("The ego vehicle stands throughout: the file gives it no speed.")
         nose_m = ego.start_s_m + ego.body.size_m[0] / 2
         actors = [
             self._actor(number, mover, nose_m)

@@ -21,7 +21,9 @@ from pipeline.simulation.openscenario.storyboard.stage import PlayedScenario
 from pipeline.simulation.openscenario.xml_files import XmlElement, number_in, shown
 
 _LIGHT = "Weather, light and friction of the scenario are left out: the simulator has one sky and a dry road."
+_SIGNALS = "Traffic signals of the scenario are left out."
 _APPEARANCE = "Appearance (lights, animation) of the scenario is left out."
+_LEFT_OUT = {"EnvironmentAction": _LIGHT, "InfrastructureAction": _SIGNALS}
 _QUINTIC_PEAK = 10.0 / sqrt(3.0)
 """Highest lateral acceleration of the simulator's lane change, times duration² / width."""
 _SUPPORTED = (
@@ -46,8 +48,8 @@ def start_action(at: XmlElement, actors: list[str], scope: ParameterScope, stage
 
 
 def _global(at: XmlElement, scope: ParameterScope, stage: PlayedScenario) -> None:
-    if at.tag == "EnvironmentAction":
-        stage.note(_LIGHT)
+    if at.tag in _LEFT_OUT:
+        stage.note(_LEFT_OUT[at.tag])
         return
     if at.tag != "VariableAction":
         raise at.refusal(f"{shown(at.tag)} is not supported; {_SUPPORTED}")

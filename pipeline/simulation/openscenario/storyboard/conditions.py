@@ -28,7 +28,7 @@ class Trigger:
 
     def __init__(self, at: XmlElement, scope: ParameterScope, step_s: float) -> None:
         self._groups = [
-            [_TimedCondition(each, scope, step_s) for each in group.all("Condition")]
+            [_TimedCondition(each, scope, step_s) for each in group.all("Condition") if not _is_criterion(each)]
             for group in at.all("ConditionGroup")
         ]
 
@@ -36,6 +36,11 @@ class Trigger:
         """Call once per step. Every condition is asked every time, as edges and delays need its past."""
         held = [[condition.holds(stage) for condition in group] for group in self._groups]
         return any(group and all(group) for group in held)
+
+
+def _is_criterion(at: XmlElement) -> bool:
+    """Whether it is what CARLA's ScenarioRunner judges a run by, written as a condition of the StopTrigger."""
+    return at.attributes.get("name", "").startswith("criteria_")
 
 
 class _TimedCondition:

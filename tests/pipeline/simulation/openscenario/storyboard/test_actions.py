@@ -229,5 +229,6 @@ def test_an_offset_that_is_kept_from_a_vehicle_that_keeps_its_own(tmp_path: Path
 def test_weather_and_lights_are_left_out_with_a_note(tmp_path: Path) -> None:
     lights = "<PrivateAction><AppearanceAction><LightStateAction/></AppearanceAction></PrivateAction>"
     weather = "<GlobalAction><EnvironmentAction/></GlobalAction>"
-    made = after(tmp_path, lights, weather, lights)
-    assert [note.split(" ")[0] for note in made.notes] == ["Appearance", "Weather,"]
+    signals = "<GlobalAction><InfrastructureAction/></GlobalAction>"
+    made = after(tmp_path, lights, weather, lights, signals)
+    assert [note.split(" ")[0] for note in made.notes] == ["Appearance", "Weather,", "Traffic"]
