@@ -58,8 +58,8 @@ def _road(scenario: Scenario, now: World) -> Iterable[str]:
         across, half = np.arange(-reach, reach, _ROAD_STEP_M), crossing.half_width_m()
         sides = [now.to_ego(middle.to_world(across, d_m)) for d_m in (-half, half)]
         yield _closed(np.vstack([sides[0], sides[1][::-1]]), "tarmac")
-    for right, left in road.edges_m():
-        for d_m in np.arange(right, left + 0.1, road.lane_width_m).tolist():
+    for lines_m in road.lane_lines_m():
+        for d_m in sorted(lines_m):
             yield _open(line(d_m), "paint")
 
 

@@ -191,11 +191,11 @@ def _from_openscenario(path: Path, options: str) -> Scenario:
     from pipeline.simulation.openscenario import OpenScenarioError, convert  # needed for these files only
 
     given = dict(parse_qsl(options, keep_blank_values=True))
-    number = given.pop("variant", None)
+    number, ego = given.pop("variant", None), given.pop("ego", None)
     if number is not None and not (number.isascii() and number.isdecimal() and len(number) < 10):
         raise ScenarioError(f"{path.name}: variant={number!r}: expected a number from 1")
     try:
-        return _checked(convert(path, None if number is None else int(number), given), path.name)
+        return _checked(convert(path, None if number is None else int(number), given, ego), path.name)
     except OpenScenarioError as error:
         raise ScenarioError(str(error)) from None
 

@@ -9,15 +9,91 @@ from tests.fuzz.file_targets import by_file
 from tests.fuzz.target import Target
 from tests.pipeline.simulation.openscenario.files import (
     BEND,
+    LEFT,
+    RIGHT,
+    STRAIGHT,
     Parts,
     at_time,
     condition,
     declared,
     event,
+    lane,
     lane_action,
+    on_lane,
     speed_action,
     story,
+    xodr,
 )
+
+_LONGITUDINAL = "<PrivateAction><LongitudinalAction>{}</LongitudinalAction></PrivateAction>"
+_VERTEX = '<Vertex time="{}"><Position><RelativeRoadPosition entityRef="Lead" ds="{}" dt="{}"/></Position></Vertex>'
+_EVENTS = (
+    event("keep", speed_action('<RelativeTargetSpeed entityRef="Ego" value="1" continuous="true"/>')),
+    event(
+        "gap",
+        _LONGITUDINAL.format(
+            '<LongitudinalDistanceAction entityRef="Ego" freespace="true" continuous="true" timeGap="1.5">'
+            '<DynamicConstraints maxAcceleration="2" maxDeceleration="4" maxAccelerationRate="1" maxSpeed="40"/>'
+            "</LongitudinalDistanceAction>"
+        ),
+        condition(at_time(1.0)),
+    ),
+    event(
+        "profile",
+        _LONGITUDINAL.format(
+            '<SpeedProfileAction followingMode="follow"><DynamicConstraints maxAcceleration="2" maxDeceleration="4" '
+            'maxAccelerationRate="1" maxDecelerationRate="2"/><SpeedProfileEntry time="2" speed="22"/>'
+            '<SpeedProfileEntry speed="18"/></SpeedProfileAction>'
+        ),
+        condition(at_time(2.0)),
+    ),
+    event(
+        "meet",
+        f'<PrivateAction><SynchronizeAction masterEntityRef="Ego"><TargetPositionMaster>{on_lane(-1, 300.0)}'
+        f"</TargetPositionMaster><TargetPosition>{on_lane(-1, 350.0)}</TargetPosition><FinalSpeed>"
+        '<AbsoluteSpeed value="15"><TargetTimeSteadyState time="1"/></AbsoluteSpeed></FinalSpeed></SynchronizeAction>'
+        "</PrivateAction>",
+        condition(at_time(3.0)),
+    ),
+    event(
+        "follow",
+        "<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory><Shape><Polyline>"
+        f"{_VERTEX.format(0, 0, 0)}{_VERTEX.format(3, 50, -3)}"
+        "</Polyline></Shape></Trajectory></TrajectoryRef><TimeReference>"
+        '<Timing domainAbsoluteRelative="relative" scale="1" offset="0"/></TimeReference></FollowTrajectoryAction>'
+        "</RoutingAction></PrivateAction>",
+        condition(at_time(5.0)),
+    ),
+)
+"""Every kind of action that takes time, one after another."""
+
+_OPENING = '<lane id="-3" type="driving"><width sOffset="0" a="0" b="0" c="0.0036" d="-0.000048"/></lane>'
+_CURVES = xodr(
+    '<geometry s="0" x="0" y="0" hdg="0.1" length="200"><line/></geometry>'
+    '<geometry s="200" x="199.0008" y="19.9667" hdg="0.1" length="150.45"><paramPoly3 pRange="normalized" aU="0" '
+    'bU="150" cU="0" dU="0" aV="0" bV="0" cV="10" dV="-2"/></geometry>',
+    f'{LEFT}{RIGHT}</laneSection><laneSection s="220">{LEFT}<right>{lane(-1)}{lane(-2)}{_OPENING}</right>',
+    '<elevationProfile><elevation s="0" a="0" b="0.02" c="-0.0001" d="0"/></elevationProfile>'
+    '<lateralProfile><superelevation s="0" a="0.03" b="0" c="0" d="0"/></lateralProfile>',
+)
+"""Polynomials, lane sections and profiles."""
+
+_JOINED = xodr(
+    STRAIGHT.replace("2000", "290"),
+    inside='<link><successor elementType="junction" elementId="9"/></link>',
+    more=(
+        '<road id="11" junction="9" length="60"><link>'
+        '<predecessor elementType="road" elementId="7" contactPoint="end"/>'
+        '<successor elementType="road" elementId="8" contactPoint="end"/></link><planView>'
+        '<geometry s="0" x="290" y="0" hdg="0" length="60"><arc curvature="0.01"/></geometry></planView>'
+        f"<lanes><laneSection s='0'><right>{lane(-1)}</right></laneSection></lanes></road>"
+        '<road id="8" length="80"><planView><geometry s="0" x="400" y="0" hdg="3" length="80">'
+        '<poly3 a="0" b="0" c="0.001" d="0"/></geometry></planView>'
+        f"<lanes><laneSection s='0'>{LEFT}</laneSection></lanes></road>"
+        '<junction id="9"/>'
+    ),
+)
+"""Roads that join through a junction."""
 
 
 def scenario_targets(folder: Path) -> dict[str, Target]:
@@ -31,6 +107,7 @@ def scenario_targets(folder: Path) -> dict[str, Target]:
         ),
     )
     path = whole.write(folder)
+    acting = Parts(init=whole.init, stories=story(*_EVENTS))
     values = (
         '<OpenSCENARIO><ParameterValueDistribution><ScenarioFile filepath="drive.xosc"/><Deterministic>'
         '<DeterministicSingleParameterDistribution parameterName="v"><DistributionRange stepWidth="5">'
@@ -41,9 +118,10 @@ def scenario_targets(folder: Path) -> dict[str, Target]:
     kept.mkdir()
     beside = whole.write(kept)
     return {
-        "openscenario": Target((path.read_bytes(),), by_file(folder, path.name, scenario.load)),
+        "openscenario": Target((path.read_bytes(), acting.xosc().encode()), by_file(folder, path.name, scenario.load)),
         "opendrive": Target(
-            (whole.road.encode(), BEND.encode()), by_file(kept, "road.xodr", lambda _: scenario.load(str(beside)))
+            tuple(text.encode() for text in (whole.road, BEND, _CURVES, _JOINED)),
+            by_file(kept, "road.xodr", lambda _: scenario.load(str(beside))),
         ),
         "parameter values": Target((values.encode(),), by_file(kept, "values.xosc", scenario.load)),
     }

@@ -103,8 +103,7 @@ def _carriageways(road: Road, s_m: F64) -> list[_Strip]:
 
 def _wheel_tracks(road: Road, s_m: F64) -> list[_Strip]:
     """The darker wheel tracks in each lane."""
-    lanes = (*range(-road.lanes_forward, 0), *range(1, road.lanes_oncoming + 1))
-    middles = [road.lane_offset_m(lane) + wheel for lane in lanes for wheel in (-_WHEELS_M, _WHEELS_M)]
+    middles = [road.lane_offset_m(lane) + wheel for lane in road.lanes() for wheel in (-_WHEELS_M, _WHEELS_M)]
     return [_strip(s_m, middle - _TRACK_M / 2, middle + _TRACK_M / 2, _WORN) for middle in middles]
 
 
@@ -120,7 +119,9 @@ def _edge_lines(road: Road, s_m: F64, open_m: list[tuple[float, float]]) -> list
 def edge_paint_m(road: Road) -> list[float]:
     """d of the solid lines' middles: a little inside the carriageways, none in the middle of an undivided road."""
     pairs = [(right + _EDGE_INSET_M, left - _EDGE_INSET_M) for right, left in road.edges_m()]
-    return [edge for pair in pairs for edge in pair if not (_undivided(road) and abs(edge) < _NO_MEDIAN_M)]
+    return [
+        edge for pair in pairs for edge in pair if not (_undivided(road) and abs(edge - _middle(road)) < _NO_MEDIAN_M)
+    ]
 
 
 def _lane_lines(road: Road, world: World, open_m: list[tuple[float, float]]) -> list[_Strip]:
@@ -129,14 +130,19 @@ def _lane_lines(road: Road, world: World, open_m: list[tuple[float, float]]) -> 
     first = np.floor((world.s_m - _BEHIND_M) / period) * period
     starts = np.arange(first, world.s_m + _DASHES_AHEAD_M, period)
     free = [start for start in starts if not any(low < start + _DASH_M and start < high for low, high in open_m)]
-    lines = [0.0] if _undivided(road) else []
-    for right, left in road.edges_m():
-        lines += list(right + road.lane_width_m * np.arange(1, round((left - right) / road.lane_width_m)))
+    forward, oncoming = road.lane_lines_m()
+    lines = [*([_middle(road)] if _undivided(road) else []), *forward[1:-1], *oncoming[1:-1]]
     return [_strip(start + _DASH_ENDS, d - _MARK_M / 2, d + _MARK_M / 2, _WHITE) for d in lines for start in free]
 
 
 def _undivided(road: Road) -> bool:
     return road.lanes_oncoming > 0 and road.median_m < _NO_MEDIAN_M
+
+
+def _middle(road: Road) -> float:
+    """d between the two directions."""
+    forward, oncoming = road.lane_lines_m()
+    return (forward[0] + oncoming[0]) / 2 if oncoming else forward[0]
 
 
 def _without(s_m: F64, open_m: list[tuple[float, float]]) -> list[F64]:

@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
-from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, read_xml
+from pipeline.simulation.openscenario.xml_files import (
+    OpenScenarioError,
+    XmlElement,
+    catalog_paths,
+    named_path,
+    read_xml,
+)
 
 
 def referenced_files(path: Path) -> Iterator[Path]:
@@ -35,8 +42,9 @@ def _of_scenario(path: Path) -> Iterator[Path]:
         if each.tag == "LogicFile":
             yield _named(path, each, "filepath")
         elif each.tag == "Directory":
-            yield from sorted(_named(path, each, "path").glob("*.xosc"))
+            with suppress(FileNotFoundError):
+                yield from catalog_paths(path.parent, each.attributes.get("path", ""))
 
 
 def _named(path: Path, at: XmlElement, attribute: str) -> Path:
-    return path.parent / at.attributes.get(attribute, "").replace("\\", "/")
+    return named_path(path.parent, at.attributes.get(attribute, ""))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import isfinite
@@ -10,12 +11,12 @@ from xml.parsers import expat
 
 from pipeline.common.errors import BadInput
 from pipeline.common.files.user_file_errors import reason_of
-from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
+from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, check_allowed, read_regular
 
 _DEEPEST = 60
 """Nested elements; OpenSCENARIO files have about twenty."""
-_MOST_ELEMENTS = 100_000
-"""Elements of one file; Euro NCAP's scenarios have a few hundred."""
+_MOST_ELEMENTS = 300_000
+"""Elements of one file: scenarios have hundreds, the road network of a town a hundred thousand."""
 _LONGEST_SHOWN = 60
 
 
@@ -83,6 +84,33 @@ def shown(text: str) -> str:
     """A name or value from a file as quoted in a message: on one line and not too long."""
     plain = "".join(character if character.isprintable() else " " for character in text)
     return f"{plain[:_LONGEST_SHOWN]}…" if len(plain) > _LONGEST_SHOWN else plain
+
+
+def named_path(folder: Path, name: str) -> Path:
+    """A file or folder that a file in ``folder`` names: there, or else beside that file, if both were copied."""
+    there = folder / name.replace("\\", "/")
+    try:
+        if there.exists():
+            return there
+        beside = folder / there.name
+        for each in (beside, beside.with_name(f"{beside.name}.xodr")):
+            if there.name and each.is_file():
+                return each
+    except (OSError, ValueError):  # a name that no file can have; reading it says so
+        pass
+    return there
+
+
+def catalog_paths(folder: Path, name: str) -> list[Path]:
+    """The files of a folder with catalogs that a file in ``folder`` names. If there is no such folder, those beside
+    that file whose names say that they are catalogs. OSError or ValueError if the folder cannot be listed."""
+    there = folder / name.replace("\\", "/")
+    check_allowed(there)
+    if not there.is_dir():
+        beside = sorted(path for path in folder.glob("*.xosc") if "catalog" in path.name.lower())
+        if beside:
+            return beside
+    return sorted(there / each for each in os.listdir(there) if each.lower().endswith(".xosc"))
 
 
 def read_xml(path: Path, root: str) -> XmlElement:

@@ -22,10 +22,9 @@ def lane_points(now: World, road: Road, camera: CameraCalibration, noise: LineNo
     """The points of one moment. The same seed, index and world give the same points."""
     rng = np.random.default_rng([seed, 10, index])
     alignment = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
-    right, left = road.edges_m()[0]
     along = now.s_m + np.arange(_FROM_M, noise.reach_m * 1.2, _STEP_M)
     found, lines = [np.zeros((0, 2))], [np.zeros(0, int)]
-    painted_m = np.arange(right, left + 0.1, road.lane_width_m).tolist() if road.painted else []
+    painted_m = sorted(road.lane_lines_m()[0]) if road.painted else []
     for number, d_m in enumerate(painted_m):
         places = now.to_ego(road.to_world(along, d_m))
         near = (

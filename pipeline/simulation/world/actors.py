@@ -100,6 +100,13 @@ class LaneChange(ScenarioPart):
     """Target lane; numbered as in OpenDRIVE."""
     offset_m: float | None = Field(default=None, ge=-20.0, le=20.0)
     """Offset to the road's left from the target lane's centre, afterwards; None keeps the script's."""
+    until_s: float | None = Field(default=None, ge=0.0)
+    """When it is broken off: the offset reached then is kept. None: it is completed."""
+
+    def ends_s(self) -> float:
+        """When it is over."""
+        completed = self.start_s + self.duration_s
+        return completed if self.until_s is None else min(max(self.until_s, self.start_s), completed)
 
 
 class Script(Speeds):
@@ -121,7 +128,7 @@ class Script(Speeds):
                 raise ValueError(f"the lane change at {change.start_s:g} s starts before the previous one ends")
             if (change.lane > 0) != (lane > 0):
                 raise ValueError(f"the lane change at {change.start_s:g} s leads to the other carriageway")
-            free_at, lane = change.start_s + change.duration_s, change.lane
+            free_at, lane = change.ends_s(), change.lane
         return self
 
 
@@ -221,11 +228,15 @@ def _offset(script: Script, road: Road, t_s: float) -> tuple[float, float, float
     here = road.lane_offset_m(script.lane) + script.offset_m
     for change in script.lane_changes:
         there = road.lane_offset_m(change.lane) + (script.offset_m if change.offset_m is None else change.offset_m)
-        p = (t_s - change.start_s) / change.duration_s
-        if p <= 0.0:
+        ends_s = change.ends_s()
+        if t_s <= change.start_s:
             break
+        p = (min(t_s, ends_s) - change.start_s) / change.duration_s
         if p < 1.0:
             step = p**3 * (10.0 - 15.0 * p + 6.0 * p * p)
+            if t_s > ends_s:
+                here += (there - here) * step
+                continue
             rate = 30.0 * p * p * (1.0 - p) ** 2 / change.duration_s
             accel = 60.0 * p * (1.0 - p) * (1.0 - 2.0 * p) / change.duration_s**2
             return here + (there - here) * step, (there - here) * rate, (there - here) * accel

@@ -55,6 +55,13 @@ class RoadLine:
         ways = np.concatenate([[0.0], np.cumsum(np.diff(self._outer) * shares)])
         return float(np.interp(np.interp(s_m, self._outer, ways) + way_m, ways, self._outer))
 
+    def driven_m(self, from_m: float, to_m: float, d_m: float) -> float:
+        """The way from one s to another at constant d, negative against the line: the inverse of ``advance``."""
+        shares = 1.0 - self._curvature * d_m
+        ways = np.concatenate([[0.0], np.cumsum(np.diff(self._outer) * shares)])
+        start, end = np.interp([from_m, to_m], self._outer, ways)
+        return float(end - start)
+
 
 def _arc(length_m: F64, curvature_per_m: F64) -> tuple[F64, F64, F64]:
     """Metres ahead, metres to the left and the rotation after a distance along arcs: sin θ/κ and (1 − cos θ)/κ, θ =

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from itertools import pairwise
 from math import ceil
 from typing import Any, Literal, Self
 
@@ -140,6 +141,11 @@ class Road(ScenarioPart):
     """Lanes of the other direction."""
     median_m: float = Field(default=4.0, ge=0.0, le=30.0)
     """Between the directions, without lanes."""
+    forward_edges_m: tuple[float, ...] = ()
+    """d of the lines of the ego vehicle's lanes, from the middle of the road outwards, if lanes differ in width or the
+    directions lie unequally far out; then the four keys above follow from them."""
+    oncoming_edges_m: tuple[float, ...] = ()
+    """The same for the other direction; only with ``forward_edges_m``."""
     shoulder_m: float = Field(default=2.5, ge=0.0, le=10.0)
     """Beside the outermost lanes."""
     painted: bool = True
@@ -148,10 +154,35 @@ class Road(ScenarioPart):
     """Minimum vertical radius of its crests and sags; None: it is level."""
     crests_every_m: float = Field(default=400.0, ge=50.0)
     """Distance from crest to crest."""
+    humps_per_m: tuple[tuple[float, float], ...] = ()
+    """(s, vertical curvature) in ascending order, linear in between, instead of ``crest_radius_m``."""
     beacons: tuple[Beacon, ...] = ()
     """Obstacles on the road."""
     strips: tuple[Strip, ...] = ()
     """Structures along the road."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_edges(cls, given: Any) -> Any:
+        """The keys that follow from the edges of lanes."""
+        forward, oncoming = ([*_numbers(given, f"{name}_edges_m")] for name in ("forward", "oncoming"))
+        if not forward:
+            if oncoming:
+                raise ValueError("oncoming_edges_m needs forward_edges_m")
+            return given
+        if len(forward) == 1 or len(oncoming) == 1:
+            raise ValueError("a lane has two edges; give more than one, or none")
+        if any(b >= a for a, b in pairwise(forward)) or any(b <= a for a, b in pairwise(oncoming)):
+            raise ValueError("the edges of lanes must lead outwards: forward_edges_m falls, oncoming_edges_m rises")
+        if oncoming and oncoming[0] < forward[0]:
+            raise ValueError("the directions overlap: oncoming_edges_m must begin to the left of forward_edges_m")
+        return {
+            **given,
+            "lanes_forward": len(forward) - 1,
+            "lanes_oncoming": max(len(oncoming) - 1, 0),
+            "lane_width_m": (forward[0] - forward[-1]) / (len(forward) - 1),
+            "median_m": min(oncoming[0] - forward[0], 30.0) if oncoming else 0.0,
+        }
 
     @model_validator(mode="after")
     def _wide_enough_bends(self) -> Road:
@@ -169,21 +200,43 @@ class Road(ScenarioPart):
         """d of a lane's middle. ValueError for a lane that the road does not have."""
         if lane == 0 or not -self.lanes_forward <= lane <= self.lanes_oncoming:
             raise ValueError(f"no lane {lane}: there are −{self.lanes_forward}…−1 and 1…{self.lanes_oncoming}")
+        if self.forward_edges_m:
+            edges = self.lane_lines_m()[0 if lane < 0 else 1]
+            return (edges[abs(lane) - 1] + edges[abs(lane)]) / 2
         side = 1.0 if lane > 0 else -1.0
         return side * (self.median_m / 2 + (abs(lane) - 0.5) * self.lane_width_m)
 
     def hump_per_m(self, s_m: float) -> float:
         """Vertical curvature at s, positive on a crest. Crests and sags alternate."""
+        if self.humps_per_m:
+            at_m, curvature = zip(*self.humps_per_m, strict=True)
+            return float(np.interp(s_m, at_m, curvature))
         if self.crest_radius_m is None:
             return 0.0
         return float(np.sin(2.0 * np.pi * s_m / self.crests_every_m)) / self.crest_radius_m
 
+    def lane_lines_m(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """d of every edge of a lane from the middle of the road outwards: forward, and oncoming (empty if none)."""
+        return self._lane_lines
+
+    @cached_property
+    def _lane_lines(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        if self.forward_edges_m:
+            return self.forward_edges_m, self.oncoming_edges_m
+        inner = self.median_m / 2
+        forward = tuple(-inner - i * self.lane_width_m for i in range(self.lanes_forward + 1))
+        oncoming = tuple(inner + i * self.lane_width_m for i in range(self.lanes_oncoming + 1))
+        return forward, oncoming if self.lanes_oncoming else ()
+
+    def lanes(self) -> tuple[int, ...]:
+        """The numbers of all lanes."""
+        return (*range(-self.lanes_forward, 0), *range(1, self.lanes_oncoming + 1))
+
     def edges_m(self) -> tuple[tuple[float, float], ...]:
         """d of the (right, left) edges of each carriageway, without shoulders: forward first."""
-        inner = self.median_m / 2
-        forward = (-inner - self.lanes_forward * self.lane_width_m, -inner)
-        oncoming = (inner, inner + self.lanes_oncoming * self.lane_width_m)
-        return (forward, oncoming) if self.lanes_oncoming else (forward,)
+        forward, oncoming = self.lane_lines_m()
+        pairs = ((forward[-1], forward[0]), *([(oncoming[0], oncoming[-1])] if oncoming else []))
+        return tuple(pairs)
 
     def curvature_per_m(self, s_m: float) -> float:
         """Curvature of the reference line at s; the first and last segment continue indefinitely."""
@@ -212,3 +265,10 @@ class Road(ScenarioPart):
             x, y, heading = self.to_world(crossing.s_m, 0.0)[0].tolist()
             lines.append(RoadLine([(_CROSSING_REACH_M, 0.0)], (x, y, heading + float(np.radians(crossing.angle_deg)))))
         return tuple(lines)
+
+
+def _numbers(given: Any, key: str) -> list[float]:
+    """A list of numbers among the given keys; empty if it is none, which its own validation reports."""
+    found = given.get(key, ()) if isinstance(given, dict) else ()
+    numbers = [each for each in found if isinstance(each, int | float)] if isinstance(found, list | tuple) else []
+    return numbers if isinstance(found, list | tuple) and len(numbers) == len(found) else []

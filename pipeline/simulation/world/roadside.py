@@ -60,7 +60,11 @@ def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, .
     things = [
         *_rails(road, start_m, end_m),
         *_posts(start_m, end_m, right, left),
-        *(_gantries(start_m, end_m, right) if road.median_m >= _LEAST_MEDIAN_M or not road.lanes_oncoming else ()),
+        *(
+            _gantries(start_m, end_m, right, max(0.0, road.lane_lines_m()[0][0] + 0.6))
+            if road.median_m >= _LEAST_MEDIAN_M or not road.lanes_oncoming
+            else ()
+        ),
         *_trees(np.random.default_rng([seed, 1]), start_m, end_m, right, left),
         *(Thing("post", b.s_m, b.d_m, b.length_m, b.width_m, 0.0, b.high_m, 0.0) for b in road.beacons),
         *_strips(road, start_m, end_m),
@@ -124,7 +128,8 @@ def _rails(road: Road, start_m: float, end_m: float) -> list[Thing]:
     if road.median_m < _LEAST_MEDIAN_M:
         return []
     middles = np.arange(start_m, end_m, RAIL_LENGTH_M) + RAIL_LENGTH_M / 2
-    sides = (-road.median_m / 2 + 0.6, road.median_m / 2 - 0.6)
+    inner = road.lane_lines_m()[0][0]
+    sides = (inner + 0.6, inner + road.median_m - 0.6)
     return [
         Thing("rail", float(s), d, RAIL_LENGTH_M, 0.12, RAIL_LOW_M, RAIL_HIGH_M, 0.0) for s in middles for d in sides
     ]
@@ -149,14 +154,14 @@ def _posts(start_m: float, end_m: float, right_m: float, left_m: float) -> list[
     ]
 
 
-def _gantries(start_m: float, end_m: float, right_m: float) -> list[Thing]:
+def _gantries(start_m: float, end_m: float, right_m: float, left_m: float) -> list[Thing]:
     """Sign gantries over the forward carriageway at intervals."""
     things = []
     first = np.ceil(start_m / _GANTRY_STEP_M) * _GANTRY_STEP_M
     for s in np.arange(first, end_m, _GANTRY_STEP_M):
         leg = right_m - 1.0
         things.append(Thing("gantry_leg", float(s), leg, 0.35, 0.35, 0.0, SIGN_HIGH_M, 0.0))
-        things.append(Thing("gantry_leg", float(s), 0.0, 0.35, 0.35, 0.0, SIGN_HIGH_M, 0.0))
+        things.append(Thing("gantry_leg", float(s), left_m, 0.35, 0.35, 0.0, SIGN_HIGH_M, 0.0))
         things.append(Thing("gantry_sign", float(s), leg / 2, 0.2, -leg * 0.8, SIGN_LOW_M, SIGN_HIGH_M, 0.0))
     return things
 

@@ -6,8 +6,19 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.simulation.openscenario import referenced_files
 from pipeline.simulation.scenario import ScenarioError
-from tests.pipeline.simulation.openscenario.files import Parts, declared, entity, init, on_lane, vehicle
+from tests.pipeline.simulation.openscenario.files import (
+    Parts,
+    declared,
+    entity,
+    event,
+    init,
+    on_lane,
+    speed_action,
+    story,
+    vehicle,
+)
 
 CATALOGS = '<VehicleCatalog><Directory path="catalogs"/></VehicleCatalog>'
 REFERENCE = '<CatalogReference catalogName="$catalog" entryName="small">{}</CatalogReference>'
@@ -48,7 +59,16 @@ def test_a_body_from_a_catalog_with_its_own_parameters(tmp_path: Path) -> None:
     assert parts.load(tmp_path).actors[0].size_m == (3.0, 2.0, 1.4)
 
 
-@pytest.mark.parametrize("name", ["Ego", "ego", "EGO", "Hero", "hero"])
+def test_catalogs_that_were_copied_beside_the_scenario(tmp_path: Path) -> None:
+    parts = with_catalog(tmp_path)
+    (tmp_path / "catalogs" / "any name.xosc").rename(tmp_path / "VehicleCatalog.xosc")
+    (tmp_path / "catalogs").rmdir()
+    (tmp_path / "other.xosc").write_text("not a catalog, and not XML")
+    assert parts.load(tmp_path).actors[0].size_m == (3.0, 2.0, 1.2)
+    assert tmp_path / "VehicleCatalog.xosc" in list(referenced_files(tmp_path / "drive.xosc"))
+
+
+@pytest.mark.parametrize("name", ["Ego", "ego", "EGO", "Hero", "hero", "EgoVehicle", "hero_1"])
 def test_the_ego_vehicle_by_its_name(name: str, tmp_path: Path) -> None:
     parts = Parts(
         entities=entity("Lead", controller=CONTROLLER) + entity(name),
@@ -65,12 +85,62 @@ def test_the_ego_vehicle_by_its_controller(tmp_path: Path) -> None:
     assert parts.load(tmp_path).ego.speed_mps == {0.0: 20.0}
 
 
+TWO = Parts(
+    entities=entity("A") + entity("B"),
+    init=init("A", on_lane(-1, 150.0), "10") + init("B", on_lane(-1, 100.0), "20"),
+)
+
+
+def test_without_a_name_or_controller_the_first_is_the_ego_vehicle(tmp_path: Path) -> None:
+    made = TWO.load(tmp_path)
+    assert made.ego.speed_mps == {0.0: 10.0}
+    assert made.notes[0] == (
+        "No entity is called Ego, so the first, A, is taken for the ego vehicle; choose another with ?ego=NAME."
+    )
+
+
+def test_the_ego_vehicle_can_be_chosen(tmp_path: Path) -> None:
+    made = TWO.load(tmp_path, "?ego=B")
+    assert (made.ego.speed_mps, made.notes) == ({0.0: 20.0}, ())
+    with pytest.raises(ScenarioError, match="ego='C': no such entity"):
+        TWO.load(tmp_path, "?ego=C")
+
+
+BESIDE = '<LanePosition roadId="7" laneId="-3" s="{}"/>'
+
+
+@pytest.mark.parametrize("body", [PEDESTRIAN, vehicle("bicycle"), "<MiscObject/>"])
+def test_what_the_simulator_has_not_is_left_out_beside_the_lanes(body: str, tmp_path: Path) -> None:
+    what = {PEDESTRIAN: "Pedestrian", "<MiscObject/>": "MiscObject"}.get(body, "bicycle")
+    parts = Parts(entities=entity("Ego") + entity("Lead") + entity("X", body))
+    parts.init += init("X", BESIDE.format(160.0).replace('s="', 'offset="-0.2" s="'), "0")
+    made = parts.load(tmp_path)
+    assert len(made.actors) == 1
+    assert made.notes == (f"X, a {what} beside the driving lanes, is left out.",)
+
+
+@pytest.mark.parametrize(
+    ("position", "stories", "says"),
+    [
+        (on_lane(-2, 160.0), "", "entity X is a Pedestrian, which is not supported on a driving lane"),
+        (
+            BESIDE.format(160.0),
+            story(event("e", speed_action("2")), actors="X"),
+            "entity X is a Pedestrian, which is not supported when it acts in the storyboard",
+        ),
+    ],
+)
+def test_a_pedestrian_who_matters_is_refused(position: str, stories: str, says: str, tmp_path: Path) -> None:
+    parts = Parts(entities=entity("Ego") + entity("Lead") + entity("X", PEDESTRIAN), stories=stories)
+    parts.init += init("X", position)
+    with pytest.raises(ScenarioError, match=says):
+        parts.load(tmp_path)
+
+
 @pytest.mark.parametrize(
     ("entities", "says"),
     [
-        (entity("A") + entity("B"), "which entity is the ego vehicle.* there are A, B"),
-        (entity("Ego") + entity("hero"), "which entity is the ego vehicle"),
-        ("", "there are none"),
+        ("", "no entities"),
         (entity("Ego") + entity("Ego"), "two entities are called 'Ego'"),
         (entity("Ego") + entity("Child", PEDESTRIAN), "entity Child is a Pedestrian, which is not supported"),
         (entity("Ego") + entity("Lead", vehicle("bicycle")), "entity Lead is a bicycle, which is not supported"),

@@ -21,8 +21,8 @@ EGO_NOSE_M = 1.349 + 4.358 / 2
 REASONS = {
     "pedestrian": r"is a Pedestrian, which is not supported",
     "bicycle": r"is a bicycle, which is not supported",
-    "route": r"FollowTrajectoryAction is not supported",
-    "distance": r"LongitudinalDistanceAction is supported as a jump only",
+    "route": r"FollowTrajectoryAction is not supported as the start of the ego vehicle",
+    "trajectory": r"FollowTrajectoryAction needs a Trajectory; catalogs of trajectories are not read",
     "variants": r"\d+ variants of .*; choose one with .*\?variant=1",
     "catalog": r"no Storyboard: it is not a scenario",
 }
@@ -32,7 +32,7 @@ EXPECTED = [
     (r"NCAP_AEB_VRU_CB\w+(-\d+)?_\w*2023|NCAP_AEB_VRU_CB", "bicycle"),
     (r"/CBLA|/CB(FA|NA|NAO)_", "bicycle"),
     (r"(VRU_|/)CP", "pedestrian"),
-    (r"CCFhol", "distance"),
+    (r"CCFhol", "trajectory"),
     (r"C[CM]Ftap|C[CM]Cscp", "route"),
     (r"Variation_2023|/(Standard|Extended)Range/", "variants"),
 ]

@@ -60,3 +60,15 @@ def test_an_offset_stays_through_a_lane_change() -> None:
     change = {"start_s": 2.0, "duration_s": 4.0, "lane": -2}
     script = Script.model_validate({"lane": -1, "offset_m": 0.5, "speed_mps": {0: 20}, "lane_changes": [change]})
     assert [motion(script, ROAD, t).d_m for t in (0.0, 9.0)] == pytest.approx([-3.3, -6.9])
+
+
+def test_a_lane_change_that_is_broken_off_keeps_what_it_reached() -> None:
+    """Half of its time is half of its way; another change starts from there."""
+    road = Road(segments=(Segment(length_m=500),), lane_width_m=4.0, median_m=0.0)
+    changes = (
+        {"start_s": 2.0, "duration_s": 4.0, "lane": -2, "until_s": 4.0},
+        {"start_s": 5.0, "duration_s": 2.0, "lane": -1},
+    )
+    script = Script.model_validate({"lane": -1, "speed_mps": {0: 20}, "lane_changes": changes})
+    assert [motion(script, road, t_s).d_m for t_s in (2.0, 4.0, 4.9, 6.0, 8.0)] == pytest.approx([-2, -4, -4, -3, -2])
+    assert motion(script, road, 4.5).d_rate_mps == 0.0

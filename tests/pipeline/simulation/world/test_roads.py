@@ -98,3 +98,45 @@ def test_a_changed_copy_forgets_the_old_course_and_is_checked() -> None:
     assert straight.to_world(300.0, 0.0)[0, 1] == 0.0
     with pytest.raises(ValueError, match="lanes_forward"):
         ROAD.model_copy(update={"lanes_forward": 0})
+
+
+EDGES = {"forward_edges_m": (0.5, -3.0, -7.0), "oncoming_edges_m": (2.5, 6.5)}
+
+
+def test_lanes_of_unequal_width() -> None:
+    road = Road(segments=(Segment(length_m=100),), **EDGES)
+    assert road.lanes() == (-2, -1, 1)
+    assert [road.lane_offset_m(lane) for lane in road.lanes()] == [-5.0, -1.25, 4.5]
+    assert road.edges_m() == ((-7.0, 0.5), (2.5, 6.5))
+    assert (road.lane_width_m, road.median_m) == (3.75, 2.0)
+    equal = Road(segments=road.segments, lanes_forward=2, lanes_oncoming=1, median_m=1.0, lane_width_m=3.0)
+    assert equal.lane_lines_m() == ((-0.5, -3.5, -6.5), (0.5, 3.5))
+
+
+@pytest.mark.parametrize(
+    ("edges", "says"),
+    [
+        ({"forward_edges_m": (-1.0,)}, "a lane has two edges"),
+        ({"forward_edges_m": (-4.0, -1.0)}, "must lead outwards"),
+        ({"forward_edges_m": (0.0, -3.0), "oncoming_edges_m": (4.0, 1.0)}, "must lead outwards"),
+        ({"forward_edges_m": (0.0, -3.0), "oncoming_edges_m": (-1.0, 3.0)}, "the directions overlap"),
+        ({"oncoming_edges_m": (0.0, 3.0)}, "oncoming_edges_m needs forward_edges_m"),
+        ({"forward_edges_m": ("left", "right")}, "valid number"),
+    ],
+)
+def test_edges_of_lanes_that_are_refused(edges: dict[str, tuple[float, ...]], says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        Road(segments=(Segment(length_m=100),), **edges)
+
+
+def test_humps_are_linear_between_their_places() -> None:
+    road = Road(segments=(Segment(length_m=100),), humps_per_m=((10.0, 0.0), (30.0, 0.002), (40.0, -0.001)))
+    assert [road.hump_per_m(s) for s in (0.0, 20.0, 30.0, 35.0, 90.0)] == pytest.approx(
+        [0.0, 0.001, 0.002, 0.0005, -0.001]
+    )
+
+
+@given(d=st.floats(-6.0, 6.0), start=st.floats(0.0, 80.0), way=st.floats(-60.0, 60.0))
+def test_the_way_between_two_places_is_what_leads_from_one_to_the_other(d: float, start: float, way: float) -> None:
+    line = Road(segments=(Segment(length_m=40), Segment(length_m=60, radius_m=50))).line
+    assert line.driven_m(start, line.advance(start, way, d), d) == pytest.approx(way, abs=1e-6)

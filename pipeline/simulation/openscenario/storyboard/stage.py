@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from pipeline.simulation.openscenario.movers import Mover
-from pipeline.simulation.openscenario.opendrive import DrivenRoad
-from pipeline.simulation.openscenario.positions import RoadPlace
+from pipeline.simulation.openscenario.roads.driven_road import DrivenRoad
+from pipeline.simulation.openscenario.storyboard.movers import Mover
+from pipeline.simulation.openscenario.storyboard.positions import RoadPlace
+from pipeline.simulation.openscenario.storyboard.running import SpeedControl
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
+
+_KEPT_M = 0.05
 
 
 @dataclass
@@ -20,6 +23,14 @@ class PlayedScenario:
     """Entities that have a place, by name."""
     ego: str = ""
     """Name of the ego vehicle."""
+    left_out: set[str] = field(default_factory=set)
+    """Entities that are not simulated, as the notes say; their actions do nothing."""
+    controlled: set[str] = field(default_factory=set)
+    """Entities to which the file gives a controller."""
+    controls: list[SpeedControl] = field(default_factory=list)
+    """Speeds that are controlled at every step."""
+    watched: list[tuple[Mover, float, XmlElement]] = field(default_factory=list)
+    """Entities whose offset others keep relative to it, that offset, and the actions that do."""
     variables: dict[str, str] = field(default_factory=dict)
     """Their present values."""
     states: dict[tuple[str, str], str] = field(default_factory=dict)
@@ -35,9 +46,27 @@ class PlayedScenario:
 
     def mover(self, name: str, at: XmlElement) -> Mover:
         """An entity by name."""
+        if name in self.left_out:
+            raise at.refusal(f"{shown(name)} is not simulated, so nothing can refer to it")
         if name not in self.movers:
             raise at.refusal(f"no entity {shown(name)!r} with a position")
         return self.movers[name]
+
+    def watch_offset(self, other: Mover, at: XmlElement) -> None:
+        """An action keeps its offset from ``other``, which must therefore keep its own."""
+        self.watched.append((other, other.now(self.t_s)[1].d_m, at))
+
+    def step_controls(self) -> None:
+        """Set the controlled speeds for the step that begins now."""
+        self.controls = [each for each in self.controls if not each.is_over(self.t_s)]
+        for each in self.controls:
+            each.step(self.t_s)
+        for other, d_m, at in self.watched:
+            if abs(other.now(self.t_s)[1].d_m - d_m) > _KEPT_M:
+                raise at.refusal(
+                    f"{at.tag} with continuous=true relative to {shown(other.body.name)}, which moves sideways "
+                    "meanwhile, is not supported"
+                )
 
     def place_of(self, name: str, at: XmlElement) -> RoadPlace:
         """Where an entity is now."""
@@ -46,6 +75,11 @@ class PlayedScenario:
     def speed(self, name: str, at: XmlElement) -> float:
         """Its present speed."""
         return self.mover(name, at).now(self.t_s)[1].speed_mps
+
+    def is_beyond_road(self, name: str, at: XmlElement) -> bool:
+        """Whether an entity has left the way at one of its ends."""
+        s_m = self.mover(name, at).now(self.t_s)[0]
+        return not 0.0 <= s_m <= self.road.length_m
 
     def note(self, sentence: str) -> None:
         """Remember that something is left out."""

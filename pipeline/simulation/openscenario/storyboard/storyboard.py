@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pipeline.simulation.openscenario.actions import RunningAction, start_action
-from pipeline.simulation.openscenario.conditions import Trigger
 from pipeline.simulation.openscenario.entities import CatalogFiles
 from pipeline.simulation.openscenario.parameters import ParameterScope
-from pipeline.simulation.openscenario.stage import PlayedScenario
+from pipeline.simulation.openscenario.storyboard.actions import start_action
+from pipeline.simulation.openscenario.storyboard.conditions import Trigger
+from pipeline.simulation.openscenario.storyboard.running import STEP_S, Running
+from pipeline.simulation.openscenario.storyboard.stage import PlayedScenario
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
 
-STEP_S = 0.02
-"""Triggers are examined at this interval: at 130 km/h a vehicle drives 0.7 m meanwhile."""
 _MOST_EVENTS = 500
 _MOST_CONDITIONS = 500
 """Limits for files of unknown origin; playing two minutes then takes under a minute. Euro NCAP's have under ten."""
@@ -148,7 +147,7 @@ class _Event:
         for name, _ in self._actions:
             stage.register("action", name)
         self._start = _trigger(at.find("StartTrigger"), scope)
-        self._running: list[tuple[str, list[RunningAction]]] | None = None
+        self._running: list[tuple[str, list[Running]]] | None = None
         self.is_complete = False
 
     def step(self, stage: PlayedScenario, others: list[_Event]) -> None:

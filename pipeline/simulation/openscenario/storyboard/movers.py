@@ -11,8 +11,8 @@ from pydantic import ValidationError
 
 from pipeline.common.files.user_file_errors import first_complaint
 from pipeline.simulation.openscenario.entities import VehicleBody
-from pipeline.simulation.openscenario.opendrive import DrivenRoad
-from pipeline.simulation.openscenario.positions import RoadPlace, lane_at
+from pipeline.simulation.openscenario.roads.driven_road import DrivenRoad
+from pipeline.simulation.openscenario.storyboard.positions import RoadPlace
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
 from pipeline.simulation.world.actors import LaneChange, Motion, Script, motion
 from pipeline.simulation.world.roads import Road
@@ -21,6 +21,7 @@ _AT_ONCE_S = 1e-3
 """Duration of a jump in speed: a script's speed is piecewise linear."""
 _PIECES = 8
 """Linear pieces in which a smooth change of speed is divided: within 1 % of the change."""
+_STEERED_MPS = 1e-3
 _SHAPES: dict[str, tuple[Callable[[float], float], float]] = {
     "linear": (lambda p: p, 1.0),
     "cubic": (lambda p: p * p * (3.0 - 2.0 * p), 1.5),
@@ -37,10 +38,11 @@ class Mover:
     def __init__(self, body: VehicleBody, place: RoadPlace, road: DrivenRoad, at: XmlElement) -> None:
         self.body, self.way, self._road, self._at = body, place.way, road, at
         self._corners: list[tuple[float, float]] = [(0.0, 0.0)]
+        self._steered: list[tuple[float, float]] = []
         self._changes: list[LaneChange] = []
-        self.speed_version = 0  # counts the changes of speed
-        self.place(place)
+        self.speed_version = self.lane_version = 0  # count the changes of speed and of offset
         self._known: tuple[float, Motion, float] | None = None
+        self.place(place)
 
     def place(self, place: RoadPlace) -> None:
         """Put its reference point there at time 0."""
@@ -63,47 +65,86 @@ class Mover:
         s_m, moved = self.now(t_s)
         return RoadPlace(s_m - self.way * self.body.centre_m, moved.d_m, self.way)
 
-    def lane_now(self, t_s: float) -> int:
-        """The nearest driving lane of the file."""
-        return lane_at(self._road, self.now(t_s)[1].d_m)
+    def offsets_m(self) -> list[float]:
+        """d at the start and after each lane change."""
+        times_s = [0.0, *(change.ends_s() for change in self._changes)]
+        return [motion(self.script, self._road.road, t_s).d_m for t_s in times_s]
 
     def change_speed(self, t_s: float, to_mps: float, shape: str, duration_s: float, at: XmlElement) -> float:
         """A change of speed that starts at time t and replaces what was planned; returns when it ends. Shape as in
         ``SHAPES``."""
-        if not 0.0 <= to_mps <= 100.0:
-            raise at.refusal(f"{shown(self.body.name)}: {to_mps:.4g} m/s; the simulator drives forward, up to 100 m/s")
-        self.speed_version += 1
-        self._corners, from_mps = self._corners_until(t_s), self.now(t_s)[1].speed_mps
-        if t_s == 0.0 and (shape == "step" or duration_s == 0.0):
-            self._corners = [(0.0, to_mps)]
-            return self._renewed(0.0, at)
-        if shape == "step" or duration_s < _AT_ONCE_S:
-            self._corners += [(t_s, from_mps), (t_s + _AT_ONCE_S, to_mps)]
-            return self._renewed(t_s, at)
         pieces = 1 if shape == "linear" else _PIECES
-        share_after = _SHAPES[shape][0]
-        self._corners += [
-            (t_s + duration_s * i / pieces, from_mps + (to_mps - from_mps) * share_after(i / pieces))
+        from_mps = self._replan_speed(t_s)
+        if shape == "step" or duration_s < _AT_ONCE_S:
+            return self.plan_speed([(t_s, from_mps), (t_s + _AT_ONCE_S, to_mps)] if t_s else [(0.0, to_mps)], at, t_s)
+        corners = [
+            (t_s + duration_s * i / pieces, from_mps + (to_mps - from_mps) * share_of(shape, i / pieces))
             for i in range(pieces + 1)
         ]
-        return self._renewed(t_s + duration_s, at)
+        return self.plan_speed(corners, at, t_s + duration_s)
+
+    def plan_speed(self, corners: list[tuple[float, float]], at: XmlElement, ends_s: float) -> float:
+        """Speeds (time, m/s) from the first corner's time on, linear in between; returns when the change ends."""
+        if not all(0.0 <= speed <= 100.0 for _, speed in corners):
+            worst = max((speed for _, speed in corners), key=lambda speed: max(-speed, speed - 100.0))
+            raise at.refusal(f"{shown(self.body.name)}: {worst:.4g} m/s; the simulator drives forward, up to 100 m/s")
+        self._replan_speed(corners[0][0])
+        self._corners = [*self._corners_until(corners[0][0]), *corners]
+        self._renew(at)
+        return ends_s
+
+    def begin_control(self, t_s: float) -> None:
+        """Hold the present speed, to be steered from now on."""
+        speed_mps = self._replan_speed(t_s)
+        self._corners.append((t_s, speed_mps))
+        self._renew(self._at)
+
+    def steer_speed(self, t_s: float, until_s: float, to_mps: float, at: XmlElement) -> None:
+        """A speed that a control sets for the end of a step; linear from the present one. Corners that a straight line
+        passes within 1 mm/s are left out."""
+        if not self._steered:
+            self._corners = [*self._corners_until(t_s), (t_s, self.now(t_s)[1].speed_mps)]
+        start_s, start_mps = self._corners[-1 if not self._steered else -2]
+        slope = (to_mps - start_mps) / (until_s - start_s)
+        if self._steered and all(
+            abs(start_mps + slope * (time - start_s) - speed) < _STEERED_MPS for time, speed in self._steered
+        ):
+            self._corners.pop()
+        else:
+            self._steered = []
+        self._steered.append((until_s, to_mps))
+        self._corners.append((until_s, to_mps))
+        self._renew(at)
 
     def change_lane(self, t_s: float, d_m: float, duration_s: float, at: XmlElement) -> float:
-        """A move to another offset from the reference line; returns when it ends."""
+        """A move to another offset from the reference line, which breaks off one that is not complete; returns when it
+        ends."""
+        self.break_off_lane_change(t_s, at)
         lane, offset = self._lane_and_offset(d_m, at)
         try:
             change = LaneChange(start_s=t_s, duration_s=duration_s, lane=lane, offset_m=offset)
         except ValidationError as error:
             raise at.refusal(first_complaint(error, LaneChange)) from None
         self._changes.append(change)
-        return self._renewed(t_s + duration_s, at)
+        self._renew(at)
+        return t_s + duration_s
+
+    def break_off_lane_change(self, t_s: float, at: XmlElement) -> None:
+        """Keep the offset that was reached, if a change is not complete."""
+        self.lane_version += 1
+        if self._changes and self._changes[-1].ends_s() > t_s:
+            self._changes[-1] = self._changes[-1].model_copy(update={"until_s": t_s})
+            self._renew(at)
+
+    def _replan_speed(self, t_s: float) -> float:
+        """Forget what was planned from time t on; returns the speed then."""
+        speed_mps = self.now(t_s)[1].speed_mps
+        self.speed_version += 1
+        self._corners, self._steered = self._corners_until(t_s), []
+        return speed_mps
 
     def _corners_until(self, t_s: float) -> list[tuple[float, float]]:
         return self._corners[: bisect_left(self._corners, (t_s, -1.0))]
-
-    def _renewed(self, ends_s: float, at: XmlElement) -> float:
-        self._renew(at)
-        return ends_s
 
     def _renew(self, at: XmlElement) -> None:
         self._known = None
@@ -121,11 +162,16 @@ class Mover:
         """The simulator's lane whose traffic drives in this direction, and the offset from its middle: a vehicle may
         drive on the other side."""
         road: Road = self._road.road
-        lanes = range(-road.lanes_forward, 0) if self.way > 0 else range(1, road.lanes_oncoming + 1)
+        lanes = [each for each in road.lanes() if (each < 0) == (self.way > 0)]
         if not lanes:
             raise at.refusal(f"{shown(self.body.name)} drives against a road that has no oncoming lane")
         lane = min(lanes, key=lambda each: abs(road.lane_offset_m(each) - d_m))
         return lane, d_m - road.lane_offset_m(lane)
+
+
+def share_of(shape: str, share: float) -> float:
+    """Share of a change that is done after a share of its time. Shape as in ``SHAPES``, but for a step."""
+    return _SHAPES[shape][0](share)
 
 
 def seconds_for(shape: str, dimension: str, value: float, change: float, speed_mps: float, at: XmlElement) -> float:
@@ -135,6 +181,8 @@ def seconds_for(shape: str, dimension: str, value: float, change: float, speed_m
         raise at.refusal(f"dynamicsShape={shown(shape)!r} is not supported; {', '.join(SHAPES)} are")
     if shape == "step" or change == 0.0:
         return 0.0
+    if dimension == "rate":
+        value = abs(value)  # many files give a negative rate for braking
     if value < 0.0 or (value == 0.0 and dimension != "time"):
         raise at.refusal(f"{at.tag} value={value:g}: expected a positive number")
     if dimension == "time":

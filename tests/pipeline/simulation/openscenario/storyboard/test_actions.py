@@ -158,16 +158,16 @@ FOLLOW = "<PrivateAction><RoutingAction><FollowTrajectoryAction/></RoutingAction
     ("action", "says"),
     [
         (TELEPORT, "TeleportAction is supported at the start only"),
-        (JUMP.format('distance="12"', ""), "LongitudinalDistanceAction is supported at the start only"),
-        (FOLLOW, "FollowTrajectoryAction is not supported; SpeedAction, LaneChangeAction"),
-        ("<PrivateAction><SynchronizeAction/></PrivateAction>", "SynchronizeAction is not supported"),
+        (
+            JUMP.format('distance="12"', ""),
+            "LongitudinalDistanceAction without DynamicConstraints is supported at the start",
+        ),
+        (FOLLOW, "FollowTrajectoryAction needs a Trajectory; catalogs of trajectories are not read"),
         ("<PrivateAction><VisibilityAction/></PrivateAction>", "VisibilityAction is not supported"),
-        ("<PrivateAction><ControllerAction><AssignControllerAction/></ControllerAction></PrivateAction>", "AssignC"),
         ("<GlobalAction><EntityAction/></GlobalAction>", "EntityAction is not supported"),
         ("<UserDefinedAction/>", "UserDefinedAction is not supported"),
         (speed_action("500"), r"Lead: 500 m/s; the simulator drives forward, up to 100 m/s"),
         (speed_action(RELATIVE.format(-50, "delta")), "Lead: -30 m/s"),
-        (speed_action(RELATIVE.format(1, "delta").replace("false", "true")), "continuous=true is not supported"),
         (speed_action("10", "wavy", 1.0), "dynamicsShape='wavy' is not supported; linear, cubic"),
         (speed_action("10", "linear", 1.0, "mood"), "dynamicsDimension='mood' is not supported"),
         (speed_action("10", "linear", -1.0), "expected a positive number"),
@@ -186,13 +186,49 @@ def test_actions_that_are_refused(action: str, says: str, tmp_path: Path) -> Non
     assert str(error.value).startswith("drive.xosc, line 1: ")
 
 
-def test_what_is_continuous_at_the_start_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="supported as a jump only"):
-        after(tmp_path, JUMP.format('distance="12"', 'continuous="true"'), at_s=0.0)
+CONTROL = "<PrivateAction><ControllerAction>{}</ControllerAction></PrivateAction>"
+ASSIGN = '<AssignControllerAction {}><Controller name="driver"/></AssignControllerAction>'
+
+
+def test_a_controller_that_takes_over_another_vehicle_is_refused(tmp_path: Path) -> None:
+    driven = CONTROL.format(ASSIGN.format("") + '<ActivateControllerAction longitudinal="true" lateral="false"/>')
+    with pytest.raises(ScenarioError, match="a controller drives Lead, which is not supported"):
+        after(tmp_path, driven)
+    with pytest.raises(ScenarioError, match="OverrideControllerValueAction for Lead is not supported"):
+        after(
+            tmp_path,
+            CONTROL.format('<OverrideControllerValueAction><Brake active="true"/></OverrideControllerValueAction>'),
+        )
+
+
+def test_a_controller_that_does_not_is_left_out_with_a_note(tmp_path: Path) -> None:
+    made = after(tmp_path, CONTROL.format(ASSIGN.format('activateLongitudinal="false"')))
+    assert made.notes == ("The controller of Lead is left out: it follows its actions in the storyboard.",)
+    default = CONTROL.format('<ActivateControllerAction longitudinal="true" lateral="true"/>')
+    assert after(tmp_path, default).notes == ()
+    assert after(tmp_path, default, actors="Ego").notes[0].startswith("The ego vehicle's controller is left out")
+
+
+KEPT = OFFSET.replace('"false"', '"true"').format(
+    'maxLateralAcc="1"', '<RelativeTargetLaneOffset entityRef="Ego" value="0.5"/>'
+)
+
+
+def test_an_offset_that_is_kept_from_a_vehicle_that_keeps_its_own(tmp_path: Path) -> None:
+    assert offsets(after(tmp_path, KEPT), 9.0) == pytest.approx([-1.25])
+    parts = Parts(
+        stories=story(event("keep", KEPT, condition(at_time(1.0))))
+        + story(event("away", lane_action('<AbsoluteTargetLane value="-2"/>'), condition(at_time(3.0))), actors="Ego")
+        .replace('"s"', '"s2"')
+        .replace('"act"', '"act2"')
+    )
+    with pytest.raises(ScenarioError, match="relative to Ego, which moves sideways meanwhile, is not supported"):
+        parts.load(tmp_path)
 
 
 def test_weather_and_lights_are_left_out_with_a_note(tmp_path: Path) -> None:
     lights = "<PrivateAction><AppearanceAction><LightStateAction/></AppearanceAction></PrivateAction>"
     weather = "<GlobalAction><EnvironmentAction/></GlobalAction>"
-    made = after(tmp_path, lights, weather, lights)
-    assert [note.split(" ")[0] for note in made.notes] == ["Appearance", "Weather,"]
+    signals = "<GlobalAction><InfrastructureAction/></GlobalAction>"
+    made = after(tmp_path, lights, weather, lights, signals)
+    assert [note.split(" ")[0] for note in made.notes] == ["Appearance", "Weather,", "Traffic"]

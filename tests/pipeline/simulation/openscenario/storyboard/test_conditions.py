@@ -157,11 +157,54 @@ def test_a_variable_that_an_action_sets(tmp_path: Path) -> None:
     assert fired_at(tmp_path, parts) == pytest.approx(3.0, abs=2 * STEP_S)
 
 
+BRAKE = event("brake", speed_action("6", "linear", 2.0, "rate"), condition(at_time(3.0)))
+ACCELERATION = '<AccelerationCondition value="-1.5" rule="lessThan"/>'
+BEHIND = '<RelativeObjectPosition entityRef="Ego" dx="{}" dy="0"/>'
+
+
+@pytest.mark.parametrize(
+    ("inside", "who", "expected_s"),
+    [
+        (ACCELERATION, "Lead", 3.04),
+        (DISTANCE.format(BEHIND.format(0)), "Lead", 2.0),
+        (DISTANCE.format(BEHIND.format(-10)), "Lead", 3.0),
+        ("<OffroadCondition duration='0'/>", "Ego", None),
+        ("<EndOfRoadCondition duration='1'/>", "Ego", None),
+    ],
+)
+def test_conditions_on_motion_and_moving_places(
+    inside: str, who: str, expected_s: float | None, tmp_path: Path
+) -> None:
+    """The ego vehicle approaches by 10 m/s from 50 m."""
+    parts = drive(condition(by_entity(inside, who)), before=BRAKE if inside == ACCELERATION else "")
+    assert fired_at(tmp_path, parts) == (None if expected_s is None else pytest.approx(expected_s, abs=2 * STEP_S))
+
+
+def test_a_vehicle_that_has_left_the_road(tmp_path: Path) -> None:
+    """The lead's middle, 1.5 m ahead of its reference point, passes the end at 1998.5 m after 4.85 s."""
+    parts = drive(condition(by_entity("<EndOfRoadCondition duration='1'/>", "Lead")))
+    parts.init = init("Ego", on_lane(-1, 1000.0), "20") + init("Lead", on_lane(-1, 1950.0), "10")
+    assert fired_at(tmp_path, parts) == pytest.approx(4.85 + 1.0, abs=2 * STEP_S)
+
+
+def test_criteria_of_a_carla_file_trigger_nothing(tmp_path: Path) -> None:
+    """Alone in a group they never fire; beside a condition they do not matter."""
+    criterion = condition(by_value('<ParameterCondition parameterRef="" value="" rule="lessThan"/>'))
+    criterion = criterion.replace('name="c"', 'name="criteria_CollisionTest"')
+    assert fired_at(tmp_path, drive(criterion)) is None
+    both = criterion.replace("</ConditionGroup>", "") + condition(at_time(2.0)).replace("<ConditionGroup>", "")
+    assert fired_at(tmp_path, drive(both)) == pytest.approx(2.0, abs=2 * STEP_S)
+
+
 @pytest.mark.parametrize(
     ("trigger", "says"),
     [
         (condition(by_value("<TimeOfDayCondition/>")), "TimeOfDayCondition is not supported; SimulationTime"),
-        (condition(by_entity("<OffroadCondition/>")), "OffroadCondition is not supported; TimeHeadway"),
+        (condition(by_entity("<AngleCondition/>")), "AngleCondition is not supported; TimeHeadway"),
+        (
+            condition(by_entity('<AccelerationCondition direction="lateral" value="1"/>')),
+            "AccelerationCondition is supported along the road only",
+        ),
         (condition(by_entity(TTC, "Nobody")), "no entity 'Nobody' with a position"),
         (condition(at_time(1.0), edge="sideways"), "unknown conditionEdge 'sideways'"),
         (condition(at_time(1.0), delay=-1.0), "a negative delay"),
@@ -172,7 +215,7 @@ def test_a_variable_that_an_action_sets(tmp_path: Path) -> None:
         (condition(by_value(STATE.format("event", "nothing", "completeState"))), "no event 'nothing'"),
         (condition(by_entity(GAP.format("around", "true", 1))), "distance type 'around' is not supported"),
         (condition(by_entity('<CollisionCondition><ByType type="vehicle"/></CollisionCondition>')), "with a ByType"),
-        (condition(by_entity(REACHED.format("<RoutePosition/>"))), "ReachPositionCondition needs a LanePosition"),
+        (condition(by_entity(REACHED.format("<RoutePosition/>"))), "RoutePosition is not supported; LanePosition"),
         (condition(""), "has neither ByValueCondition nor ByEntityCondition"),
     ],
 )

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from math import hypot, inf
 
 from pipeline.simulation.openscenario.parameters import RULES, ParameterScope, compare
-from pipeline.simulation.openscenario.positions import RoadPlace, place_at
-from pipeline.simulation.openscenario.stage import PlayedScenario
+from pipeline.simulation.openscenario.storyboard.positions import ON_ROADS, RoadPlace, file_point, place_at
+from pipeline.simulation.openscenario.storyboard.stage import PlayedScenario
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
 
 Test = Callable[[PlayedScenario], bool]
@@ -17,7 +17,7 @@ Test = Callable[[PlayedScenario], bool]
 _BY_VALUE = "SimulationTimeCondition, ParameterCondition, VariableCondition and StoryboardElementStateCondition are"
 _BY_ENTITY = (
     "TimeHeadway, TimeToCollision, RelativeDistance, Distance, ReachPosition, Speed, RelativeSpeed, StandStill, "
-    "TraveledDistance and CollisionCondition are"
+    "TraveledDistance, Collision, Acceleration, EndOfRoad and OffroadCondition are"
 )
 _STANDSTILL_MPS = 0.01
 """Speeds below it count as standing: wheel-speed sensors report 0 below a few cm/s."""
@@ -28,7 +28,7 @@ class Trigger:
 
     def __init__(self, at: XmlElement, scope: ParameterScope, step_s: float) -> None:
         self._groups = [
-            [_TimedCondition(each, scope, step_s) for each in group.all("Condition")]
+            [_TimedCondition(each, scope, step_s) for each in group.all("Condition") if not _is_criterion(each)]
             for group in at.all("ConditionGroup")
         ]
 
@@ -36,6 +36,11 @@ class Trigger:
         """Call once per step. Every condition is asked every time, as edges and delays need its past."""
         held = [[condition.holds(stage) for condition in group] for group in self._groups]
         return any(group and all(group) for group in held)
+
+
+def _is_criterion(at: XmlElement) -> bool:
+    """Whether it is what CARLA's ScenarioRunner judges a run by, written as a condition of the StopTrigger."""
+    return at.attributes.get("name", "").startswith("criteria_")
 
 
 class _TimedCondition:
@@ -167,20 +172,34 @@ def _distance_type(at: XmlElement, scope: ParameterScope) -> str:
 
 
 def _to_position(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], float]:
-    """Distance of an entity's reference point from a fixed position."""
+    """Distance of an entity's reference point from a position: in the plane, or along or across the way."""
     position, kind = at.one("Position"), _distance_type(at, scope)
-    if position.only().tag not in ("LanePosition", "RoadPosition", "WorldPosition"):
-        raise position.refusal(f"{at.tag} needs a LanePosition, RoadPosition or WorldPosition")
+    is_fixed = not position.only().tag.startswith("Relative")
     known: list[RoadPlace] = []
+    points: list[tuple[float, float]] = []
 
-    def distance(stage: PlayedScenario, name: str) -> float:
-        if not known:
-            known.append(place_at(position, scope, stage.road, stage.place_of))
-        place, there = stage.place_of(name, at), known[0]
-        along, across = place.s_m - there.s_m, place.d_m - there.d_m
-        return {"longitudinal": abs(along), "lateral": abs(across)}.get(kind, hypot(along, across))
+    def target(stage: PlayedScenario) -> RoadPlace:
+        if not known or not is_fixed:
+            known[:] = [place_at(position, scope, stage.road, stage.place_of)]
+        return known[0]
 
-    return distance
+    def in_plane(stage: PlayedScenario, name: str) -> float:
+        here = stage.place_of(name, at)
+        x, y = stage.road.to_file_world(here.s_m, here.d_m)
+        if not points or not is_fixed:
+            points[:] = [point(stage)]
+        return hypot(x - points[0][0], y - points[0][1])
+
+    def point(stage: PlayedScenario) -> tuple[float, float]:
+        if position.only().tag in ON_ROADS:
+            return file_point(position.only(), scope, stage.road.network)
+        return stage.road.to_file_world(*target(stage)[:2])
+
+    def in_lane(stage: PlayedScenario, name: str) -> float:
+        here, there = stage.place_of(name, at), target(stage)
+        return abs(here.s_m - there.s_m) if kind == "longitudinal" else abs(here.d_m - there.d_m)
+
+    return in_lane if kind in ("longitudinal", "lateral") else in_plane
 
 
 def _distance(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
@@ -206,16 +225,40 @@ def _relative_speed(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedSc
 
 
 def _standstill(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
-    duration = scope.number(at, "duration")
+    scope.number(at, "duration")
+    return _for_seconds(at, scope, lambda stage, name: stage.speed(name, at) <= _STANDSTILL_MPS)
+
+
+def _acceleration(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
+    if scope.text(at, "direction", "longitudinal") != "longitudinal":
+        raise at.refusal("AccelerationCondition is supported along the road only")
+    limit = _limit(at, scope)
+    return lambda stage, name: limit(stage.mover(name, at).now(stage.t_s)[1].accel_mps2)
+
+
+def _for_seconds(
+    at: XmlElement, scope: ParameterScope, holds: Callable[[PlayedScenario, str], bool]
+) -> Callable[[PlayedScenario, str], bool]:
+    """Whether something has held for the condition's duration."""
+    duration = scope.number(at, "duration", 0.0)
     since: dict[str, float] = {}
 
     def test(stage: PlayedScenario, name: str) -> bool:
-        if stage.speed(name, at) > _STANDSTILL_MPS:
+        if not holds(stage, name):
             since.pop(name, None)
             return False
         return stage.t_s - since.setdefault(name, stage.t_s) >= duration
 
     return test
+
+
+def _end_of_road(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
+    return _for_seconds(at, scope, lambda stage, name: stage.is_beyond_road(name, at))
+
+
+def _offroad(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
+    """Vehicles keep to the road, so this never holds."""
+    return lambda stage, name: False
 
 
 def _travelled(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
@@ -242,4 +285,7 @@ _ENTITY_CONDITIONS: dict[str, Callable[[XmlElement, ParameterScope], Callable[[P
     "StandStillCondition": _standstill,
     "TraveledDistanceCondition": _travelled,
     "CollisionCondition": _collision,
+    "AccelerationCondition": _acceleration,
+    "EndOfRoadCondition": _end_of_road,
+    "OffroadCondition": _offroad,
 }

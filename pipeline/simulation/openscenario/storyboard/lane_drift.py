@@ -1,0 +1,47 @@
+"""Notices where lanes do not run parallel to the way: a vehicle that the simulator keeps at its offset would leave its
+lane there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from pipeline.simulation.openscenario.storyboard.stage import PlayedScenario
+from pipeline.simulation.openscenario.xml_files import shown
+
+_EVERY_S = 0.5
+_MOST_M = 0.3
+"""A sixth of the room that a car has in its lane; more could change whose path it is in."""
+
+
+@dataclass
+class LaneDrift:
+    """The offset of every vehicle from the nearest lane since its last lane change."""
+
+    _kept: dict[str, tuple[int, float]] = field(default_factory=dict)
+    _next_s: float = 0.0
+
+    def check(self, stage: PlayedScenario) -> None:
+        """OpenScenarioError if a lane has shifted sideways under a vehicle."""
+        if stage.t_s < self._next_s - 1e-9:
+            return
+        self._next_s = stage.t_s + _EVERY_S
+        for name, mover in stage.movers.items():
+            s_m, now = mover.now(stage.t_s)
+            if now.d_rate_mps != 0.0 or not 0.0 <= s_m <= stage.road.length_m:
+                self._kept.pop(name, None)
+                continue
+            lanes = stage.road.lanes_at(s_m)
+            lane = min(lanes, key=lambda each: abs(lanes[each] - now.d_m), default=None)
+            if lane is None:
+                continue
+            offset_m = now.d_m - lanes[lane]
+            version, before_m = self._kept.setdefault(name, (mover.lane_version, offset_m))
+            if version != mover.lane_version:
+                self._kept[name] = mover.lane_version, offset_m
+            elif abs(offset_m - before_m) > _MOST_M:
+                track = stage.road.track_at(s_m)
+                raise track.road.at.refusal(
+                    f"the lanes of road {shown(track.road.id)} shift sideways by {abs(offset_m - before_m):.1f} m at "
+                    f"s = {track.road_m(s_m):.0f} m, where {shown(name)} drives; lanes that are driven on must run "
+                    "parallel to the ego vehicle's"
+                )
