@@ -33,6 +33,7 @@ from pipeline.labels.formats import native
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.params import Params, from_yaml, preset
 from pipeline.run import Sensors, sensed
+from pipeline.sources.driven_way import DrivenWay
 from pipeline.step import State, step
 from pipeline.types import Result
 from pipeline.types.source import Source
@@ -134,7 +135,7 @@ class Evaluate:
             return of_source(source, rules.lead)
         file = Path(self.truth[n])
         known = native.from_json(read_bytes(file), str(file))
-        truth = of_labels(as_bases(known, self._classes()), rules.lead)
+        truth = of_labels(as_bases(known, self._classes()), rules.lead, lambda: DrivenWay.of(source))
         ticks = tuple(source.t_ns(index) for index in range(len(source)))
         frames = {tick: frame for tick, frame in truth.frames.items() if tick in set(ticks)}
         if not frames:

@@ -20,6 +20,7 @@ from pipeline.detection import Detectors, Look
 from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.params import Params
 from pipeline.run import Sensors, sensed
+from pipeline.sources.driven_way import DrivenWay
 from pipeline.step import State, step
 from pipeline.types import F64, I64, Frame
 from pipeline.types.source import Mark, Marked, Source, TruthObject, is_simulated
@@ -72,6 +73,11 @@ class OpenRecording:
         self.describing = Lock()
         self.described: LabeledDrive | None = None
         """Description of the drive for label files, once requested; ``describing`` is locked while it is made."""
+
+    @cached_property
+    def way(self) -> DrivenWay:
+        """The way that the car takes in it."""
+        return DrivenWay.of(self.setup.source)
 
     def advance(self, run: DriveRun, frame: Frame | None = None) -> None:
         """Process the next frame of a run. frame: it as input of ``step``, if it is at hand. Raises whatever a source

@@ -32,7 +32,8 @@ class LeadRule:
     """Defines which labelled vehicle is the lead, and when a CIPV matches it."""
 
     half_lane_m: float = 1.5
-    """A vehicle whose centre is closer to the car's axis than this is in the lane."""
+    """A vehicle whose centre is closer than this to the way that the car takes is in the lane; where the recording does
+    not tell that way, to the car's axis."""
     max_range_m: float = FARTHEST_LEAD_M
     """Leads beyond this are ignored."""
     lateral_slack_m: float = 0.3
@@ -69,16 +70,20 @@ class Judged:
 
 
 def true_lead(truth: Iterable[TruthObject], rule: LeadRule) -> TruthObject | None:
-    """The nearest labelled vehicle in the lane, which is assumed to be straight."""
+    """The nearest labelled vehicle in the lane."""
     ahead = [
         item
         for item in truth
         if item.label.lower() in LABELLED_VEHICLES
         and item.cuboid.center[0] > 0.0
-        and abs(item.cuboid.center[1]) < rule.half_lane_m
+        and abs(_beside_m(item)) < rule.half_lane_m
         and nearest_face_m(item) <= rule.max_range_m
     ]
     return min(ahead, key=nearest_face_m, default=None)
+
+
+def _beside_m(item: TruthObject) -> float:
+    return item.cuboid.center[1] if item.path_offset_m is None else item.path_offset_m
 
 
 def nearest_face_m(item: TruthObject) -> float:

@@ -34,6 +34,7 @@ from pipeline.formats.nuscenes_tables import (
     read_table,
     truth_object,
 )
+from pipeline.sources.driven_way import DrivenWay
 from pipeline.sources.uri_options import split_options
 from pipeline.types import F32, F64, U8, CameraCalibration, CameraImage, Frame, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
@@ -78,6 +79,7 @@ class NuscenesSource:
         self._image_times = np.array([row.timestamp * 1000 for row in self._images], dtype=np.int64)
         self._T_map_ego = self._poses(tables)
         self._own = motion_along(self._ticks, self._T_map_ego)
+        self._way = DrivenWay(self._ticks, self._own)
         self._boxes, self._categories = _labels(tables, samples)
         steps = np.diff(self._ticks)
         self.rate_hz = round(1e9 / float(np.median(steps)), 1) if len(steps) and np.median(steps) > 0 else 2.0
@@ -116,7 +118,7 @@ class NuscenesSource:
             truth_object(each, *self._categories.get(each.instance_token, ("object", -1)), T_map_ego)
             for each in self._boxes.get(row.sample_token, ())
         ]
-        return tuple(each for each in found if each is not None)
+        return self._way.placed(self._ticks[index], [each for each in found if each is not None])
 
     def _outline(self, index: int) -> Frame:
         t_ns = self.t_ns(index)

@@ -15,10 +15,11 @@ from pipeline.simulation.sensors.faults import NONE
 from pipeline.simulation.sensors.rig import SensorRig
 from pipeline.simulation.sensors.senses import Senses
 from pipeline.simulation.world import world_state
+from pipeline.sources.driven_way import placed_beside
 from pipeline.types import Frame, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
-_TRUTH_RANGE_M = 120.0
+_TRUTH_RANGE_M, _WAY_STEP_M = 120.0, 1.0
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> SimulatedSource:
@@ -69,7 +70,9 @@ class SimulatedSource:
 
     def truth(self, index: int) -> tuple[TruthObject, ...]:
         self.t_ns(index)
-        return truth_of(self._world(index))
+        now, road = self._world(index), self._scenario.road
+        ahead_m = now.s_m + np.arange(0.0, _TRUTH_RANGE_M + _WAY_STEP_M, _WAY_STEP_M)
+        return placed_beside(now.to_ego(road.to_world(ahead_m, now.d_m)), truth_of(now))
 
     def _world(self, index: int) -> world_state.World:
         return world_state.at(self._scenario, self.t_ns(index) / 1e9)

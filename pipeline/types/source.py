@@ -37,6 +37,9 @@ class TruthObject:
     """Share of the object outside the image, 0–1; None if the labels do not contain it."""
     occlusion: int | None = None
     """0 visible, 1 partly, 2 largely hidden; None if the labels do not contain it."""
+    path_offset_m: float | None = None
+    """Lateral distance of its centre from the way that the car takes, positive to the left; None where the recording
+    does not tell that way as far as there."""
 
 
 class Source(Protocol):

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from app.labels.store.database import Database
     from app.labels.store.drive_labels import DriveLabels
     from app.labels.store.undo_order import Way
+    from pipeline.sources.driven_way import DrivenWay
 
 logger = logging.getLogger("cipv.labels")
 
@@ -155,7 +156,11 @@ class LabelDesk:
         """Scores of runs against labels."""
         from app.labels.service.scoring import LabelScores
 
-        return LabelScores(self.default_classes)
+        return LabelScores(self.default_classes, self._way_of)
+
+    def _way_of(self, labels: DriveLabels) -> DrivenWay | None:
+        opened = self._open
+        return opened.recording.way if opened.recording is not None and opened.labels is labels else None
 
     # ------------------------------------------------------------ acts
 

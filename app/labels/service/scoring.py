@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,7 @@ from pipeline.evaluation.scores.report import MOST
 from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels
 from pipeline.evaluation.scores.worst import Bad, worst
 from pipeline.labels.classes import ClassList, as_bases, default_classes
+from pipeline.sources.driven_way import DrivenWay
 
 if TYPE_CHECKING:
     from app.labels.store.drive_labels import DriveLabels
@@ -48,8 +49,12 @@ class Standing:
 class LabelScores:
     """Any thread. Scores are cached until labels or runs change."""
 
-    def __init__(self, classes: ClassList | None = None) -> None:
-        """classes: for recordings whose project has none. Sub-classes are scored as their parent class."""
+    def __init__(
+        self, classes: ClassList | None = None, way_of: Callable[[DriveLabels], DrivenWay | None] = lambda _: None
+    ) -> None:
+        """classes: for recordings whose project has none. Sub-classes are scored as their parent class. way_of: the way
+        of the recording that labels are of, None if it is not open any more."""
+        self._way_of = way_of
         self._classes = classes or default_classes()
         self._lock = threading.Lock()
         self._of: tuple[DriveLabels, int, ClassList] | None = None
@@ -62,7 +67,7 @@ class LabelScores:
             revision, classes = labels.revision, labels.classes() or self._classes
             if self._of is None or self._of[0] is not labels or self._of[1:] != (revision, classes):
                 try:
-                    self._truth = of_labels(as_bases(labels.unnamed_set(), classes), RULE)
+                    self._truth = of_labels(as_bases(labels.unnamed_set(), classes), RULE, lambda: self._way_of(labels))
                 except NoTruth:
                     self._truth = None
                 self._of, self._scores = (labels, revision, classes), {}

@@ -8,7 +8,7 @@ proposed, and something confirms that all were labelled: accepted proposals ther
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from pipeline.common.errors import BadInput
@@ -16,6 +16,7 @@ from pipeline.evaluation.lead_verdict import LABELLED_VEHICLES, LeadRule, true_l
 from pipeline.evaluation.scores.velocities import velocities
 from pipeline.labels.link_identities import linked
 from pipeline.labels.model import WHOLE_TAG, LabelSet, LabelTrack, LeadRange
+from pipeline.sources.driven_way import DrivenWay
 from pipeline.types import Box, Point2
 from pipeline.types.source import Source, TruthObject
 
@@ -71,8 +72,8 @@ class DriveTruth:
 
 
 def of_source(source: Source, rule: LeadRule) -> DriveTruth:
-    """A recording's own labels. The lead is the nearest vehicle in the lane, which is assumed to be straight. NoTruth
-    if no frame is labelled. Labels without ids are linked from frame to frame by distance."""
+    """A recording's own labels. The lead is the nearest vehicle in the lane (``LeadRule``). NoTruth if no frame is
+    labelled. Labels without ids are linked from frame to frame by distance."""
     ticks = tuple(source.t_ns(index) for index in range(len(source)))
     labelled = {tick: truth for index, tick in enumerate(ticks) if (truth := source.truth(index)) is not None}
     if not labelled:
@@ -116,20 +117,25 @@ def _only_the_leads(frame: FrameTruth) -> FrameTruth:
     return replace(frame, velocity_mps=kept)
 
 
-def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
+def of_labels(labels: LabelSet, rule: LeadRule, way: Callable[[], DrivenWay | None] | None = None) -> DriveTruth:
     """Labels made by people. Only labels that were accepted by a person or imported count: an unreviewed proposal is
-    the pipeline's own output. If no lead is labelled at all, it is the nearest vehicle in the lane, which is assumed to
-    be straight, in completely labelled frames. NoTruth if nothing counts. If all tracks have only one frame, they are
-    linked by distance."""
+    the pipeline's own output. If no lead is labelled at all, it is the nearest vehicle in the lane (``LeadRule``), in
+    completely labelled frames. NoTruth if nothing counts. If all tracks have only one frame, they are linked by
+    distance.
+
+    way: of the recording, which is asked for only where no lead is labelled; without it, the lane is straight.
+    """
     tracks = {track.id: track for track in labels.tracks if track.state in _COUNTED}
     ranges = [each for each in labels.leads if each.state in _COUNTED]
     objects, unplaced = _objects_by_frame(tracks), _unplaced_by_frame(tracks)
     left = _left_proposed(labels)
     whole = _said_whole(labels) - left
+    driven = way() if way is not None and objects and not ranges else None
     covered = {index for each in ranges for index in range(each.first, each.last + 1)}
     frames = {}
     for index in sorted((objects.keys() | covered) & set(range(len(labels.t_ns)))):
         items, tick = objects.get(index, ()), labels.t_ns[index]
+        items = driven.placed(tick, items) if driven is not None else items
         known = FrameTruth(tick, items, None, whole=index in whole, unplaced=unplaced.get(index, ()))
         if not ranges:
             frames[tick] = replace(known, lead=true_lead(items, rule), lead_known=known.whole)

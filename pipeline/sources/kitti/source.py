@@ -9,6 +9,7 @@ The ego frame is the Velodyne's axes. Intensity, 0–1 in the files, is 0–255 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from pipeline.formats.kitti_calibration import (
     parse_raw_calibration,
 )
 from pipeline.formats.kitti_records import parse_labels, parse_oxts
+from pipeline.sources.driven_way import DrivenWay
 from pipeline.sources.kitti.files import Files
 from pipeline.sources.kitti.hdl64_rings import (
     NOMINAL_ELEVATIONS_DEG,
@@ -106,9 +108,15 @@ class KittiSource:
         if path is None:
             return None
         try:
-            return parse_labels(read_bytes(path), self._calibration_of(name, []).T_rect_ego)
+            labels = parse_labels(read_bytes(path), self._calibration_of(name, []).T_rect_ego)
         except SourceError:
             return None
+        return self._way.placed(self._ticks[index], labels)
+
+    @cached_property
+    def _way(self) -> DrivenWay:
+        motions = [self._own_motion(name, tick, [])[0] for name, tick in zip(self._names, self._ticks, strict=True)]
+        return DrivenWay(self._ticks, motions)
 
     def T_rect_ego(self, index: int) -> F64:
         """(4, 4), takes ego points to the rectified camera 0, the frame of the labels."""

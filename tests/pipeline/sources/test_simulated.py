@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.alignment.projection import project_cuboid, resolve
+from pipeline.evaluation.lead_verdict import LeadRule, true_lead
 from pipeline.params import AlignmentParams
 from pipeline.sources import SourceError, open_source
 from pipeline.types import Frame
@@ -88,6 +89,23 @@ def test_a_scenario_of_ones_own(tmp_path: Path) -> None:
     path.write_text("{title: Mine, colour: red}")
     with pytest.raises(SourceError, match=r"mine\.yaml: "):
         open_source(f"sim:{path}")
+
+
+def test_the_lead_of_a_bend_is_the_vehicle_on_the_road_and_not_the_one_straight_ahead(tmp_path: Path) -> None:
+    path = tmp_path / "bend.yaml"
+    path.write_text(
+        "{title: Bend, duration_s: 3, road: {segments: [{length_m: 500, radius_m: 60}], lanes_forward: 1, "
+        "lanes_oncoming: 1, median_m: 0}, ego: {lane: -1, speed_mps: {0: 10}}, actors: ["
+        "{id: 1, kind: car, lane: -1, ahead_m: 35, speed_mps: {0: 10}}, "
+        "{id: 2, kind: car, lane: -1, ahead_m: 15, speed_mps: {0: 10}, offset_m: -4}]}"
+    )
+    truth = open_source(f"sim:{path}").truth(20)
+    assert truth is not None
+    lead, parked = truth
+    assert lead.cuboid.center[1] > 8.0
+    assert lead.path_offset_m == pytest.approx(0.0, abs=0.05)
+    assert abs(parked.path_offset_m or 0.0) > 2.0
+    assert true_lead(truth, LeadRule()) is lead
 
 
 def _with_faults(tmp_path: Path, name: str, faults: str) -> Source:

@@ -32,7 +32,8 @@ from pipeline.labels.model import (
     State,
 )
 from pipeline.sources import open_source
-from pipeline.types import FusedObject
+from pipeline.sources.driven_way import DrivenWay
+from pipeline.types import EgoState, FusedObject
 from pipeline.types.source import TruthObject
 from tests.pipeline.build import cuboid, fused
 from tests.pipeline.evaluation.scores.drives import TICK_NS, believed, labelled
@@ -72,6 +73,16 @@ def leads(known: DriveTruth) -> list[int | str | None]:
 
 def test_without_labelled_leads_the_nearest_in_the_lane_leads() -> None:
     assert leads(of_labels(labels(track(4, 30.0), track(5, 20.0, 3.5)), RULE)) == [4, 4, 4]
+
+
+def test_in_a_bend_the_nearest_on_the_way_leads() -> None:
+    """The car turns left on a circle of 50 m radius: where the vehicles are, its way is 4 to 5 m to the left."""
+    made, ticks = labels(track(4, 20.0), track(5, 20.0, 4.3)), [n * TICK_NS for n in range(60)]
+    turning = DrivenWay(ticks, [EgoState(tick, 10.0, 0.2, source="can") for tick in ticks])
+    assert leads(of_labels(made, RULE)) == [4, 4, 4]
+    assert leads(of_labels(made, RULE, lambda: turning)) == [5, 5, 5]
+    said = replace(made, leads=(led(0, 2, 4),))
+    assert leads(of_labels(said, RULE, lambda: turning)) == [4, 4, 4], "a person has decided"
 
 
 @pytest.mark.parametrize(
