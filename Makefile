@@ -12,6 +12,9 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: install demo test check check-types check-layers check-style fix bench docs screenshots suite soak fuzz sbom lock clean
 
+# macOS has GNU make 3.81, which cannot keep the output of two jobs apart.
+SYNC := $(if $(filter output-sync,$(.FEATURES)),--output-sync)
+
 # On a terminal, uv shows its own progress bar; in CI and into a file, it only reports errors.
 QUIET := $(shell test -t 2 && test -z "$$CI" || echo --quiet)
 
@@ -44,11 +47,11 @@ demo: install
 # long, and 9.5 GB. tests/conftest.py says who stays together, orders the files, the long ones first, and keeps half of
 # the processes, rounded down, for browsers.
 test: .venv/.installed
-	@$(MAKE) --no-print-directory --jobs 2 --output-sync .venv/.compiled check-types check-layers check-style
+	@$(MAKE) --no-print-directory --jobs 2 $(SYNC) .venv/.compiled check-types check-layers check-style
 	@$(BIN)/python -m pytest -q --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder $(TESTS)
 
 check: .venv/.installed
-	@$(MAKE) --no-print-directory --jobs 2 --output-sync check-types check-layers check-style
+	@$(MAKE) --no-print-directory --jobs 2 $(SYNC) check-types check-layers check-style
 
 check-types:
 	@$(BIN)/mypy
