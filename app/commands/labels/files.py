@@ -46,8 +46,8 @@ def account() -> str:
     in a container that is started for a number."""
     try:
         return getpass.getuser()
-    except (KeyError, OSError):  # OSError from Python 3.13 on
-        return f"account {os.getuid()}"
+    except (KeyError, ImportError, OSError):  # OSError from Python 3.13 on, ImportError before on Windows
+        return f"account {os.getuid()}" if hasattr(os, "getuid") else "unnamed account"
 
 
 @dataclass(frozen=True)
