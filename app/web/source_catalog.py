@@ -29,5 +29,6 @@ def recordings() -> list[tuple[str, str]]:
         for path in sorted(root.iterdir()) if root.is_dir() else ():
             scheme = looks_like(path)
             if scheme is not None:
-                found.append((f"{scheme}:{path}", f"{scheme} · {path.name}"))
+                title = path.name if path.name.startswith(scheme) else f"{scheme} · {path.name}"
+                found.append((f"{scheme}:{path}", title))
     return found

@@ -17,6 +17,7 @@ from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
 _LARGEST_PX = 100_000
+_TRACKING = {"R_rect": "R0_rect", "Tr_velo_cam": "Tr_velo_to_cam"}
 _VELODYNE_HEIGHT_M = 1.73
 """Above the road (Geiger et al. 2013, figure 3)."""
 
@@ -34,21 +35,23 @@ class KittiCalibration:
 def parse_object_calibration(
     data: bytes, file: str, size: tuple[int, int], T_ego_lidar: F64 | None = None
 ) -> KittiCalibration:
-    """``calib/NNNNNN.txt`` with P2, R0_rect and Tr_velo_to_cam. T_ego_lidar: as for ``check_looks_ahead``. SourceError
-    names the file and what is wrong."""
-    table = parse_key_values(data)
+    """``calib/NNNNNN.txt`` with P2, R0_rect and Tr_velo_to_cam, which the tracking benchmark calls R_rect and
+    Tr_velo_cam. T_ego_lidar: as for ``check_looks_ahead``. SourceError names the file and what is wrong."""
+    table = {_TRACKING.get(name, name): numbers for name, numbers in parse_key_values(data).items()}
     projection = _values(table, "P2", (3, 4), file)
     rectify = _values(table, "R0_rect", (3, 3), file)
     to_camera = _values(table, "Tr_velo_to_cam", (3, 4), file)
     return _calibration(projection, rectify, to_camera, file, size, T_ego_lidar)
 
 
-def parse_odometry_calibration(data: bytes, file: str, size: tuple[int, int]) -> KittiCalibration:
-    """A sequence's ``calib.txt`` with P2 and Tr, which goes from the Velodyne to the rectified camera 0. SourceError
-    names the file and what is wrong."""
+def parse_odometry_calibration(
+    data: bytes, file: str, size: tuple[int, int], T_ego_lidar: F64 | None = None
+) -> KittiCalibration:
+    """A sequence's ``calib.txt`` with P2 and Tr, which goes from the Velodyne to the rectified camera 0. T_ego_lidar:
+    as for ``check_looks_ahead``. SourceError names the file and what is wrong."""
     table = parse_key_values(data)
     projection, to_camera = _values(table, "P2", (3, 4), file), _values(table, "Tr", (3, 4), file)
-    return _calibration(projection, np.eye(3), to_camera, file, size)
+    return _calibration(projection, np.eye(3), to_camera, file, size, T_ego_lidar)
 
 
 def parse_raw_calibration(
@@ -89,15 +92,16 @@ def parse_360_calibration(
 
 
 def parse_key_values(data: bytes) -> dict[str, list[float]]:
-    """Lines ``name: number number …``; lines of anything else (dates, text) are passed over."""
+    """Lines ``name: number number …``, of which some of the tracking benchmark lack the colon; lines of anything else
+    (dates, text) are passed over."""
     table: dict[str, list[float]] = {}
     for line in data.decode("utf-8", "replace").splitlines():
-        name, colon, rest = line.partition(":")
+        name, _, rest = line.partition(":" if ":" in line else " ")
         try:
             numbers = [float(word) for word in rest.split()]
         except ValueError:
             continue
-        if colon and numbers:
+        if numbers and not name[:1].isdigit():
             table[name.strip()] = numbers
     return table
 

@@ -17,7 +17,7 @@ def names() -> tuple[str, ...]:
 
 def offers() -> list[tuple[str, str]]:
     """(name, title) of every built-in scenario, for a list to choose from."""
-    return [(name, f"Simulation · {_title(name)}") for name in names()]
+    return [(name, _title(name)) for name in names()]
 
 
 @cache

@@ -32,6 +32,7 @@ import * as runs from "./panels/runs.js";
 import * as why from "./panels/why.js";
 import * as gutters from "./workspace/gutters.js";
 import * as layouts from "./workspace/layouts.js";
+import * as more from "./workspace/more.js";
 import * as panes from "./workspace/panes.js";
 import * as share from "./workspace/share_link.js";
 import * as theme from "./workspace/theme.js";
@@ -40,7 +41,8 @@ for (const part of [theme, panes, gutters, layers, trails, three, ownPlayhead, s
   part.setUp();
 // text before canvases: a canvas that measures text forces a layout, and each later change of text another one
 for (const part of [banner, objects, why, transport, notices, vitals, camera, bev, timeline, exporting]) part.setUp();
-for (const part of [params, history, runs, align, labeling, sources, fleet, layouts, share, keyboard]) part.setUp();
+for (const part of [params, history, runs, align, labeling, sources, fleet]) part.setUp();
+for (const part of [layouts, more, share, keyboard]) part.setUp();
 $("#help-button").addEventListener("click", help.show);
 $("#event-back").addEventListener("click", () => toEvent(-1));
 $("#event-next").addEventListener("click", () => toEvent(1));

@@ -132,3 +132,21 @@ def test_arrow_keys_step_a_number_within_its_limits(open_page: OpenPage) -> None
     field.fill("7,95")
     field.press("ArrowUp")
     expect(field).to_have_value("8")
+
+
+PRESS = """([key, code, modifiers]) => document.body.dispatchEvent(
+  new KeyboardEvent("keydown", { key, code, ...modifiers, bubbles: true, cancelable: true }))"""
+
+
+def test_the_row_of_digits_gives_digits_in_a_layout_that_types_them_with_shift(open_page: OpenPage) -> None:
+    page = open_page()
+    table, camera, speed = page.locator(".table-pane"), page.locator(".camera-pane"), page.locator("#transport select")
+    page.evaluate(PRESS, ["'", "Digit4", {}])
+    expect(table).to_be_hidden()
+    page.evaluate(PRESS, ["'", "Digit4", {}])
+    expect(table).to_be_visible()
+    page.evaluate(PRESS, ["1", "Digit1", {"shiftKey": True}])
+    expect(camera).to_contain_class("is-grown")
+    expect(speed).to_have_value("1")
+    page.evaluate(PRESS, ["]", "Digit9", {"modifierAltGraph": True}])  # as on a German keyboard
+    expect(speed).not_to_have_value("1")

@@ -39,6 +39,75 @@ def test_an_event_is_told_to_its_end(open_page: OpenPage, site: Site) -> None:
     assert page.evaluate(CUT, ".event .what") == []
 
 
+SIZES = ((720, 450), (900, 700), (1024, 600), (1024, 768), (390, 844))
+"""Of the page in pixels: a screen of 1440 × 900 at 200 %, a half screen, two small ones and a phone."""
+
+
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_all_of_the_top_bar_is_in_view_or_in_its_menu(width: int, height: int, open_page: OpenPage) -> None:
+    page = open_page(width, height)
+    bar, more = page.locator(".topbar"), page.get_by_role("button", name="More")
+    for control in bar.locator("button:visible").all():
+        expect(control).to_be_in_viewport(ratio=1)
+    names = ("Fleet", "Align", "Layout ▾", "Share", "Help")
+    if more.is_visible():
+        more.click()
+        bar = page.get_by_role("dialog", name="More")
+    for name in names:
+        expect(bar.get_by_text(name, exact=True)).to_be_in_viewport(ratio=1)
+
+
+def test_the_menu_of_the_top_bar_is_used_with_keys(open_page: OpenPage) -> None:
+    page = open_page(720, 450)
+    wait_for_frame(page, START)
+    more, menu = page.get_by_role("button", name="More"), page.locator("#menu")
+    more.press("Enter")
+    expect(menu.get_by_text("Fleet")).to_be_focused()
+    page.keyboard.press("Escape")
+    expect(menu).to_be_hidden()
+    expect(more).to_be_focused()
+    more.press("Enter")
+    menu.get_by_text("Align").press("Enter")
+    expect(menu).to_be_hidden()
+    expect(page.locator("#align-bar")).to_be_visible()
+    more.press("Enter")
+    expect(menu.get_by_text("Align")).to_have_attribute("aria-pressed", "true")
+    menu.get_by_text("Layout").press("Enter")
+    expect(menu.get_by_role("checkbox", name="Camera")).to_be_focused()
+    expect(more).to_have_attribute("aria-expanded", "false")
+
+
+def test_share_in_the_menu_says_that_it_has_copied(open_page: OpenPage) -> None:
+    page = open_page(720, 450)
+    wait_for_frame(page, START)
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.get_by_role("button", name="More").click()
+    page.locator("#menu .share").click()
+    expect(page.locator("#menu").get_by_text("Copied")).to_be_visible()
+    assert "frame=60" in page.evaluate("navigator.clipboard.readText()")
+
+
+WITHOUT_IMAGE = """async (hasImage) => {
+  const { get, set } = await import("/js/core/store.js");
+  set("state", { ...get("state"), uri: "pcap:no-camera" });
+  set("frame", { ...get("frame"), image: hasImage ? { width: 640, height: 360 } : null });
+}"""
+
+
+def test_a_recording_without_a_camera_has_no_camera_layers_to_choose(open_page: OpenPage) -> None:
+    page = open_page()
+    wait_for_frame(page, START)
+    chips, tools = page.locator("#camera-layers"), page.locator(".view-tools[data-view=camera]")
+    expect(chips).to_be_visible()
+    page.evaluate(WITHOUT_IMAGE, False)
+    expect(chips).to_be_hidden()
+    expect(tools).to_be_hidden()
+    page.evaluate(WITHOUT_IMAGE, True)
+    expect(chips).to_be_visible()
+    page.evaluate(WITHOUT_IMAGE, False)
+    expect(chips).to_be_visible()
+
+
 REASONS = ("beside or behind the bumper", "out of path by 11.4 m", "17 by 4 m: not a vehicle")
 
 

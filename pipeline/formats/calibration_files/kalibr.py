@@ -13,6 +13,7 @@ import yaml
 
 from pipeline.common.geometry import inverse
 from pipeline.formats.calibration_files.contents import CalibrationFiles, yaml_mapping
+from pipeline.formats.calibration_files.lens import polynomial_lens
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
@@ -27,23 +28,20 @@ def parse(files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F6
     camera = chain.get(_CAMERA)
     if not isinstance(camera, dict):
         raise SourceError(f"{CHAIN}: no {_CAMERA}")
-    try:
-        model, distortion_model = str(camera["camera_model"]), str(camera.get("distortion_model", "none"))
-        fu, fv, pu, pv = (float(each) for each in camera["intrinsics"])
-        distortion = np.asarray(camera.get("distortion_coeffs", []), dtype=np.float64)
-        width, height = (int(each) for each in camera["resolution"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise SourceError(f"{CHAIN}: {_CAMERA} is incomplete: {error}") from None
+    model, distortion_model = (str(camera.get(name, "none")) for name in ("camera_model", "distortion_model"))
     if model != "pinhole":
         raise SourceError(f"{CHAIN}: camera_model {model} is not supported; calibrate as pinhole")
-    if np.any(distortion) and (distortion_model != "radtan" or distortion.shape != (4,)):
-        raise SourceError(
-            f"{CHAIN}: {distortion.size} numbers of {distortion_model} distortion; only radtan with 4 is supported"
-        )
-    if not np.all(np.isfinite(distortion)) or min(width, height) < 16:
-        raise SourceError(f"{CHAIN}: invalid distortion_coeffs or resolution")
+    try:
+        fu, fv, pu, pv = (float(each) for each in camera["intrinsics"])
+        width, height = (int(each) for each in camera["resolution"])
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise SourceError(f"{CHAIN}: {_CAMERA} is incomplete: {error}") from None
+    if distortion_model not in ("radtan", "none"):
+        raise SourceError(f"{CHAIN}: {distortion_model} distortion; only radtan is supported")
+    lens = polynomial_lens(camera.get("distortion_coeffs", []), distortion_model, f"{CHAIN}: distortion_coeffs")
+    if min(width, height) < 16:
+        raise SourceError(f"{CHAIN}: invalid resolution")
     K = camera_matrix([[fu, 0.0, pu], [0.0, fv, pv], [0.0, 0.0, 1.0]], f"{CHAIN}: intrinsics")
-    lens = distortion if np.any(distortion) else np.zeros(0)
     found = CameraCalibration(K, lens, _transform(files, camera), width, height)
     check_looks_ahead(found, TRANSFORM if TRANSFORM in files else CHAIN, T_ego_lidar)
     return found

@@ -1,5 +1,6 @@
-"""KITTI: ``calib.txt`` of the object benchmark (P2, R0_rect, Tr_velo_to_cam), which does not store the images' size, or
-the raw data's ``calib_cam_to_cam.txt`` with ``calib_velo_to_cam.txt``. Both are for undistorted images."""
+"""KITTI: the file of the object and tracking benchmarks (P2, R0_rect, Tr_velo_to_cam) or of odometry (P2, Tr), none of
+which stores the images' size, or the raw data's ``calib_cam_to_cam.txt`` with ``calib_velo_to_cam.txt``. All are for
+undistorted images."""
 
 from __future__ import annotations
 
@@ -8,7 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.formats.calibration_files.contents import CalibrationFiles, the_file
-from pipeline.formats.kitti_calibration import parse_object_calibration, parse_raw_calibration
+from pipeline.formats.kitti_calibration import (
+    parse_key_values,
+    parse_object_calibration,
+    parse_odometry_calibration,
+    parse_raw_calibration,
+)
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
@@ -26,7 +32,8 @@ def parse(files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F6
     name, data = the_file(files)
     if size is None:
         raise SourceError(f"{name}: KITTI's calibration does not store the image size; specify it")
-    return parse_object_calibration(data, name, size, T_ego_lidar).camera
+    parse_one = parse_odometry_calibration if "Tr" in parse_key_values(data) else parse_object_calibration
+    return parse_one(data, name, size, T_ego_lidar).camera
 
 
 def write(path: Path, camera: CameraCalibration) -> None:

@@ -13,13 +13,14 @@ _SIGNS: tuple[tuple[tuple[bytes, ...], str, str | None], ...] = (
     ((b"T_cam_lidar", b"T_camera_lidar", b"T_lidar_cam"), "kalibr", kalibr.TRANSFORM),
     ((b"child_frame_id",), "ros", ros.TRANSFORM),
     ((b"camera_matrix", b"distortion_model"), "ros", ros.INFO),
-    ((b"Tr_velo_to_cam", b"P2:"), "kitti", None),
+    ((b"Tr_velo_to_cam", b"Tr_velo_cam", b"P2:"), "kitti", None),
     ((b"P_rect_02",), "kitti", kitti.CAMERAS),
     ((b"delta_f:",), "kitti", kitti.VELODYNE),
     ((b"calib_time:",), "kitti", kitti.IMU),
 )
 """Any of these words in a file says of which format it is, and which of its files; the first line that applies."""
 _RIG = b"fx_px"
+_SENSOR_KIT = b"sensor_kit_base_link"
 _PARTS = {
     ros.INFO: "the camera info",
     ros.TRANSFORM: "the static transform",
@@ -66,5 +67,10 @@ def _sign(name: str, data: bytes) -> tuple[str, str | None]:
             return kind, part
     if _RIG in data:
         raise SourceError(f"{name}: a rig file describes a recording; put it beside the recording")
+    if _SENSOR_KIT in data:
+        raise SourceError(
+            f"{name}: Autoware's sensor kit has the mounts of many sensors; give the transform between the camera's "
+            "optical frame and the LiDAR as a TransformStamped"
+        )
     readable = [each.title for each in FORMATS.values() if each.parse is not None]
     raise SourceError(f"{name}: not a calibration of {', '.join(readable[:-1])} or {readable[-1]}")

@@ -1,6 +1,7 @@
 """ROS: a folder with ``camera_info.yaml``, as ``camera_calibration`` writes it, and ``static_transform.yaml``, a
 ``geometry_msgs/TransformStamped``. Its frames give the direction of the transform: the camera's frame is that in the
-header of the camera info, optical (REP 103)."""
+header of the camera info, optical (REP 103). Also what ``ros2 topic echo`` prints of a CameraInfo and of a TFMessage
+with one transform."""
 
 from __future__ import annotations
 
@@ -12,37 +13,35 @@ import yaml
 
 from pipeline.common.geometry import inverse, rotation
 from pipeline.formats.calibration_files.contents import CalibrationFiles, yaml_mapping
+from pipeline.formats.calibration_files.lens import polynomial_lens
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
 INFO, TRANSFORM = "camera_info.yaml", "static_transform.yaml"
 _CAMERA, _LIDAR = "camera_optical", "lidar"
-_MODELS = {"plumb_bob": (4, 5), "rational_polynomial": (8,)}
 _ANGLES = ("roll", "pitch", "yaw")
 
 
 def parse(files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F64 | None = None) -> CameraCalibration:
-    info, transform = (yaml_mapping(files, name) for name in (INFO, TRANSFORM))
+    info, transform = _as_saved(yaml_mapping(files, INFO)), _the_transform(yaml_mapping(files, TRANSFORM))
     try:
         K = camera_matrix(np.reshape(info["camera_matrix"]["data"], (3, 3)), f"{INFO}: camera_matrix")
-        distortion = np.asarray(info.get("distortion_coefficients", {}).get("data", []), dtype=np.float64)
+        distortion = info.get("distortion_coefficients", {}).get("data", [])
         model = str(info.get("distortion_model", "plumb_bob"))
         width, height = int(info["image_width"]), int(info["image_height"])
-        own = str(info.get("header", {}).get("frame_id", _CAMERA)).lstrip("/")
         parent = str(transform["header"]["frame_id"]).lstrip("/")
         child = str(transform["child_frame_id"]).lstrip("/")
+        own = _camera_frame(info, parent, child)
         T_parent_child = _transform(transform["transform"])
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise SourceError(f"{INFO}, {TRANSFORM}: incomplete camera info or transform: {error}") from None
-    if distortion.ndim != 1 or not np.all(np.isfinite(distortion)):
-        raise SourceError(f"{INFO}: distortion_coefficients.data: not a list of finite numbers")
-    if np.any(distortion) and len(distortion) not in _MODELS.get(model, ()):
-        raise SourceError(f"{INFO}: {model} with {len(distortion)} numbers is not supported")
+    if min(width, height) < 16:
+        raise SourceError(f"{INFO}: invalid image_width or image_height")
+    lens = polynomial_lens(distortion, model, f"{INFO}: distortion")
     if own not in (parent, child):
         raise SourceError(f"{TRANSFORM}: goes from {child} to {parent}, but the camera's frame is {own}")
     T_camera_lidar = T_parent_child if own == parent else inverse(T_parent_child)
-    lens = distortion if np.any(distortion) else np.zeros(0)
     camera = CameraCalibration(K, lens, T_camera_lidar, width, height)
     check_looks_ahead(camera, TRANSFORM, T_ego_lidar)
     return camera
@@ -71,6 +70,36 @@ def write(path: Path, camera: CameraCalibration) -> None:
     }
     for name, content in ((INFO, info), (TRANSFORM, transform)):
         (path / name).write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+
+
+def _as_saved(info: dict[str, Any]) -> dict[str, Any]:
+    """A message with the names of a saved file; ROS 1 has capital letters for K and D."""
+    if "camera_matrix" in info or "width" not in info:
+        return info
+    K, D = (info.get(name.upper(), info.get(name)) for name in "kd")
+    size = {"image_width": info["width"], "image_height": info.get("height")}
+    return {**info, **size, "camera_matrix": {"data": K}, "distortion_coefficients": {"data": D}}
+
+
+def _the_transform(given: dict[str, Any]) -> dict[str, Any]:
+    """The one transform of a TFMessage."""
+    several = given.get("transforms", [given])
+    if not isinstance(several, list) or len(several) != 1 or not isinstance(several[0], dict):
+        raise SourceError(f"{TRANSFORM}: has several transforms or none; give the one between camera and LiDAR")
+    return several[0]
+
+
+def _camera_frame(info: dict[str, Any], parent: str, child: str) -> str:
+    """The frame of the header. Files of ``camera_calibration`` have none: then that of the two with "cam" or "optical"
+    or with the camera's name in it."""
+    header = info.get("header") or {}
+    if header.get("frame_id"):
+        return str(header["frame_id"]).lstrip("/")
+    for words in (("cam", "optical"), (str(info.get("camera_name") or "cam").lower(),)):
+        found = [frame for frame in (parent, child) if any(word in frame.lower() for word in words)]
+        if len(found) == 1:
+            return found[0]
+    raise SourceError(f"{INFO}: no header with the camera's frame_id; add it: {parent} or {child}")
 
 
 def _transform(given: dict[str, Any]) -> F64:

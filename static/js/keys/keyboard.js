@@ -63,13 +63,15 @@ function giveBack(view) {
 }
 
 /**
- * Key name, independent of keyboard layout for digits: "Shift+1", "Ctrl+z", "?", "Space".
+ * Key name: "Shift+1", "Ctrl+z", "?", "Space". The row of digits gives digits in every keyboard layout, also in those
+ * that type them with Shift (French, Czech).
  * @param {KeyboardEvent} event
  */
-export function nameOf({ key, code, shiftKey, ctrlKey, metaKey }) {
-  const digit = /^Digit(\d)$/.exec(code)?.[1];
+export function nameOf(event) {
+  const { key, code, shiftKey, ctrlKey, metaKey } = event;
+  const digit = event.getModifierState("AltGraph") ? undefined : /^Digit(\d)$/.exec(code)?.[1]; // AltGr: [ ] and more
   const bare =
-    key === " " ? "Space" : shiftKey && digit ? digit : key.length === 1 && !shiftKey ? key.toLowerCase() : key;
+    key === " " ? "Space" : (digit ?? (key.length === 1 && !shiftKey ? key.toLowerCase() : key));
   const isSaid = shiftKey && (digit !== undefined || bare.length > 1 || bare.toLowerCase() !== bare.toUpperCase());
   return `${ctrlKey || metaKey ? "Ctrl+" : ""}${isSaid ? "Shift+" : ""}${bare}`;
 }

@@ -86,7 +86,7 @@ const defaults = () => [
       key("o", "O", "set clip end", clip.markOut),
       key("t", "T", "mark this frame", addMark),
       key("+ =", "+", "zoom in", () => zoom(1)),
-      key("-", "−", "zoom out", () => zoom(-1)),
+      key("- )", "−", "zoom out", () => zoom(-1)), // ): in the place of −, where the − of French is that of the 6
       key("0", "0", "show the whole drive", fit),
     ],
   },

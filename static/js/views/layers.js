@@ -76,6 +76,7 @@ export function setUp() {
   }
   on(["layers"], reflect);
   on(["frame"], showLaneChip);
+  on(["frame"], showCameraChips);
   reflect();
 }
 
@@ -102,6 +103,22 @@ function showLaneChip() {
   const hasLanes = Boolean(get("frame")?.display.plan_lanes),
     chip = $("[data-layer=lanes]");
   if (chip.hidden === hasLanes) chip.hidden = !hasLanes;
+}
+
+/** Address of the last recording of which an image was seen. @type {string|null|undefined} */
+let withImages;
+
+/** The camera's chips and tools are hidden until the recording has an image; a missing one does not hide them again. */
+function showCameraChips() {
+  const uri = get("state")?.uri,
+    frame = get("frame");
+  if (!frame) return;
+  if (frame.image) withImages = uri;
+  for (const part of document.querySelectorAll("#camera-layers, .view-tools[data-view=camera]")) {
+    const isHidden = withImages !== uri,
+      each = /** @type {HTMLElement} */ (part);
+    if (each.hidden !== isHidden) each.hidden = isHidden;
+  }
 }
 
 /** @param {View} view */

@@ -14,14 +14,17 @@ new ResizeObserver(() => owner && menu.matches(":popover-open") && place(owner))
  */
 export function attachMenu(button, label, fill) {
   button.setAttribute("aria-expanded", "false");
-  button.addEventListener("click", () => {
+  button.addEventListener("click", ({ detail }) => {
     if (owner === button && menu.matches(":popover-open")) return menu.hidePopover();
+    close();
+    owner?.setAttribute("aria-expanded", "false");
     owner = button;
     menu.setAttribute("aria-label", label);
     menu.replaceChildren(...fill());
     menu.showPopover();
     place(button);
     button.setAttribute("aria-expanded", "true");
+    if (detail === 0) focusFirst(); // pressed with a key
   });
   menu.addEventListener("toggle", (event) => {
     if (/** @type {ToggleEvent} */ (event).newState === "closed") button.setAttribute("aria-expanded", "false");
@@ -39,11 +42,16 @@ export function close() {
   if (menu.matches(":popover-open")) menu.hidePopover();
 }
 
+function focusFirst() {
+  const first = /** @type {HTMLElement|null} */ (menu.querySelector("button, a, input"));
+  first?.focus();
+}
+
 /** Below the button if most of the window is there, else above it. @param {HTMLElement} button */
 function place(button) {
   menu.style.left = "0"; // its text wraps at the window's edge: at the old place, it would be too narrow
   menu.style.maxHeight = "";
-  const at = button.getBoundingClientRect(),
+  const at = (button.checkVisibility() ? button : $("#more-button")).getBoundingClientRect(),
     own = menu.getBoundingClientRect();
   const below = at.bottom + GAP_PX,
     room = innerHeight - below - GAP_PX,

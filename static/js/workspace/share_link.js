@@ -88,7 +88,7 @@ export async function share() {
 
 /** @param {boolean} isCopied */
 function sayCopied(isCopied) {
-  $("#share-button").classList.toggle("is-other", isCopied);
+  for (const button of document.querySelectorAll(".share")) button.classList.toggle("is-other", isCopied);
   text($("#announcement"), isCopied ? "Link copied" : "");
 }
 

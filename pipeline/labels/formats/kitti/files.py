@@ -171,9 +171,8 @@ def _view_beside(home: Path, name: str, shot: FrameInfo) -> tuple[F64, CameraCal
     file = home / _CALIBRATION / f"{name}.txt"
     if not file.is_file():
         return _view(shot)
-    text = read_bytes(file).replace(b"R_rect ", b"R0_rect: ").replace(b"Tr_velo_cam ", b"Tr_velo_to_cam: ")
     size = (shot.camera.width, shot.camera.height) if shot.camera is not None else _USUAL_SIZE
-    return parse_object_calibration(text, str(file), size).T_rect_ego, shot.camera
+    return parse_object_calibration(read_bytes(file), str(file), size).T_rect_ego, shot.camera
 
 
 def _files(path: Path, folder: str) -> tuple[Path, dict[str, Path]]:

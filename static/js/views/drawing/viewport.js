@@ -106,7 +106,7 @@ export class Viewport {
     /** @type {Record<string, number>} */
     const factors = { "+": 1.25, "=": 1.25, "-": 0.8 };
     if (factors[event.key]) this.zoom(factors[event.key]);
-    else if (event.key === "0") this.show("ahead");
+    else if (event.key === "0" || event.code === "Digit0") this.show("ahead");
     else return;
     event.preventDefault();
   }

@@ -165,9 +165,12 @@ def test_kalibr_takes_the_transform_from_either_place_and_either_way(tmp_path: P
     ("values", "named"),
     [
         ({"camera_model": "omni"}, "omni is not supported"),
+        ({"camera_model": "ds", "intrinsics": [-0.2, 0.6, 800.0, 800.0, 1.0, 1.0]}, "ds is not supported"),
+        ({"distortion_model": "equidistant", "distortion_coeffs": [0.0] * 4}, "only radtan"),
         ({"distortion_model": "equidistant"}, "equidistant distortion; only radtan"),
         ({"intrinsics": [800.0, 800.0]}, "incomplete"),
-        ({"resolution": [0, 0]}, "invalid distortion_coeffs or resolution"),
+        ({"resolution": [0, 0]}, "invalid resolution"),
+        ({"resolution": [float("inf"), 720]}, "incomplete"),
         ({"intrinsics": [-800.0, 800.0, 1.0, 1.0]}, "not a camera matrix"),
         ({"T_cam_lidar": [[2.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}, "not a rigid transform"),
     ],
