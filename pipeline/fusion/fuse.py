@@ -34,6 +34,9 @@ NO_TRACKS: Tracks = {}
 _TAKES_OVER_HITS = 2
 """Sightings of a cluster before it may replace one that still exists, or contradict the camera: a spurious cluster
 lasts for one sweep."""
+_LONG_FRAMES = 10
+"""A track that has belonged to an object for this many frames in a row, a second at 10 Hz, was not joined to it by
+chance."""
 _SETTLED_RANGES = 3
 """Distances of a camera track, after which a single cluster does not contradict it."""
 
@@ -132,7 +135,8 @@ def fuse(
         rows = with_ranged(rows, vision, lidar, ranged)
     tracks: dict[str, Sequence[LidarTrack | VisionTrack | RangedTrack]] = {V: vision, L: lidar, **ranged}
     keys = [{letter: tracks[letter][place].id for letter, place in row.items()} for row in rows]
-    state, ids = _identities(state, keys)
+    is_seen = [any(not tracks[letter][place].carried for letter, place in row.items()) for row in rows]
+    state, ids = _identities(state, keys, is_seen)
 
     footprints = corners[:, :4, :2].tolist()
     sides = _box_sides(
@@ -287,18 +291,26 @@ def _assign(overlap: F64, joinable: np.ndarray, params: FusionParams) -> dict[in
     return chosen
 
 
-def _identities(state: FusionState, keys: list[dict[str, int]]) -> tuple[FusionState, list[int]]:
-    """The object id of each row. keys: the track id of each of its sensors, by letter. A row inherits an id of its
-    tracks that is not yet taken: that which one of them has had for longest, so that a track that another object had
-    for a moment does not bring along that object's id; of several, the oldest. Rows of more sensors choose first, so
-    that a single fragment never takes over the id of a whole object."""
-    order = sorted(range(len(keys)), key=lambda k: (-len(keys[k]), k))
+def _identities(state: FusionState, keys: list[dict[str, int]], is_seen: list[bool]) -> tuple[FusionState, list[int]]:
+    """The object id of each row. keys: the track id of each of its sensors, by letter. is_seen: whether a sensor
+    measures it now.
+
+    A row inherits an id of its tracks that is not yet taken: that which one of them has had for longest, so that a
+    track that another object had for a moment does not bring along that object's id; of several, the oldest. Rows of
+    more sensors choose first, so that a single fragment never takes over the id of a whole object; then those that are
+    seen and have had their id for long: a vehicle that leaves the image keeps its id where the LiDAR follows it, not
+    where its box was expected."""
+    before = [[state.owner_of(letter, track) for letter, track in key.items()] for key in keys]
+    is_followed = [
+        seen and any(owner is not None and owner.frames >= _LONG_FRAMES for owner in owners)
+        for seen, owners in zip(is_seen, before, strict=True)
+    ]
+    order = sorted(range(len(keys)), key=lambda k: (-len(keys[k]), not is_followed[k], k))
     ids = [0] * len(keys)
     taken: set[int] = set()
     next_id = state.next_id
     for k in order:
-        before = [state.owner_of(letter, track) for letter, track in keys[k].items()]
-        known = [(-owner.frames, owner.id) for owner in before if owner is not None and owner.id not in taken]
+        known = [(-owner.frames, owner.id) for owner in before[k] if owner is not None and owner.id not in taken]
         ids[k] = min(known)[1] if known else next_id
         next_id += not known
         taken.add(ids[k])

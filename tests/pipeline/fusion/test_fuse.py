@@ -320,6 +320,26 @@ def test_an_object_takes_the_number_that_its_tracks_have_had_for_longest(
     assert state.owner_of("L", 1) == Owner(ahead, cluster_frames + 1 if ahead == 1 else 1)
 
 
+@pytest.mark.parametrize(
+    ("cluster_frames", "box_carried", "cluster_carried", "keeps"),
+    [
+        pytest.param(12, True, False, "L", id="it has left the image, and the LiDAR follows it"),
+        pytest.param(12, False, True, "V", id="it has left the LiDAR's reach"),
+        pytest.param(12, False, False, "V", id="both are seen, in different places"),
+        pytest.param(12, True, True, "V", id="nobody sees it"),
+        pytest.param(2, True, False, "V", id="a cluster that was joined with it for a moment"),
+    ],
+)
+def test_a_parted_object_keeps_its_number_where_it_is_seen(
+    cluster_frames: int, box_carried: bool, cluster_carried: bool, keeps: str
+) -> None:
+    cluster = lidar_track(1, 20.0)._replace(carried=cluster_carried)
+    box = replace(vision_track(1, (900.0, 300.0, 960.0, 350.0), 33.0), carried=box_carried)
+    owners = {"V": {1: Owner(1, 40)}, "L": {1: Owner(1, cluster_frames)}}
+    _, after = joined([cluster], [box], state=FusionState(2, owners))
+    assert {item.source: item.id for item in after.objects} == {keeps: 1, "V" if keeps == "L" else "L": 2}
+
+
 def test_two_numbers_that_become_one_object_keep_the_older_and_part_again_without_a_clash() -> None:
     track = lidar_track(1, 20.0)
     apart = vision_track(1, (900.0, 300.0, 1000.0, 400.0), 20.0)
