@@ -60,7 +60,7 @@ def _write(file: Path, number: int, seconds: float) -> None:
         for index in range(begin, begin + frames):
             now = world_state.at(scene, index / scene.rate_hz)
             frame = senses.sensed(sensors.frame(now, index, index * step_ns, image=False), now)
-            writer.write(frame, truth=truth_of(now))
+            writer.write(frame, truth=truth_of(now, scene.road))
         writer.close()
     except BaseException:
         writer.discard()

@@ -15,6 +15,7 @@ from pipeline.simulation.sensors.faults import NONE
 from pipeline.simulation.sensors.rig import SensorRig
 from pipeline.simulation.sensors.senses import Senses
 from pipeline.simulation.world import world_state
+from pipeline.simulation.world.roads import Road
 from pipeline.sources.driven_way import placed_beside
 from pipeline.types import Frame, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
@@ -70,9 +71,7 @@ class SimulatedSource:
 
     def truth(self, index: int) -> tuple[TruthObject, ...]:
         self.t_ns(index)
-        now, road = self._world(index), self._scenario.road
-        ahead_m = now.s_m + np.arange(0.0, _TRUTH_RANGE_M + _WAY_STEP_M, _WAY_STEP_M)
-        return placed_beside(now.to_ego(road.to_world(ahead_m, now.d_m)), truth_of(now))
+        return truth_of(self._world(index), self._scenario.road)
 
     def _world(self, index: int) -> world_state.World:
         return world_state.at(self._scenario, self.t_ns(index) / 1e9)
@@ -91,10 +90,13 @@ def _notes(scene: scenario.Scenario) -> Iterator[str]:
         yield "The sensors of this drive have faults: see `faults` in its file."
 
 
-def truth_of(now: world_state.World) -> tuple[TruthObject, ...]:
-    """Every vehicle that is at least partly ahead of the LiDAR and within 120 m, including hidden ones."""
-    return tuple(
+def truth_of(now: world_state.World, road: Road) -> tuple[TruthObject, ...]:
+    """Every vehicle that is at least partly ahead of the LiDAR and within 120 m, including hidden ones. The way of the
+    car is parallel to the road."""
+    ahead_m = now.s_m + np.arange(0.0, _TRUTH_RANGE_M + _WAY_STEP_M, _WAY_STEP_M)
+    found = tuple(
         TruthObject(state.actor.kind, state.cuboid, state.actor.id)
         for state in sorted(now.actors, key=lambda state: state.actor.id)
         if state.cuboid.footprint()[:, 0].max() > 0.0 and np.hypot(*state.cuboid.center[:2]) < _TRUTH_RANGE_M
     )
+    return placed_beside(now.to_ego(road.to_world(ahead_m, now.d_m)), found)

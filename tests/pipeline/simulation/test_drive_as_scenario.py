@@ -64,7 +64,7 @@ def test_a_kept_drive_gives_the_very_frames_and_results_of_the_loop(
             assert frame.sweep is not None
             np.testing.assert_array_equal(frame.sweep.points, tick.frame.sweep.points)
         assert believed(result) == believed(tick.result)
-        assert source.truth(index) == truth_of(tick.world)
+        assert source.truth(index) == truth_of(tick.world, kept.road)
 
 
 def test_the_drive_is_not_the_script(braking: Scenario) -> None:
