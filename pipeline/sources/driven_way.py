@@ -16,7 +16,8 @@ from pipeline.types.source import InParts, Source, TruthObject
 
 _LONGEST_GAP_S = 1.0
 """Across longer gaps, the way is not known."""
-_FARTHEST_M = 150.0
+_FARTHEST_M, _LONGEST_S = 150.0, 30.0
+"""How far the way is followed; a car that stands for longer has not shown where it will go."""
 _LEAST_MOVE_M = 0.1
 """Frames that are closer together are one point: a standing car has no direction."""
 _BEYOND_M = 5.0
@@ -61,7 +62,7 @@ class DrivenWay:
             travelled_m += moved_m
             if hypot(x - found[-1][0], y - found[-1][1]) >= _LEAST_MOVE_M:
                 found.append((x, y))
-            if travelled_m > _FARTHEST_M:
+            if travelled_m > _FARTHEST_M or self._t_ns[k + 1] - self._t_ns[index] > _LONGEST_S * 1e9:
                 break
         return np.array(found)
 

@@ -57,6 +57,10 @@ def no_yaw_rate(tick: int) -> EgoState:
     return EgoState(tick, SPEED_MPS, None, source="gnss")
 
 
+def waiting(tick: int) -> EgoState:
+    return turning(tick) if tick > 40_000_000_000 else standing(tick)
+
+
 def standing(tick: int) -> EgoState:
     return EgoState(tick, 0.0, 0.0, source="can")
 
@@ -71,6 +75,7 @@ def standing(tick: int) -> EgoState:
         pytest.param(way(gap_at=20, gap_ns=500_000_000), [True, True], id="a gap of half a second"),
         pytest.param(way(no_yaw_rate), [False, False], id="without a yaw rate"),
         pytest.param(way(standing), [False, False], id="a standing car"),
+        pytest.param(way(waiting, ticks=500), [False, False], id="a car that waits for 40 s"),
     ],
 )
 def test_the_way_is_known_as_far_as_the_motion_is(driven: DrivenWay, known: list[bool]) -> None:
