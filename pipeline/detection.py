@@ -9,8 +9,9 @@ from typing import Protocol, TypeVar, cast
 
 from pipeline.inference.model_registry import EMBEDDED
 from pipeline.inference.runtime import DetectorMissing
+from pipeline.lanes.network import LaneNetwork
 from pipeline.lanes.open_detector import LaneDetector, open_lanes, usual_every
-from pipeline.types import U8, Frame, RawBoxes, RawLanes
+from pipeline.types import U8, CameraCalibration, Frame, RawBoxes, RawLanes
 from pipeline.types.source import AnySource, Source, is_live_source, is_simulated
 from pipeline.vision.detector import Detector, open_detector
 from pipeline.vision.far_view import WINDOW_PX, FarView, open_far_view
@@ -53,17 +54,24 @@ class Detectors:
     """Processes the far part of the image a second time; None without a second pass."""
     far_every: int = 1
     """The far view runs in every n-th frame by its index."""
+    far_lanes: Detects[RawLanes] | None = None
+    """Takes every second turn of ``lanes``, for the far part of the image only; None: ``lanes`` takes every turn."""
     left_out: tuple[str, ...] = ()
     """What does not run because the machine is too slow, as notes of the frame."""
 
-    def looks_for_lanes(self, index: int) -> bool:
-        """Whether lane lines are detected in the frame with this index."""
-        return self.lanes is not None and index % self.lanes_every == 0
+    def lanes_of(self, index: int) -> Detects[RawLanes] | None:
+        """The lane detector that processes the frame with this index; None if it is nobody's turn."""
+        turn, rest = divmod(index, self.lanes_every)
+        return self.lanes_in_turn(turn) if rest == 0 else None
+
+    def lanes_in_turn(self, turn: int) -> Detects[RawLanes] | None:
+        """The lane detector whose turn it is: whole images and their far part alternate."""
+        return self.far_lanes if self.far_lanes is not None and turn % 2 == 1 else self.lanes
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all detectors: equal names give equal outputs."""
-        asked = (self.boxes, self.lanes, self.far)
+        asked = (self.boxes, self.lanes, self.far_lanes, self.far)
         return tuple(each.name for each in asked if each is not None)
 
     def looks_far(self, index: int) -> bool:
@@ -96,8 +104,9 @@ def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
         far = ask(detectors.far.of(frame), frame, bgr)
         whole = frame.raw_boxes
         frame = replace(frame, raw_boxes=detectors.far.added_to(whole, far) if whole is not None else far)
-    if detectors.lanes is not None and detectors.looks_for_lanes(frame.index):
-        frame = replace(frame, raw_lanes=ask(detectors.lanes, frame, bgr))
+    lanes = detectors.lanes_of(frame.index)
+    if lanes is not None:
+        frame = replace(frame, raw_lanes=ask(lanes, frame, bgr))
     return frame
 
 
@@ -124,8 +133,18 @@ def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None
     without images, unless a detector is named."""
     if spec is None and image_size(source) is None:
         return None
-    camera = source.camera if is_live_source(source) else cast("Source", source).frame(0).camera
-    return open_lanes(spec, camera, is_simulated(source))
+    return open_lanes(spec, camera_of(source), is_simulated(source))
+
+
+def far_lanes_for(source: AnySource, lanes: object) -> LaneNetwork | None:
+    """The same lane network for the far part of the source's images. None without a network, or if the whole image
+    shows as much."""
+    return lanes.far_of(camera_of(source)) if isinstance(lanes, LaneNetwork) else None
+
+
+def camera_of(source: AnySource) -> CameraCalibration | None:
+    """The calibration of the source's images: of the first frame of a recording; None if it is not known."""
+    return source.camera if is_live_source(source) else cast("Source", source).frame(0).camera
 
 
 def brings_detections(source: AnySource) -> bool:
@@ -152,7 +171,7 @@ class DetectorChoice:
     lanes_every: int | None = None
     """Lanes are detected in every n-th frame; None for a default that depends on the lane detector's speed."""
     far_px: int | None = WINDOW_PX
-    """Side of the far view's window in native pixels; None without a far view."""
+    """Side of the far view's window in native pixels; None without a far view, for lanes as well."""
 
 
 def open_detectors(
@@ -169,8 +188,11 @@ def open_detectors(
     for note in lanes.notes if lanes is not None else ():
         say(note)
     boxes = open_boxes(source, choice.boxes, sensors, say)
-    far = far_view_for(source, boxes, choice.far_px) if choice.far_px is not None else None
-    return Detectors(boxes, lanes, choice.lanes_every or usual_every(lanes, source.rate_hz), far)
+    every = choice.lanes_every or usual_every(lanes, source.rate_hz)
+    if choice.far_px is None:
+        return Detectors(boxes, lanes, every)
+    far = far_view_for(source, boxes, choice.far_px)
+    return Detectors(boxes, lanes, every, far, far_lanes=far_lanes_for(source, lanes))
 
 
 def open_boxes(

@@ -52,6 +52,8 @@ class LiveDetectors:
         self._early: tuple[U8, dict[str, RawBoxes | RawLanes]] | None = None
         """The image processed before its tick, and what detectors found in it, by their names."""
         self._since_lanes = detectors.lanes_every
+        self._lanes_turn = -1
+        """Number of turns that lane detectors had, minus one."""
         self._last_index: int | None = None
         self._calm = CALM_TICKS
         self._looked_far = False
@@ -64,7 +66,7 @@ class LiveDetectors:
         detector raised."""
         frame = self._with_lines(frame)
         left_out: list[str] = []
-        lanes = self._detectors.lanes if self._is_lanes_turn(frame) else None
+        lanes = self._detectors.lanes_in_turn(self._lanes_turn) if self._is_lanes_turn(frame) else None
         if lanes is not None and self._detectors.lanes_every > 1:
             if not self._starts(lanes, frame):
                 left_out.append(LANES_LEFT_OUT)
@@ -72,7 +74,7 @@ class LiveDetectors:
         far = self._detectors.far if self._has_time_to_look_far(frame) else None
         if far is not self._detectors.far and frame.image is not None:
             left_out.append(FAR_LEFT_OUT)
-        asked = replace(self._detectors, lanes=lanes, lanes_every=1, far=far, far_every=1, left_out=tuple(left_out))
+        asked = Detectors(self._detectors.boxes, lanes, far=far, left_out=tuple(left_out))
         return frame, asked
 
     def next_tick(self, source: LiveSource, timeout_s: float, params: Params) -> Frame | None:
@@ -101,7 +103,8 @@ class LiveDetectors:
         bgr = frame.image.bgr
         found: dict[str, RawBoxes | RawLanes] = {}
         self._early = bgr, found
-        boxes, far, lanes = self._detectors.boxes, self._detectors.far, self._detectors.lanes
+        boxes, far = self._detectors.boxes, self._detectors.far
+        lanes = self._detectors.lanes_in_turn(self._lanes_turn + 1)
         if boxes is not None:
             found[boxes.name] = self._ask(boxes, frame, bgr)
         if far is not None and far_view and self._calm >= CALM_TICKS:
@@ -112,6 +115,7 @@ class LiveDetectors:
     def _is_lanes_turn(self, frame: Frame) -> bool:
         is_due = self._since_lanes >= self._detectors.lanes_every and frame.image is not None
         self._since_lanes = 1 if is_due else self._since_lanes + 1
+        self._lanes_turn += is_due
         return is_due
 
     def _with_lines(self, frame: Frame) -> Frame:

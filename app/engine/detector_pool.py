@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.engine.snapshot import Notice
-from pipeline.detection import Detectors, Detects, brings_detections, far_view_for, image_size
+from pipeline.detection import Detectors, Detects, brings_detections, far_lanes_for, far_view_for, image_size
 from pipeline.inference.runtime import DetectorError, DetectorMissing
 from pipeline.lanes.open_detector import usual_every
 from pipeline.run import Sensors
@@ -62,7 +62,8 @@ class DetectorPool:
         lanes = self.lanes_for(source, notices)
         boxes = self.boxes_for(source, notices)
         every = self._lanes_every or usual_every(lanes, source.rate_hz)
-        return Detectors(boxes, lanes, every, self.far_view_for(source, boxes))
+        far_lanes = far_lanes_for(source, lanes) if self._far_view_px is not None else None
+        return Detectors(boxes, lanes, every, self.far_view_for(source, boxes), far_lanes=far_lanes)
 
     def far_view_for(self, source: AnySource, boxes: Detects[RawBoxes] | None) -> FarView | None:
         """The detector's second pass for the source's images; None if it is disabled or adds nothing."""

@@ -152,8 +152,9 @@ class SeekablePipeline:
             asked = replace(asked, boxes=None)
         if asked.far is not None and asked.looks_far(index) and not is_wanted and not self._ask.knows(asked.far, index):
             asked = replace(asked, far=None)
-        if asked.lanes is not None and asked.looks_for_lanes(index) and not self._ask.knows(asked.lanes, index):
-            asked = replace(asked, lanes=None)
+        lanes = asked.lanes_of(index)
+        if lanes is not None and not self._ask.knows(lanes, index):
+            asked = replace(asked, lanes=None, far_lanes=None)
         return asked
 
     def _is_at_hand(self, index: int) -> bool:

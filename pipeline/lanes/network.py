@@ -28,9 +28,10 @@ from pipeline.inference.runtime import (
 )
 from pipeline.inference.tuning import USUAL_THREADS
 from pipeline.inference.used_files import file_notes
+from pipeline.lanes.far_window import far_window, window_outline
 from pipeline.lanes.heads import LaneHead, UnknownLaneHead, pick_head
 from pipeline.lanes.horizon import ImageOutline, image_outline
-from pipeline.types import F32, U8, CameraCalibration, RawLanes
+from pipeline.types import F32, U8, CameraCalibration, PixelWindow, RawLanes
 
 _FREE_SIZE: Size = (360, 640)
 """Input (height, width) for a graph with free size: that of the BDD100K networks."""
@@ -42,6 +43,8 @@ _ROW_STEP, _FEWEST_ROWS = 8, 64
 Astyx, nothing was measured."""
 _MOST_SKY = 0.6
 """At most this share of an image is cut off as sky, whatever its calibration says."""
+_CUT_PX = 3.0
+"""Points this close to an inner edge of the window are where it was cut, not where the road ends."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +66,12 @@ class LaneNetwork:
     threads: int
     """Number of threads per image."""
     outline: ImageOutline
-    """Of the camera's images."""
+    """Of the camera's images, or of the window."""
     sha256: str
     """Of the file."""
     _session: ort.InferenceSession = field(repr=False, compare=False)
+    window: PixelWindow | None = None
+    """The only part of the images that it processes; None for the whole image."""
 
     def detect(self, bgr: U8) -> RawLanes:
         """Points on lines and on the road's edges in an image (H, W, 3) uint8, in its pixels.
@@ -74,6 +79,8 @@ class LaneNetwork:
         DetectorError for an array that is not such an image, or if the network fails on it.
         """
         check_image(bgr)
+        if self.window is not None:
+            return self._in_window(bgr, self.window)
         placed = _placed((bgr.shape[0], bgr.shape[1]), self.input_size, self.head, self.outline.horizon)
         found = self.head.points(run_session(self._session, self._blob(bgr, placed)))
         keep = found.score >= _MIN_SCORE
@@ -85,10 +92,29 @@ class LaneNetwork:
     def of_camera(self, camera: CameraCalibration | None) -> LaneNetwork:
         """The same network for images of another camera; None if it is not known. It is loaded again only if the size
         of its input depends on the camera."""
-        outline = image_outline(camera)
+        return self._seeing(image_outline(camera), None)
+
+    def far_of(self, camera: CameraCalibration | None) -> LaneNetwork | None:
+        """The same network for the far part of a camera's images (``far_window``). None if that would show no more than
+        the whole image."""
+        window = far_window(camera) if camera is not None and self.head.keeps_aspect else None
+        return self._seeing(window_outline(camera, window), window) if camera is not None and window else None
+
+    def _seeing(self, outline: ImageOutline, window: PixelWindow | None) -> LaneNetwork:
         if self.head.keeps_aspect and outline != self.outline:
-            return load_lane_network(self.path, self.threads, outline)
-        return replace(self, name=_name(self.path, self.sha256, self.head, outline), outline=outline)
+            return load_lane_network(self.path, self.threads, outline, window)
+        name = _name(self.path, self.sha256, self.head, outline, window)
+        return replace(self, name=name, outline=outline, window=window)
+
+    def _in_window(self, bgr: U8, window: PixelWindow) -> RawLanes:
+        """The same for the part of an image in the window; none if the image is smaller than the camera's."""
+        x1, y1, x2, y2 = window
+        if bgr.shape[1] < x2 or bgr.shape[0] < y2:
+            return RawLanes(self.name, np.zeros((0, 2), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int32))
+        seen = replace(self, window=None).detect(np.ascontiguousarray(bgr[y1:y2, x1:x2]))
+        u = seen.points[:, 0]
+        left, right = (u > _CUT_PX) | (x1 == 0), (u < x2 - x1 - 1 - _CUT_PX) | (x2 == bgr.shape[1])
+        return replace(seen, points=seen.points + np.array([x1, y1], np.float32)).only(left & right)
 
     def _blob(self, bgr: U8, placed: _Placed) -> F32:
         """(1, 3, h, w) float32, the network's input."""
@@ -133,9 +159,11 @@ def open_lane_network(
     return load_lane_network(path, threads, image_outline(camera))
 
 
-def load_lane_network(path: Path, threads: int, outline: ImageOutline) -> LaneNetwork:
-    """The network in a file, tested by running it on a grey image. outline: of the camera's images. DetectorError if it
-    is not a lane network that can be run."""
+def load_lane_network(
+    path: Path, threads: int, outline: ImageOutline, window: PixelWindow | None = None
+) -> LaneNetwork:
+    """The network in a file, tested by running it on a grey image. outline: of the camera's images, or of the window in
+    them that it is to process. DetectorError if it is not a lane network that can be run."""
     model = with_empty_masks(read_graph(path))
     try:
         own = input_size(model)
@@ -157,10 +185,11 @@ def load_lane_network(path: Path, threads: int, outline: ImageOutline) -> LaneNe
         head = head if smaller is not None else replace(head, horizon=None, keeps_aspect=False)
         session, size = (smaller, (rows, size[1])) if smaller is not None else (session, size)
     sha256 = file_sha256(path)
-    name = _name(path, sha256, head, outline)
+    name = _name(path, sha256, head, outline, window)
     notes = (f"Lane lines by the network {path.stem}", *file_notes(path, sha256))
     count = session.get_session_options().intra_op_num_threads
-    return LaneNetwork(path, name, tuple(session.get_providers()), size, head, notes, count, outline, sha256, session)
+    providers = tuple(session.get_providers())
+    return LaneNetwork(path, name, providers, size, head, notes, count, outline, sha256, session, window)
 
 
 def _probe(session: ort.InferenceSession, size: Size) -> Sequence[F32]:
@@ -188,13 +217,13 @@ def _with_rows(
     return session if mask.shape[-2] == rows else None
 
 
-def _name(path: Path, sha256: str, head: LaneHead, outline: ImageOutline) -> str:
+def _name(path: Path, sha256: str, head: LaneHead, outline: ImageOutline, window: PixelWindow | None) -> str:
     """Of a network. What its input depends on is part of it."""
     name = f"{path.stem}-{sha256[:12]}" + ("-road" if head.road is not None else "")
-    if head.horizon is None:
-        return name
-    aspect = f"-{outline.aspect:.3f}" if head.keeps_aspect else ""
-    return f"{name}-{outline.horizon:.3f}{aspect}"
+    if head.horizon is not None:
+        aspect = f"-{outline.aspect:.3f}" if head.keeps_aspect else ""
+        name = f"{name}-{outline.horizon:.3f}{aspect}"
+    return name if window is None else f"{name}-far{'.'.join(map(str, window))}"
 
 
 def _placed(image: Size, size: Size, head: LaneHead, horizon: float) -> _Placed:

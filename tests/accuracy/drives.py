@@ -79,12 +79,9 @@ def drive(
     results, judged = {}, {}
     found = looking.lanes(uri, lanes)
     every = lanes_every or usual_every(found and found.detector, source.rate_hz)
-    for frame, result in through(
-        frames,
-        params,
-        Detectors(detector, found, every, looking.far_view(folder, image.bgr.shape[1], image.bgr.shape[0])),
-        sensors,
-    ):
+    far = looking.far_view(folder, image.bgr.shape[1], image.bgr.shape[0])
+    detectors = Detectors(detector, found, every, far, far_lanes=looking.far_lanes(uri, lanes))
+    for frame, result in through(frames, params, detectors, sensors):
         results[frame.name] = result
         truth = source.truth(frame.index)
         if truth is not None:

@@ -22,7 +22,8 @@ def test_the_empty_road_is_no_car_as_wide_as_the_far_view(data_dir: Path) -> Non
     assert far is not None
     leads = {}
     for case, view in (("as it is", far), ("every box of the far view", replace(far, sure_px=float("inf")))):
-        results = [result for _, result in through(frames, Params(), Detectors(boxes, lanes, 3, view), "both")]
+        detectors = Detectors(boxes, lanes, 3, view, far_lanes=looking.far_lanes(source.uri, "twinlitenet"))
+        results = [result for _, result in through(frames, Params(), detectors, "both")]
         leads[case] = [result.cipv.distance_m for result in results if result.cipv is not None]
     assert leads["as it is"] == []
     assert len(leads["every box of the far view"]) > 2, "the video shows it"

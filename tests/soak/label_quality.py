@@ -119,7 +119,8 @@ def _run(source: Source, frames: Sequence[Frame]) -> Iterator[tuple[Frame, Resul
     lanes = looking.lanes(source.uri, "twinlitenet")
     every = usual_every(lanes and lanes.detector, source.rate_hz)
     boxes, far = looking.yolox_nano(data_dir(), width, height), looking.far_view(data_dir(), width, height)
-    return through(frames, Params(), Detectors(boxes, lanes, every, far), "both")
+    far_lanes = looking.far_lanes(source.uri, "twinlitenet")
+    return through(frames, Params(), Detectors(boxes, lanes, every, far, far_lanes=far_lanes), "both")
 
 
 def by_frame(tracks: Sequence[LabelTrack], holds: Callable[[Cuboid], bool] = lambda _: True) -> ByFrame:

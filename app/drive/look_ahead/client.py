@@ -61,7 +61,8 @@ class NetworkProcess:
         far = asked.far
         if far is not None:
             far = replace(far, detector=cast("Any", self._there(far.detector)))
-        return replace(asked, boxes=self._there(asked.boxes), lanes=self._there(asked.lanes), far=far)
+        lanes, far_lanes = self._there(asked.lanes), self._there(asked.far_lanes)
+        return replace(asked, boxes=self._there(asked.boxes), lanes=lanes, far=far, far_lanes=far_lanes)
 
     def detect(self, number: int, bgr: U8) -> RawBoxes | RawLanes:
         """The detections of a network in an image (H, W, 3) uint8."""
@@ -136,13 +137,13 @@ class _Remote:
 def _networks(detectors: Detectors) -> list[Detector | LaneNetwork]:
     """The networks among the detectors."""
     far = detectors.far.detector if detectors.far is not None else None
-    asked = (detectors.boxes, far, detectors.lanes)
+    asked = (detectors.boxes, far, detectors.lanes, detectors.far_lanes)
     return [each for each in asked if isinstance(each, Detector | LaneNetwork)]
 
 
 def _file_of(network: Detector | LaneNetwork) -> NetworkFile:
-    outline = network.outline if isinstance(network, LaneNetwork) else None
-    return NetworkFile(network.name, str(network.path.resolve()), network.threads, network.input_size, outline)
+    outline, window = (network.outline, network.window) if isinstance(network, LaneNetwork) else (None, None)
+    return NetworkFile(network.name, str(network.path.resolve()), network.threads, network.input_size, outline, window)
 
 
 def _pipe(stream: IO[bytes] | None) -> IO[bytes]:

@@ -7,6 +7,7 @@ import msgspec
 
 from app.core.kept_detections import DetectionRow
 from pipeline.lanes.horizon import ImageOutline
+from pipeline.types import PixelWindow
 
 
 class NetworkFile(msgspec.Struct, frozen=True):
@@ -21,7 +22,9 @@ class NetworkFile(msgspec.Struct, frozen=True):
     input_size: tuple[int, int]
     """(height, width)."""
     outline: ImageOutline | None
-    """For a lane network, of the camera's images; None for a vehicle detector."""
+    """For a lane network, of what it sees; None for a vehicle detector."""
+    window: PixelWindow | None = None
+    """For a lane network, the part of the image that it sees; None for the whole image."""
 
 
 class Networks(msgspec.Struct):

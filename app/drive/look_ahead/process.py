@@ -74,7 +74,7 @@ def _opened(file: NetworkFile) -> Detector | LaneNetwork:
     """The network; BadInput if it differs from the server's, for example because the file has been replaced."""
     network: Detector | LaneNetwork
     if file.outline is not None:
-        network = load_lane_network(Path(file.path), file.threads, file.outline)
+        network = load_lane_network(Path(file.path), file.threads, file.outline, file.window)
     else:
         network = open_detector(file.path, None, file.threads)
         if network.input_size != file.input_size:
