@@ -6,7 +6,7 @@ network follows kerbs and the edge of the road to 50 m, at the same cost, but it
 So the two views take turns.
 
 On KITTI 0009, a street without lane lines, the mean error of the path against the way then driven falls from 0.47 to
-0.25 m at 30 m and from 0.67 to 0.36 m at 40 m (``tests.soak.own_motion``).
+0.24 m at 30 m and from 0.67 to 0.37 m at 40 m.
 """
 
 from __future__ import annotations

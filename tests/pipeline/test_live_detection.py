@@ -139,6 +139,22 @@ def _looked(indices: Iterable[int]) -> list[int]:
     return seen
 
 
+@pytest.mark.parametrize("every", [1, 3])
+def test_the_far_part_of_the_image_has_every_second_turn(every: int) -> None:
+    """Of the turns that were taken, whatever their ticks' indices."""
+    lanes, far = _Lanes(is_quick=True), _Lanes(is_quick=True)
+    far.name = "far"
+    live = LiveDetectors(Detectors(None, lanes, lanes_every=every, far_lanes=far))
+    calls = []
+    for number in range(4 * every):
+        detect(*live.of(_tick(7 * number, number)))
+        for thread in threading.enumerate():
+            if thread.name == "cipv-lanes":
+                thread.join()
+        calls.append((lanes.calls, far.calls))
+    assert calls[::every] == [(1, 0), (1, 1), (2, 1), (2, 2)]
+
+
 def test_a_tick_without_an_image_passes_the_lanes_turn_on() -> None:
     frames = [_tick(n) for n in range(6)]
     frames[3] = replace(frames[3], image=None)

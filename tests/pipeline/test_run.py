@@ -85,6 +85,17 @@ def test_lanes_are_looked_for_in_every_nth_frame_and_boxes_in_all() -> None:
     assert [frame.index for frame in seen if frame.raw_lanes is not None] == [0, 3, 6]
 
 
+def test_the_far_part_of_the_image_has_every_second_turn_of_the_lanes() -> None:
+    """By the frame's index, so that a frame's lines do not depend on the order in which frames are read."""
+    lanes, far = _Seen(_NO_LANES), _Seen(replace(_NO_LANES, model="far"))
+    asked = Detectors(None, lanes, lanes_every=3, far_lanes=far)
+    seen = [detect(frame, asked).raw_lanes for frame in reversed(_frames(10))]
+    assert [each and each.model for each in reversed(seen)] == [
+        *("lanes", None, None, "far", None, None, "lanes", None, None, "far"),
+    ]
+    assert asked.names == ("lanes", "far"), "caches and tables tell them apart"
+
+
 def test_a_car_with_lidar_alone_asks_no_detector() -> None:
     boxes, lanes = _Seen(_NO_BOXES), _Seen(_NO_LANES)
     frame, _, result, _ = advance(State(), _frames(1)[0], Params(), Detectors(boxes, lanes), "lidar")

@@ -18,6 +18,7 @@ from pipeline.lanes.open_detector import OFF, open_lanes
 from pipeline.types import U8, CameraCalibration
 from pipeline.types.detections import ROAD_LEFT, ROAD_RIGHT
 from tests.pipeline.lanes import lane_networks
+from tests.pipeline.lanes.lane_cameras import camera_of
 from tests.pipeline.vision import networks
 
 RED, GREEN, BLUE = (0, 0, 255), (0, 255, 0), (255, 0, 0)
@@ -40,9 +41,7 @@ def image(**bars: tuple[int, int]) -> U8:
 
 def level_camera(horizon: float, width: int = WIDTH, height: int = HEIGHT) -> CameraCalibration:
     """Looks straight ahead, with the horizon at this share of the image's height."""
-    K = np.array([[1000.0, 0.0, width / 2], [0.0, 1000.0, horizon * height], [0.0, 0.0, 1.0]])
-    level = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-    return CameraCalibration(K, np.zeros(0), level, width, height)
+    return camera_of(1000.0, width, height, (width / 2, horizon * height))
 
 
 MASKS = {
@@ -96,6 +95,55 @@ def test_a_fully_convolutional_network_sees_the_road_in_its_own_aspect(
     assert raw.points[:, 1].max() == pytest.approx(height, abs=2.0 * height / rows + 1.0)
     assert open_lane_network(file).of_camera(level_camera(horizon, width, height)).input_size == (rows, 640)
     assert open_lane_network(file, camera=level_camera(0.3)).name != network.name
+
+
+def test_the_far_part_of_an_image_is_seen_at_twice_the_scale_in_the_images_pixels(tmp_path: Path) -> None:
+    """A line that is two pixels wide, and ends half way down, is where it is in the image. So is the edge of the road,
+    while what leaves the window on its left ends nowhere."""
+    wide = camera_of(721.5, 1242, 375, (610.0, 173.0))
+    whole = open_lane_network(str(lane_networks.twin(tmp_path / "twin.onnx", (360, 640), attention=True)), camera=wide)
+    far = whole.far_of(wide)
+    assert far is not None
+    assert far.window == (290, 145, 931, 273)
+    assert far.input_size == (128, 640)
+    assert whole.input_size == (136, 640), "it costs as much"
+    bgr = np.zeros((375, 1242, 3), np.uint8)
+    bgr[180:230, 700:702] = RED
+    line = far.detect(bgr).painted().points
+    assert line[:, 0] == pytest.approx(700.5, abs=1.0)
+    assert (line[:, 1].min(), line[:, 1].max()) == pytest.approx((180.0, 229.0), abs=1.5)
+    bgr[180:, :800] = BLUE
+    edges = far.detect(bgr).road_edges()
+    assert set(edges.line.tolist()) == {ROAD_RIGHT}
+    assert edges.points[:, 0] == pytest.approx(800.0, abs=1.5)
+    assert edges.points[:, 1].max() == pytest.approx(272.0, abs=1.5)
+
+
+def test_nothing_beyond_the_window_is_seen_and_a_smaller_image_has_no_window(tmp_path: Path) -> None:
+    wide = camera_of(721.5, 1242, 375, (610.0, 173.0))
+    far = open_lane_network(str(lane_networks.twin(tmp_path / "twin.onnx", (360, 640)))).far_of(wide)
+    assert far is not None
+    bgr = np.zeros((375, 1242, 3), np.uint8)
+    bgr[:, 100:102] = bgr[300:, 600:602] = RED
+    assert len(far.detect(bgr).points) == 0
+    bgr[:, 600:602] = RED
+    assert len(far.detect(bgr).points) > 0
+    assert len(far.detect(bgr[:, :900]).points) == 0
+
+
+def test_the_far_views_of_two_cameras_share_a_session(tmp_path: Path) -> None:
+    whole = open_lane_network(str(lane_networks.twin(tmp_path / "twin.onnx", (360, 640))))
+    first = whole.far_of(camera_of(721.5, 1242, 375, (610.0, 173.0)))
+    assert first is not None
+    second = first.far_of(camera_of(721.5, 1242, 375, (580.0, 173.0)))
+    assert second is not None
+    assert second._session is first._session
+    assert second.name != first.name, "their points differ"
+    assert second == whole.far_of(camera_of(721.5, 1242, 375, (580.0, 173.0)))
+    assert whole.far_of(None) is None
+    assert whole.far_of(camera_of(1818, 2048, 618, (1040, 320))) is None
+    curves = open_lane_network(str(lane_networks.lstr(tmp_path / "lstr.onnx")))
+    assert curves.far_of(camera_of(721.5, 1242, 375, (610.0, 173.0))) is None, "it needs its own aspect"
 
 
 def test_a_network_whose_rows_cannot_be_reduced_sees_the_whole_image(tmp_path: Path) -> None:

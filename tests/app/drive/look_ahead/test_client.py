@@ -25,6 +25,8 @@ from pipeline.types import RawBoxes, RawLanes
 from pipeline.vision.detector import open_detector
 from tests.app.drive.look_ahead.networks import COMMAND, both_views
 from tests.app.engine.recording_helpers import CountingDetector, Recording
+from tests.pipeline.lanes import lane_networks
+from tests.pipeline.lanes.lane_cameras import camera_of
 from tests.pipeline.recording.frames import same
 
 WAIT_S = 180.0
@@ -70,6 +72,26 @@ def test_lanes_are_the_same_to_the_last_bit(data_dir: Path) -> None:
     assert process.detectors.lanes is not None
     try:
         assert same(process.detectors.lanes.detect(image.bgr), lanes.detect(image.bgr))
+    finally:
+        process.close()
+
+
+def test_the_far_part_is_the_same_to_the_last_bit(tmp_path: Path) -> None:
+    wide = camera_of(721.5, 1242, 375, (610.0, 173.0))
+    lanes = open_lane_network(str(lane_networks.twin(tmp_path / "twin.onnx", (360, 640))), camera=wide)
+    far = lanes.far_of(wide)
+    assert far is not None
+    bgr = np.zeros((375, 1242, 3), np.uint8)
+    bgr[160:, 600:603] = (0, 0, 255)
+    assert len(far.detect(bgr).points) > 0
+    process = NetworkProcess(Detectors(lanes=lanes, far_lanes=far))
+    there = process.detectors
+    assert there.names == (lanes.name, far.name)
+    assert there.lanes is not None
+    assert there.far_lanes is not None
+    try:
+        assert same(there.far_lanes.detect(bgr), far.detect(bgr))
+        assert same(there.lanes.detect(bgr), lanes.detect(bgr))
     finally:
         process.close()
 
