@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from math import inf
 
+from pipeline.decision.braking_evidence import RANGED_SIGHTINGS
 from pipeline.decision.place import Place
 from pipeline.params import CipvParams
 from pipeline.types import FusedObject
@@ -37,7 +38,7 @@ def clears_path_s(
 
     ego_speed_mps: None while unknown.
     """
-    if where is None or not params.use_crossing or not (item.ranged or item.camera_ranges >= _FEWEST_RANGES):
+    if where is None or not params.use_crossing or not _has_velocity(item):
         return None
     sideways_mps = where.believed_mps
     if abs(sideways_mps) < _SLOWEST_MPS or not _crosses(where, ego_speed_mps is not None):
@@ -49,6 +50,12 @@ def clears_path_s(
     arrives_s = min(nearest_m / closing_mps if closing_mps > _ARRIVING_MPS else inf, _LONGEST_S)
     early_s = arrives_s - leaves_s
     return early_s if early_s > params.crossing_margin_s else None
+
+
+def _has_velocity(item: FusedObject) -> bool:
+    """Whether its lateral speed is known. What the LiDAR has only just found has the speed of its first boxes."""
+    by_lidar = item.ranged and (not item.imaged or item.ranged_steady >= RANGED_SIGHTINGS)
+    return by_lidar or item.camera_ranges >= _FEWEST_RANGES
 
 
 def _crosses(where: Place, is_ego_speed_known: bool) -> bool:

@@ -63,6 +63,20 @@ def test_who_crosses_leads_only_if_it_is_met(item: FusedObject, ego_mps: float, 
         assert not reaction_candidates.enters_corridor(judged, PATH, None, AebParams())
 
 
+@pytest.mark.parametrize(
+    ("ranged_steady", "camera_ranges", "is_known"), [(1, 3, False), (2, 4, False), (3, 3, True), (1, 5, True)]
+)
+def test_what_the_lidar_has_just_found_crosses_once_a_speed_is_known(
+    ranged_steady: int, camera_ranges: int, is_known: bool
+) -> None:
+    """A box that jumps from one far car to the next seems to move sideways as fast as cross traffic."""
+    seen = dataclasses.replace(
+        crosser(30.0, 8.0, 10.0), source="VL", ranged_steady=ranged_steady, camera_ranges=camera_ranges
+    )
+    (judged,) = chosen(seen, 10.0).objects
+    assert (judged.clears_path_s is not None) is is_known
+
+
 def test_it_may_be_switched_off() -> None:
     assert chosen(crosser(12.0, 8.0, 0.0), 0.0, CipvParams(use_crossing=False)).lead is not None
 
