@@ -27,13 +27,13 @@ class LaneLine:
     side: Side
     """On which side of the car it is."""
     coefficients: F64
-    """(4,) float64 c0 … c3, of metres."""
-    covariance: F64
     """(4,) float64 c0 … c3, with x and y in metres."""
+    covariance: F64
+    """(4, 4) float64, of the coefficients; grows while the line is not measured."""
     x_min_m: float
-    """(4, 4) float64 covariance of the coefficients; grows while the line is not measured."""
-    x_max_m: float
     """x where the support by paint starts."""
+    x_max_m: float
+    """x where it ends."""
     quality: float
     """0–1, how well the detector and the tracking support it."""
     age_s: float
