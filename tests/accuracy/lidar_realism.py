@@ -16,7 +16,7 @@ import numpy as np
 from pipeline.common.geometry import Cuboid
 from pipeline.simulation.sensors.lidar.model import LidarModel
 from pipeline.simulation.sensors.lidar.rays import BOX_FIELDS
-from pipeline.simulation.sensors.lidar.scene import vehicle_boxes
+from pipeline.simulation.sensors.lidar.scene import actor_boxes
 from pipeline.simulation.sensors.lidar.sensor import Lidar
 from pipeline.simulation.world.actors import Vehicle, VehicleKind
 from pipeline.simulation.world.world_state import ActorState
@@ -105,7 +105,7 @@ def _boxes(item: TruthObject, rng: np.random.Generator) -> list[tuple[float, ...
         return []
     grey = int(rng.integers(15, 245))
     vehicle = Vehicle(id=1, kind=kind, colour=f"#{grey:02x}{grey:02x}{grey:02x}")
-    return vehicle_boxes(ActorState(vehicle, item.cuboid, 0.0, False, 0.0))
+    return actor_boxes(ActorState(vehicle, item.cuboid, 0.0, False, 0.0))
 
 
 def _on(sweep: Sweep, cuboid: Cuboid) -> tuple[int, int]:

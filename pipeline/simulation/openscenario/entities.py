@@ -9,7 +9,7 @@ from typing import cast
 from pipeline.common.files.user_file_errors import did_you_mean, reason_of
 from pipeline.simulation.openscenario.parameters import ParameterScope
 from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, catalog_paths, read_xml, shown
-from pipeline.simulation.world.actors import VehicleKind
+from pipeline.simulation.world.actors import ActorKind
 
 _KINDS: dict[str, str] = {"car": "car", "van": "van", "truck": "truck", "bus": "bus", "motorbike": "motorcycle"}
 """``vehicleCategory`` → kind in the simulator."""
@@ -26,7 +26,7 @@ class VehicleBody:
 
     name: str
     """Of the entity."""
-    kind: VehicleKind | None
+    kind: ActorKind | None
     """As simulated; None for what the simulator does not have."""
     what: str
     """In the file's words."""
@@ -149,6 +149,4 @@ def _body(at: XmlElement, name: str, scope: ParameterScope, catalogs: CatalogFil
         return VehicleBody(name, None, what, at, _SMALL_M, 0.0)
     box, centre = shape.one("BoundingBox", "Dimensions"), shape.one("BoundingBox", "Center")
     length, width, height = (inner.number(box, key) for key in ("length", "width", "height"))
-    return VehicleBody(
-        name, cast("VehicleKind", kind), what, at, (length, width, height), inner.number(centre, "x", 0.0)
-    )
+    return VehicleBody(name, cast("ActorKind", kind), what, at, (length, width, height), inner.number(centre, "x", 0.0))
