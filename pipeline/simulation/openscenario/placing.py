@@ -1,21 +1,33 @@
-"""Puts the entities of a scenario on the road, or leaves out what the simulator does not have and what the ego vehicle
-does not meet."""
+"""Puts the entities of a scenario on the ego vehicle's road, on a road of their own or on a line, or leaves out what
+the simulator does not have."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import cos, sin
 
-from pipeline.simulation.openscenario.entities import VehicleBody
+import numpy as np
+
+from pipeline.simulation.openscenario.entities import NO_EGO, VehicleBody
 from pipeline.simulation.openscenario.parameters import ParameterScope
-from pipeline.simulation.openscenario.roads.driven_road import OffTheWay
+from pipeline.simulation.openscenario.roads.building import driven_road
+from pipeline.simulation.openscenario.roads.driven_road import DrivenRoad, OffTheWay
+from pipeline.simulation.openscenario.roads.free_line import straight
 from pipeline.simulation.openscenario.roads.network import FileRoad, Network
 from pipeline.simulation.openscenario.storyboard.movers import Mover
-from pipeline.simulation.openscenario.storyboard.positions import PlaceOf, RoadPlace, place_at
+from pipeline.simulation.openscenario.storyboard.poses import pose_at
+from pipeline.simulation.openscenario.storyboard.positions import Entities, RoadPlace, place_at
 from pipeline.simulation.openscenario.storyboard.stage import PlayedScenario
-from pipeline.simulation.openscenario.storyboard.start import file_start, with_scopes
+from pipeline.simulation.openscenario.storyboard.start import file_start, named_roads, start_at, with_scopes
+from pipeline.simulation.openscenario.storyboard.trajectories import read_trajectory, trajectory_of
 from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, shown
+from pipeline.simulation.world.lines import WorldPose
 
 _AHEAD_STEP_M = 5.0
+_ALONG_SIN, _BESIDE_M = 0.09, 3.0
+"""An entity turned from a road by more than 5°, or farther from the middle of every lane, does not drive along it."""
+_LOOKED_M, _LOOK_STEP_M, _LEVEL_M = 2_000.0, 10.0, 2.0
+"""How far ways are followed to see whether they cross at different heights, the step, and the least difference."""
 _STANDING = ("TeleportAction", "AppearanceAction", "ControllerAction", "ActivateControllerAction", "VisibilityAction")
 
 
@@ -32,6 +44,10 @@ class Placing:
         self._acting = set(_actors(storyboard, scope))
         self.teleports: dict[str, XmlElement] = {}
         """Entity → its position in the Init."""
+        self.trajectories: dict[str, XmlElement] = {}
+        """Entity → its first ``FollowTrajectoryAction`` in the Init."""
+        self.ego_place: RoadPlace | None = None
+        """Where the ego vehicle starts, if its trajectory says so."""
         self.others: list[tuple[XmlElement, list[str]]] = []
         """The other actions of the Init, and their entities."""
 
@@ -62,56 +78,89 @@ class Placing:
                     self.teleports[name] = teleport.one("Position")
                 else:
                     self.others.append((action, [name]))
+                trajectory = action.find("RoutingAction", "FollowTrajectoryAction")
+                if trajectory is not None:
+                    self.trajectories.setdefault(name, trajectory)
 
     def put_ego(self, stage: PlayedScenario) -> None:
         """Place the ego vehicle, and before it those to which its position refers."""
-        self._put(stage.ego, stage, ())
+        self.put(stage.ego, stage, ())
 
     def put_all(self, stage: PlayedScenario) -> None:
         """Place every entity, each after those to which its position refers."""
         for name in self._bodies:
-            self._put(name, stage, ())
+            self.put(name, stage, ())
 
-    def _put(self, name: str, stage: PlayedScenario, asked: tuple[str, ...]) -> None:
-        """asked: who is waiting for it."""
-        if name in stage.movers or name in stage.left_out:
+    def put(self, name: str, stage: PlayedScenario, asked: tuple[str, ...]) -> None:
+        """Place an entity, unless it is placed or not one of the file's. asked: who is waiting for it."""
+        if name in stage.movers or name in stage.left_out or name not in self._bodies:
             return
-        body = self._bodies[name]
-        if name not in self.teleports:
+        body, entities = self._bodies[name], _PlacedFirst(self, stage, (*asked, name))
+        if name == stage.ego and self.ego_place is not None:
+            stage.movers[name] = Mover(body, self.ego_place, stage.road, self.trajectories[name])
+        elif name in self.teleports:
+            self._put_at(self.teleports[name], body, stage, entities)
+        elif name in self.trajectories:
+            action = self.trajectories[name]
+            found = read_trajectory(trajectory_of(action), self._scope, entities)
+            offset_m = self._scope.number(action, "initialDistanceOffset", 0.0)
+            stage.movers[name] = Mover.on_line(body, found.line, offset_m, stage.road, action)
+        else:
             self._leave_out(stage, f"{shown(name)} is left out: it has no position at the start.", name)
-            return
 
-        def place_of(other: str, at: XmlElement) -> RoadPlace:
-            if other in (name, *asked):
-                raise at.refusal(f"the position of {shown(other)} refers to itself")
-            if other in self._bodies:
-                self._put(other, stage, (*asked, name))
-            return stage.place_of(other, at)
-
-        position = self.teleports[name]
+    def _put_at(self, position: XmlElement, body: VehicleBody, stage: PlayedScenario, entities: _PlacedFirst) -> None:
+        """Put an entity at its position in the Init."""
+        name = body.name
         if body.kind is None:
-            self._check_stranger(body, _without_orientation(position), stage, place_of)
+            self._check_stranger(body, _without_orientation(position), stage, entities)
             return
+        own_roads = named_roads(self._storyboard, name, self._scope)
         try:
-            place = place_at(position, self._scope, stage.road, place_of)
-        except OffTheWay as error:
+            place = place_at(position, self._scope, stage.road, entities, on_road=body.kind not in NO_EGO)
+            if name == stage.ego or not self._is_routed(name) or own_roads <= stage.road.road_ids:
+                stage.movers[name] = Mover(body, place, stage.road, position)
+                return
+        except OffTheWay:
             if name == stage.ego:
                 raise
+        pose = entities.pose_at(position, self._scope)
+        if not self._moves(name):
+            stage.movers[name] = Mover.on_line(body, straight(pose), 0.0, stage.road, position)
+            return
+        try:
+            own = self._own_road(body, pose, own_roads, stage)
+        except OpenScenarioError as error:
             self._check_elsewhere(name, stage, error)
             return
-        stage.movers[name] = Mover(body, place, stage.road, position)
+        if own is None:
+            stage.movers[name] = Mover.on_line(body, straight(pose), 0.0, stage.road, position)
+        elif _is_on_other_level(own, pose, stage.road):
+            self._leave_out(stage, f"{shown(name)} is left out: it drives above or below the ego vehicle's road.", name)
+        else:
+            place = RoadPlace(*own.project(pose[0], pose[1]), 1)
+            stage.movers[name] = Mover(body, place, own, position)
+
+    def _own_road(
+        self, body: VehicleBody, pose: WorldPose, wanted: frozenset[str], stage: PlayedScenario
+    ) -> DrivenRoad | None:
+        """The road along which an entity drives that is not on the ego vehicle's; None if it faces along none, or
+        stands beside all lanes: then it moves straight on."""
+        x, y, heading = pose
+        start, t_m = start_at(stage.road.network, x, y)
+        turned = heading - float(start.road.line.at(np.array([start.s_m]))[0, 2])
+        away_m = abs(sum(start.road.lanes.edges_at(start.lane, start.s_m)) / 2 - t_m)
+        if abs(sin(turned)) > _ALONG_SIN or away_m > _BESIDE_M:
+            return None
+        way = 1 if cos(turned) > 0.0 else -1
+        return driven_road(stage.road.network, start.road, start.s_m, start.lane, way, wanted)
 
     def _check_stranger(
-        self, body: VehicleBody, position: XmlElement, stage: PlayedScenario, place_of: PlaceOf
+        self, body: VehicleBody, position: XmlElement, stage: PlayedScenario, entities: Entities
     ) -> None:
         """Leave out what stands or moves beside the driving lanes."""
         try:
-            place = place_at(position, self._scope, stage.road, place_of)
+            place = place_at(position, self._scope, stage.road, entities)
         except OffTheWay:
-            place = None
-        except OpenScenarioError as error:
-            if "beside the middle of road" not in str(error):
-                raise
             place = None
         reach = [] if place is None else [place.s_m]
         while reach and self._moves(body.name) and reach[-1] + _AHEAD_STEP_M < stage.road.length_m:
@@ -125,17 +174,19 @@ class Placing:
             stage, f"{shown(body.name)}, a {shown(body.what)} beside the driving lanes, is left out.", body.name
         )
 
-    def _check_elsewhere(self, name: str, stage: PlayedScenario, error: OffTheWay) -> None:
-        """Leave out a vehicle that never comes onto the way of the ego vehicle."""
+    def _check_elsewhere(self, name: str, stage: PlayedScenario, error: OpenScenarioError) -> None:
+        """Leave out a vehicle on a road that cannot be simulated, if it never comes onto the way of the ego vehicle."""
         start = file_start(name, self.teleports, self._scope, stage.road.network)
-        if self._moves(name):
-            met = {road.id for road in _reached(start.road, stage.road.network)} & _met(stage)
-            if met:
-                raise OpenScenarioError(
-                    f"{error}, and {shown(name)} may come onto road {shown(sorted(met)[0])}, which is on or across it"
-                )
-        what = "drives elsewhere" if self._moves(name) else "stands elsewhere"
-        self._leave_out(stage, f"{shown(name)} is left out: it {what}, on road {shown(start.road.id)}.", name)
+        met = {road.id for road in _reached(start.road, stage.road.network)} & _met(stage)
+        if met:
+            raise OpenScenarioError(
+                f"{error}, and {shown(name)} may come onto road {shown(sorted(met)[0])}, which is on or across it"
+            )
+        self._leave_out(
+            stage,
+            f"{shown(name)} is left out: road {shown(start.road.id)}, where it drives, cannot be simulated.",
+            name,
+        )
 
     def _leave_out(self, stage: PlayedScenario, note: str, name: str) -> None:
         stage.left_out.add(name)
@@ -160,6 +211,52 @@ class Placing:
             if private.tag == "Private" and self._scope.text(private, "entityRef", "") == name:
                 for action in private.all("PrivateAction"):
                     yield from action.children
+
+
+class _PlacedFirst:
+    """The entities to which a position refers, each placed when it is asked for."""
+
+    def __init__(self, placing: Placing, stage: PlayedScenario, asked: tuple[str, ...]) -> None:
+        """asked: who is waiting for them, the last one whose position this is."""
+        self._placing, self._stage, self._asked = placing, stage, asked
+
+    @property
+    def network(self) -> Network:
+        """All roads of the file."""
+        return self._stage.network
+
+    def place_of(self, name: str, at: XmlElement, road: DrivenRoad) -> RoadPlace:
+        self._place(name, at)
+        return self._stage.place_of(name, at, road)
+
+    def pose_of(self, name: str, at: XmlElement) -> WorldPose:
+        self._place(name, at)
+        return self._stage.pose_of(name, at)
+
+    def road_of(self, name: str, at: XmlElement) -> DrivenRoad:
+        self._place(name, at)
+        return self._stage.road_of(name, at)
+
+    def pose_at(self, position: XmlElement, scope: ParameterScope) -> WorldPose:
+        return pose_at(position, scope, self)
+
+    def _place(self, name: str, at: XmlElement) -> None:
+        if name in self._asked:
+            raise at.refusal(f"the position of {shown(name)} refers to itself")
+        self._placing.put(name, self._stage, self._asked)
+
+
+def _is_on_other_level(own: DrivenRoad, pose: WorldPose, road: DrivenRoad) -> bool:
+    """Whether a way crosses the ego vehicle's road on a bridge or in a tunnel."""
+    start_m = own.project(pose[0], pose[1])[0]
+    s_m = np.arange(start_m, min(own.length_m, start_m + _LOOKED_M), _LOOK_STEP_M)
+    points = np.array([own.to_file_world(s, 0.0) for s in s_m.tolist()]).reshape(-1, 2)
+    at_m, apart_m = road.nearest_m(points)
+    return any(
+        abs(own.height_m(s) - road.height_m(at)) > _LEVEL_M
+        for s, at, apart in zip(s_m.tolist(), at_m.tolist(), apart_m.tolist(), strict=True)
+        if apart < _LOOK_STEP_M
+    )
 
 
 def _actors(storyboard: XmlElement, scope: ParameterScope) -> Iterator[str]:

@@ -18,7 +18,7 @@ class WayPiece(ScenarioPart):
 
     length_m: float = Field(gt=0.0, le=100_000.0)
     """Along the way."""
-    curvature_per_m: float = Field(default=0.0, ge=-20.0, le=20.0)
+    curvature_per_m: float = Field(default=0.0, ge=-100.0, le=100.0)
     """Positive to the left."""
 
 

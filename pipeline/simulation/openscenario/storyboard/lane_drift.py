@@ -26,11 +26,13 @@ class LaneDrift:
             return
         self._next_s = stage.t_s + _EVERY_S
         for name, mover in stage.movers.items():
+            if mover.line is not None or mover.body.kind == "pedestrian":
+                continue
             s_m, now = mover.now(stage.t_s)
-            if now.d_rate_mps != 0.0 or not 0.0 <= s_m <= stage.road.length_m:
+            if now.d_rate_mps != 0.0 or not 0.0 <= s_m <= mover.road.length_m:
                 self._kept.pop(name, None)
                 continue
-            lanes = stage.road.lanes_at(s_m)
+            lanes = mover.road.lanes_at(s_m)
             lane = min(lanes, key=lambda each: abs(lanes[each] - now.d_m), default=None)
             if lane is None:
                 continue
@@ -39,7 +41,7 @@ class LaneDrift:
             if version != mover.lane_version:
                 self._kept[name] = mover.lane_version, offset_m
             elif abs(offset_m - before_m) > _MOST_M:
-                track = stage.road.track_at(s_m)
+                track = mover.road.track_at(s_m)
                 raise track.road.at.refusal(
                     f"the lanes of road {shown(track.road.id)} shift sideways by {abs(offset_m - before_m):.1f} m at "
                     f"s = {track.road_m(s_m):.0f} m, where {shown(name)} drives; lanes that are driven on must run "
