@@ -116,6 +116,8 @@ def _body(at: XmlElement, name: str, scope: ParameterScope, catalogs: CatalogFil
     kind = _KINDS.get(what)
     if kind is None:
         return VehicleBody(name, None, what, at, _SMALL_M, 0.0)
+    if kind in NO_EGO and shape.find("BoundingBox") is None:
+        return VehicleBody(name, kind, what, at, SIZES_M[kind], 0.0)
     box, centre = shape.one("BoundingBox", "Dimensions"), shape.one("BoundingBox", "Center")
     length, width, height = (inner.number(box, key) for key in ("length", "width", "height"))
     if kind == "bicycle" and height < _WITH_RIDER_M:

@@ -4,30 +4,23 @@ the simulator does not have."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from math import cos, sin
 
-import numpy as np
-
+from pipeline.simulation.openscenario.elsewhere import is_on_other_level, may_meet, own_road
 from pipeline.simulation.openscenario.entities import NO_EGO, VehicleBody
 from pipeline.simulation.openscenario.parameters import ParameterScope
-from pipeline.simulation.openscenario.roads.building import driven_road
 from pipeline.simulation.openscenario.roads.driven_road import DrivenRoad, OffTheWay
 from pipeline.simulation.openscenario.roads.free_line import straight
-from pipeline.simulation.openscenario.roads.network import FileRoad, Network
+from pipeline.simulation.openscenario.roads.network import Network
 from pipeline.simulation.openscenario.storyboard.movers import Mover
 from pipeline.simulation.openscenario.storyboard.poses import pose_at
 from pipeline.simulation.openscenario.storyboard.positions import Entities, RoadPlace, place_at
 from pipeline.simulation.openscenario.storyboard.stage import PlayedScenario
-from pipeline.simulation.openscenario.storyboard.start import file_start, named_roads, start_at, with_scopes
+from pipeline.simulation.openscenario.storyboard.start import file_start, named_roads, with_scopes
 from pipeline.simulation.openscenario.storyboard.trajectories import read_trajectory, trajectory_of
 from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, shown
 from pipeline.simulation.world.lines import WorldPose
 
 _AHEAD_STEP_M = 5.0
-_ALONG_SIN, _BESIDE_M = 0.09, 3.0
-"""An entity turned from a road by more than 5°, or farther from the middle of every lane, does not drive along it."""
-_LOOKED_M, _LOOK_STEP_M, _LEVEL_M = 2_000.0, 10.0, 2.0
-"""How far ways are followed to see whether they cross at different heights, the step, and the least difference."""
 _STANDING = ("TeleportAction", "AppearanceAction", "ControllerAction", "ActivateControllerAction", "VisibilityAction")
 
 
@@ -128,31 +121,17 @@ class Placing:
             stage.movers[name] = Mover.on_line(body, straight(pose), 0.0, stage.road, position)
             return
         try:
-            own = self._own_road(body, pose, own_roads, stage)
+            own = own_road(pose, own_roads, stage.network)
         except OpenScenarioError as error:
             self._check_elsewhere(name, stage, error)
             return
         if own is None:
             stage.movers[name] = Mover.on_line(body, straight(pose), 0.0, stage.road, position)
-        elif _is_on_other_level(own, pose, stage.road):
+        elif is_on_other_level(own, pose, stage.road):
             self._leave_out(stage, f"{shown(name)} is left out: it drives above or below the ego vehicle's road.", name)
         else:
             place = RoadPlace(*own.project(pose[0], pose[1]), 1)
             stage.movers[name] = Mover(body, place, own, position)
-
-    def _own_road(
-        self, body: VehicleBody, pose: WorldPose, wanted: frozenset[str], stage: PlayedScenario
-    ) -> DrivenRoad | None:
-        """The road along which an entity drives that is not on the ego vehicle's; None if it faces along none, or
-        stands beside all lanes: then it moves straight on."""
-        x, y, heading = pose
-        start, t_m = start_at(stage.road.network, x, y)
-        turned = heading - float(start.road.line.at(np.array([start.s_m]))[0, 2])
-        away_m = abs(sum(start.road.lanes.edges_at(start.lane, start.s_m)) / 2 - t_m)
-        if abs(sin(turned)) > _ALONG_SIN or away_m > _BESIDE_M:
-            return None
-        way = 1 if cos(turned) > 0.0 else -1
-        return driven_road(stage.road.network, start.road, start.s_m, start.lane, way, wanted)
 
     def _check_stranger(
         self, body: VehicleBody, position: XmlElement, stage: PlayedScenario, entities: Entities
@@ -177,10 +156,10 @@ class Placing:
     def _check_elsewhere(self, name: str, stage: PlayedScenario, error: OpenScenarioError) -> None:
         """Leave out a vehicle on a road that cannot be simulated, if it never comes onto the way of the ego vehicle."""
         start = file_start(name, self.teleports, self._scope, stage.road.network)
-        met = {road.id for road in _reached(start.road, stage.road.network)} & _met(stage)
+        met = may_meet(start.road, stage.road)
         if met:
             raise OpenScenarioError(
-                f"{error}, and {shown(name)} may come onto road {shown(sorted(met)[0])}, which is on or across it"
+                f"{error}, and {shown(name)} may come onto road {shown(met[0])}, which is on or across it"
             )
         self._leave_out(
             stage,
@@ -246,19 +225,6 @@ class _PlacedFirst:
         self._placing.put(name, self._stage, self._asked)
 
 
-def _is_on_other_level(own: DrivenRoad, pose: WorldPose, road: DrivenRoad) -> bool:
-    """Whether a way crosses the ego vehicle's road on a bridge or in a tunnel."""
-    start_m = own.project(pose[0], pose[1])[0]
-    s_m = np.arange(start_m, min(own.length_m, start_m + _LOOKED_M), _LOOK_STEP_M)
-    points = np.array([own.to_file_world(s, 0.0) for s in s_m.tolist()]).reshape(-1, 2)
-    at_m, apart_m = road.nearest_m(points)
-    return any(
-        abs(own.height_m(s) - road.height_m(at)) > _LEVEL_M
-        for s, at, apart in zip(s_m.tolist(), at_m.tolist(), apart_m.tolist(), strict=True)
-        if apart < _LOOK_STEP_M
-    )
-
-
 def _actors(storyboard: XmlElement, scope: ParameterScope) -> Iterator[str]:
     """The entities that act in a story."""
     for part, inner in with_scopes(storyboard, scope):
@@ -278,27 +244,3 @@ def _without_orientation(position: XmlElement) -> XmlElement:
         [each for each in at.children if each.tag != "Orientation"],
     )
     return XmlElement(position.file, position.tag, position.line, position.attributes, [bare])
-
-
-def _met(stage: PlayedScenario) -> set[str]:
-    """The roads of the way, and those through the same junctions."""
-    roads = [stage.road.network.roads[number] for number in stage.road.road_ids]
-    junctions = {road.junction for road in roads} - {None}
-    return {road.id for road in roads} | {
-        road.id for road in stage.road.network.roads.values() if road.junction in junctions
-    }
-
-
-def _reached(road: FileRoad, network: Network) -> list[FileRoad]:
-    """All roads that are joined to one, in any direction, itself included."""
-    found, waiting = {road.id: road}, [road]
-    while waiting:
-        here = waiting.pop()
-        ends = [end for end in (here.end(1), here.end(-1)) if end is not None]
-        there = [each for end in ends if end.is_junction for each in network.through(end.id)]
-        there += [network.roads[end.id] for end in ends if not end.is_junction and end.id in network.roads]
-        for each in there:
-            if each.id not in found:
-                found[each.id] = each
-                waiting.append(each)
-    return list(found.values())
