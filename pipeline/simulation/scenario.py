@@ -4,7 +4,7 @@ are reported in one sentence."""
 from __future__ import annotations
 
 from functools import cached_property
-from math import ceil, pi
+from math import ceil, hypot, pi
 from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import parse_qsl
@@ -29,6 +29,8 @@ from pipeline.types import F64
 from pipeline.types.sensors import SensorKind, further_sensors
 
 _GAP_STEP_S, _GAP_HALVINGS = 0.25, 10
+_CLEAR_M, _ASIDE_M, _LONGEST_M = 1.0, 0.5, 2_000.0
+"""Ways are kept clear in steps, that far beside whoever takes them, and so far along them."""
 
 
 class ScenarioError(BadInput):
@@ -158,6 +160,17 @@ class Scenario(ScenarioPart):
     def free_ways(self) -> tuple[RoadLine, ...]:
         """The ways of ``free_actors`` in the world."""
         return tuple(actor.line(self.road) for actor in self.free_actors)
+
+    @cached_property
+    def kept_clear(self) -> F64 | None:
+        """(M, 3) world x, y and radius of circles along the ways of ``free_actors`` in which nothing may stand; None
+        without any."""
+        circles = [
+            np.column_stack([way.to_world(s_m, 0.0)[:, :2], np.full(len(s_m), hypot(*actor.size()[:2]) / 2 + _ASIDE_M)])
+            for actor, way in zip(self.free_actors, self.free_ways, strict=True)
+            for s_m in [np.arange(0.0, min(actor.travelled_m(self.duration_s), _LONGEST_M) + _CLEAR_M, _CLEAR_M)]
+        ]
+        return np.concatenate(circles) if circles else None
 
     def without_others(self) -> Scenario:
         """The same drive on an empty road."""

@@ -11,6 +11,7 @@ from pipeline.evaluation.lead_verdict import LeadRule, true_lead
 from pipeline.simulation import scenario
 from pipeline.simulation.scenario import Scenario, ScenarioError
 from pipeline.simulation.world import world_state
+from pipeline.simulation.world.roadside import Roadside
 from pipeline.sources.simulated import truth_of
 
 CROSSES = "{id: 1, kind: pedestrian, s_m: 130, d_m: -5, heading_deg: 90, speed_mps: {0: 0, 2: 0, 2.001: 1.5}}"
@@ -92,3 +93,21 @@ def test_labels_are_named_as_those_of_real_recordings_and_are_no_lead() -> None:
 def test_a_wrong_one_is_told_in_one_sentence(actors: str, more: str, says: str) -> None:
     with pytest.raises(ScenarioError, match=says):
         scene(actors, more=more)
+
+
+def test_nothing_stands_where_they_go() -> None:
+    """Trees and buildings stand at random beside the road, but not on the way of a car from the right."""
+    way = "[{length_m: 60}, {length_m: 15.7, curvature_per_m: 0.1}]"
+    made = scene(f"{{id: 1, kind: car, s_m: 180, d_m: -60, heading_deg: 90, way: {way}, speed_mps: {{0: 15}}}}")
+    kept = Roadside.build(made.road, 0, 0.0, 900.0, made.kept_clear)
+    usual = Roadside.build(made.road, 0, 0.0, 900.0)
+
+    def nearest_m(roadside: Roadside) -> float:
+        there = made.free_ways[0].to_world(np.arange(0.0, 150.0, 0.5), 0.0)
+        apart = np.hypot(roadside.poses[:, :1] - there[:, 0], roadside.poses[:, 1:2] - there[:, 1]).min(axis=1)
+        return float(min(apart - [max(thing.length_m, thing.width_m) / 2 for thing in roadside.things]))
+
+    assert nearest_m(usual) < 0.5
+    assert nearest_m(kept) > 1.5
+    assert set(kept.things) < set(usual.things)
+    assert scene("").kept_clear is None
