@@ -11,7 +11,7 @@ from pipeline.simulation.openscenario.roads.driven_road import OffTheWay
 from pipeline.simulation.openscenario.roads.free_line import turned_rad
 from pipeline.simulation.openscenario.storyboard.movers import Mover
 from pipeline.simulation.openscenario.storyboard.positions import place_at
-from pipeline.simulation.openscenario.storyboard.running import Followed, Running, SpeedChange
+from pipeline.simulation.openscenario.storyboard.running import Running, SpeedChange, TrajectoryRun
 from pipeline.simulation.openscenario.storyboard.stage import PlayedScenario
 from pipeline.simulation.openscenario.storyboard.trajectories import Trajectory, read_trajectory, trajectory_of
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
@@ -73,7 +73,7 @@ def follow_trajectory(at: XmlElement, mover: Mover, scope: ParameterScope, stage
     before_m = mover.now(stage.t_s)[1].travelled_m - offset_m
     if clock is not None:
         _keep_times(found, before_m, clock, mover, stage)
-    return Followed(mover, before_m + found.line.length_m, mover.lane_version)
+    return TrajectoryRun(mover, before_m + found.line.length_m, mover.lane_version)
 
 
 @dataclass(frozen=True)

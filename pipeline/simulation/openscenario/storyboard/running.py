@@ -74,7 +74,7 @@ class OffsetChange(Running):
 
 
 @dataclass(frozen=True)
-class Followed(Running):
+class TrajectoryRun(Running):
     """A trajectory that is followed to its end."""
 
     mover: Mover

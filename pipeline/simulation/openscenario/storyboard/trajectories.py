@@ -19,7 +19,7 @@ _GAP_M = 0.5
 _LONGEST_M = 10_000.0
 _SHAPES = "Polyline, Clothoid, ClothoidSpline and Nurbs are"
 
-Times = tuple[tuple[float, float], ...]
+PointTimes = tuple[tuple[float, float], ...]
 """(s, seconds) pairs along a trajectory, before its scale and offset."""
 
 
@@ -29,7 +29,7 @@ class Trajectory:
 
     line: FreeLine
     """In the file's world."""
-    times: Times
+    times: PointTimes
     """When it is where; empty if the file says nothing."""
     at: XmlElement
     """Its shape in the file."""
@@ -65,14 +65,16 @@ def read_trajectory(
 
 def _polyline(
     at: XmlElement, scope: ParameterScope, entities: Entities, here: WorldPose | None
-) -> tuple[FreeLine, Times]:
+) -> tuple[FreeLine, PointTimes]:
     vertices = at.all("Vertex")
     _check_count(vertices, at)
     line, s_m = polyline([entities.pose_at(each.one("Position"), scope)[:2] for each in vertices])
     return line, _timed(vertices, s_m, scope)
 
 
-def _nurbs(at: XmlElement, scope: ParameterScope, entities: Entities, here: WorldPose | None) -> tuple[FreeLine, Times]:
+def _nurbs(
+    at: XmlElement, scope: ParameterScope, entities: Entities, here: WorldPose | None
+) -> tuple[FreeLine, PointTimes]:
     controls, knots = at.all("ControlPoint"), at.all("Knot")
     _check_count(controls, at)
     points = np.array([entities.pose_at(each.one("Position"), scope)[:2] for each in controls])
@@ -88,8 +90,8 @@ def _check_count(points: list[XmlElement], at: XmlElement) -> None:
         raise at.refusal(f"a trajectory needs 2 to {_MOST_POINTS} points")
 
 
-def _timed(points: list[XmlElement], s_m: list[float], scope: ParameterScope) -> Times:
-    """Times of the points that have one, if the last one has."""
+def _timed(points: list[XmlElement], s_m: list[float], scope: ParameterScope) -> PointTimes:
+    """PointTimes of the points that have one, if the last one has."""
     if "time" not in points[-1].attributes:
         return ()
     return tuple(
@@ -99,7 +101,7 @@ def _timed(points: list[XmlElement], s_m: list[float], scope: ParameterScope) ->
 
 def _clothoid(
     at: XmlElement, scope: ParameterScope, entities: Entities, here: WorldPose | None
-) -> tuple[FreeLine, Times]:
+) -> tuple[FreeLine, PointTimes]:
     """``curvatureDot`` is what version 1.0 calls ``curvaturePrime``: the change of curvature along the line."""
     length, bend = scope.number(at, "length"), scope.number(at, "curvature")
     rate = scope.number(at, "curvaturePrime" if "curvaturePrime" in at.attributes else "curvatureDot")
@@ -112,7 +114,7 @@ def _clothoid(
 
 def _spline(
     at: XmlElement, scope: ParameterScope, entities: Entities, here: WorldPose | None
-) -> tuple[FreeLine, Times]:
+) -> tuple[FreeLine, PointTimes]:
     segments = at.all("ClothoidSplineSegment")
     if not 1 <= len(segments) <= _MOST_POINTS:
         raise at.refusal(f"a ClothoidSpline needs 1 to {_MOST_POINTS} segments")
