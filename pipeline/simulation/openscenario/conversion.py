@@ -15,6 +15,7 @@ from pipeline.simulation.openscenario.free_parts import free_actor, is_free
 from pipeline.simulation.openscenario.parameters import ParameterScope
 from pipeline.simulation.openscenario.placing import Placing
 from pipeline.simulation.openscenario.roads.building import driven_road
+from pipeline.simulation.openscenario.roads.crossing_roads import crossing_roads
 from pipeline.simulation.openscenario.roads.driven_road import DrivenRoad
 from pipeline.simulation.openscenario.roads.free_line import turned_rad
 from pipeline.simulation.openscenario.roads.network import Network
@@ -130,7 +131,7 @@ class _Conversion:
         return {
             "title": title,
             "duration_s": duration_s,
-            "road": self._paved(stage.road.road),
+            "road": self._paved(stage.road.road).model_copy(update={"crossings": crossing_roads(stage.road)}),
             "ego": {**ego.script.model_dump(), "start_m": nose_m},
             "actors": [self._actor(number, each, nose_m) for number, each in others if not is_free(each, stage)],
             "free_actors": [

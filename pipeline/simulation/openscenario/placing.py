@@ -212,6 +212,10 @@ class _PlacedFirst:
         self._place(name, at)
         return self._stage.pose_of(name, at)
 
+    def follows(self, name: str, at: XmlElement, road: DrivenRoad) -> bool:
+        self._place(name, at)
+        return self._stage.follows(name, at, road)
+
     def road_of(self, name: str, at: XmlElement) -> DrivenRoad:
         self._place(name, at)
         return self._stage.road_of(name, at)

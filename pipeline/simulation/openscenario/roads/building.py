@@ -30,7 +30,7 @@ _NARROWEST_M, _WIDEST_SHOULDER_M = 0.5, 10.0
 
 _MIRRORED = "The road has left-hand traffic; it is simulated as its mirror image, on the right."
 _BANKED = "Superelevation of the road is left out: it is not banked."
-_UNDRAWN = "Junctions and other roads of the file are not drawn."
+_UNDRAWN = "Of the other roads of the file, only those straight across are drawn."
 _ONE_SECTION = "Lanes are drawn as they are at the ego vehicle's start, along the whole road."
 
 

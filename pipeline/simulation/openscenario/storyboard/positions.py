@@ -45,6 +45,10 @@ class Entities(Protocol):
         """The place of an entity on a road, the nearest if it is not on it."""
         ...
 
+    def follows(self, name: str, at: XmlElement, road: DrivenRoad) -> bool:
+        """Whether an entity follows the lanes of a road."""
+        ...
+
     def pose_at(self, position: XmlElement, scope: ParameterScope) -> WorldPose:
         """x, y and heading of a ``Position`` element in the file's world."""
         ...
@@ -64,7 +68,8 @@ def place_at(
     """The place that a ``Position`` element describes. OffTheWay if it is on another road than the ego vehicle's way,
     OpenScenarioError if it is on none. on_road: False if it may lie beside the road."""
     at = position.only()
-    if at.tag in OFF_ROADS:
+    is_turned = at.tag == "RelativeObjectPosition" and not entities.follows(scope.text(at, "entityRef"), at, road)
+    if is_turned or at.tag in OFF_ROADS:
         found = _from_pose(position, scope, road, entities)
     else:
         found = _from_road(at, scope, road, entities)
@@ -99,7 +104,7 @@ def _from_road(at: XmlElement, scope: ParameterScope, road: DrivenRoad, entities
 
 
 def _from_pose(position: XmlElement, scope: ParameterScope, road: DrivenRoad, entities: Entities) -> RoadPlace:
-    """A place on a trajectory or route, seen from the road."""
+    """A place on a trajectory or route, or relative to an entity that is elsewhere, seen from the road."""
     x, y, heading = entities.pose_at(position, scope)
     s, d = road.project(x, y)
     at = position.only()

@@ -94,6 +94,11 @@ class PlayedScenario:
         """x, y and heading of an entity's reference point in the file's world."""
         return self.mover(name, at).pose(self.t_s)
 
+    def follows(self, name: str, at: XmlElement, road: DrivenRoad) -> bool:
+        """Whether an entity follows the lanes of a road."""
+        mover = self.mover(name, at)
+        return mover.line is None and mover.road is road
+
     def road_of(self, name: str, at: XmlElement) -> DrivenRoad:
         """The road whose lanes an entity follows."""
         mover = self.mover(name, at)

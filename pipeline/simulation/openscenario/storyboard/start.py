@@ -87,6 +87,9 @@ class NoEntities:
     def pose_of(self, name: str, at: XmlElement) -> WorldPose:
         raise self._refusal(name, at)
 
+    def follows(self, name: str, at: XmlElement, road: DrivenRoad) -> bool:
+        raise self._refusal(name, at)
+
     def road_of(self, name: str, at: XmlElement) -> DrivenRoad:
         raise self._refusal(name, at)
 

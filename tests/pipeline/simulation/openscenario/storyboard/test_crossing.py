@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.simulation.scenario import ScenarioError
+from pipeline.simulation.world import world_state
 from tests.pipeline.simulation.openscenario.files import (
     Parts,
     at_time,
@@ -187,6 +188,18 @@ def test_it_may_change_lanes_there(tmp_path: Path) -> None:
     assert pose(made, 9.0) == pytest.approx((300.75, -5.0, pi / 2), abs=0.1)
 
 
+def test_a_place_relative_to_a_turned_vehicle_counts_along_it(tmp_path: Path) -> None:
+    """A parked car faces north on road 8; another stands 5 m behind it and 1 m to its left."""
+    parts = crossing('<LanePosition roadId="8" laneId="-1" s="85"/>')
+    parts.entities += entity("Behind", vehicle(centre=0.0))
+    parts.init += init("Behind", '<RelativeObjectPosition entityRef="Other" dx="-5" dy="1"/>')
+    made = parts.load(tmp_path)
+    assert made.actors == ()
+    states = {state.actor.id: state.cuboid for state in world_state.at(made, 0.0).actors}
+    assert np.subtract(states[2].center[:2], states[1].center[:2]) == pytest.approx((-1.0, -5.0))
+    assert states[2].yaw_rad == pytest.approx(pi / 2)
+
+
 @pytest.mark.parametrize(
     ("where", "x"),
     [
@@ -217,6 +230,48 @@ def test_a_place_on_a_route_counts_along_the_route(where: str, x: float, tmp_pat
 def test_places_on_routes_that_are_refused(position: str, says: str, tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match=says):
         crossing(position).load(tmp_path)
+
+
+def test_traffic_on_the_left_is_mirrored(tmp_path: Path) -> None:
+    """From the near kerb, on the left, to the right: in the simulator from the right to the left."""
+    facing = f'<LanePosition roadId="7" laneId="1" s="160" offset="4"><Orientation h="{-pi / 2}"/></LanePosition>'
+    parts = with_walker()
+    parts.init = init("Ego", on_lane(1, 100.0), "10") + init("Walker", facing, "1")
+    parts.road = xodr(of_road='rule="LHT"')
+    made = parts.load(tmp_path)
+    assert pose(made, 0.0) == pytest.approx((160.0, -5.75, pi / 2))
+    assert pose(made, 3.0) == pytest.approx((160.0, -2.75, pi / 2))
+
+
+ARM = (
+    '<road id="{}" length="80" junction="-1"><link><successor elementType="junction" elementId="5"/></link><planView>'
+    '<geometry s="0" x="{}" y="{}" hdg="{}" length="80"><line/></geometry></planView><lanes><laneSection s="0">{}'
+    "</laneSection></lanes></road>"
+)
+THROUGH = (
+    '<road id="6" length="20" junction="5"><link><predecessor elementType="road" elementId="7" contactPoint="end"/>'
+    "</link><planView>"
+    '<geometry s="0" x="300" y="0" hdg="0" length="20"><line/></geometry></planView><lanes>'
+    '<laneSection s="0">{}</laneSection></lanes></road>'
+)
+TO_JUNCTION = '<link><successor elementType="junction" elementId="5"/></link>'
+
+
+@pytest.mark.parametrize(("north_x", "count"), [(310.0, 1), (330.0, 0), (None, 0)])
+def test_roads_straight_across_a_junction_are_drawn(north_x: float | None, count: int, tmp_path: Path) -> None:
+    """Not those of which only one arm exists, or whose arms do not meet."""
+    both = f"<left>{lane(1)}</left><right>{lane(-1)}</right>"
+    arms = ARM.format(8, 310, -90, pi / 2, both) + THROUGH.format(both)
+    if north_x is not None:
+        arms += ARM.format(9, north_x, 90, -pi / 2, both)
+    parts = Parts(entities=entity("Ego"), init=init("Ego", on_lane(-1, 100.0), "10"))
+    line = '<geometry s="0" x="0" y="0" hdg="0" length="300"><line/></geometry>'
+    parts.road = xodr(line, inside=TO_JUNCTION, more=arms)
+    crossings = parts.load(tmp_path).road.crossings
+    assert len(crossings) == count
+    if crossings:
+        assert (crossings[0].s_m, crossings[0].angle_deg) == pytest.approx((310.0, 90.0), abs=0.01)
+        assert (crossings[0].lanes_each_way, crossings[0].lane_width_m) == (1, 3.5)
 
 
 # ---------------------------------------------------------------- other actions
