@@ -17,6 +17,8 @@ from pipeline.types import F64
 
 CORNER_M = 0.2
 """Distance by which a rounded corner of a polyline passes its vertex at most."""
+LONGEST_M = 10_000.0
+"""Longer lines are not followed."""
 _SAME_M, _STRAIGHT_RAD = 1e-6, 1e-6
 _SEARCH_STEP_M, _NURBS_STEP_M = 0.5, 0.1
 _MOST_SAMPLES = 50_000
@@ -173,6 +175,8 @@ def nurbs(points: F64, weights: F64, knots: F64, order: int) -> tuple[FreeLine, 
         raise ValueError("knots must ascend, and weights be positive")
     homogeneous = BSpline(knots, np.column_stack([points * weights[:, None], weights]), order - 1)
     rough_m = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    if rough_m > LONGEST_M:
+        raise ValueError(f"its control points are more than {LONGEST_M / 1e3:g} km apart")
     count = int(min(max(rough_m / _NURBS_STEP_M, 8 * len(points)), _MOST_SAMPLES))
     at = np.linspace(knots[order - 1], knots[len(points)], count)
     (x, y, w), (dx, dy, dw) = homogeneous(at).T, homogeneous.derivative()(at).T

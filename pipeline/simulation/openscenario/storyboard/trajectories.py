@@ -8,7 +8,7 @@ from math import hypot
 import numpy as np
 
 from pipeline.simulation.openscenario.parameters import ParameterScope
-from pipeline.simulation.openscenario.roads.free_line import FreeLine, clothoid, nurbs, polyline
+from pipeline.simulation.openscenario.roads.free_line import LONGEST_M, FreeLine, clothoid, nurbs, polyline
 from pipeline.simulation.openscenario.storyboard.positions import Entities
 from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, shown
 from pipeline.simulation.world.lines import WorldPose
@@ -16,7 +16,6 @@ from pipeline.simulation.world.lines import WorldPose
 _MOST_POINTS = 2_000
 _GAP_M = 0.5
 """Segments of a spline that meet with more than this are refused."""
-_LONGEST_M = 10_000.0
 _SHAPES = "Polyline, Clothoid, ClothoidSpline and Nurbs are"
 
 PointTimes = tuple[tuple[float, float], ...]
@@ -58,8 +57,8 @@ def read_trajectory(
         raise
     except ValueError as error:
         raise shape.refusal(f"this trajectory is not supported: {error}") from None
-    if line.length_m > _LONGEST_M:
-        raise shape.refusal(f"a trajectory may be {_LONGEST_M / 1e3:g} km long at most")
+    if line.length_m > LONGEST_M:
+        raise shape.refusal(f"a trajectory may be {LONGEST_M / 1e3:g} km long at most")
     return Trajectory(line, times, shape)
 
 
@@ -141,8 +140,8 @@ def _spline(
 
 
 def _bend(at: XmlElement, start: WorldPose, length_m: float, from_per_m: float, to_per_m: float) -> FreeLine:
-    if not 0.0 < length_m <= _LONGEST_M:
-        raise at.refusal(f"{at.tag} length={length_m:g}: expected a positive number up to {_LONGEST_M:g}")
+    if not 0.0 < length_m <= LONGEST_M:
+        raise at.refusal(f"{at.tag} length={length_m:g}: expected a positive number up to {LONGEST_M:g}")
     return clothoid(start, length_m, from_per_m, to_per_m)
 
 
