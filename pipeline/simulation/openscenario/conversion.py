@@ -181,7 +181,9 @@ class _Conversion:
             if storyboard.step(stage):
                 return max(stage.t_s, _BRIEFEST_S)
             if ego.now(stage.t_s)[0] > stage.road.length_m:
-                stage.note(f"The drive ends where the ego vehicle leaves road {shown(stage.road.last_road)}.")
+                last = f"leaves road {shown(stage.road.last_road)}"
+                last = "has followed its trajectory" if stage.road.tracks[-1].is_free else last
+                stage.note(f"The drive ends where the ego vehicle {last}.")
                 return max(stage.t_s, _BRIEFEST_S)
             drift.check(stage)
             stage.step_controls()

@@ -170,6 +170,8 @@ def test_the_way_of_an_ego_vehicle_that_turns_is_its_trajectory(tmp_path: Path) 
     assert poses[0] == pytest.approx((203.5, -1.75, 0.0), abs=0.02)
     assert poses[1] == pytest.approx((260.0, 8.25, pi / 2), abs=0.04)
     assert poses[2][0] == pytest.approx(260.0, abs=0.03)
+    parts.stop = condition(at_time(60.0))
+    assert "The drive ends where the ego vehicle has followed its trajectory." in parts.load(tmp_path).notes
     assert made.actors[0].ahead_m == pytest.approx(230.0 + 1.5 - 2.0 - 203.5, abs=0.01)
 
 
