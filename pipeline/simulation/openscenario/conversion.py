@@ -20,7 +20,7 @@ from pipeline.simulation.openscenario.roads.driven_road import DrivenRoad
 from pipeline.simulation.openscenario.roads.free_line import turned_rad
 from pipeline.simulation.openscenario.roads.network import Network
 from pipeline.simulation.openscenario.storyboard.actions import start_action
-from pipeline.simulation.openscenario.storyboard.lane_drift import LaneDrift
+from pipeline.simulation.openscenario.storyboard.lane_drift import LaneDrift, LaneShift
 from pipeline.simulation.openscenario.storyboard.movers import Mover
 from pipeline.simulation.openscenario.storyboard.running import STEP_S
 from pipeline.simulation.openscenario.storyboard.stage import PlayedScenario
@@ -56,25 +56,44 @@ def convert(path: Path, variant: int | None, given: Mapping[str, str], ego: str 
         raise root.refusal("no Storyboard: it is not a scenario")
     if root.find("Entities", "Object") is not None:
         raise root.refusal("it is written for OpenSCENARIO 0.9; versions 1.0 to 1.3 are supported")
-    made = _Conversion(root, path.parent, values, ego).scenario(title)
+    made = _made(root, path.parent, values, ego, title)
     if variants is not None and variant is None:
         variants.check_single()  # last: what cannot be simulated at all need not be chosen from
     return made
 
 
+def _made(root: XmlElement, folder: Path, values: Mapping[str, str], ego: str | None, title: str) -> dict[str, Any]:
+    """The keys of a scenario. Vehicles whose lanes do not run parallel to the ego vehicle's get roads of their own."""
+    notes, own_ways = mirror_world_positions(root), set[str]()
+    while True:
+        try:
+            return _Conversion(root, folder, values, ego, notes, frozenset(own_ways)).scenario(title)
+        except LaneShift as shift:
+            if shift.name in own_ways:
+                raise
+            own_ways.add(shift.name)
+
+
 class _Conversion:
     """One scenario file with its parameters."""
 
-    def __init__(self, root: XmlElement, folder: Path, values: Mapping[str, str], ego: str | None) -> None:
+    def __init__(
+        self,
+        root: XmlElement,
+        folder: Path,
+        values: Mapping[str, str],
+        ego: str | None,
+        notes: list[str],
+        own_ways: frozenset[str],
+    ) -> None:
         self._root, self._scope = root, ParameterScope()
         self._scope.declare(root, values)
-        notes = mirror_world_positions(root)
         self._catalogs = CatalogFiles(root, self._scope, folder)
         self._storyboard = self._catalogs.expanded(root.one("Storyboard"), self._scope)
         self._bodies = read_entities(root, self._scope, self._catalogs)
         name, guess = ego_name(root, self._bodies, ego)
-        notes += [guess] if guess is not None else []
-        self._placing = Placing(self._storyboard, self._scope, self._bodies)
+        notes = [*notes, *([guess] if guess is not None else [])]
+        self._placing = Placing(self._storyboard, self._scope, self._bodies, own_ways)
         self._placing.check_kinds(name)
         self._placing.read_init()
         logic = root.one("RoadNetwork", "LogicFile")

@@ -32,8 +32,10 @@ class Placing:
         storyboard: XmlElement,
         scope: ParameterScope,
         bodies: Mapping[str, VehicleBody],
+        own_ways: frozenset[str],
     ) -> None:
-        self._storyboard, self._scope, self._bodies = storyboard, scope, bodies
+        """own_ways: entities that get a road of their own wherever they start."""
+        self._storyboard, self._scope, self._bodies, self._own_ways = storyboard, scope, bodies, own_ways
         self._acting = set(_actors(storyboard, scope))
         self.teleports: dict[str, XmlElement] = {}
         """Entity → its position in the Init."""
@@ -110,7 +112,8 @@ class Placing:
         own_roads = named_roads(self._storyboard, name, self._scope)
         try:
             place = place_at(position, self._scope, stage.road, entities, on_road=body.kind not in NO_EGO)
-            if name == stage.ego or not self._is_routed(name) or own_roads <= stage.road.road_ids:
+            is_along = not self._is_routed(name) or own_roads <= stage.road.road_ids
+            if name == stage.ego or (is_along and name not in self._own_ways):
                 stage.movers[name] = Mover(body, place, stage.road, position)
                 return
         except OffTheWay:

@@ -6,11 +6,20 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from pipeline.simulation.openscenario.storyboard.stage import PlayedScenario
-from pipeline.simulation.openscenario.xml_files import shown
+from pipeline.simulation.openscenario.xml_files import OpenScenarioError, shown
 
 _EVERY_S = 0.5
 _MOST_M = 0.3
 """A sixth of the room that a car has in its lane; more could change whose path it is in."""
+
+
+class LaneShift(OpenScenarioError):
+    """A lane has shifted sideways under a vehicle."""
+
+    def __init__(self, name: str, text: str) -> None:
+        super().__init__(text)
+        self.name = name
+        """Of the vehicle."""
 
 
 @dataclass
@@ -21,7 +30,7 @@ class LaneDrift:
     _next_s: float = 0.0
 
     def check(self, stage: PlayedScenario) -> None:
-        """OpenScenarioError if a lane has shifted sideways under a vehicle."""
+        """LaneShift if a lane has shifted sideways under a vehicle."""
         if stage.t_s < self._next_s - 1e-9:
             return
         self._next_s = stage.t_s + _EVERY_S
@@ -42,8 +51,9 @@ class LaneDrift:
                 self._kept[name] = mover.lane_version, offset_m
             elif abs(offset_m - before_m) > _MOST_M:
                 track = mover.road.track_at(s_m)
-                raise track.road.at.refusal(
-                    f"the lanes of road {shown(track.road.id)} shift sideways by {abs(offset_m - before_m):.1f} m at "
-                    f"s = {track.road_m(s_m):.0f} m, where {shown(name)} drives; lanes that are driven on must run "
-                    "parallel to the ego vehicle's"
+                raise LaneShift(
+                    name,
+                    f"{track.road.at.file}, line {track.road.at.line}: the lanes of road {shown(track.road.id)} shift "
+                    f"sideways by {abs(offset_m - before_m):.1f} m at s = {track.road_m(s_m):.0f} m, where "
+                    f"{shown(name)} drives; a lane onto which a vehicle changes must run parallel to the one before",
                 )

@@ -17,6 +17,7 @@ from tests.pipeline.simulation.openscenario.files import (
     event,
     init,
     lane,
+    lane_action,
     on_lane,
     speed_action,
     story,
@@ -184,7 +185,7 @@ def test_a_vehicle_on_a_road_that_cannot_be_simulated_is_refused_if_it_may_come(
         parts.load(tmp_path)
 
 
-def test_lanes_that_shift_under_a_vehicle_are_refused(tmp_path: Path) -> None:
+def test_a_vehicle_whose_lane_shifts_follows_it_on_a_road_of_its_own(tmp_path: Path) -> None:
     """Lane −1 becomes 2 m wider between s = 200 and 300, so that lane −2 moves; the way follows lane −1."""
     growing = (
         '<lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
@@ -195,7 +196,15 @@ def test_lanes_that_shift_under_a_vehicle_are_refused(tmp_path: Path) -> None:
         init=init("Ego", on_lane(-1, 100.0), "20") + init("Lead", on_lane(-2, 150.0), "20"),
         road=xodr(lanes=f"<right>{growing}{lane(-2)}</right>"),
     )
-    with pytest.raises(ScenarioError, match=r"the lanes of road 7 shift sideways by 0.\d m at s = 2\d\d m, where Lead"):
-        parts.load(tmp_path)
+    made = parts.load(tmp_path)
+    assert made.actors == ()
+    y_before, y_after = (free_pose(made, t_s)[1] for t_s in (1.0, 9.0))
+    assert y_after - y_before == pytest.approx(-2.0 + 1.0, abs=0.03), (
+        "the way follows the middle of lane −1, 1 m farther"
+    )
+    turn = lane_action('<AbsoluteTargetLane value="-2"/>', value=2.0)
     parts.init = init("Ego", on_lane(-1, 100.0), "20") + init("Lead", on_lane(-1, 150.0), "20")
     assert parts.load(tmp_path).actors[0].offset_m == pytest.approx(0.0)
+    parts.stories = story(event("e", turn))
+    with pytest.raises(ScenarioError, match=r"the lanes of road 7 shift sideways by 0.\d m at s = 2\d\d m, where Lead"):
+        parts.load(tmp_path)
