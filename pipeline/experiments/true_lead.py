@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.common.near_face import near_face_middle
+from pipeline.evaluation.lead_verdict import LABELLED_VEHICLES
 from pipeline.params import CipvParams, PathParams
 from pipeline.path.corridor import nearest_on_path
 from pipeline.simulation.scenario import Scenario
@@ -41,7 +42,7 @@ class ScriptedWay:
     @staticmethod
     def of(scene: Scenario) -> ScriptedWay:
         """The way over the whole drive and 15 s more."""
-        alone = scene.model_copy(update={"actors": (), "crossing_actors": ()})
+        alone = scene.without_others()
         t_s = np.arange(0.0, scene.duration_s + _LONGEST_S, _STEP_S)
         return ScriptedWay(t_s, np.array([world_state.at(alone, float(t)).pose[:2] for t in t_s]))
 
@@ -62,7 +63,9 @@ def true_lead(now: World, path: Path | None, max_m: float = MAX_M) -> tuple[Acto
     found: list[tuple[float, ActorState]] = []
     doubtful_m = np.inf
     for state in now.actors:
-        if path is None or _is_beyond(state, max_m) or range_m(state) > max_m:
+        if path is None or state.actor.kind not in LABELLED_VEHICLES or _is_beyond(state, max_m):
+            continue
+        if range_m(state) > max_m:
             continue
         too_little, nearest = overlap(state, path)
         if nearest <= 0.0:

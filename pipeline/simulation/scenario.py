@@ -4,7 +4,7 @@ are reported in one sentence."""
 from __future__ import annotations
 
 from functools import cached_property
-from math import ceil, pi
+from math import ceil, hypot, pi
 from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import parse_qsl
@@ -20,13 +20,17 @@ from pipeline.simulation.sensors.detection_model import Detections
 from pipeline.simulation.sensors.faults import NONE, Faults
 from pipeline.simulation.sensors.gnss_model import MEASURED, RTK, GnssModel, OdometryModel
 from pipeline.simulation.sensors.lidar.model import VLP16, LidarModel
-from pipeline.simulation.world.actors import Actor, Motion, Script, motion
+from pipeline.simulation.world.actors import Actor, Motion, Script, Speeds, motion
+from pipeline.simulation.world.free_ways import FreeActor
 from pipeline.simulation.world.intersection_ways import CrossingActor, CrossingWay, route
+from pipeline.simulation.world.lines import RoadLine
 from pipeline.simulation.world.roads import Road, ScenarioPart
 from pipeline.types import F64
 from pipeline.types.sensors import SensorKind, further_sensors
 
 _GAP_STEP_S, _GAP_HALVINGS = 0.25, 10
+_CLEAR_M, _ASIDE_M, _LONGEST_M = 1.0, 0.5, 2_000.0
+"""Ways are kept clear in steps, that far beside whoever takes them, and so far along them."""
 
 
 class ScenarioError(BadInput):
@@ -68,9 +72,11 @@ class Scenario(ScenarioPart):
     ego: Ego
     """The ego vehicle's script."""
     actors: tuple[Actor, ...] = ()
-    """Vehicles along the road."""
+    """Road users along the road."""
     crossing_actors: tuple[CrossingActor, ...] = ()
-    """Vehicles that come from a crossing's other arms."""
+    """Road users that come from a crossing's other arms."""
+    free_actors: tuple[FreeActor, ...] = ()
+    """Road users on ways of their own, such as pedestrians who cross."""
     sensors: Literal["lidar", "camera", "both"] = "both"
     """Which of LiDAR and camera are available to the pipeline."""
     further_sensors: tuple[str, ...] = ()
@@ -91,9 +97,11 @@ class Scenario(ScenarioPart):
                 self.road.lane_offset_m(lane)
         if self.ego.lane > 0:
             raise ValueError("the ego vehicle must drive along the road, on a lane below 0")
-        if any(script.brake is not None and script.brake.at_s is None for script in (self.ego, *self.crossing_actors)):
+        elsewhere: tuple[CrossingActor | FreeActor, ...] = (*self.crossing_actors, *self.free_actors)
+        scripts: tuple[Speeds, ...] = (self.ego, *elsewhere)
+        if any(script.brake is not None and script.brake.at_s is None for script in scripts):
             raise ValueError("only vehicles on the ego vehicle's road can brake at_gap_m; give at_s")
-        ids = [actor.id for actor in (*self.actors, *self.crossing_actors)]
+        ids = [actor.id for actor in (*self.actors, *elsewhere)]
         if len(set(ids)) != len(ids):
             raise ValueError("two actors have the same id")
         for actor in self.crossing_actors:
@@ -147,6 +155,26 @@ class Scenario(ScenarioPart):
     def routes(self) -> tuple[CrossingWay, ...]:
         """The paths of ``crossing_actors``."""
         return tuple(route(actor, self.road) for actor in self.crossing_actors)
+
+    @cached_property
+    def free_ways(self) -> tuple[RoadLine, ...]:
+        """The ways of ``free_actors`` in the world."""
+        return tuple(actor.line(self.road) for actor in self.free_actors)
+
+    @cached_property
+    def kept_clear(self) -> F64 | None:
+        """(M, 3) world x, y and radius of circles along the ways of ``free_actors`` in which nothing may stand; None
+        without any."""
+        circles = [
+            np.column_stack([way.to_world(s_m, 0.0)[:, :2], np.full(len(s_m), hypot(*actor.size()[:2]) / 2 + _ASIDE_M)])
+            for actor, way in zip(self.free_actors, self.free_ways, strict=True)
+            for s_m in [np.arange(0.0, min(actor.travelled_m(self.duration_s), _LONGEST_M) + _CLEAR_M, _CLEAR_M)]
+        ]
+        return np.concatenate(circles) if circles else None
+
+    def without_others(self) -> Scenario:
+        """The same drive on an empty road."""
+        return self.model_copy(update={"actors": (), "crossing_actors": (), "free_actors": ()})
 
 
 def _timed(scenario: Scenario, actor: Actor) -> Actor:

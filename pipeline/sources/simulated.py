@@ -21,6 +21,8 @@ from pipeline.types import Frame, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
 _TRUTH_RANGE_M, _WAY_STEP_M = 120.0, 1.0
+_CALLED = {"pedestrian": "person"}
+"""Kinds of actors whose labels have another name, as those of real recordings do."""
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> SimulatedSource:
@@ -91,11 +93,11 @@ def _notes(scene: scenario.Scenario) -> Iterator[str]:
 
 
 def truth_of(now: world_state.World, road: Road) -> tuple[TruthObject, ...]:
-    """Every vehicle that is at least partly ahead of the LiDAR and within 120 m, including hidden ones. The way of the
-    car is parallel to the road."""
+    """Every road user that is at least partly ahead of the LiDAR and within 120 m, including hidden ones. The way of
+    the car is parallel to the road."""
     ahead_m = now.s_m + np.arange(0.0, _TRUTH_RANGE_M + _WAY_STEP_M, _WAY_STEP_M)
     found = tuple(
-        TruthObject(state.actor.kind, state.cuboid, state.actor.id)
+        TruthObject(_CALLED.get(state.actor.kind, state.actor.kind), state.cuboid, state.actor.id)
         for state in sorted(now.actors, key=lambda state: state.actor.id)
         if state.cuboid.footprint()[:, 0].max() > 0.0 and np.hypot(*state.cuboid.center[:2]) < _TRUTH_RANGE_M
     )

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from pipeline.common.geometry import transform
 from pipeline.simulation.drawing.canvas import NEAR_M, clip_near
-from pipeline.simulation.drawing.vehicle_meshes import mesh
+from pipeline.simulation.drawing.meshes import mesh
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, ActorState, World
 from pipeline.types import F64, Box, CameraCalibration
 

@@ -13,14 +13,15 @@ import numpy as np
 from pipeline.simulation.scenario import Scenario, load
 from pipeline.simulation.sensors.camera import DrawnCamera
 from pipeline.simulation.world import world_state
-from pipeline.simulation.world.actors import SIZES_M
+from pipeline.simulation.world.actors import SIZES_M, ActorKind
 from pipeline.simulation.world.roads import Road
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.types import U8
 
 MOMENTS_A_ROAD = 20
 _ROAD_M = 3000.0
-_KINDS, _SHARES = ("car", "van", "truck", "bus", "motorcycle"), (0.52, 0.14, 0.16, 0.08, 0.10)
+_KINDS: tuple[ActorKind, ...] = ("car", "van", "truck", "bus", "motorcycle")
+_SHARES = (0.52, 0.14, 0.16, 0.08, 0.10)
 _MODELS_A_KIND = 12
 _NEAREST_M, _FARTHEST_M = -9.0, 130.0
 _CLEAR_AHEAD_M = 3.0

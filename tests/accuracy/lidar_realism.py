@@ -16,16 +16,16 @@ import numpy as np
 from pipeline.common.geometry import Cuboid
 from pipeline.simulation.sensors.lidar.model import LidarModel
 from pipeline.simulation.sensors.lidar.rays import BOX_FIELDS
-from pipeline.simulation.sensors.lidar.scene import vehicle_boxes
+from pipeline.simulation.sensors.lidar.scene import actor_boxes
 from pipeline.simulation.sensors.lidar.sensor import Lidar
-from pipeline.simulation.world.actors import Vehicle, VehicleKind
+from pipeline.simulation.world.actors import ActorKind, RoadUser
 from pipeline.simulation.world.world_state import ActorState
 from pipeline.sources.astyx import AstyxSource, parse_calibration
 from pipeline.types import F64, Sweep
 from pipeline.types.source import TruthObject
 
 BIN_M = 10.0
-_KINDS: dict[str, VehicleKind] = {
+_KINDS: dict[str, ActorKind] = {
     "car": "car",
     "truck": "truck",
     "trailer": "truck",
@@ -104,8 +104,8 @@ def _boxes(item: TruthObject, rng: np.random.Generator) -> list[tuple[float, ...
     if kind is None:
         return []
     grey = int(rng.integers(15, 245))
-    vehicle = Vehicle(id=1, kind=kind, colour=f"#{grey:02x}{grey:02x}{grey:02x}")
-    return vehicle_boxes(ActorState(vehicle, item.cuboid, 0.0, False, 0.0))
+    vehicle = RoadUser(id=1, kind=kind, colour=f"#{grey:02x}{grey:02x}{grey:02x}")
+    return actor_boxes(ActorState(vehicle, item.cuboid, 0.0, False, 0.0))
 
 
 def _on(sweep: Sweep, cuboid: Cuboid) -> tuple[int, int]:

@@ -16,14 +16,18 @@ from tests.pipeline.simulation.openscenario.files import (
     at_time,
     condition,
     declared,
+    entity,
     event,
+    init,
     lane,
     lane_action,
     on_lane,
     speed_action,
     story,
+    vehicle,
     xodr,
 )
+from tests.pipeline.simulation.openscenario.walkers import CROSS, follow, private, trajectory
 
 _LONGITUDINAL = "<PrivateAction><LongitudinalAction>{}</LongitudinalAction></PrivateAction>"
 _VERTEX = '<Vertex time="{}"><Position><RelativeRoadPosition entityRef="Lead" ds="{}" dt="{}"/></Position></Vertex>'
@@ -66,6 +70,28 @@ _EVENTS = (
     ),
 )
 """Every kind of action that takes time, one after another."""
+
+_BEND_LEFT = trajectory(
+    f'<ClothoidSpline><ClothoidSplineSegment curvatureStart="0" curvatureEnd="0.05" length="30"><PositionStart>'
+    f'{on_lane(-1, 100.0)}</PositionStart></ClothoidSplineSegment><ClothoidSplineSegment curvatureStart="0.05" '
+    'curvatureEnd="0" length="30"/></ClothoidSpline>'
+)
+_CONTROL = (
+    '<ControlPoint weight="1"><Position><RelativeWorldPosition entityRef="Lead" dx="{}" dy="{}"/></Position>'
+    "</ControlPoint>"
+)
+_NURBS = trajectory(
+    f'<Nurbs order="3">{_CONTROL.format(0, 0)}{_CONTROL.format(10, 0)}{_CONTROL.format(20, 10)}'
+    + "".join(f'<Knot value="{value}"/>' for value in (0, 0, 0, 1, 1, 1))
+    + "</Nurbs>"
+)
+_WAYPOINT = "<Waypoint routeStrategy='shortest'><Position>{}</Position></Waypoint>"
+_ON_ROUTE = (
+    f"<RoutePosition><RouteRef><Route name='r'>{_WAYPOINT.format(on_lane(-2, 90.0))}"
+    f"{_WAYPOINT.format(on_lane(-2, 400.0))}</Route></RouteRef><InRoutePosition>"
+    '<FromLaneCoordinates pathS="50" laneId="-2" laneOffset="0.5"/></InRoutePosition></RoutePosition>'
+)
+"""Trajectories and routes of every kind."""
 
 _OPENING = '<lane id="-3" type="driving"><width sOffset="0" a="0" b="0" c="0.0036" d="-0.000048"/></lane>'
 _CURVES = xodr(
@@ -117,8 +143,18 @@ def scenario_targets(folder: Path) -> dict[str, Target]:
     kept = folder / "kept"
     kept.mkdir()
     beside = whole.write(kept)
+    crossing = Parts(
+        entities=entity("Ego") + entity("Walker", vehicle("bicycle")) + entity("Lead"),
+        init=private("Ego", follow(_BEND_LEFT), speed_action("8"))
+        + private("Walker", follow(CROSS, more='initialDistanceOffset="1"'), speed_action("1"))
+        + init("Lead", _ON_ROUTE, "5"),
+        stories=story(event("round", follow(_NURBS), condition(at_time(1.0)))),
+    )
     return {
-        "openscenario": Target((path.read_bytes(), acting.xosc().encode()), by_file(folder, path.name, scenario.load)),
+        "openscenario": Target(
+            (path.read_bytes(), acting.xosc().encode(), crossing.xosc().encode()),
+            by_file(folder, path.name, scenario.load),
+        ),
         "opendrive": Target(
             tuple(text.encode() for text in (whole.road, BEND, _CURVES, _JOINED)),
             by_file(kept, "road.xodr", lambda _: scenario.load(str(beside))),

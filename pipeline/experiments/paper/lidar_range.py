@@ -14,7 +14,7 @@ from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.straight_track import parameters, scene, target_of, true_range_m
 from pipeline.simulation.closed_loop import LoopStep, Setup, drive
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.world.actors import VehicleKind
+from pipeline.simulation.world.actors import ActorKind
 
 PRINTED = {"mean error %": 2.14, "largest error m": 0.47, "recognised up to m": 35.0}
 _SPEED_MPS = 10.0
@@ -31,7 +31,7 @@ COLOURS = ("#a3202a", "#e8e8e6", "#15181c", "#5b6f86")
 class RangeCase:
     """One approach to a standing vehicle."""
 
-    kind: VehicleKind
+    kind: ActorKind
     """Kind of the standing vehicle; larger ones are detected farther away."""
     seed: int
     """Seed of noise and scenery."""
@@ -48,7 +48,7 @@ class RangeSample:
 
 
 def cases(short: bool) -> list[RangeCase]:
-    kinds: tuple[VehicleKind, ...] = ("car",) if short else ("car", "van", "truck", "motorcycle")
+    kinds: tuple[ActorKind, ...] = ("car",) if short else ("car", "van", "truck", "motorcycle")
     return [RangeCase(kind, seed) for kind in kinds for seed in range(2 if short else 10)]
 
 

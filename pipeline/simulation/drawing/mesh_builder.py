@@ -32,6 +32,10 @@ _COLOURS = {
     "seam": (120.0, 122.0, 124.0),
     "tape": (40.0, 40.0, 205.0),
     "jacket": (50.0, 46.0, 110.0),
+    "trousers": (78.0, 58.0, 48.0),
+    "skin": (140.0, 168.0, 212.0),
+    "hair": (30.0, 38.0, 52.0),
+    "shoes": (30.0, 28.0, 28.0),
 }
 _GLOWS = frozenset({BRAKE, "head", "plate"})
 
@@ -62,6 +66,8 @@ class Mesh:
     """(F,) index of the part; parts are painted far to near."""
     group_x: F64
     """Places of the parts along x, metres."""
+    group_y: F64
+    """Places of the parts along y, metres."""
 
     def colours_of(self, paint: Colour, brake: Colour) -> F64:
         """(F, 3) colours of a vehicle with this paint and rear lights, unshaded."""
@@ -97,9 +103,11 @@ class MeshBuilder:
         self.colours.append(colour)
         self.groups.append(self.group)
 
-    def loft(self, levels: list[tuple[float, float, float, float]], colour: str, chamfer: float = 0.22) -> None:
-        """A skin over levels (z, rear x, front x, width), with bevelled corners, and a lid."""
-        rings = [_octagon(*level, chamfer) for level in levels]
+    def loft(
+        self, levels: list[tuple[float, float, float, float]], colour: str, chamfer: float = 0.22, y: float = 0.0
+    ) -> None:
+        """A skin over levels (z, rear x, front x, width) around y, with bevelled corners, and a lid."""
+        rings = [_octagon(*level, chamfer) + np.array([0.0, y, 0.0]) for level in levels]
         for low, high in pairwise(rings):
             middle = (low.mean(axis=0) + high.mean(axis=0)) / 2
             for i in range(8):
@@ -156,6 +164,7 @@ class MeshBuilder:
             glows=np.array([colour in _GLOWS for colour in self.colours]),
             group=groups,
             group_x=np.array([middles[groups == g, 0].mean() for g in range(int(groups.max()) + 1)]),
+            group_y=np.array([middles[groups == g, 1].mean() for g in range(int(groups.max()) + 1)]),
         )
 
 

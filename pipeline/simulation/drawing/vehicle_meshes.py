@@ -1,23 +1,13 @@
-"""Meshes of vehicles: lofted bodies with windows, lights, plates and wheels, in metres."""
+"""Shapes of motor vehicles: lofted bodies with windows, lights, plates and wheels, in metres."""
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
-from pipeline.simulation.drawing.mesh_builder import BODY, BRAKE, Mesh, MeshBuilder
+from pipeline.simulation.drawing.mesh_builder import BODY, BRAKE, MeshBuilder
 
 
-@lru_cache(maxsize=64)
-def mesh(kind: str, size_m: tuple[float, float, float]) -> Mesh:
-    """The mesh of a kind of vehicle at a length, width and height."""
-    builder = MeshBuilder()
-    {"car": _car, "van": _van, "truck": _truck, "bus": _bus, "motorcycle": _motorcycle}[kind](builder, *size_m)
-    return builder.build()
-
-
-def _car(b: MeshBuilder, length: float, width: float, height: float) -> None:
+def car(b: MeshBuilder, length: float, width: float, height: float) -> None:
     r, f, w, h = -length / 2, length / 2, width, height
     axles = [r + 0.19 * length, f - 0.19 * length]
     b.tyre_backs(axles, w / 2, 0.32)
@@ -34,7 +24,7 @@ def _car(b: MeshBuilder, length: float, width: float, height: float) -> None:
     _cabin(b, (belt, h), glass, cabin)
 
 
-def _van(b: MeshBuilder, length: float, width: float, height: float) -> None:
+def van(b: MeshBuilder, length: float, width: float, height: float) -> None:
     r, f, w, h = -length / 2, length / 2, width, height
     axles = [r + 0.19 * length, f - 0.17 * length]
     b.tyre_backs(axles, w / 2, 0.35)
@@ -104,7 +94,7 @@ def _cabin(
         b.side([(end_low, low), (inner, low), (inner, high), (end_high, high)], half, "glass")
 
 
-def _truck(b: MeshBuilder, length: float, width: float, height: float) -> None:
+def truck(b: MeshBuilder, length: float, width: float, height: float) -> None:
     r, f, w, h = -length / 2, length / 2, width, height
     box_front = f - 2.5
     axles = [r + 1.2, r + 2.5, r + 3.8]
@@ -137,7 +127,7 @@ def _truck(b: MeshBuilder, length: float, width: float, height: float) -> None:
     b.wheels([f - 1.4], w / 2 - 0.04, 0.5)
 
 
-def _bus(b: MeshBuilder, length: float, width: float, height: float) -> None:
+def bus(b: MeshBuilder, length: float, width: float, height: float) -> None:
     r, f, w, h = -length / 2, length / 2, width, height
     b.tyre_backs([r + 2.6], w / 2, 0.48)
     b.loft([(0.32, r, f, w), (1.2, r, f, w), (h, r + 0.05, f - 0.1, w - 0.06)], BODY, 0.2)
@@ -154,7 +144,7 @@ def _bus(b: MeshBuilder, length: float, width: float, height: float) -> None:
     b.wheels([r + 2.6, f - 2.6], w / 2, 0.48)
 
 
-def _motorcycle(b: MeshBuilder, length: float, width: float, height: float) -> None:
+def motorcycle(b: MeshBuilder, length: float, width: float, height: float) -> None:
     r, f, w, h = -length / 2, length / 2, width, height
     for x in (r + 0.3, f - 0.3):
         wheel = [(0.0, x - 0.2, x + 0.2, 0.16), (0.3, x - 0.3, x + 0.3, 0.18), (0.6, x - 0.2, x + 0.2, 0.14)]

@@ -1,21 +1,31 @@
-"""The vehicles of a scenario, written inline or in catalogs, and which of them is the ego vehicle."""
+"""The road users of a scenario, written inline or in catalogs, and which of them is the ego vehicle."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import cast
 
-from pipeline.common.files.user_file_errors import did_you_mean, reason_of
+from pipeline.common.files.user_file_errors import did_you_mean
+from pipeline.simulation.openscenario.catalogs import CatalogFiles
 from pipeline.simulation.openscenario.parameters import ParameterScope
-from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, catalog_paths, read_xml, shown
-from pipeline.simulation.world.actors import VehicleKind
+from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, shown
+from pipeline.simulation.world.actors import SIZES_M, ActorKind
 
-_KINDS: dict[str, str] = {"car": "car", "van": "van", "truck": "truck", "bus": "bus", "motorbike": "motorcycle"}
-"""``vehicleCategory`` → kind in the simulator."""
+_KINDS: dict[str, ActorKind] = {
+    "car": "car",
+    "van": "van",
+    "truck": "truck",
+    "bus": "bus",
+    "motorbike": "motorcycle",
+    "bicycle": "bicycle",
+    "pedestrian": "pedestrian",
+}
+"""``vehicleCategory`` or ``pedestrianCategory`` → kind in the simulator."""
+NO_EGO: tuple[ActorKind, ...] = ("bicycle", "pedestrian")
+"""Kinds that cannot be the ego vehicle."""
 _MOST_ENTITIES = 100
-_MOST_CATALOG_FILES = 200
 _EGO_NAMES = ("ego", "hero")
+_WITH_RIDER_M = 1.4
+"""The bounding box of a lower bicycle is without its rider, whom the simulator adds."""
 _SMALL_M = (1.0, 1.0, 1.0)
 """Size of what the simulator does not have, for telling whether it is on a driving lane."""
 
@@ -26,7 +36,7 @@ class VehicleBody:
 
     name: str
     """Of the entity."""
-    kind: VehicleKind | None
+    kind: ActorKind | None
     """As simulated; None for what the simulator does not have."""
     what: str
     """In the file's words."""
@@ -44,52 +54,10 @@ class VehicleBody:
             f"{', '.join(_KINDS)}"
         )
 
-
-class CatalogFiles:
-    """The catalogs that a scenario names, read when they are needed."""
-
-    def __init__(self, scenario: XmlElement, scope: ParameterScope, folder: Path) -> None:
-        self._folder, self._named = folder, list[tuple[XmlElement, str]]()
-        locations = scenario.find("CatalogLocations")
-        for kind in locations.children if locations is not None else []:
-            for each in kind.all("Directory"):
-                self._named.append((each, scope.text(each, "path")))
-        self._catalogs: dict[str, XmlElement] | None = None
-
-    def entry(self, reference: XmlElement, scope: ParameterScope) -> tuple[XmlElement, ParameterScope]:
-        """The element that a ``CatalogReference`` names, and the scope of its own parameters."""
-        catalog, name = scope.text(reference, "catalogName"), scope.text(reference, "entryName")
-        if self._catalogs is None:
-            self._catalogs = self._read()
-        if catalog not in self._catalogs:
-            raise reference.refusal(f"no catalog {shown(catalog)!r} in the folders of CatalogLocations")
-        for each in self._catalogs[catalog].children:
-            if each.attributes.get("name") == name:
-                assigned = reference.find("ParameterAssignments")
-                given = {
-                    scope.text(one, "parameterRef"): scope.text(one, "value")
-                    for one in (assigned.all("ParameterAssignment") if assigned is not None else [])
-                }
-                inner = ParameterScope()
-                inner.declare(each, given)
-                return each, inner
-        raise reference.refusal(f"no entry {shown(name)!r} in catalog {shown(catalog)!r}")
-
-    def _read(self) -> dict[str, XmlElement]:
-        found: dict[str, XmlElement] = {}
-        for at, name in self._named:
-            last = shown(Path(name).name)
-            try:
-                paths = catalog_paths(self._folder, name)
-            except (OSError, ValueError) as error:
-                raise at.refusal(f"the catalogs in {last} cannot be read: {reason_of(error)}") from None
-            if len(paths) > _MOST_CATALOG_FILES:
-                raise at.refusal(f"more than {_MOST_CATALOG_FILES} files in {last}")
-            for path in paths:
-                catalog = read_xml(path, "OpenSCENARIO").find("Catalog")
-                if catalog is not None:
-                    found.setdefault(catalog.attributes.get("name", ""), catalog)
-        return found
+    @property
+    def can_be_ego(self) -> bool:
+        """Whether it is a motor vehicle."""
+        return self.kind is not None and self.kind not in NO_EGO
 
 
 def read_entities(scenario: XmlElement, scope: ParameterScope, catalogs: CatalogFiles) -> dict[str, VehicleBody]:
@@ -110,7 +78,7 @@ def ego_name(scenario: XmlElement, bodies: dict[str, VehicleBody], given: str | 
     first."""
     if given is not None and given not in bodies:
         raise OpenScenarioError(f"{scenario.file}: ego={shown(given)!r}: no such entity{did_you_mean(given, bodies)}")
-    vehicles = [name for name, body in bodies.items() if body.kind is not None]
+    vehicles = [name for name, body in bodies.items() if body.can_be_ego]
     controlled = [name for name in with_controllers(scenario) if name in vehicles]
     choices = (
         [] if given is None else [given],
@@ -121,8 +89,8 @@ def ego_name(scenario: XmlElement, bodies: dict[str, VehicleBody], given: str | 
     )
     for found in choices:
         if len(found) == 1:
-            if bodies[found[0]].kind is None:
-                raise bodies[found[0]].refusal()
+            if not bodies[found[0]].can_be_ego:
+                raise bodies[found[0]].refusal(" as the ego vehicle")
             return found[0], None
     if vehicles:
         return vehicles[0], (
@@ -143,12 +111,15 @@ def _body(at: XmlElement, name: str, scope: ParameterScope, catalogs: CatalogFil
     shape, inner = catalogs.entry(reference, scope) if reference is not None else (None, scope)
     if shape is None:
         shape = next((each for each in at.children if each.tag != "ObjectController"), at)
-    what = inner.text(shape, "vehicleCategory") if shape.tag == "Vehicle" else shape.tag
+    category = {"Vehicle": "vehicleCategory", "Pedestrian": "pedestrianCategory"}.get(shape.tag)
+    what = inner.text(shape, category) if category is not None else shape.tag
     kind = _KINDS.get(what)
     if kind is None:
         return VehicleBody(name, None, what, at, _SMALL_M, 0.0)
+    if kind in NO_EGO and shape.find("BoundingBox") is None:
+        return VehicleBody(name, kind, what, at, SIZES_M[kind], 0.0)
     box, centre = shape.one("BoundingBox", "Dimensions"), shape.one("BoundingBox", "Center")
     length, width, height = (inner.number(box, key) for key in ("length", "width", "height"))
-    return VehicleBody(
-        name, cast("VehicleKind", kind), what, at, (length, width, height), inner.number(centre, "x", 0.0)
-    )
+    if kind == "bicycle" and height < _WITH_RIDER_M:
+        height = SIZES_M["bicycle"][2]
+    return VehicleBody(name, kind, what, at, (length, width, height), inner.number(centre, "x", 0.0))

@@ -13,10 +13,10 @@ from pipeline.common.geometry import Cuboid, inverse, rotation
 from pipeline.simulation.drawing import backdrop
 from pipeline.simulation.drawing.canvas import Canvas, Colour
 from pipeline.simulation.drawing.lens import ORDINARY, CameraModel, ImageSensor
+from pipeline.simulation.drawing.meshes import mesh
 from pipeline.simulation.drawing.road_markings import paint_ground
 from pipeline.simulation.drawing.roadside_shapes import add_thing
 from pipeline.simulation.drawing.turned_view import margin_for, turned, with_margin
-from pipeline.simulation.drawing.vehicle_meshes import mesh
 from pipeline.simulation.world.roads import Road
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, ActorState, World
@@ -100,7 +100,7 @@ class DrawnCamera:
     def _add_standing(self, canvas: Canvas, world: World) -> None:
         """Vehicles and roadside items, farthest first (painter's algorithm)."""
         ahead = [state for state in world.actors if -_BEHIND_M < state.cuboid.center[0] < _AHEAD_M]
-        jobs = [(*state.cuboid.center[:2], partial(_add_vehicle, canvas, state)) for state in ahead]
+        jobs = [(*state.cuboid.center[:2], partial(_add_actor, canvas, state)) for state in ahead]
         for thing, x, y, yaw in self._roadside.near(world, _BEHIND_M, _AHEAD_M):
             jobs.append((x, y, partial(add_thing, canvas, thing, x, y, yaw)))
         for _, _, add in sorted(jobs, key=lambda job: (-job[0], -abs(job[1]))):
@@ -118,7 +118,7 @@ def _add_shadow(canvas: Canvas, state: ActorState) -> None:
         canvas.add_face(tuple((px, py, -LIDAR_HEIGHT_M) for px, py in flat.tolist()), bgr)
 
 
-def _add_vehicle(canvas: Canvas, state: ActorState) -> None:
+def _add_actor(canvas: Canvas, state: ActorState) -> None:
     shape = mesh(state.actor.kind, state.actor.size())
     x, y, _ = state.cuboid.center
     c, s = np.cos(state.cuboid.yaw_rad), np.sin(state.cuboid.yaw_rad)
@@ -130,7 +130,7 @@ def _add_vehicle(canvas: Canvas, state: ActorState) -> None:
     points = shape.vertices @ turn + foot
     colours = shape.colours_of(_paint(state.actor.colour), _BRAKE_ON if state.braking else _BRAKE_OFF)
     normals[shape.glows] = 0.0
-    away = np.hypot(x + shape.group_x * c, y + shape.group_x * s)
+    away = np.hypot(x + shape.group_x * c - shape.group_y * s, y + shape.group_x * s + shape.group_y * c)
     for group in np.argsort(-away, kind="stable"):
         chosen = seen & (shape.group == group)
         canvas.add(points[chosen[shape.face_of_vertex]], shape.counts[chosen], colours[chosen], normals[chosen])

@@ -17,7 +17,7 @@ _BEFORE_M, _BEYOND_M, _SPACING_M, _STEP_S = 40.0, 400.0, 2.0, 0.2
 def planned_route(scenario: Scenario) -> Route:
     """Along the ego lane from 40 m behind the start to 400 m beyond the script's end, including the script's lane
     changes."""
-    alone = scenario.model_copy(update={"actors": (), "crossing_actors": ()})
+    alone = scenario.without_others()
     drive = [world_state.at(alone, t) for t in np.arange(0.0, scenario.duration_s + _STEP_S, _STEP_S).tolist()]
     s, d = np.array([[now.s_m, now.d_m] for now in drive]).T
     at = np.arange(s[0] - _BEFORE_M, s[-1] + _BEYOND_M, _SPACING_M)

@@ -48,7 +48,7 @@ class SensorRig:
         self._scenario = scenario
         self._lidar = Lidar(scenario.lidar)
         self._roadside = Roadside.build(
-            scenario.road, scenario.seed, scenario.ego.start_m - _BEFORE_M, end_m + _BEYOND_M
+            scenario.road, scenario.seed, scenario.ego.start_m - _BEFORE_M, end_m + _BEYOND_M, scenario.kept_clear
         )
 
     def frame(self, now: World, index: int, t_ns: int, image: bool = True, exposure: Exposure | None = None) -> Frame:

@@ -13,11 +13,19 @@ import numpy as np
 from pipeline.alignment.projection import Pinhole, project_cuboids
 from pipeline.common.geometry import corners_of
 from pipeline.simulation.sensors.detection_model import BoxNoise
-from pipeline.simulation.world.actors import SIZES_M
+from pipeline.simulation.world.actors import SIZES_M, ActorKind
 from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.types import F64, Box, CameraCalibration, DistanceLaw, RawBoxes
 
-LABELS = {"car": "car", "van": "car", "truck": "truck", "bus": "bus", "motorcycle": "motorcycle"}
+LABELS: dict[ActorKind, str] = {
+    "car": "car",
+    "van": "car",
+    "truck": "truck",
+    "bus": "bus",
+    "motorcycle": "motorcycle",
+    "bicycle": "bicycle",
+    "pedestrian": "person",
+}
 """The COCO class of each kind of actor; COCO has no vans."""
 LAW = DistanceLaw(
     coefficient=907.0 * SIZES_M["car"][2],

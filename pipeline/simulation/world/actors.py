@@ -13,14 +13,17 @@ from pydantic import Field, field_validator, model_validator
 
 from pipeline.simulation.world.roads import Road, ScenarioPart
 
-Extent = Annotated[float, Field(ge=0.3, le=30.0)]
-VehicleKind = Literal["car", "van", "truck", "bus", "motorcycle"]
-SIZES_M: dict[str, tuple[float, float, float]] = {
+Extent = Annotated[float, Field(ge=0.2, le=30.0)]
+ActorKind = Literal["car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian"]
+"""A bicycle has its rider on it."""
+SIZES_M: dict[ActorKind, tuple[float, float, float]] = {
     "car": (4.5, 1.82, 1.48),
     "van": (5.3, 2.0, 2.05),
     "truck": (12.0, 2.5, 3.8),
     "bus": (11.5, 2.5, 3.1),
     "motorcycle": (2.2, 0.8, 1.45),
+    "bicycle": (1.85, 0.55, 1.78),
+    "pedestrian": (0.62, 0.52, 1.72),
 }
 """Length, width and height of each kind as simulated, in metres. Deliberately different from
 ``pipeline.fusion.vehicle_sizes``, which the pipeline assumes for unmeasured sizes: equal values would make results too
@@ -132,12 +135,12 @@ class Script(Speeds):
         return self
 
 
-class Vehicle(ScenarioPart):
-    """Properties of a vehicle."""
+class RoadUser(ScenarioPart):
+    """Properties of a vehicle or a pedestrian."""
 
     id: int = Field(ge=1)
     """Unique in the scenario; also used in labels."""
-    kind: VehicleKind
+    kind: ActorKind
     """Defines shape and usual size."""
     colour: str = Field(default="#8090a0", pattern="^#[0-9a-fA-F]{6}$")
     """#rrggbb."""
@@ -148,8 +151,8 @@ class Vehicle(ScenarioPart):
         return self.size_m or SIZES_M[self.kind]
 
 
-class Actor(Vehicle, Script):
-    """A vehicle on the road."""
+class Actor(RoadUser, Script):
+    """A road user that follows lanes of the road."""
 
     ahead_m: float = Field(ge=-1000.0, le=5000.0)
     """From the ego origin to its nearest face along the road at time 0; negative when its nearest face is behind."""

@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from pipeline.simulation.world.actors import Speeds, Vehicle
+from pipeline.simulation.world.actors import RoadUser, Speeds
 from pipeline.simulation.world.lines import RoadLine, WorldPose
 from pipeline.simulation.world.roads import Crossing, Road
 
@@ -18,7 +18,7 @@ Approach = Literal["ahead", "oncoming", "left", "right"]
 Turn = Literal["left", "straight", "right"]
 
 
-class CrossingActor(Vehicle, Speeds):
+class CrossingActor(RoadUser, Speeds):
     """A vehicle that drives over a crossing."""
 
     crossing: int = Field(default=0, ge=0)

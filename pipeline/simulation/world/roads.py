@@ -67,15 +67,19 @@ class Segment(ScenarioPart):
         return self
 
     def arcs(self) -> list[tuple[float, float]]:
-        """(length, curvature) of the arcs that approximate it. A transition is divided into arcs of at most half a
-        metre, each with the curvature at its middle: headings at the joints are exact, positions accurate to about a
-        millimetre."""
+        """(length, curvature) of the arcs that approximate it."""
         if self.end_curvature_per_m is None:
             return [(self.length_m, self.curvature_per_m)]
-        count = ceil(self.length_m / _TRANSITION_STEP_M)
-        shares = (np.arange(count) + 0.5) / count
-        bends = self.curvature_per_m + shares * (self.end_curvature_per_m - self.curvature_per_m)
-        return [(self.length_m / count, bend) for bend in bends.tolist()]
+        return transition_arcs(self.length_m, self.curvature_per_m, self.end_curvature_per_m)
+
+
+def transition_arcs(length_m: float, from_per_m: float, to_per_m: float) -> list[tuple[float, float]]:
+    """(length, curvature) of the arcs that approximate a transition: at most half a metre each, with the curvature at
+    its middle, so that headings at the joints are exact and positions accurate to about a millimetre."""
+    count = ceil(length_m / _TRANSITION_STEP_M)
+    shares = (np.arange(count) + 0.5) / count
+    bends = from_per_m + shares * (to_per_m - from_per_m)
+    return [(length_m / count, bend) for bend in bends.tolist()]
 
 
 class Crossing(ScenarioPart):

@@ -26,6 +26,8 @@ _BY_THE_ROAD = frozenset({"rail", "post", "gantry_leg", "gantry_sign", "kerb", "
 """These belong to the road, so only crossings displace them."""
 _COURSE_STEP_M = 4.0
 _CORNER_M = 5.0
+_STEP_M, _OVERHEAD_M = 0.3, 3.0
+"""Lower things are stepped over, and higher ones passed under."""
 _LEAST_MEDIAN_M = 1.0
 """A narrower median has no room for rails or a gantry's leg."""
 
@@ -52,8 +54,9 @@ class Thing:
     """A number from 0 to 1 that varies colour and shape."""
 
 
-def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, ...]:
-    """Everything beside the road from s = start to end, in order of s. The items at a position depend on the seed and
+def place(road: Road, seed: int, start_m: float, end_m: float, kept_clear: F64 | None = None) -> tuple[Thing, ...]:
+    """Everything beside the road from s = start to end, in order of s. kept_clear: (M, 3) world x, y and radius of
+    circles in which nothing stands, such as where pedestrians walk. The items at a position depend on the seed and
     the start, but not on the end: each kind has its own random generator."""
     right = road.edges_m()[0][0] - road.shoulder_m
     left = road.edges_m()[-1][1] + road.shoulder_m
@@ -70,11 +73,12 @@ def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, .
         *_strips(road, start_m, end_m),
         *_buildings(np.random.default_rng([seed, 1, 1]), start_m, end_m, right, left),
     ]
-    return tuple(sorted(_off_the_road(things, road, start_m, end_m), key=lambda thing: thing.s_m))
+    return tuple(sorted(_off_the_road(things, road, start_m, end_m, kept_clear), key=lambda thing: thing.s_m))
 
 
-def _off_the_road(things: list[Thing], road: Road, start_m: float, end_m: float) -> list[Thing]:
-    """Without items in the way of a crossing road or of another section of the same, winding road."""
+def _off_the_road(things: list[Thing], road: Road, start_m: float, end_m: float, kept_clear: F64 | None) -> list[Thing]:
+    """Without items in the way of a crossing road, of another section of the same, winding road, or in circles that are
+    kept clear."""
     s_m, d_m = np.array([thing.s_m for thing in things]), np.array([thing.d_m for thing in things])
     places = road.to_world(s_m, d_m)[:, :2]
     reach_m = np.array([np.hypot(thing.length_m, thing.width_m) / 2 for thing in things])
@@ -91,6 +95,11 @@ def _off_the_road(things: list[Thing], road: Road, start_m: float, end_m: float)
         x, y, heading = line.to_world(0.0, 0.0)[0]
         beside = np.abs((places[:, 1] - y) * np.cos(heading) - (places[:, 0] - x) * np.sin(heading))
         clear &= beside > crossing.half_width_m() + _CORNER_M + reach_m
+    if kept_clear is not None and len(things):
+        x, y, radius_m = kept_clear.T
+        apart_m = np.hypot(places[:, 0, None] - x, places[:, 1, None] - y)
+        steps_over = np.array([thing.high_m < _STEP_M or thing.low_m > _OVERHEAD_M for thing in things])
+        clear &= steps_over | (apart_m > radius_m + reach_m[:, None]).all(axis=1)
     return [thing for thing, stays in zip(things, clear, strict=True) if stays]
 
 
@@ -106,8 +115,9 @@ class Roadside:
     """(N, 3) world x, y and heading of the things."""
 
     @staticmethod
-    def build(road: Road, seed: int, start_m: float, end_m: float) -> Roadside:
-        things = place(road, seed, start_m, end_m)
+    def build(road: Road, seed: int, start_m: float, end_m: float, kept_clear: F64 | None = None) -> Roadside:
+        """See ``place``."""
+        things = place(road, seed, start_m, end_m, kept_clear)
         s_m = np.array([thing.s_m for thing in things])
         return Roadside(things, s_m, road.to_world(s_m, np.array([thing.d_m for thing in things])))
 

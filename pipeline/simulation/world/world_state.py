@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.common.geometry import Cuboid
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.world.actors import Motion, Vehicle, motion
+from pipeline.simulation.world.actors import Motion, RoadUser, motion
 from pipeline.simulation.world.roads import Road
 from pipeline.types import F64
 
@@ -31,7 +31,7 @@ _SLOWEST_STEER_MPS = 2.0  # below this speed a lane change is a slow drift to th
 class ActorState:
     """An actor at one moment, in the ego frame."""
 
-    actor: Vehicle
+    actor: RoadUser
     """The actor's properties."""
     cuboid: Cuboid
     """In the ego frame."""
@@ -91,7 +91,7 @@ def at(scenario: Scenario, t_s: float, ego: Motion | None = None) -> World:
         (),
         scenario.road.hump_per_m(s_m),
     )
-    states = [*_on_the_road(scenario, world), *_crossing(scenario, world)]
+    states = [*_on_the_road(scenario, world), *_crossing(scenario, world), *_free(scenario, world)]
     return replace(world, actors=tuple(sorted(states, key=lambda s: (-hypot(*s.cuboid.center[:2]), s.actor.id))))
 
 
@@ -155,7 +155,20 @@ def _crossing(scenario: Scenario, world: World) -> list[ActorState]:
     return states
 
 
-def _state(world: World, actor: Vehicle, pose: F64, speed_mps: float, accel_mps2: float, yaw_rate: float) -> ActorState:
+def _free(scenario: Scenario, world: World) -> list[ActorState]:
+    """The actors on ways of their own."""
+    states = []
+    for actor, way in zip(scenario.free_actors, scenario.free_ways, strict=True):
+        s_m = actor.travelled_m(world.t_s)
+        speed, accel = actor.speed_and_accel(world.t_s)
+        bend = actor.curvature_per_m(s_m)
+        states.append(_state(world, actor, way.to_world(s_m, 0.0)[0], speed, accel, bend * speed))
+    return states
+
+
+def _state(
+    world: World, actor: RoadUser, pose: F64, speed_mps: float, accel_mps2: float, yaw_rate: float
+) -> ActorState:
     """An actor with a pose in the world, relative to the ego vehicle."""
     x, y = world.to_ego(pose[None])[0].tolist()
     return _placed(world, actor, x, y, float(pose[2]), speed_mps, accel_mps2, yaw_rate)
@@ -163,7 +176,7 @@ def _state(world: World, actor: Vehicle, pose: F64, speed_mps: float, accel_mps2
 
 def _placed(
     world: World,
-    actor: Vehicle,
+    actor: RoadUser,
     x: float,
     y: float,
     heading: float,

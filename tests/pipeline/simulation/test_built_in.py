@@ -137,3 +137,12 @@ def test_the_queue_stops_twice() -> None:
     stands = np.array([now.speed_mps < 0.1 for now in drive("stop_and_go")])
     assert np.count_nonzero(np.diff(stands.astype(int)) == 1) == 2
     assert min(gap_m(now, 1) for now in drive("stop_and_go")) > 4.0
+
+
+def test_a_pedestrian_crosses_before_the_car_which_waits() -> None:
+    worlds = drive("pedestrian_crosses")
+    across = [now.t_s for now in worlds if abs(actor(now, 1).cuboid.center[1]) < 0.95]
+    assert 6.0 < across[0] < across[-1] < 9.0
+    assert min(gap_m(now, 1) for now in worlds if now.t_s in across) > 3.0
+    assert actor(worlds[-1], 1).cuboid.center[0] < 0.0, "the car has driven on"
+    assert {state.actor.kind for state in worlds[0].actors} == {"pedestrian", "bicycle", "car"}

@@ -17,6 +17,7 @@ from pipeline.simulation.sensors.faults import Faults, Knock
 from pipeline.simulation.sensors.gnss_model import GnssModel, OdometryModel
 from pipeline.simulation.sensors.lidar.model import LidarModel
 from pipeline.simulation.world.actors import Actor, Brake
+from pipeline.simulation.world.free_ways import FreeActor, WayPiece
 from pipeline.simulation.world.intersection_ways import CrossingActor
 from pipeline.simulation.world.roads import Beacon, Crossing, Road, Segment, Strip
 
@@ -31,6 +32,8 @@ PARTS: dict[str, type[BaseModel]] = {
     "ego": Ego,
     "actor": Actor,
     "crossing_actor": CrossingActor,
+    "free_actor": FreeActor,
+    "way_piece": WayPiece,
     "brake": Brake,
     "camera": CameraModel,
     "lidar": LidarModel,

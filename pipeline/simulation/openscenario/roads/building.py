@@ -14,9 +14,10 @@ from pipeline.common.files.user_file_errors import first_complaint
 from pipeline.simulation.openscenario.roads.arc_fit import fit_arcs
 from pipeline.simulation.openscenario.roads.driven_road import DrivenRoad
 from pipeline.simulation.openscenario.roads.elevation import humps
+from pipeline.simulation.openscenario.roads.free_line import FreeLine
 from pipeline.simulation.openscenario.roads.lane_sections import Cubics
 from pipeline.simulation.openscenario.roads.network import FileRoad, Network
-from pipeline.simulation.openscenario.roads.track import TrackedStretch, track_along
+from pipeline.simulation.openscenario.roads.track import TrackedStretch, track_along, track_of
 from pipeline.simulation.openscenario.roads.way import AHEAD_M, BEHIND_M, Stretch, WayFinder
 from pipeline.simulation.world.lines import WorldPose
 from pipeline.simulation.world.roads import Road, Segment
@@ -29,7 +30,7 @@ _NARROWEST_M, _WIDEST_SHOULDER_M = 0.5, 10.0
 
 _MIRRORED = "The road has left-hand traffic; it is simulated as its mirror image, on the right."
 _BANKED = "Superelevation of the road is left out: it is not banked."
-_UNDRAWN = "Junctions and other roads of the file are not drawn."
+_UNDRAWN = "Of the other roads of the file, only those straight across are drawn."
 _ONE_SECTION = "Lanes are drawn as they are at the ego vehicle's start, along the whole road."
 
 
@@ -40,6 +41,24 @@ def driven_road(
     junctions. OpenScenarioError says what cannot be simulated."""
     finder = WayFinder(network, wanted)
     ahead = _tracks(finder.follow(road, s_m, lane, way, AHEAD_M), road, s_m)
+    return _made(finder, network, road, s_m, lane, way, ahead)
+
+
+def road_along(
+    network: Network, road: FileRoad, s_m: float, t_m: float, lane: int, way: int, line: FreeLine
+) -> DrivenRoad:
+    """The same for a vehicle that follows a trajectory from a place on a road: its way is the road, with the lanes of
+    its start. t_m: of its start; line: the trajectory from there on."""
+    start_t = float(road.lanes.centre.at(np.array([s_m]))[0])
+    stretch = Stretch(road, road.lanes.section_at(s_m), way, lane, s_m, s_m + way * line.length_m)
+    ahead = [track_of(line, stretch, start_t, t_m)]
+    return _made(WayFinder(network, frozenset()), network, road, s_m, lane, way, ahead)
+
+
+def _made(
+    finder: WayFinder, network: Network, road: FileRoad, s_m: float, lane: int, way: int, ahead: list[TrackedStretch]
+) -> DrivenRoad:
+    """The road of what lies ahead of a start, and of the way that leads there."""
     behind = [_turned(each) for each in reversed(_tracks(finder.follow(road, s_m, lane, -way, BEHIND_M), road, s_m))]
     hand = -1 if road.is_left_hand else 1
     try:
@@ -107,7 +126,7 @@ def _own_segments(tracks: list[TrackedStretch], hand: int) -> tuple[Segment, ...
     """The geometries of a road along which the whole way leads; None if it leads elsewhere, or a geometry is a
     polynomial."""
     road = tracks[0].road
-    if any(each.road is not road or each.way < 0 or np.abs(each.t_m).max() > 1e-9 for each in tracks):
+    if any(each.is_free or each.road is not road or each.way < 0 or np.abs(each.t_m).max() > 1e-9 for each in tracks):
         return None
     segments = [each.segment for each in road.line.geometries]
     found = [each for each in segments if each is not None]
@@ -138,8 +157,7 @@ def _ascending(poses: F64) -> F64:
 
 
 def _elevation(track: TrackedStretch) -> F64:
-    profile = track.road.at.find("elevationProfile")
-    return Cubics(profile.all("elevation") if profile is not None else []).at(track.s_m)
+    return track.road.heights_m(np.clip(track.s_m, 0.0, track.road.line.length_m) if track.is_free else track.s_m)
 
 
 def _is_banked(road: FileRoad) -> bool:

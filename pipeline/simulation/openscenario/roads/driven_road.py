@@ -22,6 +22,10 @@ from pipeline.types import F64
 
 _SEARCH_STEP_M = 0.5
 _CONVERGED_M = 1e-9
+_MOST_STEPS, _SLOWEST = 20, 0.2
+"""Of the search for the nearest place: steps, and by how much a bend may lengthen one."""
+_PARALLEL_RAD = 0.09
+"""Roads that are turned against a trajectory by more than this, 5°, are left by it."""
 
 
 class OffTheWay(OpenScenarioError):
@@ -67,6 +71,22 @@ class DrivenRoad:
         """Heading of the way in the file's world."""
         return self.start[2] + self.hand * float(self.road.to_world(s_m, 0.0)[0, 2])
 
+    def height_m(self, s_m: float) -> float:
+        """Height of the file's road there."""
+        track = self.track_at(s_m)
+        return float(track.road.heights_m(np.array([track.road_m(s_m)]))[0])
+
+    def nearest_m(self, points: F64) -> tuple[F64, F64]:
+        """(N,) s of the samples of the way nearest to (N, 2) points of the file's world, and (N,) their distances."""
+        s, line = self._samples
+        x0, y0, turned = self.start
+        away = points - (x0, y0)
+        x = away[:, 0] * cos(turned) + away[:, 1] * sin(turned)
+        y = (away[:, 1] * cos(turned) - away[:, 0] * sin(turned)) * self.hand
+        apart = np.hypot(line[:, 0] - x[:, None], line[:, 1] - y[:, None])
+        nearest = apart.argmin(axis=1)
+        return s[nearest], apart[np.arange(len(points)), nearest]
+
     def to_file_world(self, s_m: float, d_m: float) -> tuple[float, float]:
         """x and y in the file's world."""
         x, y, _ = self.road.to_world(s_m, d_m)[0].tolist()
@@ -83,11 +103,12 @@ class DrivenRoad:
         if s_m is None:
             s, line = self._samples
             s_m = float(s[int(np.argmin(np.hypot(line[:, 0] - x, line[:, 1] - y)))])
-        for _ in range(5):  # Newton's steps along the tangent converge within a micrometre
+        for _ in range(_MOST_STEPS):  # Newton's steps converge within a micrometre
             px, py, heading = self.road.to_world(s_m, 0.0)[0].tolist()
-            step_m = (x - px) * cos(heading) + (y - py) * sin(heading)
-            s_m += step_m
             d_m = (y - py) * cos(heading) - (x - px) * sin(heading)
+            step_m = (x - px) * cos(heading) + (y - py) * sin(heading)
+            step_m /= max(1.0 - self.road.curvature_per_m(s_m) * d_m, _SLOWEST)
+            s_m += step_m
             if abs(step_m) < _CONVERGED_M:
                 break
         return s_m, d_m
@@ -97,13 +118,18 @@ class DrivenRoad:
         if the way does not lead there."""
         tracks = [track for track in self.tracks if track.road is road]
         track = min(tracks, key=lambda each: each.beyond(s_m)) if tracks else None
+        off = OffTheWay(
+            f"{at.file}, line {at.line}: {at.tag} lies on road {shown(road.id)} at s = {s_m:.4g} m, off the way of "
+            "the ego vehicle"
+        )
         if track is None or track.beyond(s_m) > 1e-6:
-            raise OffTheWay(
-                f"{at.file}, line {at.line}: {at.tag} lies on road {shown(road.id)} at s = {s_m:.4g} m, off the way of "
-                "the ego vehicle"
-            )
+            raise off
         x, y = road.line.offset(np.array([s_m]), np.array([t_m]))[0].tolist()
         along, across = self.project(x, y, track.way_m(s_m))
+        if track.is_free:
+            turned = float(road.line.at(np.array([s_m]))[0, 2]) - self.heading(along)
+            if abs(np.sin(turned)) > _PARALLEL_RAD:
+                raise off
         return along, across, track.way
 
     def lanes_at(self, s_m: float) -> dict[int, float]:

@@ -9,7 +9,7 @@ from math import ceil, inf
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.simulation.openscenario.roads.lane_sections import RoadLanes
+from pipeline.simulation.openscenario.roads.lane_sections import Cubics, RoadLanes
 from pipeline.simulation.openscenario.roads.plan_view import PlanView
 from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, shown
 from pipeline.types import F64
@@ -73,6 +73,11 @@ class FileRoad:
             attributes["elementId"],
             attributes.get("contactPoint", "start") == "start",
         )
+
+    def heights_m(self, s_m: F64) -> F64:
+        """(N,) heights of the reference line."""
+        profile = self.at.find("elevationProfile")
+        return Cubics(profile.all("elevation") if profile is not None else []).at(s_m)
 
     def traffic_way(self, lane: int) -> int:
         """Direction of a lane's traffic along this road."""

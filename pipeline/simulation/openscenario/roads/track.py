@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.simulation.openscenario.roads.free_line import FreeLine
 from pipeline.simulation.openscenario.roads.network import FileRoad
 from pipeline.simulation.openscenario.roads.way import Stretch
 from pipeline.types import F64
@@ -31,6 +32,8 @@ class TrackedStretch:
     """(N,) t of the lane that is followed."""
     at_m: F64
     """(N,) distance along the way; zeros until it is known."""
+    is_free: bool = False
+    """Whether it follows a trajectory instead of the road, whose lanes are then taken along."""
 
     @property
     def road(self) -> FileRoad:
@@ -60,7 +63,8 @@ class TrackedStretch:
 
     def road_m(self, at_m: float) -> float:
         """s of the road at a distance along the way."""
-        return float(np.interp(at_m, self.at_m, self.s_m))
+        s_m = float(np.interp(at_m, self.at_m, self.s_m))
+        return min(max(s_m, 0.0), self.road.line.length_m) if self.is_free else s_m
 
     def lanes(self, at_m: float, hand: int) -> dict[int, float]:
         """Lane → d of its middle, of all lanes on which motor vehicles drive."""
@@ -94,6 +98,15 @@ def track_along(stretch: Stretch, before: TrackedStretch | None, start_t_m: floa
     heading = line[:, 2] + np.arctan2(slope, 1.0 - line[:, 3] * t) + (np.pi if stretch.way < 0 else 0.0)
     poses = np.column_stack([stretch.road.line.offset(s, t), heading])
     return TrackedStretch(stretch, s, t, poses, lane_t, np.zeros(len(s)))
+
+
+def track_of(line: FreeLine, stretch: Stretch, start_t_m: float, own_t_m: float) -> TrackedStretch:
+    """The reference line beside a trajectory that leaves the road: as far to its side as lane 0 is at the start.
+    start_t_m: t of lane 0 there; own_t_m: t of the trajectory."""
+    at = np.append(np.arange(0.0, line.length_m, _STEP_M / 2), line.length_m)
+    poses = line.line.to_world(at, stretch.way * (start_t_m - own_t_m))
+    t, own_t = np.full(len(at), start_t_m), np.full(len(at), own_t_m)
+    return TrackedStretch(stretch, stretch.from_m + stretch.way * at, t, poses, own_t, np.zeros(len(at)), is_free=True)
 
 
 def _samples(stretch: Stretch) -> F64:

@@ -24,12 +24,14 @@ _LIGHT = "Weather, light and friction of the scenario are left out: the simulato
 _SIGNALS = "Traffic signals of the scenario are left out."
 _APPEARANCE = "Appearance (lights, animation) of the scenario is left out."
 _LEFT_OUT = {"EnvironmentAction": _LIGHT, "InfrastructureAction": _SIGNALS}
+_AT_ONCE_S = 0.5
+"""Entities that are deleted later than this would be missed."""
 _QUINTIC_PEAK = 10.0 / sqrt(3.0)
 """Highest lateral acceleration of the simulator's lane change, times duration² / width."""
 _SUPPORTED = (
     "SpeedAction, SpeedProfileAction, LongitudinalDistanceAction, SynchronizeAction, LaneChangeAction, "
-    "LaneOffsetAction, AssignRouteAction, AcquirePositionAction, FollowTrajectoryAction, VariableAction and, at the "
-    "start, TeleportAction are"
+    "LaneOffsetAction, AssignRouteAction, AcquirePositionAction, FollowTrajectoryAction, VariableAction, "
+    "ParameterAction and, at the start, TeleportAction and DeleteEntityAction are"
 )
 
 
@@ -51,17 +53,41 @@ def _global(at: XmlElement, scope: ParameterScope, stage: PlayedScenario) -> Non
     if at.tag in _LEFT_OUT:
         stage.note(_LEFT_OUT[at.tag])
         return
-    if at.tag != "VariableAction":
+    if at.tag == "EntityAction":
+        _delete(at, scope, stage)
+    elif at.tag == "ParameterAction":
+        name = scope.text(at, "parameterRef")
+        if name not in scope.values:
+            raise at.refusal(f"no parameter {shown(name)!r} is declared")
+        stage.assigned[name] = _changed(stage.assigned.get(name, scope.values[name]), name, at.only(), scope)
+    elif at.tag == "VariableAction":
+        name = scope.text(at, "variableRef")
+        if name not in stage.variables:
+            raise at.refusal(f"no variable {shown(name)!r} is declared")
+        stage.variables[name] = _changed(stage.variables[name], name, at.only(), scope)
+    else:
         raise at.refusal(f"{shown(at.tag)} is not supported; {_SUPPORTED}")
-    name, how = scope.text(at, "variableRef"), at.only()
-    if name not in stage.variables:
-        raise at.refusal(f"no variable {shown(name)!r} is declared")
+
+
+def _changed(before: str, name: str, how: XmlElement, scope: ParameterScope) -> str:
+    """The value of a variable or parameter after a ``SetAction`` or ``ModifyAction``."""
     if how.tag == "SetAction":
-        stage.variables[name] = scope.text(how, "value")
-        return
+        return scope.text(how, "value")
     rule = how.one("Rule").only()
-    value, before = scope.number(rule, "value"), number_in(stage.variables[name], at, name)
-    stage.variables[name] = repr(before + value if rule.tag == "AddValue" else before * value)
+    value, number = scope.number(rule, "value"), number_in(before, how, name)
+    return repr(number + value if rule.tag in ("AddValue", "addValue") else number * value)
+
+
+def _delete(at: XmlElement, scope: ParameterScope, stage: PlayedScenario) -> None:
+    """An entity that is deleted as the drive begins is left out."""
+    name, how = scope.text(at, "entityRef"), at.only()
+    if how.tag != "DeleteEntityAction" or name == stage.ego:
+        raise how.refusal(f"{shown(how.tag)} for {shown(name)} is not supported; DeleteEntityAction for others is")
+    if stage.t_s > _AT_ONCE_S:
+        raise how.refusal(f"DeleteEntityAction is supported at the start only: {shown(name)} cannot vanish later")
+    if stage.movers.pop(name, None) is not None:
+        stage.left_out.add(name)
+        stage.note(f"{shown(name)} is left out: the file deletes it as the drive begins.")
 
 
 def _private(at: XmlElement, name: str, scope: ParameterScope, stage: PlayedScenario) -> Running | None:
@@ -76,7 +102,7 @@ def _private(at: XmlElement, name: str, scope: ParameterScope, stage: PlayedScen
     mover = stage.mover(name, at)
     if at.tag == "TeleportAction":
         _at_start(at, stage)
-        mover.place(place_at(at.one("Position"), scope, stage.road, stage.place_of))
+        mover.place(place_at(at.one("Position"), scope, mover.road, stage))
         return None
     inner = at.only() if at.tag in ("LongitudinalAction", "LateralAction", "RoutingAction") else at
     starter = _STARTERS.get(inner.tag)
@@ -97,11 +123,11 @@ def _lane_change(at: XmlElement, mover: Mover, scope: ParameterScope, stage: Pla
     if target.tag == "AbsoluteTargetLane":
         lane = scope.integer(target, "value")
     else:
-        other = stage.place_of(scope.text(target, "entityRef"), target)
-        count = scope.integer(target, "value") * other.way * stage.road.track_at(other.s_m).way
-        lane = lane_beside(stage.road, other, count, target)
-    d_m = stage.road.lane_or_refusal(here.s_m, lane, target)
-    d_m += stage.road.hand * mover.way * scope.number(at, "targetLaneOffset", 0.0)
+        other = stage.place_of(scope.text(target, "entityRef"), target, mover.road)
+        count = scope.integer(target, "value") * other.way * mover.road.track_at(other.s_m).way
+        lane = lane_beside(mover.road, other, count, target)
+    d_m = mover.road.lane_or_refusal(here.s_m, lane, target)
+    d_m += mover.road.hand * mover.way * scope.number(at, "targetLaneOffset", 0.0)
     now = mover.now(stage.t_s)[1]
     shape = scope.text(dynamics, "dynamicsShape")
     if shape == "step":
@@ -124,12 +150,12 @@ def _lane_offset(at: XmlElement, mover: Mover, scope: ParameterScope, stage: Pla
     limit = scope.number(dynamics, "maxLateralAcc", 0.0)
     if limit <= 0.0 or scope.text(dynamics, "dynamicsShape") not in SHAPES[:-1]:
         raise dynamics.refusal(f"LaneOffsetAction needs a maxLateralAcc and one of {', '.join(SHAPES[:-1])}")
-    offset = stage.road.hand * mover.way * scope.number(target, "value")
+    offset = mover.road.hand * mover.way * scope.number(target, "value")
     here, now = mover.place_now(stage.t_s), mover.now(stage.t_s)[1]
     if target.tag == "AbsoluteTargetLaneOffset":
-        d_m = stage.road.lanes_at(here.s_m)[lane_at(stage.road, here)] + offset
+        d_m = mover.road.lanes_at(here.s_m)[lane_at(mover.road, here)] + offset
     else:
-        d_m = stage.place_of(scope.text(target, "entityRef"), target).d_m + offset
+        d_m = stage.place_of(scope.text(target, "entityRef"), target, mover.road).d_m + offset
     ends_s = stage.t_s
     if d_m != now.d_m:
         ends_s = mover.change_lane(stage.t_s, d_m, sqrt(_QUINTIC_PEAK * abs(d_m - now.d_m) / limit), at)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from math import hypot, inf
 
 from pipeline.simulation.openscenario.parameters import RULES, ParameterScope, compare
+from pipeline.simulation.openscenario.roads.free_line import turned_rad
 from pipeline.simulation.openscenario.storyboard.positions import ON_ROADS, RoadPlace, file_point, place_at
 from pipeline.simulation.openscenario.storyboard.stage import PlayedScenario
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
@@ -17,7 +18,7 @@ Test = Callable[[PlayedScenario], bool]
 _BY_VALUE = "SimulationTimeCondition, ParameterCondition, VariableCondition and StoryboardElementStateCondition are"
 _BY_ENTITY = (
     "TimeHeadway, TimeToCollision, RelativeDistance, Distance, ReachPosition, Speed, RelativeSpeed, StandStill, "
-    "TraveledDistance, Collision, Acceleration, EndOfRoad and OffroadCondition are"
+    "TraveledDistance, Collision, Acceleration, Angle, EndOfRoad and OffroadCondition are"
 )
 _STANDSTILL_MPS = 0.01
 """Speeds below it count as standing: wheel-speed sensors report 0 below a few cm/s."""
@@ -88,8 +89,8 @@ def _by_value(at: XmlElement, scope: ParameterScope) -> Test:
         name, rule, value = (scope.text(at, key) for key in ("parameterRef", "rule", "value"))
         if name not in scope.values:
             raise at.refusal(f"no parameter {shown(name)!r} is declared")
-        fixed = compare(scope.values[name], rule, value, at)
-        return lambda stage: fixed
+        compare(scope.values[name], rule, value, at)  # a wrong rule is told at once
+        return lambda stage: compare(stage.assigned.get(name, scope.values[name]), rule, value, at)
     if at.tag == "VariableCondition":
         name, rule, value = (scope.text(at, key) for key in ("variableRef", "rule", "value"))
 
@@ -180,12 +181,11 @@ def _to_position(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScena
 
     def target(stage: PlayedScenario) -> RoadPlace:
         if not known or not is_fixed:
-            known[:] = [place_at(position, scope, stage.road, stage.place_of)]
+            known[:] = [place_at(position, scope, stage.road, stage, on_road=False)]
         return known[0]
 
     def in_plane(stage: PlayedScenario, name: str) -> float:
-        here = stage.place_of(name, at)
-        x, y = stage.road.to_file_world(here.s_m, here.d_m)
+        x, y, _ = stage.pose_of(name, at)
         if not points or not is_fixed:
             points[:] = [point(stage)]
         return hypot(x - points[0][0], y - points[0][1])
@@ -193,7 +193,7 @@ def _to_position(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScena
     def point(stage: PlayedScenario) -> tuple[float, float]:
         if position.only().tag in ON_ROADS:
             return file_point(position.only(), scope, stage.road.network)
-        return stage.road.to_file_world(*target(stage)[:2])
+        return stage.pose_at(position, scope)[:2]
 
     def in_lane(stage: PlayedScenario, name: str) -> float:
         here, there = stage.place_of(name, at), target(stage)
@@ -234,6 +234,14 @@ def _acceleration(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScen
         raise at.refusal("AccelerationCondition is supported along the road only")
     limit = _limit(at, scope)
     return lambda stage, name: limit(stage.mover(name, at).now(stage.t_s)[1].accel_mps2)
+
+
+def _angle(at: XmlElement, scope: ParameterScope) -> Callable[[PlayedScenario, str], bool]:
+    """Whether an entity's heading in the file's world is within a tolerance of an angle."""
+    if scope.text(at, "angleType", "heading") != "heading" or scope.text(at, "coordinateSystem", "world") != "world":
+        raise at.refusal("AngleCondition is supported for the heading in the world only")
+    angle, tolerance = scope.number(at, "angle"), scope.number(at, "angleTolerance")
+    return lambda stage, name: turned_rad(stage.pose_of(name, at)[2], angle) <= tolerance
 
 
 def _for_seconds(
@@ -286,6 +294,7 @@ _ENTITY_CONDITIONS: dict[str, Callable[[XmlElement, ParameterScope], Callable[[P
     "TraveledDistanceCondition": _travelled,
     "CollisionCondition": _collision,
     "AccelerationCondition": _acceleration,
+    "AngleCondition": _angle,
     "EndOfRoadCondition": _end_of_road,
     "OffroadCondition": _offroad,
 }

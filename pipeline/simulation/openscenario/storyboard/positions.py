@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import atan2, cos, degrees, pi, remainder, sin, tau
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from pipeline.simulation.openscenario.parameters import ParameterScope
-from pipeline.simulation.openscenario.roads.driven_road import DrivenRoad
+from pipeline.simulation.openscenario.roads.driven_road import DrivenRoad, OffTheWay
 from pipeline.simulation.openscenario.roads.network import FileRoad, Network
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
+from pipeline.simulation.world.lines import WorldPose
 
 ON_ROADS = ("LanePosition", "RoadPosition", "WorldPosition")
 """Positions that refer to no entity."""
+OFF_ROADS = ("TrajectoryPosition", "RoutePosition")
+"""Positions that are read as poses in the file's world."""
 _ALONG_RAD = 0.09
 """Maximum rotation from the road's direction, 5°: vehicles in the simulator point along the road."""
-_LANE_M = 3.0
-"""A place farther from the middle of every lane is not on the road."""
+_LANE_M, _WAY_M = 3.0, 15.0
+"""A place farther from the middle of every lane is not on the road; one farther from the way is elsewhere."""
 _SUPPORTED = (
-    "LanePosition, RoadPosition, WorldPosition, RelativeLanePosition, RelativeRoadPosition, RelativeObjectPosition and "
-    "RelativeWorldPosition are"
+    "LanePosition, RoadPosition, WorldPosition, RelativeLanePosition, RelativeRoadPosition, RelativeObjectPosition, "
+    "RelativeWorldPosition, TrajectoryPosition and RoutePosition are"
 )
 
 
@@ -36,16 +38,57 @@ class RoadPlace(NamedTuple):
     """+1 facing along the road, −1 against it."""
 
 
-PlaceOf = Callable[[str, XmlElement], RoadPlace]
-"""The place of an entity by name; the element is for messages."""
+class Entities(Protocol):
+    """The entities to which positions may refer. The elements are for messages."""
+
+    def place_of(self, name: str, at: XmlElement, road: DrivenRoad) -> RoadPlace:
+        """The place of an entity on a road, the nearest if it is not on it."""
+        ...
+
+    def follows(self, name: str, at: XmlElement, road: DrivenRoad) -> bool:
+        """Whether an entity follows the lanes of a road."""
+        ...
+
+    def pose_at(self, position: XmlElement, scope: ParameterScope) -> WorldPose:
+        """x, y and heading of a ``Position`` element in the file's world."""
+        ...
+
+
+class Turned(OffTheWay):
+    """A place at which a vehicle would not face along the road."""
+
+
+class BesideRoad(OffTheWay):
+    """A place beside the road."""
 
 
 def place_at(
-    position: XmlElement, scope: ParameterScope, road: DrivenRoad, place_of: PlaceOf, on_road: bool = True
+    position: XmlElement, scope: ParameterScope, road: DrivenRoad, entities: Entities, on_road: bool = True
 ) -> RoadPlace:
     """The place that a ``Position`` element describes. OffTheWay if it is on another road than the ego vehicle's way,
     OpenScenarioError if it is on none. on_road: False if it may lie beside the road."""
     at = position.only()
+    is_turned = at.tag == "RelativeObjectPosition" and not entities.follows(scope.text(at, "entityRef"), at, road)
+    if is_turned or at.tag in OFF_ROADS:
+        found = _from_pose(position, scope, road, entities)
+    else:
+        found = _from_road(at, scope, road, entities)
+    if not 0.0 <= found.s_m <= road.length_m:
+        raise at.refusal(
+            f"{at.tag} lies at s = {found.s_m:.1f} m, outside road {shown(road.last_road)} ({road.length_m:g} m)"
+        )
+    edges = [edge for pair in road.road.edges_m() for edge in pair]
+    beside = max(found.d_m - max(edges), min(edges) - found.d_m) - road.road.shoulder_m
+    if on_road and beside > 0.0 and min(abs(found.d_m - d) for d in road.lanes_at(found.s_m).values()) > _LANE_M:
+        there = shown(road.track_at(found.s_m).road.id)
+        raise BesideRoad(
+            f"{at.file}, line {at.line}: {at.tag} lies {abs(found.d_m):.1f} m beside the middle of road {there}, not "
+            "on it"
+        )
+    return found
+
+
+def _from_road(at: XmlElement, scope: ParameterScope, road: DrivenRoad, entities: Entities) -> RoadPlace:
     reader = {
         "LanePosition": _on_lane,
         "RoadPosition": _on_road,
@@ -57,17 +100,17 @@ def place_at(
     }.get(at.tag)
     if reader is None:
         raise at.refusal(f"{shown(at.tag)} is not supported; {_SUPPORTED}")
-    found = reader(at, scope, road, place_of)
-    if not 0.0 <= found.s_m <= road.length_m:
-        raise at.refusal(
-            f"{at.tag} lies at s = {found.s_m:.1f} m, outside road {shown(road.last_road)} ({road.length_m:g} m)"
-        )
-    edges = [edge for pair in road.road.edges_m() for edge in pair]
-    beside = max(found.d_m - max(edges), min(edges) - found.d_m) - road.road.shoulder_m
-    if on_road and beside > 0.0 and min(abs(found.d_m - d) for d in road.lanes_at(found.s_m).values()) > _LANE_M:
-        there = shown(road.track_at(found.s_m).road.id)
-        raise at.refusal(f"{at.tag} lies {abs(found.d_m):.1f} m beside the middle of road {there}, not on it")
-    return found
+    return reader(at, scope, road, entities)
+
+
+def _from_pose(position: XmlElement, scope: ParameterScope, road: DrivenRoad, entities: Entities) -> RoadPlace:
+    """A place on a trajectory or route, or relative to an entity that is elsewhere, seen from the road."""
+    x, y, heading = entities.pose_at(position, scope)
+    s, d = road.project(x, y)
+    at = position.only()
+    if abs(d) > _WAY_M or not 0.0 <= s <= road.length_m:
+        raise OffTheWay(f"{at.file}, line {at.line}: {at.tag} lies off the way of the ego vehicle")
+    return RoadPlace(s, d, way_of(heading - road.heading(s), at))
 
 
 def lane_at(road: DrivenRoad, place: RoadPlace) -> int:
@@ -130,7 +173,7 @@ def _nearest_lane(road: FileRoad, s_m: float, t_m: float, at: XmlElement) -> int
     return min(driven, key=lambda lane: abs(sum(road.lanes.edges_at(lane, s_m)) / 2 - t_m))
 
 
-def _on_lane(at: XmlElement, scope: ParameterScope, road: DrivenRoad, place_of: PlaceOf) -> RoadPlace:
+def _on_lane(at: XmlElement, scope: ParameterScope, road: DrivenRoad, entities: Entities) -> RoadPlace:
     there, s_file, t, lane = file_place(at, scope, road.network)
     s, d, way = road.place(there, s_file, t, at)
     return RoadPlace(s, d, _way(at, scope, road.heading(s), way * there.traffic_way(lane), None))
@@ -139,18 +182,18 @@ def _on_lane(at: XmlElement, scope: ParameterScope, road: DrivenRoad, place_of: 
 _on_road = _on_lane
 
 
-def _in_world(at: XmlElement, scope: ParameterScope, road: DrivenRoad, place_of: PlaceOf) -> RoadPlace:
+def _in_world(at: XmlElement, scope: ParameterScope, road: DrivenRoad, entities: Entities) -> RoadPlace:
     x, y = scope.number(at, "x"), scope.number(at, "y")
     s, d = road.project(x, y)
     if len(road.network.roads) > 1:
         there, s_file, t = road.network.project(x, y)
         s, d, _ = road.place(there, s_file, t, at)
-    return RoadPlace(s, d, _way_of(scope.number(at, "h", 0.0) - road.heading(s), at))
+    return RoadPlace(s, d, way_of(scope.number(at, "h", 0.0) - road.heading(s), at))
 
 
-def _beside_lanes(at: XmlElement, scope: ParameterScope, road: DrivenRoad, place_of: PlaceOf) -> RoadPlace:
+def _beside_lanes(at: XmlElement, scope: ParameterScope, road: DrivenRoad, entities: Entities) -> RoadPlace:
     """Distances count along the file's road."""
-    other = place_of(scope.text(at, "entityRef"), at)
+    other = entities.place_of(scope.text(at, "entityRef"), at, road)
     lane = lane_beside(road, other, scope.integer(at, "dLane"), at)
     along = scope.number(at, "dsLane") if "dsLane" in at.attributes else scope.number(at, "ds")
     s = other.s_m + road.track_at(other.s_m).way * along
@@ -159,17 +202,17 @@ def _beside_lanes(at: XmlElement, scope: ParameterScope, road: DrivenRoad, place
     return RoadPlace(s, d, _way(at, scope, road.heading(s), road.traffic_way(s, lane), other))
 
 
-def _along_road(at: XmlElement, scope: ParameterScope, road: DrivenRoad, place_of: PlaceOf) -> RoadPlace:
-    other = place_of(scope.text(at, "entityRef"), at)
+def _along_road(at: XmlElement, scope: ParameterScope, road: DrivenRoad, entities: Entities) -> RoadPlace:
+    other = entities.place_of(scope.text(at, "entityRef"), at, road)
     s = other.s_m + road.track_at(other.s_m).way * scope.number(at, "ds")
     here = RoadPlace(s, other.d_m + road.left_of_file(s) * scope.number(at, "dt"), other.way)
     usual = road.traffic_way(s, lane_at(road, here))
     return here._replace(way=_way(at, scope, road.heading(s), usual, other))
 
 
-def _from_object(at: XmlElement, scope: ParameterScope, road: DrivenRoad, place_of: PlaceOf) -> RoadPlace:
+def _from_object(at: XmlElement, scope: ParameterScope, road: DrivenRoad, entities: Entities) -> RoadPlace:
     """dx and dy along the axes of the entity, or of the world."""
-    other = place_of(scope.text(at, "entityRef"), at)
+    other = entities.place_of(scope.text(at, "entityRef"), at, road)
     is_turned = at.tag == "RelativeObjectPosition"
     turned = road.heading(other.s_m) + (pi if other.way < 0 else 0.0) if is_turned else 0.0
     x, y = road.to_file_world(other.s_m, other.d_m)
@@ -189,17 +232,18 @@ def _way(at: XmlElement, scope: ParameterScope, road_heading: float, usual: int,
         return usual
     turned = scope.number(orientation, "h")
     if scope.text(orientation, "type", "absolute") == "relative":
-        return _way_of(turned, orientation) * (other.way if other is not None else usual)
-    return _way_of(turned - road_heading, orientation)
+        return way_of(turned, orientation) * (other.way if other is not None else usual)
+    return way_of(turned - road_heading, orientation)
 
 
-def _way_of(turned_rad: float, at: XmlElement) -> int:
+def way_of(turned_rad: float, at: XmlElement) -> int:
     """+1 along the road, −1 against it."""
     across = abs(atan2(sin(turned_rad), cos(turned_rad)))
     if across <= _ALONG_RAD:
         return 1
     if abs(remainder(across - pi, tau)) <= _ALONG_RAD:
         return -1
-    raise at.refusal(
-        f"a vehicle turned by {degrees(across):.0f}° from the road is not supported; they face along the road"
+    raise Turned(
+        f"{at.file}, line {at.line}: a vehicle turned by {degrees(across):.0f}° from the road is not supported; they "
+        "face along the road"
     )

@@ -73,6 +73,24 @@ class OffsetChange(Running):
             self.mover.break_off_lane_change(t_s, at)
 
 
+@dataclass(frozen=True)
+class TrajectoryRun(Running):
+    """A trajectory that is followed to its end."""
+
+    mover: Mover
+    """Whom it moves."""
+    until_m: float
+    """Distance travelled at its end."""
+    version: int
+    """``Mover.lane_version`` since it began."""
+
+    def is_over(self, t_s: float) -> bool:
+        return self.mover.now(t_s)[1].travelled_m >= self.until_m - 1e-9 or self.mover.lane_version != self.version
+
+    def stop(self, t_s: float, at: XmlElement) -> None:
+        """The rest is followed all the same: there is no other way to go."""
+
+
 class SpeedLaw(Protocol):
     """Speeds as a function of what the entities do."""
 
@@ -186,11 +204,11 @@ class KeepDistance:
     """In the step before, for the limits of its rate."""
 
     def next_mps(self, mover: Mover, t_s: float) -> float | None:
-        own, other = mover.place_now(t_s), self.other.place_now(t_s)
+        own, other = mover.place_now(t_s), self.other.place_on(mover.road, t_s)
         own_mps, other_mps = mover.now(t_s)[1].speed_mps, self.other.now(t_s)[1].speed_mps
         gap_m = self.time_gap_s * own_mps if self.distance_m is None else self.distance_m
         error_m = mover.way * (other.s_m + self.side * gap_m + self.extra_m - own.s_m)
-        closing_mps = mover.way * self.other.way * other_mps - own_mps
+        closing_mps = mover.way * other.way * other_mps - own_mps
         if not self.is_continuous and abs(error_m) < _ARRIVED_M and abs(closing_mps) < _ARRIVED_MPS:
             return None
         wanted = _STIFFNESS_PER_S2 * error_m + 2.0 * sqrt(_STIFFNESS_PER_S2) * closing_mps
@@ -206,9 +224,9 @@ class Arrive:
     other: Mover
     """The master of the synchronisation."""
     other_to_m: float
-    """s of its target along the way."""
+    """s of its target on the road or line that it follows."""
     to_m: float
-    """s of one's own target."""
+    """The same of one's own target."""
     final_mps: float | None
     """Speed at the target; None: whatever results."""
     steady_s: float
@@ -217,9 +235,7 @@ class Arrive:
     """Distance from the targets at which both count as arrived."""
 
     def next_mps(self, mover: Mover, t_s: float) -> float | None:
-        other, own = self.other.place_now(t_s), mover.place_now(t_s)
-        left_m = self.other.way * (self.other_to_m - other.s_m)
-        own_left_m = mover.way * (self.to_m - own.s_m)
+        left_m, own_left_m = self.other.left_m(self.other_to_m, t_s), mover.left_m(self.to_m, t_s)
         other_mps, now_mps = self.other.now(t_s)[1].speed_mps, mover.now(t_s)[1].speed_mps
         if left_m <= 0.0 or max(left_m, own_left_m) <= self.tolerance_m:
             return None

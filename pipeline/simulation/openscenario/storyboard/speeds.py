@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from math import inf, sqrt
 
 from pipeline.simulation.openscenario.parameters import ParameterScope
+from pipeline.simulation.openscenario.roads.driven_road import OffTheWay
 from pipeline.simulation.openscenario.storyboard.movers import Mover, seconds_for, share_of
 from pipeline.simulation.openscenario.storyboard.positions import place_at
 from pipeline.simulation.openscenario.storyboard.running import (
@@ -118,6 +120,8 @@ def _shares() -> list[float]:
 def longitudinal_distance(at: XmlElement, mover: Mover, scope: ParameterScope, stage: PlayedScenario) -> Running | None:
     """``LongitudinalDistanceAction``: a jump at the start if nothing limits it, otherwise driven."""
     other = stage.mover(scope.text(at, "entityRef"), at)
+    if mover.line is not None:
+        raise at.refusal(f"{at.tag} of {shown(mover.body.name)} is not supported: it follows no lane")
     if ("distance" in at.attributes) == ("timeGap" in at.attributes):
         raise at.refusal("LongitudinalDistanceAction needs either a distance or a timeGap")
     distance_m = scope.number(at, "distance") if "distance" in at.attributes else None
@@ -126,7 +130,7 @@ def longitudinal_distance(at: XmlElement, mover: Mover, scope: ParameterScope, s
     extra_m = 0.0
     if scope.truth(at, "freespace", True):
         extra_m = side * (mover.body.size_m[0] + other.body.size_m[0]) / 2
-        extra_m += other.way * other.body.centre_m - mover.way * mover.body.centre_m
+        extra_m += other.place_on(mover.road, stage.t_s).way * other.body.centre_m - mover.way * mover.body.centre_m
     is_continuous, is_limited = scope.truth(at, "continuous", False), at.find("DynamicConstraints") is not None
     if not is_limited:
         if stage.t_s > 0.0:
@@ -135,7 +139,7 @@ def longitudinal_distance(at: XmlElement, mover: Mover, scope: ParameterScope, s
                 "jump during a drive"
             )
         gap_m = time_gap_s * mover.now(0.0)[1].speed_mps if distance_m is None else distance_m
-        there = other.place_now(0.0)
+        there = other.place_on(mover.road, 0.0)
         mover.place(mover.place_now(0.0)._replace(s_m=there.s_m + side * gap_m + extra_m))
         if not is_continuous:
             return None
@@ -145,7 +149,7 @@ def longitudinal_distance(at: XmlElement, mover: Mover, scope: ParameterScope, s
 
 def _side(displacement: str, mover: Mover, other: Mover, stage: PlayedScenario) -> int:
     """Whether to be ahead (+1) or behind (−1) along the way."""
-    own, there = mover.place_now(stage.t_s), other.place_now(stage.t_s)
+    own, there = mover.place_now(stage.t_s), other.place_on(mover.road, stage.t_s)
     if displacement in _SIDES:
         return _SIDES[displacement] * there.way
     return 1 if own.s_m >= there.s_m else -1
@@ -155,12 +159,19 @@ def synchronize(at: XmlElement, mover: Mover, scope: ParameterScope, stage: Play
     """``SynchronizeAction``: two entities reach their own places at the same time."""
     other = stage.mover(scope.text(at, "masterEntityRef"), at)
     final_mps, steady_s = _final_speed(at, other, scope, stage)
-    to, own_to = (
-        place_at(at.one(tag), scope, stage.road, stage.place_of, on_road=False)
-        for tag in ("TargetPositionMaster", "TargetPosition")
-    )
+    to_m = _reached_m(at.one("TargetPositionMaster"), other, scope, stage)
+    own_to_m = _reached_m(at.one("TargetPosition"), mover, scope, stage)
     tolerance_m = scope.number(at, "targetTolerance", 0.0)
-    return _controlled(at, mover, Arrive(other, to.s_m, own_to.s_m, final_mps, steady_s, tolerance_m), stage)
+    return _controlled(at, mover, Arrive(other, to_m, own_to_m, final_mps, steady_s, tolerance_m), stage)
+
+
+def _reached_m(position: XmlElement, mover: Mover, scope: ParameterScope, stage: PlayedScenario) -> float:
+    """s of a position on the road or line that an entity follows; the nearest place if it lies beside that."""
+    if mover.line is None:
+        with suppress(OffTheWay):
+            return place_at(position, scope, mover.road, stage, on_road=False).s_m
+    x, y, _ = stage.pose_at(position, scope)
+    return mover.line.project(x, y) if mover.line is not None else mover.road.project(x, y)[0]
 
 
 def _final_speed(

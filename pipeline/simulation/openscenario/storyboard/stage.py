@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import cos, sin
+from typing import NamedTuple
 
+from pipeline.common.geometry import Cuboid
+from pipeline.simulation.openscenario.parameters import ParameterScope
 from pipeline.simulation.openscenario.roads.driven_road import DrivenRoad
+from pipeline.simulation.openscenario.roads.free_line import overlaps
+from pipeline.simulation.openscenario.roads.network import Network
 from pipeline.simulation.openscenario.storyboard.movers import Mover
+from pipeline.simulation.openscenario.storyboard.poses import pose_at
 from pipeline.simulation.openscenario.storyboard.positions import RoadPlace
 from pipeline.simulation.openscenario.storyboard.running import SpeedControl
 from pipeline.simulation.openscenario.xml_files import XmlElement, shown
+from pipeline.simulation.world.lines import WorldPose
+from pipeline.types import F64
 
 _KEPT_M = 0.05
 
@@ -41,6 +50,10 @@ class PlayedScenario:
     """The same of names that several elements have, which no condition can refer to."""
     notes: list[str] = field(default_factory=list)
     """What is left out, each sentence once."""
+    has_trajectory: bool = False
+    """Whether the ego vehicle's way is that of its trajectory in the Init."""
+    assigned: dict[str, str] = field(default_factory=dict)
+    """Parameters that actions have set, and their present values."""
     t_s: float = 0.0
     """Simulation time."""
 
@@ -68,18 +81,42 @@ class PlayedScenario:
                     "meanwhile, is not supported"
                 )
 
-    def place_of(self, name: str, at: XmlElement) -> RoadPlace:
-        """Where an entity is now."""
-        return self.mover(name, at).place_now(self.t_s)
+    @property
+    def network(self) -> Network:
+        """All roads of the file."""
+        return self.road.network
+
+    def place_of(self, name: str, at: XmlElement, road: DrivenRoad | None = None) -> RoadPlace:
+        """Where an entity is now on a road, by default the ego vehicle's; the nearest place if it is elsewhere."""
+        return self.mover(name, at).place_on(road or self.road, self.t_s)
+
+    def pose_of(self, name: str, at: XmlElement) -> WorldPose:
+        """x, y and heading of an entity's reference point in the file's world."""
+        return self.mover(name, at).pose(self.t_s)
+
+    def follows(self, name: str, at: XmlElement, road: DrivenRoad) -> bool:
+        """Whether an entity follows the lanes of a road."""
+        mover = self.mover(name, at)
+        return mover.line is None and mover.road is road
+
+    def road_of(self, name: str, at: XmlElement) -> DrivenRoad:
+        """The road whose lanes an entity follows."""
+        mover = self.mover(name, at)
+        return mover.road if mover.line is None else self.road
+
+    def pose_at(self, position: XmlElement, scope: ParameterScope) -> WorldPose:
+        """x, y and heading of a position in the file's world."""
+        return pose_at(position, scope, self)
 
     def speed(self, name: str, at: XmlElement) -> float:
         """Its present speed."""
         return self.mover(name, at).now(self.t_s)[1].speed_mps
 
     def is_beyond_road(self, name: str, at: XmlElement) -> bool:
-        """Whether an entity has left the way at one of its ends."""
-        s_m = self.mover(name, at).now(self.t_s)[0]
-        return not 0.0 <= s_m <= self.road.length_m
+        """Whether an entity has left its way at one of its ends."""
+        mover = self.mover(name, at)
+        length_m = mover.road.length_m if mover.line is None else mover.line.length_m
+        return not 0.0 <= mover.now(self.t_s)[0] <= length_m
 
     def note(self, sentence: str) -> None:
         """Remember that something is left out."""
@@ -98,15 +135,14 @@ class PlayedScenario:
         self.changed[kind, name] = (transition, self.t_s)
 
     def gap_m(self, one: str, other: str, kind: str, freespace: bool, at: XmlElement) -> float:
-        """Distance between two entities along the road (``longitudinal``), across it (``lateral``) or both
-        (``euclidianDistance``): between their faces, or between their reference points."""
-        first, second = self.mover(one, at), self.mover(other, at)
+        """Distance between two entities along the ego vehicle's road (``longitudinal``), across it (``lateral``) or
+        both (``euclidianDistance``): between their faces, or between their reference points."""
         if freespace:
-            (s1, now1), (s2, now2) = first.now(self.t_s), second.now(self.t_s)
-            along = max(abs(s1 - s2) - (first.body.size_m[0] + second.body.size_m[0]) / 2, 0.0)
-            across = max(abs(now1.d_m - now2.d_m) - (first.body.size_m[1] + second.body.size_m[1]) / 2, 0.0)
+            first, second = (self._extent(self.mover(name, at)) for name in (one, other))
+            along = max(abs(first.s_m - second.s_m) - (first.along_m + second.along_m) / 2, 0.0)
+            across = max(abs(first.d_m - second.d_m) - (first.across_m + second.across_m) / 2, 0.0)
         else:
-            place, there = first.place_now(self.t_s), second.place_now(self.t_s)
+            place, there = self.place_of(one, at), self.place_of(other, at)
             along, across = abs(place.s_m - there.s_m), abs(place.d_m - there.d_m)
         if kind == "longitudinal":
             return along
@@ -118,15 +154,57 @@ class PlayedScenario:
             f"distance type {shown(kind)!r} is not supported; longitudinal, lateral, euclidianDistance are"
         )
 
+    def _extent(self, mover: Mover) -> _Extent:
+        length, width, _ = mover.body.size_m
+        if self._is_along(mover):
+            s_m, now = mover.now(self.t_s)
+            return _Extent(s_m, now.d_m, length, width)
+        x, y, heading = mover.pose(self.t_s, at_centre=True)
+        s_m, d_m = self.road.project(x, y)
+        turned = heading - self.road.heading(s_m)
+        c, s = abs(cos(turned)), abs(sin(turned))
+        return _Extent(s_m, d_m, length * c + width * s, length * s + width * c)
+
+    def _is_along(self, mover: Mover) -> bool:
+        """Whether an entity follows the lanes of the ego vehicle's road."""
+        return mover.line is None and mover.road is self.road
+
     def closing_mps(self, one: str, other: str, at: XmlElement) -> float:
         """How fast two entities approach each other along the road."""
-        (s1, now1), (s2, now2) = (self.mover(name, at).now(self.t_s) for name in (one, other))
-        speeds = self.mover(one, at).way * now1.speed_mps - self.mover(other, at).way * now2.speed_mps
+        first, second = self.mover(one, at), self.mover(other, at)
+        s1, s2 = (self._extent(mover).s_m for mover in (first, second))
+        speeds = self._along_mps(first) - self._along_mps(second)
         return speeds if s2 > s1 else -speeds
+
+    def _along_mps(self, mover: Mover) -> float:
+        """Speed along the ego vehicle's road."""
+        speed_mps = mover.now(self.t_s)[1].speed_mps
+        if self._is_along(mover):
+            return mover.way * speed_mps
+        x, y, heading = mover.pose(self.t_s)
+        return speed_mps * cos(heading - self.road.heading(self.road.project(x, y)[0]))
 
     def touch(self, one: str, other: str, at: XmlElement) -> bool:
         """Whether two entities overlap."""
-        return (
-            self.gap_m(one, other, "longitudinal", True, at) <= 0.0
-            and self.gap_m(one, other, "lateral", True, at) <= 0.0
-        )
+        if any(self.gap_m(one, other, kind, True, at) > 0.0 for kind in ("longitudinal", "lateral")):
+            return False
+        movers = [self.mover(name, at) for name in (one, other)]
+        return all(map(self._is_along, movers)) or overlaps(*(self._footprint(mover) for mover in movers))
+
+    def _footprint(self, mover: Mover) -> F64:
+        """(4, 2) corners in the file's world."""
+        x, y, heading = mover.pose(self.t_s, at_centre=True)
+        return Cuboid((x, y, 0.0), mover.body.size_m, heading).footprint()
+
+
+class _Extent(NamedTuple):
+    """The rectangle along the road around an entity."""
+
+    s_m: float
+    """Of its middle."""
+    d_m: float
+    """The same."""
+    along_m: float
+    """Length along the road."""
+    across_m: float
+    """Width across it."""

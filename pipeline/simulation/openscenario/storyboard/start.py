@@ -4,11 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import cos
+
+import numpy as np
 
 from pipeline.simulation.openscenario.parameters import ParameterScope
+from pipeline.simulation.openscenario.roads.building import driven_road, road_along
+from pipeline.simulation.openscenario.roads.driven_road import DrivenRoad
+from pipeline.simulation.openscenario.roads.free_line import FreeLine
 from pipeline.simulation.openscenario.roads.network import FileRoad, Network
-from pipeline.simulation.openscenario.storyboard.positions import ON_ROADS, file_place
-from pipeline.simulation.openscenario.xml_files import XmlElement, shown
+from pipeline.simulation.openscenario.storyboard.poses import pose_at
+from pipeline.simulation.openscenario.storyboard.positions import OFF_ROADS, ON_ROADS, RoadPlace, file_place
+from pipeline.simulation.openscenario.storyboard.trajectories import Trajectory
+from pipeline.simulation.openscenario.xml_files import OpenScenarioError, XmlElement, shown
+from pipeline.simulation.world.lines import WorldPose
+
+_STEP_M, _PARALLEL_M = 2.0, 0.3
+"""Step at which a trajectory is compared with the roads, and by how much it may leave its lane."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +53,9 @@ def file_start(
     if at.tag in ON_ROADS:
         road, s, _, lane = file_place(at, scope, network)
         return FileStart(road, s, lane)
+    if at.tag in OFF_ROADS:
+        x, y, _ = pose_at(teleports[name], scope, NoEntities(network))
+        return start_at(network, x, y)[0]
     if not at.tag.startswith("Relative"):
         raise at.refusal(f"{shown(at.tag)} is not supported; {', '.join(ON_ROADS)} and positions relative to these are")
     other = scope.text(at, "entityRef")
@@ -51,6 +66,70 @@ def file_start(
     return file_start(other, teleports, scope, network, (*asked, name))
 
 
+def start_at(network: Network, x_m: float, y_m: float) -> tuple[FileStart, float]:
+    """The nearest lane to a point of the file's world, and t there."""
+    road, s, t = network.project(x_m, y_m)
+    driven = road.lanes.driven_at(s) or list(road.lanes.section_at(s).lanes)
+    lane = min(driven, key=lambda each: abs(sum(road.lanes.edges_at(each, s)) / 2 - t))
+    return FileStart(road, min(max(s, 0.0), road.line.length_m), lane), t
+
+
+@dataclass(frozen=True)
+class NoEntities:
+    """The file before any entity is placed: positions that refer to one are refused."""
+
+    network: Network
+    """All roads of the file."""
+
+    def place_of(self, name: str, at: XmlElement, road: DrivenRoad) -> RoadPlace:
+        raise self._refusal(name, at)
+
+    def pose_of(self, name: str, at: XmlElement) -> WorldPose:
+        raise self._refusal(name, at)
+
+    def follows(self, name: str, at: XmlElement, road: DrivenRoad) -> bool:
+        raise self._refusal(name, at)
+
+    def road_of(self, name: str, at: XmlElement) -> DrivenRoad:
+        raise self._refusal(name, at)
+
+    def pose_at(self, position: XmlElement, scope: ParameterScope) -> WorldPose:
+        return pose_at(position, scope, self)
+
+    def _refusal(self, name: str, at: XmlElement) -> OpenScenarioError:
+        return at.refusal(f"the start of the ego vehicle cannot refer to {shown(name)}, which is placed after it")
+
+
+def ego_way(
+    trajectory: Trajectory, start_m: float, network: Network, wanted: frozenset[str], name: str
+) -> tuple[DrivenRoad, RoadPlace]:
+    """The road along which the ego vehicle follows a trajectory from s = start_m, and its place there: the file's
+    roads if it keeps to their lanes, else the trajectory itself."""
+    line = trajectory.line.from_m(start_m)
+    x, y, heading = line.start
+    start, t_m = start_at(network, x, y)
+    way = 1 if cos(heading - float(start.road.line.at(np.array([start.s_m]))[0, 2])) >= 0.0 else -1
+    here = [each for each in start.road.lanes.driven_at(start.s_m) if start.road.traffic_way(each) == way]
+    if not here:
+        raise trajectory.at.refusal(
+            f"road {shown(start.road.id)} has no driving lane in the direction in which {shown(name)} starts"
+        )
+    lane = min(here, key=lambda each: abs(sum(start.road.lanes.edges_at(each, start.s_m)) / 2 - t_m))
+    road = driven_road(network, start.road, start.s_m, lane, way, wanted)
+    if not _keeps_to(road, line):
+        road = road_along(network, start.road, start.s_m, t_m, lane, way, line)
+    s_m, d_m = road.project(x, y)
+    return road, RoadPlace(s_m, d_m, 1)
+
+
+def _keeps_to(road: DrivenRoad, line: FreeLine) -> bool:
+    """Whether a line runs parallel to the reference line of a road, up to where that ends."""
+    s = np.arange(0.0, line.length_m, _STEP_M)
+    at_m, offsets = zip(*(road.project(x, y) for x, y, _ in line.line.to_world(s, 0.0).tolist()), strict=True)
+    inside = np.array(at_m) <= road.length_m
+    return bool(np.ptp(np.array(offsets)[inside]) <= _PARALLEL_M and inside[0])
+
+
 def with_scopes(storyboard: XmlElement, scope: ParameterScope) -> Iterator[tuple[XmlElement, ParameterScope]]:
     """The Init, the stories and the rest of a storyboard, with the parameters that are visible there."""
     for each in storyboard.children:
@@ -59,26 +138,26 @@ def with_scopes(storyboard: XmlElement, scope: ParameterScope) -> Iterator[tuple
         yield each, inner
 
 
-def ego_roads(storyboard: XmlElement, ego: str, scope: ParameterScope) -> frozenset[str]:
-    """The roads that a route of the ego vehicle, or a condition on its place, names: it takes them at junctions."""
+def named_roads(storyboard: XmlElement, name: str, scope: ParameterScope) -> frozenset[str]:
+    """The roads that a route of an entity, or a condition on its place, names: it takes them at junctions."""
     return frozenset(
         inner.text(named, "roadId")
         for part, inner in with_scopes(storyboard, scope)
         for each in part.below()
-        if _concerns(each, ego, inner)
+        if _concerns(each, name, inner)
         for named in each.below()
         if "roadId" in named.attributes
     )
 
 
-def _concerns(at: XmlElement, ego: str, scope: ParameterScope) -> bool:
-    """Whether an element says where the ego vehicle is to be."""
+def _concerns(at: XmlElement, name: str, scope: ParameterScope) -> bool:
+    """Whether an element says where an entity is to be."""
     if at.tag == "Private":
-        return scope.text(at, "entityRef", "") == ego
+        return scope.text(at, "entityRef", "") == name
     if at.tag == "ByEntityCondition":
         who = at.find("TriggeringEntities")
     elif at.tag == "ManeuverGroup" and any(each.tag == "RoutingAction" for each in at.below()):
         who = at.find("Actors")
     else:
         return False
-    return who is not None and any(scope.text(each, "entityRef", "") == ego for each in who.all("EntityRef"))
+    return who is not None and any(scope.text(each, "entityRef", "") == name for each in who.all("EntityRef"))

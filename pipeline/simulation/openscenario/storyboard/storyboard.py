@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pipeline.simulation.openscenario.entities import CatalogFiles
+from pipeline.simulation.openscenario.catalogs import CatalogFiles
 from pipeline.simulation.openscenario.parameters import ParameterScope
 from pipeline.simulation.openscenario.storyboard.actions import start_action
 from pipeline.simulation.openscenario.storyboard.conditions import Trigger
@@ -92,7 +92,7 @@ class _ManeuverGroup:
                 maneuver, inner = catalogs.entry(each, scope)
                 if maneuver.tag != "Maneuver":
                     raise each.refusal(f"expected a Maneuver in the catalog instead of {shown(maneuver.tag)}")
-                self._maneuvers.append(_Maneuver(maneuver, names, inner, stage))
+                self._maneuvers.append(_Maneuver(catalogs.expanded_inside(maneuver, inner), names, inner, stage))
             elif each.tag == "Maneuver":
                 inner = ParameterScope(scope.values)
                 inner.declare(each, {})

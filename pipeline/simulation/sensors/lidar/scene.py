@@ -1,18 +1,18 @@
 """The objects that the simulated LiDAR can hit: upright boxes of known material. A car is a body, a narrower cabin,
-mostly of glass, and a reflective plate."""
+mostly of glass, and a reflective plate; a pedestrian is legs, torso and head."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pipeline.simulation.sensors.lidar.rays import BOX_FIELDS
-from pipeline.simulation.world.actors import VehicleKind
+from pipeline.simulation.world.actors import ActorKind
 from pipeline.simulation.world.roadside import Roadside, Thing
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, ActorState, World
 from pipeline.types import F64
 
 MAX_RANGE_M = 100.0
-ROAD, PAINT, GLASS, PLATE, METAL, FOLIAGE, WALL = range(7)
+ROAD, PAINT, GLASS, PLATE, METAL, FOLIAGE, WALL, CLOTH = range(8)
 MATERIALS = np.array(
     [
         [9.0, 135.0, 4.0, 0.01, 1.0],
@@ -22,6 +22,7 @@ MATERIALS = np.array(
         [60.0, 55.0, 8.0, 0.0, 0.95],
         [22.0, 38.0, 12.0, 0.35, 0.95],
         [48.0, 70.0, 12.0, 0.0, 1.0],
+        [26.0, 44.0, 8.0, 0.03, 0.95],
     ]
 )
 """For each material: intensity 0–255; range at which half of the returns are lost at normal incidence (m); width of
@@ -31,7 +32,7 @@ _DARKEST = 0.35
 
 # The top of bonnet and boot lid slopes and sends light away as glass does.
 # along the length: middle and extent; extent across; from and to height: shares of the vehicle's size; material
-_PARTS: dict[VehicleKind, tuple[tuple[float, float, float, float, float, int], ...]] = {
+_PARTS: dict[ActorKind, tuple[tuple[float, float, float, float, float, int], ...]] = {
     "car": (
         (0.0, 1.0, 1.0, 0.17, 0.66, PAINT),
         (0.0, 0.98, 0.98, 0.66, 0.70, GLASS),
@@ -50,6 +51,18 @@ _PARTS: dict[VehicleKind, tuple[tuple[float, float, float, float, float, int], .
     ),
     "bus": ((0.0, 1.0, 1.0, 0.1, 0.45, PAINT), (0.0, 0.99, 0.98, 0.45, 1.0, GLASS)),
     "motorcycle": ((0.0, 1.0, 0.4, 0.1, 0.6, METAL), (-0.1, 0.35, 1.0, 0.5, 1.0, FOLIAGE)),
+    "bicycle": (
+        (0.0, 1.0, 0.08, 0.0, 0.38, METAL),
+        (0.23, 0.04, 1.0, 0.57, 0.6, METAL),
+        (-0.08, 0.3, 0.6, 0.16, 0.55, CLOTH),
+        (-0.1, 0.2, 0.72, 0.55, 0.83, CLOTH),
+        (-0.06, 0.11, 0.3, 0.85, 1.0, CLOTH),
+    ),
+    "pedestrian": (
+        (0.0, 0.75, 0.6, 0.0, 0.47, CLOTH),
+        (0.0, 0.42, 1.0, 0.44, 0.82, CLOTH),
+        (0.0, 0.32, 0.32, 0.86, 1.0, CLOTH),
+    ),
 }
 
 
@@ -58,21 +71,21 @@ def scene_boxes(world: World, roadside: Roadside) -> F64:
     rows: list[tuple[float, ...]] = []
     for state in world.actors:
         if np.hypot(*state.cuboid.center[:2]) < MAX_RANGE_M + 20.0:
-            rows.extend(vehicle_boxes(state))
-    vehicles = len(rows)
+            rows.extend(actor_boxes(state))
+    actors = len(rows)
     for thing, x, y, yaw in roadside.near(world, 20.0, MAX_RANGE_M + 10.0):
         rows.extend(_thing_boxes(thing, x, y, yaw))
     boxes = np.array(rows, dtype=np.float64).reshape(-1, BOX_FIELDS)
     if world.hump_per_m:
-        boxes[vehicles:, 2] += world.lift_m(boxes[vehicles:, 0])
+        boxes[actors:, 2] += world.lift_m(boxes[actors:, 0])
     boxes[:, 9] += boxes[:, 1] * world.yaw_rate_radps - world.speed_mps
     boxes[:, 10] -= boxes[:, 0] * world.yaw_rate_radps
     boxes[:, 11] -= world.yaw_rate_radps
     return boxes
 
 
-def vehicle_boxes(state: ActorState) -> list[tuple[float, ...]]:
-    """The boxes of a vehicle, with its velocity over ground in ego axes."""
+def actor_boxes(state: ActorState) -> list[tuple[float, ...]]:
+    """The boxes of an actor, with its velocity over ground in ego axes."""
     length, width, height = state.cuboid.size
     x, y, z = state.cuboid.center
     c, s = float(np.cos(state.cuboid.yaw_rad)), float(np.sin(state.cuboid.yaw_rad))

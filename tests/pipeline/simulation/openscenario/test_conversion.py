@@ -125,7 +125,7 @@ def test_files_that_were_copied_into_one_folder(named: str, tmp_path: Path) -> N
         (('<LogicFile filepath="road.xodr"/>', ""), "RoadNetwork has no LogicFile"),
         (("<Init><Actions>", "<Init><Others>"), "not XML"),
         (('entityRef="Ego"', 'entityRef="Nobody"'), "no entity 'Nobody'"),
-        (("TeleportAction", "Teleported"), "Teleported is not supported|has no TeleportAction in Init"),
+        (("TeleportAction", "Teleported"), "the ego vehicle Ego has no position in Init"),
     ],
 )
 def test_what_is_missing_is_named(change: tuple[str, str], says: str, tmp_path: Path) -> None:

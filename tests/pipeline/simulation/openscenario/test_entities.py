@@ -8,6 +8,7 @@ import pytest
 
 from pipeline.simulation.openscenario import referenced_files
 from pipeline.simulation.scenario import ScenarioError
+from pipeline.simulation.world.actors import SIZES_M
 from tests.pipeline.simulation.openscenario.files import (
     Parts,
     declared,
@@ -109,9 +110,11 @@ def test_the_ego_vehicle_can_be_chosen(tmp_path: Path) -> None:
 BESIDE = '<LanePosition roadId="7" laneId="-3" s="{}"/>'
 
 
-@pytest.mark.parametrize("body", [PEDESTRIAN, vehicle("bicycle"), "<MiscObject/>"])
-def test_what_the_simulator_has_not_is_left_out_beside_the_lanes(body: str, tmp_path: Path) -> None:
-    what = {PEDESTRIAN: "Pedestrian", "<MiscObject/>": "MiscObject"}.get(body, "bicycle")
+WHEELCHAIR = '<Pedestrian name="p" pedestrianCategory="wheelchair"/>'
+
+
+@pytest.mark.parametrize(("body", "what"), [(WHEELCHAIR, "wheelchair"), ("<MiscObject/>", "MiscObject")])
+def test_what_the_simulator_has_not_is_left_out_beside_the_lanes(body: str, what: str, tmp_path: Path) -> None:
     parts = Parts(entities=entity("Ego") + entity("Lead") + entity("X", body))
     parts.init += init("X", BESIDE.format(160.0).replace('s="', 'offset="-0.2" s="'), "0")
     made = parts.load(tmp_path)
@@ -122,19 +125,44 @@ def test_what_the_simulator_has_not_is_left_out_beside_the_lanes(body: str, tmp_
 @pytest.mark.parametrize(
     ("position", "stories", "says"),
     [
-        (on_lane(-2, 160.0), "", "entity X is a Pedestrian, which is not supported on a driving lane"),
+        (on_lane(-2, 160.0), "", "entity X is a wheelchair, which is not supported on a driving lane"),
         (
             BESIDE.format(160.0),
             story(event("e", speed_action("2")), actors="X"),
-            "entity X is a Pedestrian, which is not supported when it acts in the storyboard",
+            "entity X is a wheelchair, which is not supported when it acts in the storyboard",
         ),
     ],
 )
-def test_a_pedestrian_who_matters_is_refused(position: str, stories: str, says: str, tmp_path: Path) -> None:
-    parts = Parts(entities=entity("Ego") + entity("Lead") + entity("X", PEDESTRIAN), stories=stories)
+def test_what_the_simulator_has_not_is_refused_where_it_matters(
+    position: str, stories: str, says: str, tmp_path: Path
+) -> None:
+    parts = Parts(entities=entity("Ego") + entity("Lead") + entity("X", WHEELCHAIR), stories=stories)
     parts.init += init("X", position)
     with pytest.raises(ScenarioError, match=says):
         parts.load(tmp_path)
+
+
+def test_pedestrians_and_bicycles_are_road_users(tmp_path: Path) -> None:
+    """A bicycle's bounding box may be without its rider."""
+    parts = Parts(entities=entity("Ego") + entity("Walker", PEDESTRIAN) + entity("Cyclist", vehicle("bicycle")))
+    parts.init = (
+        init("Ego", on_lane(-1, 100.0), "20")
+        + init("Walker", BESIDE.format(160.0), "1.5")
+        + init("Cyclist", on_lane(-1, 150.0), "5")
+    )
+    parts.entities = parts.entities.replace('height="1.5"', 'height="1.1"', 3)
+    walker, cyclist = parts.load(tmp_path).actors
+    assert (walker.kind, walker.size(), walker.speed_mps) == ("pedestrian", SIZES_M["pedestrian"], {0.0: 1.5})
+    assert (cyclist.kind, cyclist.size()) == ("bicycle", (4.0, 2.0, SIZES_M["bicycle"][2]))
+
+
+@pytest.mark.parametrize("body", [PEDESTRIAN, vehicle("bicycle")])
+def test_a_pedestrian_or_bicycle_is_no_ego_vehicle(body: str, tmp_path: Path) -> None:
+    parts = Parts(entities=entity("Ego", body) + entity("Car"))
+    parts.init = init("Ego", on_lane(-1, 150.0), "2") + init("Car", on_lane(-1, 100.0), "20")
+    assert parts.load(tmp_path).ego.speed_mps == {0.0: 20.0}
+    with pytest.raises(ScenarioError, match="which is not supported as the ego vehicle"):
+        parts.load(tmp_path, "?ego=Ego")
 
 
 @pytest.mark.parametrize(
@@ -142,9 +170,11 @@ def test_a_pedestrian_who_matters_is_refused(position: str, stories: str, says: 
     [
         ("", "no entities"),
         (entity("Ego") + entity("Ego"), "two entities are called 'Ego'"),
-        (entity("Ego") + entity("Child", PEDESTRIAN), "entity Child is a Pedestrian, which is not supported"),
-        (entity("Ego") + entity("Lead", vehicle("bicycle")), "entity Lead is a bicycle, which is not supported"),
-        (entity("Ego") + entity("Lead", vehicle("tram")), "the simulator has car, van, truck, bus, motorbike"),
+        (entity("Ego", PEDESTRIAN) + entity("Lead", PEDESTRIAN), "entity Ego is a pedestrian, which is not supported"),
+        (
+            entity("Ego") + entity("Lead", vehicle("tram")),
+            "entity Lead is a tram, which is not supported: the simulator has car, van, truck, bus, motorbike, bicy",
+        ),
         (entity("Ego") + entity("Cone", "<MiscObject/>"), "entity Cone is a MiscObject"),
         (entity("Ego") + entity("Lead", vehicle(length=-1)), "size_m.0: Input should be"),
         (entity("Ego") + entity("Lead", vehicle(length=500)), "size_m.0: Input should be"),

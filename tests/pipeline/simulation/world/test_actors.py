@@ -13,7 +13,10 @@ from pipeline.simulation.world.roads import Road, Segment
 ROAD = Road(segments=(Segment(length_m=1000.0),))
 
 
-@given(st.dictionaries(st.floats(0, 20), st.floats(0, 40), min_size=1, max_size=6), st.floats(0, 25))
+TIMES = st.floats(0, 20, allow_subnormal=False)
+
+
+@given(st.dictionaries(TIMES, st.floats(0, 40), min_size=1, max_size=6), st.floats(0, 25, allow_subnormal=False))
 def test_the_way_driven_is_the_integral_of_the_speed(speeds: dict[float, float], t_s: float) -> None:
     times, values = np.array(sorted(speeds)), np.array([speeds[time] for time in sorted(speeds)])
     now = motion(Script(lane=-1, speed_mps=speeds), ROAD, t_s)

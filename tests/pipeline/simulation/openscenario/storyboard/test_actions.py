@@ -151,6 +151,8 @@ def test_a_distance_at_the_start(how: str, ahead_m: float, tmp_path: Path) -> No
 
 
 TELEPORT = f"<PrivateAction><TeleportAction><Position>{on_lane(-2, 300.0)}</Position></TeleportAction></PrivateAction>"
+ENTITY = '<GlobalAction><EntityAction entityRef="{}">{}</EntityAction></GlobalAction>'
+SET_PARAMETER = '<GlobalAction><ParameterAction parameterRef="{}">{}</ParameterAction></GlobalAction>'
 FOLLOW = "<PrivateAction><RoutingAction><FollowTrajectoryAction/></RoutingAction></PrivateAction>"
 
 
@@ -162,9 +164,13 @@ FOLLOW = "<PrivateAction><RoutingAction><FollowTrajectoryAction/></RoutingAction
             JUMP.format('distance="12"', ""),
             "LongitudinalDistanceAction without DynamicConstraints is supported at the start",
         ),
-        (FOLLOW, "FollowTrajectoryAction needs a Trajectory; catalogs of trajectories are not read"),
+        (FOLLOW, "FollowTrajectoryAction needs a Trajectory"),
         ("<PrivateAction><VisibilityAction/></PrivateAction>", "VisibilityAction is not supported"),
-        ("<GlobalAction><EntityAction/></GlobalAction>", "EntityAction is not supported"),
+        (ENTITY.format("Lead", "<AddEntityAction/>"), "AddEntityAction for Lead is not supported; DeleteEntityAction"),
+        (ENTITY.format("Ego", "<DeleteEntityAction/>"), "DeleteEntityAction for Ego is not supported"),
+        (ENTITY.format("Lead", "<DeleteEntityAction/>"), "DeleteEntityAction is supported at the start only: Lead"),
+        (SET_PARAMETER.format("speed", '<SetAction value="1"/>'), "no parameter 'speed' is declared"),
+        ("<GlobalAction><TrafficAction/></GlobalAction>", "TrafficAction is not supported"),
         ("<UserDefinedAction/>", "UserDefinedAction is not supported"),
         (speed_action("500"), r"Lead: 500 m/s; the simulator drives forward, up to 100 m/s"),
         (speed_action(RELATIVE.format(-50, "delta")), "Lead: -30 m/s"),

@@ -49,6 +49,7 @@ TTC = (
     '<TimeToCollisionConditionTarget><EntityRef entityRef="Lead"/></TimeToCollisionConditionTarget>'
     "</TimeToCollisionCondition>"
 )
+ANGLE = '<AngleCondition angleType="{}" angle="{}" angleTolerance="0.01"/>'
 REACHED = '<ReachPositionCondition tolerance="1"><Position>{}</Position></ReachPositionCondition>'
 DISTANCE = '<DistanceCondition value="30" rule="lessThan" freespace="false"><Position>{}</Position></DistanceCondition>'
 
@@ -82,6 +83,8 @@ DISTANCE = '<DistanceCondition value="30" rule="lessThan" freespace="false"><Pos
         pytest.param(
             condition(by_entity(HEADWAY.format("false", 'relativeDistanceType="longitudinal"', 1.5))), 2.0, id="1.2"
         ),
+        pytest.param(condition(by_entity(ANGLE.format("heading", 0.005))), 0.0, id="heading"),
+        pytest.param(condition(by_entity(ANGLE.format("heading", 1.57))), None, id="another heading"),
         pytest.param(condition(by_entity(TTC)), 2.6, id="time to collision"),
         pytest.param(
             condition(by_entity(TTC, "Lead").replace('entityRef="Lead"/></TimeTo', 'entityRef="Ego"/></TimeTo')),
@@ -200,7 +203,8 @@ def test_criteria_of_a_carla_file_trigger_nothing(tmp_path: Path) -> None:
     ("trigger", "says"),
     [
         (condition(by_value("<TimeOfDayCondition/>")), "TimeOfDayCondition is not supported; SimulationTime"),
-        (condition(by_entity("<AngleCondition/>")), "AngleCondition is not supported; TimeHeadway"),
+        (condition(by_entity("<TrafficSignalCondition/>")), "TrafficSignalCondition is not supported; TimeHeadway"),
+        (condition(by_entity(ANGLE.format("pitch", 1))), "AngleCondition is supported for the heading in the world"),
         (
             condition(by_entity('<AccelerationCondition direction="lateral" value="1"/>')),
             "AccelerationCondition is supported along the road only",
@@ -215,7 +219,7 @@ def test_criteria_of_a_carla_file_trigger_nothing(tmp_path: Path) -> None:
         (condition(by_value(STATE.format("event", "nothing", "completeState"))), "no event 'nothing'"),
         (condition(by_entity(GAP.format("around", "true", 1))), "distance type 'around' is not supported"),
         (condition(by_entity('<CollisionCondition><ByType type="vehicle"/></CollisionCondition>')), "with a ByType"),
-        (condition(by_entity(REACHED.format("<RoutePosition/>"))), "RoutePosition is not supported; LanePosition"),
+        (condition(by_entity(REACHED.format("<RoutePosition/>"))), "RoutePosition has no RouteRef"),
         (condition(""), "has neither ByValueCondition nor ByEntityCondition"),
     ],
 )
