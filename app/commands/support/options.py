@@ -98,7 +98,7 @@ class PipelineOptions:
     for a network, more often below 10 Hz, and every frame for the classical detector"""
     far_view_px: Annotated[int, tyro.conf.arg(metavar="PX")] = 416
     """Run the detector a second time on the far part of the road, in a window this many native pixels wide; 0: never,
-    and the lane network then sees whole images only. Every other frame skips it when live sensors outpace the machine"""
+    and the lane network sees whole images only. Every other frame skips it when live sensors outpace the machine"""
 
     def parameters(self) -> Params:
         """The preset, changed by --params, then by each --set. ParamsError names the first invalid one."""
