@@ -6,6 +6,8 @@ post), and its course must lead into the corridor.
 
 from __future__ import annotations
 
+from math import inf
+
 from pipeline.decision.gates import ABREAST_M, is_solid
 from pipeline.decision.path_position import believed_mps
 from pipeline.params import AebParams
@@ -15,6 +17,10 @@ from pipeline.types import Cipv, FusedObject, Path
 _VELOCITY_HITS = 3
 """After two sightings the LiDAR's velocity is the difference of two noisy positions, which may point across the road.
 The same holds after a sighting far from the predicted position. A longer camera track does not improve this."""
+_STOPS_WITH_MPS2 = 3.5
+"""Strongest braking of a driver who means to give way: more is an emergency (ISO 15622 permits ACC as much)."""
+_ACROSS = 0.7
+"""Share of a speed that is lateral at more than 45° to the path."""
 _SURE_SIGMAS = 2.0
 """Number of standard deviations of the path by which oncoming traffic must be inside the corridor."""
 
@@ -40,7 +46,7 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: Ae
     If the path's uncertainty exceeds its width, no course counts as leading into it: in a bend, other traffic follows
     the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty where the
     two meet, also while it was seen for too short a time to be sure that it moves. Oncoming or crossing objects behind
-    the lead cannot be reached. What crosses and is gone before the car arrives is not met.
+    the lead cannot be reached. What crosses and is gone before the car arrives is not met; its front enters first.
 
     What is in the corridor must be seen there in this frame as well.
     """
@@ -59,9 +65,21 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: Ae
     sideways = believed_mps(item.lateral_mps, item)
     if oncoming and params.react_where_met:
         return abs(item.path_offset_m + sideways * item.ttc_s) + _SURE_SIGMAS * sigma_m <= path.half_width_m
-    toward = -sideways if item.path_offset_m > 0 else sideways
-    aside_m = abs(item.path_offset_m) - max(toward, 0.0) * item.ttc_s
-    return aside_m + (_SURE_SIGMAS * sigma_m if oncoming else 0.0) <= path.half_width_m
+    toward = max(-sideways if item.path_offset_m > 0 else sideways, 0.0)
+    aside_m = abs(item.path_offset_m) - toward * item.ttc_s
+    if aside_m + (_SURE_SIGMAS * sigma_m if oncoming else 0.0) <= path.half_width_m:
+        return True
+    return params.react_to_crossing and not oncoming and _surely_drives_in(item, toward, item.ttc_s)
+
+
+def _surely_drives_in(item: FusedObject, toward_mps: float, ttc_s: float) -> bool:
+    """Whether the front of a crossing vehicle is over the edge of the path before the car is there, and its driver can
+    hardly prevent it any more. The middle of its side, by which ``path_offset_m`` is measured, follows half a length
+    later: for a car at 20 km/h, 0.4 s."""
+    is_across = abs(item.lateral_mps or 0.0) > _ACROSS * (item.speed_over_ground_mps or inf)
+    if not is_across or item.crossing_s is None or item.crossing_s > ttc_s:
+        return False
+    return toward_mps > 2.0 * _STOPS_WITH_MPS2 * item.crossing_s
 
 
 def _sigma_m(path: Path, ahead_m: float) -> float:

@@ -184,7 +184,13 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "confirm_frames": 1,
             "speed_hits": 1,
         },
-        "aeb": {"enabled": False, "closing_sigmas": 0.0, "react_to_present": False, "react_where_met": False},
+        "aeb": {
+            "enabled": False,
+            "closing_sigmas": 0.0,
+            "react_to_present": False,
+            "react_where_met": False,
+            "react_to_crossing": False,
+        },
     },
 }
 """The values of each preset that differ from the declared defaults."""

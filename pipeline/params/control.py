@@ -115,6 +115,11 @@ class AebParams(Section):
         "ACC and emergency braking react to oncoming traffic only if it is in the path where the two meet; off: also "
         "if it crosses the path before",
     )
+    react_to_crossing: bool = choice(
+        True,
+        "ACC and emergency braking react to what crosses as soon as its front is sure to enter the path before the car "
+        "is there; off: only once the middle of its side would",
+    )
     confirm_frames: int = slider(2, 1, 10, 1, "frames", "Consecutive frames that must request a stage before it starts")
     release_ttc_s: float = slider(6.0, 1.0, 20.0, 0.5, "s", "Keep braking below this time to collision")
     release_s: float = slider(0.3, 0.0, 3.0, 0.1, "s", "Braking ends this long after the danger has passed")

@@ -79,6 +79,30 @@ def test_enters_corridor(item: FusedObject, ego_mps: float | None, enters: bool)
     assert enters_corridor(judged(item, ego_mps), PATH, None, AebParams()) is enters
 
 
+def from_the_side(x: float, front_y: float, sideways_mps: float, ego_mps: float = 5.5) -> FusedObject:
+    """A car of 4.4 m across our way, at 20 km/h."""
+    middle_y = front_y + 2.2 if front_y > 0.0 else front_y - 2.2
+    item = fused(1, x, middle_y, velocity=(-ego_mps, sideways_mps), length=1.8, width=4.4)
+    return dataclasses.replace(item, closest_point=(x, front_y, 0.0), distance_m=float(np.hypot(x, front_y)))
+
+
+@pytest.mark.parametrize(
+    ("item", "enters"),
+    [
+        pytest.param(from_the_side(5.1, 4.1, -5.5), True, id="from the left, its front 2.6 m beside the path"),
+        pytest.param(from_the_side(5.1, -4.1, 5.5), True, id="from the right"),
+        pytest.param(from_the_side(8.0, 7.0, -5.5), False, id="its driver can still give way"),
+        pytest.param(from_the_side(5.1, 4.1, 5.5), False, id="it drives away"),
+        pytest.param(from_the_side(5.1, 4.1, -1.5), False, id="it rolls to the line"),
+        pytest.param(from_the_side(0.6, 4.1, -5.5), False, id="beside the car"),
+    ],
+)
+def test_what_crosses_enters_with_its_front(item: FusedObject, enters: bool) -> None:
+    """At 20 km/h each, as in Euro NCAP's CCCscp. The middle of its side is over the edge 0.4 s later."""
+    assert enters_corridor(judged(item, 5.5), PATH, None, AebParams()) is enters
+    assert not enters_corridor(judged(item, 5.5), PATH, None, AebParams(react_to_crossing=False))
+
+
 @pytest.mark.parametrize(
     ("then_m", "params", "enters"),
     [
