@@ -16,7 +16,7 @@ from mcap.records import Footer, McapRecord, Statistics, SummaryOffset
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC, Writer
 
-from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import open_new
 from pipeline.common.files.signing import configured_signer
 from pipeline.common.progress import Progress, silent
 from pipeline.recording import topics
@@ -66,10 +66,7 @@ def relabel(
         place = _first_with_labels(file)
         if summary is None or place == 0 or not _is_in_order(file, summary):
             return False
-        try:
-            target = out.open("x+b")
-        except FileExistsError:
-            raise BadInput(f"{out}: file already exists; choose another name or remove it") from None
+        target = open_new(out, "x+b")
         try:
             with target:
                 before = file.directory.chunks[place - 1]

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from pipeline.common.files.output_files import write_new_files
 from pipeline.common.geometry import inverse
 from pipeline.formats.calibration_files.contents import CalibrationFiles, yaml_mapping
 from pipeline.formats.calibration_files.lens import polynomial_lens
@@ -63,11 +64,9 @@ def write(path: Path, camera: CameraCalibration) -> None:
             "rostopic": "/camera/image_raw",
         }
     }
-    path.mkdir(parents=True, exist_ok=True)
-    transform = {_FORWARD[0]: camera.T_camera_ego.tolist()}
-    for name, content in ((CHAIN, chain), (TRANSFORM, transform)):
-        text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
-        (path / name).write_text(text, encoding="utf-8")
+    files = {CHAIN: chain, TRANSFORM: {_FORWARD[0]: camera.T_camera_ego.tolist()}}
+    texts = {name: yaml.safe_dump(content, sort_keys=False, default_flow_style=None) for name, content in files.items()}
+    write_new_files(path, texts)
 
 
 def _transform(files: CalibrationFiles, camera: Mapping[str, Any]) -> F64:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.common.files.output_files import write_new
 from pipeline.formats.calibration_files.contents import CalibrationFiles, the_file
 from pipeline.formats.kitti_calibration import (
     parse_key_values,
@@ -43,7 +44,7 @@ def write(path: Path, camera: CameraCalibration) -> None:
     projection = np.hstack([camera.K, np.zeros((3, 1))])
     rows = {f"P{number}": projection for number in range(4)}
     rows |= {"R0_rect": np.eye(3), "Tr_velo_to_cam": camera.T_camera_ego[:3]}
-    path.write_text("".join(f"{name}: {_numbers(values)}\n" for name, values in rows.items()), encoding="utf-8")
+    write_new(path, "".join(f"{name}: {_numbers(values)}\n" for name, values in rows.items()))
 
 
 def _numbers(values: F64) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from pipeline.common.files.output_files import write_new_files
 from pipeline.common.geometry import inverse, rotation
 from pipeline.formats.calibration_files.contents import CalibrationFiles, yaml_mapping
 from pipeline.formats.calibration_files.lens import polynomial_lens
@@ -48,7 +49,6 @@ def parse(files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F6
 
 
 def write(path: Path, camera: CameraCalibration) -> None:
-    path.mkdir(parents=True, exist_ok=True)
     lens = camera.distortion if camera.distortion.size else np.zeros(5)
     info = {
         "header": {"frame_id": _CAMERA},
@@ -68,8 +68,8 @@ def write(path: Path, camera: CameraCalibration) -> None:
         "child_frame_id": _LIDAR,
         "transform": {"translation": place, "rotation": {"x": x, "y": y, "z": z, "w": w}},
     }
-    for name, content in ((INFO, info), (TRANSFORM, transform)):
-        (path / name).write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    files = {INFO: info, TRANSFORM: transform}
+    write_new_files(path, {name: yaml.safe_dump(content, sort_keys=False) for name, content in files.items()})
 
 
 def _as_saved(info: dict[str, Any]) -> dict[str, Any]:

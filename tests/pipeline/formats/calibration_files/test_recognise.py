@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +22,7 @@ SIZE = STRAIGHT.width, STRAIGHT.height
 
 def contents(name: str, camera: CameraCalibration, folder: Path) -> dict[str, bytes]:
     """The files of a format, under names that say nothing."""
-    path = written(name, camera, folder / name)
+    path = written(name, camera, Path(tempfile.mkdtemp(dir=folder)))
     files = [path] if path.is_file() else sorted(path.iterdir())
     return {f"{name} {number}": file.read_bytes() for number, file in enumerate(files)}
 
