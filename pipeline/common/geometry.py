@@ -11,6 +11,9 @@ import numpy.typing as npt
 
 F64 = npt.NDArray[np.float64]
 
+T_OPTICAL_BODY = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
+"""From a camera's body axes (x forward, y left, z up; REP 103) to its optical ones (x right, y down, z forward)."""
+
 
 class Cuboid(NamedTuple):
     """An upright box on the ground."""

@@ -9,8 +9,7 @@ import numpy as np
 import yaml
 
 from pipeline.common.files.output_files import write_new
-from pipeline.common.geometry import inverse
-from pipeline.formats.extrinsic_mistakes import T_OPTICAL_BODY
+from pipeline.common.geometry import T_OPTICAL_BODY, inverse
 from pipeline.types import F64, CameraCalibration
 
 

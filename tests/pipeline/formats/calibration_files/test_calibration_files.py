@@ -11,10 +11,9 @@ import pytest
 import yaml
 
 from pipeline.common.errors import BadInput
-from pipeline.common.geometry import inverse, rotation
+from pipeline.common.geometry import T_OPTICAL_BODY, inverse, rotation
 from pipeline.formats.calibration_files import FORMATS, kalibr
 from pipeline.formats.calibration_files.ros import INFO, TRANSFORM
-from pipeline.formats.extrinsic_mistakes import T_OPTICAL_BODY
 from pipeline.sources.rig import load_rig
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
