@@ -97,7 +97,7 @@ def _is_same(ours: Lead, theirs: Lead, partners: Mapping[int, int]) -> bool:
 def pairs(ours: list[Cuboid], theirs: list[Cuboid]) -> list[tuple[int, int, float]]:
     """Matching cuboids, one-to-one, with their overlap."""
     overlaps = np.array([[bev_iou(a, b) for b in theirs] for a in ours])
-    rows, columns = linear_sum_assignment(-overlaps)
+    rows, columns = linear_sum_assignment(np.where(overlaps >= _SAME_IOU, overlaps, 0.0), maximize=True)
     return [
         (int(a), int(b), float(overlaps[a, b]))
         for a, b in zip(rows, columns, strict=True)
