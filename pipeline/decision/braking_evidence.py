@@ -18,7 +18,8 @@ from pipeline.params import ExistenceParams
 from pipeline.types import Braking, FusedObject
 
 RANGED_SIGHTINGS = 3
-"""After only two sightings, the LiDAR's speed is just the difference of two noisy positions."""
+"""After only two sightings, the LiDAR's velocity is the difference of two noisy positions: its speed is not known, and
+it may point across the road."""
 _SPEED_SHARE = 1.0 / 8.0
 """A closing speed with at most this relative error gives the deceleration required, which grows with its square, to
 within a quarter."""

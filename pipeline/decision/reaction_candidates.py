@@ -6,23 +6,22 @@ post), and its course must lead into the corridor.
 
 from __future__ import annotations
 
+from pipeline.decision.braking_evidence import RANGED_SIGHTINGS
 from pipeline.decision.gates import ABREAST_M, is_solid
 from pipeline.decision.path_position import believed_mps
 from pipeline.params import AebParams
 from pipeline.path.estimates import STEP_M
 from pipeline.types import Cipv, FusedObject, Path
 
-_VELOCITY_HITS = 3
-"""After two sightings the LiDAR's velocity is the difference of two noisy positions, which may point across the road.
-The same holds after a sighting far from the predicted position. A longer camera track does not improve this."""
 _SURE_SIGMAS = 2.0
 """Number of standard deviations of the path by which oncoming traffic must be inside the corridor."""
 
 
 def is_dependable(item: FusedObject) -> bool:
     """Seen now, with a measured range, and all conditions of a lead met except class and position. A distance from box
-    height alone gives too uncertain a speed to brake for an object that is not the lead."""
-    has_velocity = item.ranged and (not item.imaged or item.ranged_steady >= _VELOCITY_HITS)
+    height alone gives too uncertain a speed to brake for an object that is not the lead, and so do too few sightings by
+    the LiDAR since the last one far from the predicted position; a longer camera track does not improve this."""
+    has_velocity = item.ranged and (not item.imaged or item.ranged_steady >= RANGED_SIGHTINGS)
     return has_velocity and not item.carried and is_solid(item)
 
 

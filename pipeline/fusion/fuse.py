@@ -27,6 +27,7 @@ from pipeline.ranging.further import Tracks
 from pipeline.types import VEHICLES, Box, FusedObject, Gate, LidarTrack, Mask, Point2, RangedTrack, VisionTrack
 
 _SURELY_ONE = 0.5
+"""Horizontal overlap of cluster and box from which they are surely one vehicle: see ``Fusion.ranged_boxes``."""
 _KEPT_IOU = 0.2
 """Another cluster must overlap a box by this much more than the one it was joined with: with a VLP-16's few rings,
 overlaps vary by as much from frame to frame."""
