@@ -45,6 +45,8 @@ _MOST_REFUSED = 2
 _LONGEST_GAP_S = 1.5
 """After this time without a sweep, odometry restarts."""
 _DESKEW = DeskewParams(enabled=True)
+_CONTRADICTS = "LiDAR odometry: sweeps contradict each other"
+_NOT_INSTALLED = "LiDAR odometry: not available, since kiss-icp has no package for this version of Python"
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,10 +165,6 @@ def follow(
         (*before.clouds, cloud)[-_KEPT:], (*before.poses, pose)[-_KEPT:], new_speed, new_turning, agreeing, refused
     )
     return OdometryStep(after, _motion(new_speed, new_turning, pose) if agreeing >= _AGREEING else None)
-
-
-_CONTRADICTS = "LiDAR odometry: sweeps contradict each other"
-_NOT_INSTALLED = "LiDAR odometry: not available, since kiss-icp has no package for this version of Python"
 
 
 def _too_little(points: int, fixed: structure.Support) -> str:
