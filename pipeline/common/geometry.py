@@ -34,6 +34,8 @@ class Cuboid(NamedTuple):
         return corners_of([self])[0]
 
 
+CUBOID_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+"""The edges of a cuboid as pairs of ``Cuboid.corners``: bottom, top, uprights."""
 _SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)]) / 2
 """Signs along length and width: front left, front right, rear right, rear left."""
 

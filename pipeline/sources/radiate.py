@@ -26,6 +26,7 @@ from pipeline.formats.text_rows import parse_rows
 from pipeline.sources import rig as rig_files
 from pipeline.sources.uri_options import split_options
 from pipeline.types import F32, F64, U8, CameraCalibration, EgoState, Frame, GnssFix, Sweep
+from pipeline.types.frame import SLOWEST_COURSE_MPS
 from pipeline.types.source import Opening, SourceError, TruthObject
 
 _CHANNELS = 32
@@ -41,7 +42,6 @@ _DISTORTION = np.array([-0.183879883467351, 0.0308609205858947, 0.0, 0.0])
 _TURNS_DEG, _OFFSET_M = (-1.2787805, 0.530414, 0.000802), (0.26029, -0.05021277, -0.037881)
 """From the LiDAR to the left camera: differences of both rotations and translations in ``default-calib.yaml``."""
 _T_EGO_LIDAR = np.array([[0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-_SLOWEST_COURSE_MPS = 0.5
 
 
 class TimedFiles(NamedTuple):
@@ -185,7 +185,7 @@ def parse_state(data: bytes, file: str, t_ns: int) -> tuple[EgoState, GnssFix]:
     if not np.isfinite(numbers).all() or not is_place or np.abs(numbers[3:]).max() > 200.0:
         raise SourceError(f"{file}: not a record of the GNSS/INS")
     speed_mps = float(np.hypot(north, east))
-    course_rad = float(np.arctan2(east, north) % (2.0 * np.pi)) if speed_mps >= _SLOWEST_COURSE_MPS else None
+    course_rad = float(np.arctan2(east, north) % (2.0 * np.pi)) if speed_mps >= SLOWEST_COURSE_MPS else None
     ego = EgoState(t_ns, speed_mps, -down_radps, source="ins")
     fix = GnssFix(t_ns, lat_deg, lon_deg, alt_m, course_rad, speed_mps, "dgnss", max(sigma_m, 0.01))
     return ego, fix

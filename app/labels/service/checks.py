@@ -13,7 +13,7 @@ from app.labels.store.drive_labels import DriveLabels
 from app.labels.transfer.files import drive_for
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.close_up import fit_of
-from pipeline.labels.model import LabelSet, LabelTrack
+from pipeline.labels.model import COUNTED_STATES, LabelSet, LabelTrack
 from pipeline.labels.plausibility import Problem, problems
 from pipeline.lidar.ground import fit_ground
 from pipeline.params import GroundParams
@@ -62,7 +62,7 @@ def _empty(labels: LabelSet, recording: OpenRecording) -> list[Problem]:
     """Near cuboids without a single point, or below or above the road: one frame per track, and only labels accepted by
     people."""
     found: list[Problem] = []
-    for track in [each for each in labels.tracks if each.state in ("accepted", "corrected")][:_MOST_READ]:
+    for track in [each for each in labels.tracks if each.state in COUNTED_STATES][:_MOST_READ]:
         frame = _nearest(track)
         if frame is None:
             continue
