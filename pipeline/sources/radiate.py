@@ -24,6 +24,7 @@ from pipeline.common.time_range import is_time
 from pipeline.formats.file_reading import files_by_name, image_of, image_size, read_bytes, recording_folder
 from pipeline.formats.text_rows import parse_rows
 from pipeline.sources import rig as rig_files
+from pipeline.sources.sidecar_files import IMAGE_WITHIN_NS
 from pipeline.sources.uri_options import split_options
 from pipeline.types import F32, F64, U8, CameraCalibration, EgoState, Frame, GnssFix, Sweep
 from pipeline.types.frame import SLOWEST_COURSE_MPS
@@ -32,7 +33,7 @@ from pipeline.types.source import Opening, SourceError, TruthObject
 _CHANNELS = 32
 _COLUMNS = 5  # x y z intensity ring
 _NO_IMAGES = "no images: no zed_left/*.png whose time is in zed_left.txt"
-_IMAGE_WITHIN_NS, _STATE_WITHIN_NS = 100_000_000, 500_000_000
+_STATE_WITHIN_NS = 500_000_000
 _STAMP = re.compile(rb"Frame:\s*(\d{1,9})\s+Time:\s*(\d{1,10})\.(\d{1,9})\s*$")
 _ROAD_Z_M = -2.1
 """From the LiDAR's road returns at 4 to 12 m in the SDK's sample; the files do not contain its height."""
@@ -97,7 +98,7 @@ class RadiateSource:
         sweep = self._sweep(index, notes)
         image = None
         if self._images.paths:
-            at = nearest(self._images.times_ns, t_ns, _IMAGE_WITHIN_NS)
+            at = nearest(self._images.times_ns, t_ns, IMAGE_WITHIN_NS)
             stamp = int(self._images.times_ns[at]) if at is not None else None
             image = image_of(self._images.paths[at] if at is not None else None, stamp, self._size, notes)
         else:
