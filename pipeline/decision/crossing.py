@@ -27,6 +27,7 @@ _ARRIVING_MPS = 0.5
 _LONGEST_S = 10.0
 """Nobody knows what either vehicle does later than this."""
 _SIGMAS = 2.0
+"""The other vehicle may be this many standard deviations nearer than measured."""
 
 
 def clears_path_s(

@@ -18,7 +18,9 @@ _SECONDS = ("time", "t", "timestamp", "time_stamp", "time_offset")
 MOST_POINTS = 4_000_000
 """Of a cloud in a file or message: more than ten times those of the largest LiDARs."""
 _LONGEST_SWEEP_S = 1.0
+"""Times of points farther from the sweep's own than this are of another clock and left out."""
 _FEWEST_A_RING = 20
+"""Points of a ring below which its mean elevation says too little."""
 _VLP16 = len(VLP16_ELEVATIONS_DEG)
 
 

@@ -297,7 +297,7 @@ def _identities(state: FusionState, keys: list[dict[str, int]], is_seen: list[bo
     measures it now.
 
     A row inherits an id of its tracks that is not yet taken: that which one of them has had for longest, so that a
-    track that another object had for a moment does not bring along that object's id; of several, the oldest. Rows of
+    track that another object had for a moment does not bring that object's id; of several, the oldest. Rows of
     more sensors choose first, so that a single fragment never takes over the id of a whole object; then those that are
     seen and have had their id for long: a vehicle that leaves the image keeps its id where the LiDAR follows it, not
     where its box was expected."""

@@ -23,7 +23,9 @@ _BESIDE_M = 0.6
 _ROAD_M = 0.2
 """Points this close to its bottom may be road."""
 _SHOWN_M = 1.5
+"""Of the surroundings, around the cuboid."""
 _IMAGE_MARGIN = 0.4
+"""Share of the box shown around it in the image."""
 _BACK, _POINT, _BESIDE, _EDGE, _TEXT = (24, 20, 17), (235, 225, 215), (90, 150, 255), (140, 220, 120), (190, 190, 190)
 _VIEWS = (("top", 0, 1), ("side", 0, 2), ("rear", 1, 2))
 

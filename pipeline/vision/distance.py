@@ -35,6 +35,7 @@ _HUBER = 1.345
 """Residuals beyond this many standard deviations get less weight: 95 % efficiency on clean data (Huber 1981, section
 4)."""
 _ROUNDS = 30
+"""Of iteratively reweighted least squares."""
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ class ParameterSweep:
         return 0
 
     def _proposer(self, base: Params) -> tuple[Proposer, int]:
-        """What to try, and how many sets. Everything that is wrong is told here, before the work."""
+        """What to try, and how many sets. Every error is raised here, before the work."""
         from app.fleet.sweep import MOST_POINTS, fixed, grid, latin, parse_axis, searching
 
         if not self.addresses:

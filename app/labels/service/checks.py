@@ -24,8 +24,8 @@ _NEAR_M = 30.0
 _MOST_READ = 200
 _OFF_ROAD_M = 0.5
 """Of the labelled vehicles of Astyx and KITTI 0009 within 30 m, none is more than 0.2 m off."""
-_AROUND_M = 4.0
-_FEWEST_AROUND = 5
+_AROUND_M, _FEWEST_AROUND = 4.0, 5
+"""Ground points within this distance of the cuboid; with fewer of them, the plane alone is compared."""
 
 
 @dataclass(frozen=True)

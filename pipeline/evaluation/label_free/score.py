@@ -33,7 +33,7 @@ SURE_MPS, FASTEST_MPS = 2.0, 70.0
 """An earlier closing speed is judged if later measurements determine it to the first, and if it is below the second:
 250 km/h, which nothing on a road exceeds."""
 PROOF_S, LEAST_PROOF_S = 2.0, 1.0
-"""Time after its selection in which a lead must be confirmed. If the clip ends before the second, nothing is said."""
+"""Time after its selection in which a lead must be confirmed. If the clip ends before the second, it is not judged."""
 PHANTOM_SHARE = 0.5
 """A lead is a phantom if it was seen in the path for less than this share of that time."""
 LATE_S, LASTING_S, NEARER_M = 3.0, 0.5, 0.5

@@ -20,6 +20,7 @@ from pipeline.vision.classes import canonical
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 _FEWEST_PAIRS = 3
+"""Pairs of cuboid and box that can show that two files do not belong together."""
 
 
 @dataclass(frozen=True)
