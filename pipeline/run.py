@@ -21,9 +21,11 @@ from pipeline.types.source import LiveSource, Source
 from pipeline.warm_up import warm_up
 
 _SILENCE_S = 0.5
+"""Wait for live sensors between two calls of ``on_silence``."""
 _BESIDE = ThreadPoolExecutor(thread_name_prefix="lidar")
 """Processes the sweep while detectors process the image."""
-_TRIES = 10
+_TRIES, _RETRY_S = 10, 0.5
+"""Of reading a frame while the system has no memory or no file handle left."""
 
 Sensors = Literal["lidar", "camera", "both"]
 
@@ -104,7 +106,7 @@ def patiently(source: Source, index: int) -> Frame:
         try:
             return source.frame(index)
         except Overloaded:
-            time.sleep(_SILENCE_S)
+            time.sleep(_RETRY_S)
     return source.frame(index)
 
 

@@ -246,9 +246,8 @@ def _road_lines(measured: lanes.LaneMeasurement | None, ego: EgoState | None) ->
     """The lines of this image that are certain, for the comparison with the car's own motion."""
     if measured is None:
         return None
-    return drift_lines.of_measured(
-        measured.lines, measured.pitch.rad, *((ego.speed_mps, ego.yaw_rate_radps) if ego is not None else (None, None))
-    )
+    speed_mps, yaw_rate_radps = (ego.speed_mps, ego.yaw_rate_radps) if ego is not None else (None, None)
+    return drift_lines.of_measured(measured.lines, measured.pitch.rad, speed_mps, yaw_rate_radps)
 
 
 def _note_of(turned: drift.Drift | None) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from app.streaming.encode import display_json
 from app.views.colors import Rgb, rgb, role_of
 from app.views.scene import cipv_id, object_text, stands_out
 from pipeline.alignment.projection import resolve
+from pipeline.common.geometry import CUBOID_EDGES
 from pipeline.params import Params
 from pipeline.types import U8, Frame, FusedObject, Result
 
@@ -18,8 +19,6 @@ WIDTH_PX = 1280
 _BLANK = (720, 1280)
 _BANNER_PX = 58
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
-_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-"""The edges of a cuboid as pairs of its corners: bottom, top, uprights."""
 _PATH_OPACITY = 0.25
 _STATES = {"warn": "WARNING", "partial_brake": "PARTIAL BRAKING", "full_brake": "FULL BRAKING"}
 
@@ -81,7 +80,7 @@ def _draw_object(canvas: U8, item: FusedObject, result: Result, display: dict[st
     if corners is not None and all(corner is not None for corner in corners):
         places = _visible(corners, canvas)
         if len(places) == len(corners):
-            for a, b in _EDGES:
+            for a, b in CUBOID_EDGES:
                 cv2.line(canvas, tuple(map(int, places[a])), tuple(map(int, places[b])), _bgr(color), 1, cv2.LINE_AA)
     if box is None:
         return

@@ -27,6 +27,7 @@ from pipeline.calibration.mount.drive import fit_mount_drive
 from pipeline.calibration.mount.fit import mount_sentence, turned
 from pipeline.calibration.times import fit_times
 from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import ensure_new, write_new
 from pipeline.detection import Detectors, detect, detector_for
 from pipeline.formats.calibration_files.rig import write_rig
 from pipeline.inference.distance_laws import keep_law
@@ -60,7 +61,7 @@ class Calibrate:
     offset: bool = False
     """alignment: also fit the pinhole camera's lateral and vertical position; the angles become less certain"""
     out: Annotated[Path | None, option("PATH")] = None
-    """Write a preset file for `cipv run --params`; mount: a rig file"""
+    """Write a preset file for `cipv run --params`; mount: a rig file. Must not exist"""
     images: Annotated[Path | None, option("FOLDER")] = None
     """alignment: write images of up to six frames with boxes, and clusters before and after the fit"""
     keep: bool = False
@@ -78,7 +79,7 @@ class Calibrate:
         return (self._fit_distance if self.what == "distance" else self._fit_alignment)(params, source, detector)
 
     def _check(self) -> None:
-        """BadInput if an option belongs to another fit."""
+        """BadInput if an option belongs to another fit, or the file to write exists."""
         belongs = {
             "--model": (self.model != "pinhole", "alignment"),
             "--offset": (self.offset, "alignment"),
@@ -90,6 +91,8 @@ class Calibrate:
         for name, (given, to) in belongs.items():
             if given and to != self.what:
                 raise BadInput(f"{name} does not belong to `cipv calibrate {self.what}`")
+        if self.out is not None:
+            ensure_new(self.out)
         if self.offset and self.model == "angular":
             raise BadInput("--offset needs the pinhole model: the angular one has no position")
 
@@ -131,7 +134,7 @@ class Calibrate:
             print(f"cipv: {warning}", file=sys.stderr)
         if self.out is not None:
             section = fit.section
-            self.out.write_text(yaml.safe_dump({"alignment": section}, sort_keys=False), encoding="utf-8")
+            write_new(self.out, yaml.safe_dump({"alignment": section}, sort_keys=False))
         if self.images is not None:
             write_residual_images(self.images, frame_of, len(source), fit, params)
         return 0
@@ -152,7 +155,7 @@ class Calibrate:
             print(f"cipv: {warning}", file=sys.stderr)
         if self.out is not None:
             values = {name.removeprefix("sync."): value for name, value in times.changes.items()}
-            self.out.write_text(yaml.safe_dump({"sync": values}, sort_keys=False), encoding="utf-8")
+            write_new(self.out, yaml.safe_dump({"sync": values}, sort_keys=False))
         return 0
 
     def _fit_distance(self, params: Params, source: Source, detector: Detector) -> int:
@@ -176,7 +179,7 @@ class Calibrate:
                 table.add_row(label, *numbers, *shares)
             Console().print(table)
         if self.out is not None:
-            self.out.write_text(yaml.safe_dump(as_overrides(fits), sort_keys=False), encoding="utf-8")
+            write_new(self.out, yaml.safe_dump(as_overrides(fits), sort_keys=False))
         if self.keep:
             kept = keep_law(detector.path, as_law(fits, params.distance.reference_focal_px), self._about(source, fits))
             print(f"{kept}: used with {detector.path.name} from now on", file=sys.stderr)

@@ -17,6 +17,7 @@ from app.commands.support.options import PipelineOptions
 from pipeline.alignment.convert import angular_of, angular_values, calibration_in_use, costs
 from pipeline.alignment.projection import Alignment, Pinhole, resolve
 from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import write_new
 from pipeline.formats.calibration_files import FORMATS, write_calibration
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import lidar_frame
@@ -34,7 +35,7 @@ class ConvertCalibration:
     """A recording, or with --format a file; for ROS, the folder with camera_info.yaml and static_transform.yaml; for
     Kalibr, the folder with camchain.yaml and transform.yaml; for KITTI's raw data, the folder of a day"""
     out: Path
-    """File to write; for ROS and Kalibr, a folder"""
+    """File to write; must not exist. For ROS and Kalibr, the folder for their files"""
     format: Annotated[Literal["kitti", "ros", "opencv", "kalibr"] | None, option("kitti|ros|opencv|kalibr")] = None
     """Format of the file to read. Without it, SOURCE is a recording"""
     to: Literal["kitti", "ros", "opencv", "kalibr", "rig", "angular"] = "rig"
@@ -54,7 +55,7 @@ class ConvertCalibration:
         if self.to == "angular":
             found = angular_of(_pinhole(camera), camera)
             self._say_cost(_pinhole(camera), found, camera)
-            self.out.write_text(yaml.safe_dump({"alignment": angular_values(found)}, sort_keys=False), encoding="utf-8")
+            write_new(self.out, yaml.safe_dump({"alignment": angular_values(found)}, sort_keys=False))
         else:
             write_calibration(self.out, self.to, camera, T_ego_lidar)
         print(f"{self.out}: {self.to}, {camera.width}×{camera.height}, f = {camera.K[0, 0]:.1f} px")

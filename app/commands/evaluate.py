@@ -15,12 +15,12 @@ import tyro
 
 from app.commands.support.arguments import option
 from app.commands.support.options import PipelineOptions, SourceOptions
-from app.commands.support.output_files import ensure_writable
 from app.commands.support.progress_bars import frames_progress
 from app.labels.project_classes import project_classes
 from app.reports.html import html
 from app.reports.terminal_tables import show
 from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import ensure_writable
 from pipeline.common.files.user_file_errors import given_path
 from pipeline.detection import Detectors
 from pipeline.evaluation.lead_verdict import LeadRule
@@ -70,7 +70,7 @@ class Evaluate:
     max_range_m: float = 60.0
     """Leads beyond this distance are ignored"""
     report: Annotated[Path | None, option("FILE")] = None
-    """Write an HTML file with tables, charts and links to the worst frames"""
+    """Write an HTML file with tables, charts and links to the worst frames; an existing file is replaced"""
     dashboard: Annotated[str, tyro.conf.arg(metavar="URL")] = DASHBOARD
     """Dashboard address for the report's links, as `cipv serve` prints it"""
     json: bool = False

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import write_new
 
 if TYPE_CHECKING:
     from pipeline.sources.live.check import SensorReport
@@ -29,7 +30,7 @@ class Live:
     what: tyro.conf.Positional[Literal["init", "check"]]
     """init: write the file; check: listen to each sensor and report its health"""
     file: tyro.conf.Positional[Path] = Path("live.yaml")
-    """The configuration file"""
+    """The configuration file; `init` never overwrites one"""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 3.0
     """check: how long to listen"""
     json: bool = False
@@ -41,11 +42,7 @@ class Live:
     def _init(self) -> int:
         from pipeline.sources.live.config_template import TEMPLATE
 
-        try:
-            with self.file.open("x", encoding="utf-8") as file:
-                file.write(TEMPLATE)
-        except FileExistsError:
-            raise BadInput(f"{self.file}: file already exists; not overwritten") from None
+        write_new(self.file, TEMPLATE)
         print(f"{self.file} written: edit it, then `cipv live check {self.file}`")
         return 0
 

@@ -12,10 +12,11 @@ import tyro
 
 from app.commands.support.progress_bars import bytes_progress, task_progress
 from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import ensure_writable
 from pipeline.inference.model_registry import ModelEntry, known_model, list_models, own_file, pull, register, store
 from pipeline.inference.model_registry import find as find_model
 from pipeline.inference.runtime import ways_of
-from pipeline.inference.tuning import USUAL_THREADS, is_tuned, keep_fastest, kept_gain, kept_way, tune
+from pipeline.inference.tuning import USUAL_THREADS, is_tuned, keep_fastest, kept_gain, kept_way, settings_file, tune
 from pipeline.lanes.network import open_lane_network
 from pipeline.types import REAL_VEHICLES
 from pipeline.vision.detector import open_detector
@@ -109,6 +110,7 @@ class TuneModel:
         path = find_model(self.spec)
         if path is None:
             raise BadInput(f"no network {self.spec!r} is installed; see `cipv models list`")
+        ensure_writable(settings_file())
         trials = []
         for trial in tune(ways_of(path), self.threads, self.rounding):
             trials.append(trial)

@@ -36,11 +36,11 @@ class RunPipeline:
     sensors: Literal["lidar", "camera", "both"] = "both"
     """Ablation: run as if the car had this sensor only"""
     out: Annotated[Path | None, option("PATH")] = None
-    """Write one JSON object per frame to this file; - for standard output"""
+    """Write one JSON object per frame to this file; an existing file is replaced; - for standard output"""
     frames: Annotated[int | None, option("N")] = None
     """Stop after N frames; without it, live sensors run until Ctrl-C"""
     rrd: Annotated[Path | None, option("FILE")] = None
-    """Write a rerun recording to this file"""
+    """Write a rerun recording to this file; an existing file is replaced"""
 
     def __call__(self) -> int:
         params = self.pipeline.parameters()

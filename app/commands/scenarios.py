@@ -11,12 +11,12 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from app.commands.support.arguments import option
-from app.commands.support.output_files import ensure_writable
 from app.commands.support.progress_bars import frames_progress
 from app.reports.experiment_drives import ReplayFolder
 from app.reports.html import html
 from app.reports.terminal_tables import show
 from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import ensure_writable
 from pipeline.evaluation.report_sections import as_json
 from pipeline.experiments.experiment import Experiment
 from pipeline.experiments.robustness.experiment import suite as robustness
@@ -51,7 +51,7 @@ class Scenarios:
     ablation: bool = False
     """robustness: repeat with each rule against false leads switched off in turn"""
     report: Annotated[Path | None, option("FILE")] = None
-    """Write an HTML file with tables and charts"""
+    """Write an HTML file with tables and charts; an existing file is replaced"""
     drives: Annotated[Path | None, option("DIR")] = None
     """Save every drive to this folder, listed in its index.html and linked from the report; open one as sim:<file>.
     robustness: only drives with a failure; default: robustness-failures"""

@@ -31,6 +31,7 @@ from app.web.serve import serve
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress
 from pipeline.detection import detector_for, lanes_for
+from pipeline.inference.model_registry import store
 from pipeline.lanes.open_detector import LaneDetector
 from pipeline.sources import open_any
 from pipeline.sources.along_route import along_route
@@ -149,9 +150,10 @@ class Serve:
             return self.server.serve(self.engine(tuning.used))
 
     def engine(self, on_network: Callable[[object], object] = lambda _: None) -> Engine:
-        """The engine for the source, not started yet. BadInput if the source cannot be opened. on_network: called with
-        every detector that it opens."""
+        """The engine for the source, not started yet. BadInput if the source cannot be opened or there is no place for
+        networks. on_network: called with every detector that it opens."""
         params = self.pipeline.parameters()
+        store()  # like a typo below, reported in the terminal
         route = planned(self.route)
         # opened here, so that a typo is reported in the terminal; a large recording is not opened twice
         first = {self.source: opened(self.source, self.rings)}

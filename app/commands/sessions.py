@@ -33,7 +33,7 @@ class ImportRecording:
 
     source: SourceOptions
     out: Path
-    """The session to write: a new file ending in .mcap"""
+    """The session to write, ending in .mcap; must not exist"""
 
     def __call__(self) -> int:
         source = self.source.open()
@@ -56,11 +56,13 @@ class Export:
     to_s: Annotated[float | None, option("S", name="to")] = None
     """End S seconds into the drive"""
     rrd: Annotated[Path | None, option("FILE")] = None
-    """Write a rerun recording; the pipeline runs again, with the recorded parameters unless others are given"""
+    """Write a rerun recording; the pipeline runs again, with the recorded parameters unless others are given;
+    an existing file is replaced"""
     mcap: Annotated[Path | None, option("FILE")] = None
-    """Write a session"""
+    """Write a session; must not exist"""
     csv: Annotated[Path | None, option("FILE")] = None
-    """Write one row per object and frame: the recorded results, or those of a new run if there are none"""
+    """Write one row per object and frame: the recorded results, or those of a new run if there are none;
+    an existing file is replaced"""
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
 
     def __call__(self) -> int:
@@ -99,7 +101,7 @@ class Recover:
     file: tyro.conf.Positional[Path]
     """The file to read; it is not changed"""
     out: Annotated[Path | None, option("PATH")] = None
-    """The file to write; default: <name>_recovered.mcap next to it"""
+    """The file to write; must not exist; default: <name>_recovered.mcap next to it"""
 
     def __call__(self) -> int:
         out = self.out or self.file.with_name(f"{self.file.stem}_recovered.mcap")

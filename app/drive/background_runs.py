@@ -27,7 +27,9 @@ from pipeline.warm_up import warm_up
 logger = logging.getLogger("cipv.drive")
 
 _TELL_EVERY_S = 0.25
+"""How often pages are told how far a run is."""
 _PATIENCE_S = 10.0
+"""How long the end waits for a read in progress."""
 _TRY_AGAIN_S = 0.5
 """Delay before a retry if the system could not read."""
 _MOST_HANGS = 3

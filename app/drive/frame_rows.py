@@ -19,11 +19,11 @@ from pipeline.evaluation.lead_verdict import Judged
 from pipeline.fusion.rows import LIDAR_RANGE_SIGMA_M
 from pipeline.path.yaw_rate import usable_rate
 from pipeline.types import VEHICLES, Frame, FusedObject, Result, VisionTrack, object_sources
+from pipeline.types.rounding import DECIMALS
 from pipeline.vision.classes import COCO_80
 
 LABELS = ("", *COCO_80)
 """An object of any other class is stored without a class."""
-_DECIMALS = 4
 _PLACE = {name: place for place, name in enumerate(LABELS)}
 _NOWHERE = (math.nan,) * 7
 _UNBOXED = (math.nan,) * 4
@@ -234,4 +234,4 @@ def _float(value: float | None) -> float:
 def _plain(value: Any) -> Any:
     if not isinstance(value, float):
         return value
-    return round(value, _DECIMALS) + 0.0 if math.isfinite(value) else None
+    return round(value, DECIMALS) + 0.0 if math.isfinite(value) else None

@@ -21,6 +21,7 @@ from pipeline.types.source import TruthObject
 _MOST_STATES = 4000
 """A state of a real drive adds about 25 KB to its neighbours: 100 MB at most."""
 _THIN_STATES = 500
+"""States kept of a run that is not shown."""
 
 
 class KnownState(NamedTuple):

@@ -9,8 +9,8 @@ from app.drive.full_run import DriveRun
 from pipeline.common.errors import BadInput
 from pipeline.params import Params
 
-MOST_UNKEPT = 4
-MOST_KEPT = 12
+MOST_UNKEPT, MOST_KEPT = 4, 12
+"""Runs in memory that nobody has saved, and saved ones."""
 LONGEST_NAME = 80
 
 

@@ -16,8 +16,7 @@ from pipeline.evaluation.scores.results_file import EMPTY, NO_HEALTH, NO_PATH
 from pipeline.labels.headings import Moment
 from pipeline.labels.propose import Seen
 from pipeline.types import AccCommand, Box, Cipv, EgoState, FusedObject, Result
-
-_DECIMALS = 4
+from pipeline.types.rounding import DECIMALS
 
 
 def seen_of(records: Objects) -> list[Seen]:
@@ -97,12 +96,12 @@ def _object(record: Any) -> FusedObject:
 
 
 def _cuboid(record: Any) -> Cuboid | None:
-    x, y, z, length, width, height, yaw = (round(float(value), _DECIMALS) for value in record["cuboid"])
+    x, y, z, length, width, height, yaw = (round(float(value), DECIMALS) for value in record["cuboid"])
     return Cuboid((x, y, z), (length, width, height), yaw) if math.isfinite(x) else None
 
 
 def _bbox(record: Any) -> Box | None:
-    x1, y1, x2, y2 = (round(float(value), _DECIMALS) for value in record["bbox"])
+    x1, y1, x2, y2 = (round(float(value), DECIMALS) for value in record["bbox"])
     return (x1, y1, x2, y2) if math.isfinite(x1) else None
 
 

@@ -41,7 +41,9 @@ from pipeline.warm_up import is_warm, warm_up
 logger = logging.getLogger("cipv.engine")
 
 _PATIENCE_S = 2.0
+"""How long the end waits for a network run or a read in progress."""
 _TELL_EVERY_S = 0.25
+"""How often pages are told how far the opening of a recording is."""
 _COMPILING = "Preparing the pipeline … The first start after an installation takes about a minute."
 
 
@@ -50,7 +52,7 @@ class Engine:
     detector for a source's images; None runs without a vehicle detector and without a notice. ``open_lanes`` returns
     the lane detector, which runs on every ``lanes_every``-th frame. ``far_view_px``: side of the window of the second
     pass, None for none. ``whole_drives``: a recording's whole drive is computed in the background (``drives``), so that
-    any frame is shown as in a complete run. ``desk``: where what is shown can be recorded; by default the folder of
+    any frame is shown as in a complete run. ``recorder``: where what is shown can be recorded; by default the folder of
     this machine's sessions. ``labels``: the labels, and the steps that can be undone; by default discarded at the end.
     ``detections``: those of earlier frames; by default none are kept."""
 
@@ -68,7 +70,7 @@ class Engine:
         open_lanes: OpenLanes | None = None,
         lanes_every: int | None = None,
         far_view_px: int | None = None,
-        desk: SessionRecorder | None = None,
+        recorder: SessionRecorder | None = None,
         labels: LabelDesk | None = None,
         watchdog: Watchdog | None = None,
         detections: DetectionCache | None = None,
@@ -83,18 +85,18 @@ class Engine:
         self.control.on_ask = self.drives.turn.asked
         self.page_frames = PageFrames(self.drives.turn.foreground)
         """For pages with their own playhead."""
-        self.desk = desk or SessionRecorder()
+        self.recorder = recorder or SessionRecorder()
         self.labels = labels or LabelDesk()
         self._whole_drives = whole_drives
         self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every, far_view_px)
         self._player: Player | None = None
         self.detectors = Detectors()
         """Detectors of the open source."""
-        self.watchdog = self.drives.watchdog = self.desk.watchdog = watchdog or Watchdog()
+        self.watchdog = self.drives.watchdog = self.recorder.watchdog = watchdog or Watchdog()
         self.takeovers = Takeovers(self.watchdog, self._work, self._say_stuck, self.control.change, self.drives.turn)
 
     def start(self) -> None:
-        self.drives.on_change = self.desk.on_change = self.control.change
+        self.drives.on_change = self.recorder.on_change = self.control.change
         self.drives.on_stuck, self.drives.on_trouble = self._say_stuck, self._say_trouble
         self.drives.start()
         self.labels.start(self.control)
@@ -104,7 +106,7 @@ class Engine:
         """Close the recording, if any, end the worker, and close the databases. A network run or a read in progress is
         finished first, but waited for no longer than systems wait for a program that was asked to end."""
         self.control.change(stop=True)
-        self.desk.stop(SAVE_S)
+        self.recorder.stop(SAVE_S)
         ends_s = time.monotonic() + _PATIENCE_S
         self.drives.stop(_PATIENCE_S)
         self.takeovers.end(max(0.0, ends_s - time.monotonic()))
@@ -186,7 +188,7 @@ class Engine:
         """A notice on every page and on the in-vehicle display, for a minute; permanently if a function is disabled
         from now on."""
         others = tuple(notice for notice in self.snapshot.notices if f"({stuck.doing})" not in notice.text)
-        said = stuck_notice(stuck, more, is_recording=self.desk.state is not None)
+        said = stuck_notice(stuck, more, is_recording=self.recorder.state is not None)
         self._publisher.publish(replace(self.snapshot, notices=(*others, said)))
 
     def _say_trouble(self, text: str) -> None:
@@ -217,7 +219,7 @@ class Engine:
             return False
         notices = [Notice("info", text) for text in (*source.notes, *ABLATION_NOTICES[self._sensors])]
         detectors = self._detectors.both_for(source, notices)
-        self.desk.stop()
+        self.recorder.stop()
         self._close()
         self.takeovers.forget()
         player = self._player_of(source, detectors)
@@ -250,7 +252,7 @@ class Engine:
 
             of_lanes = partial(self.takeovers.watching_helper, "lane detection")
             live = LivePipeline(source, detectors, self._sensors, of_lanes)
-            return LivePlayer(live, self.control, self.drives, self.desk)
+            return LivePlayer(live, self.control, self.drives, self.recorder)
         recording = cast("Source", source)
 
         def seekable() -> SeekablePipeline:
@@ -260,7 +262,7 @@ class Engine:
         self.page_frames.open(seekable())
         setup = RunSetup(recording, pipeline.timeline_s, detectors, self._sensors) if self._whole_drives else None
         watching = partial(self.takeovers.watching_helper, "reading ahead")
-        return RecordedPlayer(pipeline, self.control, self.drives, setup, self.desk, watching)
+        return RecordedPlayer(pipeline, self.control, self.drives, setup, self.recorder, watching)
 
     def _close(self) -> None:
         player, self._player = self._player, None
@@ -293,4 +295,4 @@ class Engine:
 
     def _with_parts(self, shown: Snapshot) -> Snapshot:
         """Adds the state of the drive's run, of recording and of the labels."""
-        return replace(shown, drive=self.drives.state, recording=self.desk.state, labels=self.labels.state)
+        return replace(shown, drive=self.drives.state, recording=self.recorder.state, labels=self.labels.state)

@@ -23,6 +23,7 @@ from pipeline.types import U8, Frame
 from pipeline.types.source import LiveSource
 
 _SILENCE_S = 1.0
+"""Without a tick for this long, the page lists the sensors that deliver nothing."""
 
 
 class LivePipeline:

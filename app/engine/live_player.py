@@ -23,20 +23,22 @@ _HEALTH_EVERY_S = 0.5
 
 class LivePlayer:
     """A ``Player`` for live sensors. While paused, the shown tick is kept and can be rerun with other parameters;
-    resuming jumps to the present. Every tick is passed to the desk, shown or not."""
+    resuming jumps to the present. Every tick is passed to the recorder, shown or not."""
 
     live = True
     count = 0
     duration_s = 0.0
 
-    def __init__(self, pipeline: LivePipeline, control: Control, drives: BackgroundRuns, desk: SessionRecorder) -> None:
-        self._pipeline, self._control, self._drives, self._desk = pipeline, control, drives, desk
+    def __init__(
+        self, pipeline: LivePipeline, control: Control, drives: BackgroundRuns, recorder: SessionRecorder
+    ) -> None:
+        self._pipeline, self._control, self._drives, self._recorder = pipeline, control, drives, recorder
         self._came: Frame | None = None
         self._health_told_s = 0.0
 
     def successor(self, detectors: Detectors) -> LivePlayer:
         """Takes over from a hanging player; the sensors stay open."""
-        return LivePlayer(self._pipeline.successor(detectors), self._control, self._drives, self._desk)
+        return LivePlayer(self._pipeline.successor(detectors), self._control, self._drives, self._recorder)
 
     @property
     def source(self) -> LiveSource:
@@ -64,7 +66,7 @@ class LivePlayer:
     def serve(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:
         if self._came is not None:
             came, self._came = self._came, None
-            self._desk.take(self._pipeline.run(came, wish.params))
+            self._recorder.take(self._pipeline.run(came, wish.params))
         held, newest = shown.processed, self._pipeline.newest
         is_behind = newest is not None and (held is None or newest.frame is not held.frame)
         if wish.playing and is_behind:

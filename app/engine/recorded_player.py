@@ -40,14 +40,15 @@ class RecordedPlayer:
         control: Control,
         drives: BackgroundRuns,
         setup: RunSetup | None,
-        desk: SessionRecorder,
+        recorder: SessionRecorder,
         watching: Callable[[], AbstractContextManager[object]] = nullcontext,
     ) -> None:
         self.source: Source = pipeline.source
         self.count = len(pipeline.source)
         self.duration_s = float(pipeline.timeline_s[-1])
         self.skipped = 0
-        self._pipeline, self._control, self._drives, self._setup, self._desk = pipeline, control, drives, setup, desk
+        self._pipeline, self._setup = pipeline, setup
+        self._control, self._drives, self._recorder = control, drives, recorder
         self._clock: PlaybackClock | None = None
         self._given_up: int | None = None
         self._ahead = ReadAhead(self._prepare, control.change, watching)
@@ -82,7 +83,7 @@ class RecordedPlayer:
         if processed is not None:
             if processed.whole:
                 self._drives.offer(processed.frame)
-            self._desk.take(processed)
+            self._recorder.take(processed)
         if wish.settled:
             self._drives.want(wish.params, wish.preset)
         return processed

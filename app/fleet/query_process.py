@@ -25,6 +25,7 @@ from app.fleet.runs import check_run, latest_run
 from app.fleet.store import Store
 from pipeline.common.errors import BadInput
 from pipeline.common.files.user_files import Overloaded
+from pipeline.common.idle_priority import be_killed_first
 
 if TYPE_CHECKING:
     from app.fleet.find import FleetTables
@@ -36,8 +37,6 @@ _KILLED_AFTER_S = 2.0
 """In addition, if DuckDB does not stop it."""
 _OF_A_THREAD = 128 << 20
 """Address space that a thread reserves for its stack and its heap."""
-_KILLED_FIRST = Path("/proc/self/oom_score_adj"), "1000"
-"""If memory runs out, the system kills this process instead of the server (Linux)."""
 
 
 class FleetQuery(msgspec.Struct):
@@ -140,8 +139,7 @@ def main() -> None:
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # sent to the whole group; the server decides when this process ends
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    with suppress(OSError):
-        _KILLED_FIRST[0].write_text(_KILLED_FIRST[1], encoding="ascii")
+    be_killed_first()
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a library prints must not get between the answers
     questions: queue.SimpleQueue[FleetQuery] = queue.SimpleQueue()

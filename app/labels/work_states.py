@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Literal
 
 State = Literal["open", "labeling", "review", "done"]
 """open: not started. review: labelled, waiting for a second person's review."""
-STATES: tuple[State, ...] = get_args(State)

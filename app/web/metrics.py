@@ -80,7 +80,7 @@ class _Now(Collector):
         self._rate_hz = rate_hz
 
     def collect(self) -> Iterator[Metric]:
-        shown, recording, traffic = self._engine.snapshot, self._engine.desk.state, self._stream.traffic
+        shown, recording, traffic = self._engine.snapshot, self._engine.recorder.state, self._stream.traffic
         yield GaugeMetricFamily("cipv_engine_up", "1 while the worker is running", self._engine.alive)
         yield GaugeMetricFamily("cipv_frames_per_second", "Results per second, recently", self._rate_hz())
         yield GaugeMetricFamily("cipv_frames_skipped", "Frames skipped since the source was opened", shown.skipped)

@@ -66,7 +66,7 @@ def serve(
     warnings.filterwarnings("ignore", message="The 'alias' attribute with value")
     with asked_to_stop() as asked:
         if ends_process:
-            end_process_once(asked, partial(engine.desk.stop, SAVE_S))
+            end_process_once(asked, partial(engine.recorder.stop, SAVE_S))
         engine.start()
         try:
             from app.web.server import Server, create_app

@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.alignment.projection import Alignment, Angular, corrected, resolve
 from pipeline.common.errors import BadInput
+from pipeline.common.geometry import T_OPTICAL_BODY
 from pipeline.params import AlignmentParams
 from pipeline.types import F64, CameraCalibration
 
@@ -86,8 +87,7 @@ def pinhole_of(angular: Angular, width: int, height: int) -> CameraCalibration:
     right, down = -points[:, 1] / points[:, 0], -points[:, 2] / points[:, 0]
     (fx, cx), (fy, cy) = _line(right, pixels[:, 0]), _line(down, pixels[:, 1])
     K = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-    T_camera_ego = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
-    return CameraCalibration(K, np.zeros(0), T_camera_ego, width, height)
+    return CameraCalibration(K, np.zeros(0), T_OPTICAL_BODY, width, height)
 
 
 def costs(aligned: Alignment, converted: Alignment, width: int, height: int, road_z_m: float | None) -> list[Cost]:

@@ -15,6 +15,7 @@ import numpy as np
 from pipeline.alignment.projection import Alignment, project_cuboid, resolve
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid, closest_on_polygon, iou_matrix, transform
+from pipeline.common.robust import mad_sigma
 from pipeline.lidar import boxes, cluster, downsample, ground
 from pipeline.params import Params
 from pipeline.types import REAL_VEHICLES, VEHICLES, CameraCalibration, DistanceLaw, Frame
@@ -142,7 +143,7 @@ def _fit(pairs: list[Pair], exponent: float | None) -> LawFit:
         len(pairs),
         float(error.mean()),
         float(np.quantile(error, 0.9)),
-        float(1.4826 * np.median(np.abs(np.log(ratio)))),
+        mad_sigma(np.log(ratio)),
     )
 
 

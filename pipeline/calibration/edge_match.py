@@ -16,6 +16,7 @@ import numpy as np
 
 from pipeline.alignment.projection import Alignment, Angular, resolve
 from pipeline.calibration.depth_edges import EdgeScene
+from pipeline.common.robust import mad_sigma
 from pipeline.params import AlignmentParams
 from pipeline.types import F32, F64, I64, U8, CameraCalibration
 
@@ -103,7 +104,7 @@ def _placed(strengths: F64, borders: int, near: Sequence[Near]) -> EdgeScore:
     """Rank of the first of the strengths among all."""
     usual, best = float(np.median(strengths)), int(np.argmax(strengths))
     height = float(strengths[best]) - usual
-    sigmas = round(height / max(1.4826 * float(np.median(np.abs(strengths - usual))), 1e-6), 2)
+    sigmas = round(height / max(mad_sigma(strengths - usual), 1e-6), 2)
     if sigmas < STANDS_OUT:
         return EdgeScore(None, sigmas, borders)
     score = float(np.clip((strengths[0] - usual) / height, 0.0, 1.0))

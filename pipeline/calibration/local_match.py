@@ -16,6 +16,7 @@ import numpy as np
 from pipeline.alignment.projection import resolve
 from pipeline.calibration.depth_edges import EdgeScene
 from pipeline.calibration.edge_match import MARGIN, Seen
+from pipeline.common.robust import mad_sigma
 from pipeline.params import AlignmentParams
 from pipeline.types import F64, I64, CameraCalibration
 
@@ -151,7 +152,7 @@ def _region(shifts: F64, strength: F64, present: int, borders: int) -> Region:
     if borders < FEWEST:
         return Region(borders, None, None)
     usual, best = float(np.median(strength)), int(np.argmax(strength))
-    noise = max(1.4826 * float(np.median(np.abs(strength - usual))), 1e-6)
+    noise = max(mad_sigma(strength - usual), 1e-6)
     height = float(strength[best]) - usual
     is_at_the_end = abs(shifts[best, 1]) == np.abs(shifts[:, 1]).max()
     if height / noise < STANDS_OUT or is_at_the_end:

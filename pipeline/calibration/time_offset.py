@@ -23,6 +23,7 @@ from pipeline.calibration.depth_edges import EdgeScene, edge_scene
 from pipeline.calibration.speed_delay import SpeedPair, forward_m
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
+from pipeline.common.robust import mad_sigma
 from pipeline.lidar.deskew import deskew
 from pipeline.params import AlignmentParams, DeskewParams, Params, with_changes
 from pipeline.run import only
@@ -201,7 +202,7 @@ def _best(strength: F64, lags_s: F64) -> tuple[float, float]:
     smooth = np.convolve(np.pad(curve, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
     at = int(np.argmax(smooth))
     usual = float(np.median(strength))
-    noise = max(1.4826 * float(np.median(np.abs(strength - usual))), 1e-6)
+    noise = max(mad_sigma(strength - usual), 1e-6)
     low, high = max(at - 3, 0), min(at + 4, len(curve))
     a, b, _ = np.polyfit(lags_s[low:high], smooth[low:high], 2)
     best = -b / (2 * a) if a < 0 else lags_s[at]

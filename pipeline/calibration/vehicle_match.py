@@ -20,7 +20,7 @@ from pipeline.params import AlignmentParams
 FEWEST_VEHICLES = 12
 """Pairs of boxes and clusters below which edges alone are asked, as for a fit."""
 CLEAR_DEG, STEP_DEG = 0.5, 0.25
-"""Smallest turn that is told, more than three times the errors that all frames share; what it is rounded to."""
+"""Smallest turn that is reported, more than three times the errors that all frames share; what it is rounded to."""
 
 
 def with_vehicles(found: EdgeScore, scenes: Sequence[FitScene], params: AlignmentParams) -> EdgeScore:

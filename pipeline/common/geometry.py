@@ -11,6 +11,9 @@ import numpy.typing as npt
 
 F64 = npt.NDArray[np.float64]
 
+T_OPTICAL_BODY = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
+"""From a camera's body axes (x forward, y left, z up; REP 103) to its optical ones (x right, y down, z forward)."""
+
 
 class Cuboid(NamedTuple):
     """An upright box on the ground."""
@@ -31,6 +34,8 @@ class Cuboid(NamedTuple):
         return corners_of([self])[0]
 
 
+CUBOID_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+"""The edges of a cuboid as pairs of ``Cuboid.corners``: bottom, top, uprights."""
 _SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)]) / 2
 """Signs along length and width: front left, front right, rear right, rear left."""
 

@@ -1,4 +1,4 @@
-"""Idle priority: for work that nobody waits for."""
+"""Idle priority, and other ways for a process to stand back: for work that nobody waits for."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 _NICEST = 19
+_KILLED_FIRST = Path("/proc/self/oom_score_adj"), "1000"
 _SESSION_NICENESS = Path("/proc/self/autogroup")
 _THREADS = Path("/proc/self/task")
 
@@ -28,6 +29,13 @@ def take_idle_priority() -> None:
         with suppress(OSError, AttributeError):
             os.setpriority(os.PRIO_PROCESS, thread, _NICEST)
             os.sched_setscheduler(thread, os.SCHED_IDLE, os.sched_param(0))
+
+
+def be_killed_first() -> None:
+    """If memory runs out, let the system end this process instead of the server (Linux)."""
+    file, score = _KILLED_FIRST
+    with suppress(OSError):
+        file.write_text(score, encoding="ascii")
 
 
 def _threads() -> list[int]:

@@ -17,8 +17,9 @@ from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.params import ExistenceParams
 from pipeline.types import Braking, FusedObject
 
-RANGED_SIGHTINGS = 3
-"""After only two sightings, the LiDAR's speed is just the difference of two noisy positions."""
+_RANGED_SIGHTINGS = 3
+"""After only two sightings, the LiDAR's velocity is the difference of two noisy positions: its speed is not known, and
+it may point across the road."""
 _SPEED_SHARE = 1.0 / 8.0
 """A closing speed with at most this relative error gives the deceleration required, which grows with its square, to
 within a quarter."""
@@ -44,11 +45,16 @@ def _justified(item: FusedObject, params: ExistenceParams) -> Braking:
     is_steady = item.camera_ranges >= params.camera_ranges
     if item.ranged:
         # a camera track, however long, does not turn one LiDAR sighting into a measured speed
-        return Braking.FULL if item.ranged_hits >= RANGED_SIGHTINGS else Braking.PARTIAL
+        return Braking.FULL if item.ranged_hits >= _RANGED_SIGHTINGS else Braking.PARTIAL
     is_in_path = (item.in_path_probability or 0.0) >= params.min_braking
     if not (is_steady and is_in_path):
         return Braking.COMFORT
     return Braking.FULL if has_known_height(item) and _has_known_speed(item) else Braking.PARTIAL
+
+
+def has_ranged_velocity(item: FusedObject) -> bool:
+    """Whether the LiDAR knows its velocity. What it has only just found has that of its image boxes."""
+    return item.ranged and (not item.imaged or item.ranged_steady >= _RANGED_SIGHTINGS)
 
 
 def has_known_height(item: FusedObject) -> bool:

@@ -28,6 +28,7 @@ from pipeline.types import VEHICLES, Cipv, FusedObject, Moment, Path, Rejection,
 _BLUR_M = 0.2
 """Sightings of an object that moves sideways are averaged over at most the time in which it moves this far."""
 _HOVERS_MPS = 1.0
+"""A lead with this lateral speed is leaving the path, or crossing it: no hysteresis keeps it."""
 _DRIVES_S = 1.0
 """What was surely moving for this long has driven: a new side that comes into view moves an object for less."""
 _BOXED_S = 0.5

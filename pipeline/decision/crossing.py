@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import inf
 
-from pipeline.decision.braking_evidence import RANGED_SIGHTINGS
+from pipeline.decision.braking_evidence import has_ranged_velocity
 from pipeline.decision.place import Place
 from pipeline.params import CipvParams
 from pipeline.types import FusedObject
@@ -28,6 +28,7 @@ _ARRIVING_MPS = 0.5
 _LONGEST_S = 10.0
 """Nobody knows what either vehicle does later than this."""
 _SIGMAS = 2.0
+"""The other vehicle may be this many standard deviations nearer than measured."""
 
 
 def clears_path_s(
@@ -54,8 +55,7 @@ def clears_path_s(
 
 def _has_velocity(item: FusedObject) -> bool:
     """Whether its lateral speed is known. What the LiDAR has only just found has the speed of its first boxes."""
-    by_lidar = item.ranged and (not item.imaged or item.ranged_steady >= RANGED_SIGHTINGS)
-    return by_lidar or item.camera_ranges >= _FEWEST_RANGES
+    return has_ranged_velocity(item) or item.camera_ranges >= _FEWEST_RANGES
 
 
 def _crosses(where: Place, is_ego_speed_known: bool) -> bool:

@@ -24,8 +24,8 @@ _CLUSTER_NOISE_M = 0.1
 0052, and more where other parts of the vehicle come into view."""
 _SPEED_SIGMA_MPS = 5.0
 """Of a new lead's speed; the filter needs half a second of LiDAR distances to do better."""
-_TOLD_MPS2 = 0.8
-"""An acceleration is told once its standard deviation is below this: without any measurement, it is 1 m/s², and the
+_KNOWN_MPS2 = 0.8
+"""An acceleration is reported once its standard deviation is below this: without any measurement, it is 1 m/s², and the
 camera's distances hardly change that."""
 _MAX_NIS = 10.8
 """99.9 % of χ² with one degree of freedom: a distance farther off is another vehicle's, or another part's."""
@@ -69,7 +69,7 @@ def follow(
     if mean[1] < 0.0:
         mean = np.array([mean[0], 0.0, max(mean[2], 0.0)])  # it has stopped, and does not go on to drive backwards
     sigma_mps2 = float(cov[2, 2]) ** 0.5
-    if item.ranged and sigma_mps2 < _TOLD_MPS2:
+    if item.ranged and sigma_mps2 < _KNOWN_MPS2:
         lead = evolve(lead, accel_mps2=float(mean[2]), accel_sigma_mps2=sigma_mps2)
     return LeadMotionState(lead.id, mean, cov, own_mps), lead
 

@@ -39,7 +39,7 @@ _ALONG = 0.36
 _WIDEST_M = 3.2
 """Maximum extent across the path of a vehicle that drives along it, without its flank."""
 _LONGEST_M = 6.0
-"""Length of a car's flank that may be visible. Trucks and buses: ``LARGEST_SIZE_M``."""
+"""Length of a car's flank that may be visible. Trucks and buses: ``LONGEST_M``."""
 _CAR_LENGTH_M, _SLOWEST_MPS, _MOST_TURNED = 4.5, 5.0, 0.2
 """A car that changes lanes and is faster than the second is rotated by lateral speed over forward speed, at most by the
 third; its nose is ahead by the first."""

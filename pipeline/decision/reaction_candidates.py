@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from math import inf
 
+from pipeline.decision.braking_evidence import has_ranged_velocity
 from pipeline.decision.gates import ABREAST_M, is_solid
 from pipeline.decision.path_position import believed_mps
 from pipeline.params import AebParams
 from pipeline.path.estimates import STEP_M
 from pipeline.types import Cipv, FusedObject, Path
 
-_VELOCITY_HITS = 3
-"""After two sightings the LiDAR's velocity is the difference of two noisy positions, which may point across the road.
-The same holds after a sighting far from the predicted position. A longer camera track does not improve this."""
 _STOPS_WITH_MPS2 = 3.5
 """Strongest braking of a driver who means to give way: more is an emergency (ISO 15622 permits ACC as much)."""
 _ACROSS = 0.7
@@ -27,9 +25,9 @@ _SURE_SIGMAS = 2.0
 
 def is_dependable(item: FusedObject) -> bool:
     """Seen now, with a measured range, and all conditions of a lead met except class and position. A distance from box
-    height alone gives too uncertain a speed to brake for an object that is not the lead."""
-    has_velocity = item.ranged and (not item.imaged or item.ranged_steady >= _VELOCITY_HITS)
-    return has_velocity and not item.carried and is_solid(item)
+    height alone gives too uncertain a speed to brake for an object that is not the lead, and so do too few sightings by
+    the LiDAR since the last one far from the predicted position; a longer camera track does not improve this."""
+    return has_ranged_velocity(item) and not item.carried and is_solid(item)
 
 
 def is_there_now(item: FusedObject, params: AebParams) -> bool:

@@ -45,6 +45,12 @@ _MOST_REFUSED = 2
 _LONGEST_GAP_S = 1.5
 """After this time without a sweep, odometry restarts."""
 _DESKEW = DeskewParams(enabled=True)
+_CONTRADICTS = "LiDAR odometry: sweeps contradict each other"
+_NOT_INSTALLED = "LiDAR odometry: not available, since kiss-icp has no package for this version of Python"
+
+
+Rates = tuple[RateFilter, RateFilter]
+"""Of the speed and of the heading."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,43 +136,82 @@ def follow(
     if not before.clouds:
         return OdometryStep(OdometryState((cloud,), (np.eye(4),)), None)
 
-    last = before.poses[-1]
+    moved = _registered(before, cloud, fixed, since_s, (speed, turning))
+    if before.speed is None or before.turning is None:
+        rates = (
+            rate_filter.start(moved.along_m, since_s, moved.along_sigma_m, _ACCEL_MPS2),
+            rate_filter.start(moved.turned_rad, since_s, moved.turned_sigma_rad, _TURN_RADPS2),
+        )
+        return _stepped(before, cloud, moved.pose, rates, 1)
+    foreseen = (
+        rate_filter.predict(before.speed, since_s, _JERK_MPS3),
+        rate_filter.predict(before.turning, since_s, _TURN_JERK_RADPS3),
+    )
+    if moved.fit < _LEAST_FIT or moved.surprise(foreseen, since_s) > _GATE_SIGMAS:
+        return _refused(before, cloud, foreseen, since_s)
+    rates = (
+        rate_filter.update(foreseen[0], moved.along_m, since_s, moved.along_sigma_m),
+        rate_filter.update(foreseen[1], moved.turned_rad, since_s, moved.turned_sigma_rad),
+    )
+    return _stepped(before, cloud, moved.pose, rates, before.agreeing + 1)
+
+
+class _Moved(NamedTuple):
+    """Where a sweep was registered, and the displacement since the last one."""
+
+    pose: F64
+    """(4, 4) T_start_ego."""
+    fit: float
+    """Share of structure that matches."""
+    along_m: float
+    """Length of the arc."""
+    along_sigma_m: float
+    """Standard deviation of that."""
+    turned_rad: float
+    """Positive to the left."""
+    turned_sigma_rad: float
+    """Standard deviation of that."""
+
+    def surprise(self, foreseen: Rates, since_s: float) -> float:
+        """Deviation from the prediction, in standard deviations; the larger of the two."""
+        return max(
+            _surprise(foreseen[0], self.along_m, since_s, self.along_sigma_m),
+            _surprise(foreseen[1], self.turned_rad, since_s, self.turned_sigma_rad),
+        )
+
+
+def _registered(
+    before: OdometryState,
+    cloud: F32,
+    fixed: structure.Support,
+    since_s: float,
+    foreseen: tuple[RateFilter | None, RateFilter | None],
+) -> _Moved:
+    """The cloud registered to the last ones, from the foreseen motion or, without one, from every speed of a car."""
+    last, (speed, turning) = before.poses[-1], foreseen
     starts = [speed.rate] if speed is not None else _starts(since_s)
     rate = turning.rate if turning is not None else 0.0
     guesses = [last @ _moved_by(start * since_s, rate * since_s) for start in starts]
     pose, fit = registration.align(cloud, before.clouds, before.poses, guesses)
     step = np.linalg.inv(last) @ pose
     turned = atan2(step[1, 0], step[0, 0])
-    moved = float(step[0, 3]) * cos(0.5 * turned) + float(step[1, 3]) * sin(0.5 * turned)
-    moved_sigma, turned_sigma = _CELL_SIGMA_M / fixed.along_x**0.5, _CELL_SIGMA_M / fixed.turning_m2**0.5
-
-    agreeing, refused = before.agreeing, before.refused
-    if before.speed is None or before.turning is None:
-        new_speed = rate_filter.start(moved, since_s, moved_sigma, _ACCEL_MPS2)
-        new_turning = rate_filter.start(turned, since_s, turned_sigma, _TURN_RADPS2)
-        agreeing = 1
-    else:
-        foreseen = rate_filter.predict(before.speed, since_s, _JERK_MPS3)
-        foreseen_turn = rate_filter.predict(before.turning, since_s, _TURN_JERK_RADPS3)
-        surprise = max(
-            _surprise(foreseen, moved, since_s, moved_sigma), _surprise(foreseen_turn, turned, since_s, turned_sigma)
-        )
-        if surprise > _GATE_SIGMAS or fit < _LEAST_FIT:
-            if refused + 1 > _MOST_REFUSED or agreeing < _AGREEING:
-                return OdometryStep(OdometryState((cloud,), (np.eye(4),)), None, _CONTRADICTS)
-            kept = evolve(before, refused=refused + 1, unplaced_s=since_s)
-            return OdometryStep(kept, _motion(foreseen, foreseen_turn, last @ _moved_by(moved, turned)), _CONTRADICTS)
-        new_speed = rate_filter.update(foreseen, moved, since_s, moved_sigma)
-        new_turning = rate_filter.update(foreseen_turn, turned, since_s, turned_sigma)
-        agreeing, refused = agreeing + 1, 0
-    after = OdometryState(
-        (*before.clouds, cloud)[-_KEPT:], (*before.poses, pose)[-_KEPT:], new_speed, new_turning, agreeing, refused
-    )
-    return OdometryStep(after, _motion(new_speed, new_turning, pose) if agreeing >= _AGREEING else None)
+    along = float(step[0, 3]) * cos(0.5 * turned) + float(step[1, 3]) * sin(0.5 * turned)
+    return _Moved(pose, fit, along, _CELL_SIGMA_M / fixed.along_x**0.5, turned, _CELL_SIGMA_M / fixed.turning_m2**0.5)
 
 
-_CONTRADICTS = "LiDAR odometry: sweeps contradict each other"
-_NOT_INSTALLED = "LiDAR odometry: not available, since kiss-icp has no package for this version of Python"
+def _stepped(before: OdometryState, cloud: F32, pose: F64, rates: Rates, agreeing: int) -> OdometryStep:
+    """After a displacement that the filters accept."""
+    after = OdometryState((*before.clouds, cloud)[-_KEPT:], (*before.poses, pose)[-_KEPT:], *rates, agreeing)
+    return OdometryStep(after, _motion(rates, pose) if agreeing >= _AGREEING else None)
+
+
+def _refused(before: OdometryState, cloud: F32, foreseen: Rates, since_s: float) -> OdometryStep:
+    """After a displacement that contradicts the filters: the foreseen motion, for a few sweeps; then a new start."""
+    if before.refused + 1 > _MOST_REFUSED or before.agreeing < _AGREEING:
+        return OdometryStep(OdometryState((cloud,), (np.eye(4),)), None, _CONTRADICTS)
+    kept = evolve(before, refused=before.refused + 1, unplaced_s=since_s)
+    expected = [rate_filter.expected(each, since_s)[0] for each in foreseen]
+    return OdometryStep(kept, _motion(foreseen, before.poses[-1] @ _moved_by(*expected)), _CONTRADICTS)
 
 
 def _too_little(points: int, fixed: structure.Support) -> str:
@@ -213,6 +258,7 @@ def _moved_by(moved: float, turned: float) -> F64:
     return pose
 
 
-def _motion(speed: RateFilter, turning: RateFilter, pose: F64) -> LidarMotion:
+def _motion(rates: Rates, pose: F64) -> LidarMotion:
+    speed, turning = rates
     place = (float(pose[0, 3]), float(pose[1, 3]), atan2(pose[1, 0], pose[0, 0]))
     return LidarMotion(speed.rate, speed.sigma, turning.rate, turning.sigma, place)

@@ -36,6 +36,8 @@ _SPEED_SIGMA_MPS: dict[MotionSource, tuple[float, float]] = {"can": (0.1, 0.01),
 """For each source: a constant part, and a share of the speed (tyre wear changes the radius by 1 %)."""
 _YAW_RATE_SIGMA_RADPS: dict[MotionSource, float] = {"can": 0.005, "ins": 0.002, "gnss": 1.0 * pi / 180.0}
 """The car's own sensor as measured in comma2k19; for a receiver, the slope of courses that are accurate to 0.2°."""
+_NAMES: dict[str, str] = {"can": "CAN", "ins": "IMU", "gnss": "GNSS", "lidar": "LiDAR"}
+"""For people."""
 
 
 @dataclass(frozen=True)
@@ -215,6 +217,3 @@ def _turns_otherwise(chosen: MotionEstimate | None, each: MotionEstimate) -> lis
         f"yaw rate: {_NAMES[chosen.source]} {chosen.yaw_rate_radps * 180.0 / pi:+.0f}°/s, "
         f"{_NAMES[each.source]} {each.yaw_rate_radps * 180.0 / pi:+.0f}°/s"
     ]
-
-
-_NAMES: dict[str, str] = {"can": "CAN", "ins": "IMU", "gnss": "GNSS", "lidar": "LiDAR"}

@@ -27,6 +27,7 @@ _MOST_MATCHED = 1500
 _FITS_M = 0.5
 """Maximum distance between points of one surface in two sweeps of 16 rings."""
 _JUDGED_BY = 2
+"""A pose is scored against this many of the latest sweeps."""
 
 
 class Registration(NamedTuple):

@@ -5,11 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.common.geometry import inverse, rotation
+from pipeline.common.geometry import T_OPTICAL_BODY, inverse, rotation
 from pipeline.types import F64
 
-T_OPTICAL_BODY = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
-"""From a camera's body axes (x forward, y left, z up; REP 103) to its optical ones (x right, y down, z forward)."""
 _UPRIGHT = 0.5
 """Cosine of the largest roll of an upright camera: 60°."""
 

@@ -18,6 +18,8 @@ from pipeline.formats.extrinsic_mistakes import likely_mistake, looks_ahead
 from pipeline.types import F64, U8, CameraCalibration, CameraImage
 from pipeline.types.source import SourceError
 
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
+"""Of the images in a folder."""
 _JPEG_START = b"\xff\xd8"
 _MARKERS = ((_JPEG_START, b"\xff\xd9"), (b"\x89PNG", b"IEND"))
 _LARGEST_FILE_BYTES = 512 << 20

@@ -7,7 +7,8 @@ import numpy as np
 from pipeline.types import F32
 from pipeline.types.source import SourceError
 
-_FARTHEST_M = 1000.0
+FARTHEST_M = 1000.0
+"""No LiDAR measures farther: such numbers are damaged."""
 
 
 def parse_points(data: bytes, file: str, columns: int, brightest: float, notes: list[str]) -> F32:
@@ -19,7 +20,7 @@ def parse_points(data: bytes, file: str, columns: int, brightest: float, notes: 
         notes.append(f"{file}: truncated in the middle of a point")
     raw = np.frombuffer(data, dtype="<f4", count=whole * columns).reshape(-1, columns)
     with np.errstate(invalid="ignore"):  # comparing a signalling NaN of a damaged file
-        good = np.all(np.abs(raw[:, :3]) < _FARTHEST_M, axis=1) & (raw[:, 3] >= 0.0) & (raw[:, 3] <= brightest)
+        good = np.all(np.abs(raw[:, :3]) < FARTHEST_M, axis=1) & (raw[:, 3] >= 0.0) & (raw[:, 3] <= brightest)
     kept = raw[good & np.any(raw[:, :3] != 0.0, axis=1)]
     if not len(kept):
         raise SourceError(f"{file}: no LiDAR points")

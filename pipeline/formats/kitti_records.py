@@ -12,6 +12,7 @@ import numpy as np
 from pipeline.common.geometry import Cuboid, inverse, transform
 from pipeline.common.time_range import is_time
 from pipeline.types import F64, Box, GnssQuality
+from pipeline.types.frame import SLOWEST_COURSE_MPS
 from pipeline.types.source import SourceError, TruthObject
 
 DONT_CARE = "DontCare"
@@ -43,7 +44,6 @@ _LAT, _LON, _ALT, _YAW, _NORTH_MPS, _EAST_MPS, _FORWARD_MPS = 0, 1, 2, 5, 6, 7, 
 _YAW_RATE, _POSITION_ERROR, _POSITION_MODE = 22, 23, 27
 _QUALITY: dict[int, GnssQuality] = {3: "single", 4: "dgnss", 5: "rtk_float", 6: "rtk_fixed", 7: "dgnss", 8: "dgnss"}
 """OXTS's position modes that are a fix; below 3 the unit reckons from what it had."""
-_SLOWEST_COURSE_MPS = 0.5
 _VELODYNE_FROM_IMU_M = (0.81, -0.32)
 """Forward and left, from calib_imu_to_velo.txt, which is the same to a centimetre in all drives."""
 _METRES_A_DEGREE = 111_320.0
@@ -196,7 +196,7 @@ def parse_oxts(data: bytes, file: str) -> Oxts:
         lat_deg + (forward * s + left * c) / _METRES_A_DEGREE,
         lon_deg + (forward * c - left * s) / (_METRES_A_DEGREE * np.cos(np.radians(lat_deg))),
         values[_ALT],
-        float(np.arctan2(east, north) % (2.0 * np.pi)) if np.hypot(east, north) >= _SLOWEST_COURSE_MPS else None,
+        float(np.arctan2(east, north) % (2.0 * np.pi)) if np.hypot(east, north) >= SLOWEST_COURSE_MPS else None,
         max(values[_POSITION_ERROR], 0.01),
         _QUALITY.get(int(np.clip(values[_POSITION_MODE], -1, 99))),
     )

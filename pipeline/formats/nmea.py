@@ -11,10 +11,9 @@ from typing import Any
 import pynmea2
 
 from pipeline.types import GnssFix, GnssQuality
+from pipeline.types.frame import SLOWEST_COURSE_MPS
 
-_KNOT_MPS = 1852.0 / 3600.0
-_SLOWEST_COURSE_MPS = 0.5
-"""Below this speed, a course is noise of the receiver."""
+KNOT_MPS = 1852.0 / 3600.0
 _QUALITY: Mapping[int, GnssQuality] = {1: "single", 2: "dgnss", 3: "single", 4: "rtk_fixed", 5: "rtk_float"}
 """GGA's quality indicator; 0 is no fix, 6 to 8 are dead reckoning, typed in or simulated."""
 _RANGE_ERROR_M: Mapping[GnssQuality, float] = {"single": 3.0, "dgnss": 1.0, "rtk_float": 0.3, "rtk_fixed": 0.015}
@@ -96,11 +95,11 @@ class NmeaReader:
             return None
         if rmc is not None and isinstance(rmc.datestamp, date):
             self._date = rmc.datestamp
-        speed_mps = float(rmc.spd_over_grnd) * _KNOT_MPS if rmc is not None and rmc.spd_over_grnd is not None else None
+        speed_mps = float(rmc.spd_over_grnd) * KNOT_MPS if rmc is not None and rmc.spd_over_grnd is not None else None
         if speed_mps is None or self._moment is None:
             return None
         course = rmc.true_course
-        is_moving = course is not None and speed_mps >= _SLOWEST_COURSE_MPS
+        is_moving = course is not None and speed_mps >= SLOWEST_COURSE_MPS
         lat_deg, lon_deg = float(place.latitude), float(place.longitude)
         if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
             raise ValueError("an impossible position")

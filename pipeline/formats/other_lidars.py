@@ -1,4 +1,4 @@
-"""Packets of LiDARs that are not decoded here: whose they are, so that a person is told what to do.
+"""Packets of LiDARs that are not decoded here: whose they are, so that the error can say what to do.
 
 No package that decodes Hesai's or RoboSense's packets in Python is kept well. Ouster's own, ouster-sdk, pins versions
 of rosbags, click and flask that the product cannot share, and needs a metadata file beside the capture.

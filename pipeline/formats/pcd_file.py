@@ -13,6 +13,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.formats.point_cloud_fields import MOST_POINTS
 from pipeline.types.source import SourceError
 
 _TYPES = {
@@ -20,7 +21,6 @@ _TYPES = {
     ("F", 8): "f8",
     **{(kind, size): f"{kind.lower()}{size}" for kind in "IU" for size in (1, 2, 4, 8)},
 }
-_MAX_POINTS = 4_000_000
 _MAX_HEADER = 8192
 _LINES = ("VERSION", "FIELDS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
 
@@ -90,7 +90,7 @@ def _dtype(lines: dict[str, list[str]]) -> np.dtype[np.void]:
 
 def _points(lines: dict[str, list[str]]) -> int:
     points = int(lines["POINTS"][0]) if "POINTS" in lines else int(lines["WIDTH"][0]) * int(lines["HEIGHT"][0])
-    if not 0 <= points <= _MAX_POINTS:
+    if not 0 <= points <= MOST_POINTS:
         raise ValueError("an invalid number of points")
     return points
 

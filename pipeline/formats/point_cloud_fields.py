@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.formats.float_points import FARTHEST_M
 from pipeline.formats.velodyne.elevations import VLP16_ELEVATIONS_DEG
 from pipeline.types import F32, F64, U8, Sweep
 from pipeline.types.source import SourceError
@@ -14,9 +15,12 @@ from pipeline.types.source import SourceError
 _RING_NAMES = ("ring", "channel", "laser_id")
 _INTENSITY_NAMES = ("intensity", "i", "reflectivity")
 _SECONDS = ("time", "t", "timestamp", "time_stamp", "time_offset")
-_FARTHEST_M = 1000.0
+MOST_POINTS = 4_000_000
+"""Of a cloud in a file or message: more than ten times those of the largest LiDARs."""
 _LONGEST_SWEEP_S = 1.0
+"""Times of points farther from the sweep's own than this are of another clock and left out."""
 _FEWEST_A_RING = 20
+"""Points of a ring below which its mean elevation says too little."""
 _VLP16 = len(VLP16_ELEVATIONS_DEG)
 
 
@@ -57,7 +61,7 @@ def cloud_of(raw: npt.NDArray[np.void], t_ns: int, notes: list[str]) -> Cloud:
         raise SourceError("a point cloud without x, y and z")
     with np.errstate(invalid="ignore", over="ignore"):  # signalling NaNs and huge numbers of a damaged file
         xyz = np.column_stack([raw[axis].astype(np.float32) for axis in "xyz"])
-        good = np.all(np.abs(xyz) < _FARTHEST_M, axis=1) & np.any(xyz != 0.0, axis=1)
+        good = np.all(np.abs(xyz) < FARTHEST_M, axis=1) & np.any(xyz != 0.0, axis=1)
         if not good.any():
             raise SourceError("no LiDAR points")
         xyz, kept = np.ascontiguousarray(xyz[good]), raw[good]

@@ -18,6 +18,7 @@ from pipeline.types import VEHICLES, FusedObject, Path
 _REACH_M = 35.0
 """Farther away, a sweep may hit a car too rarely to form a cluster."""
 _CONFIRMED = 3
+"""Measurements of a track before it is evidence."""
 _NARROWEST_M, _WIDEST_M = 1.2, 6.0
 _SAME_RANGE_SIGMAS, _APART_RAD = 1.5, radians(8.0)
 

@@ -27,6 +27,7 @@ from pipeline.ranging.further import Tracks
 from pipeline.types import VEHICLES, Box, FusedObject, Gate, LidarTrack, Mask, Point2, RangedTrack, VisionTrack
 
 _SURELY_ONE = 0.5
+"""Horizontal overlap of cluster and box from which they are surely one vehicle: see ``Fusion.ranged_boxes``."""
 _KEPT_IOU = 0.2
 """Another cluster must overlap a box by this much more than the one it was joined with: with a VLP-16's few rings,
 overlaps vary by as much from frame to frame."""
@@ -296,7 +297,7 @@ def _identities(state: FusionState, keys: list[dict[str, int]], is_seen: list[bo
     measures it now.
 
     A row inherits an id of its tracks that is not yet taken: that which one of them has had for longest, so that a
-    track that another object had for a moment does not bring along that object's id; of several, the oldest. Rows of
+    track that another object had for a moment does not bring that object's id; of several, the oldest. Rows of
     more sensors choose first, so that a single fragment never takes over the id of a whole object; then those that are
     seen and have had their id for long: a vehicle that leaves the image keeps its id where the LiDAR follows it, not
     where its box was expected."""

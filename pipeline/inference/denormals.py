@@ -26,6 +26,7 @@ _MXCSR = 7
 _FLUSH_ARM = 1 << 24
 """Bit FZ of the register FPCR, the first word of ``fenv_t`` (glibc and musl on aarch64)."""
 _FENV_WORDS = 16
+"""More than ``fenv_t`` takes on any platform here."""
 
 
 def flush_weights(model: onnx.ModelProto) -> int:

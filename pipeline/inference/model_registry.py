@@ -19,8 +19,8 @@ from pydantic import BaseModel
 
 from pipeline.common.errors import BadInput
 from pipeline.common.files.data_dir import data_dir, file_sha256
-from pipeline.common.files.own_folder import own_folder
-from pipeline.common.files.user_file_errors import given_path
+from pipeline.common.files.own_folder import own_folder, why_impossible
+from pipeline.common.files.user_file_errors import given_path, reason_of
 from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.common.files.whole_files import replace_text
 from pipeline.common.progress import Progress, silent
@@ -65,8 +65,12 @@ class ModelEntry:
 
 
 def store() -> Path:
-    """The folder of installed networks; it need not exist."""
-    return own_folder() / "models"
+    """The folder of installed networks; it need not exist. ModelError if it cannot exist."""
+    folder = own_folder() / "models"
+    impossible = why_impossible(folder)
+    if impossible is not None:
+        raise ModelError(impossible)
+    return folder
 
 
 def list_models() -> tuple[ModelEntry, ...]:
@@ -270,7 +274,9 @@ def _read_registry() -> _Registry:
         registry = _Registry.model_validate_json(read_regular(path, LARGEST_TEXT_BYTES))
     except FileNotFoundError:
         return _Registry()
-    except (OSError, ValueError, RecursionError):
+    except OSError as error:
+        raise ModelError(f"{path} cannot be read: {reason_of(error)}") from None
+    except (ValueError, RecursionError):
         registry = None
     if registry is None or not all(map(_is_name, (*registry.models, *registry.defaults.values()))):
         raise ModelError(f"{path} is damaged; delete it and register your networks again")

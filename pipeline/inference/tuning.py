@@ -90,7 +90,7 @@ def untuned(threads: int) -> RunSettings:
 
 def kept_way(path: Path, threads: int) -> RunSettings:
     """The tuned settings for a network's file on this machine, or the default ones."""
-    rows, usual = _read(_file()), untuned(threads)
+    rows, usual = _read(settings_file()), untuned(threads)
     row = rows.get(_key(path)) if rows else None
     if row is None:
         return usual
@@ -104,19 +104,19 @@ def kept_way(path: Path, threads: int) -> RunSettings:
 
 def is_tuned(path: Path) -> bool:
     """Whether settings are stored for a network's file on this machine."""
-    return _key(path) in _read(_file())
+    return _key(path) in _read(settings_file())
 
 
 def keep(path: Path, way: RunSettings, gain: Gain | None = None) -> None:
     """Use these settings for this file's network from now on. OSError if the store cannot be written."""
-    file = _file()
+    file = settings_file()
     row = asdict(way) | (asdict(gain) if gain is not None else {})
     replace_text(file, json.dumps(_read(file) | {_key(path): row}, indent=1, sort_keys=True) + "\n")
 
 
 def kept_gain(path: Path) -> Gain | None:
     """What the stored settings for a network's file gained on this machine; None if nothing is stored."""
-    row = _read(_file()).get(_key(path), {})
+    row = _read(settings_file()).get(_key(path), {})
     try:
         return Gain(float(row["usual_ms"]), float(row["best_ms"]))
     except (KeyError, TypeError, ValueError, OverflowError):
@@ -244,7 +244,8 @@ def _no_arena(way: RunSettings) -> Iterator[RunSettings]:
     yield evolve(way, arena=False)
 
 
-def _file() -> Path:
+def settings_file() -> Path:
+    """The file of the stored settings; it need not exist. ModelError if it cannot exist."""
     return store() / "tuning.json"
 
 

@@ -13,12 +13,10 @@ from scipy.optimize import linear_sum_assignment
 
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
-from pipeline.labels.model import LabelSet, LabelTrack, Lead
+from pipeline.labels.model import COUNTED_STATES, LabelSet, LabelTrack, Lead
 
 _SAME_IOU = 0.1
 """Two cuboids with a smaller overlap, seen from above, are different vehicles."""
-_COUNTED = ("accepted", "corrected")
-"""Only these states count; a proposal has not been confirmed by anybody."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ def _is_same(ours: Lead, theirs: Lead, partners: Mapping[int, int]) -> bool:
 def pairs(ours: list[Cuboid], theirs: list[Cuboid]) -> list[tuple[int, int, float]]:
     """Matching cuboids, one-to-one, with their overlap."""
     overlaps = np.array([[bev_iou(a, b) for b in theirs] for a in ours])
-    rows, columns = linear_sum_assignment(-overlaps)
+    rows, columns = linear_sum_assignment(np.where(overlaps >= _SAME_IOU, overlaps, 0.0), maximize=True)
     return [
         (int(a), int(b), float(overlaps[a, b]))
         for a, b in zip(rows, columns, strict=True)
@@ -108,7 +106,7 @@ def pairs(ours: list[Cuboid], theirs: list[Cuboid]) -> list[tuple[int, int, floa
 def _by_frame(labels: LabelSet) -> dict[int, list[tuple[LabelTrack, Cuboid]]]:
     found: dict[int, list[tuple[LabelTrack, Cuboid]]] = {}
     for track in labels.tracks:
-        if track.state in _COUNTED:
+        if track.state in COUNTED_STATES:
             for each in track.sightings:
                 if each.cuboid is not None:
                     found.setdefault(each.frame, []).append((track, each.cuboid))
@@ -119,6 +117,6 @@ def _leads(labels: LabelSet) -> dict[int, Lead]:
     return {
         frame: each.lead
         for each in labels.leads
-        if each.state in _COUNTED
+        if each.state in COUNTED_STATES
         for frame in range(each.first, each.last + 1)
     }

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from pipeline.alignment.projection import Alignment
-from pipeline.common.geometry import Cuboid
+from pipeline.common.geometry import CUBOID_EDGES, Cuboid
 from pipeline.labels.model import Sighting
 from pipeline.types import F32, F64, U8, Frame
 
@@ -23,10 +23,11 @@ _BESIDE_M = 0.6
 _ROAD_M = 0.2
 """Points this close to its bottom may be road."""
 _SHOWN_M = 1.5
+"""Of the surroundings, around the cuboid."""
 _IMAGE_MARGIN = 0.4
+"""Share of the box shown around it in the image."""
 _BACK, _POINT, _BESIDE, _EDGE, _TEXT = (24, 20, 17), (235, 225, 215), (90, 150, 255), (140, 220, 120), (190, 190, 190)
 _VIEWS = (("top", 0, 1), ("side", 0, 2), ("rear", 1, 2))
-_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ def _in_image(frame: Frame, sighting: Sighting, alignment: Alignment | None) -> 
     shown = cv2.warpAffine(frame.image.bgr, onto, (WIDTH_PX, HEIGHT_PX), flags=cv2.INTER_LINEAR, borderValue=_BACK)
     if pixels is not None:
         at = np.rint(pixels * scale + onto[:, 2]).astype(int)
-        for a, b in _EDGES:
+        for a, b in CUBOID_EDGES:
             cv2.line(shown, at[a].tolist(), at[b].tolist(), _EDGE, 1, cv2.LINE_AA)
     elif sighting.bbox is not None:
         ends = np.rint(around * scale + onto[:, 2]).astype(int)

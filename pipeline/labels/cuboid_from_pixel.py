@@ -12,18 +12,17 @@ from pipeline.alignment.projection import Alignment, resolve
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
 from pipeline.fusion.vehicle_sizes import usual_size_m
-from pipeline.labels.cuboids.points_of import FEWEST_POINTS
+from pipeline.labels.cuboids.points_of import CLUSTERS, FEWEST_POINTS
 from pipeline.labels.cuboids.snap import onto_points
 from pipeline.lidar.boxes import fit_obstacles
 from pipeline.lidar.cluster import candidates, cluster
 from pipeline.lidar.ground import Ground, fit_ground
-from pipeline.params import BoxParams, ClusterParams, GroundParams, Params
+from pipeline.params import BoxParams, GroundParams, Params
 from pipeline.types import F32, I32, REAL_VEHICLES, Box, Detection, Frame, Mask, VisionMeasurement
 from pipeline.vision.distance import measure
 
 _CLICK_SHARE = 0.015
 """Maximum distance of a point from a click, in image widths."""
-_CLUSTERS = ClusterParams(front_only=False, min_points=FEWEST_POINTS)
 _OWN_SHARE = 0.5
 """A cluster with a smaller share inside the box is something behind or in front of it."""
 
@@ -99,7 +98,7 @@ def _points_of(
     sweep = frame.sweep.points
     everything = np.ones(len(sweep), dtype=bool)
     ground = fit_ground(sweep, everything, GroundParams())
-    labels = cluster(sweep, candidates(sweep, ground, everything, _CLUSTERS), _CLUSTERS)
+    labels = cluster(sweep, candidates(sweep, ground, everything, CLUSTERS), CLUSTERS)
     uv = alignment.project(sweep[:, :3].astype(np.float64))
     if bbox is not None:
         inside = np.all((uv >= bbox[:2]) & (uv <= bbox[2:]), axis=1) & (labels >= 0)

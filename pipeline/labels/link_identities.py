@@ -23,6 +23,7 @@ MAX_GAP_S = TimeParams().reset_gap_s
 _LINK_M, _LINK_MPS = 2.0, 10.0
 _FIRST_MPS, _FIRST_ASIDE_M = 50.0, 1.0
 _NEVER = 1e6
+"""Cost of an impossible pair, metres: above any that is possible."""
 _STILL = np.zeros(2)
 
 

@@ -16,7 +16,11 @@ from pipeline.types import Box, Point2
 State = Literal["proposed", "accepted", "corrected", "rejected"]
 """proposed: not reviewed yet. corrected: a person changed the proposal. rejected: a person marked it as wrong; it is
 kept, so that it is not proposed again."""
+COUNTED_STATES: tuple[State, ...] = ("accepted", "corrected")
+"""States of labels that somebody answers for. A proposal has not been confirmed by anybody."""
 
+Maker = Literal["pipeline", "person", "import"]
+"""Type of a label's author."""
 
 Heading = Literal["", "motion", "lane", "unknown"]
 """Source of the heading of proposed cuboids: the vehicle's motion, or its lane. unknown: undetermined, a person must
@@ -30,7 +34,7 @@ FARTHEST_LEAD_M = 60.0
 class Origin:
     """Who made a label."""
 
-    maker: Literal["pipeline", "person", "import"]
+    maker: Maker
     """Type of author."""
     name: str
     """The person, or the file or run that it came from."""

@@ -17,7 +17,7 @@ import numpy as np
 from pipeline.common.geometry import Cuboid, iou_matrix
 from pipeline.labels.boxes import boxes_of
 from pipeline.labels.formats.base import LabeledDrive
-from pipeline.labels.model import LabelSet, LabelTrack, Sighting
+from pipeline.labels.model import COUNTED_STATES, LabelSet, LabelTrack, Sighting
 
 LONGEST_STEP_S = 0.5
 """Jumps are not checked between frames farther apart in time."""
@@ -53,7 +53,7 @@ class Problem:
 def problems(labels: LabelSet, drive: LabeledDrive) -> list[Problem]:
     """Problems by frame. Proposals and rejected labels are not checked; nor are frames more than ``LONGEST_STEP_S``
     apart."""
-    tracks = [track for track in labels.tracks if track.state in ("accepted", "corrected")]
+    tracks = [track for track in labels.tracks if track.state in COUNTED_STATES]
     found = [
         *(each for track in tracks for each in _of_track(track, drive.t_ns)),
         *_overlaps(tracks),

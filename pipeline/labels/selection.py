@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, LeadRange, PathLabel
+from pipeline.labels.model import COUNTED_STATES, EventLabel, LabelSet, LabelTrack, LeadRange, PathLabel
 
 Selection = Literal["all", "accepted", "reviewed"]
 """accepted: accepted or corrected by a person or a file. reviewed: also approved by a second person."""
@@ -18,7 +18,7 @@ def selected(labels: LabelSet, what: Selection) -> LabelSet:
         return labels
 
     def stands(label: LabelTrack | LeadRange | PathLabel | EventLabel) -> bool:
-        is_accepted = label.state in ("accepted", "corrected") and not label.comment
+        is_accepted = label.state in COUNTED_STATES and not label.comment
         return is_accepted and (what == "accepted" or bool(label.reviewer))
 
     tracks = tuple(filter(stands, labels.tracks))

@@ -28,6 +28,7 @@ _MIN_CONTRAST, _FULL_CONTRAST = 9.0, 60.0
 """Minimum brightness difference between paint and both sides in grey levels, and the difference from which it is
 certainly paint."""
 _PER_ROW = 12
+"""Marking candidates kept of one image row; bounds the arrays."""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pipeline.types.lane import EgoLane, LaneLine
 
 _POLYLINE_STEP_M = 1.0
 _DRAWN_FROM_M = 1.0
+"""Ahead of the camera; nearer points project far outside the image."""
 
 
 def polylines(lane: EgoLane) -> dict[str, F64]:

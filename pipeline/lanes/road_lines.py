@@ -50,7 +50,9 @@ _BEYOND = 0.6
 inverse."""
 _COMPARED = powers(10.0)
 _APART_M = 0.6
+"""Two lines nearer to each other than this, ten metres ahead, are one."""
 _VEHICLE_MARGIN = 0.1
+"""Share of a box's width left out at either side of it."""
 
 
 @dataclass(frozen=True)

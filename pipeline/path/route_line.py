@@ -17,7 +17,8 @@ SPACING_M = 1.0
 _SMALLEST_STEP_M = 0.3
 _LONGEST_SMOOTHING_M = 8.0
 _SMOOTHING_PER_SIGMA = 20.0
-_NORTH, _SOUTH = 32600, 32700
+UTM_NORTH, UTM_SOUTH = 32600, 32700
+"""EPSG codes of the UTM grids of WGS 84, without the zone that is added to them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +61,7 @@ def lay_out(route: Route) -> RouteLine | None:
 def utm_zone(lat_deg: float, lon_deg: float) -> int:
     """EPSG code of the UTM zone of a WGS 84 position."""
     zone = min(int((lon_deg + 180.0) / 6.0) % 60 + 1, 60)
-    return (_NORTH if lat_deg >= 0.0 else _SOUTH) + zone
+    return (UTM_NORTH if lat_deg >= 0.0 else UTM_SOUTH) + zone
 
 
 def to_grid(epsg: int, lat_deg: float, lon_deg: float) -> tuple[float, float, float]:

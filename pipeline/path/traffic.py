@@ -50,6 +50,7 @@ _KEPT_S, _BEHIND_M = 20.0, -10.0
 _USUAL_TIME_S = 3.0
 """Time ahead over which the curvature changes as much as the lateral jerk of roads permits."""
 _WIDEST_RAD = 1.2
+"""Larger bearings count as this one: a point beside or behind the car lies at the end of no endless arc."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,7 +43,7 @@ because a loaded machine may be slow."""
 _MOST_HANGS = 3
 """After this many hangs, a recording ends: each leaves a thread and an open file behind."""
 _TOLD_S = 60.0
-"""How long a restart is told."""
+"""How long a restart is shown."""
 _DISK_HANGS = (
     "the disk does not respond. New data is kept in memory and written once it does; what does not fit is counted as "
     "lost"

@@ -16,16 +16,15 @@ from mcap.records import Footer, McapRecord, Statistics, SummaryOffset
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC, Writer
 
-from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import open_new
 from pipeline.common.files.signing import configured_signer
 from pipeline.common.progress import Progress, silent
 from pipeline.recording import topics
-from pipeline.recording.mcap.chain import ChainWriter, link_at
+from pipeline.recording.mcap.chain import PIECE_BYTES, ChainWriter, link_at
 from pipeline.recording.mcap.index import read_summary, summary_start
 from pipeline.recording.mcap.output import CHUNK_BYTES
 from pipeline.recording.mcap.reader import McapFile, Stored
 
-_PIECE_BYTES = 1 << 20
 _CRC_BYTES = 4
 _LABELS = topics.channel(topics.LABELS)
 
@@ -66,10 +65,7 @@ def relabel(
         place = _first_with_labels(file)
         if summary is None or place == 0 or not _is_in_order(file, summary):
             return False
-        try:
-            target = out.open("x+b")
-        except FileExistsError:
-            raise BadInput(f"{out}: file already exists; choose another name or remove it") from None
+        target = open_new(out, "x+b")
         try:
             with target:
                 before = file.directory.chunks[place - 1]
@@ -105,7 +101,7 @@ def _copy(source: BinaryIO, target: BinaryIO, end: int, progress: Progress) -> N
     source.seek(0)
     while done < end:
         progress(done, end)
-        piece = source.read(min(_PIECE_BYTES, end - done))
+        piece = source.read(min(PIECE_BYTES, end - done))
         if not piece:
             raise OSError("the session shrank while being read")
         target.write(piece)

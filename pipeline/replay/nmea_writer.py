@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from datetime import UTC, datetime
 
+from pipeline.formats.nmea import KNOT_MPS
 from pipeline.types import GnssFix
 
 _QUALITY = {"single": 1, "dgnss": 2, "rtk_fixed": 4, "rtk_float": 5}
-_KNOT_MPS = 1852.0 / 3600.0
 
 
 def sentences(fix: GnssFix, utc_ns: int) -> bytes:
@@ -22,7 +22,7 @@ def sentences(fix: GnssFix, utc_ns: int) -> bytes:
     bodies = (
         f"GPGST,{clock},,,,,{fix.sigma_m:.3f},{fix.sigma_m:.3f},{fix.sigma_m:.3f}",
         f"GPGGA,{clock},{place},{_QUALITY[fix.quality]},12,0.8,{height},M,0.0,M,,",
-        f"GPRMC,{clock},A,{place},{fix.speed_mps / _KNOT_MPS:.4f},{course},{at:%d%m%y},,,A",
+        f"GPRMC,{clock},A,{place},{fix.speed_mps / KNOT_MPS:.4f},{course},{at:%d%m%y},,,A",
     )
     return b"".join(_with_checksum(body) for body in bodies)
 

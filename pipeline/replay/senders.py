@@ -24,6 +24,7 @@ _LOOPBACK = "127.0.0.1"
 _EVERY = "0.0.0.0"
 _HOUR_NS = 3_600_000_000_000
 _STAMP_AT = 1200
+"""Offset of the time stamp in a data packet."""
 
 
 class Sender(Protocol):

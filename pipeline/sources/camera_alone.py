@@ -16,7 +16,14 @@ from pipeline.common.fast_replace import evolve
 from pipeline.common.nearest_in_time import Timeline
 from pipeline.common.time_range import is_time
 from pipeline.ego_motion.from_gnss import MotionFromGnss
-from pipeline.formats.file_reading import files_by_name, read_bytes, read_image, recording_file, recording_folder
+from pipeline.formats.file_reading import (
+    IMAGE_SUFFIXES,
+    files_by_name,
+    read_bytes,
+    read_image,
+    recording_file,
+    recording_folder,
+)
 from pipeline.formats.gpx_file import parse_gpx
 from pipeline.formats.video_file import VideoFile
 from pipeline.source_kinds import VIDEO_SUFFIXES
@@ -28,7 +35,6 @@ from pipeline.sources.uri_options import number_option, split_options
 from pipeline.types import U8, CameraCalibration, CameraImage, Frame, GnssFix, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
-IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png")
 _OPTIONS = ("rate_hz", "hfov_deg", "height_m", "nmea", "gpx", "rig", "gnss_offset_s")
 _RANGES = {"rate_hz": (0.01, 1000.0), "hfov_deg": (10.0, 170.0), "height_m": (0.1, 10.0)}
 """Of options: from slow time lapses to high-speed cameras, from telephoto to wide-angle lenses, from low cars to

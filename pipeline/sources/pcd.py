@@ -12,7 +12,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.common.time_range import is_time
-from pipeline.formats.file_reading import files_by_name, image_of, image_size, read_bytes, recording_folder
+from pipeline.formats.file_reading import (
+    IMAGE_SUFFIXES,
+    files_by_name,
+    image_of,
+    image_size,
+    read_bytes,
+    recording_folder,
+)
 from pipeline.formats.pcd_file import parse_pcd
 from pipeline.formats.point_cloud_fields import cloud_of
 from pipeline.sources import rig as rig_files
@@ -22,7 +29,6 @@ from pipeline.types.source import Opening, SourceError, TruthObject
 
 _STEP_NS = 100_000_000
 _IMAGES = ("", "images", "image", "camera", "image_02")
-_IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _CLOUDS = ("", "pcd", "lidar", "velodyne", "points")
 _NUMBER = re.compile(r"^\d+(\.\d+)?$")
 _EPOCH_S = 631_152_000  # 1990: smaller numbers count frames
@@ -45,7 +51,7 @@ class PcdSource:
         if not self._sweeps:
             raise SourceError(f"{path}: contains no PCD files")
         self._names = list(self._sweeps)
-        self._images = next((found for name in _IMAGES if (found := files_by_name(folder / name, _IMAGE_SUFFIXES))), {})
+        self._images = next((found for name in _IMAGES if (found := files_by_name(folder / name, IMAGE_SUFFIXES))), {})
         self._size = image_size(self._images.values()) or (0, 0)
         rig_file = rig_files.rig_in_folder(folder, options)
         rig = rig_files.load_rig(rig_file) if rig_file is not None else rig_files.Rig()

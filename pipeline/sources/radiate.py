@@ -24,14 +24,16 @@ from pipeline.common.time_range import is_time
 from pipeline.formats.file_reading import files_by_name, image_of, image_size, read_bytes, recording_folder
 from pipeline.formats.text_rows import parse_rows
 from pipeline.sources import rig as rig_files
+from pipeline.sources.sidecar_files import IMAGE_WITHIN_NS
 from pipeline.sources.uri_options import split_options
 from pipeline.types import F32, F64, U8, CameraCalibration, EgoState, Frame, GnssFix, Sweep
+from pipeline.types.frame import SLOWEST_COURSE_MPS
 from pipeline.types.source import Opening, SourceError, TruthObject
 
 _CHANNELS = 32
 _COLUMNS = 5  # x y z intensity ring
 _NO_IMAGES = "no images: no zed_left/*.png whose time is in zed_left.txt"
-_IMAGE_WITHIN_NS, _STATE_WITHIN_NS = 100_000_000, 500_000_000
+_STATE_WITHIN_NS = 500_000_000
 _STAMP = re.compile(rb"Frame:\s*(\d{1,9})\s+Time:\s*(\d{1,10})\.(\d{1,9})\s*$")
 _ROAD_Z_M = -2.1
 """From the LiDAR's road returns at 4 to 12 m in the SDK's sample; the files do not contain its height."""
@@ -41,7 +43,6 @@ _DISTORTION = np.array([-0.183879883467351, 0.0308609205858947, 0.0, 0.0])
 _TURNS_DEG, _OFFSET_M = (-1.2787805, 0.530414, 0.000802), (0.26029, -0.05021277, -0.037881)
 """From the LiDAR to the left camera: differences of both rotations and translations in ``default-calib.yaml``."""
 _T_EGO_LIDAR = np.array([[0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-_SLOWEST_COURSE_MPS = 0.5
 
 
 class TimedFiles(NamedTuple):
@@ -97,7 +98,7 @@ class RadiateSource:
         sweep = self._sweep(index, notes)
         image = None
         if self._images.paths:
-            at = nearest(self._images.times_ns, t_ns, _IMAGE_WITHIN_NS)
+            at = nearest(self._images.times_ns, t_ns, IMAGE_WITHIN_NS)
             stamp = int(self._images.times_ns[at]) if at is not None else None
             image = image_of(self._images.paths[at] if at is not None else None, stamp, self._size, notes)
         else:
@@ -185,7 +186,7 @@ def parse_state(data: bytes, file: str, t_ns: int) -> tuple[EgoState, GnssFix]:
     if not np.isfinite(numbers).all() or not is_place or np.abs(numbers[3:]).max() > 200.0:
         raise SourceError(f"{file}: not a record of the GNSS/INS")
     speed_mps = float(np.hypot(north, east))
-    course_rad = float(np.arctan2(east, north) % (2.0 * np.pi)) if speed_mps >= _SLOWEST_COURSE_MPS else None
+    course_rad = float(np.arctan2(east, north) % (2.0 * np.pi)) if speed_mps >= SLOWEST_COURSE_MPS else None
     ego = EgoState(t_ns, speed_mps, -down_radps, source="ins")
     fix = GnssFix(t_ns, lat_deg, lon_deg, alt_m, course_rad, speed_mps, "dgnss", max(sigma_m, 0.01))
     return ego, fix

@@ -24,6 +24,7 @@ from pipeline.common.files.user_file_errors import given_path
 from pipeline.common.files.user_files import read_regular
 from pipeline.formats.nmea import parse_sentence
 from pipeline.formats.xml_text import parse_xml
+from pipeline.path.route_line import UTM_NORTH, UTM_SOUTH
 from pipeline.types import GnssFix, Route
 
 _LAT_NAMES = ("lat", "lat_deg", "latitude", "latitude_deg")
@@ -31,7 +32,6 @@ _LON_NAMES = ("lon", "lon_deg", "lng", "long", "longitude", "longitude_deg")
 _EAST_NAMES = ("easting", "easting_m", "east", "utm_easting", "utm_x")
 _NORTH_NAMES = ("northing", "northing_m", "north", "utm_northing", "utm_y")
 _ZONE_NAMES = ("epsg", "zone", "utm_zone")
-_UTM_NORTH, _UTM_SOUTH = 32600, 32700
 SIGMA_BY_NMEA_QUALITY_M = {1: 2.0, 2: 0.8, 4: 0.02, 5: 0.3}
 """By GGA's quality field: single, differential, RTK fixed, RTK float."""
 _UNKNOWN_SIGMA_M = 0.5
@@ -151,7 +151,7 @@ def utm_epsg(zone: str) -> int | None:
     match = re.fullmatch(r"(?:EPSG:)?(32[67])(\d\d)|(\d{1,2}) ?([NS])", zone.strip().upper())
     if match is None:
         return None
-    base = int(match[1]) * 100 if match[1] else _UTM_NORTH if match[4] == "N" else _UTM_SOUTH
+    base = int(match[1]) * 100 if match[1] else UTM_NORTH if match[4] == "N" else UTM_SOUTH
     number = int(match[2] or match[3])
     return base + number if 1 <= number <= 60 else None
 

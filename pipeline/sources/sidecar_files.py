@@ -26,8 +26,10 @@ OPTIONS = ("video", "video_offset_s", "nmea", "rig")
 _LARGEST_NMEA_BYTES = 1 << 30
 """Ten sentences of 80 bytes ten times a second, for more than a day."""
 NMEA_SUFFIXES = (".nmea", ".nma", ".ubx.txt")
-_IMAGE_WITHIN_NS = 100_000_000
+IMAGE_WITHIN_NS = 100_000_000
+"""The image of a sweep is at most this far away in time: a period of 10 Hz."""
 FIX_WITHIN_NS = 1_500_000_000
+"""A fix is used for as long as this; receivers send once a second or more often."""
 _LONGEST_LINE = 1024
 
 
@@ -93,7 +95,7 @@ class Beside:
         if self._video is None:
             notes += self._unreadable
             return None
-        index = nearest(self._video.times_ns, t_ns - self._video_begins_ns, _IMAGE_WITHIN_NS)
+        index = nearest(self._video.times_ns, t_ns - self._video_begins_ns, IMAGE_WITHIN_NS)
         if index is None:
             notes.append("no image within 0.1 s")
             return None

@@ -149,6 +149,10 @@ class OwnMotion:
 GnssQuality = Literal["single", "dgnss", "rtk_float", "rtk_fixed"]
 
 
+SLOWEST_COURSE_MPS = 0.5
+"""Below this speed, a course is noise of the receiver."""
+
+
 @dataclass(frozen=True)
 class GnssFix:
     """Position of the ego origin on the Earth (WGS 84)."""

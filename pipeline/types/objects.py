@@ -12,39 +12,39 @@ from pipeline.types.measurements import Obstacle
 from pipeline.types.sensors import ObjectSource, are_several, is_camera_in, is_lidar_in, is_ranging_in, kinds_in
 
 HeightFrom = Literal["class", "shape", "road", "range"] | None
-"""Of a vehicle that the camera sees: the usual height of its class; the shape of its boxes; where they meet the road;
-measured ranges; None without a distance."""
+"""How the height of a vehicle that the camera sees was estimated: from its class, from the shape of its boxes, from
+where they meet the road, or from measured ranges. None without a distance."""
 
 
 class LidarTrack(NamedTuple):
     """An obstacle followed over time."""
 
     id: int
-    """Never given twice."""
+    """Never reused."""
     obstacle: Obstacle
-    """The last one seen, moved by the prediction while the track is carried."""
+    """As last seen; while the track is carried, at its predicted position."""
     velocity_mps: Point2 | None
-    """Relative to ego, x and y; None until two sightings."""
+    """Relative to ego, x and y; None until the second sighting."""
     hits: int
     """Sightings so far."""
     missed: int
-    """Sweeps in a row that lacked it."""
+    """Number of consecutive sweeps without it."""
     carried: bool
     """Not seen in this frame."""
     unseen_s: float = 0.0
     """Time since it was last seen."""
     rigid_mps: float | None = None
-    """How fast both sides of it surely move together along ego y, relative to ego; None where that is not asked."""
+    """Speed along ego y, relative to ego, that both of its sides certainly share; None if it is not estimated."""
     steady: int = 1
-    """Sightings in a row, with the first one, that lay where the track was expected."""
+    """Number of consecutive sightings near the predicted position, including the first sighting."""
 
 
 @dataclass(frozen=True)
 class VisionTrack:
-    """A detected box followed over time. What was never measured is None."""
+    """A detected box followed over time. Values that were never measured are None."""
 
     id: int
-    """Never given twice."""
+    """Never reused."""
     bbox: Box
     """Pixels of the raw image."""
     label: str
@@ -62,160 +62,159 @@ class VisionTrack:
     hits: int
     """Sightings so far."""
     missed: int
-    """Images in a row that lacked it."""
+    """Number of consecutive images without it."""
     carried: bool
     """Not seen in this frame."""
     measured: bool = True
     """Whether its distance was measured in this frame: a box cut by the image's edge is seen, but not measured."""
     ranges: int = 0
-    """Distances in a row that its place took in, since it was last begun."""
+    """Number of consecutive distances that its position is based on, since that was last initialised."""
     returns: int = 0
-    """LiDAR returns inside its box that its distance was measured by in this frame."""
+    """Number of LiDAR returns inside its box that gave its distance in this frame; 0 without any."""
     height_from: HeightFrom = None
-    """How tall it is taken for, on which its distance rests."""
+    """How its height was estimated, from which its distance is computed."""
     speed_sigma_mps: float | None = None
-    """Standard deviation of its velocity along the line of sight, with that of the law's lasting error; None without a
-    velocity."""
+    """Standard deviation of its velocity along the line of sight, including the constant error of the distance law;
+    None without a velocity."""
     wander_mps: float = 0.0
-    """The same because boxes wander: errors that last for a second or more seem to be motion."""
+    """Standard deviation of the apparent speed of slowly wandering boxes: errors that last for a second look like
+    motion."""
     images: int = 1
-    """Images since its first sighting, with that one, in which the detector ran."""
+    """Number of images in which the detector ran, from its first sighting on."""
 
     @property
     def boxed_share(self) -> float:
-        """Share of these images that have its box."""
+        """Share of ``images`` in which it was detected."""
         return self.hits / self.images
 
 
 class RangedTrack(NamedTuple):
-    """What a ranging sensor other than the LiDAR, such as a radar, has followed over time."""
+    """An object that a ranging sensor other than the LiDAR, such as a radar, follows over time."""
 
     id: int
-    """Never given twice by its sensor."""
+    """Never reused by its sensor."""
     position: Point2
     """Ego x, y of its nearest point, filtered."""
     sigma_m: Point2
     """Standard deviation of the position along the line of sight and across it."""
     velocity_mps: Point2 | None
-    """Relative to ego, x and y; None until it is known."""
+    """Relative to ego, x and y; None while unknown."""
     hits: int
     """Sightings so far."""
     carried: bool
     """Not seen in this frame."""
     steady: int = 1
-    """Sightings in a row, with the first one, that lay where the track was expected."""
+    """Number of consecutive sightings near the predicted position, including the first sighting."""
 
 
 DistanceFrom = str | None
-"""``cluster``: a LiDAR cluster; ``returns``: single LiDAR returns inside its image box; ``box``: the height of that
-box; the name of another ranging sensor; None: nothing in this frame."""
+"""What the distance was measured from in this frame: ``cluster``, a LiDAR cluster; ``returns``, single LiDAR returns
+inside the image box; ``box``, the height of that box; or the name of another ranging sensor. None: not measured."""
 
 
 @dataclass(frozen=True)
 class FusedObject:
-    """One physical object: the paper's Table 3 row, with what docs/reference/results.md adds; its frames and units
-    apply.
+    """One physical object: a row of the paper's Table 3, extended as in docs/reference/results.md, which defines frames
+    and units.
 
-    A V object whose distance is not known (no law for its class, a box cut by the image's edge, beyond the law's
-    reach) keeps its row; its place and distance are None, and it cannot be the CIPV.
+    A V object of unknown distance (no law for its class, a box cut by the image's edge, beyond the range of the law)
+    keeps its row; its position and distance are None, and it cannot be the CIPV.
 
-    Stages ask for capabilities (``ranged``, ``seen_by_lidar``); the letters of ``source`` and ``seen_by`` are for the
+    Stages use capabilities (``ranged``, ``seen_by_lidar``); the letters in ``source`` and ``seen_by`` are only for the
     result.
     """
 
     id: int
-    """Id of the object, stable from frame to frame, whichever sensors see the object."""
+    """Stays the same from frame to frame, whichever sensors see the object."""
     source: ObjectSource
-    """Which sensors' tracks it is made of."""
+    """The sensors whose tracks it consists of."""
     label: str | None
-    """Its class, by the camera; None for what only the LiDAR has."""
+    """Its class according to the camera; None if only the LiDAR sees it."""
     score: float | None
     """The detector's score for that class, 0–1."""
     bbox: Box | None
     """Its image box, pixels; None outside the image."""
     bev: tuple[Point2, Point2, Point2, Point2] | None
-    """Its footprint from above: ego x, y of front left, front right, rear right, rear left."""
+    """Footprint: ego x, y of front left, front right, rear right, rear left."""
     cuboid: Cuboid | None
-    """The box around its LiDAR points; None without any."""
+    """Box around its LiDAR points; None without points."""
     closest_point: Point3 | None
-    """Ego x, y, z of the point of it that is nearest to the ego origin."""
+    """Ego x, y, z of its point nearest to the ego origin."""
     distance_m: float | None
     """Horizontal range from the ego origin to that point."""
     distance_sigma_m: float | None
     """Standard deviation of the distance."""
     velocity_mps: Point2 | None
-    """Relative to ego, x and y; None until it can be told."""
+    """Relative to ego, x and y; None while unknown."""
     seen_by: ObjectSource
-    """Which of its sensors saw it in this frame; none: it is carried."""
+    """The sensors that saw it in this frame; empty if it is carried."""
     hits: int
-    """Sightings so far, by the sensor that has more of them."""
+    """Sightings so far, by the sensor with most of them."""
     lidar_points: int
-    """Points of its last cluster."""
+    """Number of points of its last cluster."""
     lidar_track: int | None
     """Id of its LiDAR track."""
     vision_track: int | None
     """Id of its vision track."""
     gates: tuple[Gate, ...] = ()
-    """The tests it went through, for display."""
+    """The tests of this object, for display."""
     speed_over_ground_mps: float | None = None
-    """None where own speed is not known."""
+    """None while own speed is unknown."""
     oncoming: bool | None = None
-    """Whether it drives against our direction, within 45°; None where own speed is not known."""
+    """Whether it drives in the opposite direction, within 45°; None while own speed is unknown."""
     moving: bool | None = None
-    """Whether it moves over the ground; None where own speed is not known."""
+    """Whether it moves over ground; None while own speed is unknown."""
     surely_moving: bool | None = None
-    """Whether it moves by more than the error of its speed explains; None where own speed is not known."""
+    """Whether it moves faster than the error of its speed can explain; None while own speed is unknown."""
     ttc_s: float | None = None
     """Time to collision; None while the gap does not shrink."""
     in_path: bool = False
     """Whether ``in_path_probability`` is above a half."""
     in_path_probability: float | None = None
-    """What its sightings so far say together, the fresh ones most; None where its place is not known."""
+    """From all its sightings so far, with the most weight on recent ones; None while its position is unknown."""
     path_offset_m: float | None = None
     """From the path's centre to the middle of its nearest face, positive to the left."""
     path_margin_m: float | None = None
-    """How far inside the path this sighting alone places it, negative outside; None where its place is not known."""
+    """How far inside the path it is by this sighting alone, negative outside; None while its position is unknown."""
     measured: bool = True
-    """Whether its distance was measured in this frame; otherwise it is a prediction."""
+    """Whether its distance was measured in this frame; otherwise it is predicted."""
     lateral_mps: float | None = None
     """Speed to the left of the path, over ground."""
     crossing_s: float | None = None
-    """Until it is over the edge of the path, or out of the path if it is in it; None when its sideways speed leads to
-    neither."""
+    """Time until it enters the path or, if it is inside, leaves it; None if its lateral speed leads to neither."""
     clears_path_s: float | None = None
-    """How long before the car arrives it will have left the path that it crosses; None for one that does not cross, or
-    that the car might meet."""
+    """For an object that crosses the path: how long before the car arrives it will have left it. None for others, and
+    if the car might meet it."""
     ranged_hits: int = 0
-    """Sightings by the sensor that measures range, by the one that has more of them; 0 without one."""
+    """Sightings by a ranging sensor, by the one with most of them; 0 without one."""
     ranged_steady: int = 0
-    """The most recent of these in a row that were where the track was expected."""
+    """The most recent consecutive ones of these that were near the predicted position."""
     justifies: Braking = Braking.FULL
-    """The hardest braking that what is known of it can justify."""
+    """The hardest braking that the evidence for it justifies."""
     camera_ranges: int = 0
-    """Distances in a row that its vision track took in."""
+    """Number of consecutive distances that its vision track is based on."""
     camera_speed_sigma_mps: float | None = None
-    """Standard deviation of its velocity along the line of sight where that comes from its image boxes."""
+    """Standard deviation of its velocity along the line of sight, if that comes from its image boxes."""
     camera_wander_mps: float = 0.0
-    """The same because its boxes wander, which matters for whether it moves at all."""
+    """As ``VisionTrack.wander_mps``: decides whether it may be standing."""
     boxed_share: float = 1.0
-    """Share of the images since its first box that have one; 1 without a vision track."""
+    """As ``VisionTrack.boxed_share``; 1 without a vision track."""
     returns: int = 0
-    """LiDAR returns inside its image box that ranged it in this frame, where it has no cluster."""
+    """Number of LiDAR returns inside its image box that gave its distance in this frame; 0 with a cluster."""
     height_from: HeightFrom = None
-    """What the camera alone takes its height from, on which its distance rests; None for an object with a cluster."""
+    """How the camera estimated its height, from which its distance is computed; None with a cluster."""
     existence: float | None = None
-    """Probability that it is really there, by the evidence of both sensors; None where that is not weighed."""
+    """Probability that it exists, from the evidence of all sensors; None if that is switched off."""
     rigid_mps: float | None = None
-    """Of its LiDAR track: how fast both its sides surely move together along ego y, relative to ego. None without."""
+    """As ``LidarTrack.rigid_mps``; None without a LiDAR track."""
     box_sides: tuple[Point2, Point2] | None = None
-    """Ego x, y where the lines of sight past its box's left and right edge are as far away as the object; None unless
-    the camera sees it now."""
+    """Ego x, y of its box's left and right edge at its distance; None unless the camera sees it in this frame."""
     eligibility: Eligibility | None = None
-    """Which conditions of a lead it meets; None before it was judged."""
+    """Which conditions of a lead it meets; None until it has been checked."""
 
     @property
     def distance_from(self) -> DistanceFrom:
-        """What its distance was measured by in this frame."""
+        """What its distance was measured from in this frame."""
         if self.carried or not self.measured or self.distance_m is None:
             return None
         if self.seen_by_lidar:
@@ -226,18 +225,18 @@ class FusedObject:
 
     @property
     def carried(self) -> bool:
-        """Not seen in this frame: where it is now is a prediction."""
+        """Not seen in this frame: its position is predicted."""
         return not self.seen_by
 
     @property
     def ranged(self) -> bool:
-        """A sensor that measures range follows it. Otherwise its distance and speed come from the height of its image
-        box, and are much less sure."""
+        """A ranging sensor follows it. Otherwise its distance and speed come from the height of its image box, and are
+        much less accurate."""
         return is_ranging_in(self.source)
 
     @property
     def ranged_now(self) -> bool:
-        """A sensor that measures range saw it in this frame."""
+        """A ranging sensor saw it in this frame."""
         return is_ranging_in(self.seen_by)
 
     @property
@@ -262,5 +261,5 @@ class FusedObject:
 
     @property
     def seen_by_two_sensors(self) -> bool:
-        """More than one sensor saw it in this frame, so no second look is needed to believe in it."""
+        """More than one sensor saw it in this frame, which confirms it at once."""
         return are_several(self.seen_by)

@@ -69,8 +69,8 @@ class Cipv:
     reason: str
     """Why this object, in words."""
     accel_mps2: float | None = None
-    """Its acceleration over ground along our line of sight, negative when it brakes; None until it can be told, and for
-    the next CIPV."""
+    """Its acceleration over ground along our line of sight, negative when it brakes; None until it is known well
+    enough, and for the next CIPV."""
     accel_sigma_mps2: float | None = None
     """Standard deviation of that."""
 

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from pipeline.alignment.projection import Alignment, Angular, Pinhole
 from pipeline.common.geometry import F64
+from pipeline.common.robust import mad_sigma
 from pipeline.params import DistanceParams
 from pipeline.types import REAL_VEHICLES, Box, CameraCalibration, Detection, DistanceLaw, VisionMeasurement
 
@@ -34,6 +35,7 @@ _HUBER = 1.345
 """Residuals beyond this many standard deviations get less weight: 95 % efficiency on clean data (Huber 1981, section
 4)."""
 _ROUNDS = 30
+"""Of iteratively reweighted least squares."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ def fit_power_law(heights_px: npt.ArrayLike, distances_m: npt.ArrayLike, exponen
     for _ in range(_ROUNDS):
         intercept, slope = _weighted_line(x, y, weights, exponent)
         residual = np.abs(y - intercept - slope * x)
-        sigma = 1.4826 * float(np.median(residual))
+        sigma = mad_sigma(residual)
         weights = np.minimum(1.0, _HUBER * sigma / np.maximum(residual, 1e-12)) if sigma > 1e-12 else weights
     return PowerLaw(math.exp(intercept), slope)
 

@@ -40,6 +40,7 @@ this wide in the windows of Astyx, KITTI 0052 and 0009 and a video, 19 had no co
 of these was a vehicle: they were the road ahead, taken for a car as wide as the window, the gap between vehicles, and
 parts of them. Of those 12 to 16 px wide, 3 % had none, of smaller ones 20 % and more."""
 _COUNTERPART_IOU = 0.4
+"""Overlap above which a box of the whole image is the same vehicle."""
 
 
 class WindowDetector(Protocol):

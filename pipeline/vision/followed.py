@@ -280,7 +280,7 @@ def renamed(followed: Followed, label: str, seen: VisionMeasurement) -> Followed
 
 
 def _is_plausible(place: CvState, ego_speed_mps: float | None) -> bool:
-    """Whether something on a road can move so. Without own speed only twice the limits can be told."""
+    """Whether something on a road can move so. Without the own speed, the limits are twice as wide."""
     along_mps = float(place.mean[2])
     own = ego_speed_mps if ego_speed_mps is not None else 0.0
     spare = 0.0 if ego_speed_mps is not None else FASTEST_ONCOMING_MPS

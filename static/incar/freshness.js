@@ -55,7 +55,7 @@ export function mayBeMs({ rate_hz, speed, live }) {
  * Age of the current frame: by the server's clock, and at least the time since it arrived. Null while there is no frame
  * or the server's clock is unknown.
  */
-export function ageMs() {
+function ageMs() {
   if (!frame || !isClockKnown()) return null;
   return Math.max(serverNow() - frame.madeUnixMs, performance.now() - cameAt);
 }

@@ -125,7 +125,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         return detectors[-1]
 
     desk = SessionRecorder(tmp_path_factory.mktemp("sessions"))
-    engine = Engine(open_source, open_counted, Params(), uri="sim:straight", whole_drives=True, desk=desk)
+    engine = Engine(open_source, open_counted, Params(), uri="sim:straight", whole_drives=True, recorder=desk)
     engine.start()
     engine.wait_for(lambda s: s.processed is not None, 120)
     running = Site(engine, 0, detectors)

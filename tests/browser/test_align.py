@@ -16,6 +16,7 @@ from app.engine.engine import Engine
 from pipeline.alignment.projection import corrected
 from pipeline.common.geometry import inverse
 from pipeline.formats.calibration_files import opencv
+from pipeline.formats.calibration_files.contents import GivenFile
 from pipeline.params import AlignmentParams, Params, with_changes
 from pipeline.sources import open_source
 from pipeline.types import Frame
@@ -128,7 +129,7 @@ def exported(page: Page, panel: Locator) -> Path:
 def test_a_calibration_goes_out_and_comes_back_as_one_step(page: Page, knocked: Site, tmp_path: Path):
     page.get_by_role("button", name="Files", exact=True).click()
     panel = page.get_by_label("Calibration files")
-    camera = opencv.parse({"out.yaml": exported(page, panel).read_bytes()}, None)
+    camera = opencv.parse({"": GivenFile("out.yaml", exported(page, panel).read_bytes())}, None)
     moved = AlignmentParams(yaw_deg=2.0, pitch_deg=-1.5, forward_m=0.1)
     opencv.write(tmp_path / "in.yaml", corrected(moved, camera))
     opencv.write(tmp_path / "wrong.yaml", replace(camera, T_camera_ego=inverse(camera.T_camera_ego)))

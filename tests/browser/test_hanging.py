@@ -38,7 +38,7 @@ def on_a_slow_disk(tmp_path: Path) -> Iterator[tuple[Site, Recording]]:
         uri=recording.uri,
         playing=True,
         watchdog=watchdog,
-        desk=SessionRecorder(tmp_path),
+        recorder=SessionRecorder(tmp_path),
     )
     engine.start()
     site = Site(engine, 0)
@@ -93,7 +93,7 @@ def test_a_recording_in_trouble_is_said_on_every_page(
     try:
         for path, page in pages.items():
             page.goto(site.address + path)
-        site.engine.desk.start(site.engine.source)
+        site.engine.recorder.start(site.engine.source)
         for path, page in pages.items():
             expect(page.locator(PAGES[path])).to_contain_text(said, timeout=WAIT_S * 1000)
     finally:

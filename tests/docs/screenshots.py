@@ -167,7 +167,7 @@ def dashboard(uri: str = SOURCE, moment: int = MOMENT) -> Iterator[Site]:
             whole_drives=True,
             open_lanes=lanes_for,
             far_view_px=WINDOW_PX,
-            desk=SessionRecorder(Path(folder)),
+            recorder=SessionRecorder(Path(folder)),
             labels=LabelDesk(Database.in_file(Path(folder) / "labels.db")),
         )
         with serving(engine) as site:

@@ -274,7 +274,7 @@ def desk(request: pytest.FixtureRequest, data_dir: Path, tmp_path: Path) -> Iter
                 (folder / part.name / file.name).symlink_to(file)
     uri = f"{scheme}:{folder}"
     recorder = SessionRecorder(tmp_path / "sessions")
-    engine = Engine(open_source, detector_for, Params(), uri=uri, whole_drives=True, desk=recorder)
+    engine = Engine(open_source, detector_for, Params(), uri=uri, whole_drives=True, recorder=recorder)
     site = Site(engine, 0)
     site.start()  # first: building the routes silences warnings for a moment, which other threads must not interrupt
     engine.start()

@@ -13,9 +13,9 @@ import tyro
 
 from app.commands.evaluate import DASHBOARD, dashboard_link
 from app.commands.support.arguments import option
-from app.commands.support.output_files import ensure_writable
 from app.fleet.extra import need_extra
 from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import ensure_writable
 
 _CHANGES = 20
 
@@ -39,7 +39,7 @@ class Compare:
     gate: Annotated[Path | None, option("FILE")] = None
     """Rules that the run must meet (YAML)"""
     report: Annotated[Path | None, option("FILE")] = None
-    """Write an HTML file with tables and links to the largest changes"""
+    """Write an HTML file with tables and links to the largest changes; an existing file is replaced"""
     dashboard: Annotated[str, tyro.conf.arg(metavar="URL")] = DASHBOARD
     """Dashboard address for the links, as `cipv serve` prints it"""
     json: bool = False

@@ -15,10 +15,10 @@ from app.commands.support.arguments import option
 from app.commands.support.cluster import ClusterOptions, run_with_bar, tally_of
 from app.commands.support.interruption import says_when_interrupted
 from app.commands.support.options import PipelineOptions
-from app.commands.support.output_files import ensure_writable
 from app.core.terminal import one_line
 from app.fleet.extra import need_extra
 from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import ensure_new, ensure_writable, write_new
 from pipeline.evaluation.report_sections import Chart, ReportSection, Series, Table
 from pipeline.params import Params, flat, to_yaml, with_changes
 
@@ -58,9 +58,9 @@ class ParameterSweep:
     """KITTI: LiDAR channels to keep: 16, like a VLP-16, or 64 for all"""
     cluster: ClusterOptions = field(default_factory=ClusterOptions)
     save: Annotated[Path | None, option("FILE")] = None
-    """Write the best set as a preset file (YAML)"""
+    """Write the best set as a preset file (YAML); must not exist"""
     report: Annotated[Path | None, option("FILE")] = None
-    """Write an HTML file with the table and the Pareto front"""
+    """Write an HTML file with the table and the Pareto front; an existing file is replaced"""
     json: bool = False
     """Print the figures as JSON"""
 
@@ -76,6 +76,8 @@ class ParameterSweep:
         base = self.pipeline.parameters()
         propose, count = self._proposer(base)
         plan = Plan(tuple(map(absolute, self.addresses)), base, self.pipeline.choice(), self.sensors, self.rings)
+        if self.save is not None:
+            ensure_new(self.save)
         for file in (self.save, self.report):
             if file is not None:
                 ensure_writable(file)
@@ -93,12 +95,12 @@ class ParameterSweep:
             print(f"cipv: no set has both scores, {names[0]} and {names[1]}; none is the best", file=sys.stderr)
             return 1
         if self.save is not None:
-            self.save.write_text(to_yaml(with_changes(base, best.changes)), encoding="utf-8")
+            write_new(self.save, to_yaml(with_changes(base, best.changes)))
             print(f"cipv: {self.save}: the set of run {best.run}", file=sys.stderr)
         return 0
 
     def _proposer(self, base: Params) -> tuple[Proposer, int]:
-        """What to try, and how many sets. Everything that is wrong is told here, before the work."""
+        """What to try, and how many sets. Every error is raised here, before the work."""
         from app.fleet.sweep import MOST_POINTS, fixed, grid, latin, parse_axis, searching
 
         if not self.addresses:

@@ -20,7 +20,7 @@ from app.core.kept_detections import row_of
 from app.core.pipe_messages import PipeClosed, exactly, receive, send
 from app.drive.look_ahead.messages import ImageHeader, NetworkFile, NetworkReply, Networks
 from pipeline.common.errors import BadInput
-from pipeline.common.idle_priority import take_idle_priority
+from pipeline.common.idle_priority import be_killed_first, take_idle_priority
 from pipeline.lanes.network import LaneNetwork, load_lane_network
 from pipeline.vision.detector import Detector, open_detector
 
@@ -28,8 +28,6 @@ _STARTS_AT = 10
 """Niceness until the networks are open."""
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 """A terminal or a supervisor sends these to the whole group; the server decides when this process ends."""
-_KILLED_FIRST = Path("/proc/self/oom_score_adj"), "1000"
-"""If memory runs out, the system kills this process instead of the server (Linux)."""
 
 
 def main() -> None:
@@ -37,8 +35,7 @@ def main() -> None:
     for name in _SIGNALS:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    with suppress(OSError):
-        _KILLED_FIRST[0].write_text(_KILLED_FIRST[1], encoding="ascii")
+    be_killed_first()
     with suppress(OSError, AttributeError):
         os.nice(_STARTS_AT)
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")

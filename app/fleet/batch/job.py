@@ -33,7 +33,7 @@ class Job:
         return answers_file(self.recording.mark, detectors, first, self.piece_frames)
 
     def reason(self, text: str) -> str:
-        """A message about the recording, without its address in front, which is told beside it."""
+        """A message about the recording without its address in front, which is printed beside it."""
         _, _, path = self.recording.address.partition(":")
         return text.removeprefix(f"{self.recording.address}: ").removeprefix(f"{path}: ")
 

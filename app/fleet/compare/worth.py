@@ -16,7 +16,7 @@ from pipeline.evaluation.scores.figures import CONFIDENCE, RESAMPLES, SEED, Inte
 from pipeline.types import F64
 
 FEWEST = 8
-"""Pairs of values below which no correlation is told."""
+"""Fewest pairs of values for a correlation."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from app.fleet.mining.choose import ChosenSecond
 from app.labels.acts.tags import put_tag
 from app.labels.store.database import Database
 from app.labels.store.drive_labels import DriveLabels, info_of
-from pipeline.labels.model import NEXT_TAG, FrameTag, LeadRange, Origin
+from pipeline.labels.model import COUNTED_STATES, NEXT_TAG, FrameTag, LeadRange, Origin
 from pipeline.sources import open_source
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class MiningQueue:
         """Whether a person has labelled the lead in all of these frames. Raises SourceError if the recording cannot be
         opened."""
         leads = [cast("LeadRange", item.value) for item in self._of(address).items("lead").values()]
-        sure = [each for each in leads if each.state in ("accepted", "corrected")]
+        sure = [each for each in leads if each.state in COUNTED_STATES]
         said = {n for lead in sure for n in range(lead.first, lead.last + 1)}
         return set(range(first, last + 1)) <= said
 

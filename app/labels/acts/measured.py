@@ -21,9 +21,8 @@ from pipeline.labels.cuboids.snap import refit
 from pipeline.labels.model import LabelTrack, Sighting
 from pipeline.params import Params
 from pipeline.types import Frame
+from pipeline.types.rounding import DECIMALS
 from pipeline.vision.classes import canonical
-
-_DECIMALS = 4
 
 
 def measured(
@@ -113,9 +112,9 @@ def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddMeasured, str]:
 
 def _given(cuboid: Cuboid) -> CuboidShape:
     """ActRefused for a cuboid that nobody could have drawn."""
-    x, y, z = (round(value, _DECIMALS) for value in cuboid.center)
-    length, width, height = (round(value, _DECIMALS) for value in cuboid.size)
+    x, y, z = (round(value, DECIMALS) for value in cuboid.center)
+    length, width, height = (round(value, DECIMALS) for value in cuboid.size)
     try:
-        return CuboidShape(center=(x, y, z), size=(length, width, height), yaw_rad=round(cuboid.yaw_rad, _DECIMALS))
+        return CuboidShape(center=(x, y, z), size=(length, width, height), yaw_rad=round(cuboid.yaw_rad, DECIMALS))
     except ValidationError:
         raise ActRefused(f"the points there are {length:.0f} × {width:.0f} × {height:.0f} m: not a vehicle") from None

@@ -119,7 +119,7 @@ class OverFrames(Strict):
     """An act on a range of frames."""
 
     seen: Id | None = None
-    """The revision of the labels that the person saw; what others have said in these frames since is a conflict. None
-    says it whatever was said."""
+    """The revision of the labels that the person saw; what others have changed in these frames since is a conflict.
+    None overrides whatever they did."""
     over_reviewed: bool = False
     """Whether what a second person has reviewed there may be cut."""

@@ -19,9 +19,7 @@ from app.labels.store.tables import ControlRow, DriveRow, ProjectDriveRow
 from pipeline.labels.agreement import agreement
 from pipeline.labels.classes import ClassList, as_bases
 from pipeline.labels.formats.native import from_json, to_json
-from pipeline.labels.model import LabelSet, LabelTrack, LeadRange
-
-_COUNTED = ("accepted", "corrected")
+from pipeline.labels.model import COUNTED_STATES, LabelSet, LabelTrack, LeadRange
 
 
 def pack_truth(truth: LabelSet, first: int, last: int) -> bytes:
@@ -102,4 +100,5 @@ def within(labels: LabelSet, first: int, last: int) -> LabelSet:
 
 def has_labels(labels: LabelSet) -> bool:
     """Whether anything in the set counts as truth."""
-    return any(each.state in _COUNTED for each in labels.tracks) or any(each.state in _COUNTED for each in labels.leads)
+    stated: tuple[LabelTrack | LeadRange, ...] = (*labels.tracks, *labels.leads)
+    return any(each.state in COUNTED_STATES for each in stated)

@@ -15,13 +15,11 @@ from app.labels.store.drive_labels import DriveLabels, info_of
 from app.labels.store.frame_ranges import free_spans, outside
 from app.labels.store.work import doubt, is_unclear
 from pipeline.common.errors import BadInput
-from pipeline.labels.model import NEXT_TAG, FrameTag, LabelSet, LeadRange, Origin
+from pipeline.labels.model import COUNTED_STATES, NEXT_TAG, FrameTag, LabelSet, LeadRange, Origin
 from pipeline.sources import open_source
 
 if TYPE_CHECKING:
     from app.labels.store.draft import Draft
-
-_LABELLED = ("accepted", "corrected")
 
 
 def set_up(database: Database, file: ProjectFile, person: str) -> Iterator[str]:
@@ -82,7 +80,7 @@ def _tagging(project: str, frames: list[int], origin: Origin) -> Callable[[Draft
 
     def tag(draft: Draft) -> str:
         leads = [cast("LeadRange", item.value) for item in draft.all("lead").values()]
-        said = {n for each in leads if each.state in _LABELLED for n in range(each.first, each.last + 1)}
+        said = {n for each in leads if each.state in COUNTED_STATES for n in range(each.first, each.last + 1)}
         others: set[int] = set()
         for number, item in draft.all("tag").items():
             old = cast("FrameTag", item.value)

@@ -13,7 +13,7 @@ from app.labels.store.drive_labels import DriveLabels
 from app.labels.transfer.files import drive_for
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.close_up import fit_of
-from pipeline.labels.model import LabelSet, LabelTrack
+from pipeline.labels.model import COUNTED_STATES, LabelSet, LabelTrack
 from pipeline.labels.plausibility import Problem, problems
 from pipeline.lidar.ground import fit_ground
 from pipeline.params import GroundParams
@@ -24,8 +24,8 @@ _NEAR_M = 30.0
 _MOST_READ = 200
 _OFF_ROAD_M = 0.5
 """Of the labelled vehicles of Astyx and KITTI 0009 within 30 m, none is more than 0.2 m off."""
-_AROUND_M = 4.0
-_FEWEST_AROUND = 5
+_AROUND_M, _FEWEST_AROUND = 4.0, 5
+"""Ground points within this distance of the cuboid; with fewer of them, the plane alone is compared."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def _empty(labels: LabelSet, recording: OpenRecording) -> list[Problem]:
     """Near cuboids without a single point, or below or above the road: one frame per track, and only labels accepted by
     people."""
     found: list[Problem] = []
-    for track in [each for each in labels.tracks if each.state in ("accepted", "corrected")][:_MOST_READ]:
+    for track in [each for each in labels.tracks if each.state in COUNTED_STATES][:_MOST_READ]:
         frame = _nearest(track)
         if frame is None:
             continue

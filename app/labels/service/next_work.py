@@ -10,7 +10,7 @@ from app.drive.full_run import DriveRun
 from app.labels.store.values import KINDS, Item, ItemKind
 from app.labels.wording import lead_text
 from pipeline.evaluation.lead_verdict import Judged
-from pipeline.labels.model import NEXT_TAG, EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel
+from pipeline.labels.model import COUNTED_STATES, NEXT_TAG, EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel
 
 if TYPE_CHECKING:
     from app.labels.service.scoring import LabelScores
@@ -137,7 +137,7 @@ def _unreviewed(labels: DriveLabels, person: str) -> list[WorkPlace]:
     places = []
     for frame, item in _begun(found):
         value = item.value
-        if isinstance(value, FrameTag) or value.state not in ("accepted", "corrected") or value.reviewer:
+        if isinstance(value, FrameTag) or value.state not in COUNTED_STATES or value.reviewer:
             continue
         author = found.authors.get((item.kind, item.id), "")
         if not person or person != author:

@@ -11,11 +11,10 @@ from sqlalchemy import ColumnElement, Connection, and_, func, select
 from app.labels.store.tables import ActRow, ChangeRow
 from app.labels.store.undo_order import WAYS
 from app.labels.store.values import Item, ItemKind, unpack_content
-from pipeline.labels.model import FrameTag, LeadRange
+from pipeline.labels.model import COUNTED_STATES, FrameTag, LeadRange
 
 _REVIEWS = ("review_ok", "send_back")
 """Acts that judge a label without changing it."""
-_COUNTED = ("accepted", "corrected")
 _MOST_NAMED = 500
 """Maximum ids in one query: databases limit this."""
 
@@ -32,7 +31,7 @@ def read_authors(connection: Connection, drive_id: int, items: Iterable[Item]) -
             continue
         if value.origin.maker == "person":
             found[item.kind, item.id] = value.origin.name
-        elif value.state in _COUNTED:
+        elif value.state in COUNTED_STATES:
             decided.setdefault(item.kind, []).append(item.id)
     for kind, numbers in decided.items():
         by = _lead_deciders(connection, drive_id) if kind == "lead" else _deciders(connection, drive_id, kind, numbers)

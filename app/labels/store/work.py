@@ -15,7 +15,7 @@ from app.labels.store.items import read_items
 from app.labels.store.tables import DriveRow, ProjectDriveRow, SightingRow, WorkRow
 from app.labels.store.values import ItemKind
 from app.labels.work_states import State
-from pipeline.labels.model import NEXT_TAG, EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel
+from pipeline.labels.model import COUNTED_STATES, NEXT_TAG, EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel
 
 _FRAME_KINDS: tuple[ItemKind, ...] = ("path", "event")
 
@@ -137,10 +137,10 @@ def _work(connection: Connection, drive: Any, person: str, state: State) -> Work
     )
     lengths = {track: count for track, count in counted}
     proposed = [each for each in tracks if each.state == "proposed"]
-    accepted = [each for each in tracks if each.state in ("accepted", "corrected")]
+    accepted = [each for each in tracks if each.state in COUNTED_STATES]
     unsure = sum(doubt(each) * lengths.get(each.id, 0) for each in proposed)
     unclear = sum(each.last + 1 - each.first for each in leads if is_unclear(each))
-    spans = [range(each.first, each.last + 1) for each in leads if each.state in ("accepted", "corrected")]
+    spans = [range(each.first, each.last + 1) for each in leads if each.state in COUNTED_STATES]
     said = sum(map(len, spans))
     tags = [cast("FrameTag", item.value) for item in read_items(connection, drive.id, "tag").values()]
     sampled = {frame for tag in tags if tag.tag == NEXT_TAG for frame in range(tag.first, tag.last + 1)}
@@ -163,7 +163,7 @@ def _work(connection: Connection, drive: Any, person: str, state: State) -> Work
         len(sampled),
         drive.project or "",
         sum(each.state == "proposed" for each in stated),
-        sum(each.state in ("accepted", "corrected") and not each.reviewer for each in stated),
+        sum(each.state in COUNTED_STATES and not each.reviewer for each in stated),
     )
 
 

@@ -28,7 +28,8 @@ from app.core.server_address import LOOPBACK_HOSTS, WILDCARDS, is_address
 from app.web.guards.revocation import serve_while_valid
 from app.web.guards.tokens import Guesses, Tokens
 
-_READING = frozenset({"GET", "HEAD", "OPTIONS"})
+READING = frozenset({"GET", "HEAD", "OPTIONS"})
+"""Methods of HTTP that change nothing."""
 _OWN_SITES = (None, "same-origin", "none")
 """Accepted values of Sec-Fetch-Site (W3C Fetch Metadata). ``same-site`` is excluded, because it may be another port of
 this host."""
@@ -124,7 +125,7 @@ class Guard:
         if scope["type"] not in ("http", "websocket"):
             return await self._app(scope, receive, send)
         is_socket = scope["type"] == "websocket"
-        answer = await self._refused(HTTPConnection(scope), is_socket or scope["method"] not in _READING)
+        answer = await self._refused(HTTPConnection(scope), is_socket or scope["method"] not in READING)
         if answer is None:
             if is_socket and self._tokens is not None:
                 still = await self._still(HTTPConnection(scope))
@@ -202,7 +203,7 @@ def _display_may(scope: Scope) -> bool:
         return False  # contains drives of other cars
     if (scope["method"], path) in _LABEL_ROLES:
         return False
-    return scope["method"] in _READING or (scope["method"], path) in _DISPLAY_MAY
+    return scope["method"] in READING or (scope["method"], path) in _DISPLAY_MAY
 
 
 def _given(connection: HTTPConnection) -> str | None:

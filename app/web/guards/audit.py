@@ -26,11 +26,11 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.core.client_role import account_of, is_display
+from app.web.guards.access import READING
 from pipeline.common.files.user_file_errors import reason_of
 
 logger = logging.getLogger("cipv.audit")
 
-_READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _WITH_CONTROLS = "/viser"
 """Address prefix of the only WebSocket through which parameters are changed."""
 _SHOWN_BYTES = 500
@@ -92,7 +92,7 @@ class Audit:
             await self._app(scope, receive, send)
 
     async def _request(self, scope: Scope, receive: Receive, send: Send) -> None:
-        changes = scope["method"] not in _READING
+        changes = scope["method"] not in READING
         body, status, is_file = bytearray(), 0, False
 
         async def receiving() -> Message:

@@ -179,7 +179,7 @@ def drive_router(engine: Engine, drives: BackgroundRuns, marks: Marks) -> APIRou
         index = shown.index if body.index is None or shown.live else body.index
         if not shown.live and index >= max(shown.count, 1):
             raise HTTPException(422, f"index: the recording has {shown.count} frames")
-        in_session = index == shown.index and engine.desk.mark(body.text or "marked")
+        in_session = index == shown.index and engine.recorder.mark(body.text or "marked")
         t_ns = shown.processed.frame.t_ns if shown.live and shown.processed is not None else None
         try:
             made = marks.add(_marks_of(shown), index, body.text, t_ns=t_ns, in_session=in_session)

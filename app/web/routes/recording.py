@@ -30,7 +30,7 @@ def recording_router(engine: Engine) -> APIRouter:
     def read() -> RecordingJson | None:
         """Get the state of the recording. Null while nothing is recorded. The same as ``state.recording`` in the stream
         and in /api/state."""
-        return _json(engine.desk.state)
+        return _json(engine.recorder.state)
 
     @router.post("/recording")
     def record(body: RecordingChoice) -> RecordingJson | None:
@@ -39,7 +39,7 @@ def recording_router(engine: Engine) -> APIRouter:
         POST /api/source {"uri": file}. Marks made meanwhile (POST /api/marks) are in it. 409 with a sentence when
         nothing is open or no file can be made. Opening another source ends the recording."""
         with refusing():
-            state = engine.desk.start(engine.source, engine.detectors) if body.on else engine.desk.stop()
+            state = engine.recorder.start(engine.source, engine.detectors) if body.on else engine.recorder.stop()
         engine.control.change()
         return _json(state)
 

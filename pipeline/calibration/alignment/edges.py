@@ -32,12 +32,13 @@ YAWS_DEG = tuple(np.arange(-0.6, 0.61, 0.2).round(2).tolist())
 BLOCK_NS = 500_000_000
 """Frames within half a second show the same edges and are resampled together."""
 FEWEST, FEWEST_BLOCKS = 500, 4
-"""Depth edges and pieces of the drive below which nothing is said."""
+"""Fewest depth edges and pieces of the drive for a verdict."""
 DRAWS = 60
 """Resampled drives, for the standard deviation."""
 WIDEST_DEG = 0.7
 """Above this standard deviation, no roll stands out."""
 _NEAREST_SIGMA_DEG = 0.1
+"""Resampling one drive never shows the errors that all of its frames share: no roll is known better than this."""
 
 
 class EdgeView(NamedTuple):

@@ -17,6 +17,7 @@ import numpy as np
 from pipeline.calibration.mount.observe import MountRecord, Piece, RoadPlane
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import inverse, rotation
+from pipeline.common.robust import mad_sigma
 from pipeline.types import F64, CameraCalibration
 
 FEWEST_ROADS, FEWEST_PIECES = 10, 8
@@ -151,7 +152,7 @@ def _against_travel(pieces: Sequence[Piece]) -> Told:
     found, spread = _with_spread(rows, [each.t_ns for each in pieces], solved)
     # the prior is not a measurement: the standard deviation is that of the pieces alone
     turned = rows[:, 1] - rows[:, 0] * float(rows[:, 0] @ rows[:, 1]) / float(rows[:, 0] @ rows[:, 0])
-    noise = 1.4826 * float(np.median(np.abs(rows[:, 2] + found[0] * rows[:, 0] - found[1] * rows[:, 1])))
+    noise = mad_sigma(rows[:, 2] + found[0] * rows[:, 0] - found[1] * rows[:, 1])
     axle_sigma = hypot(spread[1], noise / max(float(np.linalg.norm(turned)), 1e-9))
     return {
         "yaw_deg": (degrees(found[0]), hypot(degrees(spread[0]), YAW_FLOOR_DEG)),
@@ -168,7 +169,7 @@ def _against_speed(pieces: Sequence[Piece]) -> Told:
 
     found, spread = _with_spread(rows, [each.t_ns for each in pieces], solved)
     turned = rows[:, 1] - rows[:, 0] * float(rows[:, 0] @ rows[:, 1]) / float(rows[:, 0] @ rows[:, 0])
-    noise = 1.4826 * float(np.median(np.abs(rows[:, 2] - found[0] * rows[:, 0] + found[1] * rows[:, 1])))
+    noise = mad_sigma(rows[:, 2] - found[0] * rows[:, 0] + found[1] * rows[:, 1])
     return {
         "speed_scale": (round(float(found[0]), 4), float(spread[0])),
         "left_of_axle_m": (float(found[1]), hypot(spread[1], noise / max(float(np.linalg.norm(turned)), 1e-9))),

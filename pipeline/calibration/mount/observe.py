@@ -13,6 +13,7 @@ from math import atan2, cos, hypot, sin
 import numpy as np
 
 from pipeline.common.progress import Progress, silent
+from pipeline.common.robust import mad_sigma
 from pipeline.params import Params, with_changes
 from pipeline.run import only
 from pipeline.step import State, step
@@ -145,7 +146,7 @@ def _road(t_ns: int, points: F32, ground: Ground) -> RoadPlane | None:
     for _ in range(6):
         plane, *_ = np.linalg.lstsq(design[kept], z[kept], rcond=None)
         off = np.abs(design @ plane - z)
-        kept = off <= 2.5 * (1.4826 * float(np.median(off[kept])) + 1e-3)
+        kept = off <= 2.5 * (mad_sigma(off[kept]) + 1e-3)
     if np.count_nonzero(kept) < FEWEST_POINTS:
         return None
     # needs more than one ring to determine the slope ahead

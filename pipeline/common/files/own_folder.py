@@ -26,6 +26,17 @@ def own_folder() -> Path:
         return private_folder()
 
 
+def why_impossible(folder: Path) -> str | None:
+    """Why a folder below ``own_folder`` cannot be created, as a sentence with the remedy: a part of its path is a file.
+    None if it exists or nothing is known to prevent it; permissions show when something is written."""
+    blocking = next((each for each in (folder, *folder.parents) if os.path.lexists(each)), None)
+    if blocking is None or blocking.is_dir():
+        return None
+    reason = f"{own_folder()} cannot be created, since {blocking} is not a folder"
+    named = os.environ.get(HOME_VARIABLE)
+    return f"{HOME_VARIABLE}: {reason}" if named else f"{reason}; set {HOME_VARIABLE} to a folder for networks"
+
+
 def place_compiled_kernels(source: Path) -> None:
     """Let numba keep compiled kernels where that is possible. By itself it tries only the folder of the source, which
     may be read-only, and the account's home, which may be missing, and then refuses to start.

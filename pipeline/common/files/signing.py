@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import ensure_new
 from pipeline.common.files.user_file_errors import given_path, reason_of
 from pipeline.common.files.user_files import read_regular
 
@@ -73,14 +74,12 @@ def new_keys(private: Path) -> tuple[Path, str]:
     pem, raw = serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8
     secret = key.private_bytes(pem, raw, serialization.NoEncryption())
     shown = key.public_key().public_bytes(pem, serialization.PublicFormat.SubjectPublicKeyInfo)
-    if public.exists():
-        raise BadInput(f"{public}: file already exists; keys are never overwritten")
+    ensure_new(private)
+    ensure_new(public)
     for path, data, mode in ((private, secret, 0o600), (public, shown, 0o644)):
         try:
             with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
                 file.write(data)
-        except FileExistsError:
-            raise BadInput(f"{path}: file already exists; keys are never overwritten") from None
         except OSError as error:
             raise BadInput(f"{path}: cannot be written: {reason_of(error)}") from None
     return public, key.public_key().public_bytes_raw().hex()

@@ -16,6 +16,7 @@ from pipeline.common.clips import begins_clip
 from pipeline.evaluation.label_free.backward import look_back
 from pipeline.evaluation.label_free.history import NONE, SIGHTING, History, SightingRecords
 from pipeline.evaluation.scores.figures import Sums
+from pipeline.evaluation.scores.matching import MAX_RANGE_M, UNRANGED_SHARE
 from pipeline.types import F64, I64
 
 DriveScores = dict[str, Sums]
@@ -25,18 +26,19 @@ SURE_SHARE, SURE_M = 0.1, 0.5
 """An earlier distance is judged if later measurements determine it to this share of it, or to this value."""
 PROOFS = 3
 """Sightings by both sensors that must measure an object before the camera's earlier distances are judged."""
-FARTHEST_M, LARGEST_SHARE = 60.0, 0.35
+FARTHEST_M, LARGEST_SHARE = MAX_RANGE_M, UNRANGED_SHARE
 """As in scoring with labels: vehicles are judged up to this distance, and the camera's error is capped at this share of
 it, which is the maximum distance of an object from its matching label."""
-SURE_MPS = 2.0
-"""The same for a closing speed."""
-PROOF_S = 2.0
-"""Time after which a lead must have been confirmed."""
+SURE_MPS, FASTEST_MPS = 2.0, 70.0
+"""An earlier closing speed is judged if later measurements determine it to the first, and if it is below the second:
+250 km/h, which nothing on a road exceeds."""
+PROOF_S, LEAST_PROOF_S = 2.0, 1.0
+"""Time after its selection in which a lead must be confirmed. If the clip ends before the second, it is not judged."""
 PHANTOM_SHARE = 0.5
-"""A lead is a phantom if it was certainly in the path for less than this share of the time after it was chosen."""
-LATE_S = 3.0
-"""How far before its selection a lead is searched."""
-LONGEST_CLOSING_MPS = 70.0
+"""A lead is a phantom if it was seen in the path for less than this share of that time."""
+LATE_S, LASTING_S, NEARER_M = 3.0, 0.5, 0.5
+"""How far before its selection a lead is searched, if it led for longer than the second, and how much nearer than the
+object chosen there it must be."""
 
 
 class ScoredClip(NamedTuple):
@@ -124,7 +126,7 @@ def camera_speed(clip: ScoredClip) -> Sums:
     """Mean absolute error of the camera's closing speed."""
     over = under = 0.0
     for seen, _, closing, sigma in _hindsight(clip):
-        known = np.isfinite(seen["closing_mps"]) & (sigma <= SURE_MPS) & (np.abs(closing) < LONGEST_CLOSING_MPS)
+        known = np.isfinite(seen["closing_mps"]) & (sigma <= SURE_MPS) & (np.abs(closing) < FASTEST_MPS)
         over += float(np.abs(seen["closing_mps"] - closing)[known].sum())
         under += int(known.sum())
     return over, under
@@ -151,14 +153,6 @@ def episodes(lead: I64) -> list[Episode]:
     return [Episode(int(lead[first]), first, end - 1) for first, end in pairwise(bounds) if lead[first] != NONE]
 
 
-def _sure(clip: ScoredClip, number: int) -> np.ndarray:
-    """(N,) frames in which an object was certainly in the path: measured by the LiDAR, or tracked by both sensors."""
-    found = np.zeros(len(clip.t_s), bool)
-    seen = clip.objects.get(number, np.zeros(0, SIGHTING))
-    found[seen["frame"]] = seen["in_path"] & ~seen["carried"] & (seen["ranged"] | seen["two_sensors"])
-    return found
-
-
 def _there(clip: ScoredClip, number: int) -> np.ndarray:
     """(N,) frames in which an object was in the path and seen by any sensor."""
     found = np.zeros(len(clip.t_s), bool)
@@ -173,7 +167,7 @@ def phantom_frames(clip: ScoredClip) -> np.ndarray:
     for episode in episodes(clip.lead):
         there = _there(clip, episode.lead)
         until = int(np.searchsorted(clip.t_s, clip.t_s[episode.first] + PROOF_S, side="right"))
-        if clip.t_s[-1] - clip.t_s[episode.first] < PROOF_S / 2.0:
+        if clip.t_s[-1] - clip.t_s[episode.first] < LEAST_PROOF_S:
             continue  # unknown what it would have turned out to be
         after = there[episode.first : until]
         if after.mean() < PHANTOM_SHARE:
@@ -191,7 +185,7 @@ def late_frames(clip: ScoredClip) -> np.ndarray:
     other."""
     late = np.zeros(len(clip.t_s), bool)
     for episode in episodes(clip.lead):
-        if clip.t_s[episode.last] - clip.t_s[episode.first] < PROOF_S / 4.0:
+        if clip.t_s[episode.last] - clip.t_s[episode.first] < LASTING_S:
             continue
         seen = clip.objects.get(episode.lead, np.zeros(0, SIGHTING))
         there = _there(clip, episode.lead)
@@ -201,7 +195,7 @@ def late_frames(clip: ScoredClip) -> np.ndarray:
         while at >= 0 and clip.t_s[episode.first] - clip.t_s[at] <= LATE_S and there[at]:
             chosen = clip.objects.get(int(clip.lead[at]), np.zeros(0, SIGHTING))
             other = chosen["distance_m"][chosen["frame"] == at]
-            if not len(other) or distance[at] < other[0] - 0.5:
+            if not len(other) or distance[at] < other[0] - NEARER_M:
                 late[at] = True
             at -= 1
     return late

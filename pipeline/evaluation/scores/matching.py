@@ -25,7 +25,8 @@ RANGED_SHARE, UNRANGED_SHARE = 0.15, 0.35
 for objects with measured range, the second for those with range from the box height. A measured range is either correct
 or of another object; one from a box height may be off by a third."""
 CONFIRM_HITS = CipvParams().confirm_hits
-_NEVER = 1e6
+_LESS_M = 1e-6
+"""By this, a pair at its limit is preferred to a missed vehicle."""
 
 
 class Error(NamedTuple):
@@ -74,7 +75,9 @@ def errors(result: Result, truth: FrameTruth) -> tuple[Error, ...]:
 
 
 def _pairs(wanted: Sequence[TruthObject], seen: Sequence[FusedObject]) -> list[tuple[int, int]]:
-    """One-to-one assignment with the smallest total distance."""
+    """One-to-one assignment with the smallest total distance, where a missed vehicle costs as much as the farthest
+    object that could be it. (Maximising the number of pairs would give a missed vehicle its neighbour's object, and the
+    neighbour a ghost.)"""
     if not wanted or not seen:
         return []
     true = np.array([face_of(item) for item in wanted])
@@ -84,9 +87,11 @@ def _pairs(wanted: Sequence[TruthObject], seen: Sequence[FusedObject]) -> list[t
     shares = np.array([RANGED_SHARE if item.ranged else UNRANGED_SHARE for item in seen])
     reach = np.maximum(LEAST_M, ranges[:, None] * shares[None])
     away = np.abs(np.array([item.distance_m for item in seen])[None] - ranges[:, None])
-    cost = np.where((off[..., 1] <= SIDE_M) & (away <= reach), np.hypot(off[..., 0], off[..., 1]), _NEVER)
+    allowed = (off[..., 1] <= SIDE_M) & (away <= reach)
+    missed = np.hypot(SIDE_M, np.maximum(LEAST_M, ranges * UNRANGED_SHARE))[:, None]
+    cost = np.where(allowed, np.minimum(np.hypot(off[..., 0], off[..., 1]), missed - _LESS_M), missed)
     rows, columns = linear_sum_assignment(cost)
-    return [(int(n), int(k)) for n, k in zip(rows, columns, strict=True) if cost[n, k] < _NEVER]
+    return [(int(n), int(k)) for n, k in zip(rows, columns, strict=True) if allowed[n, k]]
 
 
 def _faces(seen: Sequence[FusedObject]) -> F64:

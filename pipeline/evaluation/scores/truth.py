@@ -15,7 +15,7 @@ from pipeline.common.errors import BadInput
 from pipeline.evaluation.lead_verdict import LABELLED_VEHICLES, LeadRule, true_lead
 from pipeline.evaluation.scores.velocities import velocities
 from pipeline.labels.link_identities import linked
-from pipeline.labels.model import WHOLE_TAG, LabelSet, LabelTrack, LeadRange
+from pipeline.labels.model import COUNTED_STATES, WHOLE_TAG, LabelSet, LabelTrack, LeadRange
 from pipeline.sources.driven_way import DrivenWay
 from pipeline.types import Box, Point2
 from pipeline.types.source import Source, TruthObject
@@ -24,7 +24,6 @@ _NOT_FOLLOWED = (
     "The labels have no identities over time: vehicles are linked from frame to frame by distance. Identity scores "
     "depend on that, and speed is scored for leads only."
 )
-_COUNTED = ("accepted", "corrected")
 
 
 class NoTruth(BadInput):
@@ -125,8 +124,8 @@ def of_labels(labels: LabelSet, rule: LeadRule, way: Callable[[], DrivenWay | No
 
     way: of the recording, which is asked for only where no lead is labelled; without it, the lane is straight.
     """
-    tracks = {track.id: track for track in labels.tracks if track.state in _COUNTED}
-    ranges = [each for each in labels.leads if each.state in _COUNTED]
+    tracks = {track.id: track for track in labels.tracks if track.state in COUNTED_STATES}
+    ranges = [each for each in labels.leads if each.state in COUNTED_STATES]
     objects, unplaced = _objects_by_frame(tracks), _unplaced_by_frame(tracks)
     left = _left_proposed(labels)
     whole = _said_whole(labels) - left
@@ -147,7 +146,7 @@ def of_labels(labels: LabelSet, rule: LeadRule, way: Callable[[], DrivenWay | No
         frames[tick] = replace(known, lead=lead, lead_known=is_known, lead_box=box)
     if not frames:
         raise NoTruth(f"{labels.source}: none of these labels is accepted")
-    events = [each for each in labels.events if each.kind == "cut_in" and each.state in _COUNTED and each.tracks]
+    events = [each for each in labels.events if each.kind == "cut_in" and each.state in COUNTED_STATES and each.tracks]
     cut_ins = tuple((labels.t_ns[each.frame], each.tracks[0]) for each in events) or None
     followed = len(frames) < 2 or any(len(track.sightings) > 1 for track in tracks.values()) or not tracks
     moving, of_motion = _over_time(frames, followed)
@@ -188,7 +187,7 @@ def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, F
 
 def _as_proposed(labels: LabelSet) -> tuple[int, int]:
     """(cuboids accepted unchanged from the pipeline, all cuboids that count)."""
-    counted = [track for track in labels.tracks if track.state in _COUNTED]
+    counted = [track for track in labels.tracks if track.state in COUNTED_STATES]
     placed = {track.id: sum(each.cuboid is not None for each in track.sightings) for track in counted}
     return sum(placed[track.id] for track in counted if track.origin.maker == "pipeline"), sum(placed.values())
 

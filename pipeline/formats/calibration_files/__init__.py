@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 from pipeline.common.files.user_file_errors import reason_of
 from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.formats.calibration_files import kalibr, kitti, opencv, rig, ros
-from pipeline.formats.calibration_files.contents import CalibrationFiles
+from pipeline.formats.calibration_files.contents import CalibrationFiles, GivenFile
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
@@ -53,7 +53,9 @@ class Format(NamedTuple):
         files = [path / name for name in self.names if (path / name).exists()] if is_folder else [path]
         if not files and self.names:
             raise SourceError(f"{path.name}: neither {' nor '.join(self.names)} in it")
-        return self.parse({each.name: _content(each) for each in files}, size)
+        # a file by itself may be called anything: it is the one that suffices without the others
+        single = self.names[0] if not is_folder and self.names and not self.needs_all else None
+        return self.parse({single or each.name: GivenFile(each.name, _content(each)) for each in files}, size)
 
 
 FORMATS: Mapping[str, Format] = {

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from pipeline.common.files.user_file_errors import parse_yaml
 from pipeline.types.source import SourceError
 
-CalibrationFiles = Mapping[str, bytes]
-"""Contents by file name."""
+
+class GivenFile(NamedTuple):
+    """One file of a calibration."""
+
+    name: str
+    """Its own, for errors."""
+    data: bytes
+    """Its content."""
+
+
+CalibrationFiles = Mapping[str, GivenFile]
+"""By the names that their format has for them, whatever they are called; by any name for a format of one file."""
 
 _VERSION = "%YAML:1.0"
 """First line of OpenCV's files, and of those that OpenVINS reads; not a valid YAML directive."""
@@ -18,10 +28,10 @@ _END = re.compile(r"(^---\s*)+\Z", re.MULTILINE)
 """End of what ``ros2 topic echo`` prints."""
 
 
-def the_file(files: CalibrationFiles) -> tuple[str, bytes]:
-    """Name and content of a calibration of one file."""
-    ((name, data),) = files.items()
-    return name, data
+def the_file(files: CalibrationFiles) -> GivenFile:
+    """That of a calibration of one file."""
+    (file,) = files.values()
+    return file
 
 
 def plain_yaml(text: str) -> str:
@@ -29,12 +39,18 @@ def plain_yaml(text: str) -> str:
     return _END.sub("", text.strip().removeprefix(_VERSION))
 
 
-def yaml_mapping(files: CalibrationFiles, name: str) -> dict[str, Any]:
-    """The values of one of the files. SourceError if it is missing, or not YAML with names."""
-    if name not in files:
-        raise SourceError(f"{name}: no such file")
+def file_of(files: CalibrationFiles, part: str) -> GivenFile:
+    """One of several files, by its format's name for it. SourceError if it is missing."""
+    if part not in files:
+        raise SourceError(f"{part}: no such file")
+    return files[part]
+
+
+def yaml_mapping(file: GivenFile) -> dict[str, Any]:
+    """The values of a file. SourceError if it is not YAML with names."""
+    name, data = file
     try:
-        loaded = parse_yaml(plain_yaml(files[name].decode("utf-8")), name, SourceError)
+        loaded = parse_yaml(plain_yaml(data.decode("utf-8")), name, SourceError)
     except UnicodeDecodeError:
         raise SourceError(f"{name}: not YAML: not a text file") from None
     if not isinstance(loaded, dict):

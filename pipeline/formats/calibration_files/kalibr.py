@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import yaml
 
+from pipeline.common.files.output_files import write_new_files
 from pipeline.common.geometry import inverse
-from pipeline.formats.calibration_files.contents import CalibrationFiles, yaml_mapping
+from pipeline.formats.calibration_files.contents import CalibrationFiles, file_of, yaml_mapping
 from pipeline.formats.calibration_files.lens import polynomial_lens
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
@@ -24,26 +25,27 @@ _FORWARD, _BACKWARD = ("T_cam_lidar", "T_camera_lidar"), ("T_lidar_cam", "T_lida
 
 
 def parse(files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F64 | None = None) -> CameraCalibration:
-    chain = yaml_mapping(files, CHAIN)
+    file = file_of(files, CHAIN)
+    chain = yaml_mapping(file)
     camera = chain.get(_CAMERA)
     if not isinstance(camera, dict):
-        raise SourceError(f"{CHAIN}: no {_CAMERA}")
+        raise SourceError(f"{file.name}: no {_CAMERA}")
     model, distortion_model = (str(camera.get(name, "none")) for name in ("camera_model", "distortion_model"))
     if model != "pinhole":
-        raise SourceError(f"{CHAIN}: camera_model {model} is not supported; calibrate as pinhole")
+        raise SourceError(f"{file.name}: camera_model {model} is not supported; calibrate as pinhole")
     try:
         fu, fv, pu, pv = (float(each) for each in camera["intrinsics"])
         width, height = (int(each) for each in camera["resolution"])
     except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise SourceError(f"{CHAIN}: {_CAMERA} is incomplete: {error}") from None
+        raise SourceError(f"{file.name}: {_CAMERA} is incomplete: {error}") from None
     if distortion_model not in ("radtan", "none"):
-        raise SourceError(f"{CHAIN}: {distortion_model} distortion; only radtan is supported")
-    lens = polynomial_lens(camera.get("distortion_coeffs", []), distortion_model, f"{CHAIN}: distortion_coeffs")
+        raise SourceError(f"{file.name}: {distortion_model} distortion; only radtan is supported")
+    lens = polynomial_lens(camera.get("distortion_coeffs", []), distortion_model, f"{file.name}: distortion_coeffs")
     if min(width, height) < 16:
-        raise SourceError(f"{CHAIN}: invalid resolution")
-    K = camera_matrix([[fu, 0.0, pu], [0.0, fv, pv], [0.0, 0.0, 1.0]], f"{CHAIN}: intrinsics")
+        raise SourceError(f"{file.name}: invalid resolution")
+    K = camera_matrix([[fu, 0.0, pu], [0.0, fv, pv], [0.0, 0.0, 1.0]], f"{file.name}: intrinsics")
     found = CameraCalibration(K, lens, _transform(files, camera), width, height)
-    check_looks_ahead(found, TRANSFORM if TRANSFORM in files else CHAIN, T_ego_lidar)
+    check_looks_ahead(found, files.get(TRANSFORM, file).name, T_ego_lidar)
     return found
 
 
@@ -63,21 +65,20 @@ def write(path: Path, camera: CameraCalibration) -> None:
             "rostopic": "/camera/image_raw",
         }
     }
-    path.mkdir(parents=True, exist_ok=True)
-    transform = {_FORWARD[0]: camera.T_camera_ego.tolist()}
-    for name, content in ((CHAIN, chain), (TRANSFORM, transform)):
-        text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
-        (path / name).write_text(text, encoding="utf-8")
+    files = {CHAIN: chain, TRANSFORM: {_FORWARD[0]: camera.T_camera_ego.tolist()}}
+    texts = {name: yaml.safe_dump(content, sort_keys=False, default_flow_style=None) for name, content in files.items()}
+    write_new_files(path, texts)
 
 
 def _transform(files: CalibrationFiles, camera: Mapping[str, Any]) -> F64:
     """T_camera_lidar of the chain, else of the file beside it."""
-    places = [(CHAIN, camera)]
+    places = [(files[CHAIN].name, camera)]
     if TRANSFORM in files:
-        places.append((TRANSFORM, yaml_mapping(files, TRANSFORM)))
+        places.append((files[TRANSFORM].name, yaml_mapping(files[TRANSFORM])))
     for file, given in places:
         for name in (*_FORWARD, *_BACKWARD):
             if name in given:
                 T = rigid_transform(given[name], f"{file}: {name}")
                 return T if name in _FORWARD else inverse(T)
-    raise SourceError(f"no {_FORWARD[0]} in {CHAIN} or {TRANSFORM}")
+    names = " or ".join([files[CHAIN].name, files[TRANSFORM].name if TRANSFORM in files else TRANSFORM])
+    raise SourceError(f"no {_FORWARD[0]} in {names}")

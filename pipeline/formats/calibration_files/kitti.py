@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.formats.calibration_files.contents import CalibrationFiles, the_file
+from pipeline.common.files.output_files import write_new
+from pipeline.formats.calibration_files.contents import CalibrationFiles, file_of, the_file
 from pipeline.formats.kitti_calibration import (
     parse_key_values,
     parse_object_calibration,
@@ -24,11 +25,9 @@ CAMERAS, VELODYNE, IMU = "calib_cam_to_cam.txt", "calib_velo_to_cam.txt", "calib
 
 def parse(files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F64 | None = None) -> CameraCalibration:
     if CAMERAS in files or VELODYNE in files:
-        for name in (CAMERAS, VELODYNE):
-            if name not in files:
-                raise SourceError(f"{name}: no such file")
-        pair = CAMERAS, VELODYNE
-        return parse_raw_calibration(files[CAMERAS], files[VELODYNE], pair, None, T_ego_lidar).camera
+        cameras, velodyne = file_of(files, CAMERAS), file_of(files, VELODYNE)
+        names = cameras.name, velodyne.name
+        return parse_raw_calibration(cameras.data, velodyne.data, names, None, T_ego_lidar).camera
     name, data = the_file(files)
     if size is None:
         raise SourceError(f"{name}: KITTI's calibration does not store the image size; specify it")
@@ -43,7 +42,7 @@ def write(path: Path, camera: CameraCalibration) -> None:
     projection = np.hstack([camera.K, np.zeros((3, 1))])
     rows = {f"P{number}": projection for number in range(4)}
     rows |= {"R0_rect": np.eye(3), "Tr_velo_to_cam": camera.T_camera_ego[:3]}
-    path.write_text("".join(f"{name}: {_numbers(values)}\n" for name, values in rows.items()), encoding="utf-8")
+    write_new(path, "".join(f"{name}: {_numbers(values)}\n" for name, values in rows.items()))
 
 
 def _numbers(values: F64) -> str:

@@ -1,4 +1,5 @@
-"""The lens of a calibration file: OpenCV's polynomial, which is also plumb_bob and rational_polynomial of ROS."""
+"""The lens of a calibration file or a ROS bag: OpenCV's polynomial, which ROS calls plumb_bob or
+rational_polynomial."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ _POLYNOMIALS = ("plumb_bob", "rational_polynomial", "radtan", "none", "")
 FISHEYE = "equidistant"
 _FISHEYES = (FISHEYE, "fisheye", "kannala_brandt", "fov", "thin_prism_fisheye")
 """Another projection: without coefficients, it is no pinhole either."""
-_LENGTHS = (4, 5, 8)
+LENGTHS = (4, 5, 8)
+"""Numbers of coefficients of the polynomial."""
 
 
 def polynomial_lens(values: npt.ArrayLike, model: str, what: str) -> F64:
@@ -38,6 +40,6 @@ def polynomial_lens(values: npt.ArrayLike, model: str, what: str) -> F64:
                 f"{what}: a thin prism or a tilted sensor is not supported; calibrate with 5 or 8 numbers"
             )
         given = given[:8]
-    if len(given) not in _LENGTHS:
+    if len(given) not in LENGTHS:
         raise SourceError(f"{what}: {len(given)} distortion coefficients; 4, 5 or 8 are supported")
     return given

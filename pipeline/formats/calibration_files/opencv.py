@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from pipeline.common.files.output_files import write_new
 from pipeline.common.files.user_file_errors import parse_yaml
 from pipeline.common.geometry import inverse
 from pipeline.formats.calibration_files.contents import CalibrationFiles, plain_yaml, the_file
@@ -61,7 +62,7 @@ def write(path: Path, camera: CameraCalibration) -> None:
         "distortion_coefficients", np.atleast_2d(camera.distortion if camera.distortion.size else np.zeros(5))
     )
     storage.write("T_camera_lidar", camera.T_camera_ego)
-    path.write_text(storage.releaseAndGetString(), encoding="utf-8")
+    write_new(path, storage.releaseAndGetString())
 
 
 def _matrix(loaded: dict[Any, Any], name: str, file: str) -> F64:

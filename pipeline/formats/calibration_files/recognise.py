@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from pipeline.formats.calibration_files import FORMATS, Format, kalibr, kitti, ros
-from pipeline.formats.calibration_files.contents import CalibrationFiles
+from pipeline.formats.calibration_files.contents import GivenFile
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
@@ -35,23 +37,24 @@ _UNUSED = (kitti.IMU,)
 
 
 def parse_any(
-    files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F64 | None = None
+    files: Mapping[str, bytes], size: tuple[int, int] | None, T_ego_lidar: F64 | None = None
 ) -> tuple[Format, CameraCalibration]:
-    """The format and the calibration. size: width and height of the images, for formats that do not store them.
-    T_ego_lidar: as for ``Format.parse``. SourceError names what is missing, mixed up or cannot be meant."""
-    kinds: dict[str, dict[str, bytes]] = {}
+    """The format and the calibration. files: content by name. size: width and height of the images, for formats that do
+    not store them. T_ego_lidar: as for ``Format.parse``. SourceError names what is missing, mixed up or cannot be
+    meant."""
+    kinds: dict[str, dict[str, GivenFile]] = {}
     for name, data in files.items():
         kind, part = _sign(name, data)
         if (part or name) in kinds.setdefault(kind, {}):
             raise SourceError(f"{name}: {_PARTS.get(part or '', 'a calibration')} is given twice")
-        kinds[kind][part or name] = data
+        kinds[kind][part or name] = GivenFile(name, data)
     if len(kinds) != 1:
         titles = " and ".join(FORMATS[kind].title for kind in kinds)
         raise SourceError(f"files of {titles}: give those of one calibration" if kinds else "no file is given")
     ((kind, parts),) = kinds.items()
     chosen = FORMATS[kind]
     assert chosen.parse is not None
-    parts = {name: data for name, data in parts.items() if name not in _UNUSED}
+    parts = {part: file for part, file in parts.items() if part not in _UNUSED}
     whole = parts.keys() - set(chosen.names)
     if whole and len(parts) > 1:
         raise SourceError(f"{len(parts)} files of {chosen.title}: give one")

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from pipeline.common.geometry import inverse
-from pipeline.formats.extrinsic_mistakes import T_OPTICAL_BODY
+from pipeline.common.files.output_files import write_new
+from pipeline.common.geometry import T_OPTICAL_BODY, inverse
 from pipeline.types import F64, CameraCalibration
 
 
@@ -25,7 +25,7 @@ def write_rig(path: Path, camera: CameraCalibration | None, T_ego_lidar: F64 | N
         rig["lidar"] = {"mount": _mount(T_ego_lidar)}
     if camera is not None:
         rig["camera"] = {"calibration": _calibration(camera)}
-    path.write_text(yaml.safe_dump(rig, sort_keys=False), encoding="utf-8")
+    write_new(path, yaml.safe_dump(rig, sort_keys=False))
 
 
 def _calibration(camera: CameraCalibration) -> dict[str, object]:

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import yaml
 
+from pipeline.common.files.output_files import write_new_files
 from pipeline.common.geometry import inverse, rotation
-from pipeline.formats.calibration_files.contents import CalibrationFiles, yaml_mapping
+from pipeline.formats.calibration_files.contents import CalibrationFiles, file_of, the_file, yaml_mapping
 from pipeline.formats.calibration_files.lens import polynomial_lens
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
@@ -24,31 +25,35 @@ _ANGLES = ("roll", "pitch", "yaw")
 
 
 def parse(files: CalibrationFiles, size: tuple[int, int] | None, T_ego_lidar: F64 | None = None) -> CameraCalibration:
-    info, transform = _as_saved(yaml_mapping(files, INFO)), _the_transform(yaml_mapping(files, TRANSFORM))
+    if INFO not in files and TRANSFORM not in files:
+        raise SourceError(f"{the_file(files).name}: ROS needs two files: a folder with {INFO} and {TRANSFORM}")
+    info_file, transform_file = file_of(files, INFO), file_of(files, TRANSFORM)
+    in_info, in_transform = info_file.name, transform_file.name
+    info = _as_saved(yaml_mapping(info_file))
+    transform = _the_transform(yaml_mapping(transform_file), in_transform)
     try:
-        K = camera_matrix(np.reshape(info["camera_matrix"]["data"], (3, 3)), f"{INFO}: camera_matrix")
+        K = camera_matrix(np.reshape(info["camera_matrix"]["data"], (3, 3)), f"{in_info}: camera_matrix")
         distortion = info.get("distortion_coefficients", {}).get("data", [])
         model = str(info.get("distortion_model", "plumb_bob"))
         width, height = int(info["image_width"]), int(info["image_height"])
         parent = str(transform["header"]["frame_id"]).lstrip("/")
         child = str(transform["child_frame_id"]).lstrip("/")
-        own = _camera_frame(info, parent, child)
-        T_parent_child = _transform(transform["transform"])
+        own = _camera_frame(info, parent, child, in_info)
+        T_parent_child = _transform(transform["transform"], in_transform)
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise SourceError(f"{INFO}, {TRANSFORM}: incomplete camera info or transform: {error}") from None
+        raise SourceError(f"{in_info}, {in_transform}: incomplete camera info or transform: {error}") from None
     if min(width, height) < 16:
-        raise SourceError(f"{INFO}: invalid image_width or image_height")
-    lens = polynomial_lens(distortion, model, f"{INFO}: distortion")
+        raise SourceError(f"{in_info}: invalid image_width or image_height")
+    lens = polynomial_lens(distortion, model, f"{in_info}: distortion")
     if own not in (parent, child):
-        raise SourceError(f"{TRANSFORM}: goes from {child} to {parent}, but the camera's frame is {own}")
+        raise SourceError(f"{in_transform}: goes from {child} to {parent}, but the camera's frame is {own}")
     T_camera_lidar = T_parent_child if own == parent else inverse(T_parent_child)
     camera = CameraCalibration(K, lens, T_camera_lidar, width, height)
-    check_looks_ahead(camera, TRANSFORM, T_ego_lidar)
+    check_looks_ahead(camera, in_transform, T_ego_lidar)
     return camera
 
 
 def write(path: Path, camera: CameraCalibration) -> None:
-    path.mkdir(parents=True, exist_ok=True)
     lens = camera.distortion if camera.distortion.size else np.zeros(5)
     info = {
         "header": {"frame_id": _CAMERA},
@@ -68,8 +73,8 @@ def write(path: Path, camera: CameraCalibration) -> None:
         "child_frame_id": _LIDAR,
         "transform": {"translation": place, "rotation": {"x": x, "y": y, "z": z, "w": w}},
     }
-    for name, content in ((INFO, info), (TRANSFORM, transform)):
-        (path / name).write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    files = {INFO: info, TRANSFORM: transform}
+    write_new_files(path, {name: yaml.safe_dump(content, sort_keys=False) for name, content in files.items()})
 
 
 def _as_saved(info: dict[str, Any]) -> dict[str, Any]:
@@ -81,15 +86,15 @@ def _as_saved(info: dict[str, Any]) -> dict[str, Any]:
     return {**info, **size, "camera_matrix": {"data": K}, "distortion_coefficients": {"data": D}}
 
 
-def _the_transform(given: dict[str, Any]) -> dict[str, Any]:
+def _the_transform(given: dict[str, Any], file: str) -> dict[str, Any]:
     """The one transform of a TFMessage."""
     several = given.get("transforms", [given])
     if not isinstance(several, list) or len(several) != 1 or not isinstance(several[0], dict):
-        raise SourceError(f"{TRANSFORM}: has several transforms or none; give the one between camera and LiDAR")
+        raise SourceError(f"{file}: has several transforms or none; give the one between camera and LiDAR")
     return several[0]
 
 
-def _camera_frame(info: dict[str, Any], parent: str, child: str) -> str:
+def _camera_frame(info: dict[str, Any], parent: str, child: str, file: str) -> str:
     """The frame of the header. Files of ``camera_calibration`` have none: then that of the two with "cam" or "optical"
     or with the camera's name in it."""
     header = info.get("header") or {}
@@ -99,16 +104,16 @@ def _camera_frame(info: dict[str, Any], parent: str, child: str) -> str:
         found = [frame for frame in (parent, child) if any(word in frame.lower() for word in words)]
         if len(found) == 1:
             return found[0]
-    raise SourceError(f"{INFO}: no header with the camera's frame_id; add it: {parent} or {child}")
+    raise SourceError(f"{file}: no header with the camera's frame_id; add it: {parent} or {child}")
 
 
-def _transform(given: dict[str, Any]) -> F64:
+def _transform(given: dict[str, Any], file: str) -> F64:
     """(4, 4) of a translation in metres and a rotation as a quaternion, or as roll, pitch and yaw in radians."""
     T, turn = np.eye(4), given["rotation"]
     if "w" in turn:
         x, y, z, w = (float(turn[name]) for name in "xyzw")
         if not np.isclose(x * x + y * y + z * z + w * w, 1.0, atol=1e-3):
-            raise SourceError(f"{TRANSFORM}: the quaternion is not of unit length")
+            raise SourceError(f"{file}: the quaternion is not of unit length")
         T[:3, :3] = [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
             [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -117,10 +122,10 @@ def _transform(given: dict[str, Any]) -> F64:
     else:
         angles = [float(turn[name]) for name in _ANGLES]
         if max(map(abs, angles)) > 2 * np.pi:
-            raise SourceError(f"{TRANSFORM}: roll, pitch and yaw are in radians; these look like degrees")
+            raise SourceError(f"{file}: roll, pitch and yaw are in radians; these look like degrees")
         T[:3, :3] = rotation(*angles)
     T[:3, 3] = [float(given["translation"][axis]) for axis in "xyz"]
-    return rigid_transform(T, TRANSFORM)
+    return rigid_transform(T, file)
 
 
 def _quaternion(R: F64) -> tuple[float, float, float, float]:

@@ -10,7 +10,9 @@ from itertools import islice
 
 PACKET_BYTES = 1206
 _PRODUCT = 1205
+"""Offset of the product's byte in a packet."""
 _LOOK_AT = 200
+"""Packets that decide what the sensor is."""
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ class Packet(NamedTuple):
 def read_packet(data: bytes, model: VelodyneModel = VLP16) -> Packet:
     """What the packet says about itself. BadPacket with the reason when it is not a whole, plausible one of the model.
 
-    A mutated range or reflectivity cannot be told from a true one; UDP's checksum guards those.
+    A mutated range or reflectivity cannot be recognised; UDP's checksum guards against those.
     """
     if len(data) != PACKET_BYTES:
         raise BadPacket(f"not {PACKET_BYTES} bytes")

@@ -63,7 +63,7 @@ class AngleSightings(NamedTuple):
 
 
 class AngleChange(NamedTuple):
-    """The angle before and after each of T moments, degrees; standard deviations."""
+    """The angle before and after each of T moments, with standard deviations; degrees."""
 
     before: F64
     """(T,)."""
@@ -74,9 +74,7 @@ class AngleChange(NamedTuple):
     step_sigma: F64
     """(T,) of ``after − before``."""
     time_s: F64
-    """(T,) the time offset."""
-    time_sigma_s: F64
-    """(T,)."""
+    """(T,) time offset of the images."""
     own: F64
     """(T, V) error of each vehicle."""
 
@@ -123,7 +121,6 @@ def changes(seen: AngleSightings, values: F64, moments: I64) -> AngleChange:
         np.sqrt(covariance[:, 1, 1]),
         np.sqrt(variance),
         found[:, 2],
-        np.sqrt(covariance[:, 2, 2]),
         own,
     )
 

@@ -16,6 +16,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from pipeline.common.robust import mad_sigma
 from pipeline.types import F64
 
 AT_M = 12.0
@@ -189,4 +190,4 @@ def _scatter(values: F64, sigma_deg: F64) -> float:
     if len(values) < FEWEST_PIECES:
         return 1.0
     steps = np.abs(np.diff(values)) / np.hypot(sigma_deg[1:], sigma_deg[:-1])
-    return max(1.4826 * float(np.median(steps)), 1.0)
+    return max(mad_sigma(steps), 1.0)

@@ -32,6 +32,7 @@ _BESIDE_M = 4.5
 frames, KITTI drives 0009 and 0052); of 476 pairs up to 6 m apart, 475."""
 _ACROSS_RAD = math.radians(45.0)
 _FEWEST_POINTS = 5
+"""Of the cluster whose sides are measured."""
 
 
 @dataclass

@@ -20,7 +20,8 @@ _INSIDE_M = 0.15
 _LONGEST_M = 2.0
 """A cluster that extends farther beyond the cuboid contains the vehicle and something beside it: only the near part is
 used."""
-_CLUSTERS = ClusterParams(front_only=False, min_points=FEWEST_POINTS)
+CLUSTERS = ClusterParams(front_only=False, min_points=FEWEST_POINTS)
+"""Vehicles are labelled all round, and with fewer points than the pipeline needs."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ def clustered(sweep: F32) -> Clustered:
     """sweep: (N, 4) float32 ``x y z intensity``, ego frame."""
     every = np.ones(len(sweep), dtype=bool)
     ground = fit_ground(sweep, every, GroundParams())
-    return Clustered(sweep, ground, cluster(sweep, candidates(sweep, ground, every, _CLUSTERS), _CLUSTERS))
+    return Clustered(sweep, ground, cluster(sweep, candidates(sweep, ground, every, CLUSTERS), CLUSTERS))
 
 
 def points_of(sweep: Clustered, cuboid: Cuboid) -> F32 | None:

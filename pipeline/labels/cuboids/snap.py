@@ -83,6 +83,7 @@ _MOST_DRAWN_TURN_RAD = math.radians(10.0)
 _TWO_SIDES_M = 0.6
 """A shorter second side is just the depth of a bumper and does not determine the yaw."""
 _GROUND_GAP_M = 0.6
+"""The ground found is not the cuboid's if the lowest point is farther from it than half a height and this."""
 
 
 class TooFewPoints(BadInput):

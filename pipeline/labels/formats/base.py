@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pipeline.alignment.projection import Pinhole, project_cuboids
 from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import open_new
 from pipeline.common.geometry import Cuboid, corners_of
 from pipeline.common.progress import Progress, silent
 from pipeline.labels.classes import NO_CLASSES, ClassList
@@ -19,6 +20,7 @@ from pipeline.vision.classes import canonical
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 _FEWEST_PAIRS = 3
+"""Pairs of cuboid and box that can show that two files do not belong together."""
 
 
 @dataclass(frozen=True)
@@ -175,8 +177,5 @@ def make_folder(out: Path) -> Path:
 def write_file(out: Path, data: bytes) -> None:
     """Write a new file. Raises BadInput if it exists."""
     out.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        with out.open("xb") as file:
-            file.write(data)
-    except FileExistsError:
-        raise BadInput(f"{out}: file already exists; choose another name or remove it") from None
+    with open_new(out) as file:
+        file.write(data)

@@ -13,7 +13,6 @@ import io
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 from pydantic import TypeAdapter
 
@@ -21,7 +20,7 @@ from pipeline.common.errors import BadInput
 from pipeline.common.geometry import closest_on_polygon
 from pipeline.labels.formats.base import Imported, LabeledDrive, write_file
 from pipeline.labels.formats.reading import fit, read_bytes
-from pipeline.labels.model import LabelSet, Lead, LeadRange, Origin, State
+from pipeline.labels.model import LabelSet, Lead, LeadRange, Maker, Origin, State
 
 _TOLD = (
     "frame", "name", "t_ns", "lead", "state", "maker", "by", "made_unix_ms", "params", "calibration", "how", "comment",
@@ -30,7 +29,7 @@ _TOLD = (
 _COLUMNS = (*_TOLD, "label", "distance_m", "x_m", "y_m")
 _LONGEST_NUMBER = 20
 _STATE: TypeAdapter[State] = TypeAdapter(State)
-_MAKER: TypeAdapter[Literal["pipeline", "person", "import"]] = TypeAdapter(Literal["pipeline", "person", "import"])
+_MAKER: TypeAdapter[Maker] = TypeAdapter(Maker)
 
 
 def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:

@@ -30,7 +30,8 @@ from pipeline.recording.mcap.index import MAGIC, RECORD_HEAD, Directory, Unreada
 NAME = "cipv-studio/chain"
 BEGINNING = ""
 """The previous hash of the first link."""
-_PIECE_BYTES = 1 << 20
+PIECE_BYTES = 1 << 20
+"""Files are read piece by piece: they may be larger than the memory."""
 _LONGEST_LINK = 1024
 
 ChainState = Literal["not chained", "intact", "cut off", "changed"]
@@ -250,7 +251,7 @@ class _Walk:
 
     def _pieces(self, offset: int, length: int) -> Iterator[bytes]:
         self._file.seek(offset)
-        while length and (piece := self._file.read(min(length, _PIECE_BYTES))):
+        while length and (piece := self._file.read(min(length, PIECE_BYTES))):
             length -= len(piece)
             yield piece
 

@@ -13,7 +13,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import DataEnd, Footer
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
-from pipeline.common.errors import BadInput
+from pipeline.common.files.output_files import open_new
 from pipeline.common.files.signing import configured_signer
 from pipeline.recording.mcap.chain import ChainWriter
 from pipeline.recording.mcap.disk_time import DiskTime
@@ -35,7 +35,7 @@ class _Stream:
     def __init__(self, path: Path, disk: DiskTime) -> None:
         signer = configured_signer()  # if this fails, no file has been created yet
         with disk.waiting("opening a file"):
-            self.file = path.open("xb", buffering=0)
+            self.file = open_new(path, buffering=0)
         self._disk = disk
         self.chain = ChainWriter(self.file, signer=signer)
 
@@ -77,10 +77,7 @@ class Output:
         profile: str = PROFILE,
         disk: DiskTime | None = None,
     ) -> None:
-        try:
-            self._stream = _Stream(path, disk or DiskTime())
-        except FileExistsError:
-            raise BadInput(f"{path}: file already exists; choose another name or remove it") from None
+        self._stream = _Stream(path, disk or DiskTime())
         self.path = path
         self._channels: dict[Channel, int] = {}
         self._schemas: dict[tuple[str, str, bytes], int] = {}

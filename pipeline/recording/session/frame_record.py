@@ -14,6 +14,7 @@ from typing import Annotated, TypeVar
 import numpy as np
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 
+from pipeline.formats.calibration_files.lens import LENGTHS
 from pipeline.formats.file_reading import camera_matrix, rigid_transform
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
@@ -24,7 +25,6 @@ from pipeline.types.source import SourceError, TruthObject
 _INT64 = 2**63
 Nanoseconds = Annotated[int, Field(ge=-_INT64, lt=_INT64)]
 _Size = Annotated[int, Field(ge=1, le=65536)]
-_DISTORTIONS = (0, 4, 5, 8)
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class PacketsRef:
 
 
 def _known_distortion(values: tuple[float, ...]) -> tuple[float, ...]:
-    if len(values) not in _DISTORTIONS:
+    if len(values) not in (0, *LENGTHS):
         raise ValueError(f"{len(values)} distortion coefficients")
     return values
 

@@ -9,8 +9,6 @@ from pipeline.formats.file_reading import in_order, read_bytes
 from pipeline.formats.kitti_records import parse_timestamps
 from pipeline.types.source import SourceError
 
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
-
 
 @dataclass(frozen=True)
 class Files:

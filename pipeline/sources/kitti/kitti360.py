@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.ego_motion.from_poses import motion_along, motion_between
-from pipeline.formats.file_reading import files_by_name, read_bytes
+from pipeline.formats.file_reading import IMAGE_SUFFIXES, files_by_name, read_bytes
 from pipeline.formats.kitti_calibration import parse_number_lines
-from pipeline.sources.kitti.files import IMAGE_SUFFIXES, Files, read_stamps
+from pipeline.sources.kitti.files import Files, read_stamps
 from pipeline.types import F64, EgoState
 from pipeline.types.source import SourceError
 

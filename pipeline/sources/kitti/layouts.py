@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.ego_motion.from_poses import motion_along
-from pipeline.formats.file_reading import files_by_name, read_bytes
+from pipeline.formats.file_reading import IMAGE_SUFFIXES, files_by_name, read_bytes
 from pipeline.formats.kitti_calibration import KittiCalibration, parse_odometry_calibration
 from pipeline.sources.kitti import kitti360
-from pipeline.sources.kitti.files import IMAGE_SUFFIXES, Files, read_stamps
+from pipeline.sources.kitti.files import Files, read_stamps
 from pipeline.types import EgoState
 from pipeline.types.source import SourceError
 

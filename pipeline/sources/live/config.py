@@ -13,7 +13,8 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from pipeline.common.files.user_file_errors import first_complaint, given_path, parse_yaml
 from pipeline.common.files.user_files import LARGEST_TEXT_BYTES, read_regular
-from pipeline.common.geometry import inverse, rotation
+from pipeline.common.geometry import T_OPTICAL_BODY, inverse, rotation
+from pipeline.formats.calibration_files.lens import LENGTHS
 from pipeline.formats.file_reading import check_looks_ahead
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
@@ -125,14 +126,13 @@ class CalibrationConfig(ConfigPart):
 
     @model_validator(mode="after")
     def _check(self) -> CalibrationConfig:
-        if len(self.distortion) not in (0, 4, 5, 8):
+        if len(self.distortion) not in (0, *LENGTHS):
             raise ValueError("distortion: 0, 4, 5 or 8 numbers, in OpenCV's order")
         return self
 
     def calibration(self) -> CameraCalibration:
         K = np.array([[self.fx_px, 0.0, self.cx_px], [0.0, self.fy_px, self.cy_px], [0.0, 0.0, 1.0]])
-        T_camera_mount = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
-        T = T_camera_mount @ inverse(self.mount.T_ego_sensor())
+        T = T_OPTICAL_BODY @ inverse(self.mount.T_ego_sensor())
         return CameraCalibration(K, np.array(self.distortion), T, self.width_px, self.height_px)
 
 

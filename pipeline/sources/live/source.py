@@ -29,6 +29,8 @@ from pipeline.types.source import Opening, Tap
 
 T = TypeVar("T")
 
+_SWEEPS_HZ, _IMAGES_HZ = 10.0, 30.0
+"""Usual rates of LiDARs and cameras, of which one triggers the ticks."""
 _LOOK_AGAIN_S = 0.005
 """Polling interval while a tick waits for its image, or for the LiDAR to count as silent."""
 
@@ -46,7 +48,7 @@ class LiveSensors:
 
     def __init__(self, uri: str, config: LiveConfig, clock: HostClock | None = None) -> None:
         self.uri, self.title = uri, config.title
-        self.rate_hz = 10.0 if config.lidar is not None else 30.0
+        self.rate_hz = _SWEEPS_HZ if config.lidar is not None else _IMAGES_HZ
         self.dropped = 0
         self._index = -1
         self._clock = clock or HostClock()

@@ -158,7 +158,7 @@ class Synchroniser(Generic[P]):
         until_next_ns = self.images.period_ns()
         if newest.t_ns < t_ns and (until_next_ns is None or newest.t_ns + until_next_ns - t_ns < t_ns - newest.t_ns):
             return None
-        return Upcoming(t_ns, image, _own_motion_at(self.egos, t_ns, params.ego_offset_ms))
+        return Upcoming(t_ns, image, _nearest_valid(self.egos, t_ns, params.ego_offset_ms))
 
     def lidar_is_silent(self, now_ns: int) -> bool:
         """Whether there was no sweep for three of its periods, or never one."""
@@ -207,8 +207,8 @@ class Synchroniser(Generic[P]):
             sweep,
             image,
             skew_ns,
-            ego=_own_motion_at(self.egos, t_ns, params.ego_offset_ms),
-            gnss=_own_motion_at(self.fixes, t_ns, params.gnss_offset_ms),
+            ego=_nearest_valid(self.egos, t_ns, params.ego_offset_ms),
+            gnss=_nearest_valid(self.fixes, t_ns, params.gnss_offset_ms),
             replaced=self._count_replaced(leader_is_sweep=sweep is not None),
             notes=tuple(notes),
         )
@@ -220,8 +220,8 @@ class Synchroniser(Generic[P]):
         return max(0, self.sweeps.taken - sweeps - 1 if leader_is_sweep else self.images.taken - images - 1)
 
 
-def _own_motion_at(stream: SensorBuffer[T], t_ns: int, offset_ms: float) -> T | None:
-    """Own motion nearest to a time; None if it is not valid that long."""
+def _nearest_valid(stream: SensorBuffer[T], t_ns: int, offset_ms: float) -> T | None:
+    """The message of a sensor nearest to a time, with the sensor's offset; None if none is valid then."""
     at_ns = t_ns - round(offset_ms * 1e6)
     item = stream.nearest(at_ns)
     return item.value if item is not None and abs(item.t_ns - at_ns) <= _holds_for_ns(stream.period_ns()) else None

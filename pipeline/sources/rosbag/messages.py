@@ -10,13 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.formats.file_reading import decode_image
-from pipeline.formats.point_cloud_fields import Cloud, cloud_of
+from pipeline.formats.point_cloud_fields import MOST_POINTS, Cloud, cloud_of
 from pipeline.types import U8, CameraImage, EgoState, GnssFix, GnssQuality
 from pipeline.types.source import SourceError
 
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """sensor_msgs/PointField's datatypes."""
-_MAX_POINTS = 4_000_000
 _CONVERSIONS = {
     "rgb8": cv2.COLOR_RGB2BGR,
     "rgba8": cv2.COLOR_RGBA2BGR,
@@ -50,7 +49,7 @@ def cloud(message: Any, t_ns: int, notes: list[str]) -> Cloud:
     """A PointCloud2's points by field; additional fields besides x, y, z are permitted."""
     count, step = int(message.width) * int(message.height), int(message.point_step)
     data = np.asarray(message.data, dtype=np.uint8)
-    if not 0 < step <= 4096 or count > _MAX_POINTS:
+    if not 0 < step <= 4096 or count > MOST_POINTS:
         raise BadMessage("a point cloud of an invalid size")
     order = ">" if message.is_bigendian else "<"
     rows, row_step = int(message.height), int(message.row_step) or int(message.width) * step

@@ -7,15 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.common.geometry import inverse
-from pipeline.formats.extrinsic_mistakes import T_OPTICAL_BODY
+from pipeline.common.geometry import T_OPTICAL_BODY, inverse
+from pipeline.formats.calibration_files.lens import polynomial_lens
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
 TF_STATIC = "/tf_static"
 _BASES = ("base_link", "base_footprint", "vehicle", "ego_vehicle", "rear_axle")
-_DISTORTIONS = {"plumb_bob": (5, 4), "rational_polynomial": (8,), "": (5, 4, 0)}
 
 
 class TransformTree:
@@ -72,10 +71,8 @@ def calibration(
         notes.append(f"no transform between {lidar} and {camera}: LiDAR and camera are not fused")
         return None
     try:
-        K = camera_matrix(
-            np.reshape(np.asarray(info.k if hasattr(info, "k") else info.K, dtype=np.float64), (3, 3)), "K"
-        )
-        distortion = _distortion(info)
+        K = camera_matrix(np.reshape(np.asarray(_either_case(info, "k"), dtype=np.float64), (3, 3)), "K")
+        distortion = polynomial_lens(_either_case(info, "d"), str(info.distortion_model), "distortion")
         size = int(info.width), int(info.height)
         if min(size) < 16:
             raise SourceError("an image without size")
@@ -98,16 +95,9 @@ def _looking_ahead(K: F64, distortion: F64, T_camera_ego: F64, size: tuple[int, 
     return given
 
 
-def _distortion(info: Any) -> F64:
-    values = np.asarray(info.d if hasattr(info, "d") else info.D, dtype=np.float64)
-    lengths = _DISTORTIONS.get(str(info.distortion_model))
-    if lengths is None:
-        raise SourceError(f"distortion model {info.distortion_model} is not supported")
-    if not np.any(values):
-        return np.empty(0)
-    if len(values) not in lengths or not np.all(np.isfinite(values)):
-        raise SourceError(f"{len(values)} numbers of distortion")
-    return values
+def _either_case(info: Any, name: str) -> Any:
+    """A field that ROS 2 calls ``k`` or ``d``, and ROS 1 ``K`` or ``D``."""
+    return getattr(info, name) if hasattr(info, name) else getattr(info, name.upper())
 
 
 def _matrix(transform: Any) -> F64:

@@ -22,14 +22,15 @@ from pipeline.sources.rosbag.bag import Bag, BagError, bag_path
 from pipeline.sources.rosbag.index import BagIndex, TopicIndex
 from pipeline.sources.rosbag.rig import calibration
 from pipeline.sources.rosbag.topics import ROLES, map_topics, why_missing
-from pipeline.sources.sidecar_files import rig_of
+from pipeline.sources.sidecar_files import FIX_WITHIN_NS, IMAGE_WITHIN_NS, rig_of
 from pipeline.sources.uri_options import split_options
 from pipeline.types import CameraCalibration, CameraImage, EgoState, Frame, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
-_IMAGE_WITHIN_NS = 100_000_000
-_OWN_WITHIN_NS, _FIX_WITHIN_NS = 500_000_000, 1_500_000_000
+_OWN_WITHIN_NS = 500_000_000
+"""How long a message of odometry is used."""
 _MESSAGES_A_SWEEP = 3
+"""Messages of packets that a sweep may be spread over: drivers send one per rotation, cut anywhere."""
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> RosbagSource:
@@ -93,7 +94,7 @@ class RosbagSource:
 
     def _outline(self, index: int, camera: CameraCalibration | None) -> Frame:
         t_ns = self.t_ns(index)
-        ego, gnss = self._own.latest(t_ns, _OWN_WITHIN_NS), self._fixes.latest(t_ns, _FIX_WITHIN_NS)
+        ego, gnss = self._own.latest(t_ns, _OWN_WITHIN_NS), self._fixes.latest(t_ns, FIX_WITHIN_NS)
         return Frame(index, f"{index:06d}", t_ns, camera=camera, ego=ego, gnss=gnss)
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
@@ -196,7 +197,7 @@ class RosbagSource:
         if camera is None:
             notes += [self._missing["camera"]] if "camera" in self._missing else []
             return None
-        index = nearest(camera.times_ns, t_ns, _IMAGE_WITHIN_NS)
+        index = nearest(camera.times_ns, t_ns, IMAGE_WITHIN_NS)
         if index is None:
             notes.append("no image within 0.1 s")
             return None

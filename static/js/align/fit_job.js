@@ -9,6 +9,7 @@ import { change } from "../panels/params.js";
 import { withUnit } from "./parameter_values.js";
 
 const POLL_MS = 300;
+
 /**
  * @typedef {object} Found
  * @property {Record<string, number|string>} changes

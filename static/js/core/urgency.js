@@ -1,7 +1,7 @@
 /** Urgency levels of time to collision, and names of ACC states. */
 
-export const TTC_DANGER_S = 2.5,
-  TTC_WARN_S = 5;
+export const TTC_DANGER_S = 2.5;
+const TTC_WARN_S = 5;
 
 /** @param {number|null|undefined} ttc_s @returns {"danger"|"warn"|"none"} */
 export function urgencyOf(ttc_s) {

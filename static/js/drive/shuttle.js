@@ -42,7 +42,7 @@ export function backward() {
 /** Whether reverse playback is on. */
 export const isReversing = () => reverse !== null;
 
-export function stopReverse() {
+function stopReverse() {
   clearInterval(timer);
   reverse = null;
 }

@@ -2,6 +2,7 @@
 import { memory } from "../core/dom.js";
 import { get } from "../core/store.js";
 import { num, ttc } from "../core/format.js";
+import { TTC_DANGER_S } from "../core/urgency.js";
 
 /** @typedef {import("../drive/types.js").Columns} Columns */
 /** @typedef {import("./span.js").Span} Span */
@@ -50,7 +51,7 @@ export const CURVES = /** @type {Curve[]} */ ([
     key: "ttc_s",
     label: "TTC",
     unit: "s",
-    title: "Time to collision with the CIPV, clipped at 15 s; dotted line: 2.5 s limit",
+    title: `Time to collision with the CIPV, clipped at 15 s; dotted line: ${TTC_DANGER_S} s limit`,
     factor: 1,
     low: 0,
     high: 5,
@@ -58,7 +59,7 @@ export const CURVES = /** @type {Curve[]} */ ([
     digits: 1,
     words: ttc,
     role: "cipv",
-    limit: 2.5,
+    limit: TTC_DANGER_S,
   },
   {
     key: "path_offset_m",

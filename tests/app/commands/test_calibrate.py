@@ -151,6 +151,15 @@ def test_a_mount_is_fitted_to_a_drive_and_corrected_by_its_rig_file(
     assert left["pitch_deg"] == pytest.approx(0.0, abs=0.1)
 
 
+@pytest.mark.parametrize("what", ["distance", "alignment", "mount", "time"])
+def test_a_preset_that_exists_is_refused_before_the_fit(
+    what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.yaml").write_text("by hand", encoding="utf-8")
+    assert calibrate("no/such/recording", "--out", str(tmp_path / "mine.yaml"), what=what) == 2
+    assert "mine.yaml: file already exists" in capsys.readouterr().err
+
+
 def test_a_recording_with_its_own_mounts_takes_no_rig_file(
     scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

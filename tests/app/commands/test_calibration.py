@@ -40,6 +40,20 @@ def test_a_recordings_calibration_goes_through_every_format_with_its_correction(
     np.testing.assert_allclose(found.project(ahead), right.project(ahead), atol=1e-3)
 
 
+@pytest.mark.parametrize("to", ["rig", "opencv", "ros", "angular"])
+def test_a_calibration_that_exists_is_never_overwritten(
+    to: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = ("sim:straight", "--to", to, "--out", str(tmp_path / "mine"))
+    assert run(*made) == 0
+    files = sorted(path for path in tmp_path.rglob("*") if path.is_file())
+    files[-1].write_text("measured by hand", encoding="utf-8")
+    before = [path.read_bytes() for path in files]
+    assert run(*made) == 2
+    assert "file already exists; choose another name or remove it" in capsys.readouterr().err
+    assert [path.read_bytes() for path in files] == before
+
+
 def test_a_recordings_export_relates_to_the_lidar_of_its_files(data_dir: Path, tmp_path: Path) -> None:
     """As other tools use it: points of the LiDAR's files, projected with nothing but the exported file."""
     out = tmp_path / "astyx.yaml"

@@ -7,7 +7,9 @@ from typing import get_args
 
 import pytest
 
+from app.cli import main
 from app.commands.models import ListModels, RegisterModel
+from app.commands.serve import Serve
 from pipeline.inference import model_registry
 from pipeline.inference.known_networks import Task
 from pipeline.inference.tuning import Gain, RunSettings, keep
@@ -52,3 +54,29 @@ def test_the_list_says_what_tuning_chose_and_gained(
     keep(model_registry.EMBEDDED_FILE, RunSettings(("CPUExecutionProvider",), 1), gain)
     assert ListModels()() == 0
     assert f"\n    tuned for this machine: {said}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "models list",
+        "models pull yolox_nano",
+        "models register FILE mine",
+        "models tune embedded",
+        "run sim:straight --frames 1",
+        "evaluate sim:straight",
+    ],
+)
+def test_a_store_that_cannot_be_made_is_not_a_damaged_one(
+    command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("CIPV_HOME", str(tmp_path / "file" / "cipv"))
+    network = str(model_registry.EMBEDDED_FILE)
+    with pytest.raises(SystemExit) as ended:
+        main(command.replace("FILE", network).split())
+    assert ended.value.code == 2
+    reason = f"CIPV_HOME: {tmp_path}/file/cipv cannot be created, since {tmp_path}/file is not a folder"
+    assert capsys.readouterr().err.splitlines()[-1] == f"cipv: {reason}"
+    with pytest.raises(model_registry.ModelError, match="cannot be created"):
+        Serve("sim:straight").engine()

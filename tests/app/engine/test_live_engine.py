@@ -106,7 +106,7 @@ def start() -> Iterator[Start]:
                 return Recording()
             raise SourceError(f"{uri}: no such thing")
 
-        engine = Engine(open_source, lambda _: detector, Params(), uri=sensors.uri, playing=True, desk=desk)
+        engine = Engine(open_source, lambda _: detector, Params(), uri=sensors.uri, playing=True, recorder=desk)
         engines.append(engine)
         engine.start()
         engine.wait_for(lambda s: s.live, WAIT_S)
@@ -222,10 +222,10 @@ def test_what_the_line_left_out_is_counted(start: Start) -> None:
 
 def test_a_session_of_them_is_on_their_own_steady_timeline(start: Start, tmp_path: Path) -> None:
     engine, sensors, _ = start(SessionRecorder(tmp_path))
-    engine.desk.start(engine.source)
+    engine.recorder.start(engine.source)
     for index in range(3):
         shown_after(engine, sensors, index)
-    state = engine.desk.stop()
+    state = engine.recorder.stop()
     assert state is not None
     session = SessionSource("a", str(state.file))
     times_ns = [Recording().t_ns(index) for index in range(3)]
@@ -236,7 +236,7 @@ def test_a_session_of_them_is_on_their_own_steady_timeline(start: Start, tmp_pat
 def test_what_comes_between_ticks_is_recorded_until_the_end(start: Start, tmp_path: Path) -> None:
     """``now_ns`` of these sensors is the time of their ticks plus 10¹⁸."""
     engine, sensors, _ = start(SessionRecorder(tmp_path))
-    engine.desk.start(engine.source)
+    engine.recorder.start(engine.source)
     tap = sensors.tapped
     assert tap is not None
     shown = Recording().frame(0)
@@ -247,7 +247,7 @@ def test_what_comes_between_ticks_is_recorded_until_the_end(start: Start, tmp_pa
         tap.sweep(replace(shown.sweep, points=shown.sweep.points + step), 10**18 + step)
         tap.fix(GnssFix(shown.t_ns + step, 48.0, 9.0, 300.0, None, 0.0, "single", 4.0), 10**18 + step)
     shown_after(engine, sensors, 1)
-    state = engine.desk.stop()
+    state = engine.recorder.stop()
     assert sensors.tapped is None
     assert state is not None
     assert (state.frames, state.dropped) == (1, 0)

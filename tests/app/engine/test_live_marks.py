@@ -44,7 +44,7 @@ class Car:
             uri=self.sensors.uri,
             playing=True,
             whole_drives=True,
-            desk=SessionRecorder(sessions),
+            recorder=SessionRecorder(sessions),
         )
         self.app = create_app(self.engine, marks=Marks(marks))
 

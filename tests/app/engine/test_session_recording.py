@@ -34,7 +34,7 @@ WAIT_S = 180.0
 def engine(tmp_path: Path) -> Iterator[Engine]:
     first, second = Recording(), Recording("test:other", count=5)
     desk = SessionRecorder(tmp_path / "sessions")
-    engine = Engine(opener(first, second), lambda _: CountingDetector(), Params(), uri=first.uri, desk=desk)
+    engine = Engine(opener(first, second), lambda _: CountingDetector(), Params(), uri=first.uri, recorder=desk)
     engine.start()
     engine.wait_for(lambda shown: shown.processed is not None, WAIT_S)
     yield engine
@@ -184,12 +184,12 @@ def test_what_goes_wrong_is_one_sentence(
         if state is not None and state.error is not None:
             break
     assert "No space left on device" in client.get("/api/recording").json()["error"]
-    assert not engine.desk.mark("lost")
+    assert not engine.recorder.mark("lost")
     show(engine, 2), "the pipeline goes on"
 
 
 def test_nothing_open_is_nothing_to_record(tmp_path: Path) -> None:
-    engine = Engine(opener(), None, Params(), desk=SessionRecorder(tmp_path))
+    engine = Engine(opener(), None, Params(), recorder=SessionRecorder(tmp_path))
     with loop_apart() as run:
         assert Client(engine, run).post("/api/recording", json={"on": True}).status_code == 409
     assert not list(tmp_path.iterdir())

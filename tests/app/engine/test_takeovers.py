@@ -59,7 +59,7 @@ def engine_on(source: Sensors | Recording, first: CountingDetector, folder: Path
         Params(),
         uri=source.uri,
         playing=True,
-        desk=SessionRecorder(folder),
+        recorder=SessionRecorder(folder),
         watchdog=Watchdog(patience_s=0.2, first_s=FIRST_S),
     )
     engine.start()
@@ -73,7 +73,7 @@ def test_a_network_that_hangs_for_ever_is_said_and_replaced_and_no_sensor_data_i
     engine = engine_on(sensors, hanging, tmp_path)
     try:
         engine.wait_for(lambda s: s.live, WAIT_S)
-        engine.desk.start(engine.source)
+        engine.recorder.start(engine.source)
         shown_after(engine, sensors, 0)
         shown_after(engine, sensors, 1)
         sensors.give(2)
@@ -95,7 +95,7 @@ def test_a_network_that_hangs_for_ever_is_said_and_replaced_and_no_sensor_data_i
         hanging.gate.set()
         assert wait_until(lambda: sum(t.name == "cipv-engine" for t in threading.enumerate()) == 1), "it has ended"
         shown_after(engine, sensors, 4)
-        state = engine.desk.stop()
+        state = engine.recorder.stop()
     finally:
         engine.stop()
     assert state is not None

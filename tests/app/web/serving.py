@@ -33,7 +33,7 @@ def running(
         lambda _: CountingDetector(),
         Params(),
         uri=recording.uri,
-        desk=desk,
+        recorder=desk,
         whole_drives=whole_drives,
     )
     engine.start()

@@ -217,13 +217,13 @@ def test_the_figures_follow_what_happens(client: httpx.Client, engine: Engine):
         socket.recv(WAIT_S)
         assert figures(client)["cipv_clients"] == 1
         sequence = engine.snapshot.sequence
-        engine.desk.start(engine.source)
+        engine.recorder.start(engine.source)
         engine.control.step(3)
         engine.wait_for(lambda shown: shown.sequence > sequence and shown.recording is not None, WAIT_S)
         engine.control.change_params({"cluster.tolerance_m": 0.8})
         engine.wait_for(lambda shown: shown.params.cluster.tolerance_m == 0.8 and shown.sequence > sequence + 1, WAIT_S)
         now = figures(client)
-        engine.desk.stop()
+        engine.recorder.stop()
     assert now["cipv_frames_total"] > before["cipv_frames_total"]
     assert now["cipv_line_seconds_count"] > before["cipv_line_seconds_count"]
     assert now["cipv_line_seconds_sum"] > before["cipv_line_seconds_sum"]

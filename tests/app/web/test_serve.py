@@ -116,7 +116,7 @@ def test_for_other_machines_it_shows_links_with_tokens_and_lets_nobody_else_in()
         program.kill()
 
 
-RECORDING = PROGRAM.replace("playing=True", "playing=True, desk=SessionRecorder(Path(sys.argv[3]))").replace(
+RECORDING = PROGRAM.replace("playing=True", "playing=True, recorder=SessionRecorder(Path(sys.argv[3]))").replace(
     "import sys", "import sys\nfrom pathlib import Path\nfrom app.engine.session_recording import SessionRecorder"
 )
 
@@ -161,7 +161,7 @@ class Hanging(Recording):
         return super().frame(index) if index != 7 else for_ever()
 
 engine = Engine(opener(Hanging()), lambda _: CountingDetector(), Params(), uri="test:car",
-                desk=SessionRecorder(Path(sys.argv[1])), labels=LabelDesk(open_later=for_ever))
+                recorder=SessionRecorder(Path(sys.argv[1])), labels=LabelDesk(open_later=for_ever))
 ServerOptions(port=int(sys.argv[2])).serve(engine)
 """
 

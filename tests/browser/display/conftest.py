@@ -64,7 +64,7 @@ def own(tmp_path: Path, detector: CountingDetector) -> Iterator[tuple[Site, Reco
         Params(),
         uri=recording.uri,
         playing=True,
-        desk=SessionRecorder(tmp_path),
+        recorder=SessionRecorder(tmp_path),
     )
     engine.start()
     site = Site(engine, 0)

@@ -57,7 +57,7 @@ def test_recording_is_begun_and_ended_in_sight(open_display: OpenDisplay, own: t
 
 
 def test_a_refusal_is_said(open_display: OpenDisplay, tmp_path: Path):
-    engine = Engine(opener(), None, Params(), desk=SessionRecorder(tmp_path))
+    engine = Engine(opener(), None, Params(), recorder=SessionRecorder(tmp_path))
     engine.start()
     try:
         with serving(create_app(engine)) as address:

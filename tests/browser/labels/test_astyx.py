@@ -59,7 +59,7 @@ def astyx(clip: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]
         Params(),
         uri=clip,
         whole_drives=True,
-        desk=SessionRecorder(tmp_path_factory.mktemp("sessions")),
+        recorder=SessionRecorder(tmp_path_factory.mktemp("sessions")),
     )
     engine.start()
     running = Site(engine, 0)

@@ -30,7 +30,7 @@ def moments(data_dir: Path, tmp_path: Path) -> Iterator[Site]:
         for file in (each for each in part.iterdir() if each.stem in FRAMES):
             (folder / part.name / file.name).symlink_to(file)
     desk = SessionRecorder(tmp_path / "sessions")
-    engine = Engine(open_source, detector_for, Params(), uri=f"astyx:{folder}", whole_drives=True, desk=desk)
+    engine = Engine(open_source, detector_for, Params(), uri=f"astyx:{folder}", whole_drives=True, recorder=desk)
     engine.start()
     running = Site(engine, 0)
     running.start()

@@ -70,6 +70,15 @@ def test_another_place_is_refused_and_odometry_starts_anew() -> None:
     assert found.motion.pose[0] < 12.0, "its place is counted from the new beginning"
 
 
+def test_a_refused_sweep_places_the_car_where_it_was_foreseen() -> None:
+    before = drive(STREET, 12.0)[-1]
+    assert before.motion is not None
+    found = follow(before.state, seen(STREET, 12.0 * 0.8 + 1.5, 0.0, 0.0, 8), ROAD, (), 0.1, None)
+    assert found.note == "LiDAR odometry: sweeps contradict each other"
+    assert found.motion is not None
+    assert found.motion.pose[0] - before.motion.pose[0] == pytest.approx(0.1 * found.motion.speed_mps, abs=0.1)
+
+
 def test_a_gap_starts_odometry_anew() -> None:
     state = drive(STREET, 12.0)[-1].state
     assert follow(state, seen(STREET, 50.0, 0.0, 0.0, 1), ROAD, (), None, None).state.clouds == ()

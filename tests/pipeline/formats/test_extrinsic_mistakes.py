@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.common.geometry import inverse, rotation
-from pipeline.formats.extrinsic_mistakes import T_OPTICAL_BODY, is_upright, looks_ahead
+from pipeline.common.geometry import T_OPTICAL_BODY, inverse, rotation
+from pipeline.formats.extrinsic_mistakes import is_upright, looks_ahead
 from pipeline.formats.file_reading import check_looks_ahead
 from pipeline.types import F64
 from pipeline.types.source import SourceError

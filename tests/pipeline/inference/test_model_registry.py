@@ -226,6 +226,12 @@ def test_a_damaged_registry_is_named(tmp_path: Path) -> None:
         model_registry.default_model("detector")
 
 
+def test_a_registry_that_cannot_be_read_is_not_a_damaged_one():
+    (model_registry.store() / "registry.json").mkdir(parents=True)
+    with pytest.raises(model_registry.ModelError, match=r"registry\.json cannot be read: Is a directory"):
+        model_registry.default_model("detector")
+
+
 def test_damaged_lists_of_networks_are_said(tmp_path: Path):
     (tmp_path / "home" / "models").mkdir(parents=True)
     for text in (

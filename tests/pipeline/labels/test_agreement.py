@@ -47,6 +47,13 @@ def test_what_only_one_has_another_class_and_a_reversed_one_are_counted() -> Non
     assert (found.class_share, found.reversed_share, found.iou) == (0.0, 1.0, pytest.approx(1.0, abs=1e-3))
 
 
+def test_two_overlaps_too_small_to_count_do_not_prevent_one_that_counts() -> None:
+    """The cars at 20 m and 23 m overlap by 1/7; each overlaps another one by less than a tenth."""
+    found = agreement(said(car(1, 20.0), car(2, 26.35)), said(car(3, 23.0), car(4, 16.65)))
+    assert (found.vehicles, found.only_first, found.only_second) == (2, 2, 2), "of two frames"
+    assert found.iou == pytest.approx(1 / 7)
+
+
 def test_labels_of_another_recording_are_refused() -> None:
     with pytest.raises(BadInput, match="different recordings"):
         agreement(said(), replace(said(), t_ns=(1, 2, 3, 4, 5, 6)))

@@ -60,7 +60,7 @@ class LiveCar:
         self._ticks = 0
         self._ahead_s = 0.0
         self._desk = SessionRecorder(folder)
-        self._engine = Engine(open_any, None, Params(), uri=f"live:{self._config}", playing=True, desk=self._desk)
+        self._engine = Engine(open_any, None, Params(), uri=f"live:{self._config}", playing=True, recorder=self._desk)
         self._engine.listen(self._shown)
 
     def drive(self, stop: threading.Event) -> None:

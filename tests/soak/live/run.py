@@ -134,7 +134,7 @@ def _soak(folder: Path, seconds: float, networks: Networks, others: list[int]) -
         uri=f"live:{config}",
         playing=True,
         open_lanes=open_lanes,
-        desk=desk,
+        recorder=desk,
     )
     engine.listen(watcher)
     engine.start()

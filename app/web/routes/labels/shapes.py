@@ -7,13 +7,13 @@ from typing import Literal
 from app.labels.service.filmstrip import Why
 from app.labels.store.values import ItemKind
 from app.web.routes.shapes.common import ApiModel, Point
-from pipeline.labels.model import Heading, State
+from pipeline.labels.model import Heading, Maker, State
 
 
 class OriginJson(ApiModel):
     """Who made a label, and with what."""
 
-    maker: Literal["pipeline", "person", "import"]
+    maker: Maker
     """Kind of author."""
     name: str
     """The person, or the file or run that it came from."""

@@ -119,7 +119,7 @@ class CipvJson(Exact):
     reason: str
     """Why it is this one, in words."""
     accel_mps2: float | None = None
-    """Its acceleration over ground; null until it can be told, and for the next CIPV."""
+    """Its acceleration over ground; null until it is known well enough, and for the next CIPV."""
     accel_sigma_mps2: float | None = None
     """Standard deviation of that."""
 

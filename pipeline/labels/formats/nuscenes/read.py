@@ -22,7 +22,9 @@ from pipeline.vision.classes import canonical
 
 _USUAL_SIZE = (1600, 900)
 _LARGEST_M = 1e7
+"""Of a global coordinate: the northing of UTM stays below it."""
 _LARGEST_TURN_RAD = 0.2
+"""Between the camera's mounting in the file and in the recording."""
 Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -25,6 +24,7 @@ from pipeline.labels.model import (
     LabelTrack,
     Lead,
     LeadRange,
+    Maker,
     Origin,
     PathLabel,
     Sighting,
@@ -34,7 +34,7 @@ from pipeline.types import F64, Point2
 
 _STATE: TypeAdapter[State] = TypeAdapter(State)
 _HEADING: TypeAdapter[Heading] = TypeAdapter(Heading)
-_MAKER: TypeAdapter[Literal["pipeline", "person", "import"]] = TypeAdapter(Literal["pipeline", "person", "import"])
+_MAKER: TypeAdapter[Maker] = TypeAdapter(Maker)
 _LARGEST_ID = 2**63
 _DEEPEST = 32
 

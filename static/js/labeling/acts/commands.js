@@ -28,7 +28,7 @@ function withTrack(what) {
 }
 
 /** @param {LabelTrack} track @returns {ItemRef} */
-export const refOf = ({ id, revision }) => ({ kind: "track", id, revision });
+const refOf = ({ id, revision }) => ({ kind: "track", id, revision });
 
 /** Propose labels from the pipeline, in the marked frames or in all frames. */
 export async function propose() {

@@ -8,7 +8,7 @@
 const LISTS = { track: "tracks", lead: "leads", path: "paths", event: "events", tag: "tags" };
 
 /** @param {Act} act @returns {ItemRef[]} */
-export function refsOf(act) {
+function refsOf(act) {
   const one =
     typeof act.track === "number"
       ? [{ kind: /** @type {const} */ ("track"), id: act.track, revision: act.revision }]

@@ -138,14 +138,14 @@ function shape(track, bbox) {
  * @param {number} reach
  * @returns {Sides|null}
  */
-export function sidesAt([x1, y1, x2, y2], { u, v }, reach) {
+function sidesAt([x1, y1, x2, y2], { u, v }, reach) {
   if (u < x1 - reach || u > x2 + reach || v < y1 - reach || v > y2 + reach) return null;
   const near = /** @type {Sides} */ ([u - x1 < reach, v - y1 < reach, x2 - u < reach, y2 - v < reach]);
   return near.some(Boolean) ? near : [true, true, true, true];
 }
 
 /** @param {Box} box @param {Sides} sides @param {number} du @param {number} dv @returns {Box} */
-export const stretched = (box, sides, du, dv) =>
+const stretched = (box, sides, du, dv) =>
   ordered(/** @type {Box} */ (box.map((value, i) => (sides[i] ? value + (i % 2 ? dv : du) : value))));
 
 /** @param {Box} box @returns {Box} */

@@ -38,7 +38,7 @@ export function colorOf(id, isLight) {
  * Consecutive frames with the same lead and source.
  * @param {Series} series @returns {Stretch[]}
  */
-export function stretches({ done, columns }) {
+function stretches({ done, columns }) {
   /** @type {Stretch[]} */
   const found = [];
   for (let i = 0; i < done; i++) {

@@ -11,7 +11,7 @@ from app.labels.errors import ActRefused, NoSuchLabel
 from app.labels.store.database import Database
 from app.labels.store.drive_labels import DriveLabels
 from app.labels.store.work import put, queue
-from app.labels.work_states import STATES
+from app.labels.work_states import State
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.model import LabelTrack, LeadRange, Origin, Sighting
 from tests.app.labels.acts.doing import act
@@ -91,4 +91,4 @@ def test_what_nobody_has_labelled_is_not_reviewed_and_what_is_not_there_is_said(
 
 
 def test_the_command_offers_the_states_that_there_are() -> None:
-    assert get_args(Offered) == STATES
+    assert get_args(Offered) == get_args(State)

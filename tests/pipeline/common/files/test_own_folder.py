@@ -79,3 +79,13 @@ def test_kernels_compile_where_the_program_is_read_only(tmp_path: Path, home: st
     assert done.returncode == 0, done.stderr
     kept = tmp_path / ("home/.cache/cipv" if home == "writable" else f"temporary/cipv-{os.getuid()}") / "kernels"
     assert [*kept.rglob("*.nbc")], "it need not be compiled again"
+
+
+def test_a_folder_below_a_file_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    (tmp_path / "file").touch()
+    monkeypatch.delenv("CIPV_HOME", raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path / "file"))
+    reason = f"{tmp_path}/file/.cache/cipv cannot be created, since {tmp_path}/file is not a folder"
+    assert own_folder.why_impossible(own_folder.own_folder()) == f"{reason}; set CIPV_HOME to a folder for networks"
+    monkeypatch.setenv("CIPV_HOME", str(tmp_path / "new"))
+    assert own_folder.why_impossible(own_folder.own_folder() / "models") is None

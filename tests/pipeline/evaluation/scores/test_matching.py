@@ -59,3 +59,13 @@ def test_the_pairs_are_nearest_together() -> None:
     seen = [fused(7, 21.0, 0.0, source="V"), fused(8, 24.0, 0.5, source="V")]
     by_range = {round(error.range_m): error.distance_m for error in errors(believed(0, seen, None), known.frames[0])}
     assert by_range == {20: pytest.approx(1.0, abs=0.02), 30: pytest.approx(-6.0, abs=0.02)}
+
+
+def test_a_missed_vehicle_does_not_take_its_neighbours_object() -> None:
+    """The V object at 22.3 m is the car at 22 m. The car beside it was missed, and there is a ghost 7 m behind: both
+    cars could be given an object, the right one to the wrong car."""
+    known = truth({1: (22.0, 0.0), 2: (20.0, 2.4)})
+    seen = [fused(7, 22.3, 0.2, source="V"), fused(8, 29.0, 0.0, source="V")]
+    (error,) = errors(believed(0, seen, None), known.frames[0])
+    assert round(error.range_m) == 22
+    assert error.distance_m == pytest.approx(0.3, abs=0.05)

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.common.geometry import inverse, rotation
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import T_OPTICAL_BODY, inverse, rotation
 from pipeline.formats.calibration_files import FORMATS, kalibr
 from pipeline.formats.calibration_files.ros import INFO, TRANSFORM
-from pipeline.formats.extrinsic_mistakes import T_OPTICAL_BODY
 from pipeline.sources.rig import load_rig
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
@@ -50,6 +50,17 @@ def test_what_is_written_is_read(name: str, camera: CameraCalibration, tmp_path:
         return
     read = FORMATS[name].read
     same(read(written(name, camera, tmp_path), (camera.width, camera.height)), camera)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_file_that_exists_is_never_overwritten(name: str, tmp_path: Path):
+    path = written(name, STRAIGHT, tmp_path)
+    files = sorted(path.iterdir()) if path.is_dir() else [path]
+    files[-1].write_text("measured by hand", encoding="utf-8")
+    before = [file.read_bytes() for file in files]
+    with pytest.raises(BadInput, match="file already exists"):
+        written(name, STRAIGHT, tmp_path)
+    assert [file.read_bytes() for file in files] == before
 
 
 def test_a_rig_file_is_that_of_captures(tmp_path: Path):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from pipeline.common.geometry import inverse, rotation
 from pipeline.formats.calibration_files import FORMATS
@@ -14,14 +16,14 @@ from pipeline.formats.calibration_files.recognise import parse_any
 from pipeline.sources import open_source
 from pipeline.types import CameraCalibration
 from pipeline.types.source import SourceError
-from tests.pipeline.formats.calibration_files.test_calibration_files import STRAIGHT, same, written
+from tests.pipeline.formats.calibration_files.test_calibration_files import BENT, FOUR, STRAIGHT, same, written
 
 SIZE = STRAIGHT.width, STRAIGHT.height
 
 
 def contents(name: str, camera: CameraCalibration, folder: Path) -> dict[str, bytes]:
     """The files of a format, under names that say nothing."""
-    path = written(name, camera, folder / name)
+    path = written(name, camera, Path(tempfile.mkdtemp(dir=folder)))
     files = [path] if path.is_file() else sorted(path.iterdir())
     return {f"{name} {number}": file.read_bytes() for number, file in enumerate(files)}
 
@@ -59,6 +61,47 @@ def test_a_day_of_kittis_raw_data_is_recognised_with_and_without_the_imus_file(d
     ):
         with pytest.raises(SourceError, match=named):
             parse_any(files, None)
+
+
+@pytest.mark.parametrize(
+    ("name", "part", "old", "new", "said"),
+    [
+        ("ros", "camera_info.yaml", "image_width: ", "image_width: -", "invalid image_width"),
+        ("ros", "camera_info.yaml", "plumb_bob", "fisheye", "distortion: fisheye is not supported"),
+        ("ros", "camera_info.yaml", "camera_optical", "elsewhere", "goes from lidar to camera_optical"),
+        ("ros", "static_transform.yaml", "w: ", "w: 7", "the quaternion is not of unit length"),
+        ("kalibr", "camchain.yaml", "pinhole", "omni", "camera_model omni is not supported"),
+        ("kalibr", "transform.yaml", "- [", "- [7", "T_cam_lidar"),
+        ("kalibr", "camchain.yaml", "cam0:", "cam0: [", "not YAML"),
+    ],
+)
+def test_an_error_names_the_file_that_was_given(
+    name: str, part: str, old: str, new: str, said: str, tmp_path: Path
+) -> None:
+    folder = written(name, FOUR if name == "kalibr" else BENT, tmp_path)
+    texts = {file.name: file.read_text() for file in folder.iterdir()}
+    assert old in texts[part]
+    texts[part] = texts[part].replace(old, new, 1)
+    files = {f"my {called}": text.encode() for called, text in texts.items()}
+    with pytest.raises(SourceError, match=said) as refused:
+        parse_any(files, SIZE)
+    assert str(refused.value).startswith("my "), refused.value
+
+
+def test_one_file_of_two_says_what_is_needed(tmp_path: Path):
+    folder = written("ros", BENT, tmp_path)
+    with pytest.raises(SourceError, match=r"static_transform\.yaml: no such file"):
+        FORMATS["ros"].read(folder / "camera_info.yaml", SIZE)
+    (folder / "camera_info.yaml").rename(folder / "left.yaml")
+    with pytest.raises(SourceError, match=r"left\.yaml: ROS needs two files: a folder with camera_info\.yaml"):
+        FORMATS["ros"].read(folder / "left.yaml", SIZE)
+
+
+def test_a_chain_with_the_lidar_may_be_called_anything(tmp_path: Path):
+    folder = written("kalibr", FOUR, tmp_path)
+    chain, transform = (yaml.safe_load((folder / name).read_text()) for name in ("camchain.yaml", "transform.yaml"))
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump({"cam0": chain["cam0"] | transform}))
+    same(FORMATS["kalibr"].read(tmp_path / "mine.yaml", None), FOUR)
 
 
 @pytest.mark.parametrize("name", ["kitti", "ros", "opencv", "kalibr"])
