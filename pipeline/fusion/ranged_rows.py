@@ -59,12 +59,13 @@ def _place(track: LidarTrack | VisionTrack) -> _Place | None:
 
 
 def _matches(places: Sequence[_Place | None], tracks: Sequence[_Place]) -> dict[int, int]:
-    """Index of the place → index of the track of the same object; of all pairs, those that are closest together."""
+    """Index of the place → index of the track of the same object; of all pairs, those that are closest together. An
+    unmatched one costs as much as a pair at the gate, so that two poor pairs are not preferred to one that fits."""
     apart = np.array([[_apart(place, track) for track in tracks] for place in places])
     if not apart.size:
         return {}
-    rows, columns = linear_sum_assignment(np.minimum(apart, 2 * _GATE))
-    return {int(i): int(j) for i, j in zip(rows, columns, strict=True) if apart[i, j] <= _GATE}
+    rows, columns = linear_sum_assignment(np.minimum(apart, _GATE))
+    return {int(i): int(j) for i, j in zip(rows, columns, strict=True) if apart[i, j] < _GATE}
 
 
 def _apart(place: _Place | None, track: _Place) -> float:

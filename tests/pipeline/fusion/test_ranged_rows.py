@@ -62,6 +62,14 @@ def test_what_is_elsewhere_is_another_object(x: float, y: float) -> None:
     assert (alone.label, alone.hits, alone.existence) == (None, 4, None)
 
 
+def test_one_pair_that_fits_is_preferred_to_two_that_hardly_do() -> None:
+    """The radar sees the farther car and one beyond it; the nearer car is hidden from it."""
+    cars, echoes = (lidar_track(1, 30.0), lidar_track(2, 28.3)), (radar_track(1, 29.7), radar_track(2, 31.5))
+    _, found = objects(FusionState(), lidar=cars, radar=echoes)
+    assert sorted((each.source, each.lidar_track) for each in found if each.lidar_track) == [("L", 2), ("LR", 1)]
+    assert sum(each.source == "R" for each in found) == 1
+
+
 def test_an_object_keeps_its_id_from_sensor_to_sensor() -> None:
     state, (first,) = objects(FusionState(), radar=(radar_track(1, 54.0),))
     state, (second,) = objects(state, vision=(vision_track(7, BOX, 60.0, 6.0),), radar=(radar_track(1, 53.0),))
