@@ -9,14 +9,17 @@ from __future__ import annotations
 from math import inf
 
 from pipeline.decision.braking_evidence import has_ranged_velocity
-from pipeline.decision.gates import ABREAST_M, is_solid
-from pipeline.decision.path_position import believed_mps
+from pipeline.decision.gates import ABREAST_M, OWN_HALF_WIDTH_M, is_solid
+from pipeline.decision.path_position import SIDEWAYS_SIGMA_MPS, believed_mps
 from pipeline.params import AebParams
 from pipeline.path.estimates import STEP_M
 from pipeline.types import Cipv, FusedObject, Path
 
 _STOPS_WITH_MPS2 = 3.5
 """Strongest braking of a driver who means to give way: more is an emergency (ISO 15622 permits ACC as much)."""
+_ON_FOOT = ("person", "bicycle")
+"""Detectors call a cyclist one or the other."""
+_HALF_A_PERSON_M = 0.25
 _ACROSS = 0.7
 """Share of a speed that is lateral at more than 45° to the path."""
 _SURE_SIGMAS = 2.0
@@ -40,6 +43,7 @@ def is_there_now(item: FusedObject, params: AebParams) -> bool:
 def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: AebParams) -> bool:
     """Whether the object is in the corridor, or its lateral motion takes it there before the car reaches it. An object
     that stands or may stand beside the road stays there: its lateral speed is noise, and half of its points may vanish.
+    Only persons step in.
 
     If the path's uncertainty exceeds its width, no course counts as leading into it: in a bend, other traffic follows
     the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty where the
@@ -56,18 +60,30 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: Ae
         is_hidden = lead is not None and distance_m > lead.distance_m
         if is_hidden or sigma_m > path.half_width_m:
             return False
-    if not oncoming and (item.surely_moving is False or item.in_path):
-        return item.in_path and is_there_now(item, params)
+    if not oncoming and item.in_path:
+        return is_there_now(item, params)
     if item.closest_point is None or item.closest_point[0] < ABREAST_M:
         return False  # already beside the car: braking would not avoid it
     sideways = believed_mps(item.lateral_mps, item)
     if oncoming and params.react_where_met:
         return abs(item.path_offset_m + sideways * item.ttc_s) + _SURE_SIGMAS * sigma_m <= path.half_width_m
+    if not oncoming and item.surely_moving is False:
+        return params.react_to_crossing and item.label in _ON_FOOT and _steps_in(item, path)
     toward = max(-sideways if item.path_offset_m > 0 else sideways, 0.0)
     aside_m = abs(item.path_offset_m) - toward * item.ttc_s
     if aside_m + (_SURE_SIGMAS * sigma_m if oncoming else 0.0) <= path.half_width_m:
         return True
     return params.react_to_crossing and not oncoming and _surely_drives_in(item, toward, item.ttc_s)
+
+
+def _steps_in(item: FusedObject, path: Path) -> bool:
+    """Whether a person on the edge of the path will be before the car when it arrives. Walking is hardly faster than
+    what may be noise of a standing object, but nothing parked is called a person. One who is still beside the path may
+    stop there within a step."""
+    offset_m, sideways_mps = item.path_offset_m or 0.0, item.lateral_mps or 0.0
+    toward_mps = (-sideways_mps if offset_m > 0.0 else sideways_mps) - SIDEWAYS_SIGMA_MPS
+    aside_m = abs(offset_m) - max(toward_mps, 0.0) * (item.ttc_s or 0.0)
+    return abs(offset_m) <= path.half_width_m + _HALF_A_PERSON_M and aside_m <= OWN_HALF_WIDTH_M
 
 
 def _surely_drives_in(item: FusedObject, toward_mps: float, ttc_s: float) -> bool:

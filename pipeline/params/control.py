@@ -118,7 +118,7 @@ class AebParams(Section):
     react_to_crossing: bool = choice(
         True,
         "ACC and emergency braking react to what crosses as soon as its front is sure to enter the path before the car "
-        "is there; off: only once the middle of its side would",
+        "is there, and to persons who step in; off: only once the middle of its side would, and it surely moves",
     )
     confirm_frames: int = slider(2, 1, 10, 1, "frames", "Consecutive frames that must request a stage before it starts")
     release_ttc_s: float = slider(6.0, 1.0, 20.0, 0.5, "s", "Keep braking below this time to collision")

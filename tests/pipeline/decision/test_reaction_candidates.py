@@ -103,6 +103,31 @@ def test_what_crosses_enters_with_its_front(item: FusedObject, enters: bool) -> 
     assert not enters_corridor(judged(item, 5.5), PATH, None, AebParams(react_to_crossing=False))
 
 
+def walker(y: float, sideways_mps: float, label: str = "person") -> FusedObject:
+    """Half a metre wide, 12 m ahead of a car that drives at 50 km/h."""
+    return fused(1, 12.0, y, velocity=(-13.9, sideways_mps), label=label, length=0.5, width=0.5)
+
+
+@pytest.mark.parametrize(
+    ("item", "enters"),
+    [
+        pytest.param(walker(-1.6, 1.4), True, id="steps over the edge"),
+        pytest.param(walker(1.6, -1.4), True, id="from the left"),
+        pytest.param(walker(-1.6, 1.4, "bicycle"), True, id="pushes a bicycle"),
+        pytest.param(walker(-2.2, 1.4), False, id="may still stop beside the path"),
+        pytest.param(walker(-1.6, 0.6), False, id="walks along the edge"),
+        pytest.param(walker(-1.6, -1.4), False, id="steps back"),
+        pytest.param(walker(-1.6, 1.4, "car"), False, id="a parked car does not walk"),
+    ],
+)
+def test_a_person_steps_in(item: FusedObject, enters: bool) -> None:
+    """At a walking pace, nothing surely moves."""
+    known = judged(item, 13.9)
+    assert known.surely_moving is False
+    assert enters_corridor(known, PATH, None, AebParams()) is enters
+    assert not enters_corridor(known, PATH, None, AebParams(react_to_crossing=False))
+
+
 @pytest.mark.parametrize(
     ("then_m", "params", "enters"),
     [
