@@ -29,6 +29,8 @@ _SHADOW = 0.6
 _STRAIGHT_ON_M = 150.0
 _HEIGHTS_AT_M = np.arange(5.0, 45.0, 2.5)
 _ROAD_HALF_M, _LOWEST_PERCENT, _FEWEST = 1.6, 15, 8
+_ASIDE_M = 12.0
+"""The street is straight: its road lies within this of the car's axis."""
 _RANGE_NOISE_M, _LOST, _LOST_IN_GLASS = 0.02, 0.07, 0.6
 _FARTHEST_HIT_M = 90.0
 _STEP_RAD, _GAP_RAD = np.radians(0.17), np.radians(0.13)
@@ -106,10 +108,10 @@ def _slope(sweep: Sweep | None, way: F64) -> F64:
     """(2,) slope and height of the road along the way, by the lowest points on it."""
     assert sweep is not None
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
-    found = []
+    points, found = sweep.points[(sweep.points[:, 0] > 0.0) & (np.abs(sweep.points[:, 1]) < _ASIDE_M)], []
     for at_m in _HEIGHTS_AT_M:
         place = [np.interp(at_m, s, way[:, 0]), np.interp(at_m, s, way[:, 1])]
-        z = sweep.points[np.hypot(*(sweep.points[:, :2] - place).T) < _ROAD_HALF_M, 2]
+        z = points[np.hypot(*(points[:, :2] - place).T) < _ROAD_HALF_M, 2]
         if len(z) > _FEWEST:
             found.append((at_m, np.percentile(z, _LOWEST_PERCENT)))
     rows = np.array(found)

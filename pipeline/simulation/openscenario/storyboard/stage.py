@@ -20,6 +20,8 @@ from pipeline.simulation.world.lines import WorldPose
 from pipeline.types import F64
 
 _KEPT_M = 0.05
+_FASTEST_MPS = 300.0
+"""Nothing closes a gap faster, not even measured along the middle of a bend: two cars at 250 km/h do so at 140 m/s."""
 
 
 @dataclass
@@ -56,6 +58,8 @@ class PlayedScenario:
     """Parameters that actions have set, and their present values."""
     t_s: float = 0.0
     """Simulation time."""
+    _apart_until_s: dict[tuple[str, str], float] = field(default_factory=dict)
+    """Two entities → the time before which they cannot touch."""
 
     def mover(self, name: str, at: XmlElement) -> Mover:
         """An entity by name."""
@@ -186,9 +190,13 @@ class PlayedScenario:
 
     def touch(self, one: str, other: str, at: XmlElement) -> bool:
         """Whether two entities overlap."""
-        if any(self.gap_m(one, other, kind, True, at) > 0.0 for kind in ("longitudinal", "lateral")):
-            return False
         movers = [self.mover(name, at) for name in (one, other)]
+        if self.t_s < self._apart_until_s.get((one, other), 0.0):
+            return False
+        gap_m = max(self.gap_m(one, other, kind, True, at) for kind in ("longitudinal", "lateral"))
+        if gap_m > 0.0:
+            self._apart_until_s[one, other] = self.t_s + gap_m / _FASTEST_MPS
+            return False
         return all(map(self._is_along, movers)) or overlaps(*(self._footprint(mover) for mover in movers))
 
     def _footprint(self, mover: Mover) -> F64:
