@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 
 from pipeline.common.files.user_file_errors import did_you_mean
@@ -47,11 +48,12 @@ class VehicleBody:
     centre_m: float
     """Middle of the vehicle ahead of its reference point, which is the middle of its rear axle."""
 
-    def refusal(self, why: str = "") -> OpenScenarioError:
-        """The error for an entity that the simulator does not have."""
+    def refusal(self, why: str = "", but: Container[ActorKind] = ()) -> OpenScenarioError:
+        """The error for an entity that the simulator does not have, or does not have there. but: kinds that it does
+        not have there."""
+        known = ", ".join(name for name, kind in _KINDS.items() if kind not in but)
         return self.at.refusal(
-            f"entity {shown(self.name)} is a {shown(self.what)}, which is not supported{why}: the simulator has "
-            f"{', '.join(_KINDS)}"
+            f"entity {shown(self.name)} is a {shown(self.what)}, which is not supported{why}: the simulator has {known}"
         )
 
     @property
@@ -90,7 +92,7 @@ def ego_name(scenario: XmlElement, bodies: dict[str, VehicleBody], given: str | 
     for found in choices:
         if len(found) == 1:
             if not bodies[found[0]].can_be_ego:
-                raise bodies[found[0]].refusal(" as the ego vehicle")
+                raise bodies[found[0]].refusal(" as the ego vehicle", NO_EGO)
             return found[0], None
     if vehicles:
         return vehicles[0], (

@@ -161,7 +161,7 @@ def test_a_pedestrian_or_bicycle_is_no_ego_vehicle(body: str, tmp_path: Path) ->
     parts = Parts(entities=entity("Ego", body) + entity("Car"))
     parts.init = init("Ego", on_lane(-1, 150.0), "2") + init("Car", on_lane(-1, 100.0), "20")
     assert parts.load(tmp_path).ego.speed_mps == {0.0: 20.0}
-    with pytest.raises(ScenarioError, match="which is not supported as the ego vehicle"):
+    with pytest.raises(ScenarioError, match=r"as the ego vehicle: the simulator has car, .*, motorbike$"):
         parts.load(tmp_path, "?ego=Ego")
 
 
