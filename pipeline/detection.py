@@ -121,11 +121,15 @@ def detector_for(source: AnySource, spec: str | None = None) -> Detector:
     return open_detector(spec, image_size(source))
 
 
-def far_view_for(source: AnySource, detector: Detects[RawBoxes] | None, size_px: int = WINDOW_PX) -> FarView | None:
-    """The far view with the same network for the source's images. None without a network, or if the images are no
-    larger than the network's input. DetectorError if the network cannot be run at that size."""
+def far_view_for(
+    source: AnySource, detector: Detects[RawBoxes] | None, far_px: int | None = WINDOW_PX
+) -> FarView | None:
+    """The far view with the same network for the source's images. None without a network, with ``far_px`` None, or if
+    the images are no larger than the network's input. DetectorError if the network cannot be run at that size."""
     size = image_size(source)
-    return open_far_view(detector, size, size_px) if isinstance(detector, Detector) and size is not None else None
+    if far_px is None or size is None or not isinstance(detector, Detector):
+        return None
+    return open_far_view(detector, size, far_px)
 
 
 def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None:
@@ -136,10 +140,12 @@ def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None
     return open_lanes(spec, camera_of(source), is_simulated(source))
 
 
-def far_lanes_for(source: AnySource, lanes: object) -> LaneNetwork | None:
-    """The same lane network for the far part of the source's images. None without a network, or if the whole image
-    shows as much."""
-    return lanes.far_of(camera_of(source)) if isinstance(lanes, LaneNetwork) else None
+def far_lanes_for(
+    camera: CameraCalibration | None, lanes: object, far_px: int | None = WINDOW_PX
+) -> LaneNetwork | None:
+    """The same lane network for the far part of a camera's images, whose size depends on the camera alone. None without
+    a network, with ``far_px`` None, which switches off every far view, or if the whole image shows as much."""
+    return lanes.far_of(camera) if far_px is not None and isinstance(lanes, LaneNetwork) else None
 
 
 def camera_of(source: AnySource) -> CameraCalibration | None:
@@ -189,10 +195,9 @@ def open_detectors(
         say(note)
     boxes = open_boxes(source, choice.boxes, sensors, say)
     every = choice.lanes_every or usual_every(lanes, source.rate_hz)
-    if choice.far_px is None:
-        return Detectors(boxes, lanes, every)
     far = far_view_for(source, boxes, choice.far_px)
-    return Detectors(boxes, lanes, every, far, far_lanes=far_lanes_for(source, lanes))
+    far_lanes = far_lanes_for(camera_of(source), lanes, choice.far_px)
+    return Detectors(boxes, lanes, every, far, far_lanes=far_lanes)
 
 
 def open_boxes(

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Generic
 
-from pipeline.detection import Detects, Seen_co, far_lanes_for, lanes_for
+from pipeline.detection import Detects, Seen_co, camera_of, far_lanes_for, lanes_for
 from pipeline.sources import open_source
 from pipeline.types import U8, Frame, RawBoxes, RawLanes
 from pipeline.types.source import Source
@@ -83,5 +83,5 @@ def lanes(uri: str, spec: str) -> LooksOnce[RawLanes] | None:
 def far_lanes(uri: str, spec: str) -> LooksOnce[RawLanes] | None:
     """The same for the far part of the images; None if the whole image shows as much."""
     whole = lanes(uri, spec)
-    far = far_lanes_for(open_source(uri), whole.detector) if whole is not None else None
+    far = far_lanes_for(camera_of(open_source(uri)), whole.detector) if whole is not None else None
     return None if far is None else LooksOnce(far)

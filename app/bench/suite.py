@@ -13,7 +13,7 @@ from app.bench import simulation as simulation_bench
 from app.bench import whole_pipeline as pipeline_bench
 from app.bench.calibration import Calibration
 from app.web.source_catalog import recordings
-from pipeline.detection import Detectors, detector_for, far_lanes_for, far_view_for, lanes_for
+from pipeline.detection import Detectors, camera_of, detector_for, far_lanes_for, far_view_for, lanes_for
 from pipeline.inference.runtime import DetectorMissing
 from pipeline.lanes.open_detector import usual_every
 from pipeline.params import Params
@@ -43,7 +43,7 @@ def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, An
     network, lanes = _detector(detector_spec, source), lanes_for(source)
     far = far_view_for(source, network)
     every = usual_every(lanes, SWEEPS_HZ)
-    looking = Detectors(network, lanes, every, far, far_lanes=far_lanes_for(source, lanes))
+    looking = Detectors(network, lanes, every, far, far_lanes=far_lanes_for(camera_of(source), lanes))
     parts: list[Callable[[], dict[str, dict[str, Any]]]] = [
         lambda: packets_bench.stages(BUDGET_S["decode"]),
         lambda: lidar_bench.stages(_sweeps(source), BUDGET_S["lidar"], params),

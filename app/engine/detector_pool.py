@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.engine.snapshot import Notice
-from pipeline.detection import Detectors, Detects, brings_detections, far_lanes_for, far_view_for, image_size
+from pipeline.detection import Detectors, Detects, brings_detections, camera_of, far_lanes_for, far_view_for, image_size
 from pipeline.inference.runtime import DetectorError, DetectorMissing
 from pipeline.lanes.open_detector import usual_every
 from pipeline.run import Sensors
@@ -32,7 +32,7 @@ ABLATION_NOTICES: dict[Sensors, tuple[str, ...]] = {
 class DetectorPool:
     """``open_detector`` and ``open_lanes`` return the detectors for a source's images; None: no detector, without a
     notice. lanes_every: lanes are detected in every n-th frame; None: depends on the lane detector's speed.
-    far_view_px: side of the far view's window; None: no far view."""
+    far_view_px: side of the far view's window; None: no far view, of lanes neither."""
 
     def __init__(
         self,
@@ -62,13 +62,13 @@ class DetectorPool:
         lanes = self.lanes_for(source, notices)
         boxes = self.boxes_for(source, notices)
         every = self._lanes_every or usual_every(lanes, source.rate_hz)
-        far_lanes = far_lanes_for(source, lanes) if self._far_view_px is not None else None
+        far_lanes = far_lanes_for(camera_of(source), lanes, self._far_view_px)
         return Detectors(boxes, lanes, every, self.far_view_for(source, boxes), far_lanes=far_lanes)
 
     def far_view_for(self, source: AnySource, boxes: Detects[RawBoxes] | None) -> FarView | None:
         """The detector's second pass for the source's images; None if it is disabled or adds nothing."""
-        if self._far_view_px is None or boxes is None:
-            return None
+        if boxes is None:
+            return None  # not kept: the detector may be there the next time
         kind = _kind_of(source)
         if kind not in self._opened_far:
             self._opened_far[kind] = far_view_for(source, boxes, self._far_view_px)

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from pipeline.common.files.data_dir import data_dir
-from pipeline.detection import Detectors, detector_for, far_lanes_for, far_view_for, lanes_for
+from pipeline.detection import Detectors, camera_of, detector_for, far_lanes_for, far_view_for, lanes_for
 from pipeline.evaluation.lead_verdict import Judged, judge
 from pipeline.experiments.robustness.experiment import AS_IS, VARIANTS
 from pipeline.lanes.open_detector import usual_every
@@ -50,7 +50,7 @@ def opened(kind: str, sensors: Sensors) -> Seen:
     lanes = lanes_for(source, "twinlitenet")
     every = usual_every(lanes, source.rate_hz)
     far = far_view_for(source, network)
-    detectors = Detectors(network, lanes, every, far, far_lanes=far_lanes_for(source, lanes))
+    detectors = Detectors(network, lanes, every, far, far_lanes=far_lanes_for(camera_of(source), lanes))
     indices = range(len(source))
     return Seen(
         [sensed(source.frame(index), detectors, sensors) for index in indices], [source.truth(i) for i in indices]

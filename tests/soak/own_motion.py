@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.common.files.data_dir import data_dir
-from pipeline.detection import Detectors, detect, far_lanes_for, lanes_for
+from pipeline.detection import Detectors, camera_of, detect, far_lanes_for, lanes_for
 from pipeline.experiments.curves import scenarios
 from pipeline.experiments.curves.drives import driven
 from pipeline.lanes.open_detector import usual_every
@@ -135,7 +135,9 @@ def _frames(copy: Path, has_oxts: bool) -> list[Frame]:
     """Every frame, with what the lane network finds in its image, as in the product."""
     source = open_source(str(copy))
     lanes = lanes_for(source, "twinlitenet")
-    networks = Detectors(None, lanes, usual_every(lanes, source.rate_hz), far_lanes=far_lanes_for(source, lanes))
+    networks = Detectors(
+        None, lanes, usual_every(lanes, source.rate_hz), far_lanes=far_lanes_for(camera_of(source), lanes)
+    )
     frames = [detect(source.frame(index), networks) for index in range(len(source))]
     assert all((frame.ego is not None) == has_oxts for frame in frames)
     return frames

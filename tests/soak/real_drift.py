@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from pipeline.alignment.projection import corrected
 from pipeline.common.files.data_dir import data_dir
-from pipeline.detection import Detectors, detect, far_lanes_for, lanes_for
+from pipeline.detection import Detectors, camera_of, detect, far_lanes_for, lanes_for
 from pipeline.lanes.open_detector import usual_every
 from pipeline.params import AlignmentParams, preset
 from pipeline.sources import open_source
@@ -40,7 +40,7 @@ def frames_of(uri: str) -> list[Frame]:
         lanes_for(source, "twinlitenet"),
     )
     every, far = usual_every(lanes, source.rate_hz), open_far_view(network, size)
-    detectors = Detectors(network, lanes, every, far, far_lanes=far_lanes_for(source, lanes))
+    detectors = Detectors(network, lanes, every, far, far_lanes=far_lanes_for(camera_of(source), lanes))
     return [detect(each, detectors) for each in frames]
 
 

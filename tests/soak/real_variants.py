@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 
 from pipeline.common.geometry import iou_matrix
-from pipeline.detection import Detectors, Detects, far_lanes_for, lanes_for
+from pipeline.detection import Detectors, Detects, camera_of, far_lanes_for, lanes_for
 from pipeline.evaluation.lead_verdict import LeadRule, judge
 from pipeline.lanes.open_detector import usual_every
 from pipeline.params import preset
@@ -93,7 +93,7 @@ def run(folder: Path, kind: str, name: str, change: Change, sensors: Sensors) ->
         far = replace(far, detector=EveryFifthMissing(far.detector)) if far is not None else None
     lanes = lanes_for(source, "twinlitenet")
     every = usual_every(lanes, source.rate_hz)
-    detectors = Detectors(boxes, lanes, every, far, far_lanes=far_lanes_for(source, lanes))
+    detectors = Detectors(boxes, lanes, every, far, far_lanes=far_lanes_for(camera_of(source), lanes))
     done = list(through(frames, preset("default"), detectors, sensors))
     said, wrong = _judged(kind, name, source, done)
     return Row(done, said, wrong)

@@ -6,11 +6,9 @@ from dataclasses import replace
 from functools import lru_cache
 
 from app.fleet.batch.job import Job
-from pipeline.detection import DetectorChoice, Detectors, image_size, open_detectors
-from pipeline.lanes.network import LaneNetwork
+from pipeline.detection import DetectorChoice, Detectors, far_lanes_for, image_size, open_detectors
 from pipeline.lanes.open_detector import LaneDetector, usual_every
 from pipeline.run import patiently
-from pipeline.types import CameraCalibration
 from pipeline.types.source import Source, is_simulated
 
 _KINDS = 4
@@ -30,15 +28,9 @@ def detectors_for(source: Source, job: Job) -> Detectors:
     if not isinstance(opened.lanes, LaneDetector):
         return opened
     lanes = opened.lanes.of_camera(first.camera)
-    far_lanes = _far_lanes(opened, first.camera) if job.choice.far_px is not None else None
+    far_lanes = far_lanes_for(first.camera, opened.far_lanes or opened.lanes, job.choice.far_px)
     every = job.choice.lanes_every or usual_every(lanes, source.rate_hz)
     return replace(opened, lanes=lanes, lanes_every=every, far_lanes=far_lanes)
-
-
-def _far_lanes(opened: Detectors, camera: CameraCalibration | None) -> LaneNetwork | None:
-    """The lane network for the far part of a camera's images. One that is open already need not be loaded again."""
-    network = opened.far_lanes if opened.far_lanes is not None else opened.lanes
-    return network.far_of(camera) if isinstance(network, LaneNetwork) else None
 
 
 class _Opening:
