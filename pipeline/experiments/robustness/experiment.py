@@ -80,6 +80,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "AEB acts on one frame": {"aeb.confirm_frames": 1},
     "braking for what was in the path": {"aeb.react_to_present": False},
     "braking for what crosses over": {"aeb.react_where_met": False},
+    "braking for what has entered only": {"aeb.react_to_crossing": False},
     "camera speeds without error": {"aeb.closing_sigmas": 0.0},
 }
 """The parameter that switches off each rule against false leads."""

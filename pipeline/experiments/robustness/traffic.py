@@ -1,8 +1,8 @@
 """Random traffic for the robustness suite: a kilometre of street, country road or motorway, by its number.
 
-Each drive has parked rows, crossings, bends, crests, roadworks, leads that wander and stop, cars that cut in and out,
-and its own sensor faults. The ego vehicle follows a script without collisions, so the suite judges what the pipeline
-would brake for, not the consequences.
+Each drive has parked rows, people, crossings, bends, crests, roadworks, leads that wander and stop, cars that cut in
+and out, and its own sensor faults. The ego vehicle follows a script without collisions, so the suite judges what the
+pipeline would brake for, not the consequences.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.experiments.robustness.following import STEP_S, Drive, following, places_m, steady, wandering
+from pipeline.experiments.robustness.people import people
 from pipeline.experiments.robustness.road_kinds import DriveLayout, RoadKind, layout_of
 from pipeline.simulation.scenario import Scenario
 
@@ -62,6 +63,7 @@ def scenario(seed: int, number: int) -> Scenario:
     actors += _oncoming(rng, place, road["lanes_oncoming"], usual)
     if lanes > 1:
         actors += _beside(rng, place, own_lane, lanes, usual, {each["lane"] for each in actors if each["id"] < 100})
+    walkers = people(np.random.default_rng([seed, number, 1]), road, actors, way[way <= DRIVE_M], _START_M)
     return Scenario.model_validate(
         {
             "title": f"{place.name} {number}",
@@ -71,6 +73,7 @@ def scenario(seed: int, number: int) -> Scenario:
             "ego": ego,
             "actors": actors,
             "crossing_actors": _crossing(rng, road, way) if layout.crossing else [],
+            "free_actors": list(walkers) if place.parked else [],
             "gnss": {"sigma_m": 0.02 if layout.routed else 5.0},
             "lidar": {"dropout": round(float(rng.choice((0.01, 0.05, 0.15), p=(0.6, 0.3, 0.1))), 3)},
             "detections": {"measured": True, "lines": {"missed": 0.4} if layout.lanes_seen else None},

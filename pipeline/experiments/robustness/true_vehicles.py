@@ -16,8 +16,8 @@ from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.types import CameraCalibration, FusedObject, Point2
 from pipeline.types.sensors import are_several, kinds_in
 
-_PARKED, _ONCOMING, _BESIDE, _CROSSING = 100, 1000, 2000, 3000
-"""First number of each part of the random traffic (``traffic``)."""
+_PARKED, _ONCOMING, _BESIDE, _CROSSING, _PEOPLE = 100, 1000, 2000, 3000, 4000
+"""First number of each part of the random traffic (``traffic``, ``people``)."""
 
 
 def place(item: FusedObject | None) -> Point2 | None:
@@ -75,6 +75,8 @@ def what(met: Sequence[ActorState]) -> str:
     if not met:
         return "nothing there"
     number = min(state.actor.id for state in met)
+    if number >= _PEOPLE:
+        return "pedestrian"
     if number >= _CROSSING:
         return "crossing vehicle"
     if number >= _BESIDE:
