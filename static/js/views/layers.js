@@ -12,7 +12,7 @@ const CHIPS = {
     ["cuboids", "Cuboids", "Cuboids of LiDAR objects", "lidar"],
     ["lidarBoxes", "L boxes", "LiDAR boxes in the image, as used by fusion", "lidar"],
     ["visionBoxes", "V boxes", "Tracked detector boxes", "vision"],
-    ["farView", "Far", "Window of the detector's second pass, at native resolution", "vision"],
+    ["farView", "Far", "Windows in which the detector, and at times the lane network, look at more detail", "vision"],
     ["path", "Path", "Path corridor on the ground", "path"],
     ["lanes", "Lanes", "Estimated ego-lane lines", "lane"],
   ],
