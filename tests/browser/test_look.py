@@ -223,6 +223,23 @@ def test_a_key_right_after_a_dialog_is_the_pages(open_page: OpenPage):
     expect(address).to_be_visible()
 
 
+WITHOUT_WEBGL = """() => {
+  const context = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+    return kind.startsWith("webgl") ? null : context.call(this, kind, ...rest);
+  };
+}"""
+
+
+def test_without_webgl_the_views_that_need_it_say_so(open_page: OpenPage):
+    page = open_page()
+    page.evaluate(WITHOUT_WEBGL)
+    for tab, body in (("3D", "#three-body"), ("rerun", "#rerun-body")):
+        page.get_by_role("tab", name=tab).click()
+        expect(page.locator(body)).to_contain_text("needs WebGL 2, which this browser lacks or has switched off")
+        expect(page.locator(f"{body} iframe")).to_have_count(0)
+
+
 def test_the_3d_view_keeps_the_keys_that_fly_and_leaves_the_page_the_others(open_page: OpenPage, site: Site):
     page = open_page()
     page.route("**/viser/**", lambda route: route.fulfill(body="<input>", content_type="text/html"))

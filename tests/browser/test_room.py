@@ -44,11 +44,18 @@ SIZES = ((720, 450), (900, 700), (1024, 600), (1024, 768), (390, 844))
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)
-def test_all_of_the_top_bar_is_in_view_or_in_its_menu(width: int, height: int, open_page: OpenPage) -> None:
+def test_all_of_the_top_bar_is_in_view_or_in_its_menu_and_every_chip_is(
+    width: int, height: int, open_page: OpenPage
+) -> None:
     page = open_page(width, height)
     bar, more = page.locator(".topbar"), page.get_by_role("button", name="More")
     for control in bar.locator("button:visible").all():
         expect(control).to_be_in_viewport(ratio=1)
+    for chip in page.locator(".camera-pane .chips button:visible, .bev-pane .chips button:visible").all():
+        expect(chip).to_be_in_viewport(ratio=1)
+    tools = page.locator("[aria-label='plan tools']")
+    rows = tools.locator("button, select").evaluate_all("all => new Set(all.map((one) => one.offsetTop)).size")
+    assert rows == 1, "the plan has more room than its tools"
     names = ("Fleet", "Align", "Layout ▾", "Share", "Help")
     if more.is_visible():
         more.click()
