@@ -4,7 +4,7 @@
 import { tell } from "../core/connection.js";
 import { $, el } from "../core/dom.js";
 import { get, on } from "../core/store.js";
-import { webGl } from "../core/webgl.js";
+import { webGl } from "./webgl.js";
 
 /** Identifies this page's 3D view at the server. */
 const NAME = [...crypto.getRandomValues(new Uint8Array(16))].map((each) => each.toString(16).padStart(2, "0")).join("");
@@ -46,7 +46,10 @@ export function open() {
   body.append(note, view);
 }
 
-/** Say in the words of this page, until it is closed, what viser would say in its own. @param {HTMLIFrameElement} view */
+/**
+ * Say in the words of this page, until it is closed, what viser would say in its own.
+ * @param {HTMLIFrameElement} view
+ */
 function sayInPlace(view) {
   const style = view.contentDocument?.createElement("style");
   if (style) {

@@ -3,7 +3,7 @@ import { request } from "../core/api.js";
 import { el } from "../core/dom.js";
 import { NO_DRIVE } from "../drive/live_buffer.js";
 import { get } from "../core/store.js";
-import { webGl } from "../core/webgl.js";
+import { webGl } from "../views/webgl.js";
 
 /** Narrower panes use the compact blueprint. */
 const NARROW_PX = 900;
