@@ -197,15 +197,23 @@ def test_an_address_that_could_not_be_opened_is_there_to_be_mended(open_page: Op
         expect(address).to_be_hidden()
 
 
+OPENED_BEFORE = """async () => {
+  const { get, set } = await import("/js/core/store.js"), state = get("state");
+  for (const uri of ["kitti:/drive", "video:d.mp4", state.uri]) set("state", { ...state, uri });
+}"""
+"""Two other recordings, of which the server lists one, then this one again."""
+
+
 def test_what_can_be_opened_is_listed_recordings_first_and_the_dialog_does_not_wait_for_the_list(open_page: OpenPage):
     page, held = open_page(), []
+    page.evaluate(OPENED_BEFORE)
     page.route("**/api/sources", lambda route: held.append(route))
     page.keyboard.press("f")
     expect(page.get_by_label("Recording URI")).to_be_focused()
     offers = [{"uri": "sim:straight", "title": "Simulation"}, {"uri": "kitti:/drive", "title": "drive"}]
     expect(page.locator("#source-dialog")).to_contain_text("Loading the list")
     held[0].fulfill(json={"sources": offers, "open": None})
-    expect(page.locator(".open-list code")).to_have_text(["kitti:/drive", "sim:straight"])
+    expect(page.locator(".open-list code")).to_have_text(["video:d.mp4", "kitti:/drive", "sim:straight"])
     expect(page.locator(".open-list button[aria-current=true]")).to_have_text("Simulationsim:straight")
 
 

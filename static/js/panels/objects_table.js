@@ -1,7 +1,7 @@
 /** The table of fused objects, with the reason why each is or is not the CIPV. */
 import { cipvId, roleOf } from "../core/colors.js";
 import { $, el, mark, text, within } from "../core/dom.js";
-import { DASH, kmh, num, side, signed } from "../core/format.js";
+import { DASH, kmh, num, side, signed, ttc } from "../core/format.js";
 import { LongList } from "../core/long_list.js";
 import { isImaged } from "../core/object_sources.js";
 import { get, on, paintAfter, select, set } from "../core/store.js";
@@ -58,7 +58,7 @@ const COLUMNS = [
     key: "ttc",
     label: "TTC",
     help: "Time to collision in seconds; – while the gap is not shrinking",
-    words: (o) => num(o.ttc_s),
+    words: (o) => ttc(o.ttc_s),
     by: (o) => o.ttc_s ?? Infinity,
   },
   {
