@@ -199,9 +199,9 @@ def test_an_address_that_could_not_be_opened_is_there_to_be_mended(open_page: Op
 
 OPENED_BEFORE = """async () => {
   const { get, set } = await import("/js/core/store.js"), state = get("state");
-  for (const uri of ["kitti:/drive", "video:d.mp4", state.uri]) set("state", { ...state, uri });
+  for (const uri of ["/drive", "video:d.mp4", state.uri]) set("state", { ...state, uri });
 }"""
-"""Two other recordings, of which the server lists one, then this one again."""
+"""Two other recordings, of which the server lists one with the name of its kind, then this one again."""
 
 
 def test_what_can_be_opened_is_listed_recordings_first_and_the_dialog_does_not_wait_for_the_list(open_page: OpenPage):
@@ -254,6 +254,7 @@ def test_the_3d_view_keeps_the_keys_that_fly_and_leaves_the_page_the_others(open
     theme = "() => document.documentElement.dataset.theme ?? null"
     before = page.evaluate(theme)
     page.keyboard.press("3")
+    page.get_by_role("button", name="Close this note").click()
     view = page.frame_locator("iframe[title='3D view']")
     view.locator("body").click()
     page.keyboard.press("d")

@@ -29,6 +29,9 @@ export function setUp() {
   });
 }
 
+/** An address without the name of its kind, which the command line need not be given. @param {string} uri */
+const place = (uri) => uri.replace(/^\w+:(?=\/)/, "");
+
 /** Those opened in this browser, newest first. @returns {Offered[]} */
 const opened = () => memory.read("opened", []);
 
@@ -60,9 +63,9 @@ export async function open() {
   if (answer instanceof Error)
     return offers.replaceChildren(el("p", { class: "facts", textContent: `No list: ${answer.message}` }));
   const isSimulated = (/** @type {Offered} */ { uri }) => uri.startsWith("sim:");
-  const known = new Set([current, ...answer.sources.map(({ uri }) => uri)]);
+  const known = new Set([current ?? "", ...answer.sources.map(({ uri }) => uri)].map(place));
   offers.replaceChildren(
-    ...list("Opened before", opened().filter(({ uri }) => !known.has(uri)), current),
+    ...list("Opened before", opened().filter(({ uri }) => !known.has(place(uri))), current),
     ...list("Recordings", answer.sources.filter((each) => !isSimulated(each)), current),
     ...list("Simulations", answer.sources.filter(isSimulated), current),
   );
@@ -78,7 +81,7 @@ function list(heading, offered, current) {
       el("span", { textContent: title }),
       el("code", { textContent: uri, title: uri }),
     );
-    if (uri === current) button.setAttribute("aria-current", "true");
+    if (place(uri) === place(current ?? "")) button.setAttribute("aria-current", "true");
     return button;
   });
   return [el("h3", { textContent: heading }), el("div", { class: "open-list" }, ...buttons)];

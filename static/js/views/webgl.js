@@ -7,8 +7,17 @@ const SOFTWARE = /swiftshader|llvmpipe|softpipe|software/i;
 export function webGl() {
   const found = document.createElement("canvas").getContext("webgl2");
   if (!found) return "none";
-  const details = found.getExtension("WEBGL_debug_renderer_info");
-  const renderer = details ? String(found.getParameter(details.UNMASKED_RENDERER_WEBGL)) : "";
+  const renderer = rendererOf(found);
   found.getExtension("WEBGL_lose_context")?.loseContext(); // a browser keeps only a few
   return SOFTWARE.test(renderer) ? "software" : "card";
+}
+
+/**
+ * Its name: Firefox gives it at once, and warns of the extension that Chromium and Safari need for it.
+ * @param {WebGL2RenderingContext} gl
+ */
+function rendererOf(gl) {
+  const said = String(gl.getParameter(gl.RENDERER));
+  const details = said.startsWith("WebKit") ? gl.getExtension("WEBGL_debug_renderer_info") : null;
+  return details ? String(gl.getParameter(details.UNMASKED_RENDERER_WEBGL)) : said;
 }
