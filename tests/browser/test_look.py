@@ -254,7 +254,6 @@ def test_the_3d_view_keeps_the_keys_that_fly_and_leaves_the_page_the_others(open
     theme = "() => document.documentElement.dataset.theme ?? null"
     before = page.evaluate(theme)
     page.keyboard.press("3")
-    page.get_by_role("button", name="Close this note").click()
     view = page.frame_locator("iframe[title='3D view']")
     view.locator("body").click()
     page.keyboard.press("d")
