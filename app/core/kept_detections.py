@@ -59,7 +59,7 @@ class DetectionRow(msgspec.Struct, array_like=True):
     law: DistanceLaw | None = None
     """The detector's distance law."""
     far: tuple[int, int, int, int] | None = None
-    """Window of the second look, pixels; None without one."""
+    """Window of the second look, or the only one in which lane lines were looked for, pixels; None without one."""
     far_count: int = 0
     """How many of the last boxes come from it."""
     points: bytes = b""
@@ -72,7 +72,8 @@ def row_of(index: int, name: str, answer: RawBoxes | RawLanes) -> DetectionRow:
     """The row of a frame's detections by the detector with this name."""
     if isinstance(answer, RawLanes):
         points, line = answer.points.astype("<f4").tobytes(), answer.line.astype("<i4").tobytes()
-        return DetectionRow(index, name, answer.model, answer.scores.astype("<f4").tobytes(), points=points, line=line)
+        scores = answer.scores.astype("<f4").tobytes()
+        return DetectionRow(index, name, answer.model, scores, far=answer.window, points=points, line=line)
     return DetectionRow(
         index,
         name,
@@ -91,7 +92,8 @@ def answer_of(row: DetectionRow) -> RawBoxes | RawLanes:
     scores = np.frombuffer(row.scores, "<f4").astype(np.float32)
     if row.boxes is None:
         points = np.frombuffer(row.points, "<f4").astype(np.float32).reshape(-1, 2)
-        return RawLanes(row.model, points, scores, np.frombuffer(row.line, "<i4").astype(np.int32))
+        line = np.frombuffer(row.line, "<i4").astype(np.int32)
+        return RawLanes(row.model, points, scores, line, window=row.far)
     boxes = np.frombuffer(row.boxes, "<f4").astype(np.float32).reshape(-1, 4)
     if row.law is None or not len(boxes) == len(scores) == len(row.labels):
         raise ValueError("boxes without their law, scores or classes")

@@ -32,7 +32,7 @@ from app.streaming.sent_image import MAX_WIDTH_PX, SentImage, encode_image
 from pipeline.alignment.projection import Alignment, resolve
 from pipeline.common.geometry import corners_of
 from pipeline.lanes.drawn_lines import in_image, polylines
-from pipeline.types import F64, Box, CameraImage, Frame, Ground, Result
+from pipeline.types import F64, Box, CameraImage, Frame, Ground, PixelWindow, Result
 from pipeline.types.lane import EgoLane
 from pipeline.types.result_json import to_json
 
@@ -81,19 +81,20 @@ def pack(header: dict[str, Any], jpeg: bytes, arrays: bytes) -> bytes:
 
 def display_json(result: Result, aligned: Alignment | None, scale: float) -> dict[str, Any]:
     """Overlays for the camera image. Boxes are those that fusion compared; ``cuboids`` are 8 corners, bottom first;
-    ``far_view`` is the window of the detector's second pass, None without one; ``path`` is the corridor on the ground
-    of the sweep, None without a ground. ``lanes`` are the ego lane's lines where the camera saw them, None without a
-    lane detector; ``plan_lanes`` the same seen from above, x y in metres; ``plan_edges`` the structure beside the road,
-    also from above, None if the path does not use it; ``plan_drivable`` the edges of the drivable area in the
-    image, likewise; ``plan_traffic`` x, y and heading in rad of the vehicles that
-    indicate the course of the road; ``ground`` the planes under the sweep, n·p + d = 0, and the segments of x in which
-    they apply; ``ranking`` every object, best candidate for the CIPV first."""
+    ``far_view`` is the window of the detector's second pass and ``lanes_far_view`` the only one in which lane lines
+    were looked for, each None without one; ``path`` is the corridor on the ground of the sweep, None without a ground.
+    ``lanes`` are the ego lane's lines where the camera saw them, None without a lane detector; ``plan_lanes`` the same
+    seen from above, x y in metres; ``plan_edges`` the structure beside the road, also from above, None if the path does
+    not use it; ``plan_drivable`` the edges of the drivable area in the image, likewise; ``plan_traffic`` x, y and
+    heading in rad of the vehicles that indicate the course of the road; ``ground`` the planes under the sweep, n·p + d
+    = 0, and the segments of x in which they apply; ``ranking`` every object, best candidate for the CIPV first."""
     layers = result.layers
     path = {"center": result.path.center, "left": result.path.left, "right": result.path.right}
     return {
         "lidar_boxes": _boxes_json(layers.lidar_boxes, scale),
         "vision_boxes": _boxes_json(layers.vision_boxes, scale),
-        "far_view": [side * scale for side in result.sensors.far_view] if result.sensors.far_view else None,
+        "far_view": _window_json(result.sensors.far_view, scale),
+        "lanes_far_view": _window_json(result.sensors.lanes_far_view, scale),
         "cuboids": _cuboids_json(result, aligned, scale),
         "path": _on_ground(path, layers.ground, aligned, scale),
         **_lanes_json(layers.lanes, aligned, scale),
@@ -104,6 +105,10 @@ def display_json(result: Result, aligned: Alignment | None, scale: float) -> dic
         "vision_ranges": _vision_ranges(result),
         "ranking": ranking_json(result),
     }
+
+
+def _window_json(window: PixelWindow | None, scale: float) -> list[float] | None:
+    return [side * scale for side in window] if window is not None else None
 
 
 def _cuboids_json(result: Result, aligned: Alignment | None, scale: float) -> dict[str, list[list[float] | None]]:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 from app.core.session_folder import SESSIONS
 from pipeline.common.files.data_dir import data_dir
 from pipeline.source_kinds import built_in, looks_like
 
+_FOLDERS_BETWEEN = 2
+_MOST_ENTRIES = 500
+"""Looked at in each folder: one of another kind may have any number of files."""
+
 
 def catalog() -> list[tuple[str, str]]:
-    """(uri, title) pairs: scenarios, then sessions, then the recordings right below ``CIPV_DATA`` and ``sessions``."""
+    """(uri, title) pairs: scenarios, then sessions, then the recordings below ``CIPV_DATA`` and ``sessions``."""
     return [*built_in(), *sessions(), *recordings()]
 
 
@@ -23,12 +30,32 @@ def sessions(folder: Path = SESSIONS) -> list[tuple[str, str]]:
 
 
 def recordings() -> list[tuple[str, str]]:
-    """(uri, title) of entries directly below the data folder and ``sessions`` that look like a known recording."""
+    """(uri, title) of entries below the data folder and ``sessions`` that look like a known recording: directly below,
+    or in folders in between, such as KITTI's ``DATE/DRIVE``."""
     found = []
     for root in (data_dir(), SESSIONS):
-        for path in sorted(root.iterdir()) if root.is_dir() else ():
-            scheme = looks_like(path)
-            if scheme is not None:
-                title = path.name if path.name.startswith(scheme) else f"{scheme} · {path.name}"
-                found.append((f"{scheme}:{path}", title))
+        for scheme, path in _recordings_in(root, _FOLDERS_BETWEEN):
+            title = path.name if path.name.startswith(scheme) else f"{scheme} · {path.name}"
+            found.append((f"{scheme}:{path}", title))
     return found
+
+
+def _recordings_in(folder: Path, levels: int) -> Iterator[tuple[str, Path]]:
+    """Scheme and path of each recording in a folder and so many levels below. Of a folder of drives of one kind, each
+    drive."""
+    for path in _entries(folder):
+        scheme = looks_like(path)
+        if scheme is not None:
+            drives = [each for each in _entries(path) if each.is_dir() and looks_like(each) == scheme]
+            yield from ((scheme, each) for each in drives or [path])
+        elif levels and not path.is_symlink():
+            yield from _recordings_in(path, levels - 1)
+
+
+def _entries(folder: Path) -> list[Path]:
+    """By name; of a large folder only some; none of what is no folder or cannot be read."""
+    try:
+        with os.scandir(folder) as found:
+            return sorted(folder / each.name for each in islice(found, _MOST_ENTRIES))
+    except OSError:
+        return []

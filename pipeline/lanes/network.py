@@ -110,11 +110,12 @@ class LaneNetwork:
         """The same for the part of an image in the window; none if the image is smaller than the camera's."""
         x1, y1, x2, y2 = window
         if bgr.shape[1] < x2 or bgr.shape[0] < y2:
-            return RawLanes(self.name, np.zeros((0, 2), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int32))
+            none = np.zeros((0, 2), np.float32)
+            return RawLanes(self.name, none, np.zeros(0, np.float32), np.zeros(0, np.int32), window=window)
         seen = replace(self, window=None).detect(np.ascontiguousarray(bgr[y1:y2, x1:x2]))
         u = seen.points[:, 0]
         left, right = (u > _CUT_PX) | (x1 == 0), (u < x2 - x1 - 1 - _CUT_PX) | (x2 == bgr.shape[1])
-        return replace(seen, points=seen.points + np.array([x1, y1], np.float32)).only(left & right)
+        return replace(seen, points=seen.points + np.array([x1, y1], np.float32), window=window).only(left & right)
 
     def _blob(self, bgr: U8, placed: _Placed) -> F32:
         """(1, 3, h, w) float32, the network's input."""

@@ -110,6 +110,8 @@ class RawLanes:
     age_s: float = 0.0
     """How much older their image is than the frame, in seconds; 0 for the frame's own image. With live sensors, a
     network that is slower than they are must not delay a frame."""
+    window: PixelWindow | None = None
+    """The only part of the image that was processed; None for the whole image."""
 
     def painted(self) -> RawLanes:
         """Only the points on painted lines."""

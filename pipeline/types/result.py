@@ -134,6 +134,8 @@ class SensorHealth:
     lanes_age_ms: float | None = None
     """How much older than the tick the image is in which lane lines were looked for, if they came with this frame: 0
     for the frame's own image."""
+    lanes_far_view: PixelWindow | None = None
+    """The only part of that image, in native pixels, in which they were looked for; None for the whole image."""
     scans: Mapping[str, ScanHealth] = field(default_factory=dict)
     """Of further ranging sensors that delivered, by ``SensorKind.name``."""
 
@@ -154,6 +156,7 @@ class SensorHealth:
             ego_age_ms=age_ms(frame.ego.t_ns if frame.ego is not None else None),
             far_view=frame.raw_boxes.far if frame.raw_boxes is not None else None,
             lanes_age_ms=1e3 * frame.raw_lanes.age_s if frame.raw_lanes is not None else None,
+            lanes_far_view=frame.raw_lanes.window if frame.raw_lanes is not None else None,
             scans={
                 name: ScanHealth((frame.t_ns - scan.t_ns) / 1e6, len(scan.points)) for name, scan in frame.scans.items()
             },

@@ -82,6 +82,7 @@ def _sensors(health: SensorHealth, streams: tuple[StreamHealth, ...]) -> dict[st
             "skew_ms": _number(health.camera_skew_ms),
             "far_view": list(health.far_view) if health.far_view is not None else None,
             "lanes_age_ms": _number(health.lanes_age_ms),
+            "lanes_far_view": list(health.lanes_far_view) if health.lanes_far_view is not None else None,
         },
         "ego": {"age_ms": _number(health.ego_age_ms)},
     }

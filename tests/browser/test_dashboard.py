@@ -213,6 +213,19 @@ def test_every_row_of_the_table_follows_and_the_focus_stays_with_its_object(open
     wait_for_frame(page, START)
     table(page)
     assert page.evaluate("document.activeElement.dataset.id") == held
+    assert rows.count() > 5
+    assert page.locator("#objects tbody tr[tabindex='0']").count() == 1, "Tab leaves the table with one press"
+    page.keyboard.press("ArrowUp")
+    up = page.evaluate("document.activeElement.dataset.id")
+    expect(page.locator("#objects tbody tr[aria-selected=true]")).to_have_attribute("data-id", up)
+    page.keyboard.press("Tab")
+    page.keyboard.press("Shift+Tab")
+    assert page.evaluate("document.activeElement.dataset.id") == up != held
+    page.keyboard.press("Escape")
+    whole_drive(page, site)
+    for lists in ("#events-list .event", "#why .ranked"):
+        expect(page.locator(lists)).not_to_have_count(0)
+        assert page.locator(f"{lists}[tabindex='-1']").count() == page.locator(lists).count() - 1 > 0
 
 
 def test_layers_can_be_switched_off_and_stay_off(open_page: OpenPage):

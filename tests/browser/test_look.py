@@ -197,15 +197,23 @@ def test_an_address_that_could_not_be_opened_is_there_to_be_mended(open_page: Op
         expect(address).to_be_hidden()
 
 
+OPENED_BEFORE = """async () => {
+  const { get, set } = await import("/js/core/store.js"), state = get("state");
+  for (const uri of ["/drive", "video:d.mp4", state.uri]) set("state", { ...state, uri });
+}"""
+"""Two other recordings, of which the server lists one with the name of its kind, then this one again."""
+
+
 def test_what_can_be_opened_is_listed_recordings_first_and_the_dialog_does_not_wait_for_the_list(open_page: OpenPage):
     page, held = open_page(), []
+    page.evaluate(OPENED_BEFORE)
     page.route("**/api/sources", lambda route: held.append(route))
     page.keyboard.press("f")
     expect(page.get_by_label("Recording URI")).to_be_focused()
     offers = [{"uri": "sim:straight", "title": "Simulation"}, {"uri": "kitti:/drive", "title": "drive"}]
     expect(page.locator("#source-dialog")).to_contain_text("Loading the list")
     held[0].fulfill(json={"sources": offers, "open": None})
-    expect(page.locator(".open-list code")).to_have_text(["kitti:/drive", "sim:straight"])
+    expect(page.locator(".open-list code")).to_have_text(["video:d.mp4", "kitti:/drive", "sim:straight"])
     expect(page.locator(".open-list button[aria-current=true]")).to_have_text("Simulationsim:straight")
 
 
@@ -221,6 +229,23 @@ def test_a_key_right_after_a_dialog_is_the_pages(open_page: OpenPage):
         }"""
     )
     expect(address).to_be_visible()
+
+
+WITHOUT_WEBGL = """() => {
+  const context = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+    return kind.startsWith("webgl") ? null : context.call(this, kind, ...rest);
+  };
+}"""
+
+
+def test_without_webgl_the_views_that_need_it_say_so(open_page: OpenPage):
+    page = open_page()
+    page.evaluate(WITHOUT_WEBGL)
+    for tab, body in (("3D", "#three-body"), ("rerun", "#rerun-body")):
+        page.get_by_role("tab", name=tab).click()
+        expect(page.locator(body)).to_contain_text("needs WebGL 2, which this browser lacks or has switched off")
+        expect(page.locator(f"{body} iframe")).to_have_count(0)
 
 
 def test_the_3d_view_keeps_the_keys_that_fly_and_leaves_the_page_the_others(open_page: OpenPage, site: Site):

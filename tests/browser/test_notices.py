@@ -67,6 +67,14 @@ def test_many_notices_take_one_line_and_can_all_be_read(open_page: OpenPage, sit
         expect(notices.get_by_text(words)).to_be_visible()
     notices.get_by_role("button", name="Show less").click()
     expect(notices.locator(".notice")).to_have_count(1)
+    say(page, [], {"level": "info", "text": "a single notice that is longer than the page is wide, " * 9})
+    words = notices.locator(".one-line > span")
+    notices.get_by_role("button", name="Show all").click()
+    assert words.evaluate("(node) => node.scrollWidth <= node.clientWidth && node.clientHeight > 30")
+    notices.get_by_role("button", name="Show less").click()
+    assert words.evaluate("(node) => node.scrollWidth > node.clientWidth && node.clientHeight < 30")
+    say(page, [], INFO)
+    expect(notices.get_by_role("button", name="Show")).to_have_count(0)
 
 
 def test_a_note_that_was_dismissed_stays_away_with_other_numbers(open_page: OpenPage, site: Site) -> None:

@@ -44,11 +44,18 @@ SIZES = ((720, 450), (900, 700), (1024, 600), (1024, 768), (390, 844))
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)
-def test_all_of_the_top_bar_is_in_view_or_in_its_menu(width: int, height: int, open_page: OpenPage) -> None:
+def test_all_of_the_top_bar_is_in_view_or_in_its_menu_and_every_chip_is(
+    width: int, height: int, open_page: OpenPage
+) -> None:
     page = open_page(width, height)
     bar, more = page.locator(".topbar"), page.get_by_role("button", name="More")
     for control in bar.locator("button:visible").all():
         expect(control).to_be_in_viewport(ratio=1)
+    for chip in page.locator(".camera-pane .chips button:visible, .bev-pane .chips button:visible").all():
+        expect(chip).to_be_in_viewport(ratio=1)
+    tools = page.locator("[aria-label='plan tools']")
+    rows = tools.locator("button, select").evaluate_all("all => new Set(all.map((one) => one.offsetTop)).size")
+    assert rows == 1, "the plan has more room than its tools"
     names = ("Fleet", "Align", "Layout ▾", "Share", "Help")
     if more.is_visible():
         more.click()
@@ -87,25 +94,29 @@ def test_share_in_the_menu_says_that_it_has_copied(open_page: OpenPage) -> None:
     assert "frame=60" in page.evaluate("navigator.clipboard.readText()")
 
 
-WITHOUT_IMAGE = """async (hasImage) => {
+WITHOUT = """async ([hasImage, hasPoints]) => {
   const { get, set } = await import("/js/core/store.js");
   set("state", { ...get("state"), uri: "pcap:no-camera" });
-  set("frame", { ...get("frame"), image: hasImage ? { width: 640, height: 360 } : null });
+  set("frame", { ...get("frame"), image: hasImage ? { width: 640, height: 360 } : null, count: hasPoints ? 9 : 0 });
 }"""
+"""A frame of another recording."""
 
 
-def test_a_recording_without_a_camera_has_no_camera_layers_to_choose(open_page: OpenPage) -> None:
+def test_what_a_recording_has_no_sensor_for_is_not_offered(open_page: OpenPage) -> None:
     page = open_page()
     wait_for_frame(page, START)
     chips, tools = page.locator("#camera-layers"), page.locator(".view-tools[data-view=camera]")
-    expect(chips).to_be_visible()
-    page.evaluate(WITHOUT_IMAGE, False)
+    points = page.locator("[data-layer=points], [data-layer=cuboids], [data-layer=planPoints], #bev ~ * .color-by")
+    expect(points.locator("visible=true")).to_have_count(4)
+    page.evaluate(WITHOUT, [False, False])
     expect(chips).to_be_hidden()
     expect(tools).to_be_hidden()
-    page.evaluate(WITHOUT_IMAGE, True)
+    page.evaluate(WITHOUT, [True, False])
     expect(chips).to_be_visible()
-    page.evaluate(WITHOUT_IMAGE, False)
+    expect(points.locator("visible=true")).to_have_count(0)
+    page.evaluate(WITHOUT, [False, True])
     expect(chips).to_be_visible()
+    expect(points.locator("visible=true")).to_have_count(4)
 
 
 REASONS = ("beside or behind the bumper", "out of path by 11.4 m", "17 by 4 m: not a vehicle")

@@ -1,5 +1,6 @@
 /** Alignment parameters and time offsets as rows of name and value. */
 import { el } from "../core/dom.js";
+import { num } from "../core/format.js";
 
 const UNITS = [
   ["res_deg", " °/px", 5],
@@ -15,7 +16,7 @@ export const labelOf = (name) => name.replace("alignment.", "").replace(/_(deg|p
 /** @param {string} name @param {number} value */
 export function withUnit(name, value) {
   const [, unit, digits] = UNITS.find(([end]) => name.endsWith(String(end))) ?? ["", "", 3];
-  return `${value.toFixed(Number(digits))}${unit}`;
+  return `${num(value, Number(digits))}${unit}`;
 }
 
 /** Terms and descriptions of a list. @param {Record<string, number|string>} changes */

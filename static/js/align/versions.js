@@ -2,6 +2,7 @@
 import { request } from "../core/api.js";
 import { el, text } from "../core/dom.js";
 import { on } from "../core/store.js";
+import { withUnit } from "./parameter_values.js";
 import { change, settled } from "../panels/params.js";
 
 /** @typedef {import("../core/types.js").AlignmentVersion} AlignmentVersion */
@@ -103,12 +104,12 @@ function score({ match, iou }) {
 
 /** @param {AlignmentVersion} version */
 function values({ values: all }) {
-  const of = (/** @type {string} */ name) => Number(all[`alignment.${name}`] ?? NaN);
+  const of = (/** @type {string} */ name) => withUnit(name, Number(all[`alignment.${name}`] ?? NaN));
   if (all["alignment.model"] === "angular")
     return all["alignment.h_res_deg"] === null
       ? "angular"
-      : `h_res ${of("h_res_deg").toFixed(4)}, v_res ${of("v_res_deg").toFixed(4)}`;
-  return `yaw ${of("yaw_deg").toFixed(2)}°, pitch ${of("pitch_deg").toFixed(2)}°, roll ${of("roll_deg").toFixed(2)}°`;
+      : `h_res ${of("h_res_deg")}, v_res ${of("v_res_deg")}`;
+  return `yaw ${of("yaw_deg")}, pitch ${of("pitch_deg")}, roll ${of("roll_deg")}`;
 }
 
 /** @param {Error} problem @returns {null} */

@@ -154,6 +154,7 @@
  * @property {Record<string, [number, number, number, number]>} lidar_boxes
  * @property {Record<string, [number, number, number, number]>} vision_boxes
  * @property {[number, number, number, number]|null} far_view  window of the detector's second look
+ * @property {[number, number, number, number]|null} lanes_far_view  the only part in which lane lines were looked for
  * @property {Record<string, Pixels>} cuboids
  * @property {{center: Pixels, left: Pixels, right: Pixels}|null} path
  * @property {{left: Pixels, right: Pixels}|null} lanes

@@ -1,5 +1,6 @@
 /** The table of the Fleet view. */
 import { $, el } from "../core/dom.js";
+import { oneTabStop } from "../keys/one_tab_stop.js";
 
 /** Titles of columns whose names are not clear. @type {Record<string, string>} */
 const TITLES = { t_s: "time (s)", index: "frame" };
@@ -12,6 +13,8 @@ const UNITS = [
 ];
 /** Not shown, since the drive's name contains it. */
 const HIDDEN = new Set(["address"]);
+/** Of the table, which is built anew whenever the view opens. @type {{body: HTMLElement, keep: () => void}|null} */
+let tabStop = null;
 const LEFT = new Set(["drive", "kind", "text", "title", "source", "type"]);
 
 /**
@@ -38,7 +41,7 @@ export function showRows(found, onOpen, onSort, sorted) {
       if (!LEFT.has(name)) return el("td", { textContent: words });
       return el("td", { class: "left", textContent: words, title: `${words}\n${row.address}` });
     });
-    const line = el("tr", { tabIndex: 0, title: `Open ${row.address}` }, ...cells);
+    const line = el("tr", { tabIndex: -1, title: `Open ${row.address}` }, ...cells);
     line.addEventListener("click", () => onOpen(row));
     line.addEventListener("keydown", (event) => {
       if (event.key === "Enter") onOpen(row);
@@ -46,7 +49,10 @@ export function showRows(found, onOpen, onSort, sorted) {
     return line;
   });
   const nothing = el("td", { class: "left facts", colSpan: shown.length, textContent: "Nothing meets these filters." });
-  $("#fleet-rows tbody").replaceChildren(...(rows.length ? rows : [el("tr", { class: "fleet-none" }, nothing)]));
+  const body = $("#fleet-rows tbody");
+  body.replaceChildren(...(rows.length ? rows : [el("tr", { class: "fleet-none" }, nothing)]));
+  if (tabStop?.body !== body) tabStop = { body, keep: oneTabStop(body, "tr:not(.fleet-none)") };
+  tabStop.keep();
 }
 
 /** No rows, while they are unknown. */

@@ -25,13 +25,15 @@ const held = new Map();
 /** The source whose frames had notes: their row stays, so that the next one does not move the page. */
 let noted = "";
 let isOpen = false;
+/** Whether only the beginning of the shared row's text is seen while it is closed. */
+let isCut = false;
 /** The newest frame, by when it was made, and when it came, in the page's own monotonic time. */
 const newest = { madeUnixMs: -1, at: 0 };
 
 const errors = el("div"),
   level = el("b"),
   words = el("span"),
-  more = el("button", { type: "button", class: "more", title: "Show all notices", onclick: toggle }),
+  more = el("button", { type: "button", class: "more", title: "Show or hide the rest", onclick: toggle }),
   dismiss = el("button", { type: "button", textContent: "✕", aria: { label: "Dismiss" }, onclick: dismissFirst }),
   row = el("div", { class: "notice one-line", hidden: true }, level, words, more, dismiss),
   rest = el("div");
@@ -41,7 +43,8 @@ let calm = [];
 export function setUp() {
   $("#notices").append(errors, row, rest);
   on(["state", "frame", "link"], update);
-  setInterval(update, 1000);
+  setInterval(measure, 1000); // not with every frame: it makes the browser lay out the page
+  new ResizeObserver(measure).observe(words);
 }
 
 /**
@@ -52,6 +55,11 @@ export function refused(error) {
   if (!(error instanceof Refused)) return;
   refusal = { words: error.message, until: Date.now() + REFUSAL_MS };
   dismissed.delete(error.message);
+  update();
+}
+
+function measure() {
+  if (!isOpen) isCut = words.scrollWidth > words.clientWidth;
   update();
 }
 
@@ -68,7 +76,7 @@ function update() {
     (each) => !dismissed.has(kindOf(each)),
   );
   calm = ["warning", "info"].flatMap((one) => notices.filter((each) => each.level === one));
-  const key = JSON.stringify([notices, isOpen, noted]);
+  const key = JSON.stringify([notices, isOpen, isCut, noted]);
   if (key === shown) return;
   shown = key;
   errors.replaceChildren(...notices.filter((each) => each.level === "error").map(notice));
@@ -77,15 +85,15 @@ function update() {
 
 function showCalm() {
   const [first = null, ...others] = calm;
-  if (!others.length) isOpen = false;
+  if (!others.length && !isCut) isOpen = false;
   row.hidden = !first && !noted;
   mark(row, "level", first?.level ?? "none");
   text(level, first?.level ?? "");
   text(words, first?.text ?? "no notes on this frame");
   words.title = first?.text ?? "";
   row.classList.toggle("is-open", isOpen);
-  more.hidden = !others.length;
-  text(more, isOpen ? "Show less" : others.length ? `+${others.length} more` : "");
+  more.hidden = !others.length && !isCut;
+  text(more, isOpen ? "Show less" : others.length ? `+${others.length} more` : isCut ? "Show all" : "");
   more.setAttribute("aria-expanded", String(isOpen));
   rest.replaceChildren(...(isOpen ? others.map(notice) : []));
 }

@@ -1,10 +1,11 @@
 /** The table of fused objects, with the reason why each is or is not the CIPV. */
 import { cipvId, roleOf } from "../core/colors.js";
 import { $, el, mark, text, within } from "../core/dom.js";
-import { DASH, kmh, num, side, signed } from "../core/format.js";
+import { DASH, kmh, num, side, signed, ttc } from "../core/format.js";
 import { LongList } from "../core/long_list.js";
 import { isImaged } from "../core/object_sources.js";
 import { get, on, paintAfter, select, set } from "../core/store.js";
+import { oneTabStop } from "../keys/one_tab_stop.js";
 
 /** @typedef {import("../core/types.js").FusedObject} FusedObject */
 /**
@@ -57,7 +58,7 @@ const COLUMNS = [
     key: "ttc",
     label: "TTC",
     help: "Time to collision in seconds; – while the gap is not shrinking",
-    words: (o) => num(o.ttc_s),
+    words: (o) => ttc(o.ttc_s),
     by: (o) => o.ttc_s ?? Infinity,
   },
   {
@@ -91,7 +92,8 @@ let sort = { key: null, down: false };
 /** @type {WeakMap<HTMLElement, {cells: Record<string, HTMLElement>, reason: HTMLElement}>} */
 const parts = new WeakMap();
 const body = $("#objects tbody"),
-  list = new LongList(body, (/** @type {Row} */ { item }) => item.id, create, fill);
+  list = new LongList(body, (/** @type {Row} */ { item }) => item.id, create, fill),
+  keepTabStop = oneTabStop(body, "tr", (row) => set("selection", Number(row.dataset.id)));
 
 export function setUp() {
   const last = el(
@@ -103,7 +105,7 @@ export function setUp() {
   paintAfter(["frame", "selection"], update);
   on(["selection"], () => list.rowOf(get("selection") ?? -1)?.scrollIntoView({ block: "nearest" }));
   body.addEventListener("click", (event) => pick(within(event, "tr")));
-  body.addEventListener("keydown", onKey);
+  body.addEventListener("keydown", (event) => event.key === "Enter" && pick(within(event, "tr")));
   reflectSort();
 }
 
@@ -166,6 +168,7 @@ function update() {
     : null;
   list.show(order.map((item) => ({ item, why: reasons.get(item.id) ?? "" })));
   if (focused !== null) list.rowOf(focused)?.focus({ preventScroll: true });
+  keepTabStop(list.rowOf(get("selection") ?? -1));
   const sources = new Set(["VL", "V", "L", ...objects.map(({ source }) => source)]);
   const counts = [...sources].map((source) => `${objects.filter((o) => o.source === source).length} ${source}`);
   text($("#object-facts"), `${objects.length}: ${counts.join(" · ")}`);
@@ -206,7 +209,7 @@ function create() {
   const reason = el("td", { class: "reason" });
   const row = el(
     "tr",
-    { tabIndex: 0 },
+    { tabIndex: -1 },
     ...COLUMNS.map(({ key }) => {
       if (key === "source") return el("td", { class: "left" }, (cells[key] = el("span", { class: "pill" })));
       return (cells[key] = el("td", { class: key === "id" ? "id" : TEXTS.has(key) ? "left" : "", data: { key } }));
@@ -220,18 +223,4 @@ function create() {
 /** @param {HTMLElement|null} row */
 function pick(row) {
   if (row) select(Number(row.dataset.id));
-}
-
-/** @param {KeyboardEvent} event */
-function onKey(event) {
-  const row = within(event, "tr");
-  if (!row) return;
-  if (event.key === "Enter") pick(row);
-  const next =
-    event.key === "ArrowDown" ? row.nextElementSibling : event.key === "ArrowUp" ? row.previousElementSibling : null;
-  if (next instanceof HTMLElement) {
-    next.focus();
-    set("selection", Number(next.dataset.id));
-    event.preventDefault();
-  }
 }

@@ -1,10 +1,13 @@
 /** The dialog for opening another recording. */
 import { request } from "../core/api.js";
-import { $, el, entitle, text } from "../core/dom.js";
+import { $, el, entitle, memory, text } from "../core/dom.js";
 import { refused } from "./notices.js";
 import { get, on } from "../core/store.js";
 
 /** @typedef {{uri: string, title: string}} Offered */
+
+/** How many recordings are remembered. */
+const MOST_OPENED = 8;
 
 const dialog = $("#source-dialog", HTMLDialogElement);
 /** The last URI that could not be opened, so that a typo can be corrected. @type {string|null} */
@@ -16,11 +19,26 @@ export function setUp() {
   $("#source-button").addEventListener("click", open);
   on(["state"], () => {
     const state = get("state");
-    if (state?.uri !== openUri) wanted = null;
+    if (state?.uri !== openUri) {
+      wanted = null;
+      if (state?.uri) remember({ uri: state.uri, title: state.title || state.uri });
+    }
     openUri = state?.uri;
     text($("#source-title"), state?.title || state?.uri || "opening …");
     entitle($("#source-title"), `${state?.title ?? ""} (${state?.uri ?? ""}): open another recording (F)`);
   });
+}
+
+/** An address without the name of its kind, which the command line need not be given. @param {string} uri */
+const place = (uri) => uri.replace(/^\w+:(?=\/)/, "");
+
+/** Those opened in this browser, newest first. @returns {Offered[]} */
+const opened = () => memory.read("opened", []);
+
+/** @param {Offered} recording */
+function remember(recording) {
+  const others = opened().filter(({ uri }) => uri !== recording.uri);
+  memory.write("opened", [recording, ...others].slice(0, MOST_OPENED));
 }
 
 /** Shown at once: on a busy server, the list may take seconds. */
@@ -45,7 +63,9 @@ export async function open() {
   if (answer instanceof Error)
     return offers.replaceChildren(el("p", { class: "facts", textContent: `No list: ${answer.message}` }));
   const isSimulated = (/** @type {Offered} */ { uri }) => uri.startsWith("sim:");
+  const known = new Set([current ?? "", ...answer.sources.map(({ uri }) => uri)].map(place));
   offers.replaceChildren(
+    ...list("Opened before", opened().filter(({ uri }) => !known.has(place(uri))), current),
     ...list("Recordings", answer.sources.filter((each) => !isSimulated(each)), current),
     ...list("Simulations", answer.sources.filter(isSimulated), current),
   );
@@ -61,7 +81,7 @@ function list(heading, offered, current) {
       el("span", { textContent: title }),
       el("code", { textContent: uri, title: uri }),
     );
-    if (uri === current) button.setAttribute("aria-current", "true");
+    if (place(uri) === place(current ?? "")) button.setAttribute("aria-current", "true");
     return button;
   });
   return [el("h3", { textContent: heading }), el("div", { class: "open-list" }, ...buttons)];

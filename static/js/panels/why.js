@@ -7,6 +7,7 @@ import { $, el, keyed, mark, text, within } from "../core/dom.js";
 import { DASH, num } from "../core/format.js";
 import { LongList } from "../core/long_list.js";
 import { get, paintAfter, set } from "../core/store.js";
+import { oneTabStop } from "../keys/one_tab_stop.js";
 import { gateRow, kindOf, quantity, showGate } from "./gate_rows.js";
 
 /** @typedef {import("../core/types.js").Gate} Gate */
@@ -20,7 +21,8 @@ const type = el("span"),
   verdict = el("p", { class: "verdict", aria: { live: "polite" } });
 const gates = el("div", { class: "gates" }),
   ranking = el("div", { class: "ranking" });
-const candidates = new LongList(ranking, (/** @type {Ranked} */ { id }) => id, rankedRow, showRanked);
+const candidates = new LongList(ranking, (/** @type {Ranked} */ { id }) => id, rankedRow, showRanked),
+  keepTabStop = oneTabStop(ranking, ".ranked");
 const rankingTitle = el("h3", { textContent: "Candidate ranking" });
 const content = el(
   "div",
@@ -61,6 +63,7 @@ function update() {
   rankingTitle.hidden = list.length === 0;
   if (!item) content.hidden = list.length === 0;
   candidates.show(list);
+  keepTabStop();
   if (!item) return void hideObject(true);
   hideObject(false);
   text(number, `#${item.id}`);

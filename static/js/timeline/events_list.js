@@ -5,11 +5,13 @@ import { seekTo } from "../drive/seek.js";
 import { clock } from "../core/format.js";
 import { refused } from "../panels/notices.js";
 import { get, on, paint, set } from "../core/store.js";
+import { oneTabStop } from "../keys/one_tab_stop.js";
 import { nameOf, styleOf, weightOf } from "./lanes/flags.js";
 
 /** @typedef {import("../drive/types.js").DriveEvent} DriveEvent */
 
-const list = $("#events-list");
+const list = $("#events-list"),
+  keepTabStop = oneTabStop(list, ".event");
 /** @type {{event: DriveEvent, row: HTMLElement}[]} */
 let rows = [];
 /** @type {DriveEvent[]|null} */
@@ -43,6 +45,7 @@ function build() {
   rows = events.map((event) => ({ event, row: rowOf(event) }));
   list.replaceChildren(...rows.map(({ row }) => row));
   if (!rows.length) list.append(none);
+  keepTabStop();
   reflect();
 }
 

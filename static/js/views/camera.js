@@ -136,7 +136,8 @@ function drawBelief(ctx, frame) {
   const layers = get("layers") ?? {},
     { display, result } = frame;
   if (layers.path && display.path) drawPath(ctx, display.path, X, Y);
-  if (layers.farView && display.far_view) drawWindow(ctx, display.far_view, X, Y);
+  const windows = layers.farView ? farViews(display) : [];
+  for (const { window, tint } of windows) drawWindow(ctx, window, tint, X, Y);
   if (layers.points) drawPoints(ctx, frame);
   if (layers.lanes && display.lanes) for (const lane of [display.lanes.left, display.lanes.right]) drawLane(ctx, lane);
   const labels = tagsIn(ctx, frame);
@@ -152,10 +153,19 @@ function drawBelief(ctx, frame) {
   }
   if (hasObjects) drawObjects(ctx, frame, layers, labels, X, Y);
   if (chosen) drawInImage(ctx, frame, chosen, labels, X, Y);
+  for (const { window, name, tint } of windows) labels.put(name, X(window[0]) + 3, Y(window[3]) - 3, tint);
   const tape = get("tape");
   if (tape?.from.u != null && tape.from.v != null && tape.to.u != null && tape.to.v != null) {
     drawTape(ctx, [X(tape.from.u), Y(tape.from.v)], [X(tape.to.u), Y(tape.to.v)], tape, labels);
   }
+}
+
+/** The windows that networks looked at in more detail. @param {import("../core/types.js").Display} display */
+function farViews({ far_view: vehicles, lanes_far_view: lanes }) {
+  return [
+    ...(vehicles ? [{ window: vehicles, name: "far view", tint: onImage("vision") }] : []),
+    ...(lanes ? [{ window: lanes, name: "far view of lanes", tint: onImage("lane") }] : []),
+  ];
 }
 
 /** Fit the image into the pane, and the pane's default height to the image.

@@ -12,7 +12,7 @@ const CHIPS = {
     ["cuboids", "Cuboids", "Cuboids of LiDAR objects", "lidar"],
     ["lidarBoxes", "L boxes", "LiDAR boxes in the image, as used by fusion", "lidar"],
     ["visionBoxes", "V boxes", "Tracked detector boxes", "vision"],
-    ["farView", "Far", "Window of the detector's second pass, at native resolution", "vision"],
+    ["farView", "Far", "Windows in which the detector, and at times the lane network, look at more detail", "vision"],
     ["path", "Path", "Path corridor on the ground", "path"],
     ["lanes", "Lanes", "Estimated ego-lane lines", "lane"],
   ],
@@ -76,7 +76,7 @@ export function setUp() {
   }
   on(["layers"], reflect);
   on(["frame"], showLaneChip);
-  on(["frame"], showCameraChips);
+  on(["frame"], showPossible);
   reflect();
 }
 
@@ -105,19 +105,27 @@ function showLaneChip() {
   if (chip.hidden === hasLanes) chip.hidden = !hasLanes;
 }
 
-/** Address of the last recording of which an image was seen. @type {string|null|undefined} */
-let withImages;
+/** What a recording must have for each of these parts of the page. @type {Record<"image"|"points", string>} */
+const PARTS = {
+  image: "#camera-layers, .view-tools[data-view=camera]",
+  points: ["points", "cuboids", "lidarBoxes", "planPoints"].map((key) => `[data-layer=${key}]`).join() + ", .color-by",
+};
+/** Addresses of the last recording of which an image, or LiDAR points, were seen. @type {Partial<typeof PARTS>} */
+const seen = {};
 
-/** The camera's chips and tools are hidden until the recording has an image; a missing one does not hide them again. */
-function showCameraChips() {
-  const uri = get("state")?.uri,
+/** Chips and tools are hidden until the recording has what they are about; a frame without it does not hide them. */
+function showPossible() {
+  const uri = get("state")?.uri ?? "",
     frame = get("frame");
   if (!frame) return;
-  if (frame.image) withImages = uri;
-  for (const part of document.querySelectorAll("#camera-layers, .view-tools[data-view=camera]")) {
-    const isHidden = withImages !== uri,
-      each = /** @type {HTMLElement} */ (part);
-    if (each.hidden !== isHidden) each.hidden = isHidden;
+  if (frame.image) seen.image = uri;
+  if (frame.count) seen.points = uri;
+  for (const need of /** @type {(keyof typeof PARTS)[]} */ (["image", "points"])) {
+    for (const part of document.querySelectorAll(PARTS[need])) {
+      const isHidden = seen[need] !== uri,
+        each = /** @type {HTMLElement} */ (part);
+      if (each.hidden !== isHidden) each.hidden = isHidden;
+    }
   }
 }
 

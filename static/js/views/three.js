@@ -4,12 +4,17 @@
 import { tell } from "../core/connection.js";
 import { $, el } from "../core/dom.js";
 import { get, on } from "../core/store.js";
+import { webGl } from "./webgl.js";
 
 /** Identifies this page's 3D view at the server. */
 const NAME = [...crypto.getRandomValues(new Uint8Array(16))].map((each) => each.toString(16).padStart(2, "0")).join("");
 /** Narrower frames are scaled down, since there the 3D view's own panel would cover the scene. */
 const LEAST_PX = 600;
 const NO_WEBGL = "The 3D view needs WebGL 2, which this browser lacks or has switched off.";
+const SOFTWARE =
+  "The 3D view is drawn without a graphics card and may be slow: see hardware acceleration in the browser's settings.";
+/** viser's own notice of the same, by its id. */
+const NOTICE_OF_VISER = "webgl-software-rendering";
 
 export function setUp() {
   const body = $("#three-body");
@@ -28,21 +33,34 @@ export function setUp() {
 export function open() {
   const body = $("#three-body");
   if (body.firstChild) return;
-  if (!hasWebGl()) return body.append(el("p", { class: "busy", textContent: NO_WEBGL }));
+  const drawsWith = webGl();
+  if (drawsWith === "none") return body.append(el("p", { class: "busy", textContent: NO_WEBGL }));
   tell("page_3d", NAME);
   const note = el("p", { class: "busy", aria: { role: "status" }, textContent: "Opening the 3D view …" });
   const view = el("iframe", { src: `viser/of/${NAME}/`, title: "3D view" });
   view.addEventListener("load", () => {
     note.remove();
     keepConnecting(view);
+    if (drawsWith === "software") sayInPlace(view);
   });
   body.append(note, view);
 }
 
-function hasWebGl() {
-  const found = document.createElement("canvas").getContext("webgl2");
-  found?.getExtension("WEBGL_lose_context")?.loseContext(); // a browser keeps only a few
-  return found !== null;
+/**
+ * Say in the words of this page, until it is closed, what viser would say in its own.
+ * @param {HTMLIFrameElement} view
+ */
+function sayInPlace(view) {
+  const style = view.contentDocument?.createElement("style");
+  if (style) {
+    style.textContent = `#${NOTICE_OF_VISER} { display: none; }`;
+    view.contentDocument?.head.append(style);
+  }
+  const close = el("button", { type: "button", class: "icon-button quiet", textContent: "✕", title: "Close" });
+  close.setAttribute("aria-label", "Close this note");
+  const said = el("p", { class: "three-note", aria: { role: "status" } }, el("span", { textContent: SOFTWARE }), close);
+  close.addEventListener("click", () => said.remove());
+  view.after(said);
 }
 
 /**

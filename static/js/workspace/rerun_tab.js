@@ -3,9 +3,13 @@ import { request } from "../core/api.js";
 import { el } from "../core/dom.js";
 import { NO_DRIVE } from "../drive/live_buffer.js";
 import { get } from "../core/store.js";
+import { webGl } from "../views/webgl.js";
 
 /** Narrower panes use the compact blueprint. */
 const NARROW_PX = 900;
+const NO_WEBGL =
+  "rerun needs WebGL 2, which this browser lacks or has switched off. " +
+  "Save the recording (.rrd) and open it in rerun's own viewer.";
 
 /**
  * @param {HTMLElement} body container of the viewer
@@ -17,6 +21,8 @@ export async function showRerun(body) {
 /** @param {HTMLElement} body @param {number} [from] first frame; else the current one */
 async function load(body, from) {
   if (get("state")?.live) return void body.replaceChildren(el("p", { class: "facts pad", textContent: NO_DRIVE }));
+  if (webGl() === "none")
+    return void body.replaceChildren(bar(body, ""), el("p", { class: "busy", textContent: NO_WEBGL }));
   const note = el("p", { class: "busy", textContent: "Opening rerun …" });
   body.replaceChildren(note);
   try {

@@ -82,6 +82,10 @@ def test_the_labels_panel_stays_when_the_window_becomes_small(open_page: OpenPag
     expect(page.locator("#label-pane")).to_be_in_viewport()
     box = box_of(page.locator("#label-pane"))
     assert box["x"] + box["width"] <= 1024
+    page.set_viewport_size({"width": 720, "height": 450})
+    tabs = page.locator("#label-pane [role=tab]")
+    expect(tabs.first).to_be_in_viewport(ratio=1)
+    assert tabs.evaluate_all("all => all.filter((tab) => tab.scrollWidth > tab.clientWidth).length") == 0, "cut words"
     page.keyboard.press("Shift+L")
     expect(page.locator("#label-pane")).to_be_hidden()
     expect(page.locator(".side-column")).to_be_hidden()  # it would cover the views

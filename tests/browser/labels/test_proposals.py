@@ -37,6 +37,25 @@ def test_the_next_unlabelled_frame_is_one_whose_lead_is_only_proposed(hand: Hand
     hand.keys("n")
     is_at(page, START + 1)
     expect(page.locator(".said")).to_contain_text("lead only proposed")
+    labels.clear(COUNT)
+
+
+def test_accept_means_the_lead_once_the_selected_track_is_accepted(hand: Hand, labels: Labels):
+    """Whoever presses N and A in turn must not be told that nothing changed."""
+    made, row = draw(hand, labels), hand.page.locator(".track-row[aria-selected=true]")
+    labels.act("Bob", {"kind": "set_lead", "first": 0, "last": COUNT - 1, "lead": made})
+    (lead,) = labels.everything["leads"]
+    ref = {"kind": "lead", "id": lead["id"], "revision": lead["revision"]}
+    labels.act("Bob", {"kind": "send_back", "items": [ref], "comment": "look again"})
+    expect(row).to_have_attribute("data-id", str(made))
+    expect(hand.page.locator(".leads button.is-proposed")).to_have_count(1)
+    hand.keys("a")
+    labels.wait_for(lambda now: now.everything["leads"][0]["state"] == "accepted")
+    (lead,) = labels.everything["leads"]
+    labels.act("Bob", {"kind": "send_back", "items": [{**ref, "revision": lead["revision"]}], "comment": "and again"})
+    hand.keys("n")
+    is_at(hand.page, START + 1)
+    expect(row, "the next frame is about its lead").to_have_count(0)
 
 
 def test_a_search_that_finds_nothing_names_what_it_looked_for(hand: Hand):

@@ -52,6 +52,10 @@ def test_the_camera_goes_to_the_selection_and_visers_own_panel_stays_away(pages:
         expect(scene.get_by_text("CIPV Studio", exact=True)).to_be_visible()
         expect(scene.get_by_text("Parameters", exact=True), "the panel is folded up").to_be_hidden()
         viser = next(frame for frame in page.frames if "/viser/of/" in frame.url)
+        expect(scene.locator("#webgl-software-rendering")).to_be_attached()
+        expect(scene.locator("#webgl-software-rendering"), "this page says it in its own words").to_be_hidden()
+        page.get_by_role("button", name="Close this note").click()
+        expect(page.get_by_text("drawn without a graphics card")).to_have_count(0)
         assert page.evaluate("document.activeElement.tagName") != "IFRAME"
         assert viser.evaluate("document.hasFocus()"), "without it, viser does not connect again after a loss"
         middle = labels.cuboid(made, START)["center"]

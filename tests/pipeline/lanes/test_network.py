@@ -117,6 +117,7 @@ def test_the_far_part_of_an_image_is_seen_at_twice_the_scale_in_the_images_pixel
     assert set(edges.line.tolist()) == {ROAD_RIGHT}
     assert edges.points[:, 0] == pytest.approx(800.0, abs=1.5)
     assert edges.points[:, 1].max() == pytest.approx(272.0, abs=1.5)
+    assert (edges.window, whole.detect(bgr).window) == (far.window, None), "a view can show where it looked"
 
 
 def test_nothing_beyond_the_window_is_seen_and_a_smaller_image_has_no_window(tmp_path: Path) -> None:
@@ -128,7 +129,8 @@ def test_nothing_beyond_the_window_is_seen_and_a_smaller_image_has_no_window(tmp
     assert len(far.detect(bgr).points) == 0
     bgr[:, 600:602] = RED
     assert len(far.detect(bgr).points) > 0
-    assert len(far.detect(bgr[:, :900]).points) == 0
+    narrow = far.detect(bgr[:, :900])
+    assert (len(narrow.points), narrow.window) == (0, far.window)
 
 
 def test_the_far_views_of_two_cameras_share_a_session(tmp_path: Path) -> None:

@@ -19,12 +19,15 @@ from pipeline.types import (
     AccCommand,
     Cipv,
     EgoState,
+    Frame,
     FusedObject,
     Gate,
     Layers,
     MotionEstimate,
     OwnMotion,
     Path,
+    RawBoxes,
+    RawLanes,
     Rejection,
     Result,
     SensorHealth,
@@ -35,7 +38,7 @@ FIELDS = {
     "": "version frame t_ns sensors ego own_motion objects path cipv next_cipv rejected acc notes timing_ms",
     "sensors": "lidar camera ego",
     "sensors.lidar": "age_ms points",
-    "sensors.camera": "age_ms skew_ms far_view lanes_age_ms",
+    "sensors.camera": "age_ms skew_ms far_view lanes_age_ms lanes_far_view",
     "sensors.ego": "age_ms",
     "ego": "speed_mps yaw_rate_radps",
     "own_motion": "speed_from speed_sigma_mps yaw_rate_from yaw_rate_sigma_radps pose sources",
@@ -162,6 +165,15 @@ def test_what_is_unknown_is_null_and_never_zero() -> None:
     assert [row[name] for name in unknown] == [None] * len(unknown)
     empty = to_json(dataclasses.replace(whole_result(), ego=None, cipv=None, acc=None))
     assert (empty["ego"], empty["cipv"], empty["acc"], empty["next_cipv"]) == (None, None, None, None)
+
+
+def test_the_far_views_are_those_of_the_networks_outputs() -> None:
+    none = np.zeros((0, 4), np.float32)
+    boxes = RawBoxes("d", none, none[:, 0], (), far=(400, 0, 816, 375))
+    lanes = RawLanes("l", none[:, :2], none[:, 0], np.zeros(0, np.int32), window=(290, 145, 931, 273))
+    health = SensorHealth.of(Frame(0, "0", 0, raw_boxes=boxes, raw_lanes=lanes))
+    camera = to_json(dataclasses.replace(whole_result(), sensors=health))["sensors"]["camera"]
+    assert (camera["far_view"], camera["lanes_far_view"]) == ([400, 0, 816, 375], [290, 145, 931, 273])
 
 
 def test_minus_zero_is_written_as_zero() -> None:

@@ -7,7 +7,7 @@ import { grown, moved, turned } from "../views/cuboid.js";
 import { classNames, usualSize } from "../state/classes.js";
 import * as draft from "../state/draft.js";
 import { following, which } from "../state/listed.js";
-import { chosen, leadAt, shown, trackOf } from "../state/labels.js";
+import { chosen, isAccepted, leadAt, shown, trackOf } from "../state/labels.js";
 import { setItem, setTool } from "../state/mode.js";
 import { isSure, parted } from "../state/threshold.js";
 import * as span from "../state/marked_frames.js";
@@ -57,13 +57,14 @@ function offerComputed() {
 const computed = () => get("drive")?.now?.done ?? 0;
 
 /**
- * Accept or reject the selected track; without a selection, the lead range at this frame. In the list of what is to do,
- * the next one is selected at once.
+ * Accept or reject the selected track; without one, or if it is accepted already, the lead range at this frame. In the
+ * list of what is to do, the next one is selected at once.
  * @param {"accept"|"reject"} kind
  */
 export async function judge(kind) {
   const track = chosen();
-  if (!track) return span.judge(kind) || say("No label selected, and no lead in this frame");
+  const isLeadsTurn = kind === "accept" && isAccepted(track) && leadAt(shown())?.state === "proposed";
+  if (!track || isLeadsTurn) return span.judge(kind) || say("No label selected, and no lead in this frame");
   const next = which() === "open" ? following(track) : null;
   const sent = act({ kind, items: [refOf(track)] });
   if (!next) return;
@@ -271,7 +272,7 @@ export async function goTo(what, direction) {
   );
   if (found instanceof Error) return say(found.message);
   if (found.frame === null) return say(noneLeft(what, direction));
-  if (found.item) set("track", found.item.kind === "track" ? found.item.id : null);
+  if (found.item || what === "unlabelled") set("track", found.item?.kind === "track" ? found.item.id : null);
   seekTo(found.frame);
   say(found.why);
 }

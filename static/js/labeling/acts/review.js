@@ -8,7 +8,7 @@ import { get, set } from "../../core/store.js";
 import { act } from "./queue.js";
 import { ahead, say } from "./commands.js";
 import { ask } from "../panels/dialogs.js";
-import { chosen, leadAt, leadName, nameOf, shown } from "../state/labels.js";
+import { chosen, isAccepted, leadAt, leadName, nameOf, shown } from "../state/labels.js";
 import { setItem, setReview } from "../state/mode.js";
 import { knownName, mayReview } from "../state/person.js";
 
@@ -112,8 +112,7 @@ function about(kind, { id, revision, comment, author, reviewer }, name) {
 }
 
 /** Not this person's own. @param {import("../state/types.js").LeadRange} lead */
-const awaitsReview = ({ state, reviewer, author }) =>
-  (state === "accepted" || state === "corrected") && !reviewer && author !== knownName();
+const awaitsReview = (lead) => isAccepted(lead) && !lead.reviewer && lead.author !== knownName();
 
 /** Approve the label under review. */
 export async function reviewOk() {

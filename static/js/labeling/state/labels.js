@@ -63,6 +63,9 @@ export const trackOf = (id) => (id === null ? null : (get("labels")?.tracks.get(
 
 export const chosen = () => trackOf(get("track"));
 
+/** Whether a person stands by it. @param {{state: string}|null} label */
+export const isAccepted = (label) => label?.state === "accepted" || label?.state === "corrected";
+
 /** The lead range at a frame, or null. Rejected ranges are ignored. @param {number} frame */
 export const leadAt = (frame) =>
   get("labels")?.leads.find(({ first, last, state }) => first <= frame && frame <= last && state !== "rejected") ??

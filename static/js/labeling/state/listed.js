@@ -2,6 +2,7 @@
 import { memory } from "../../core/dom.js";
 import { get } from "../../core/store.js";
 import { present } from "./draft.js";
+import { isAccepted } from "./labels.js";
 import { isSure } from "./threshold.js";
 
 /** @typedef {import("./types.js").LabelTrack} LabelTrack */
@@ -48,5 +49,5 @@ const rank = ({ comment, confidence }) => (comment ? 2 : (confidence ?? 0));
 
 /** @param {LabelTrack} track */
 const isOpen = ({ state, comment }) => state === "proposed" || (Boolean(comment) && state !== "rejected");
-/** @param {LabelTrack} track */
-const isUnreviewed = ({ state, reviewer }) => (state === "accepted" || state === "corrected") && !reviewer;
+/** @param {LabelTrack} label */
+const isUnreviewed = (label) => isAccepted(label) && !label.reviewer;

@@ -121,5 +121,5 @@ export function judge(kind) {
 /** An accepted lead whose track is only proposed is selected: the next A accepts that too. @param {Lead} lead */
 function selectProposed(lead) {
   const track = typeof lead === "number" ? trackOf(lead) : null;
-  if (track?.state === "proposed" && (get("track") ?? null) === null) set("track", track.id);
+  if (track?.state === "proposed" && trackOf(get("track") ?? -1)?.state !== "proposed") set("track", track.id);
 }

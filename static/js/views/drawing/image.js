@@ -119,16 +119,17 @@ export function drawBox(ctx, [x1, y1, x2, y2], tint, width, X, Y) {
 }
 
 /**
- * The window of the far view, drawn faintly because it is not an object.
+ * The window of a far view, drawn faintly because it is not an object.
  * @param {CanvasRenderingContext2D} ctx
- * @param {number[]} window
+ * @param {[number, number, number, number]} window
+ * @param {string} tint
  * @param {Axis} X
  * @param {Axis} Y
  */
-export function drawWindow(ctx, window, X, Y) {
-  ctx.globalAlpha = 0.45;
+export function drawWindow(ctx, window, tint, X, Y) {
+  ctx.globalAlpha = 0.7;
   ctx.setLineDash([2, 4]);
-  drawBox(ctx, window, onImage("vision"), 1, X, Y);
+  drawBox(ctx, window, tint, 1, X, Y);
   ctx.setLineDash([]);
   ctx.globalAlpha = 1;
 }
