@@ -52,9 +52,13 @@ export function setUp() {
  * @param {unknown} error
  */
 export function refused(error) {
-  if (!(error instanceof Refused)) return;
-  refusal = { words: error.message, until: Date.now() + REFUSAL_MS };
-  dismissed.delete(error.message);
+  if (error instanceof Refused) briefly(error.message);
+}
+
+/** Show for a few seconds why something that was asked for was not done. @param {string} words */
+export function briefly(words) {
+  refusal = { words, until: Date.now() + REFUSAL_MS };
+  dismissed.delete(words);
   update();
 }
 
