@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 
 from pipeline.alignment.lens import through_lens
-from pipeline.common.geometry import F64, inverse, rotation
+from pipeline.common.geometry import F64, inverse, origin, rotation
 from pipeline.params import AlignmentParams
 from pipeline.types import Box, CameraCalibration
 
@@ -154,8 +154,7 @@ _last: tuple[AlignmentParams, CameraCalibration | None, Alignment | None] | None
 
 def _resolved(params: AlignmentParams, camera: CameraCalibration | None) -> Alignment | None:
     if params.model == "pinhole" and camera is not None:
-        given = corrected(params, camera)
-        return Pinhole(given.K, given.distortion, given.T_camera_ego)
+        return pinhole(params, camera)
     measured = angular_from_calibration(camera) if camera is not None else None
     typed = (params.h_res_deg, params.v_res_deg, params.cx_px, params.cy_px)
     if measured is None and any(value is None for value in typed):
@@ -169,24 +168,53 @@ def _resolved(params: AlignmentParams, camera: CameraCalibration | None) -> Alig
     return Angular(float(np.radians(h_deg)), float(np.radians(v_deg)), float(cx), float(cy))
 
 
-def corrected(params: AlignmentParams, camera: CameraCalibration) -> CameraCalibration:
+class Correction(Protocol):
+    """The parameters that correct a calibration; see ``AlignmentParams``."""
+
+    @property
+    def roll_deg(self) -> float: ...
+    @property
+    def pitch_deg(self) -> float: ...
+    @property
+    def yaw_deg(self) -> float: ...
+    @property
+    def forward_m(self) -> float: ...
+    @property
+    def left_m(self) -> float: ...
+    @property
+    def up_m(self) -> float: ...
+    @property
+    def zoom(self) -> float: ...
+
+
+def pinhole(correction: Correction, camera: CameraCalibration) -> Pinhole:
+    """The camera as ``corrected`` describes it, without a calibration in between: a fit tries thousands."""
+    return Pinhole(_intrinsics(correction, camera), camera.distortion, _mount(correction, camera))
+
+
+def corrected(correction: Correction, camera: CameraCalibration) -> CameraCalibration:
     """The calibration with the parameters' correction of its mount and focal length."""
-    K = camera.K
-    if params.zoom != 1.0:
-        K = K.copy()
-        K[:2, :2] *= params.zoom
-    return replace(camera, K=K, T_camera_ego=camera.T_camera_ego @ inverse(_correction(params, camera)))
+    return replace(camera, K=_intrinsics(correction, camera), T_camera_ego=_mount(correction, camera))
 
 
-def _correction(params: AlignmentParams, camera: CameraCalibration) -> F64:
-    """(4, 4) correction of the camera's rotation in its mount, in ego axes, about its position, followed by a shift of
-    the position."""
-    turn = rotation(*(np.radians(angle) for angle in (params.roll_deg, params.pitch_deg, params.yaw_deg)))
-    place = inverse(camera.T_camera_ego)[:3, 3]
-    correction = np.eye(4)
-    correction[:3, :3] = turn
-    correction[:3, 3] = place - turn @ place + [params.forward_m, params.left_m, params.up_m]
-    return correction
+def _intrinsics(correction: Correction, camera: CameraCalibration) -> F64:
+    """(3, 3) intrinsics with the corrected focal length, pixels."""
+    if correction.zoom == 1.0:
+        return camera.K
+    K = camera.K.copy()
+    K[:2, :2] *= correction.zoom
+    return K
+
+
+def _mount(correction: Correction, camera: CameraCalibration) -> F64:
+    """(4, 4) from the ego frame to the camera: its rotation in its mount is corrected, in ego axes, about its position,
+    and the position is then shifted."""
+    angles = np.radians((correction.roll_deg, correction.pitch_deg, correction.yaw_deg)).tolist()
+    turn, place = rotation(*angles), origin(camera.T_camera_ego)
+    change = np.eye(4)
+    change[:3, :3] = turn
+    change[:3, 3] = place - turn @ place + [correction.forward_m, correction.left_m, correction.up_m]
+    return np.asarray(camera.T_camera_ego @ inverse(change))
 
 
 def project_cuboids(alignment: Alignment, corners: F64, width: int, height: int) -> list[Box | None]:

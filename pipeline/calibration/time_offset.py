@@ -187,11 +187,13 @@ def _strengths(scene: MovingScene, lags_s: F64) -> F64:
         c, s = np.cos(turn), np.sin(turn)
         moved = np.column_stack([c * x - s * points[:, 1], s * x + c * points[:, 1], points[:, 2]])
         u, v = scene.aligned.project(moved).T
+        is_in_rows = (v >= 0) & (v < height)
+        u, row = u[is_in_rows], v[is_in_rows].astype(np.int64)
+        usual = scene.edges.usual[row]
         for n, yaw_deg in enumerate(YAWS_DEG):
             shifted = u + np.radians(yaw_deg) / per_px
-            seen = (shifted >= 0) & (shifted < width) & (v >= 0) & (v < height)
-            row = v[seen].astype(np.int64)
-            met = scene.edges.strength[row, shifted[seen].astype(np.int64)] - scene.edges.usual[row]
+            seen = (shifted >= 0) & (shifted < width)
+            met = scene.edges.strength[row[seen], shifted[seen].astype(np.int64)] - usual[seen]
             found[k, n] = float(met.sum(dtype=np.float64))
     return found
 

@@ -61,19 +61,25 @@ def transform(T: F64, points: npt.NDArray[np.floating]) -> F64:
 
 def inverse(T: F64) -> F64:
     """Inverse of a (4, 4) rigid transform, from its transpose."""
-    out = np.eye(4)
+    out = np.zeros((4, 4))
     out[:3, :3] = T[:3, :3].T
-    out[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    out[:3, 3] = origin(T)
+    out[3, 3] = 1.0
     return out
+
+
+def origin(T: F64) -> F64:
+    """(3,) the point that a (4, 4) rigid transform takes to the origin."""
+    return np.asarray(-T[:3, :3].T @ T[:3, 3])
 
 
 def rotation(roll_rad: float, pitch_rad: float, yaw_rad: float) -> F64:
     """(3, 3) rotation Rz(yaw) Ry(pitch) Rx(roll). Positive pitch turns x down, positive yaw turns x left."""
-    cr, sr, cp, sp, cy, sy = (f(a) for a in (roll_rad, pitch_rad, yaw_rad) for f in (np.cos, np.sin))
-    rx = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    ry = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    rz = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    return rz @ ry @ rx
+    angles = np.array([roll_rad, pitch_rad, yaw_rad], dtype=np.float64)
+    (cr, cp, cy), (sr, sp, sy) = np.cos(angles).tolist(), np.sin(angles).tolist()
+    yawed_and_pitched = np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0.0, cp]])
+    rolled = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
+    return yawed_and_pitched @ rolled
 
 
 def iou_matrix(a: npt.NDArray[np.floating], b: npt.NDArray[np.floating]) -> F64:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from pipeline.alignment.projection import Alignment, Angular, angular_from_calibration, resolve
+from pipeline.alignment.projection import Alignment, Angular, angular_from_calibration, pinhole, resolve
 from pipeline.params import AlignmentParams
 from pipeline.types import F64, CameraCalibration
 
@@ -37,6 +37,18 @@ ZOOM_REACH = 1.35
 ZOOMS = 2
 """Steps of the coarse search over a pinhole model's focal length, to either side."""
 _DEFAULTS = AlignmentParams().model_dump()
+
+
+class _Mount(NamedTuple):
+    """What a pinhole model corrects, without the checks of ``AlignmentParams``, which take longer than projecting."""
+
+    roll_deg: float = AlignmentParams().roll_deg
+    pitch_deg: float = AlignmentParams().pitch_deg
+    yaw_deg: float = AlignmentParams().yaw_deg
+    forward_m: float = AlignmentParams().forward_m
+    left_m: float = AlignmentParams().left_m
+    up_m: float = AlignmentParams().up_m
+    zoom: float = AlignmentParams().zoom
 
 
 @dataclass(frozen=True)
@@ -110,9 +122,10 @@ class FitModel:
         if self.name == "angular":  # as ``resolve``, but 15,000 times in a search
             h, v, cx, cy = self.values(vector).values()
             return Angular(float(np.radians(h)), float(np.radians(v)), cx, cy)
-        found = resolve(self.params(vector), camera or self.camera)
-        assert found is not None
-        return found
+        camera = camera or self.camera
+        assert camera is not None
+        zoom = {} if self.zoom is None else {"zoom": self.zoom}
+        return pinhole(_Mount(**{**self.place_m, **zoom, **self.values(vector)}), camera)
 
     def spread(self, vectors: F64) -> Mapping[str, float]:
         """Standard deviation of each parameter over (K, P) vectors."""

@@ -57,7 +57,7 @@ class PairTable:
             for i in range(boxes[k])
             for j in range(clusters[k])
         ]
-        box, cluster = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+        box, cluster = np.ascontiguousarray(np.array(pairs, dtype=np.int64).reshape(-1, 2).T)
         joined = {
             name: np.concatenate([getattr(each, name) for each in scenes])
             for name in ("boxes", "whole", "outline", "roof", "foot", "range_m")
@@ -86,11 +86,6 @@ class PairTable:
         return np.isfinite(self.roof[:, 0])
 
     @cached_property
-    def _edges(self) -> tuple[F64, np.ndarray]:
-        """(4, P) edges of each pair's box, and (P, 4) bool, whether they are whole."""
-        return self.boxes[self.box].T, self.whole[self.box]
-
-    @cached_property
     def _noise(self) -> F64:
         """(2, P) error of each pair's box across and down, pixels (1 σ)."""
         return np.asarray(np.hypot(BOX_NOISE * (self.boxes[:, 2:] - self.boxes[:, :2])[self.box].T, EDGE_PX))
@@ -99,13 +94,8 @@ class PairTable:
         """(C, 5) left, right, lowest and highest possible roof (−inf if there is no ring above), foot; pixels. NaN
         behind the camera."""
         uv = aligned.project(self._points).reshape(len(self.outline), -1, 2)
-        around, roof, foot = uv[:, :-4], uv[:, -4, 1], uv[:, -3:, 1]
         found = np.empty((len(uv), 5))
-        around[..., 0].min(axis=1, out=found[:, 0])
-        around[..., 0].max(axis=1, out=found[:, 1])
-        low = around[..., 1].min(axis=1, out=found[:, 2])
-        np.minimum(np.where(self._has_roof, roof, -np.inf), low, out=found[:, 3])
-        foot.max(axis=1, out=found[:, 4])
+        _extents(uv, self._has_roof, found)
         return found
 
     def deviations(self, widen: float, slack_px: float) -> tuple[F64, F64]:
@@ -117,16 +107,9 @@ class PairTable:
         """(P, 4) deviation of the left, top, right and bottom of each pair's cluster from its box, in standard
         deviations; 0 for an edge without information. widen, slack_px: increase the standard deviation, for a search
         that is still far off."""
-        left, right, low, high, foot = self.extents(aligned)[self.cluster].T
-        (x1, y1, x2, y2), whole = self._edges
         across, down = self.deviations(widen, slack_px)
         off = np.empty((len(self.box), 4))
-        off[:, 0] = (left - x1) / across
-        off[:, 1] = np.where(y1 > low, low - y1, np.where(y1 < high, high - y1, 0.0)) / down
-        off[:, 2] = (right - x2) / across
-        off[:, 3] = (foot - y2) / down
-        off[~whole] = 0.0
-        off[~np.isfinite(off)] = 1e3
+        _residuals(self.extents(aligned), self.boxes, self.whole, self.box, self.cluster, across, down, off)
         return off
 
     def matched(self, off: F64, gate: float) -> I64:
@@ -179,6 +162,44 @@ def angular_extents(table: PairTable) -> Callable[[Alignment], F64]:
         return pixels
 
     return extents
+
+
+@numba.njit(cache=True, nogil=True)
+def _extents(uv, has_roof, found):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Kernel of ``PairTable.extents``. uv: (C, K + 4, 2) pixels of outline, roof and feet."""
+    for c in range(len(uv)):
+        left, right, low, foot, is_seen = np.inf, -np.inf, np.inf, -np.inf, True
+        for k in range(uv.shape[1] - 4):
+            u, v = uv[c, k]
+            is_seen = is_seen and u == u and v == v
+            left, right, low = min(left, u), max(right, u), min(low, v)
+        is_seen_below = True
+        for k in range(uv.shape[1] - 3, uv.shape[1]):
+            v = uv[c, k, 1]
+            is_seen_below = is_seen_below and v == v
+            foot = max(foot, v)
+        high = -np.inf
+        if has_roof[c]:
+            roof = uv[c, -4, 1]
+            high = min(roof, low) if roof == roof else np.nan
+        found[c] = left, right, low, high if is_seen else np.nan, foot if is_seen_below else np.nan
+        if not is_seen:
+            found[c, :3] = np.nan
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _residuals(extents, boxes, whole, box, cluster, across, down, off):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Kernel of ``PairTable.residuals``."""
+    for p in range(len(box)):
+        left, right, low, high, foot = extents[cluster[p]]
+        x1, y1, x2, y2 = boxes[box[p]]
+        roof = low - y1 if y1 > low else high - y1 if y1 < high else 0.0
+        off[p] = (left - x1) / across[p], roof / down[p], (right - x2) / across[p], (foot - y2) / down[p]
+        for edge in range(4):
+            if not whole[box[p], edge]:
+                off[p, edge] = 0.0
+            elif not np.isfinite(off[p, edge]):
+                off[p, edge] = 1e3
 
 
 @numba.njit(cache=True, nogil=True)

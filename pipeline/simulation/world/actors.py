@@ -88,8 +88,9 @@ class Speeds(ScenarioPart):
 
     def speed_and_accel(self, t_s: float) -> tuple[float, float]:
         """m/s and m/s² at time t."""
-        slope = (_speed_mps(self.corners, t_s + _SLOPE_S) - _speed_mps(self.corners, t_s - _SLOPE_S)) / (2 * _SLOPE_S)
-        return _speed_mps(self.corners, t_s), slope
+        corners = self.corners
+        slope = (_speed_mps(corners, t_s + _SLOPE_S) - _speed_mps(corners, t_s - _SLOPE_S)) / (2 * _SLOPE_S)
+        return _speed_mps(corners, t_s), slope
 
 
 class LaneChange(ScenarioPart):

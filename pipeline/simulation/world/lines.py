@@ -30,37 +30,46 @@ class RoadLine:
             (along,), (sideways,), (turned,) = _arc(lengths[i : i + 1], self._curvature[i : i + 1])
             c, s = np.cos(heading), np.sin(heading)
             poses.append((x + along * c - sideways * s, y + along * s + sideways * c, heading + turned))
-        self._poses = np.array(poses)
+        self._x, self._y, self._heading = np.array(poses).T.copy()
+        self._c, self._s = np.cos(self._heading), np.sin(self._heading)
+        self.straight = not np.any(self._curvature)
+        """Whether it does not bend."""
         self._outer = np.concatenate([[-_LONG_M], self._starts[1:], [float(lengths.sum()) + _LONG_M]])
-
-    @property
-    def straight(self) -> bool:
-        return not np.any(self._curvature)
+        self._ways: tuple[float, F64] | None = None  # the last d, at which most drives stay, and its ways
 
     def to_world(self, s_m: npt.ArrayLike, d_m: npt.ArrayLike) -> F64:
         """(N, 3) x, y, heading of positions (s, d), each (N,) or a number."""
-        s, d = np.broadcast_arrays(np.atleast_1d(np.asarray(s_m, dtype=np.float64)), np.asarray(d_m, dtype=np.float64))
-        index = np.clip(np.searchsorted(self._starts, s, side="right") - 1, 0, len(self._starts) - 1)
-        x0, y0, heading0 = self._poses[index].T
-        along, sideways, turned = _arc(s - self._starts[index], self._curvature[index])
-        x = x0 + along * np.cos(heading0) - sideways * np.sin(heading0)
-        y = y0 + along * np.sin(heading0) + sideways * np.cos(heading0)
-        heading = heading0 + turned
-        return np.column_stack([x - d * np.sin(heading), y + d * np.cos(heading), heading])
+        s, d = np.asarray(s_m, dtype=np.float64), np.asarray(d_m, dtype=np.float64)
+        if s.ndim == 0:  # written out, as broadcasting takes as long as the rest
+            s = np.full(d.shape or (1,), s)
+        index = np.maximum(np.searchsorted(self._starts, s, side="right") - 1, 0)
+        length = s - self._starts[index]
+        along, sideways, turned = (length, 0.0, 0.0) if self.straight else _arc(length, self._curvature[index])
+        c0, s0 = self._c[index], self._s[index]
+        found = np.empty((len(s), 3))
+        found[:, 2] = heading = self._heading[index] + turned
+        found[:, 0] = self._x[index] + along * c0 - sideways * s0 - d * np.sin(heading)
+        found[:, 1] = self._y[index] + along * s0 + sideways * c0 + d * np.cos(heading)
+        return found
 
     def advance(self, s_m: float, way_m: float, d_m: float) -> float:
         """The s reached from ``s_m`` by driving ``way_m`` (negative: against the line) at constant d: in a bend the
         inner way is shorter."""
-        shares = 1.0 - self._curvature * d_m
-        ways = np.concatenate([[0.0], np.cumsum(np.diff(self._outer) * shares)])
+        ways = self._ways_at(d_m)
         return float(np.interp(np.interp(s_m, self._outer, ways) + way_m, ways, self._outer))
 
     def driven_m(self, from_m: float, to_m: float, d_m: float) -> float:
         """The way from one s to another at constant d, negative against the line: the inverse of ``advance``."""
-        shares = 1.0 - self._curvature * d_m
-        ways = np.concatenate([[0.0], np.cumsum(np.diff(self._outer) * shares)])
-        start, end = np.interp([from_m, to_m], self._outer, ways)
+        start, end = np.interp([from_m, to_m], self._outer, self._ways_at(d_m))
         return float(end - start)
+
+    def _ways_at(self, d_m: float) -> F64:
+        """(A + 1,) the ways at constant d from the beginning to the ends of the arcs."""
+        last = self._ways
+        if last is None or last[0] != d_m:
+            shares = 1.0 - self._curvature * d_m
+            last = self._ways = d_m, np.concatenate([[0.0], np.cumsum(np.diff(self._outer) * shares)])
+        return last[1]
 
 
 def _arc(length_m: F64, curvature_per_m: F64) -> tuple[F64, F64, F64]:

@@ -67,9 +67,19 @@ def test_record_names_a_file_in_a_folder_and_goes_on_in_another(tmp_path: Path) 
     assert sum(len(SessionSource("a", str(file))) for file in files) == 5
 
 
+LONG_SCENE = """
+title: a drive that outlasts the test
+duration_s: 600
+rate_hz: 10
+road: {segments: [{length_m: 100}]}
+ego: {lane: -1, speed_mps: {0: 0.01}}
+"""
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_record_closes_its_session_whoever_ends_it(number: signal.Signals, tmp_path: Path) -> None:
-    typed = ["record", "sim:straight", "--out", str(tmp_path / "a.mcap"), *LIDAR_ONLY]
+    (tmp_path / "long.yaml").write_text(LONG_SCENE)
+    typed = ["record", f"sim:{tmp_path}/long.yaml", "--out", str(tmp_path / "a.mcap"), *LIDAR_ONLY]
     command = [sys.executable, "-c", "from app.cli import main; main()", *typed]
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
@@ -80,7 +90,7 @@ def test_record_closes_its_session_whoever_ends_it(number: signal.Signals, tmp_p
     assert process.returncode == 0
     session = SessionSource("a", str(tmp_path / "a.mcap"))
     assert session.notes == ()
-    assert 0 < len(session) < len(open_source("sim:straight"))
+    assert 0 < len(session) < len(open_source(f"sim:{tmp_path}/long.yaml"))
     assert f"{len(session)} frames" in said
 
 

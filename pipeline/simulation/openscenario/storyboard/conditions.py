@@ -61,6 +61,8 @@ class _TimedCondition:
     def holds(self, stage: PlayedScenario) -> bool:
         """Whether it held with its edge, its delay ago."""
         now = self._test(stage)
+        if self._edge == "none" and not self._delay:  # most conditions
+            return now
         rose, fell = self._before is False and now, self._before is True and not now
         self._before = now
         edged = {"none": now, "rising": rose, "falling": fell, "risingOrFalling": rose or fell}[self._edge]

@@ -142,9 +142,7 @@ class PlayedScenario:
         """Distance between two entities along the ego vehicle's road (``longitudinal``), across it (``lateral``) or
         both (``euclidianDistance``): between their faces, or between their reference points."""
         if freespace:
-            first, second = (self._extent(self.mover(name, at)) for name in (one, other))
-            along = max(abs(first.s_m - second.s_m) - (first.along_m + second.along_m) / 2, 0.0)
-            across = max(abs(first.d_m - second.d_m) - (first.across_m + second.across_m) / 2, 0.0)
+            along, across = self._faces_apart_m(self.mover(one, at), self.mover(other, at))
         else:
             place, there = self.place_of(one, at), self.place_of(other, at)
             along, across = abs(place.s_m - there.s_m), abs(place.d_m - there.d_m)
@@ -157,6 +155,12 @@ class PlayedScenario:
         raise at.refusal(
             f"distance type {shown(kind)!r} is not supported; longitudinal, lateral, euclidianDistance are"
         )
+
+    def _faces_apart_m(self, one: Mover, other: Mover) -> tuple[float, float]:
+        """Distances between the faces of two entities along and across the road; 0 where they overlap."""
+        first, second = self._extent(one), self._extent(other)
+        along = max(abs(first.s_m - second.s_m) - (first.along_m + second.along_m) / 2, 0.0)
+        return along, max(abs(first.d_m - second.d_m) - (first.across_m + second.across_m) / 2, 0.0)
 
     def _extent(self, mover: Mover) -> _Extent:
         length, width, _ = mover.body.size_m
@@ -190,10 +194,10 @@ class PlayedScenario:
 
     def touch(self, one: str, other: str, at: XmlElement) -> bool:
         """Whether two entities overlap."""
-        movers = [self.mover(name, at) for name in (one, other)]
+        movers = self.mover(one, at), self.mover(other, at)
         if self.t_s < self._apart_until_s.get((one, other), 0.0):
             return False
-        gap_m = max(self.gap_m(one, other, kind, True, at) for kind in ("longitudinal", "lateral"))
+        gap_m = max(self._faces_apart_m(*movers))
         if gap_m > 0.0:
             self._apart_until_s[one, other] = self.t_s + gap_m / _FASTEST_MPS
             return False

@@ -49,6 +49,20 @@ def test_an_edge_of_the_image_says_nothing():
     assert found.residuals(ALIGNED)[0, 1:] == pytest.approx(cut.residuals(ALIGNED)[0, 1:], abs=3.0)
 
 
+def test_what_is_partly_behind_the_camera_is_far_from_every_box():
+    found = table(frames=1, cars=1, walls=0)
+    whole = replace(found, whole=np.full((1, 4), True))
+    corner = np.where(np.arange(found.outline.shape[1]) == 1, -1.0, 1.0)[None, :, None] * [1.0, 1.0, 1.0]
+    turned = replace(whole, outline=whole.outline * corner)
+    assert np.isnan(turned.extents(ALIGNED)[0]).tolist() == [True, True, True, True, False]
+    off = turned.residuals(ALIGNED)[0]
+    assert off[:3].tolist() == [1e3, 0.0, 1e3], "its roof says nothing"
+    assert off[3] == whole.residuals(ALIGNED)[0, 3]
+    foot = replace(whole, foot=-whole.foot)
+    assert np.isnan(foot.extents(ALIGNED)[0]).tolist() == [False, False, False, False, True]
+    assert foot.residuals(ALIGNED)[0, 3] == 1e3
+
+
 def test_the_coarse_score_is_highest_at_the_right_mount():
     model, turns = FitModel("pinhole", CAMERA, SIZE), np.array([[0.0, 0, 0], [2, 0, 0], [0, -2, 0], [-8, 5, 0]])
     scores = coarse_scores(table(), model, turns, 2.0, 5.0)
