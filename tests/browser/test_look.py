@@ -204,15 +204,23 @@ OPENED_BEFORE = """async () => {
 """Two other recordings, of which the server lists one with the name of its kind, then this one again."""
 
 
+BUSY_SERVER = """() => {
+  const asked = window.fetch, list = new Promise((done) => (window.answer = done));
+  window.fetch = (url, ...rest) =>
+    String(url).endsWith("api/sources") ? list.then((found) => Response.json(found)) : asked(url, ...rest);
+}"""
+"""Answers which recordings can be opened only when it is told what to answer."""
+
+
 def test_what_can_be_opened_is_listed_recordings_first_and_the_dialog_does_not_wait_for_the_list(open_page: OpenPage):
-    page, held = open_page(), []
+    page = open_page()
     page.evaluate(OPENED_BEFORE)
-    page.route("**/api/sources", lambda route: held.append(route))
+    page.evaluate(BUSY_SERVER)
     page.keyboard.press("f")
     expect(page.get_by_label("Recording URI")).to_be_focused()
     offers = [{"uri": "sim:straight", "title": "Simulation"}, {"uri": "kitti:/drive", "title": "drive"}]
     expect(page.locator("#source-dialog")).to_contain_text("Loading the list")
-    held[0].fulfill(json={"sources": offers, "open": None})
+    page.evaluate("found => window.answer(found)", {"sources": offers, "open": None})
     expect(page.locator(".open-list code")).to_have_text(["video:d.mp4", "kitti:/drive", "sim:straight"])
     expect(page.locator(".open-list button[aria-current=true]")).to_have_text("Simulationsim:straight")
 
