@@ -2,8 +2,9 @@
 
 A phantom is a lead or braking where the car could not meet any vehicle. Vehicles in the driven path, vehicles so near
 to its edge that either answer is right, and vehicles that enter it within three seconds are no phantoms. A vehicle is
-recognised by its place, or else by its box in the image: then the lead is not invented but misplaced, a failure of its
-own. Braking for it counts as phantom braking, because the place is what the car brakes for.
+recognised by its place, or else by its box in the image, even if the place is that of another vehicle: then the lead is
+not invented but misplaced, a failure of its own. Braking for it counts as phantom braking, because the place is what the
+car brakes for.
 """
 
 from __future__ import annotations
@@ -138,7 +139,7 @@ class Judge:
         if any(_in_path(state, path) for state in met) or self._comes_in(now, met):
             return
         text = f"#{chosen.id} at {chosen.distance_m:.1f} m"
-        boxed = None if met else vehicle_in_box(now, camera, chosen)
+        boxed = vehicle_in_box(now, camera, chosen)
         if boxed is not None and _in_path(boxed, path):
             self._fail("lead misplaced", how_misplaced(boxed, where), now.t_s, f"{text} is {named(boxed)}")
             return
@@ -162,7 +163,7 @@ class Judge:
             if not is_emergency or any(self._needs_braking(now, state) for state in due):
                 return
             cause = f"wrong speed of a true vehicle, by {seen_by(item)}"
-        elif not met and where is not None and (boxed := vehicle_in_box(now, camera, item)) is not None:
+        elif where is not None and (boxed := vehicle_in_box(now, camera, item)) is not None and boxed not in met:
             cause = f"{how_misplaced(boxed, where)}, by {seen_by(item)}"
         else:
             cause = f"{what(met)}, by {seen_by(item)}"
@@ -202,9 +203,7 @@ class Judge:
     def _is_it(self, now: World, camera: CameraCalibration | None, chosen: FusedObject, lead: ActorState) -> bool:
         """Whether the chosen object is this vehicle, even if misplaced."""
         where = place(chosen)
-        if where is None or same_place(where, lead):
-            return where is not None
-        return not vehicles_at(now, where) and vehicle_in_box(now, camera, chosen) is lead
+        return where is not None and (same_place(where, lead) or vehicle_in_box(now, camera, chosen) is lead)
 
     def _comes_in(self, now: World, met: Sequence[ActorState]) -> list[ActorState]:
         """The vehicles among ``met`` that will soon be in the path, or have just been."""

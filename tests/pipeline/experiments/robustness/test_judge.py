@@ -24,6 +24,7 @@ from pipeline.types import Box, CameraCalibration, FusedObject, Point2, Result
 FRAMES = 12
 """Longer than the time for which a lead may be missed."""
 Choice = Callable[[FusedObject, ActorState, Box], FusedObject | None]
+Parks = Callable[[Point2], Point2]
 
 
 @cache
@@ -45,8 +46,9 @@ def drive() -> tuple[Scenario, tuple[tuple[World, CameraCalibration, Result], ..
     raise AssertionError("no drive of these has a lead")
 
 
-def judged(choose: Choice) -> set[tuple[str, str]]:
-    """Kinds and causes of the failures, with the chosen object replaced in every frame after the first."""
+def judged(choose: Choice, parked: Parks | None = None) -> set[tuple[str, str]]:
+    """Kinds and causes of the failures, with the chosen object replaced in every frame after the first. parked: where
+    another vehicle of the drive is put, given the lead's nearest face."""
     scene, moments = drive()
     judge, way = Judge(scene, 1.0 / scene.rate_hz), ScriptedWay.of(scene)
     for now, camera, result in moments:
@@ -56,6 +58,8 @@ def judged(choose: Choice) -> set[tuple[str, str]]:
         chosen = result.chosen()
         assert lead is not None
         assert chosen is not None
+        if parked is not None:
+            now = with_another_at(now, lead, parked(near_face(lead)))
         box = next(each.bbox for each in in_image(now, camera) if each.actor is lead)
         other = choose(chosen, lead, box)
         assert result.cipv is not None
@@ -63,6 +67,14 @@ def judged(choose: Choice) -> set[tuple[str, str]]:
         objects = (other,) if other is not None else ()
         judge.take(now, camera, evolve(result, objects=objects, cipv=cipv, acc=None))
     return {(each.kind, each.cause) for each in judge.failures}
+
+
+def with_another_at(now: World, lead: ActorState, where: Point2) -> World:
+    """The world with another of its vehicles there, heading as the lead does."""
+    other = next(each for each in now.actors if each is not lead)
+    center = (*where, lead.cuboid.center[2])
+    moved = evolve(other, cuboid=other.cuboid._replace(center=center, yaw_rad=lead.cuboid.yaw_rad))
+    return replace(now, actors=tuple(moved if each is other else each for each in now.actors))
 
 
 def at(item: FusedObject, where: Point2, box: Box | None) -> FusedObject:
@@ -107,6 +119,17 @@ def test_what_counts_as_which_failure(case: str, choose: Choice, expected: set[t
 
     found = {(kind, cause.split(", true lead")[0]) for kind, cause in judged(after_the_first)}
     assert found == expected, case
+
+
+def test_a_misplaced_lead_is_no_phantom_where_another_vehicle_is_parked() -> None:
+    def beside(lead: Point2) -> Point2:
+        return lead[0] * 0.6, lead[1] * 0.6 + 3.0
+
+    found = judged(lambda item, lead, box: at(item, ahead_of(lead, 0.6), box), beside)
+    assert {kind for kind, _ in found} == {"lead misplaced"}
+
+    in_no_box = judged(lambda item, lead, box: at(item, ahead_of(lead, 0.6), None), beside)
+    assert {kind for kind, _ in in_no_box} == {"phantom lead", "lead late"}
 
 
 def test_nothing_is_judged_after_the_script_drove_into_a_vehicle() -> None:
