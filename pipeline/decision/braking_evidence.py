@@ -54,7 +54,13 @@ def _justified(item: FusedObject, params: ExistenceParams) -> Braking:
 
 def has_ranged_velocity(item: FusedObject) -> bool:
     """Whether the LiDAR knows its velocity. What it has only just found has that of its image boxes."""
-    return item.ranged and (not item.imaged or item.ranged_steady >= _RANGED_SIGHTINGS)
+    return item.ranged and (not item.imaged or is_ranged_steadily(item))
+
+
+def is_ranged_steadily(item: FusedObject) -> bool:
+    """Whether the LiDAR has seen it where it was expected for long enough that its velocity is no jump, as when another
+    side of it comes into view or the box leaves its cluster."""
+    return item.ranged_steady >= _RANGED_SIGHTINGS
 
 
 def has_known_height(item: FusedObject) -> bool:

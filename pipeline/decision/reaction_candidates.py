@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import inf
 
-from pipeline.decision.braking_evidence import has_ranged_velocity
+from pipeline.decision.braking_evidence import has_ranged_velocity, is_ranged_steadily
 from pipeline.decision.gates import ABREAST_M, OWN_HALF_WIDTH_M, is_solid
 from pipeline.decision.path_position import SIDEWAYS_SIGMA_MPS, believed_mps
 from pipeline.params import AebParams
@@ -47,7 +47,8 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: Ae
 
     If the path's uncertainty exceeds its width, no course counts as leading into it: in a bend, other traffic follows
     the road, as the car will. Oncoming traffic, which keeps to its lane, must be in ours with high certainty where the
-    two meet, also while it was seen for too short a time to be sure that it moves. Oncoming or crossing objects behind
+    two meet, also while it was seen for too short a time to be sure that it moves; where its lateral speed may be the jump
+    to another of its sides, it must be in ours already. Oncoming or crossing objects behind
     the lead cannot be reached. What crosses and is gone before the car arrives is not met; its front enters first.
 
     What is in the corridor must be seen there in this frame as well.
@@ -66,7 +67,10 @@ def enters_corridor(item: FusedObject, path: Path, lead: Cipv | None, params: Ae
         return False  # already beside the car: braking would not avoid it
     sideways = believed_mps(item.lateral_mps, item)
     if oncoming and params.react_where_met:
-        return abs(item.path_offset_m + sideways * item.ttc_s) + _SURE_SIGMAS * sigma_m <= path.half_width_m
+        met_m = abs(item.path_offset_m + sideways * item.ttc_s)
+        if not is_ranged_steadily(item):
+            met_m = max(met_m, abs(item.path_offset_m))
+        return met_m + _SURE_SIGMAS * sigma_m <= path.half_width_m
     if not oncoming and item.surely_moving is False:
         return params.react_to_crossing and item.label in _ON_FOOT and _steps_in(item, path)
     toward = max(-sideways if item.path_offset_m > 0 else sideways, 0.0)

@@ -156,6 +156,10 @@ LEAVES = fused(1, 29.0, 0.4, velocity=(-29.0, 2.5))
 """It is oncoming, and leaves our lane for its own, as at the end of a bend."""
 JUST_RANGED = dataclasses.replace(fused(1, 30.0, 0.9, velocity=(-35.0, 0.0)), ranged_steady=3)
 """It is oncoming at the edge of our lane, and not surely moving after three sweeps."""
+SEEN_FROM_ANOTHER_SIDE = dataclasses.replace(fused(1, 15.0, 2.0, velocity=(-29.0, -2.8)), ranged_steady=1)
+"""It is oncoming in its own lane. Its flank has come into view a sweep ago, so that it seems to move sideways."""
+COMES_OVER = dataclasses.replace(SEEN_FROM_ANOTHER_SIDE, ranged_steady=8)
+"""It is oncoming, and steers into our lane."""
 STANDS = fused(1, 30.0, 0.2, velocity=(-20.0, 0.0))
 
 
@@ -174,6 +178,8 @@ STANDS = fused(1, 30.0, 0.2, velocity=(-20.0, 0.0))
         pytest.param(LEAVES, 0.3, None, False, id="oncoming, still in our lane"),
         pytest.param(JUST_RANGED, 0.6, None, False, id="oncoming, just ranged, at the edge"),
         pytest.param(JUST_RANGED, 0.1, None, True, id="oncoming, just ranged, surely in our lane"),
+        pytest.param(SEEN_FROM_ANOTHER_SIDE, 0.1, None, False, id="oncoming, its flank comes into view"),
+        pytest.param(COMES_OVER, 0.1, None, True, id="oncoming, and steers into our lane"),
         pytest.param(STANDS, 2.5, None, True, id="stands in the way, wherever that leads"),
         pytest.param(STANDS, 0.3, 12.0, True, id="stands before the lead, which may swerve"),
     ],
@@ -186,4 +192,4 @@ def test_where_a_course_says_nothing(
     known = judged(item, 20.0)
     assert enters_corridor(known, path, lead, AebParams()) is enters
     also_before = enters_corridor(known, path, lead, AebParams(react_where_met=False))
-    assert also_before is (enters or item in (CROSSES_OVER, LEAVES))
+    assert also_before is (enters or item in (CROSSES_OVER, LEAVES, SEEN_FROM_ANOTHER_SIDE))
